@@ -1,0 +1,402 @@
+"""The nouns of the LLM4AD concept (seed Sec. II, Tab. I): I, C, S, H, F, R, P and what surrounds them.
+
+All are frozen values. The seed's letter stands in each docstring.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal, NewType
+
+PersonId = NewType("PersonId", str)
+"""Name a person's memory is kept under; only `memory` knows what file that means."""
+
+NOBODY = PersonId("")
+"""No profile: nothing is recalled and nothing is remembered."""
+
+
+@dataclass(frozen=True, slots=True)
+class Instruction:
+    """I: what the person wants, in their own words.
+
+    Attributes:
+        text: The words, stripped.
+        person: Whose words they are; `NOBODY` when unknown.
+        source: How they came in.
+    """
+
+    text: str
+    person: PersonId = NOBODY
+    source: Literal["text", "speech", "benchmark"] = "text"
+
+
+@dataclass(frozen=True, slots=True)
+class Lead:
+    """A vehicle ahead or behind, as seen along a lane.
+
+    Attributes:
+        vehicle: Its id in the snapshot.
+        distance_m: Centre to centre along the lane, always positive.
+        speed_mps: Its speed.
+    """
+
+    vehicle: int
+    distance_m: float
+    speed_mps: float
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """C as a typed object: what the situation descriptor put into words.
+
+    Attributes:
+        world: Kind of road: `highway` or `intersection` (other worlds add theirs).
+        speed_mps: Ego speed.
+        speed_limit_mps: Limit of the ego lane.
+        lane_count: Lanes in the ego's direction, the emergency lane included.
+        lane_index: Ego lane, 0 is leftmost.
+        emergency_lane: Whether the rightmost lane is an emergency lane.
+        front: Vehicle ahead in the ego lane within 100 m, if any.
+        stop_sign_m: Distance to the stop sign ahead, if any.
+        turns: Directions the next intersection allows; empty where there is none.
+        scene: Further facts a world may add (weather, road name), as text values.
+    """
+
+    world: str
+    speed_mps: float
+    speed_limit_mps: float
+    lane_count: int
+    lane_index: int
+    emergency_lane: bool
+    front: Lead | None
+    stop_sign_m: float | None
+    turns: tuple[Literal["left", "straight", "right"], ...] = ()
+    scene: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """C: the driving context, in words for the model and as values for the checks."""
+
+    text: str
+    situation: Situation
+
+
+@dataclass(frozen=True, slots=True)
+class SystemMessage:
+    """S: role, rules, driving-API documentation and examples given to the model."""
+
+    text: str
+    setting: Literal["zero-shot", "few-shot"] = "zero-shot"
+
+
+@dataclass(frozen=True, slots=True)
+class Thoughts:
+    """R: the model's reasoning, shown to the person."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """P as a language-model program: a generator function over the driving APIs (seed Sec. II-F).
+
+    Attributes:
+        source: Program text exactly as the planner gave it.
+    """
+
+    source: str
+    kind: Literal["program"] = "program"
+
+
+@dataclass(frozen=True, slots=True)
+class Parameters:
+    """P as controller parameters (Talk2Drive, seed Eq. 15).
+
+    Attributes:
+        target_speed_mps: Speed to drive.
+        look_ahead_m: Pure-pursuit look-ahead distance.
+        look_ahead_ratio: Look-ahead per speed, in seconds.
+        lane: Lane wish relative to the present one: -1 left, 0 stay, +1 right.
+    """
+
+    target_speed_mps: float
+    look_ahead_m: float
+    look_ahead_ratio: float
+    lane: Literal[-1, 0, 1] = 0
+    kind: Literal["parameters"] = "parameters"
+
+
+@dataclass(frozen=True, slots=True)
+class ActionMatrix:
+    """P as the on-board VLM's action matrix (seed Eq. 22): PID gains and MPC weights.
+
+    Attributes:
+        pid: (Kp, Ki, Kd).
+        mpc: (Wl, Wh, Ws): lateral error, heading error and steering-effort weights.
+    """
+
+    pid: tuple[float, float, float]
+    mpc: tuple[float, float, float]
+    kind: Literal["action_matrix"] = "action_matrix"
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """P as waypoints in the ego frame at a fixed period.
+
+    Attributes:
+        waypoints_m: ((x forward, y left), ...), metres.
+        period_s: Time between waypoints.
+    """
+
+    waypoints_m: tuple[tuple[float, float], ...]
+    period_s: float
+    kind: Literal["trajectory"] = "trajectory"
+
+
+Policy = Program | Parameters | ActionMatrix | Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """F: what the person said of the drive, and what it means.
+
+    Attributes:
+        text: Their words.
+        speed: -1 the drive was too fast, +1 too slow, 0 not about speed.
+        gap: -1 the gap was too small (too close), +1 too large, 0 not about the gap.
+        comfort: -1 too harsh, +1 too timid, 0 not about comfort.
+        approval: -1 disliked, 0 neutral or mixed, +1 liked as it was.
+        strength: 0..1: "a bit" is 0.35, plain 0.6, "much" 1.0; 0 when nothing should change.
+    """
+
+    text: str
+    speed: Literal[-1, 0, 1] = 0
+    gap: Literal[-1, 0, 1] = 0
+    comfort: Literal[-1, 0, 1] = 0
+    approval: Literal[-1, 0, 1] = 0
+    strength: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryItem:
+    """One remembered interaction: (I, C, R, P, F), when, and how it ended.
+
+    Attributes:
+        trip_id: The trip it came from.
+        when: ISO 8601 UTC time.
+        instruction: Words of the wish.
+        context: Words of the situation.
+        world: World kind.
+        intent: Tag of what was understood, e.g. `speed.increase` (planner's tag, may be empty).
+        thoughts: R.
+        policy: P as text.
+        settings: Numbers that P used, e.g. `target_speed_mps`, `time_headway_s`.
+        feedback: F, newest last.
+        outcome: One word of how the trip ended.
+        similarity: 0..1 against the present wish; set by recall.
+    """
+
+    trip_id: str
+    when: str
+    instruction: str
+    context: str
+    world: str
+    intent: str
+    thoughts: str
+    policy: str
+    settings: tuple[tuple[str, float], ...] = ()
+    feedback: tuple[Feedback, ...] = ()
+    outcome: str = ""
+    similarity: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """H: what memory holds that bears on the present wish, most relevant first."""
+
+    items: tuple[HistoryItem, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """An earlier attempt at the same wish and what was said of it (repair or human feedback)."""
+
+    plan_text: str
+    feedback: str
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Bounds no plan may cross. The road's own limits come from the snapshot; these come from person and operator.
+
+    Attributes:
+        name: Shown beside every result driven under these limits.
+        max_over_limit_mps: Tolerated excess over the lane's speed limit.
+        min_time_headway_s: Smallest desired time headway a plan may ask for.
+        max_time_headway_s: Largest.
+        max_speed_mps: The person's or operator's own cap, whatever the sign says; None for none.
+    """
+
+    name: str = "default"
+    max_over_limit_mps: float = 1.0
+    min_time_headway_s: float = 0.5
+    max_time_headway_s: float = 10.0
+    max_speed_mps: float | None = None
+
+
+LAMPILOT_LIMITS = Limits(name="lampilot", max_over_limit_mps=9.0, min_time_headway_s=0.01)
+"""What LaMPilot's own APIs accept. Its tasks ask for 38.3 m/s on a 31.3 m/s road and for gaps of 15 m at 30 m/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRequest:
+    """Everything a planner is given: I, C, S, H, the limits it is told of, and earlier rounds."""
+
+    instruction: Instruction
+    context: Context
+    system: SystemMessage
+    history: History = field(default_factory=History)
+    rounds: tuple[Round, ...] = ()
+    limits: Limits = field(default_factory=Limits)
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What a plan cost.
+
+    Attributes:
+        prompt_tokens: Tokens in, 0 for planners without a token model.
+        completion_tokens: Tokens out.
+        cost_usd: Price where the price list is known, else None.
+        requests: Calls made, retries included.
+        cached: Whether the answer came from the response cache.
+    """
+
+    prompt_tokens: int = 0
+    completion_tokens: int = 0
+    cost_usd: float | None = None
+    requests: int = 0
+    cached: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """(R, P) and how they came about.
+
+    Attributes:
+        thoughts: R.
+        policy: P; None when the planner declined (see `refusal`) or gave nothing usable.
+        refusal: Why there is no policy, in words for the person: not understood, impossible, off topic.
+        intent: Short tag of what was understood, e.g. `overtake.left`; empty when the planner has none.
+        settings: Numbers the policy relies on, e.g. (("target_speed_mps", 28.0),).
+        planner: Planner id, e.g. `onboard`.
+        model: Model id and version within the planner.
+        usage: Cost.
+        latency_s: Wish in, plan out.
+        raw: The reply as it came, for the record.
+    """
+
+    thoughts: Thoughts
+    policy: Policy | None
+    refusal: str = ""
+    intent: str = ""
+    settings: tuple[tuple[str, float], ...] = ()
+    planner: str = ""
+    model: str = ""
+    usage: Usage = field(default_factory=Usage)
+    latency_s: float = 0.0
+    raw: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What one check thinks of a plan.
+
+    Attributes:
+        check: Versioned id of the check, e.g. `format-v1`.
+        passed: Whether the plan may go on.
+        reason: In words, for the person and for the model's repair turn.
+        line: Program line it refers to, if any.
+        remedy: What would make it pass.
+    """
+
+    check: str
+    passed: bool
+    reason: str
+    line: int | None = None
+    remedy: str = ""
+
+
+Outcome = Literal["success", "failure", "collision", "off_road", "timeout", "ended", "refused", "not_driven"]
+"""What happened. Why it happened is in `Causes`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Causes:
+    """Why a trip went as it did, apart from its outcome; each flag is counted over all planned trips.
+
+    Attributes:
+        policy_failed: The program was rejected by the gate or died while running.
+        infra_failed: Endpoint, sandbox or machine failed; says nothing about the policy.
+        refused: Planner or checks declined the wish.
+        fallback_used: The autopilot drove on without the program at some point before the end.
+        detail: In words.
+    """
+
+    policy_failed: bool = False
+    infra_failed: bool = False
+    refused: bool = False
+    fallback_used: bool = False
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A number that may not apply: not applicable is not zero.
+
+    Attributes:
+        id: Versioned id, e.g. `lampilot-ttc-v1`.
+        value: The value; meaningless when not `applies`.
+        unit: SI unit or `points`.
+        applies: Whether the metric makes sense for this trip.
+    """
+
+    id: str
+    value: float
+    unit: str
+    applies: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Trip:
+    """What happened: from the words to the last metre.
+
+    Attributes:
+        id: Content hash of everything that decided the trip.
+        instruction, context, history, plan, verdicts: The loop's values.
+        outcome: What happened.
+        causes: Why.
+        metrics: Scores, each with its versioned id.
+        duration_s: Simulated time driven.
+        scenario: Id of the scenario.
+        seed: Its seed.
+        said: What the program told the passenger, as (time s, text).
+        record: Provenance: versions, hashes, planner and model ids.
+    """
+
+    id: str
+    instruction: Instruction
+    context: Context
+    history: History
+    plan: Plan
+    verdicts: tuple[Verdict, ...]
+    outcome: Outcome
+    causes: Causes
+    metrics: tuple[Metric, ...]
+    duration_s: float
+    scenario: str
+    seed: int
+    said: tuple[tuple[float, str], ...] = ()
+    record: tuple[tuple[str, Any], ...] = ()

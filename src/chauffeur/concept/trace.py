@@ -1,0 +1,51 @@
+"""What one control period of a trip leaves behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from chauffeur.concept.scene import Command, Snapshot, Wishes
+
+ProgramState = Literal["none", "running", "finished", "failed"]
+"""`none`: no program drives (a baseline, or it was refused); `finished`: it ended and the driver holds its wishes."""
+
+
+@dataclass(frozen=True, slots=True)
+class ApiCall:
+    """One driving-API call of a program.
+
+    Attributes:
+        name: API name.
+        args: Arguments as text.
+        result: Result as text.
+    """
+
+    name: str
+    args: str
+    result: str
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One control period: what was seen, wished, asked of the actuator and really applied.
+
+    Attributes:
+        snapshot: The instant before the command.
+        wishes: What the policy wanted.
+        requested: What the driver asked for.
+        applied: What the world really did, after clipping.
+        program: State of the program.
+        line: Program line it waits at (1-based), if it runs.
+        said: Texts told to the passenger in this period.
+        calls: Driving-API calls made in this period.
+    """
+
+    snapshot: Snapshot
+    wishes: Wishes
+    requested: Command
+    applied: Command
+    program: ProgramState = "none"
+    line: int | None = None
+    said: tuple[str, ...] = ()
+    calls: tuple[ApiCall, ...] = ()

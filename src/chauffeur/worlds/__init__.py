@@ -1,0 +1,1 @@
+"""Places to drive in. Each world knows its simulator and nothing of language."""

@@ -1,0 +1,107 @@
+"""What a world must offer. A world knows its own simulator and nothing of language.
+
+`World` is stepped with physical commands and shows frozen snapshots. `Perception` answers the questions that driving
+APIs ask, at the present instant, by vehicle id and lane id. `Driver` turns wishes into a command; it is the world's
+own low-level driver (IDM and lane keeping on LaMPilot's roads, a town driver elsewhere).
+"""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+from chauffeur.concept import Command, LaneId, Scenario, Snapshot, VehicleState, Wishes
+
+EGO = 0
+"""Id of the ego in every snapshot and perception."""
+
+
+@runtime_checkable
+class Perception(Protocol):
+    """Read-only questions about the present instant. Distances in m, speeds in m/s, ids as in the snapshot."""
+
+    def vehicle(self, vehicle_id: int) -> VehicleState:
+        """State of a vehicle. Raises KeyError for an id that is not (or no longer) on the road."""
+        ...
+
+    def has_lane(self, lane: LaneId) -> bool:
+        """Whether the road has this lane."""
+        ...
+
+    def lane_of(self, vehicle_id: int) -> LaneId:
+        """Closest lane of a vehicle."""
+        ...
+
+    def adjacent_lane(self, lane: LaneId, offset: int) -> LaneId | None:
+        """Lane `offset` places to the right (negative: left) on the same road segment; None beyond the edge."""
+        ...
+
+    def speed_limit(self, lane: LaneId) -> float:
+        """Speed limit of a lane."""
+        ...
+
+    def neighbours(self, lane: LaneId) -> tuple[int | None, int | None]:
+        """Nearest vehicle or obstacle ahead of and behind the ego in a lane, as (front, rear)."""
+        ...
+
+    def distance_along(self, from_id: int, to_id: int) -> float:
+        """Centre-to-centre distance from one vehicle to another along the first one's lane; negative if behind."""
+        ...
+
+    def cross_traffic_lanes(self, from_left: bool) -> tuple[LaneId, ...]:
+        """Lanes of the traffic crossing from the left (or right) at the next intersection; empty where none."""
+        ...
+
+    def stop_sign_ahead(self, served: frozenset[int]) -> tuple[int, float] | None:
+        """(id, distance) of the nearest stop sign ahead in the ego lane that is not in `served`."""
+        ...
+
+    def front_blocker(self, served: frozenset[int]) -> int | None:
+        """Nearest vehicle, or stop sign not in `served`, ahead on the ego's own lane."""
+        ...
+
+    def idm_entering(self, follower_id: int, leader_id: int, time_headway_s: float) -> float:
+        """IDM acceleration of `follower` if `leader` drove right ahead of it and it wished its present speed."""
+        ...
+
+
+@runtime_checkable
+class Driver(Protocol):
+    """A world's low-level driver: holds nothing but what its own control law needs."""
+
+    def command(self, wishes: Wishes) -> Command:
+        """Command for the present instant of the world."""
+        ...
+
+    def settle(self, wishes: Wishes) -> Wishes:
+        """Wishes with the lane moved on where the present lane ends (route following), defaults filled in."""
+        ...
+
+
+@runtime_checkable
+class World(Protocol):
+    """A simulated or real place to drive in."""
+
+    @property
+    def dt_s(self) -> float:
+        """Control period."""
+        ...
+
+    def reset(self, scenario: Scenario, seed: int | None = None) -> Snapshot:
+        """Set up a scenario; `seed` overrides the scenario's own. Raises ScenarioError if it cannot be set up."""
+        ...
+
+    def step(self, command: Command) -> Command:
+        """Advance one control period; returns the command really applied. Only the control loop of `drive` calls it."""
+        ...
+
+    def snapshot(self) -> Snapshot:
+        """The present instant."""
+        ...
+
+    def perception(self) -> Perception:
+        """Questions about the present instant."""
+        ...
+
+    def driver(self) -> Driver:
+        """A fresh low-level driver for the present trip."""
+        ...
