@@ -1,0 +1,1 @@
+"""LaMPilot-Bench: instruction following on highway and intersection (seed Sec. IV-A)."""

@@ -1,0 +1,66 @@
+"""LaMPilot's MOBIL baseline: lane choice without any instruction (seed Tab. IV, rows IDM and MOBIL).
+
+The IDM baseline needs no code: it is the driver with its initial wishes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from chauffeur.concept import LaneId, Wishes
+from chauffeur.control import LAMPILOT_EGO, LaneChangeOutlook, MobilParameters, idm_acceleration, should_change
+from chauffeur.worlds.base import EGO
+from chauffeur.worlds.highway.perception import HighwayPerception, approach_rate
+from chauffeur.worlds.highway.traffic import IDMVehicle
+
+
+class MobilBaseline:
+    """Chooses the target lane by MOBIL each period.
+
+    As in LaMPilot, a target lane without a vehicle ahead is judged by the vehicle ahead in the present lane, forbidden
+    lanes count as lanes, and there is no delay between changes.
+    """
+
+    def __init__(self, perception: HighwayPerception, parameters: MobilParameters | None = None) -> None:
+        self._perception = perception
+        self._parameters = parameters or MobilParameters()
+
+    def choose(self, wishes: Wishes) -> Wishes:
+        """Settled wishes with the lane MOBIL prefers."""
+        here = self._perception.lane_of(EGO)
+        for offset in (-1, 1):
+            lane = self._perception.adjacent_lane(here, offset)
+            if lane is not None and should_change(self._outlook(lane, wishes), self._parameters):
+                wishes = replace(wishes, target_lane=lane)
+        return wishes
+
+    def _outlook(self, lane: LaneId, wishes: Wishes) -> LaneChangeOutlook:
+        new_front, new_rear = self._perception.neighbours(lane)
+        old_front, _ = self._perception.neighbours(self._perception.lane_of(EGO))
+        follower_now = follower_after = None
+        if new_rear is not None:
+            follower = self._perception.entity(new_rear)
+            if isinstance(follower, IDMVehicle):
+                front = None if new_front is None else self._perception.entity(new_front)
+                follower_now = float(follower.acceleration(ego_vehicle=follower, front_vehicle=front))
+                follower_after = float(follower.acceleration(ego_vehicle=follower, front_vehicle=self._perception.ego))
+        return LaneChangeOutlook(
+            own_now=self._own(old_front, wishes),
+            own_after=self._own(new_front, wishes),
+            follower_now=follower_now,
+            follower_after=follower_after,
+        )
+
+    def _own(self, front: int | None, wishes: Wishes) -> float:
+        ego = self._perception.ego
+        assert wishes.target_speed_mps is not None
+        blocker = self._perception.front_blocker(wishes.served_stops) if front is None else front
+        if blocker is None:
+            return idm_acceleration(float(ego.speed), wishes.target_speed_mps, LAMPILOT_EGO)
+        return idm_acceleration(
+            float(ego.speed),
+            wishes.target_speed_mps,
+            LAMPILOT_EGO,
+            self._perception.distance_along(EGO, blocker),
+            approach_rate(ego, self._perception.entity(blocker)),
+        )

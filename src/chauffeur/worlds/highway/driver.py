@@ -1,0 +1,102 @@
+"""The low-level driver of LaMPilot's roads: IDM along the lane, lane keeping across it, route following at its end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from chauffeur.concept import Command, LaneId, Turn, Wishes
+from chauffeur.control import (
+    LAMPILOT_EGO,
+    LAMPILOT_STEERING,
+    full_scale,
+    idm_acceleration,
+    lane_keeping_steering,
+)
+from chauffeur.worlds.base import EGO
+from chauffeur.worlds.highway.perception import HighwayPerception, approach_rate, lane_id
+from chauffeur.worlds.highway.roads import Scene
+from chauffeur.worlds.highway.traffic import StopSign
+
+_DESTINATIONS: dict[Turn, str] = {"left": "o1", "straight": "o2", "right": "o3"}
+
+
+class HighwayDriver:
+    """LaMPilot's autopilot. Its only state is the route, planned when a turn is first wished."""
+
+    def __init__(self, scene: Scene, perception: HighwayPerception) -> None:
+        self._scene = scene
+        self._perception = perception
+        self._turn: Turn | None = None
+        self._route: list[LaneId] = []
+
+    def initial_wishes(self) -> Wishes:
+        """Keep the present speed and lane."""
+        ego = self._scene.ego
+        return Wishes(target_speed_mps=float(ego.speed), target_lane=lane_id(ego.lane_index))
+
+    def settle(self, wishes: Wishes) -> Wishes:
+        """Wishes with defaults filled in and the lane moved on to the next one where it ends."""
+        start = self.initial_wishes()
+        speed = start.target_speed_mps if wishes.target_speed_mps is None else wishes.target_speed_mps
+        lane = wishes.target_lane or start.target_lane
+        assert lane is not None
+        if wishes.turn is not None and wishes.turn != self._turn:
+            self._plan_route(wishes.turn)
+        ego, network = self._scene.ego, self._scene.road.network
+        if network.get_lane(lane).after_end(ego.position):
+            lane = lane_id(network.next_lane(lane, route=self._route, position=ego.position))
+        if speed == wishes.target_speed_mps and lane == wishes.target_lane:
+            return wishes
+        return replace(wishes, target_speed_mps=speed, target_lane=lane)
+
+    def command(self, wishes: Wishes) -> Command:
+        """Acceleration and steering for settled wishes, after LaMPilot's full-scale mapping (control/actuation.py)."""
+        actuation = self._scene.actuation
+        acceleration, steering = self.controls(wishes)
+        return Command(
+            acceleration_mps2=full_scale(acceleration, actuation.max_acceleration_mps2),
+            steering_rad=full_scale(steering, actuation.max_steering_rad),
+        )
+
+    def controls(self, wishes: Wishes) -> tuple[float, float]:
+        """IDM acceleration, m/s2, and lane-keeping steering angle, rad, before the full-scale mapping."""
+        assert wishes.target_speed_mps is not None
+        assert wishes.target_lane is not None
+        return self._longitudinal(wishes, wishes.target_speed_mps), self._lateral(wishes.target_lane)
+
+    def _longitudinal(self, wishes: Wishes, target_speed_mps: float) -> float:
+        ego = self._scene.ego
+        parameters = replace(LAMPILOT_EGO, time_headway_s=wishes.time_headway_s)
+        blocker = self._perception.front_blocker(wishes.served_stops)
+        if blocker is None:
+            return idm_acceleration(float(ego.speed), target_speed_mps, parameters)
+        entity: Any = self._perception.entity(blocker)
+        # A sign has no length: LaMPilot lets the car stop half the jam distance closer to it.
+        shorten = parameters.jam_distance_m / 2 if isinstance(entity, StopSign) else 0.0
+        return idm_acceleration(
+            float(ego.speed),
+            target_speed_mps,
+            parameters,
+            self._perception.distance_along(EGO, blocker),
+            approach_rate(ego, entity),
+            shorten,
+        )
+
+    def _lateral(self, lane: LaneId) -> float:
+        ego = self._scene.ego
+        geometry = self._scene.road.network.get_lane(lane)
+        s, offset = geometry.local_coordinates(ego.position)
+        heading_ahead = geometry.heading_at(s + ego.speed * LAMPILOT_STEERING.preview_s)
+        return lane_keeping_steering(
+            float(ego.speed), float(ego.heading), float(offset), float(heading_ahead), LAMPILOT_STEERING
+        )
+
+    def _plan_route(self, turn: Turn) -> None:
+        self._turn = turn
+        here = lane_id(self._scene.ego.lane_index)
+        try:
+            path = self._scene.road.network.shortest_path(here[1], _DESTINATIONS[turn])
+        except KeyError:  # a road without that exit
+            path = []
+        self._route = [here, *((a, b, 0) for a, b in zip(path, path[1:], strict=False))]

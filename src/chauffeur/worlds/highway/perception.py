@@ -1,0 +1,158 @@
+"""Answers to the driving APIs' questions on LaMPilot's roads, with LaMPilot's meaning of each."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from chauffeur.concept import LaneId, VehicleState
+from chauffeur.control import LAMPILOT_EGO, IdmParameters, idm_acceleration
+from chauffeur.worlds.base import EGO
+from chauffeur.worlds.highway.roads import Scene
+from chauffeur.worlds.highway.traffic import StopSign, Vehicle
+
+
+def lane_id(index: tuple[Any, Any, Any]) -> LaneId:
+    """A lane index with plain Python types; highway-env mixes in NumPy strings and integers."""
+    return str(index[0]), str(index[1]), int(index[2])
+
+
+def approach_rate(follower: Any, leader: Any) -> float:
+    """Follower's speed minus leader's along the follower's heading, m/s."""
+    return float(np.dot(follower.velocity - leader.velocity, follower.direction))
+
+
+class HighwayPerception:
+    """Perception of the present instant of a scene; stays valid as the scene is stepped."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._road = scene.road
+        self._network = scene.road.network
+        others = [v for v in scene.road.vehicles if v is not scene.ego]
+        entities = [scene.ego, *others, *scene.road.objects]
+        self._by_id: dict[int, Any] = dict(enumerate(entities))
+        self._ids: dict[int, int] = {id(entity): i for i, entity in self._by_id.items()}
+
+    @property
+    def ego(self) -> Any:
+        """highway-env's ego vehicle."""
+        return self._scene.ego
+
+    def entity(self, vehicle_id: int) -> Any:
+        """highway-env's vehicle or object. Raises KeyError for an unknown id."""
+        return self._by_id[vehicle_id]
+
+    def id_of(self, entity: Any) -> int:
+        """Id of one of highway-env's vehicles or objects."""
+        return self._ids[id(entity)]
+
+    def vehicle(self, vehicle_id: int) -> VehicleState:
+        """State of a vehicle or object. Raises KeyError for an unknown id."""
+        return vehicle_state(vehicle_id, self._by_id[vehicle_id])
+
+    def has_lane(self, lane: LaneId) -> bool:
+        """Whether the road has this lane."""
+        lanes = self._network.graph.get(lane[0], {}).get(lane[1], ())
+        return 0 <= lane[2] < len(lanes)
+
+    def lane_of(self, vehicle_id: int) -> LaneId:
+        """Closest lane of a vehicle."""
+        return lane_id(self._by_id[vehicle_id].lane_index)
+
+    def adjacent_lane(self, lane: LaneId, offset: int) -> LaneId | None:
+        """Lane `offset` places to the right (negative: left); None beyond the edge."""
+        index = lane[2] + offset
+        if offset == 0 or not 0 <= index < len(self._network.graph[lane[0]][lane[1]]):
+            return None
+        return lane[0], lane[1], index
+
+    def speed_limit(self, lane: LaneId) -> float:
+        """Speed limit, m/s."""
+        return float(self._network.get_lane(lane).speed_limit)
+
+    def neighbours(self, lane: LaneId) -> tuple[int | None, int | None]:
+        """Nearest vehicle or obstacle ahead of and behind the ego on a lane segment."""
+        front, rear = self._road.neighbour_vehicles(self.ego, lane)
+        return (
+            None if front is None else self.id_of(front),
+            None if rear is None else self.id_of(rear),
+        )
+
+    def distance_along(self, from_id: int, to_id: int) -> float:
+        """Signed centre-to-centre distance, m, along the first one's lane."""
+        origin, target = self._by_id[from_id], self._by_id[to_id]
+        return float(origin.lane_distance_to(target))
+
+    def cross_traffic_lanes(self, from_left: bool) -> tuple[LaneId, ...]:
+        """Lanes of the crossing traffic, in LaMPilot's order."""
+        if self._scene.kind != "intersection":
+            return ()
+        if from_left:
+            return ("o1", "ir1", 0), ("ir1", "il3", 0), ("il3", "o3", 0)
+        return ("il1", "o1", 0), ("ir3", "il1", 0), ("o3", "ir3", 0)
+
+    def stop_sign_ahead(self, served: frozenset[int]) -> tuple[int, float] | None:
+        """(id, distance) of the nearest unserved stop sign ahead on the ego's lane."""
+        sign = self._nearest_ahead(served, vehicles=False)
+        return None if sign is None else (sign, self.distance_along(EGO, sign))
+
+    def front_blocker(self, served: frozenset[int]) -> int | None:
+        """Nearest vehicle or unserved stop sign ahead on the ego's lane."""
+        return self._nearest_ahead(served, vehicles=True)
+
+    def _nearest_ahead(self, served: frozenset[int], *, vehicles: bool) -> int | None:
+        """Objects come before vehicles and a later equal wins: LaMPilot's order."""
+        ego = self.ego
+        lane = self._network.get_lane(ego.lane_index)
+        s = lane.local_coordinates(ego.position)[0]
+        nearest: float | None = None
+        found: Any = None
+        candidates: list[Any] = [
+            o for o in self._road.objects if isinstance(o, StopSign) and self.id_of(o) not in served
+        ]
+        if vehicles:
+            candidates += [v for v in self._road.vehicles if v is not ego and isinstance(v, Vehicle)]
+        for candidate in candidates:
+            s_other, lateral = lane.local_coordinates(candidate.position)
+            if s_other < s or (nearest is not None and s_other > nearest):
+                continue
+            if lane.on_lane(candidate.position, s_other, lateral):
+                nearest, found = s_other, candidate
+        return None if found is None else self.id_of(found)
+
+    def idm_entering(self, follower_id: int, leader_id: int, time_headway_s: float) -> float:
+        """IDM acceleration, m/s2, of `follower` at its present speed if `leader` drove right ahead of it."""
+        follower, leader = self._by_id[follower_id], self._by_id[leader_id]
+        parameters = IdmParameters(
+            acceleration_mps2=LAMPILOT_EGO.acceleration_mps2,
+            deceleration_mps2=LAMPILOT_EGO.deceleration_mps2,
+            exponent=LAMPILOT_EGO.exponent,
+            jam_distance_m=LAMPILOT_EGO.jam_distance_m,
+            time_headway_s=time_headway_s,
+        )
+        return idm_acceleration(
+            float(follower.speed),
+            float(follower.speed),
+            parameters,
+            float(follower.lane_distance_to(leader)),
+            approach_rate(follower, leader),
+        )
+
+
+def vehicle_state(vehicle_id: int, entity: Any) -> VehicleState:
+    """Frozen state of one of highway-env's vehicles or objects."""
+    kind = "car" if isinstance(entity, Vehicle) else "stop_sign" if isinstance(entity, StopSign) else "obstacle"
+    return VehicleState(
+        id=vehicle_id,
+        kind=kind,
+        x_m=float(entity.position[0]),
+        y_m=float(entity.position[1]),
+        heading_rad=float(entity.heading),
+        speed_mps=float(entity.speed),
+        length_m=float(entity.LENGTH),
+        width_m=float(entity.WIDTH),
+        lane=None if entity.lane_index is None else lane_id(entity.lane_index),
+        crashed=bool(entity.crashed),
+    )
