@@ -72,6 +72,10 @@ class Driver(Protocol):
         """Command for the present instant of the world."""
         ...
 
+    def initial_wishes(self) -> Wishes:
+        """Keep the present speed and lane: what drives when nobody wishes anything."""
+        ...
+
     def settle(self, wishes: Wishes) -> Wishes:
         """Wishes with the lane moved on where the present lane ends (route following), defaults filled in."""
         ...
@@ -96,6 +100,11 @@ class World(Protocol):
 
     def snapshot(self) -> Snapshot:
         """The present instant."""
+        ...
+
+    @property
+    def ended(self) -> bool:
+        """Whether the world will not step further: crash, off the road, end of road or of time."""
         ...
 
     def perception(self) -> Perception:

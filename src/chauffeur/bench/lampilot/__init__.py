@@ -1,1 +1,6 @@
 """LaMPilot-Bench: instruction following on highway and intersection (seed Sec. IV-A)."""
+
+from chauffeur.bench.lampilot.referee import LampilotReferee
+from chauffeur.bench.lampilot.runner import LampilotBenchmark, LampilotRun, RunConfig
+
+__all__ = ["LampilotBenchmark", "LampilotReferee", "LampilotRun", "RunConfig"]

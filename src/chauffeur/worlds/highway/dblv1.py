@@ -68,7 +68,9 @@ def load_dataset(folder: Path) -> Dataset:
             f"No such data folder: {folder}.", hint="Give the folder that holds DbLv1's task files, e.g. --data DbLv1."
         )
     index = folder / "config_list.txt"
-    names = index.read_text(encoding="utf-8").split() if index.is_file() else sorted(p.name for p in folder.glob("*.json"))
+    names = (
+        index.read_text(encoding="utf-8").split() if index.is_file() else sorted(p.name for p in folder.glob("*.json"))
+    )
     if not names:
         raise DataError(f"{folder} holds no task files (*.json).", hint="Is this the right folder?")
     digest = hashlib.sha256()

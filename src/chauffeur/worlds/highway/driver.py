@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 from chauffeur.concept import Command, LaneId, Turn, Wishes
@@ -99,4 +100,4 @@ class HighwayDriver:
             path = self._scene.road.network.shortest_path(here[1], _DESTINATIONS[turn])
         except KeyError:  # a road without that exit
             path = []
-        self._route = [here, *((a, b, 0) for a, b in zip(path, path[1:], strict=False))]
+        self._route = [here, *((a, b, 0) for a, b in pairwise(path))]

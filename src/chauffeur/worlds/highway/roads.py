@@ -260,7 +260,6 @@ def _intersection(config: RoadConfig, rng: np.random.Generator) -> Scene:
         angle = np.radians(90 * corner)
         priority = 3 if corner % 2 else 1
         rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        limit = {"speed_limit": 10}
         into, left, ahead, right = (
             f"ir{corner}",
             f"il{(corner + 1) % 4}",
@@ -270,7 +269,7 @@ def _intersection(config: RoadConfig, rng: np.random.Generator) -> Scene:
         start = rotation @ np.array([LANE_WIDTH_M / 2, access + outer])
         end = rotation @ np.array([LANE_WIDTH_M / 2, outer])
         network.add_lane(
-            f"o{corner}", into, StraightLane(start, end, line_types=(striped, continuous), priority=priority, **limit)
+            f"o{corner}", into, StraightLane(start, end, line_types=(striped, continuous), priority=priority, speed_limit=10)
         )
         network.add_lane(
             into,
@@ -282,7 +281,7 @@ def _intersection(config: RoadConfig, rng: np.random.Generator) -> Scene:
                 angle + np.radians(270),
                 line_types=[none, continuous],
                 priority=priority,
-                **limit,
+                speed_limit=10,
             ),
         )
         network.add_lane(
@@ -296,18 +295,18 @@ def _intersection(config: RoadConfig, rng: np.random.Generator) -> Scene:
                 clockwise=False,
                 line_types=[none, none],
                 priority=priority - 1,
-                **limit,
+                speed_limit=10,
             ),
         )
         start = rotation @ np.array([LANE_WIDTH_M / 2, outer])
         end = rotation @ np.array([LANE_WIDTH_M / 2, -outer])
-        network.add_lane(into, ahead, StraightLane(start, end, line_types=(none, none), priority=priority, **limit))
+        network.add_lane(into, ahead, StraightLane(start, end, line_types=(none, none), priority=priority, speed_limit=10))
         start = rotation @ np.flip([LANE_WIDTH_M / 2, access + outer], axis=0)
         end = rotation @ np.flip([LANE_WIDTH_M / 2, outer], axis=0)
         network.add_lane(
             right,
             f"o{(corner - 1) % 4}",
-            StraightLane(end, start, line_types=(none, continuous), priority=priority, **limit),
+            StraightLane(end, start, line_types=(none, continuous), priority=priority, speed_limit=10),
         )
     network.freeze()
     road = FastRegulatedRoad(network=network, np_random=rng)

@@ -1,0 +1,69 @@
+# Chauffeur. Each target prepares what it needs in .venv; nothing is installed outside this folder.
+#   make drive   drive a wish end to end (WISH="..." to choose another)
+#   make test    the test suite
+#   make lint    formatting, lint, types, import floors
+#   make bench   measurements against peers and references
+#   make docs    the documentation site
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV ?= .venv
+BIN := $(VENV)/bin
+WISH ?= Overtake the car in front of you.
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+JOBS ?= auto
+
+.PHONY: drive test lint format bench docs fresh-import clean
+
+drive: $(VENV)/.core
+	$(BIN)/chauffeur drive "$(WISH)" --save trips/latest
+
+test: $(VENV)/.dev
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+format: $(VENV)/.dev
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(VENV)/.dev
+	$(BIN)/python benchmarks/program_tick.py
+	@echo "LaMPilot-Bench: $(BIN)/chauffeur bench lampilot --data DIR --planner onboard"
+
+docs: $(VENV)/.docs
+	$(BIN)/zensical build
+
+# The package must import, and show its help, in an environment that has nothing but its own requirements.
+fresh-import:
+	rm -rf .venv-fresh
+	$(PYTHON) -m venv .venv-fresh
+	.venv-fresh/bin/python -m pip --disable-pip-version-check --quiet install -c constraints.txt .
+	.venv-fresh/bin/python -c "import chauffeur, chauffeur.cli.main, chauffeur.drive.session, chauffeur.planners.onboard"
+	.venv-fresh/bin/chauffeur --help > /dev/null
+	.venv-fresh/bin/chauffeur drive "Change to the left lane." --quiet
+	rm -rf .venv-fresh
+
+$(VENV)/.made:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Chauffeur needs Python 3.11 or newer; set PYTHON=/path/to/python3.11")'
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)/.core: $(VENV)/.made pyproject.toml constraints.txt
+	@echo "Installing Chauffeur into $(VENV) (once) ..."
+	$(PIP) install -c constraints.txt -e .
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.core
+	$(PIP) install -c constraints.txt -e ".[dev]"
+	@touch $@
+
+$(VENV)/.docs: $(VENV)/.core
+	$(PIP) install -c constraints.txt -e ".[docs]"
+	@touch $@
+
+clean:
+	rm -rf $(VENV) .venv-fresh trips runs dist build

@@ -1,0 +1,126 @@
+"""What a worker process does: put a sample into words, or drive a policy on it. Values in, JSON values out."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from chauffeur.bench.lampilot.referee import LampilotReferee
+from chauffeur.concept import ChauffeurError, Context, Limits, Plan, Program, Scenario, Wishes
+from chauffeur.describe import describe
+from chauffeur.drive.episode import Episode
+from chauffeur.drive.session import declined, drive_program, drive_without_program
+from chauffeur.safety import run_checks
+from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
+
+ROLLOUT_VERSION = "lampilot-rollout-v1"
+"""Changes whenever the same policy could drive differently."""
+
+MAX_EPISODE_S = 1000.0
+"""LaMPilot's own bound; each road ends its episodes earlier."""
+
+BASELINES = ("idm", "mobil")
+
+plan_adapter: TypeAdapter[Plan] = TypeAdapter(Plan)
+context_adapter: TypeAdapter[Context] = TypeAdapter(Context)
+
+
+@dataclass(frozen=True, slots=True)
+class RolloutJob:
+    """A policy to drive on a sample.
+
+    Attributes:
+        key: Content hash of the job.
+        scenario: The sample.
+        baseline: `idm` or `mobil`, or empty when `plan` drives.
+        plan: JSON form of the plan.
+        limits: Bounds for the checks.
+    """
+
+    key: str
+    scenario: Scenario
+    baseline: str
+    plan: dict[str, Any] | None
+    limits: Limits
+
+
+def describe_sample(scenario: Scenario) -> dict[str, Any]:
+    """C of a sample, as a row keyed by `sample`; `error` says why a sample cannot be set up."""
+    try:
+        snapshot = HighwayWorld().reset(scenario)
+    except ChauffeurError as error:
+        return {"sample": scenario.id, "context": None, "error": str(error)}
+    return {"sample": scenario.id, "context": asdict(describe(snapshot)), "error": ""}
+
+
+def roll_out(job: RolloutJob) -> dict[str, Any]:
+    """Drive one job; a row keyed by `key`. Never raises for the policy's or the sample's faults."""
+    row: dict[str, Any] = {"key": job.key, "sample": job.scenario.id, "rollout": ROLLOUT_VERSION}
+    world = HighwayWorld()
+    try:
+        snapshot = world.reset(job.scenario)
+        referee = LampilotReferee(world, job.scenario)
+    except ChauffeurError as error:
+        return row | _not_driven("not_driven", str(error), infra_failed=True)
+    if job.baseline:
+        adjust = None if job.baseline == "idm" else _mobil(world)
+        episode = drive_without_program(world, referee, MAX_EPISODE_S, record=False, adjust=adjust)
+        return row | _driven(episode, referee)
+    plan = plan_adapter.validate_python(job.plan)
+    verdicts = run_checks(plan, snapshot, job.limits)
+    row["verdicts"] = [asdict(v) for v in verdicts]
+    refusal = declined(plan, verdicts)
+    if refusal:
+        unusable = not plan.refusal and not verdicts[0].passed
+        return row | _not_driven("refused", refusal, refused=True, policy_failed=unusable)
+    assert isinstance(plan.policy, Program)
+    try:
+        episode = drive_program(world, plan.policy.source, referee, MAX_EPISODE_S, record=False)
+    except ChauffeurError as error:
+        return row | _not_driven("not_driven", str(error), infra_failed=True)
+    return row | _driven(episode, referee)
+
+
+def _mobil(world: HighwayWorld) -> Any:
+    baseline = MobilBaseline(world.perception())
+
+    def adjust(wishes: Wishes) -> Wishes:
+        return baseline.choose(wishes)
+
+    return adjust
+
+
+def _driven(episode: Episode, referee: LampilotReferee) -> dict[str, Any]:
+    values = {metric.id: metric.value for metric in episode.metrics}
+    return {
+        "outcome": episode.outcome,
+        "success": episode.success,
+        "collision": referee.collided,
+        "ttc": values["lampilot-ttc-v1"],
+        "speed_variance": values["lampilot-speed-variance-v1"],
+        "time_efficiency": values["lampilot-time-efficiency-v1"],
+        "score": values["lampilot-score-v1"],
+        "steps": episode.ticks,
+        **_causes(asdict(episode.causes)),
+    }
+
+
+def _not_driven(outcome: str, detail: str, **flags: bool) -> dict[str, Any]:
+    return {
+        "outcome": outcome,
+        "success": False,
+        "collision": False,
+        "ttc": None,
+        "speed_variance": None,
+        "time_efficiency": None,
+        "score": 0.0,
+        "steps": 0,
+        **_causes({**flags, "detail": detail}),
+    }
+
+
+def _causes(flags: dict[str, Any]) -> dict[str, Any]:
+    names = ("policy_failed", "infra_failed", "refused", "fallback_used")
+    return {name: bool(flags.get(name, False)) for name in names} | {"detail": str(flags.get("detail", ""))}

@@ -1,0 +1,33 @@
+"""Plug-ins through Python entry points: built-in parts and third-party ones use the same door."""
+
+from __future__ import annotations
+
+import difflib
+from importlib.metadata import entry_points
+from typing import Any
+
+from chauffeur.concept.errors import ConfigError
+
+
+def plugin_names(group: str) -> tuple[str, ...]:
+    """Names registered in an entry-point group such as `chauffeur.planners`, sorted."""
+    return tuple(sorted({point.name for point in entry_points(group=group)}))
+
+
+def load_plugin(group: str, name: str) -> Any:
+    """The object registered under a name.
+
+    Raises:
+        ConfigError: No such name (with the nearest one), or the plug-in cannot be imported.
+    """
+    kind = group.rsplit(".", 1)[-1].removesuffix("s")
+    found = [point for point in entry_points(group=group) if point.name == name]
+    if not found:
+        known = plugin_names(group)
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"Did you mean {near[0]!r}?" if near else f"Known: {', '.join(known) or 'none'}."
+        raise ConfigError(f"Unknown {kind} {name!r}.", hint=hint)
+    try:
+        return found[0].load()
+    except ImportError as error:
+        raise ConfigError(f"The {kind} {name!r} cannot be loaded: {error}.", hint="Run: chauffeur doctor") from error

@@ -1,0 +1,64 @@
+"""Where the ego is on the road, read from a snapshot; and the few words every descriptor shares."""
+
+from __future__ import annotations
+
+from chauffeur.concept import LaneView, Lead, ScenarioError, Snapshot
+
+SIGHT_M = 100.0
+"""How far ahead a vehicle is mentioned: the range of the benchmark's own text."""
+
+_ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
+
+
+def ego_lane(snapshot: Snapshot) -> LaneView:
+    """The lane the ego is in.
+
+    Raises:
+        ScenarioError: The snapshot says no lane, or one that its road does not have.
+    """
+    lane_id = snapshot.ego.lane
+    for lane in snapshot.lanes:
+        if lane.id == lane_id:
+            return lane
+    raise ScenarioError(
+        f"The situation cannot be described: the ego is on lane {lane_id}, which is not among the "
+        f"{len(snapshot.lanes)} lanes of the road.",
+        hint="The world must name the ego's closest lane in every snapshot.",
+    )
+
+
+def own_direction(snapshot: Snapshot) -> tuple[LaneView, ...]:
+    """Lanes of the ego's road segment and direction, leftmost first; the emergency lane is one of them."""
+    here = ego_lane(snapshot).id
+    return tuple(sorted((lane for lane in snapshot.lanes if lane.id[:2] == here[:2]), key=lambda lane: lane.id[2]))
+
+
+def front_in_sight(snapshot: Snapshot) -> Lead | None:
+    """The vehicle ahead in the ego lane, if it is within sight."""
+    front = snapshot.front
+    return front if front is not None and front.distance_m <= SIGHT_M else None
+
+
+def ordinal(number: int) -> str:
+    """1 -> `first`, ..., 11 -> `11th`."""
+    if number <= len(_ORDINALS):
+        return _ORDINALS[number - 1]
+    suffix = "th" if number % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+    return f"{number}{suffix}"
+
+
+def speed_sentence(snapshot: Snapshot) -> str:
+    """The ego's speed in words."""
+    return f"I am driving at {snapshot.ego.speed_mps:.1f} m/s."
+
+
+def front_sentence(front: Lead | None) -> str:
+    """The car ahead in words. Distances are centre to centre, as the driving APIs measure them."""
+    if front is None:
+        return f"There is no car ahead of me in my lane within {SIGHT_M:.0f} m."
+    return f"The car ahead of me in my lane is {front.distance_m:.1f} m away and drives at {front.speed_mps:.1f} m/s."
+
+
+def limit_sentence(lane: LaneView) -> str:
+    """The speed limit of the ego lane in words."""
+    return f"The speed limit of my lane is {lane.speed_limit_mps:.1f} m/s."

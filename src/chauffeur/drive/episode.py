@@ -1,0 +1,223 @@
+"""The control loop: the one place where a command reaches a world.
+
+Each control period: the policy states its wishes, the driver turns them into a command, the world applies it, the
+referee looks. A policy that fails loses the wheel at once: the driver goes on with safe wishes for a moment, and the
+trip ends; what it would have done without the policy is never counted as the policy's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from chauffeur.concept import (
+    ApiCall,
+    Causes,
+    ChauffeurError,
+    Frame,
+    Metric,
+    Outcome,
+    ProgramState,
+    SandboxError,
+    Snapshot,
+    Wishes,
+)
+from chauffeur.worlds.base import World
+
+FALLBACK_S = 10.0
+"""How long the fallback drives after a policy failed, before the trip is ended."""
+SAFE_HEADWAY_S = 2.0
+AFTER_END_S = 3.0
+"""How long a trip without a goal goes on after its program finished."""
+
+
+class PolicyTick(Protocol):
+    """What a policy gives in one control period."""
+
+    @property
+    def wishes(self) -> Wishes: ...
+    @property
+    def state(self) -> ProgramState: ...
+    @property
+    def line(self) -> int | None: ...
+    @property
+    def said(self) -> tuple[str, ...]: ...
+    @property
+    def calls(self) -> tuple[ApiCall, ...]: ...
+    @property
+    def error(self) -> ChauffeurError | None: ...
+
+
+class RunningPolicy(Protocol):
+    """A policy bound to a world, asked once per control period."""
+
+    def tick(self) -> PolicyTick:
+        """Wishes for this period. Never raises for the policy's own faults; they come as `state` and `error`."""
+        ...
+
+
+class Referee(Protocol):
+    """Judges a trip while it is driven."""
+
+    def observe(self) -> None:
+        """Look at the instant after a control period."""
+        ...
+
+    @property
+    def over(self) -> bool: ...
+    @property
+    def success(self) -> bool: ...
+    def outcome(self) -> Outcome: ...
+    def metrics(self) -> tuple[Metric, ...]: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """A driven trip, before it is filed.
+
+    Attributes:
+        frames: One per control period; empty when not recorded.
+        final: The last instant.
+        ticks: Control periods driven.
+        outcome, causes, metrics: What happened, why, and the scores.
+        said: What the passenger was told, as (time s, text).
+        success: The referee's success flag.
+    """
+
+    frames: tuple[Frame, ...]
+    final: Snapshot
+    ticks: int
+    outcome: Outcome
+    causes: Causes
+    metrics: tuple[Metric, ...]
+    said: tuple[tuple[float, str], ...]
+    success: bool
+
+
+@dataclass(frozen=True, slots=True)
+class HeldWishes:
+    """A policy without a program: the same wishes throughout. It is the IDM baseline and the fallback."""
+
+    wishes: Wishes
+    state: ProgramState = "none"
+    line: int | None = None
+    said: tuple[str, ...] = ()
+    calls: tuple[ApiCall, ...] = ()
+    error: ChauffeurError | None = None
+
+    def tick(self) -> PolicyTick:
+        """Itself."""
+        return self
+
+
+def run_episode(
+    world: World,
+    policy: RunningPolicy,
+    referee: Referee | None,
+    *,
+    max_s: float,
+    record: bool = True,
+    adjust: Callable[[Wishes], Wishes] | None = None,
+    watch: Callable[[Frame], None] | None = None,
+) -> Episode:
+    """Drive until the goal is decided, the world ends, the program has ended, or `max_s` simulated seconds passed.
+
+    Args:
+        world: A world just reset.
+        policy: What states the wishes.
+        referee: Judge of the goal; None drives freely.
+        max_s: Bound of the trip in simulated time.
+        record: Whether to keep frames (a benchmark does not need them).
+        adjust: Baseline that rewrites settled wishes each period, e.g. MOBIL's lane choice.
+        watch: Called with each recorded frame, for live display.
+    """
+    driver = world.driver()
+    frames: list[Frame] = []
+    said: list[tuple[float, str]] = []
+    failure: ChauffeurError | None = None
+    fallback: Wishes | None = None
+    idle = 0
+    ticks = 0
+    limit = round(max_s / world.dt_s)
+    end = limit
+    while ticks < end:
+        at_s = ticks * world.dt_s
+        tick = policy.tick() if fallback is None else HeldWishes(fallback, state="failed")
+        said.extend((at_s, text) for text in tick.said)
+        if tick.error is not None and fallback is None:
+            failure = tick.error
+            fallback = _safe(world, tick.wishes)
+            tick = HeldWishes(fallback, state="failed", line=tick.line, said=tick.said, calls=tick.calls)
+            end = min(end, ticks + round(FALLBACK_S / world.dt_s))
+        wishes = driver.settle(tick.wishes)
+        if adjust is not None:
+            wishes = adjust(wishes)
+        requested = driver.command(wishes)
+        before = world.snapshot() if record else None
+        applied = world.step(requested)
+        ticks += 1
+        if before is not None:
+            frame = Frame(before, wishes, requested, applied, tick.state, tick.line, tick.said, tick.calls)
+            frames.append(frame)
+            if watch is not None:
+                watch(frame)
+        if referee is not None:
+            referee.observe()
+            if referee.over and failure is None:
+                break
+        if world.ended:
+            break
+        if referee is None and tick.state == "finished":
+            idle += 1
+            if idle * world.dt_s >= AFTER_END_S:
+                break
+    final = world.snapshot()
+    success = referee is not None and referee.success and failure is None
+    return Episode(
+        frames=tuple(frames),
+        final=final,
+        ticks=ticks,
+        outcome=_outcome(final, referee, failure, out_of_time=ticks >= limit),
+        causes=_causes(failure),
+        metrics=() if referee is None else referee.metrics() if failure is None else _void(referee.metrics()),
+        said=tuple(said),
+        success=success,
+    )
+
+
+def _safe(world: World, wishes: Wishes) -> Wishes:
+    """The fallback: stay in the lane one is in, no faster than now, with a generous gap; routes are kept."""
+    ego = world.snapshot().ego
+    return replace(
+        wishes,
+        target_speed_mps=max(0.0, ego.speed_mps),
+        time_headway_s=max(SAFE_HEADWAY_S, wishes.time_headway_s),
+        target_lane=ego.lane,
+    )
+
+
+def _outcome(final: Snapshot, referee: Referee | None, failure: ChauffeurError | None, *, out_of_time: bool) -> Outcome:
+    if final.ego.crashed:
+        return "collision"
+    if final.off_road:
+        return "off_road"
+    if failure is not None:
+        return "failure"
+    if referee is not None and referee.over:
+        return referee.outcome()
+    return "timeout" if out_of_time and referee is not None else "ended"
+
+
+def _causes(failure: ChauffeurError | None) -> Causes:
+    if failure is None:
+        return Causes()
+    infra = isinstance(failure, SandboxError)
+    return Causes(policy_failed=not infra, infra_failed=infra, fallback_used=True, detail=str(failure))
+
+
+def _void(metrics: tuple[Metric, ...]) -> tuple[Metric, ...]:
+    """Scores of a failed policy: its parts do not apply and its total is 0, whatever the fallback achieved."""
+    return tuple(
+        replace(m, value=0.0) if m.id.startswith("lampilot-score") else replace(m, applies=False) for m in metrics
+    )

@@ -1,0 +1,273 @@
+"""The channels of a recorded trip: topic, schema name and JSON schema, as any MCAP reader finds them in the file.
+
+Schemas stay within the subset that viewers understand: plain types, no references. `/scene` and `/tf` carry the
+well-known Foxglove schemas, so that a recording opens in a 3D panel without a converter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+JsonSchema = dict[str, Any]
+
+
+def _object(title: str = "", /, **properties: JsonSchema) -> JsonSchema:
+    schema: JsonSchema = {"type": "object", "properties": properties}
+    return {"title": title, **schema} if title else schema
+
+
+def _array(items: JsonSchema, description: str = "") -> JsonSchema:
+    schema: JsonSchema = {"type": "array", "items": items}
+    return {**schema, "description": description} if description else schema
+
+
+def _number(description: str = "") -> JsonSchema:
+    return {"type": "number", "description": description} if description else {"type": "number"}
+
+
+def _text(description: str = "") -> JsonSchema:
+    return {"type": "string", "description": description} if description else {"type": "string"}
+
+
+def _optional_number(description: str) -> JsonSchema:
+    return {"type": ["number", "null"], "description": description}
+
+
+_INTEGER: JsonSchema = {"type": "integer"}
+_FLAG: JsonSchema = {"type": "boolean"}
+_ANY_OBJECT: JsonSchema = {"type": "object"}
+_LANE: JsonSchema = {
+    "type": ["array", "null"],
+    "items": {"type": ["string", "integer"]},
+    "description": "[from node, to node, index]; index 0 is leftmost",
+}
+_SETTINGS = _array(_array({"type": ["string", "number"]}), "[name, value] pairs")
+
+_VEHICLE = _object(
+    id=_INTEGER,
+    kind=_text("car, obstacle or stop_sign"),
+    x_m=_number("Centre; world frame, y grows to the right of +x"),
+    y_m=_number("Centre"),
+    heading_rad=_number(),
+    speed_mps=_number(),
+    length_m=_number(),
+    width_m=_number(),
+    lane=_LANE,
+    crashed=_FLAG,
+)
+_COMMAND = _object(acceleration_mps2=_number("Along the heading"), steering_rad=_number("Front wheels"))
+
+# Foxglove's own schemas, reduced to the primitives that a trip uses.
+_TIME: JsonSchema = _object("time", sec=_INTEGER, nsec=_INTEGER)
+_DURATION: JsonSchema = _object("duration", sec=_INTEGER, nsec=_INTEGER)
+_VECTOR3 = _object("foxglove.Vector3", x=_number(), y=_number(), z=_number())
+_QUATERNION = _object("foxglove.Quaternion", x=_number(), y=_number(), z=_number(), w=_number())
+_POSE = _object("foxglove.Pose", position=_VECTOR3, orientation=_QUATERNION)
+_COLOR = _object("foxglove.Color", r=_number(), g=_number(), b=_number(), a=_number())
+_CUBE = _object("foxglove.CubePrimitive", pose=_POSE, size=_VECTOR3, color=_COLOR)
+_LINE = _object(
+    "foxglove.LinePrimitive",
+    type=_INTEGER,
+    pose=_POSE,
+    thickness=_number(),
+    scale_invariant=_FLAG,
+    points=_array(_object("foxglove.Point3", x=_number(), y=_number(), z=_number())),
+    color=_COLOR,
+    colors=_array(_COLOR),
+    indices=_array(_INTEGER),
+)
+_TEXT_PRIMITIVE = _object(
+    "foxglove.TextPrimitive",
+    pose=_POSE,
+    billboard=_FLAG,
+    font_size=_number(),
+    scale_invariant=_FLAG,
+    color=_COLOR,
+    text=_text(),
+)
+_SCENE_ENTITY = _object(
+    "foxglove.SceneEntity",
+    timestamp=_TIME,
+    frame_id=_text(),
+    id=_text(),
+    lifetime=_DURATION,
+    frame_locked=_FLAG,
+    metadata=_array(_object("foxglove.KeyValuePair", key=_text(), value=_text())),
+    arrows=_array(_ANY_OBJECT),
+    cubes=_array(_CUBE),
+    spheres=_array(_ANY_OBJECT),
+    cylinders=_array(_ANY_OBJECT),
+    lines=_array(_LINE),
+    triangles=_array(_ANY_OBJECT),
+    texts=_array(_TEXT_PRIMITIVE),
+    models=_array(_ANY_OBJECT),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One MCAP channel.
+
+    Attributes:
+        topic: Name within the file.
+        schema_name: Name of its JSON schema.
+        schema: The JSON schema.
+    """
+
+    topic: str
+    schema_name: str
+    schema: JsonSchema
+
+
+INSTRUCTION = Channel(
+    "/instruction", "chauffeur.Instruction", _object(text=_text("I: the wish"), person=_text(), source=_text())
+)
+CONTEXT = Channel("/context", "chauffeur.Context", _object(text=_text("C: the driving context"), situation=_ANY_OBJECT))
+SYSTEM = Channel("/system", "chauffeur.SystemMessage", _object(text=_text("S: the system message"), setting=_text()))
+HISTORY = Channel(
+    "/history", "chauffeur.History", _object(items=_array(_ANY_OBJECT, "H: what memory recalled, nearest first"))
+)
+PLAN = Channel(
+    "/plan",
+    "chauffeur.Plan",
+    _object(
+        thoughts=_object(text=_text("R: the reasoning")),
+        policy={"type": ["object", "null"], "description": "P: the policy"},
+        refusal=_text(),
+        intent=_text(),
+        settings=_SETTINGS,
+        planner=_text(),
+        model=_text(),
+        usage=_ANY_OBJECT,
+        latency_s=_number(),
+        raw=_text(),
+    ),
+)
+VERDICTS = Channel(
+    "/verdicts",
+    "chauffeur.Verdicts",
+    _object(
+        verdicts=_array(
+            _object(check=_text(), passed=_FLAG, reason=_text(), line={"type": ["integer", "null"]}, remedy=_text())
+        )
+    ),
+)
+SCENARIO = Channel(
+    "/scenario",
+    "chauffeur.Scenario",
+    _object(
+        id=_text(), world=_text(), config=_ANY_OBJECT, seed=_INTEGER, goal=_ANY_OBJECT, wish=_text(), title=_text()
+    ),
+)
+TRIP = Channel(
+    "/trip",
+    "chauffeur.Trip",
+    _object(
+        id=_text(),
+        outcome=_text(),
+        causes=_ANY_OBJECT,
+        metrics=_array(_object(id=_text(), value=_number(), unit=_text(), applies=_FLAG)),
+        duration_s=_number(),
+        scenario=_text(),
+        seed=_INTEGER,
+        said=_array(_array({"type": ["number", "string"]}), "[time s, text] pairs"),
+        record=_array(_array({}), "[name, value] pairs of provenance"),
+    ),
+)
+LANES = Channel(
+    "/lanes",
+    "chauffeur.Lanes",
+    _object(
+        lanes=_array(
+            _object(
+                id=_LANE,
+                width_m=_number(),
+                length_m=_number(),
+                speed_limit_mps=_number(),
+                forbidden=_FLAG,
+                emergency=_FLAG,
+                centre_m=_array(_array(_number()), "[x, y] points, start to end"),
+            )
+        )
+    ),
+)
+SNAPSHOT = Channel(
+    "/snapshot",
+    "chauffeur.Snapshot",
+    _object(
+        time_s=_number(),
+        tick=_INTEGER,
+        kind=_text(),
+        ego=_VEHICLE,
+        others=_array(_VEHICLE),
+        objects=_array(_VEHICLE),
+        front={"type": ["object", "null"], "description": "Vehicle ahead: vehicle, distance_m, speed_mps"},
+        stop_sign_m=_optional_number("Distance to an unserved stop sign ahead"),
+        off_road=_FLAG,
+        ended=_FLAG,
+    ),
+)
+WISHES = Channel(
+    "/wishes",
+    "chauffeur.Wishes",
+    _object(
+        target_speed_mps=_optional_number("None keeps the present speed"),
+        time_headway_s=_number(),
+        target_lane=_LANE,
+        turn={"type": ["string", "null"]},
+        served_stops=_array(_INTEGER),
+    ),
+)
+COMMAND = Channel("/command", "chauffeur.Command", _object(requested=_COMMAND, applied=_COMMAND))
+PROGRAM = Channel(
+    "/program",
+    "chauffeur.ProgramState",
+    _object(
+        state=_text("none, running, finished or failed"),
+        line={"type": ["integer", "null"], "description": "Program line it waits at, from 1"},
+        calls=_array(_object(name=_text(), args=_text(), result=_text())),
+    ),
+)
+SAID = Channel("/said", "chauffeur.Said", _object(text=_text("What the car told the passenger")))
+SCENE = Channel(
+    "/scene",
+    "foxglove.SceneUpdate",
+    _object(
+        "foxglove.SceneUpdate",
+        deletions=_array(_object("foxglove.SceneEntityDeletion", timestamp=_TIME, type=_INTEGER, id=_text())),
+        entities=_array(_SCENE_ENTITY),
+    ),
+)
+TRANSFORM = Channel(
+    "/tf",
+    "foxglove.FrameTransform",
+    _object(
+        "foxglove.FrameTransform",
+        timestamp=_TIME,
+        parent_frame_id=_text(),
+        child_frame_id=_text(),
+        translation=_VECTOR3,
+        rotation=_QUATERNION,
+    ),
+)
+
+CHANNELS = (
+    INSTRUCTION,
+    CONTEXT,
+    SYSTEM,
+    HISTORY,
+    PLAN,
+    VERDICTS,
+    SCENARIO,
+    TRIP,
+    LANES,
+    SNAPSHOT,
+    WISHES,
+    COMMAND,
+    PROGRAM,
+    SAID,
+    SCENE,
+    TRANSFORM,
+)
+"""Every channel, in the order in which it is registered."""

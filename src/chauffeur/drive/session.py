@@ -1,0 +1,274 @@
+"""One wish driven from end to end with real parts: what `chauffeur drive` and the replay use."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from importlib.metadata import version
+from typing import Any
+
+from chauffeur.concept import (
+    Causes,
+    Feedback,
+    Frame,
+    History,
+    Instruction,
+    InstructionError,
+    Limits,
+    PersonId,
+    Plan,
+    PlanRequest,
+    Program,
+    Scenario,
+    Snapshot,
+    SystemMessage,
+    Trip,
+    Verdict,
+)
+from chauffeur.concept.registry import load_plugin
+from chauffeur.describe import describe
+from chauffeur.drive.episode import Episode, HeldWishes, Referee, RunningPolicy, run_episode
+from chauffeur.drive.loop import Memory, Stages, drive
+from chauffeur.drive.recording import RecordedTrip
+from chauffeur.planners.base import Planner
+from chauffeur.planners.prompts import build_system_message
+from chauffeur.programs import ProgramExecutor
+from chauffeur.safety import run_checks
+from chauffeur.worlds.base import World
+
+MAX_WISH_CHARACTERS = 2000
+MAX_TRIP_S = 60.0
+
+RefereeMaker = Callable[[World, Scenario, Plan], Referee | None]
+
+
+def _no_referee(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
+    del world, scenario, plan
+    return None
+
+
+def _silent(letter: str, value: object) -> None:
+    del letter, value
+
+
+class Forgetful:
+    """The memory of nobody: recalls nothing, keeps nothing."""
+
+    def recall(self, person: PersonId, instruction: Instruction, context: object, k: int) -> History:
+        """Nothing."""
+        del person, instruction, context, k
+        return History()
+
+    def remember(self, trip: Trip, feedback: Feedback | None) -> None:
+        """Nothing."""
+        del trip, feedback
+
+
+def parse_wish(text: str, person: PersonId) -> Instruction:
+    """The wish as an instruction. Raises InstructionError when it is empty or too long to be one."""
+    wish = " ".join(text.split())
+    if not wish:
+        raise InstructionError("The wish is empty.", hint='Say what you want, e.g. chauffeur drive "Overtake the car".')
+    if len(wish) > MAX_WISH_CHARACTERS:
+        raise InstructionError(
+            f"The wish has {len(wish)} characters; {MAX_WISH_CHARACTERS} are the most a wish may have.",
+            hint="Say it in a sentence or two.",
+        )
+    return Instruction(text=wish, person=person)
+
+
+def make_world(scenario: Scenario) -> World:
+    """A fresh world of the scenario's kind. Raises ConfigError for an unknown kind."""
+    world: World = load_plugin("chauffeur.worlds", scenario.world)()
+    return world
+
+
+@dataclass(slots=True)
+class Session:
+    """One trip's parts and what came of them.
+
+    Attributes:
+        planner: Who plans.
+        memory: Who remembers.
+        referee: Makes the judge of a trip; returning None drives freely.
+        tell: Called with the loop's letters as they come, and with `frame` for each control period.
+        few_shot: Whether S carries examples.
+        max_s: Bound of the trip in simulated time.
+    """
+
+    planner: Planner
+    memory: Memory = field(default_factory=Forgetful)
+    referee: RefereeMaker = _no_referee
+    tell: Callable[[str, object], None] = _silent
+    few_shot: bool = True
+    max_s: float = MAX_TRIP_S
+    _episode: Episode | None = None
+    _system: SystemMessage | None = None
+
+    async def drive(self, wish: Instruction, scenario: Scenario, seed: int, limits: Limits) -> RecordedTrip:
+        """Drive one wish.
+
+        Raises:
+            ChauffeurError: No plan could be had, or the scenario cannot be set up. The simulated car has not moved.
+        """
+        world = make_world(scenario)
+        stages = Stages(
+            world=world,
+            describe=describe,
+            memory=self.memory,
+            system=self._build_system,
+            planner=self.planner,
+            check=run_checks,
+            execute=partial(self._execute, world),
+            tell=self.tell,
+        )
+        trip = await drive(wish, scenario, seed, limits, stages)
+        episode = self._episode
+        return RecordedTrip(
+            trip=trip,
+            frames=() if episode is None else episode.frames,
+            scenario=scenario,
+            system=self._system,
+            final=None if episode is None else episode.final,
+        )
+
+    def _build_system(self, limits: Limits) -> SystemMessage:
+        self._system = build_system_message("few-shot" if self.few_shot else "zero-shot", limits=limits)
+        return self._system
+
+    def _execute(
+        self,
+        world: World,
+        request: PlanRequest,
+        plan: Plan,
+        verdicts: tuple[Verdict, ...],
+        scenario: Scenario,
+        seed: int,
+    ) -> Trip:
+        refused = declined(plan, verdicts)
+        if refused:
+            return make_trip(request, plan, verdicts, scenario, seed, None, refused)
+        assert isinstance(plan.policy, Program)
+        referee = self.referee(world, scenario, plan)
+        self._episode = drive_program(world, plan.policy.source, referee, self.max_s, lambda f: self.tell("frame", f))
+        return make_trip(request, plan, verdicts, scenario, seed, self._episode, "")
+
+
+def drive_program(
+    world: World,
+    source: str,
+    referee: Referee | None,
+    max_s: float,
+    watch: Callable[[Frame], None] | None = None,
+    *,
+    record: bool = True,
+) -> Episode:
+    """Run a checked program on a world just reset."""
+    with ProgramExecutor() as executor:
+        policy: RunningPolicy = executor.start(source, world)
+        return run_episode(world, policy, referee, max_s=max_s, record=record, watch=watch)
+
+
+def drive_without_program(world: World, referee: Referee | None, max_s: float, **options: Any) -> Episode:
+    """Let the world's own driver keep its initial wishes: the IDM baseline."""
+    return run_episode(world, HeldWishes(world.driver().initial_wishes()), referee, max_s=max_s, **options)
+
+
+def declined(plan: Plan, verdicts: tuple[Verdict, ...]) -> str:
+    """Why a plan is not driven, in words; empty when it may be."""
+    if plan.refusal:
+        return plan.refusal
+    failed = [verdict.reason for verdict in verdicts if not verdict.passed]
+    return " ".join(failed)
+
+
+def make_trip(
+    request: PlanRequest,
+    plan: Plan,
+    verdicts: tuple[Verdict, ...],
+    scenario: Scenario,
+    seed: int,
+    episode: Episode | None,
+    refusal: str,
+) -> Trip:
+    """File what happened, with its provenance."""
+    record = provenance(plan, scenario, seed, request.limits)
+    if episode is None:
+        gate_failed = not plan.refusal and bool(verdicts) and not verdicts[0].passed
+        causes = Causes(refused=True, policy_failed=gate_failed, detail=refusal)
+    else:
+        causes = episode.causes
+    return Trip(
+        id=trip_id(request, plan, scenario, seed),
+        instruction=request.instruction,
+        context=request.context,
+        history=request.history,
+        plan=plan,
+        verdicts=verdicts,
+        outcome="refused" if episode is None else episode.outcome,
+        causes=causes,
+        metrics=() if episode is None else episode.metrics,
+        duration_s=0.0 if episode is None else round(episode.ticks * 0.1, 3),
+        scenario=scenario.id,
+        seed=seed,
+        said=() if episode is None else episode.said,
+        record=record,
+    )
+
+
+def trip_id(request: PlanRequest, plan: Plan, scenario: Scenario, seed: int) -> str:
+    """Content hash of what decides a trip: wish, scenario, seed, limits, planner and policy."""
+    policy = plan.policy.source if isinstance(plan.policy, Program) else str(plan.policy)
+    parts = [
+        request.instruction.text,
+        str(request.instruction.person),
+        scenario_hash(scenario),
+        str(seed),
+        str(request.limits),
+        plan.planner,
+        plan.model,
+        policy,
+        plan.refusal,
+    ]
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
+
+
+def scenario_hash(scenario: Scenario) -> str:
+    """SHA-256 of a scenario's content."""
+    return hashlib.sha256(json.dumps(asdict(scenario), sort_keys=True).encode()).hexdigest()
+
+
+def provenance(plan: Plan, scenario: Scenario, seed: int, limits: Limits) -> tuple[tuple[str, Any], ...]:
+    """What a result must name to be repeated."""
+    return (
+        ("chauffeur", version("chauffeur")),
+        ("highway-env", version("highway-env")),
+        ("python", platform.python_version()),
+        ("planner", plan.planner),
+        ("model", plan.model),
+        ("scenario_sha256", scenario_hash(scenario)),
+        ("seed", seed),
+        ("limits", asdict(limits)),
+        ("simulated", True),
+    )
+
+
+__all__ = [
+    "MAX_TRIP_S",
+    "Forgetful",
+    "Session",
+    "Snapshot",
+    "declined",
+    "drive_program",
+    "drive_without_program",
+    "make_trip",
+    "make_world",
+    "parse_wish",
+    "provenance",
+    "scenario_hash",
+    "trip_id",
+]

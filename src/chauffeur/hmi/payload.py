@@ -1,0 +1,291 @@
+"""A recorded trip as the plain values that the page plays: rounded, in columns, nothing but JSON.
+
+Text stays text here and is set with `textContent` there, so nothing a person or a model wrote is ever markup.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from chauffeur.concept import (
+    ActionMatrix,
+    Frame,
+    HistoryItem,
+    LaneId,
+    Parameters,
+    Policy,
+    Program,
+    Snapshot,
+    Trip,
+    VehicleState,
+)
+from chauffeur.drive.recording import RecordedTrip
+from chauffeur.hmi import words
+from chauffeur.hmi.events import events_of, snapshots_of
+from chauffeur.hmi.road import Box, Road, draw_road, track_box
+
+_SIGHT_M = 260.0
+"""Nothing farther from the ego's path than this is ever on the screen."""
+_FIXED_MARGIN_M = 14.0
+_FLAT_ROAD_M = 40.0
+"""A road that spreads less than this across +x is shown lengthwise, with the camera moving along."""
+
+Json = dict[str, Any]
+
+
+def page_payload(recorded: RecordedTrip) -> Json:
+    """Everything the page shows."""
+    trip = recorded.trip
+    label, tone = words.outcome_words(trip.outcome)
+    return {
+        "simulated": words.SIMULATED,
+        "wish": trip.instruction.text,
+        "person": trip.instruction.person,
+        "source": trip.instruction.source,
+        "title": recorded.scenario.title or recorded.scenario.id,
+        "context": trip.context.text,
+        "intent": trip.plan.intent,
+        "refusal": trip.plan.refusal,
+        "settings": [words.setting(name, value) for name, value in trip.plan.settings],
+        "thoughts": trip.plan.thoughts.text,
+        "program": _program_lines(trip.plan.policy),
+        "policy": policy_words(trip.plan.policy),
+        "verdicts": [
+            {"check": v.check, "passed": v.passed, "reason": v.reason, "line": v.line, "remedy": v.remedy}
+            for v in trip.verdicts
+        ],
+        "outcome": {"label": label, "tone": tone, "causes": words.cause_words(trip.causes)},
+        "duration": round(trip.duration_s, 2),
+        "metrics": [
+            {"id": m.id, "name": words.metric_name(m.id), "value": words.metric_value(m), "applies": m.applies}
+            for m in trip.metrics
+        ],
+        "history": [_history_item(item) for item in trip.history.items],
+        "provenance": [list(pair) for pair in provenance(trip)],
+        "events": [{"t": round(e.time_s, 2), "kind": e.kind, "label": e.label} for e in events_of(recorded)],
+        "drive": _drive(recorded),
+    }
+
+
+def provenance(trip: Trip) -> list[tuple[str, str]]:
+    """Where a trip comes from, as (name, value): planner, model, seed, hashes, versions, limits."""
+    usage = trip.plan.usage
+    tokens = usage.prompt_tokens + usage.completion_tokens
+    rows = [
+        ("planner", trip.plan.planner),
+        ("model", trip.plan.model),
+        ("planning time", f"{trip.plan.latency_s:.3f} s"),
+        ("tokens", f"{usage.prompt_tokens} in, {usage.completion_tokens} out" if tokens else ""),
+        ("cost", f"{usage.cost_usd:.4f} USD" if usage.cost_usd is not None else ""),
+        ("scenario", trip.scenario),
+        ("seed", str(trip.seed)),
+        ("trip", trip.id),
+        *((name, value if isinstance(value, str) else json.dumps(value, default=str)) for name, value in trip.record),
+    ]
+    return [(name, value) for name, value in rows if value]
+
+
+def policy_words(policy: Policy | None) -> str:
+    """P as text, whatever its kind; empty when there is none."""
+    if policy is None:
+        return ""
+    if isinstance(policy, Program):
+        return policy.source
+    if isinstance(policy, Parameters):
+        names = ("target_speed_mps", "look_ahead_m", "look_ahead_ratio")
+        rows = [words.setting(name, float(getattr(policy, name))) for name in names]
+        rows.append(("lane", {-1: "one to the left", 0: "stay", 1: "one to the right"}[policy.lane]))
+        return "\n".join(f"{label}: {value}" for label, value in rows)
+    if isinstance(policy, ActionMatrix):
+        pid, mpc = policy.pid, policy.mpc
+        return f"Kp {pid[0]:g}  Ki {pid[1]:g}  Kd {pid[2]:g}\nWl {mpc[0]:g}  Wh {mpc[1]:g}  Ws {mpc[2]:g}"
+    return "\n".join(f"{x:.2f} m ahead, {y:.2f} m left" for x, y in policy.waypoints_m)
+
+
+def program_tokens(source: str) -> list[list[tuple[str, str]]]:
+    """Source as lines of (class, text): k keyword, s string, c comment, n number, d definition, a call, or empty."""
+    from pygments.lexers.python import PythonLexer
+    from pygments.token import Comment, Keyword, Name, Number, Operator, String
+
+    classes = (
+        (Comment, "c"),
+        (String, "s"),
+        (Number, "n"),
+        (Keyword, "k"),
+        (Operator.Word, "k"),
+        (Name.Function, "d"),
+    )
+    lines: list[list[tuple[str, str]]] = [[]]
+    for kind, text in PythonLexer(stripnl=False, ensurenl=False).get_tokens(source):
+        name = next((letter for base, letter in classes if kind in base), "")
+        if not name and text.startswith("(") and lines[-1] and lines[-1][-1][0] == "i":
+            lines[-1][-1] = ("a", lines[-1][-1][1])
+        if not name and kind in Name:
+            name = "i"
+        for index, piece in enumerate(text.split("\n")):
+            if index:
+                lines.append([])
+            if piece:
+                lines[-1].append((name, piece))
+    return [[("" if name == "i" else name, text) for name, text in line] for line in lines]
+
+
+def camera_box(instants: Iterable[Snapshot]) -> tuple[bool, Box]:
+    """How to look at a drive: (whether the camera moves along the road, the box that must be seen).
+
+    For a moving camera only the box's height counts.
+    """
+    shots = tuple(instants)
+    path = track_box(tuple((s.ego.x_m, s.ego.y_m) for s in shots))
+    if shots[0].kind == "intersection":
+        return False, path.grown(_FIXED_MARGIN_M)
+    beside = path.grown(60.0)
+    rows = [
+        y + side * lane.width_m / 2.0
+        for lane in shots[0].lanes
+        for (x0, _), (x1, _) in [(lane.centre_m[0], lane.centre_m[-1])]
+        if min(x0, x1) <= beside.x1 and max(x0, x1) >= beside.x0
+        for _, y in lane.centre_m
+        for side in (-1, 1)
+    ]
+    low, high = min([*rows, path.y0]), max([*rows, path.y1])
+    if high - low > _FLAT_ROAD_M:
+        return False, path.grown(_FIXED_MARGIN_M)
+    return True, Box(path.x0, low, path.x1, high)
+
+
+def _program_lines(policy: Policy | None) -> list[list[tuple[str, str]]] | None:
+    return program_tokens(policy.source.rstrip("\n")) if isinstance(policy, Program) else None
+
+
+def _history_item(item: HistoryItem) -> Json:
+    return {
+        "when": item.when,
+        "instruction": item.instruction,
+        "intent": item.intent,
+        "outcome": item.outcome,
+        "similarity": round(item.similarity, 2),
+        "settings": [words.setting(name, value) for name, value in item.settings],
+        "feedback": [{"text": f.text, "meaning": words.feedback_words(f)} for f in item.feedback],
+    }
+
+
+def _drive(recorded: RecordedTrip) -> Json | None:
+    """The moving part: one column per quantity, one entry per instant."""
+    shots = snapshots_of(recorded)
+    if not shots:
+        return None
+    frames = recorded.frames
+    # The instant after the last command has no wishes of its own: it shows the last ones.
+    rows: tuple[Frame | None, ...] = frames + (frames[-1:] or (None,)) * (len(shots) - len(frames))
+    lanes = shots[0].lanes
+    limits = {lane.id: lane.speed_limit_mps for lane in lanes}
+    moving, box = camera_box(shots)
+    sight = track_box(tuple((s.ego.x_m, s.ego.y_m) for s in shots)).grown(_SIGHT_M)
+    road = draw_road(lanes, shots[0].objects, sight)
+    return {
+        "time": [round(s.time_s, 2) for s in shots],
+        "camera": {"along": moving, "box": [round(v, 2) for v in (box.x0, box.y0, box.x1, box.y1)]},
+        "road": _road(road),
+        "obstacles": [_body(o) for o in shots[0].objects if o.kind == "obstacle"],
+        "ego": {**_column([s.ego for s in shots]), "first": 0, "l": shots[0].ego.length_m, "w": shots[0].ego.width_m},
+        "cars": _cars(shots, sight),
+        "speed": [round(s.ego.speed_mps, 2) for s in shots],
+        "acceleration": [round(row.applied.acceleration_mps2, 2) if row else 0.0 for row in rows],
+        "target": [_rounded(row.wishes.target_speed_mps) if row else None for row in rows],
+        "limit": [_rounded(limits.get(s.ego.lane) if s.ego.lane else None) for s in shots],
+        "gap": [_rounded(s.front.distance_m) if s.front else None for s in shots],
+        "lead": [s.front.vehicle if s.front else None for s in shots],
+        "stop": [_rounded(s.stop_sign_m) for s in shots],
+        "lane": [_lane_words(s, lanes) for s in shots],
+        "goal": [_goal(row, s, road) for row, s in zip(rows, shots, strict=True)],
+        "turn": [row.wishes.turn if row else None for row in rows],
+        "state": [row.program if row else "none" for row in rows],
+        "line": [row.line if row else None for row in rows],
+        "calls": [[[c.name, c.args, c.result] for c in row.calls] if row else [] for row in rows],
+        "said": [[round(f.snapshot.time_s, 2), text] for f in frames for text in f.said],
+    }
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else round(value, 2)
+
+
+def _body(vehicle: VehicleState) -> Json:
+    return {
+        "x": round(vehicle.x_m, 2),
+        "y": round(vehicle.y_m, 2),
+        "h": round(vehicle.heading_rad, 3),
+        "l": vehicle.length_m,
+        "w": vehicle.width_m,
+    }
+
+
+def _column(states: list[VehicleState]) -> Json:
+    crashed = next((index for index, state in enumerate(states) if state.crashed), None)
+    return {
+        "x": [round(state.x_m, 2) for state in states],
+        "y": [round(state.y_m, 2) for state in states],
+        "h": [round(state.heading_rad, 3) for state in states],
+        "crashed": crashed,
+    }
+
+
+def _cars(shots: tuple[Snapshot, ...], sight: Box) -> list[Json]:
+    """Every other car that comes into sight; one entry per unbroken stay on the road."""
+    stays: dict[int, list[tuple[int, list[VehicleState]]]] = {}
+    for index, shot in enumerate(shots):
+        for car in shot.others:
+            if not (sight.x0 <= car.x_m <= sight.x1 and sight.y0 <= car.y_m <= sight.y1):
+                continue
+            runs = stays.setdefault(car.id, [])
+            if not runs or runs[-1][0] + len(runs[-1][1]) != index:
+                runs.append((index, []))
+            runs[-1][1].append(car)
+    return [
+        {
+            "id": number,
+            "first": first,
+            "l": states[0].length_m,
+            "w": states[0].width_m,
+            "v": [round(state.speed_mps, 1) for state in states],
+            **_column(states),
+        }
+        for number, runs in stays.items()
+        for first, states in runs
+    ]
+
+
+def _road(road: Road) -> Json:
+    def flat(points: Iterable[tuple[float, float]]) -> list[float]:
+        return [round(value, 2) for point in points for value in point]
+
+    return {
+        "surfaces": [{"p": flat(s.centre_m), "w": s.width_m, "e": s.emergency} for s in road.surfaces],
+        "lines": [{"p": flat(line.points_m), "s": line.style} for line in road.lines],
+        "signs": [{"post": flat([s.post_m]), "line": flat(s.line_m)} for s in road.stop_signs],
+    }
+
+
+def _goal(row: Frame | None, shot: Snapshot, road: Road) -> int | None:
+    """Index of the surface the policy wants to be on, while the ego is on another lane."""
+    wanted: LaneId | None = row.wishes.target_lane if row else None
+    if wanted is None or wanted == shot.ego.lane:
+        return None
+    return next((index for index, surface in enumerate(road.surfaces) if surface.lane == wanted), None)
+
+
+def _lane_words(shot: Snapshot, lanes: Iterable[Any]) -> str:
+    if shot.ego.lane is None or shot.off_road:
+        return "off the road"
+    if shot.kind == "intersection":
+        return ""
+    start, end, place = shot.ego.lane
+    abreast = [lane for lane in lanes if lane.id[:2] == (start, end)]
+    if any(lane.emergency and lane.id[2] == place for lane in abreast):
+        return "emergency lane"
+    count = sum(not lane.emergency for lane in abreast)
+    return f"lane {place + 1} of {count} from the left"

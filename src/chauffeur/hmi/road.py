@@ -1,0 +1,222 @@
+"""A road as it looks from above: surfaces, painted lines and signs, worked out from lane geometry.
+
+Worlds give centrelines only. A line between two lanes of one road is dashed, towards an emergency lane or the verge
+solid, between opposite directions a centre line. An edge that lies on another lane's surface is not painted: that is
+how the inside of an intersection stays clear.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chauffeur.concept import LaneId, LaneView, VehicleState
+
+Points = tuple[tuple[float, float], ...]
+LineStyle = Literal["solid", "dashed", "centre"]
+_Array = NDArray[np.float64]
+
+_SAMPLE_M = 1.0
+_SHORTEST_LINE_M = 3.0
+"""Shorter runs are leftovers where lanes fan out."""
+_ON_EDGE_M = 0.35
+_STRAIGHT_M = 0.02
+_SIGN_OFFSET_M = 4.2
+"""From the middle of the lane to the post: half a lane and a step into the verge."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """One lane's asphalt. `centre_m` is cut to the part that can be seen."""
+
+    lane: LaneId
+    centre_m: Points
+    width_m: float
+    emergency: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One painted line."""
+
+    points_m: Points
+    style: LineStyle
+
+
+@dataclass(frozen=True, slots=True)
+class StopSign:
+    """A stop sign beside its lane, and the stop line across it."""
+
+    post_m: tuple[float, float]
+    line_m: tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Road:
+    """Everything to be drawn that does not move."""
+
+    surfaces: tuple[Surface, ...]
+    lines: tuple[Line, ...]
+    stop_signs: tuple[StopSign, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """An axis-aligned rectangle in world metres."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+
+    def grown(self, margin_m: float) -> Box:
+        """The box, larger by a margin on every side."""
+        return Box(self.x0 - margin_m, self.y0 - margin_m, self.x1 + margin_m, self.y1 + margin_m)
+
+    def holds(self, points: _Array) -> NDArray[np.bool_]:
+        """Which of the points lie inside."""
+        x, y = points[:, 0], points[:, 1]
+        return (x >= self.x0) & (x <= self.x1) & (y >= self.y0) & (y <= self.y1)
+
+
+def track_box(track: Points) -> Box:
+    """Bounding box of a path."""
+    xs, ys = [x for x, _ in track], [y for _, y in track]
+    return Box(min(xs), min(ys), max(xs), max(ys))
+
+
+def draw_road(lanes: tuple[LaneView, ...], objects: tuple[VehicleState, ...], visible: Box) -> Road:
+    """Work out what to draw of a road.
+
+    Args:
+        lanes: The road.
+        objects: Signs and obstacles; only signs are drawn here.
+        visible: Part of the world that can be seen, in m.
+    """
+    centres = [_resample(lane.centre_m) for lane in lanes]
+    surfaces = tuple(
+        Surface(lane.id, _simplify(centre[part]), lane.width_m, lane.emergency)
+        for lane, centre in zip(lanes, centres, strict=True)
+        for part in _runs(visible.holds(centre))
+    )
+    near = [index for index, centre in enumerate(centres) if bool(visible.holds(centre).any())]
+    lines: list[Line] = []
+    for index in near:
+        lines.extend(_lines_of(index, lanes, centres, near, visible))
+    signs = tuple(_stop_sign(o, lanes, centres, near) for o in objects if o.kind == "stop_sign" and near)
+    return Road(surfaces, tuple(lines), signs)
+
+
+def _lines_of(
+    index: int, lanes: tuple[LaneView, ...], centres: list[_Array], near: list[int], visible: Box
+) -> list[Line]:
+    lane, centre = lanes[index], centres[index]
+    by_id = {lanes[i].id: lanes[i] for i in near}
+    start, end, place = lane.id
+    lines: list[Line] = []
+    for side in (-1, 1):
+        edge = centre + _right_normal(centre) * (side * lane.width_m / 2.0)
+        beside = by_id.get((start, end, place + side))
+        if beside is not None:
+            if side < 0:
+                continue  # the lane to the left paints it
+            style: LineStyle = "solid" if beside.emergency or lane.emergency else "dashed"
+            shown = visible.holds(edge)
+            lines.extend(Line(_simplify(edge[part]), style) for part in _runs(shown))
+            continue
+        shown, centre_line = visible.holds(edge), np.zeros(len(edge), dtype=np.bool_)
+        for other in near:
+            if other == index:
+                continue
+            distance, along = _distance(edge, centres[other])
+            half = lanes[other].width_m / 2.0
+            shown &= distance > half - _ON_EDGE_M
+            opposite = (along * _direction(centre)).sum(axis=1) < -0.9
+            touching = opposite & (np.abs(distance - half) <= _ON_EDGE_M)
+            centre_line |= touching
+            if other < index:
+                shown &= ~touching  # painted once, by the first of the two
+        for mask, name in ((shown & ~centre_line, "solid"), (shown & centre_line, "centre")):
+            for part in _runs(mask):
+                points = edge[part]
+                if np.hypot(*(points[-1] - points[0])) >= _SHORTEST_LINE_M:
+                    lines.append(Line(_simplify(points), name))  # type: ignore[arg-type]
+    return lines
+
+
+def _stop_sign(sign: VehicleState, lanes: tuple[LaneView, ...], centres: list[_Array], near: list[int]) -> StopSign:
+    point = np.array([[sign.x_m, sign.y_m]])
+    candidates = [i for i in near if lanes[i].id == sign.lane] or near
+    _, index = min((float(_distance(point, centres[i])[0][0]), i) for i in candidates)
+    _, along = _distance(point, centres[index])
+    right = np.array([-along[0][1], along[0][0]])
+    post = point[0] + right * _SIGN_OFFSET_M
+    half = right * (lanes[index].width_m / 2.0 - 0.2)
+    return StopSign(_pair(post), (_pair(point[0] - half), _pair(point[0] + half)))
+
+
+def _pair(point: _Array) -> tuple[float, float]:
+    return float(point[0]), float(point[1])
+
+
+def _resample(centre: Points) -> _Array:
+    points = np.asarray(centre, dtype=np.float64)
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    at = np.concatenate([[0.0], np.cumsum(steps)])
+    count = max(2, int(np.ceil(at[-1] / _SAMPLE_M)) + 1)
+    wanted = np.linspace(0.0, at[-1], count)
+    return np.column_stack([np.interp(wanted, at, points[:, 0]), np.interp(wanted, at, points[:, 1])])
+
+
+def _direction(centre: _Array) -> _Array:
+    tangent = np.gradient(centre, axis=0)
+    return tangent / np.maximum(np.hypot(tangent[:, 0], tangent[:, 1]), 1e-9)[:, None]
+
+
+def _right_normal(centre: _Array) -> _Array:
+    """Unit vector to the right of travel; y grows to the right of +x in the worlds."""
+    direction = _direction(centre)
+    return np.column_stack([-direction[:, 1], direction[:, 0]])
+
+
+def _distance(points: _Array, polyline: _Array) -> tuple[_Array, _Array]:
+    """Distance of each point to a polyline, and the polyline's direction there."""
+    slim = np.asarray(_simplify(polyline))
+    start, vector = slim[:-1], np.diff(slim, axis=0)
+    length = np.maximum((vector**2).sum(axis=1), 1e-12)
+    offset = points[:, None, :] - start[None, :, :]
+    share = np.clip((offset * vector[None, :, :]).sum(axis=2) / length, 0.0, 1.0)
+    apart = offset - share[:, :, None] * vector[None, :, :]
+    distance = np.hypot(apart[:, :, 0], apart[:, :, 1])
+    nearest = distance.argmin(axis=1)
+    unit = vector / np.sqrt(length)[:, None]
+    return distance[np.arange(len(points)), nearest], unit[nearest]
+
+
+def _runs(mask: NDArray[np.bool_]) -> list[slice]:
+    """Stretches of at least two neighbouring samples that are set."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= 2]
+
+
+def _simplify(points: _Array) -> Points:
+    """Keep the points that a straight line between kept neighbours would miss (Douglas and Peucker)."""
+    kept = {0, len(points) - 1}
+    spans = [(0, len(points) - 1)]
+    while spans:
+        first, last = spans.pop()
+        if last - first < 2:
+            continue
+        chord = points[last] - points[first]
+        inner = points[first + 1 : last] - points[first]
+        norm = float(np.hypot(chord[0], chord[1]))
+        off = np.abs(inner[:, 0] * chord[1] - inner[:, 1] * chord[0]) / max(norm, 1e-9)
+        worst = int(off.argmax())
+        if float(off[worst]) > _STRAIGHT_M:
+            middle = first + 1 + worst
+            kept.add(middle)
+            spans += [(first, middle), (middle, last)]
+    return tuple(_pair(points[index]) for index in sorted(kept))

@@ -1,0 +1,100 @@
+"""Names and numbers as people read them: speeds with both units, outcomes and scores in words."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from chauffeur.concept import Causes, Feedback, Metric, Outcome
+from chauffeur.concept.units import kmh
+
+Tone = Literal["good", "bad", "neutral"]
+
+SIMULATED = "Simulated drive (highway-env physics)"
+
+_OUTCOMES: dict[Outcome, tuple[str, Tone]] = {
+    "success": ("Done as asked", "good"),
+    "failure": ("Not done as asked", "bad"),
+    "collision": ("Collision", "bad"),
+    "off_road": ("Left the road", "bad"),
+    "timeout": ("Ran out of time", "bad"),
+    "ended": ("Drive ended", "neutral"),
+    "refused": ("Refused", "neutral"),
+    "not_driven": ("Not driven", "neutral"),
+}
+
+_METRICS = {
+    "ttc": "Time-to-collision score",
+    "sv": "Smooth-speed score",
+    "te": "Time-efficiency score",
+    "score": "Driving score",
+}
+
+_SUFFIXES = (
+    ("_mps2", "m/s²"),
+    ("_mps", "m/s"),
+    ("_rad", "rad"),
+    ("_m", "m"),
+    ("_s", "s"),
+)
+
+
+def outcome_words(outcome: Outcome) -> tuple[str, Tone]:
+    """An outcome as a short label and whether it is good news."""
+    return _OUTCOMES[outcome]
+
+
+def cause_words(causes: Causes) -> tuple[str, ...]:
+    """Every cause that holds, in words; empty when nothing went wrong."""
+    words = [
+        text
+        for holds, text in (
+            (causes.policy_failed, "The program was rejected, or failed while it ran."),
+            (causes.infra_failed, "Endpoint, sandbox or machine failed; this says nothing about the plan."),
+            (causes.refused, "The wish was declined."),
+            (causes.fallback_used, "The autopilot drove on without the program."),
+        )
+        if holds
+    ]
+    if causes.detail:
+        words.append(causes.detail)
+    return tuple(words)
+
+
+def metric_name(metric_id: str) -> str:
+    """A versioned metric id as a name: `lampilot-ttc-v1` is the time-to-collision score."""
+    parts = [part for part in metric_id.split("-") if not (part.startswith("v") and part[1:].isdigit())]
+    known = _METRICS.get(parts[-1]) if parts else None
+    return known or " ".join(parts).capitalize()
+
+
+def metric_value(metric: Metric) -> str:
+    """Value with its unit, or that it does not apply."""
+    if not metric.applies:
+        return "does not apply"
+    return speed(metric.value) if metric.unit == "m/s" else f"{metric.value:.1f} {metric.unit}".rstrip()
+
+
+def speed(speed_mps: float) -> str:
+    """A speed in both units: `28.0 m/s (101 km/h)`."""
+    return f"{speed_mps:.1f} m/s ({kmh(speed_mps):.0f} km/h)"
+
+
+def setting(name: str, value: float) -> tuple[str, str]:
+    """A named number as (label, value with unit), read off the name's unit suffix."""
+    for suffix, unit in _SUFFIXES:
+        if name.endswith(suffix):
+            label = name.removesuffix(suffix).replace("_", " ")
+            return label, speed(value) if unit == "m/s" else f"{value:g} {unit}"
+    return name.replace("_", " "), f"{value:g}"
+
+
+def feedback_words(feedback: Feedback) -> str:
+    """What a person's feedback was taken to mean, e.g. `wants a larger gap`."""
+    meanings = (
+        (feedback.speed, "wants it slower", "wants it faster"),
+        (feedback.gap, "wants a larger gap", "wants a smaller gap"),
+        (feedback.comfort, "wants it smoother", "wants it brisker"),
+        (feedback.approval, "disliked it", "liked it"),
+    )
+    said = [less if sign < 0 else more for sign, less, more in meanings if sign]
+    return ", ".join(said) or "no change wanted"

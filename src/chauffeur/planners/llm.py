@@ -1,0 +1,275 @@
+"""The planner behind any OpenAI-compatible endpoint: cloud, vLLM, SGLang, LMDeploy, llama.cpp, Ollama."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import time
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chauffeur.concept import ConfigError, InstructionError, Plan, PlanRequest, Program, Thoughts, Usage
+from chauffeur.planners.cache import Completion, ReplyCache, default_cache_dir, endpoint_key
+from chauffeur.planners.llm_address import Address, parse_address
+from chauffeur.planners.llm_endpoint import Endpoint, Sampling
+from chauffeur.planners.llm_reply import MAX_REPLY_CHARS, Reply, read_reply
+from chauffeur.planners.llm_retry import RetryPolicy, with_retries
+from chauffeur.planners.pricing import cost_usd
+from chauffeur.planners.prompts import Message, build_messages, repair_turns
+
+if TYPE_CHECKING:
+    import numpy as np
+
+_log = logging.getLogger(__name__)
+
+OnText = Callable[[str, int], None]
+"""Gets each piece of a reply, and the number of the request it belongs to: a new number means: start over."""
+
+Gate = Callable[[str], list[str]]
+"""What the static gate finds in a program, one message (line, reason, remedy) each; empty when it may drive."""
+
+INTENT_DECLINED = "declined"
+"""`Plan.intent` when the model declined."""
+
+INTENT_UNUSABLE = "unusable"
+"""`Plan.intent` when the model answered, twice, with nothing that is a program; the model failed, not the wish."""
+
+
+@dataclass(slots=True)
+class _Bill:
+    """What one plan has cost so far."""
+
+    prompt_tokens: int = 0
+    completion_tokens: int = 0
+    requests: int = 0
+    answers: int = 0
+    cached_answers: int = 0
+    priced_prompt: int = 0
+    priced_completion: int = 0
+
+
+class LlmPlanner:
+    """Asks a model for a program, checks it, and asks once more if the gate refuses it.
+
+    Args:
+        model: Model id as the endpoint knows it.
+        address: Where the endpoint is.
+        rng: Jitter of the waits between retries.
+        sampling: How to sample.
+        timeout_s: For one whole reply.
+        retry: How often and how patiently to try again.
+        repairs: How often the model may correct an answer the gate refused.
+        cache: Where to keep replies; None keeps nothing.
+        gate: Checks a program's text; default is the gate of `chauffeur.programs`.
+        on_text: Gets the reply as it is written.
+        stream: Ask for the reply piece by piece.
+        environ: Where the API key is read from.
+        sleep: Waits the given seconds.
+        clock: Seconds of a clock that never goes back.
+    """
+
+    def __init__(
+        self,
+        model: str,
+        address: Address,
+        *,
+        rng: np.random.Generator,
+        sampling: Sampling | None = None,
+        timeout_s: float = 60.0,
+        retry: RetryPolicy | None = None,
+        repairs: int = 1,
+        cache: ReplyCache | None = None,
+        gate: Gate | None = None,
+        on_text: OnText | None = None,
+        stream: bool = True,
+        environ: Mapping[str, str] = os.environ,
+        sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._model = model
+        self._address = address
+        self._rng = rng
+        self._sampling = sampling or Sampling()
+        self._retry = retry or RetryPolicy()
+        self._repairs = repairs
+        self._cache = cache
+        self._gate = gate or program_findings
+        self._on_text = on_text
+        self._sleep = sleep
+        self._clock = clock
+        self._endpoint = Endpoint(
+            address, model, timeout_s=timeout_s, max_chars=MAX_REPLY_CHARS, stream=stream, environ=environ
+        )
+
+    @classmethod
+    def from_spec(
+        cls,
+        argument: str,
+        *,
+        base_url: str | None = None,
+        temperature: float | None = 0.0,
+        seed: int | None = None,
+        max_tokens: int = 4096,
+        timeout_s: float = 60.0,
+        attempts: int = 4,
+        cache: bool = True,
+        cache_dir: str | Path | None = None,
+        stream: bool = True,
+        gate: Gate | None = None,
+        on_text: OnText | None = None,
+    ) -> LlmPlanner:
+        """Planner for `openai/<model>`.
+
+        Args:
+            argument: Model id.
+            base_url: Address of the endpoint; default CHAUFFEUR_BASE_URL, OPENAI_BASE_URL, then OpenAI's own.
+            temperature: 0..2; None leaves it to the server.
+            seed: For servers that take one; also seeds the jitter of retries.
+            max_tokens: Most tokens the model may write.
+            timeout_s: For one whole reply.
+            attempts: Requests at most per answer.
+            cache: Whether to keep replies on disk and use kept ones.
+            cache_dir: Where; default is the user's cache folder.
+            stream: Ask for the reply piece by piece.
+            gate: Checks a program's text.
+            on_text: Gets the reply as it is written.
+
+        Raises:
+            ConfigError: A setting is missing or out of range.
+        """
+        model = argument.strip()
+        if not model:
+            raise ConfigError("The openai planner needs a model.", hint="Write for example openai/gpt-4o.")
+        for name, value, fits in (
+            ("temperature", temperature, temperature is None or 0.0 <= temperature <= 2.0),
+            ("max_tokens", max_tokens, max_tokens > 0),
+            ("timeout_s", timeout_s, timeout_s > 0.0),
+            ("attempts", attempts, attempts > 0),
+        ):
+            if not fits:
+                raise ConfigError(f"{name} = {value} is out of range.")
+        import numpy as np
+
+        root = Path(cache_dir) if cache_dir is not None else default_cache_dir()
+        return cls(
+            model,
+            parse_address(base_url, os.environ),
+            rng=np.random.default_rng(seed),
+            sampling=Sampling(temperature=temperature, seed=seed, max_tokens=max_tokens),
+            timeout_s=timeout_s,
+            retry=RetryPolicy(attempts=attempts),
+            cache=ReplyCache(root) if cache else None,
+            gate=gate,
+            on_text=on_text,
+            stream=stream,
+        )
+
+    @property
+    def id(self) -> str:
+        """`openai/<model>`."""
+        return f"openai/{self._model}"
+
+    @property
+    def model(self) -> str:
+        """Model id as asked for."""
+        return self._model
+
+    async def plan(self, request: PlanRequest) -> Plan:
+        """One plan.
+
+        Raises:
+            InstructionError: The wish is empty.
+            EndpointError: The endpoint gave no reply that can be read; a `PlannerError`.
+        """
+        if not request.instruction.text.strip():
+            raise InstructionError("The instruction is empty.", hint="Say what you want the car to do.")
+        started_s = self._clock()
+        bill = _Bill()
+        messages = build_messages(request)
+        completion, reply, findings = await self._answer(messages, bill)
+        for _ in range(self._repairs):
+            if not findings:
+                break
+            _log.info("%s: asking for a repair: %s", self.id, "; ".join(findings))
+            messages = [*messages, *repair_turns(completion.text, findings)]
+            completion, reply, findings = await self._answer(messages, bill)
+        return Plan(
+            thoughts=Thoughts(reply.thoughts),
+            # A program that the gate still refuses is handed on: the checks of the loop refuse it on the record.
+            policy=Program(reply.source) if reply.source is not None else None,
+            refusal=reply.refusal or (f"The model gave no usable program: {reply.problem}." if reply.problem else ""),
+            intent=INTENT_DECLINED if reply.refusal else INTENT_UNUSABLE if reply.problem else "",
+            planner=self.id,
+            model=completion.model or self._model,
+            usage=self._usage(bill),
+            latency_s=self._clock() - started_s,
+            raw=completion.text,
+        )
+
+    async def close(self) -> None:
+        """Close the connections to the endpoint."""
+        await self._endpoint.close()
+
+    async def _answer(self, messages: list[Message], bill: _Bill) -> tuple[Completion, Reply, list[str]]:
+        completion = await self._complete(messages, bill)
+        reply = read_reply(completion.text, cut=completion.finish in {"length", "capped"})
+        if reply.problem:
+            return completion, reply, [reply.problem]
+        return completion, reply, self._gate(reply.source) if reply.source is not None else []
+
+    async def _complete(self, messages: list[Message], bill: _Bill) -> Completion:
+        bill.answers += 1
+        key = endpoint_key(self._address.url, self._model, messages, self._sampling.parameters())
+        kept = self._cache.get(key) if self._cache else None
+        if kept is not None:
+            bill.cached_answers += 1
+            bill.prompt_tokens += kept.prompt_tokens
+            bill.completion_tokens += kept.completion_tokens
+            self._show(kept.text, bill.requests)
+            return kept
+
+        async def attempt() -> Completion:
+            bill.requests += 1
+            number = bill.requests
+            return await self._endpoint.complete(messages, self._sampling, lambda text: self._show(text, number))
+
+        completion = await with_retries(attempt, self._retry, self._rng, self._sleep)
+        bill.prompt_tokens += completion.prompt_tokens
+        bill.completion_tokens += completion.completion_tokens
+        bill.priced_prompt += completion.prompt_tokens
+        bill.priced_completion += completion.completion_tokens
+        if self._cache and completion.text and completion.finish == "stop":
+            self._cache.put(key, completion)
+        return completion
+
+    def _show(self, text: str, number: int) -> None:
+        if self._on_text is None or not text:
+            return
+        try:
+            self._on_text(text, number)
+        except Exception:  # noqa: BLE001 - whatever it raised is logged with its traceback
+            # A display that fails must not cost the passenger the plan.
+            _log.exception("the display of the reply failed and is switched off")
+            self._on_text = None
+
+    def _usage(self, bill: _Bill) -> Usage:
+        return Usage(
+            prompt_tokens=bill.prompt_tokens,
+            completion_tokens=bill.completion_tokens,
+            cost_usd=cost_usd(self._address.host, self._model, bill.priced_prompt, bill.priced_completion),
+            requests=bill.requests,
+            cached=bill.cached_answers == bill.answers,
+        )
+
+
+def program_findings(source: str) -> list[str]:
+    """What the gate of `chauffeur.programs` finds in a program, in words."""
+    from chauffeur.programs.gate import check_source
+
+    return [
+        f"{f'line {finding.line}: ' if finding.line else ''}{finding.reason} {finding.remedy}".strip()
+        for finding in check_source(source).findings
+    ]

@@ -1,0 +1,228 @@
+"""What can go wrong with an endpoint, told apart, each with what the reader can do about it."""
+
+from __future__ import annotations
+
+import math
+import socket
+from collections.abc import Callable, Mapping
+from email.utils import parsedate_to_datetime
+from typing import Any, Literal, cast
+
+from chauffeur.concept import PlannerError
+from chauffeur.planners.prompts.blocks import cap, clean
+
+Kind = Literal[
+    "no_key",
+    "unauthorized",
+    "forbidden",
+    "not_found",
+    "bad_request",
+    "rate_limit",
+    "quota",
+    "server",
+    "timeout",
+    "dns",
+    "unreachable",
+    "broken",
+    "truncated",
+    "garbage",
+    "not_an_api",
+]
+
+KEY_VARIABLES = ("CHAUFFEUR_API_KEY", "OPENAI_API_KEY")
+
+_RETRYABLE_STATUS = frozenset({408, 409, 425, 429})
+_MESSAGE_CHARS = 300
+
+
+class EndpointError(PlannerError):
+    """A model endpoint did not give a usable reply.
+
+    Attributes:
+        kind: What went wrong, for programs; the message says it to people.
+        retry_after_s: How long the server asked to wait; None when it did not.
+    """
+
+    def __init__(
+        self, kind: Kind, message: str, *, hint: str = "", retryable: bool = False, retry_after_s: float | None = None
+    ) -> None:
+        super().__init__(message, hint=hint, retryable=retryable)
+        self.kind: Kind = kind
+        self.retry_after_s = retry_after_s
+
+    def after(self, attempts: int, next_wait_s: float | None = None) -> EndpointError:
+        """The same failure, with how often it was tried and, if that is why we stop, how long the wait would be."""
+        tried = f"Tried {attempts} times." if attempts > 1 else ""
+        waits = "" if next_wait_s is None else f"The next try would have to wait {next_wait_s:.0f} s."
+        message = " ".join(part for part in (self.message, tried, waits) if part)
+        return EndpointError(
+            self.kind, message, hint=self.hint, retryable=self.retryable, retry_after_s=self.retry_after_s
+        )
+
+
+def missing_key(url: str) -> EndpointError:
+    """No key in the environment for an endpoint that is not on this machine or network."""
+    return EndpointError(
+        "no_key",
+        f"No API key for {url}.",
+        hint=f"Set {KEY_VARIABLES[0]} or {KEY_VARIABLES[1]}, or give --base-url of a server of your own.",
+    )
+
+
+def timed_out(url: str, timeout_s: float) -> EndpointError:
+    """The whole reply was not there in time."""
+    return EndpointError(
+        "timeout",
+        f"{url} gave no complete reply within {timeout_s:g} s.",
+        hint="Give it longer with --timeout, or use a smaller or nearer model.",
+        retryable=True,
+    )
+
+
+def truncated(url: str) -> EndpointError:
+    """The stream ended before the model said it was done."""
+    return EndpointError("truncated", f"The reply from {url} broke off before its end.", retryable=True)
+
+
+def not_an_api(url: str, content_type: str) -> EndpointError:
+    """Something answers there, but it does not speak the protocol."""
+    return EndpointError(
+        "not_an_api",
+        f"{url} answered with {content_type or 'an unknown type'} instead of a chat completion.",
+        hint="Check --base-url; it usually ends in /v1.",
+    )
+
+
+def garbage(url: str, detail: str) -> EndpointError:
+    """A reply in the right envelope whose content is not what the protocol says."""
+    return EndpointError("garbage", f"The reply from {url} cannot be read ({detail}).", retryable=True)
+
+
+def from_sdk(
+    error: Exception, url: str, model: str, key_variable: str | None, scrub: Callable[[str], str]
+) -> EndpointError:
+    """The typed failure behind an exception of the SDK or of the HTTP stack below it.
+
+    Args:
+        error: What was raised.
+        url: The endpoint, for people.
+        model: Model asked for.
+        key_variable: Environment variable the key came from; None when none was used.
+        scrub: Takes the key out of text the server sent.
+    """
+    status = getattr(error, "status_code", None)
+    if isinstance(status, int):
+        return _from_status(status, error, url, model, key_variable, scrub)
+    if isinstance(error, ValueError | TypeError | RecursionError):
+        return garbage(url, type(error).__name__)
+    return _from_transport(error, url, scrub)
+
+
+def _from_status(
+    status: int, error: Exception, url: str, model: str, key_variable: str | None, scrub: Callable[[str], str]
+) -> EndpointError:
+    said = _server_message(error, scrub)
+    code = getattr(error, "code", None)
+    headers = _headers(error)
+    if status == 401:
+        hint = (
+            f"Check the key in {key_variable}."
+            if key_variable
+            else f"This endpoint wants a key: set {KEY_VARIABLES[0]} or {KEY_VARIABLES[1]}."
+        )
+        return EndpointError("unauthorized", f"{url} refused the API key (401).", hint=hint)
+    if status == 403:
+        return EndpointError(
+            "forbidden", f"{url} does not allow this request (403){said}.", hint="The key may lack access to the model."
+        )
+    if status == 404:
+        return EndpointError(
+            "not_found",
+            f"{url} has no model {model!r}, or is not the right address (404){said}.",
+            hint=f"See what it serves: curl {url}/models",
+        )
+    if status == 429 and code == "insufficient_quota":
+        return EndpointError("quota", f"The account at {url} has no quota left (429){said}.", hint="Check its billing.")
+    if status == 429:
+        return EndpointError(
+            "rate_limit",
+            f"{url} limits the rate of requests (429){said}.",
+            hint="Try later, or with fewer requests at a time.",
+            retryable=True,
+            retry_after_s=retry_after_s(headers),
+        )
+    retryable = status in _RETRYABLE_STATUS or (status >= 500 and status != 501)
+    if retryable:
+        return EndpointError(
+            "server",
+            f"{url} failed ({status}){said}.",
+            hint="Try later.",
+            retryable=True,
+            retry_after_s=retry_after_s(headers),
+        )
+    return EndpointError("bad_request", f"{url} does not accept the request ({status}){said}.")
+
+
+def _from_transport(error: Exception, url: str, scrub: Callable[[str], str]) -> EndpointError:
+    chain = _chain(error)
+    if any(isinstance(cause, TimeoutError) or "Timeout" in type(cause).__name__ for cause in chain):
+        return EndpointError("timeout", f"{url} did not answer in time.", hint="Try later.", retryable=True)
+    if any(isinstance(cause, socket.gaierror) for cause in chain):
+        return EndpointError(
+            "dns",
+            f"The name of {url} cannot be resolved.",
+            hint="Check --base-url and the network connection.",
+            retryable=True,
+        )
+    if any(isinstance(cause, ConnectionRefusedError) or type(cause).__name__ == "ConnectError" for cause in chain):
+        return EndpointError(
+            "unreachable",
+            f"Nothing answers at {url}.",
+            hint="Start the server, or check --base-url and the network connection.",
+            retryable=True,
+        )
+    detail = cap(clean(scrub(str(error))), _MESSAGE_CHARS)
+    return EndpointError("broken", f"The connection to {url} failed: {detail}.", hint="Try again.", retryable=True)
+
+
+def _chain(error: BaseException) -> list[BaseException]:
+    chain: list[BaseException] = []
+    current: BaseException | None = error
+    while current is not None and len(chain) < 12:
+        chain.append(current)
+        current = current.__cause__ or current.__context__
+    return chain
+
+
+def _server_message(error: Exception, scrub: Callable[[str], str]) -> str:
+    body = getattr(error, "body", None)
+    message = cast("Mapping[str, Any]", body).get("message") if isinstance(body, Mapping) else None
+    if not isinstance(message, str) or not message.strip():
+        return ""
+    return f": {cap(clean(scrub(message)), _MESSAGE_CHARS).rstrip('.')}"
+
+
+def _headers(error: Exception) -> Mapping[str, str]:
+    headers = getattr(getattr(error, "response", None), "headers", None)
+    return cast("Mapping[str, str]", headers) if isinstance(headers, Mapping) else {}
+
+
+def retry_after_s(headers: Mapping[str, str]) -> float | None:
+    """Seconds a server asks to wait, from `retry-after-ms` or `Retry-After` (seconds, or a date against its own Date).
+
+    The server's `Date` is the clock of a dated answer, so a wrong clock on this side does no harm.
+    """
+    for name, scale in (("retry-after-ms", 1e-3), ("retry-after", 1.0)):
+        value = headers.get(name, "")
+        try:
+            seconds = float(value) * scale
+        except ValueError:
+            continue
+        if math.isfinite(seconds) and seconds >= 0.0:
+            return seconds
+    try:
+        until = parsedate_to_datetime(headers.get("retry-after", ""))
+        now = parsedate_to_datetime(headers.get("date", ""))
+        return max(0.0, (until - now).total_seconds())
+    except (ValueError, TypeError):
+        return None

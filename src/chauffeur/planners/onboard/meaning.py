@@ -1,0 +1,130 @@
+"""What a wish means, as a value: the choice of a program is made on this and never on how similar sentences look.
+
+"Drive faster" and "drive slower" are 0.9 alike to a sentence encoder; here they differ in `change`, which no rule
+may lose on the way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Manoeuvre = Literal[
+    "speed", "gap", "lane", "overtake", "pull_over", "stop", "turn", "style", "keep", "resume", "follow", "yield"
+]
+"""`follow`: stay behind the lead vehicle; `yield`: let somebody in or by; `keep`: change nothing."""
+
+Side = Literal["left", "right", "straight"]
+Change = Literal[-1, 0, 1]
+Dimension = Literal["speed", "distance", "time", "share", "lanes", "bare", "other"]
+"""`share` is a factor (half is 0.5), `bare` a number without unit, `other` a unit no manoeuvre takes (minutes)."""
+
+Frame = Literal["absolute", "relative", "factor", "over_limit"]
+"""How an amount counts: as the new value, as a difference, as a multiple, or as a difference to the speed limit."""
+
+Bound = Literal["exact", "at_most", "at_least"]
+
+BIT, PLAIN, MUCH = 0.35, 0.6, 1.0
+"""Degrees in words, the same scale as `Feedback.strength`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Amount:
+    """A quantity the person named.
+
+    Attributes:
+        value: SI value (m/s, m, s), or the plain number for `share`, `lanes` and `bare`.
+        dimension: What it measures.
+        frame: How it counts.
+        bound: Whether it is a target or a limit.
+        said: The words it came from.
+    """
+
+    value: float
+    dimension: Dimension
+    frame: Frame = "absolute"
+    bound: Bound = "exact"
+    said: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """One thing to do.
+
+    Attributes:
+        manoeuvre: What kind of thing.
+        direction: Side, where it has one.
+        change: +1 more speed or a larger gap, -1 less; 0 no direction said, or hold what is.
+        amount: Quantity named, if any.
+        degree: Strength in words when no quantity is named.
+        variant: Refines the manoeuvre: `hold`, `limit`, `match`, `max`, `edge` (leftmost, rightmost), `return`,
+            or the name of a style.
+        condition: `safe` or `intersection` when the wish names one.
+        manner: `gentle`, `swift`, or empty.
+        loose: "go left" says a side and not whether lane or turn; the road decides.
+        evidence: Words that carried the meaning.
+        score: Sum of evidence weights.
+    """
+
+    manoeuvre: Manoeuvre
+    direction: Side | None = None
+    change: Change = 0
+    amount: Amount | None = None
+    degree: float = PLAIN
+    variant: str = ""
+    condition: str = ""
+    manner: str = ""
+    loose: bool = False
+    evidence: tuple[str, ...] = ()
+    score: float = 0.0
+
+    @property
+    def family(self) -> str:
+        """Short tag, e.g. `speed.increase`, `overtake.left`, `style.hurry`."""
+        if self.manoeuvre in ("speed", "gap"):
+            return f"{self.manoeuvre}.{self._how()}"
+        if self.manoeuvre == "lane" and self.variant == "hold":
+            return "lane.keep"
+        if self.manoeuvre == "style":
+            return f"style.{self.variant}"
+        if self.direction is not None:
+            return f"{self.manoeuvre}.{self.direction}"
+        return self.manoeuvre
+
+    def _how(self) -> str:
+        if self.variant in ("limit", "match", "max", "hold"):
+            return self.variant
+        if self.amount is not None and self.amount.bound != "exact":
+            return "cap" if self.amount.bound == "at_most" else "floor"
+        if self.amount is not None and self.amount.frame == "absolute":
+            return "time" if self.amount.dimension == "time" else "set"
+        return {1: "increase", -1: "decrease", 0: "hold"}[self.change]
+
+
+Why = Literal["empty", "symbols", "language", "off_topic", "question", "ambiguous", "unknown", "unsupported", "too_long"]
+
+
+@dataclass(frozen=True, slots=True)
+class NotUnderstood:
+    """Why a wish was not taken, in words that help to say it again.
+
+    Attributes:
+        why: Kind of trouble.
+        words: For the person; a question when one answer would settle it.
+    """
+
+    why: Why
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """A wish understood: what to do, in order.
+
+    Attributes:
+        steps: One to three meanings.
+        assumed: What was taken for granted, each a full sentence.
+    """
+
+    steps: tuple[Meaning, ...]
+    assumed: tuple[str, ...] = ()

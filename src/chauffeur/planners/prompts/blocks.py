@@ -1,0 +1,78 @@
+"""Data blocks: words from outside, quoted so that they can only ever be read as data.
+
+Passengers, road signs, place names and remembered text reach the model through here. A block's lines all start with
+`| `, so no line can close its block or open another; what a chat template or a tokenizer could take for a control
+token is defused; invisible characters are dropped; lengths are capped.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+INSTRUCTION_CHARS = 1_000
+CONTEXT_CHARS = 4_000
+HISTORY_FIELD_CHARS = 600
+HISTORY_POLICY_CHARS = 2_000
+HISTORY_ITEMS = 5
+FEEDBACK_CHARS = 2_000
+PROGRAM_CHARS = 8_000
+
+_NAME = re.compile(r"[a-z][a-z0-9_-]{0,31}")
+# `<|im_start|>`, DeepSeek's full-width bars, `<s>`, `</data>`, `<start_of_turn>`, `[INST]`: what models' templates use.
+_BAR_OPEN = re.compile(r"<(?=[|｜])")
+_BAR_CLOSE = re.compile(r"(?<=[|｜])>")
+_TAG = re.compile(r"<(/?[A-Za-z_][\w:.-]*(?:\s[^<>]{0,200})?/?)>")
+_BRACKET = re.compile(r"\[(/?[A-Z][A-Z_]{2,40})\]")
+
+
+def clean(text: str) -> str:
+    """Text without control, format and unassigned characters; line ends become plain newlines.
+
+    Format characters include zero-width and bidirectional ones and the tag block, which hide text from people that a
+    model still reads.
+    """
+    lines = text.encode("utf-8", "replace").decode("utf-8").splitlines()
+    return "\n".join(
+        "".join(
+            " " if char == "\t" else char for char in line if char == "\t" or unicodedata.category(char)[0] != "C"
+        ).rstrip()
+        for line in lines
+    ).strip()
+
+
+def cap(text: str, limit: int) -> str:
+    """At most `limit` characters of text, with a note of how many were left out."""
+    if len(text) <= limit:
+        return text
+    return f"{text[:limit]} [... {len(text) - limit} characters left out]"
+
+
+def defuse(text: str) -> str:
+    """Text in which nothing looks like a control token or a block border; comparisons in programs stay as they are."""
+    text = _BAR_CLOSE.sub("›", _BAR_OPEN.sub("‹", text))
+    return _BRACKET.sub(r"(\1)", _TAG.sub(r"‹\1›", text))
+
+
+def data_block(name: str, text: str, limit: int) -> str:
+    """A quoted block.
+
+    Args:
+        name: What it holds; ours, never from outside.
+        text: The words from outside.
+        limit: Most characters to keep.
+    """
+    if not _NAME.fullmatch(name):
+        raise ValueError(f"{name!r} is not a block name")
+    # The cap comes before cleaning as well, so that a huge text costs nothing; quoting may grow it a little.
+    body = defuse(cap(clean(text[: 4 * limit]), limit))
+    quoted = "\n".join(f"| {line}".rstrip() for line in body.split("\n")) if body else "| (empty)"
+    return f'<data name="{name}">\n{quoted}\n</data>'
+
+
+def program_block(source: str) -> str:
+    """A program in a fence longer than any run of back-ticks inside, for the model's own earlier turns."""
+    body = cap(source.strip("\n"), PROGRAM_CHARS)
+    longest = max((len(run) for run in re.findall(r"`{3,}", body)), default=2)
+    fence = "`" * (longest + 1)
+    return f"{fence}python\n{body}\n{fence}"

@@ -1,0 +1,106 @@
+"""The conversation: S, then C, H and I as quoted data, then earlier rounds with what was said of them."""
+
+from __future__ import annotations
+
+from typing import Literal, TypedDict
+
+from chauffeur.concept import History, HistoryItem, PlanRequest, Round
+from chauffeur.planners.prompts.blocks import (
+    CONTEXT_CHARS,
+    FEEDBACK_CHARS,
+    HISTORY_FIELD_CHARS,
+    HISTORY_ITEMS,
+    HISTORY_POLICY_CHARS,
+    INSTRUCTION_CHARS,
+    PROGRAM_CHARS,
+    cap,
+    data_block,
+    defuse,
+    program_block,
+)
+from chauffeur.planners.prompts.system import build_system_message
+
+
+class Message(TypedDict):
+    """One turn, as chat-completions endpoints take it."""
+
+    role: Literal["system", "user", "assistant"]
+    content: str
+
+
+MAX_ROUNDS = 6
+"""Earlier rounds shown to the model; older ones are left out."""
+
+MAX_FINDINGS = 12
+"""Findings of the gate shown in a repair turn."""
+
+_ASK = "Write the program for the instruction above, in the answer format."
+_ASK_AGAIN = "Write the whole program again, taking this into account, in the answer format."
+
+
+def _item(item: HistoryItem) -> str:
+    settings = ", ".join(f"{name} = {value:g}" for name, value in item.settings)
+    said = " / ".join(feedback.text for feedback in item.feedback)
+    rows = (
+        ("wish", item.instruction, HISTORY_FIELD_CHARS),
+        ("situation", item.context, HISTORY_FIELD_CHARS),
+        ("settings used", settings, HISTORY_FIELD_CHARS),
+        ("outcome", item.outcome, HISTORY_FIELD_CHARS),
+        ("passenger said afterwards", said, HISTORY_FIELD_CHARS),
+        ("program", item.policy, HISTORY_POLICY_CHARS),
+    )
+    lines = (
+        f"{label}:\n{cap(text, limit)}" if "\n" in text else f"{label}: {cap(text, limit)}"
+        for label, text, limit in rows
+        if text
+    )
+    return "\n".join(lines)
+
+
+def _history(history: History) -> str:
+    limit = len(history.items) and (4 * HISTORY_FIELD_CHARS + HISTORY_POLICY_CHARS)
+    shown = history.items[:HISTORY_ITEMS]
+    blocks = (data_block(f"trip-{index}", _item(item), limit) for index, item in enumerate(shown, start=1))
+    return "Remembered trips of this passenger, most relevant first:\n" + "\n".join(blocks)
+
+
+def wish_turn(request: PlanRequest) -> str:
+    """C, H and I, each quoted; the instruction comes last, right before the question."""
+    parts = [data_block("context", request.context.text, CONTEXT_CHARS)]
+    if request.history.items:
+        parts.append(_history(request.history))
+    parts.append(data_block("instruction", request.instruction.text, INSTRUCTION_CHARS))
+    parts.append(_ASK)
+    return "\n\n".join(parts)
+
+
+def _round(earlier: Round) -> tuple[Message, Message]:
+    text = earlier.plan_text
+    answer = cap(text, PROGRAM_CHARS) if "```" in text else program_block(text)
+    feedback = data_block("feedback", earlier.feedback, FEEDBACK_CHARS)
+    said = f"The program was driven or checked. What was said of it:\n{feedback}\n\n{_ASK_AGAIN}"
+    return ({"role": "assistant", "content": defuse(answer)}, {"role": "user", "content": said})
+
+
+def build_messages(request: PlanRequest) -> list[Message]:
+    """The whole conversation for a request; an empty S is filled with the zero-shot one for the request's limits."""
+    system = request.system if request.system.text else build_system_message(limits=request.limits)
+    messages: list[Message] = [
+        {"role": "system", "content": system.text},
+        {"role": "user", "content": wish_turn(request)},
+    ]
+    for earlier in request.rounds[-MAX_ROUNDS:]:
+        messages.extend(_round(earlier))
+    return messages
+
+
+def repair_turns(reply: str, findings: list[str]) -> list[Message]:
+    """The model's own answer, and what the checks found in it, for one more try."""
+    shown = findings[:MAX_FINDINGS]
+    if len(findings) > len(shown):
+        shown = [*shown, f"and {len(findings) - len(shown)} more"]
+    listed = data_block("findings", "\n".join(f"- {finding}" for finding in shown), FEEDBACK_CHARS)
+    return [
+        {"role": "assistant", "content": defuse(cap(reply, PROGRAM_CHARS)) or "(empty)"},
+        {"role": "user", "content": f"The checks refused this answer:\n{listed}\n\n{_ASK_AGAIN}"},
+    ]

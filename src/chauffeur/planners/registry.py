@@ -1,0 +1,71 @@
+"""Planners by name: `onboard`, `keyword`, `openai/<model>`, `replay/<path>`, and whatever else is installed.
+
+A planner is registered as an entry point in the group `chauffeur.planners`; the built-in ones use the same door:
+
+    [project.entry-points."chauffeur.planners"]
+    mine = "my_package.planner:MyPlanner"
+
+The object has a classmethod (or function) `from_spec(argument: str, **options) -> Planner`. `argument` is what stands
+after the first slash of the specification, "" without one; `options` are keyword arguments that it names itself, so
+that a mistyped one is refused. Nothing of a planner is imported before it is asked for.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from collections.abc import Callable
+
+from chauffeur.concept import ConfigError
+from chauffeur.concept.registry import load_plugin, plugin_names
+from chauffeur.planners.base import Planner
+
+GROUP = "chauffeur.planners"
+
+
+def planner_names() -> tuple[str, ...]:
+    """Names of all registered planners, sorted."""
+    return plugin_names(GROUP)
+
+
+def make_planner(spec: str, **options: object) -> Planner:
+    """The planner a specification names.
+
+    Args:
+        spec: `name` or `name/argument`.
+        **options: Settings of that planner, e.g. `base_url` for `openai`.
+
+    Raises:
+        ConfigError: Unknown name or setting, a setting the planner refuses, or a planner that cannot be imported.
+    """
+    name, _, argument = spec.strip().partition("/")
+    build = _builder(name, load_plugin(GROUP, name))
+    _check_options(name, build, argument, options)
+    planner = build(argument, **options)
+    if not isinstance(planner, Planner):
+        raise ConfigError(f"What the entry point {name!r} builds is not a planner ({type(planner).__name__}).")
+    return planner
+
+
+def _builder(name: str, target: object) -> Callable[..., object]:
+    build = getattr(target, "from_spec", None)
+    if not callable(build):
+        raise ConfigError(f"The entry point {name!r} has no from_spec(argument, **options).")
+    return build
+
+
+def _check_options(name: str, build: Callable[..., object], argument: str, options: dict[str, object]) -> None:
+    signature = inspect.signature(build)
+    try:
+        signature.bind(argument, **options)
+    except TypeError as error:
+        takes = [
+            parameter.name
+            for parameter in signature.parameters.values()
+            if parameter.kind is inspect.Parameter.KEYWORD_ONLY
+        ]
+        unknown = next((option for option in options if option not in takes), "")
+        close = difflib.get_close_matches(unknown, takes, n=1)
+        guess = f"Did you mean {close[0]!r}? " if close else ""
+        listed = f"It takes: {', '.join(takes)}." if takes else "It takes no options."
+        raise ConfigError(f"Planner {name!r}: {error}.", hint=guess + listed) from error

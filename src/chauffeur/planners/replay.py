@@ -1,0 +1,218 @@
+"""Recorded answers played back, and the recorder that writes them: the same run again, offline and for nothing.
+
+A recording is a file of JSON lines. Each line answers one request, found by the hash of the request or else by the
+words of the instruction and the number of earlier rounds; of several such lines the last counts:
+
+    {"version": 1, "request": "<hash>", "instruction": "Pass it.", "round": 0, "plan": {...}}
+    {"version": 1, "instruction": "Pass it.", "reply": "Thoughts: ...```python ...```"}
+
+`plan` is a whole plan as the recorder wrote it; `reply` is a model's words, for recordings written by hand.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from chauffeur.concept import (
+    ActionMatrix,
+    DataError,
+    Parameters,
+    Plan,
+    PlannerError,
+    PlanRequest,
+    Policy,
+    Program,
+    Thoughts,
+    Trajectory,
+    Usage,
+)
+from chauffeur.planners.base import Planner
+from chauffeur.planners.cache import content_key
+from chauffeur.planners.llm_reply import read_reply
+
+_VERSION = 1
+_MAX_BYTES = 1_000_000_000
+
+
+def request_key(request: PlanRequest) -> str:
+    """Hash of everything a planner is given."""
+    return content_key(asdict(request))
+
+
+def _words(text: str) -> str:
+    return " ".join(text.split()).casefold()
+
+
+def _fields(line: bytes) -> Mapping[str, Any]:
+    fields = json.loads(line)
+    if fields["version"] != _VERSION:
+        raise ValueError(f"version {fields['version']!r} instead of {_VERSION}")
+    return fields
+
+
+def _policy(value: Mapping[str, Any] | None) -> Policy | None:
+    if value is None:
+        return None
+    fields = dict(value)
+    kind = fields.pop("kind", "program")
+    if kind == "program":
+        return Program(str(fields["source"]))
+    if kind == "parameters":
+        return Parameters(**fields)
+    if kind == "action_matrix":
+        return ActionMatrix(pid=_three(fields["pid"]), mpc=_three(fields["mpc"]))
+    if kind == "trajectory":
+        points = tuple((float(x), float(y)) for x, y in fields["waypoints_m"])
+        return Trajectory(waypoints_m=points, period_s=float(fields["period_s"]))
+    raise ValueError(f"unknown kind of policy {kind!r}")
+
+
+def _three(values: Any) -> tuple[float, float, float]:
+    first, second, third = values
+    return float(first), float(second), float(third)
+
+
+def _plan(line: Mapping[str, Any]) -> Plan:
+    if "plan" not in line:
+        raw = str(line["reply"])
+        reply = read_reply(raw)
+        policy = Program(reply.source) if reply.source is not None else None
+        return Plan(thoughts=Thoughts(reply.thoughts), policy=policy, refusal=reply.refusal or reply.problem, raw=raw)
+    fields = dict(line["plan"])
+    return Plan(
+        thoughts=Thoughts(str(fields.pop("thoughts")["text"])),
+        policy=_policy(fields.pop("policy")),
+        settings=tuple((str(name), float(value)) for name, value in fields.pop("settings", ())),
+        usage=Usage(**fields.pop("usage", {})),
+        **fields,
+    )
+
+
+class ReplayPlanner:
+    """Answers from a recording; for the same request always with the same plan.
+
+    Args:
+        path: The recording.
+
+    Raises:
+        DataError: The recording is missing or a line of it cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._by_request: dict[str, Plan] = {}
+        self._by_words: dict[tuple[str, int], Plan] = {}
+        try:
+            if path.stat().st_size > _MAX_BYTES:
+                raise DataError(f"The recording {path} is larger than {_MAX_BYTES} bytes.")
+            content = path.read_bytes()
+        except OSError as error:
+            raise DataError(
+                f"The recording {path} cannot be read: {error.strerror}.", hint="Give the path of a JSON-lines file."
+            ) from error
+        for number, line in enumerate(content.split(b"\n"), start=1):
+            if line.strip():
+                self._take(number, line)
+        self._model = f"sha256:{hashlib.sha256(content).hexdigest()[:16]}"
+
+    @classmethod
+    def from_spec(cls, argument: str) -> ReplayPlanner:
+        """Planner for `replay/<path>`."""
+        if not argument:
+            raise DataError("The replay planner needs a recording.", hint="Write for example replay/run.jsonl.")
+        return cls(Path(argument).expanduser())
+
+    @property
+    def id(self) -> str:
+        """`replay/<file name>`."""
+        return f"replay/{self._path.name}"
+
+    @property
+    def model(self) -> str:
+        """Hash of the recording."""
+        return self._model
+
+    async def plan(self, request: PlanRequest) -> Plan:
+        """The recorded plan, marked as this planner's and as costing nothing; `Plan.model` stays the one recorded.
+
+        Raises:
+            PlannerError: The recording has no answer to this request.
+        """
+        words = (_words(request.instruction.text), len(request.rounds))
+        plan = self._by_request.get(request_key(request)) or self._by_words.get(words)
+        if plan is None:
+            raise PlannerError(
+                f"{self._path} holds no answer to {request.instruction.text[:80]!r} in round {len(request.rounds)}.",
+                hint="Record it first, with the planner that can answer it.",
+            )
+        usage = replace(plan.usage, cost_usd=0.0, requests=0, cached=True)
+        return replace(plan, planner=self.id, model=plan.model or self._model, usage=usage, latency_s=0.0)
+
+    def _take(self, number: int, line: bytes) -> None:
+        try:
+            fields = _fields(line)
+            plan = _plan(fields)
+            words = (_words(str(fields["instruction"])), int(fields.get("round", 0)))
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+            raise DataError(
+                f"Line {number} of {self._path} is not a recorded answer ({error}).",
+                hint="Remove the line, or record it again.",
+            ) from error
+        self._by_words[words] = plan
+        if isinstance(fields.get("request"), str):
+            self._by_request[fields["request"]] = plan
+
+
+class RecordingPlanner:
+    """Another planner, with every plan it makes written down.
+
+    Args:
+        inner: The planner that does the work.
+        path: Recording to add to; made readable by its owner only, because it holds a person's words.
+    """
+
+    def __init__(self, inner: Planner, path: Path) -> None:
+        self._inner = inner
+        self._path = path
+
+    @property
+    def id(self) -> str:
+        """Id of the planner that does the work."""
+        return self._inner.id
+
+    @property
+    def model(self) -> str:
+        """Model of the planner that does the work."""
+        return self._inner.model
+
+    async def plan(self, request: PlanRequest) -> Plan:
+        """The inner planner's plan, recorded before it is returned."""
+        plan = await self._inner.plan(request)
+        record = {
+            "version": _VERSION,
+            "request": request_key(request),
+            "instruction": request.instruction.text,
+            "round": len(request.rounds),
+            "plan": asdict(plan),
+        }
+        self._append(json.dumps(record).encode("ascii") + b"\n")
+        return plan
+
+    def _append(self, line: bytes) -> None:
+        try:
+            # One write to an append-only descriptor: lines of several writers do not mix.
+            descriptor = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+            try:
+                os.write(descriptor, line)
+            finally:
+                os.close(descriptor)
+        except OSError as error:
+            raise DataError(
+                f"The plan cannot be recorded in {self._path}: {error.strerror}.", hint="Check path and free space."
+            ) from error

@@ -1,0 +1,261 @@
+"""The driving APIs at run time: the catalogue bound to a world's perception and driver, and to the program's wishes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+from chauffeur.concept import ApiCall, LaneId, Turn, Wishes
+from chauffeur.programs.catalogue import APIS, MAX_SAY_CHARS, Api, Param, argument_problem
+from chauffeur.programs.handles import HandleTable, describe
+from chauffeur.worlds.base import EGO, Driver, Perception
+
+_MAX_SHOWN_CHARS: Final = 60
+_RECOVER_BELOW_MPS: Final = 1.0
+"""LaMPilot lets a car leave a stop sign only below this speed."""
+
+
+def starting_wishes(perception: Perception, time_headway_s: float = 1.5) -> Wishes:
+    """What LaMPilot starts every program with: present speed, present lane, 1.5 s headway."""
+    return Wishes(
+        target_speed_mps=perception.vehicle(EGO).speed_mps,
+        time_headway_s=time_headway_s,
+        target_lane=perception.lane_of(EGO),
+    )
+
+
+class DrivingApis:
+    """The APIs as one program sees them. Reads the present instant, holds the wishes, records every call.
+
+    Attributes:
+        wishes: What the program wants so far.
+        handles: What it has been handed out.
+    """
+
+    def __init__(self, perception: Perception, driver: Driver, wishes: Wishes) -> None:
+        self.wishes = wishes
+        self.handles = HandleTable()
+        self._perception = perception
+        self._driver = driver
+        self._said: list[str] = []
+        self._calls: list[ApiCall] = []
+        self._methods: dict[str, Callable[..., Any]] = {api: getattr(self, f"_{api}") for api in APIS}
+
+    def begin_tick(self, perception: Perception) -> None:
+        """A new control period: look at its instant, forget the last one's calls."""
+        self._perception = perception
+        self._said = []
+        self._calls = []
+
+    def settle(self) -> None:
+        """Let the world's driver move the target lane on where it ends, as it does before every command."""
+        self.wishes = self._driver.settle(self.wishes)
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """What was said in this control period."""
+        return tuple(self._said)
+
+    @property
+    def calls(self) -> tuple[ApiCall, ...]:
+        """Calls made in this control period."""
+        return tuple(self._calls)
+
+    def call(self, name: str, arguments: Sequence[Any], keywords: Mapping[str, Any]) -> Any:
+        """Make one call for the program.
+
+        Args:
+            name: API name from the catalogue.
+            arguments: Positional arguments: untrusted.
+            keywords: Keyword arguments: untrusted.
+
+        Returns:
+            Numbers, texts, handles and lists of handles only.
+
+        Raises:
+            TypeError: Wrong number, name or type of arguments.
+            ValueError: A value that cannot be: unknown handle, vehicle gone, not finite, text too long.
+        """
+        api = APIS[name]
+        problem = argument_problem(api, len(arguments), keywords.keys())
+        if problem is not None:
+            raise TypeError(problem)
+        values: list[Any] = []
+        shown: list[str] = []
+        for index, param in enumerate(api.params):
+            given = arguments[index] if index < len(arguments) else keywords.get(param.name, param.default)
+            values.append(self._decode(api, param, given))
+            if index < len(arguments) or param.name in keywords:
+                shown.append(_show(given))
+        try:
+            result = self._encode(api, self._methods[name](*values))
+        except KeyError as error:
+            raise ValueError(f"{name}: vehicle veh:{error.args[0]} is no longer on the road") from None
+        self._calls.append(ApiCall(name, ", ".join(shown), _show(result)))
+        return result
+
+    def _decode(self, api: Api, param: Param, given: Any) -> Any:
+        where = f"{api.name}({param.name})"
+        if given is None and (param.optional or param.default is None):
+            return None
+        if param.kind == "vehicle":
+            return self.handles.vehicle(given, where)
+        if param.kind == "lane":
+            return self.handles.lane(given, where)
+        if param.kind == "number":
+            return _number(given, param, where)
+        return _text(given, where)
+
+    def _encode(self, api: Api, result: Any) -> Any:
+        if result is None:
+            return None
+        if api.returns == "vehicle":
+            return self.handles.give_vehicle(result)
+        if api.returns == "lane":
+            return self.handles.give_lane(result)
+        if api.returns == "lanes":
+            return [self.handles.give_lane(lane) for lane in result]
+        if api.returns == "number":
+            return float(result)
+        return result
+
+    def _get_ego_vehicle(self) -> int:
+        return EGO
+
+    def _get_desired_time_headway(self) -> float:
+        return self.wishes.time_headway_s
+
+    def _get_target_speed(self) -> float:
+        speed = self.wishes.target_speed_mps
+        return self._perception.vehicle(EGO).speed_mps if speed is None else speed
+
+    def _say(self, text: str) -> None:
+        self._said.append(text)
+
+    def _is_safe_enter(self, lane: LaneId | None, safe_decel: float) -> bool:
+        if lane is None:
+            return False
+        perception, headway = self._perception, self.wishes.time_headway_s
+        front, rear = perception.neighbours(lane)
+        if front is not None and perception.idm_entering(EGO, front, headway) < -safe_decel:
+            return False
+        return rear is None or perception.idm_entering(rear, EGO, headway) >= -safe_decel
+
+    def _set_desired_time_headway(self, desired_time_headway: float) -> None:
+        self.wishes = replace(self.wishes, time_headway_s=desired_time_headway)
+
+    def _set_target_speed(self, target_speed: float) -> None:
+        self.wishes = replace(self.wishes, target_speed_mps=target_speed)
+
+    def _set_target_lane(self, target_lane: LaneId) -> None:
+        if not self._perception.has_lane(target_lane):
+            raise ValueError("set_target_lane: this lane is no longer part of the road")
+        self.wishes = replace(self.wishes, target_lane=target_lane)
+
+    def _autopilot(self) -> list[float]:
+        self.settle()
+        command = self._driver.command(self.wishes)
+        return [float(command.acceleration_mps2), float(command.steering_rad)]
+
+    def _recover_from_stop(self) -> None:
+        perception, served = self._perception, self.wishes.served_stops
+        if perception.vehicle(EGO).speed_mps >= _RECOVER_BELOW_MPS:
+            return
+        blocker = perception.front_blocker(served)
+        if blocker is not None and perception.vehicle(blocker).kind == "stop_sign":
+            self.wishes = replace(self.wishes, served_stops=served | {blocker})
+
+    def _get_speed_of(self, veh: int) -> float:
+        return self._perception.vehicle(veh).speed_mps
+
+    def _get_lane_of(self, veh: int) -> LaneId:
+        return self._perception.lane_of(veh)
+
+    def _detect_front_vehicle_in(self, lane: LaneId | None, distance: float) -> int | None:
+        front, _ = self._perception.neighbours(lane or self._perception.lane_of(EGO))
+        if front is None or not 0 < self._perception.distance_along(EGO, front) < distance:
+            return None
+        return front
+
+    def _detect_rear_vehicle_in(self, lane: LaneId | None, distance: float) -> int | None:
+        _, rear = self._perception.neighbours(lane or self._perception.lane_of(EGO))
+        if rear is None or not -distance < self._perception.distance_along(EGO, rear) < 0:
+            return None
+        return rear
+
+    def _get_distance_between_vehicles(self, veh1: int, veh2: int) -> float:
+        return -self._perception.distance_along(veh1, veh2)
+
+    def _get_left_lane(self, veh: int | None) -> LaneId | None:
+        return self._beside(veh, -1)
+
+    def _get_right_lane(self, veh: int | None) -> LaneId | None:
+        return self._beside(veh, 1)
+
+    def _beside(self, veh: int | None, offset: int) -> LaneId | None:
+        perception = self._perception
+        return perception.adjacent_lane(perception.lane_of(EGO if veh is None else veh), offset)
+
+    def _get_left_to_right_cross_traffic_lanes(self) -> Sequence[LaneId]:
+        return self._perception.cross_traffic_lanes(from_left=True)
+
+    def _get_right_to_left_cross_traffic_lanes(self) -> Sequence[LaneId]:
+        return self._perception.cross_traffic_lanes(from_left=False)
+
+    def _detect_stop_sign_ahead(self) -> float:
+        sign = self._perception.stop_sign_ahead(self.wishes.served_stops)
+        return -1.0 if sign is None else sign[1]
+
+    def _turn_left_at_next_intersection(self) -> None:
+        self._turn("left")
+
+    def _turn_right_at_next_intersection(self) -> None:
+        self._turn("right")
+
+    def _go_straight_at_next_intersection(self) -> None:
+        self._turn("straight")
+
+    def _turn(self, turn: Turn) -> None:
+        self.wishes = replace(self.wishes, turn=turn)
+
+    def _get_speed_limit(self) -> float:
+        return self._perception.speed_limit(self._perception.lane_of(EGO))
+
+
+def _number(given: Any, param: Param, where: str) -> float:
+    if isinstance(given, bool) or not isinstance(given, int | float):
+        unit = f" in {param.unit}" if param.unit else ""
+        raise TypeError(f"{where} must be a number{unit}, not {describe(given)}")
+    try:
+        value = float(given)
+    except OverflowError:
+        raise ValueError(f"{where} is too large a number") from None
+    if not math.isfinite(value):
+        raise ValueError(f"{where} must be a finite number, not {value}")
+    if param.clip is not None:
+        value = min(max(value, param.clip[0]), param.clip[1])
+    return value
+
+
+def _text(given: Any, where: str) -> str:
+    if given is None or isinstance(given, bool | float):
+        return str(given)
+    if isinstance(given, int) and given.bit_length() <= 64:
+        return str(given)
+    if not isinstance(given, str):
+        raise TypeError(f"{where} must be a text, not {describe(given)}")
+    if len(given) > MAX_SAY_CHARS:
+        raise ValueError(f"{where} takes at most {MAX_SAY_CHARS} characters, not {len(given)}")
+    return given
+
+
+def _show(value: Any) -> str:
+    """A checked value as short text: only numbers, flags, texts, None and lists of them come here."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        return f"[{', '.join(_show(item) for item in value)}]"
+    text = repr(value) if isinstance(value, str) and not value.startswith(("veh:", "lane:")) else str(value)
+    return text if len(text) <= _MAX_SHOWN_CHARS else f"{text[: _MAX_SHOWN_CHARS - 1]}…"

@@ -1,0 +1,226 @@
+"""Drives a language-model program: one `next()` per control period, whatever the program does."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any, Final, Self
+
+from chauffeur.concept import ApiCall, ProgramError, ProgramState, SandboxError, Wishes
+from chauffeur.programs.binding import DrivingApis, starting_wishes
+from chauffeur.programs.catalogue import APIS
+from chauffeur.programs.errors import ProgramFault, ProgramRefusedError
+from chauffeur.programs.gate import check_source
+from chauffeur.programs.rewrite import TICK, prepare
+from chauffeur.programs.sandbox import Budget, Sandbox, SandboxRun
+from chauffeur.worlds.base import World
+
+_FORMAT: Final = "chauffeur-program-1"
+
+
+@dataclass(frozen=True, slots=True)
+class TickResult:
+    """What one control period of a program came to.
+
+    Attributes:
+        wishes: What the car should do; the last wishes stay when a program has finished or failed.
+        state: State of the program after this period.
+        line: Line (1-based) it waits at, or failed at; None when it has finished.
+        said: Texts for the passenger.
+        calls: Driving-API calls made.
+        error: Why it failed; on the failing period and all later ones.
+    """
+
+    wishes: Wishes
+    state: ProgramState
+    line: int | None = None
+    said: tuple[str, ...] = ()
+    calls: tuple[ApiCall, ...] = ()
+    error: ProgramError | None = None
+
+
+class ProgramExecutor:
+    """Runs one program at a time in a sandbox. Use it as a context manager or close it.
+
+    Nothing a program does raises from here: its faults are `TickResult.error`. What may raise is `SandboxError`, when
+    no worker can be had at all, and whatever the world itself raises.
+    """
+
+    def __init__(
+        self, *, sandbox: Sandbox | None = None, budget: Budget | None = None, library: str = "", gate: bool = True
+    ) -> None:
+        """Open a sandbox, or share one.
+
+        Args:
+            sandbox: Sandbox to share (it stays open); None opens one for this executor alone.
+            budget: Limits, when a sandbox is opened here.
+            library: Helper functions every program may call with `yield from`; checked like a program.
+            gate: Whether programs pass the static gate first. Turned off only to show that the sandbox holds alone.
+        """
+        self._owned = Sandbox(budget) if sandbox is None else None
+        self._sandbox = self._owned if self._owned is not None else sandbox
+        self._library = library
+        self._gate = gate
+        self._world: World | None = None
+        self._apis: DrivingApis | None = None
+        self._run: SandboxRun | None = None
+        self._state: ProgramState = "none"
+        self._line: int | None = None
+        self._error: ProgramError | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the program, and the sandbox if it was opened here. May be called twice."""
+        self._end_run()
+        if self._owned is not None:
+            self._owned.close()
+
+    @property
+    def state(self) -> ProgramState:
+        """State of the program."""
+        return self._state
+
+    def start(self, source: str, world: World, *, wishes: Wishes | None = None) -> ProgramState:
+        """Read a program; its main function starts with the first tick.
+
+        Args:
+            source: Program text.
+            world: World it drives in.
+            wishes: What holds already, e.g. a previous program's wishes; None is present speed, lane and 1.5 s.
+
+        Returns:
+            `running`, or `failed`; the next tick then says why.
+        """
+        self._end_run()
+        self._bind(world, wishes)
+        try:
+            if self._gate:
+                report = check_source(source, self._library)
+                if not report.passed:
+                    first = report.errors[0]
+                    raise ProgramRefusedError(first.reason, line=first.line, hint=first.remedy)
+            self._run = self._open().start(prepare(source, self._library), APIS)
+            self._state = "running"
+        except ProgramFault as error:
+            self._fail(error)
+        return self._state
+
+    def tick(self) -> TickResult:
+        """Let the program run for one control period, until its next yield.
+
+        Raises:
+            SandboxError: Nothing was started.
+        """
+        apis, world = self._apis, self._world
+        if apis is None or world is None:
+            raise SandboxError("No program was started.", hint="Call start(source, world) first.")
+        apis.begin_tick(world.perception())
+        if self._run is not None:
+            try:
+                self._advance(self._run, apis)
+            except ProgramFault as error:
+                self._fail(error)
+            except BaseException:  # the world's own fault: give the worker back, then let it be known
+                self._end_run()
+                raise
+        apis.settle()
+        return TickResult(apis.wishes, self._state, self._line, apis.said, apis.calls, self._error)
+
+    def _advance(self, run: SandboxRun, apis: DrivingApis) -> None:
+        run.begin_tick()
+        call = run.answer(None)
+        while call is not None and call.name != TICK:
+            try:
+                value: Any = apis.call(call.name, call.arguments, call.keywords)
+            except (TypeError, ValueError) as error:
+                call = run.refuse(error)
+            else:
+                call = run.answer(value)
+        if call is None:
+            self._end_run()
+            self._state, self._line = "finished", None
+            return
+        line = call.arguments[0] if call.arguments else None
+        self._line = line if isinstance(line, int) and line > 0 else None
+
+    def dump(self) -> bytes:
+        """The waiting program with its wishes, to be continued by `load`; keep the bytes in a trusted place.
+
+        Raises:
+            SandboxError: No program is running.
+        """
+        if self._run is None or self._apis is None:
+            raise SandboxError("Only a running program can be dumped.")
+        vehicles, lanes = self._apis.handles.issued()
+        wishes = self._apis.wishes
+        head = {
+            "format": _FORMAT,
+            "line": self._line,
+            "vehicles": vehicles,
+            "lanes": lanes,
+            "wishes": {
+                "target_speed_mps": wishes.target_speed_mps,
+                "time_headway_s": wishes.time_headway_s,
+                "target_lane": wishes.target_lane,
+                "turn": wishes.turn,
+                "served_stops": sorted(wishes.served_stops),
+            },
+        }
+        return json.dumps(head).encode() + b"\n" + self._run.dump()
+
+    def load(self, state: bytes, world: World) -> None:
+        """Continue a dumped program in a world at the same instant. Only for bytes from a trusted place.
+
+        Raises:
+            SandboxError: The bytes are not from `dump` of this version.
+        """
+        self._end_run()
+        head_text, _, rest = state.partition(b"\n")
+        try:
+            head: dict[str, Any] = json.loads(head_text)
+            if head["format"] != _FORMAT:
+                raise ValueError(head["format"])
+            kept = head["wishes"]
+            wishes = Wishes(
+                target_speed_mps=kept["target_speed_mps"],
+                time_headway_s=kept["time_headway_s"],
+                target_lane=None if kept["target_lane"] is None else tuple(kept["target_lane"]),
+                turn=kept["turn"],
+                served_stops=frozenset(kept["served_stops"]),
+            )
+            vehicles, lanes, line = head["vehicles"], [tuple(lane) for lane in head["lanes"]], head["line"]
+        except (ValueError, KeyError, TypeError) as error:
+            raise SandboxError("The bytes are no dumped program of this version.") from error
+        apis = self._bind(world, wishes)
+        for vehicle in vehicles:
+            apis.handles.give_vehicle(vehicle)
+        for lane in lanes:
+            apis.handles.give_lane(lane)
+        self._run = self._open().resume(rest)
+        self._state, self._line = "running", line
+
+    def _open(self) -> Sandbox:
+        assert self._sandbox is not None
+        return self._sandbox
+
+    def _bind(self, world: World, wishes: Wishes | None) -> DrivingApis:
+        perception = world.perception()
+        apis = DrivingApis(perception, world.driver(), starting_wishes(perception) if wishes is None else wishes)
+        self._world, self._apis = world, apis
+        self._state, self._line, self._error = "none", None, None
+        return apis
+
+    def _fail(self, error: ProgramFault) -> None:
+        self._end_run()
+        self._state, self._error = "failed", error
+        self._line = error.line if error.line is not None else self._line
+
+    def _end_run(self) -> None:
+        if self._run is not None:
+            self._run.close()
+            self._run = None

@@ -1,0 +1,112 @@
+"""Opaque handles: what a program holds instead of a vehicle or a lane.
+
+A handle is a string that the host gave to this very program. It carries no authority of its own: the host looks it up in
+the table of what it handed out, so a made-up one is refused, and there is no object behind it to reach into.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from chauffeur.concept import LaneId
+
+VEHICLE_PREFIX: Final = "veh:"
+LANE_PREFIX: Final = "lane:"
+
+
+def vehicle_handle(vehicle_id: int) -> str:
+    """Handle of a vehicle, e.g. `veh:3`."""
+    return f"{VEHICLE_PREFIX}{vehicle_id}"
+
+
+def lane_handle(lane: LaneId) -> str:
+    """Handle of a lane, e.g. `lane:a:b:1`; a colon inside a node name is escaped so that no two lanes share one."""
+    start, end, index = lane
+    return f"{LANE_PREFIX}{_escaped(start)}:{_escaped(end)}:{index}"
+
+
+def _escaped(node: str) -> str:
+    return node.replace("%", "%25").replace(":", "%3A")
+
+
+class HandleTable:
+    """What one program has been handed out so far."""
+
+    def __init__(self) -> None:
+        self._vehicles: dict[str, int] = {}
+        self._lanes: dict[str, LaneId] = {}
+
+    def give_vehicle(self, vehicle_id: int) -> str:
+        """Handle for a vehicle, known from now on."""
+        handle = vehicle_handle(vehicle_id)
+        self._vehicles[handle] = vehicle_id
+        return handle
+
+    def give_lane(self, lane: LaneId) -> str:
+        """Handle for a lane, known from now on."""
+        handle = lane_handle(lane)
+        self._lanes[handle] = lane
+        return handle
+
+    def vehicle(self, handle: object, where: str) -> int:
+        """Vehicle id behind a handle.
+
+        Args:
+            handle: What the program passed.
+            where: API and parameter, for the message.
+
+        Raises:
+            TypeError: It is not a vehicle handle.
+            ValueError: It looks like one, but was never handed out.
+        """
+        if isinstance(handle, str):
+            known = self._vehicles.get(handle)
+            if known is not None:
+                return known
+            if handle.startswith(VEHICLE_PREFIX):
+                raise ValueError(f"{where}: {handle[:40]!r} is no vehicle this program was given")
+        raise TypeError(f"{where} must be a vehicle, not {describe(handle)}; vehicles come from get_ego_vehicle() "
+                        "or detect_front_vehicle_in()")
+
+    def lane(self, handle: object, where: str) -> LaneId:
+        """Lane behind a handle.
+
+        Args:
+            handle: What the program passed.
+            where: API and parameter, for the message.
+
+        Raises:
+            TypeError: It is not a lane handle.
+            ValueError: It looks like one, but was never handed out.
+        """
+        if isinstance(handle, str):
+            known = self._lanes.get(handle)
+            if known is not None:
+                return known
+            if handle.startswith(LANE_PREFIX):
+                raise ValueError(f"{where}: {handle[:40]!r} is no lane this program was given")
+        raise TypeError(f"{where} must be a lane, not {describe(handle)}; lanes come from get_lane_of(), "
+                        "get_left_lane() or get_right_lane()")
+
+    def issued(self) -> tuple[list[int], list[LaneId]]:
+        """Vehicles and lanes handed out, for a snapshot."""
+        return list(self._vehicles.values()), list(self._lanes.values())
+
+
+def describe(value: object) -> str:
+    """A value in a few words, whatever its size: a program's value is never rendered whole."""
+    if value is None:
+        return "None (test for None first)"
+    if isinstance(value, bool):
+        return f"{value}"
+    if isinstance(value, int):
+        return f"the number {value}" if value.bit_length() <= 64 else "a very large number"
+    if isinstance(value, float):
+        return f"the number {value:g}"
+    if isinstance(value, str):
+        if value.startswith(VEHICLE_PREFIX):
+            return "a vehicle"
+        if value.startswith(LANE_PREFIX):
+            return "a lane"
+        return f"the text {value[:30]!r}"
+    return f"a {type(value).__name__}"

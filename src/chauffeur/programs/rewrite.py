@@ -1,0 +1,185 @@
+"""Makes a generator program runnable where there are no generators, and tells the host where it stands.
+
+`yield E` becomes `__tick__(line, (E))`, a call that the host answers one control period later; `yield from f(...)`
+becomes `f(...)`, since the helper's own yields reach the host by themselves. Only those few characters change: every
+token keeps its line, so the sandbox's tracebacks name the lines the model wrote. The model's text itself is kept.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from chauffeur.programs.errors import ProgramSyntaxError
+
+TICK: Final = "__tick__"
+"""The host call that a yield turns into."""
+
+MAX_SOURCE_CHARS: Final = 20_000
+MAX_NODES: Final = 5_000
+MAX_DEPTH: Final = 40
+
+_SITE: Final = "__site__"
+_YIELD_FROM: Final = re.compile(rb"yield(?:\s|\\\n|#[^\n]*\n)+from")
+_LIBRARY_TICK: Final = f"{TICK}({_SITE}[0], ("
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A program ready for the sandbox.
+
+    Attributes:
+        library: Rewritten helper functions, fed first; empty without a library.
+        program: Rewritten program, ending in the call of its main function.
+        main: Name of the main function.
+    """
+
+    library: str
+    program: str
+    main: str
+
+
+def parse(source: str, what: str = "program") -> ast.Module:
+    """Syntax tree of a program text within the size limits.
+
+    Args:
+        source: Program text.
+        what: How to call it in messages.
+
+    Raises:
+        ProgramSyntaxError: It is too long, too deeply nested, or not Python.
+    """
+    if len(source) > MAX_SOURCE_CHARS:
+        raise ProgramSyntaxError(
+            f"The {what} has {len(source)} characters; {MAX_SOURCE_CHARS} are allowed.", hint="Write a shorter one."
+        )
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # e.g. an invalid escape in a string: harmless, and not the reader's text
+            tree = ast.parse(source)
+    except SyntaxError as error:
+        raise ProgramSyntaxError(f"The {what} is not valid Python: {error.msg}.", line=error.lineno) from None
+    except (RecursionError, MemoryError, OverflowError):
+        raise ProgramSyntaxError(f"The {what} is nested too deeply.", hint="Use simpler expressions.") from None
+    except ValueError as error:
+        raise ProgramSyntaxError(f"The {what} is not valid Python: {error}.") from None
+    _measure(tree, what)
+    return tree
+
+
+def unix_lines(text: str) -> str:
+    """Text with the line ends that byte offsets are counted by."""
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _measure(tree: ast.Module, what: str) -> None:
+    stack: list[tuple[ast.AST, int]] = [(tree, 0)]
+    nodes = 0
+    while stack:
+        node, depth = stack.pop()
+        nodes += 1
+        if depth > MAX_DEPTH or nodes > MAX_NODES:
+            too = "nested too deeply" if depth > MAX_DEPTH else "too long"
+            line = getattr(node, "lineno", None)
+            raise ProgramSyntaxError(f"The {what} is {too}.", line=line, hint="Write a simpler one.")
+        stack.extend((child, depth + 1) for child in ast.iter_child_nodes(node))
+
+
+def own_nodes(function: ast.FunctionDef | ast.Lambda | ast.Module) -> Iterator[ast.AST]:
+    """Nodes of a function's own body, in no particular order, without those of functions defined inside it."""
+    stack: list[ast.AST] = list(function.body) if isinstance(function.body, list) else [function.body]
+    while stack:
+        node = stack.pop()
+        yield node
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef):
+            stack.extend(ast.iter_child_nodes(node))
+
+
+def is_generator(function: ast.FunctionDef) -> bool:
+    """Whether a function has a yield of its own."""
+    return any(isinstance(node, ast.Yield | ast.YieldFrom) for node in own_nodes(function))
+
+
+def takes_nothing(function: ast.FunctionDef) -> bool:
+    """Whether a function can be called without arguments."""
+    args = function.args
+    required = len(args.posonlyargs) + len(args.args) - len(args.defaults)
+    return required == 0 and all(default is not None for default in args.kw_defaults)
+
+
+def main_function(tree: ast.Module) -> ast.FunctionDef | None:
+    """The main function: the last top-level generator function that can be called without arguments."""
+    for node in reversed(tree.body):
+        if isinstance(node, ast.FunctionDef) and is_generator(node) and takes_nothing(node):
+            return node
+    return None
+
+
+def generator_names(tree: ast.Module) -> frozenset[str]:
+    """Names of all generator functions a text defines, at any depth."""
+    return frozenset(n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef) and is_generator(n))
+
+
+def prepare(source: str, library: str = "") -> Prepared:
+    """Rewrite a program, and the library it may call, for the sandbox.
+
+    Args:
+        source: Program text.
+        library: Helper functions the program may call with `yield from`.
+
+    Raises:
+        ProgramSyntaxError: The text is no program, or has no main function.
+    """
+    source, library = unix_lines(source), unix_lines(library)
+    tree = parse(source)
+    main = main_function(tree)
+    if main is None:
+        raise ProgramSyntaxError(
+            "The program has no main function.",
+            hint="Write a function without parameters that yields autopilot() once per control period.",
+        )
+    helpers = ""
+    library_generators: frozenset[str] = frozenset()
+    if library.strip():
+        library_tree = parse(library, "library")
+        library_generators = generator_names(library_tree) - generator_names(tree)
+        helpers = f"{_rewrite(library, library_tree, frozenset(), in_library=True)}\n{_SITE} = {{0: 0}}\n"
+    program = _rewrite(source, tree, library_generators, in_library=False)
+    # The first tick stands before the main call: a started program has run its top level and waits like a generator.
+    return Prepared(helpers, f"{program}\n{TICK}(0, None)\n{main.name}()\n", main.name)
+
+
+def _rewrite(source: str, tree: ast.Module, library_generators: frozenset[str], *, in_library: bool) -> str:
+    text = source.encode()
+    starts = [0]
+    for line in text.split(b"\n"):
+        starts.append(starts[-1] + len(line) + 1)
+    edits: list[tuple[int, int, bytes]] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr) and any(isinstance(n, ast.Yield | ast.YieldFrom) for n in ast.walk(node)):
+            raise ProgramSyntaxError("A yield cannot stand inside an f-string.", line=node.lineno)
+        if not isinstance(node, ast.Yield | ast.YieldFrom):
+            continue
+        assert node.end_lineno is not None and node.end_col_offset is not None  # ast.parse always sets them
+        start = starts[node.lineno - 1] + node.col_offset
+        end = starts[node.end_lineno - 1] + node.end_col_offset
+        tick = _LIBRARY_TICK if in_library else f"{TICK}({node.lineno}, ("
+        if isinstance(node, ast.Yield):
+            value = "" if node.value is not None else "None"
+            edits += [(start, start + len(b"yield"), (tick + value).encode()), (end, end, b"))")]
+            continue
+        keyword = _YIELD_FROM.match(text, start)
+        assert keyword is not None  # the node starts with these two words
+        opening, closing = "(", ")"
+        if isinstance(node.value, ast.Call) and isinstance(node.value.func, ast.Name) and not in_library \
+                and node.value.func.id in library_generators:
+            # A tick inside the library reports the program line that called it.
+            opening, closing = f"({_SITE}.update({{0: {node.lineno}}}), (", "))[1]"
+        edits += [(start, keyword.end(), opening.encode()), (end, end, closing.encode())]
+    for start, end, replacement in sorted(edits, key=lambda edit: edit[:2], reverse=True):  # offsets before it stay true
+        text = text[:start] + replacement + text[end:]
+    return text.decode()

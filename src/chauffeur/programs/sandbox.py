@@ -1,0 +1,418 @@
+"""Runs model-written programs: a Rust interpreter (pydantic-monty) in worker processes that can be killed.
+
+This is the security boundary. The program's only way out is a call to the host: its yields, the driving APIs it was
+given, and requests (files, imports, unknown names) that are answered with an error. Time is limited per stretch of
+computation and per control period, memory, recursion and calls are limited too, and a worker that does not obey is
+killed and replaced. Model text never meets CPython's own `exec` or `eval`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import os
+import resource
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Self
+
+import pydantic_monty as monty
+
+from chauffeur.concept import SandboxError
+from chauffeur.programs.errors import (
+    ProgramCallsError,
+    ProgramCrashError,
+    ProgramFault,
+    ProgramMemoryError,
+    ProgramRaisedError,
+    ProgramRecursionError,
+    ProgramSyntaxError,
+    ProgramTimeError,
+)
+from chauffeur.programs.rewrite import TICK, Prepared
+
+_EPOCH: Final = datetime.datetime(2000, 1, 1, tzinfo=datetime.UTC)
+_MAX_MESSAGE_CHARS: Final = 300
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """What a program may use up. Times are wall time of the worker.
+
+    Attributes:
+        turn_s: Computation between two calls to the host.
+        tick_s: One control period, the host's answers included.
+        grace_s: How long past `turn_s` a worker may take to stop by itself before it is killed.
+        start_s: Reading the program and running its top level.
+        calls: Calls to the host in one control period.
+        memory_bytes: Heap of the program.
+        recursion: Depth of calls.
+    """
+
+    turn_s: float = 0.02
+    tick_s: float = 0.05
+    grace_s: float = 0.03
+    start_s: float = 0.25
+    calls: int = 200
+    memory_bytes: int = 16 * 1024 * 1024
+    recursion: int = 100
+
+
+@dataclass(frozen=True, slots=True)
+class HostCall:
+    """A program waiting for its host's answer. `arguments` and `keywords` are untrusted values of any type and size."""
+
+    name: str
+    arguments: tuple[Any, ...]
+    keywords: dict[str, Any]
+
+
+class Sandbox:
+    """A warm pool of worker processes. One per process that runs programs; use it as a context manager or close it.
+
+    A program and its host take turns and never run at once, so they are fastest on one core: with `pin`, workers stay
+    on the core that opened the pool (a call takes a third of the time, measured by benchmarks/program_tick.py). Pin
+    the policy process itself to that core where latency matters.
+    """
+
+    def __init__(
+        self,
+        budget: Budget | None = None,
+        *,
+        workers: int = 2,
+        max_workers: int = 8,
+        pin: bool = True,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        """Start the workers.
+
+        Args:
+            budget: Limits of every program; the defaults if None.
+            workers: Workers kept warm.
+            max_workers: Most programs running at once.
+            pin: Keep workers on the present core, where the platform can.
+            clock: Seconds, monotonic; measures the control period's budget.
+
+        Raises:
+            SandboxError: The worker program cannot be started.
+        """
+        self.budget = Budget() if budget is None else budget
+        self._clock = clock
+        self._core = _present_core() if pin else None
+        self._pool = monty.Monty(
+            min_processes=workers,
+            max_processes=max_workers,
+            checkout_timeout=1.0,
+            request_timeout=self.budget.start_s,
+            turn_duration_limit_grace=self.budget.grace_s,
+        )
+        try:
+            with _on_core(self._core):  # the pool's threads and workers inherit it
+                self._pool.__enter__()
+        except (OSError, monty.MontyError) as error:
+            raise SandboxError(
+                f"The sandbox's worker does not start: {error}.", hint="Run: pip install 'pydantic-monty>=1.4,<1.5'"
+            ) from error
+        self._open = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the workers; programs still running end with them. May be called twice."""
+        if self._open:
+            self._open = False
+            self._pool.__exit__(None, None, None)
+
+    def start(self, prepared: Prepared, names: Iterable[str]) -> SandboxRun:
+        """Read a program, run its top level and leave it waiting before its main function's first line.
+
+        Args:
+            prepared: The rewritten program.
+            names: Host functions it may call.
+
+        Raises:
+            ProgramFault: The program itself is to blame.
+            SandboxError: No worker can be had.
+        """
+        run = self._checkout()
+        try:
+            run.load(prepared, names)
+        except BaseException:
+            run.close()
+            raise
+        return run
+
+    def resume(self, state: bytes) -> SandboxRun:
+        """Continue a program from `SandboxRun.dump()`, in any process. Only for bytes from a trusted place.
+
+        Raises:
+            SandboxError: The bytes are no snapshot of this version, or no worker can be had.
+        """
+        run = self._checkout()
+        try:
+            run.restore(state)
+        except BaseException:
+            run.close()
+            raise
+        return run
+
+    def _checkout(self) -> SandboxRun:
+        if not self._open:
+            raise SandboxError("The sandbox is closed.", hint="Open a new one.")
+        budget = self.budget
+        session = self._pool.checkout(
+            script_name="program.py",
+            limits={
+                "max_turn_duration_secs": budget.turn_s,
+                "max_memory": budget.memory_bytes,
+                "max_recursion_depth": budget.recursion,
+                "max_total_sleep_secs": 0.0,
+                "max_suspensions": 2**31,  # counted per control period instead, by SandboxRun
+            },
+            assert_message_annotations=False,
+            # The same program in the same world must do the same: no clock, no entropy.
+            os_policy={"datetime": _EPOCH, "sleep": "system", "process_time": "zero", "random_start": {"seed": 0}},
+        )
+        try:
+            session.__enter__()
+        except TimeoutError as error:
+            raise SandboxError(
+                "All sandbox workers are busy.", hint="Close executors that are done.", retryable=True
+            ) from error
+        except (OSError, monty.MontyError) as error:
+            raise SandboxError(f"No sandbox worker can be had: {error}.", retryable=True) from error
+        if session.worker_pid is not None:
+            _confine(session.worker_pid, self._core)
+        return SandboxRun(session, budget, self._clock)
+
+
+class SandboxRun:
+    """One program in its worker. `answer` and `refuse` let it run on to its next call to the host."""
+
+    def __init__(self, session: monty.MontySession, budget: Budget, clock: Callable[[], float]) -> None:
+        self._session = session
+        self._budget = budget
+        self._clock = clock
+        self._names: frozenset[str] = frozenset()
+        self._snapshot: monty.FunctionSnapshot | None = None
+        self._program_feed = "<python-input-0>"
+        self._text = b""
+        self._calls = 0
+        self._deadline = 0.0
+        self._open = True
+
+    @property
+    def worker_pid(self) -> int | None:
+        """Process id of the worker, for diagnostics."""
+        return self._session.worker_pid
+
+    def begin_tick(self) -> None:
+        """A new control period: budgets start afresh."""
+        self._calls = 0
+        self._deadline = self._clock() + self._budget.tick_s
+
+    def load(self, prepared: Prepared, names: Iterable[str]) -> None:
+        """Read library and program, and run to the first tick. Raises ProgramFault."""
+        self._names = frozenset((TICK, *names))
+        self._calls = 0
+        self._deadline = self._clock() + self._budget.start_s
+        inputs = {name: _host_function(name) for name in sorted(self._names)}
+        if prepared.library:
+            self._program_feed = "<python-input-1>"
+            self._advance(lambda: self._session.feed_start(prepared.library, inputs=inputs, print_callback=_drop))
+            inputs = {}
+        self._text = prepared.program.encode()
+        call = self._advance(lambda: self._session.feed_start(prepared.program, inputs=inputs, print_callback=_drop))
+        if call is None or call.name != TICK:
+            raise ProgramRaisedError(
+                "The program calls a driving API outside its functions.",
+                exception="RuntimeError",
+                hint="Call driving APIs inside the main function.",
+            )
+
+    def restore(self, state: bytes) -> None:
+        """Take over a dumped program. Raises SandboxError."""
+        names_end = state.index(b"\n")
+        feed_end = state.index(b"\n", names_end + 1)
+        self._names = frozenset(state[:names_end].decode().split())
+        self._program_feed = state[names_end + 1 : feed_end].decode()
+        try:
+            snapshot = self._session.load_snapshot(state[feed_end + 1 :], print_callback=_drop)
+        except (monty.MontyError, ValueError) as error:
+            raise SandboxError(f"The snapshot cannot be loaded: {str(error)[:_MAX_MESSAGE_CHARS]}.") from error
+        if not isinstance(snapshot, monty.FunctionSnapshot):
+            raise SandboxError("The snapshot does not wait for its host.")
+        self._snapshot = snapshot
+
+    def dump(self) -> bytes:
+        """The waiting program as bytes. Raises SandboxError when it does not wait."""
+        if self._snapshot is None:
+            raise SandboxError("Only a waiting program can be dumped.")
+        head = f"{' '.join(sorted(self._names))}\n{self._program_feed}\n"
+        return head.encode() + self._snapshot.dump()
+
+    def answer(self, value: object) -> HostCall | None:
+        """Give the result of the waiting call; returns the next call, or None when the program has ended.
+
+        Raises:
+            ProgramFault: The program failed; the run is closed.
+        """
+        snapshot = self._waiting()
+        return self._advance(lambda: snapshot.resume({"return_value": value}))
+
+    def refuse(self, error: Exception) -> HostCall | None:
+        """Raise an error inside the program at the waiting call; otherwise as `answer`."""
+        snapshot = self._waiting()
+        return self._advance(lambda: snapshot.resume({"exception": error}))
+
+    def close(self) -> None:
+        """Give the worker back. May be called twice."""
+        if self._open:
+            self._open = False
+            self._snapshot = None
+            # A worker that is already gone has nothing to give back.
+            with contextlib.suppress(monty.MontyError, OSError):
+                self._session.__exit__(None, None, None)
+
+    def _waiting(self) -> monty.FunctionSnapshot:
+        assert self._snapshot is not None, "the program does not wait for an answer"
+        return self._snapshot
+
+    def _advance(self, step: Callable[[], monty.SyncSnapshot]) -> HostCall | None:
+        self._snapshot = None
+        try:
+            while True:
+                state = step()
+                if isinstance(state, monty.MontyComplete):
+                    return None
+                self._charge(state)
+                if isinstance(state, monty.NameLookupSnapshot):
+                    step = state.resume  # left undefined: NameError in the program
+                elif isinstance(state, monty.FutureSnapshot):
+                    raise ProgramRaisedError("The program waits for something that never comes.", exception="RuntimeError")
+                elif state.is_os_function:
+                    step = state.resume_not_handled  # PermissionError or ModuleNotFoundError in the program
+                elif state.function_name in self._names:
+                    self._snapshot = state
+                    return HostCall(str(state.function_name), state.args, state.kwargs)
+                else:
+                    step = _unknown(state)
+        except monty.MontyError as error:
+            self.close()
+            raise self._fault(error) from None
+        except BaseException:
+            self.close()
+            raise
+
+    def _charge(self, state: monty.FunctionSnapshot | monty.NameLookupSnapshot | monty.FutureSnapshot) -> None:
+        self._calls += 1
+        if self._calls > self._budget.calls:
+            raise ProgramCallsError(
+                f"The program made more than {self._budget.calls} calls in one control period.",
+                line=self._line_at(state.position),
+                hint="Yield autopilot() once per pass through every loop.",
+            )
+        if self._clock() > self._deadline:
+            raise ProgramTimeError(
+                f"The program took more than {self._budget.tick_s * 1000:.0f} ms of one control period.",
+                line=self._line_at(state.position),
+                hint="Compute less between two yields.",
+            )
+
+    def _line_at(self, position: monty.SourceRange) -> int | None:
+        if position.filename != self._program_feed or not self._text:
+            return None
+        return self._text.count(b"\n", 0, position.start) + 1
+
+    def _fault(self, error: monty.MontyError) -> ProgramFault:
+        if isinstance(error, monty.MontyCrashedError):
+            if error.timed_out:
+                return ProgramTimeError("The program did not stop in time; its worker was killed.")
+            return ProgramCrashError("The program brought its sandbox worker down; the worker was replaced.")
+        line = None
+        if isinstance(error, monty.MontyRuntimeError | monty.MontySyntaxError):
+            lines = [frame.line for frame in error.traceback() if frame.filename == self._program_feed]
+            line = lines[-1] if lines else None
+        text = str(error)[:_MAX_MESSAGE_CHARS]
+        if isinstance(error, monty.MontySyntaxError):
+            return ProgramSyntaxError(f"The program cannot be read: {text}.", line=line)
+        return _runtime_fault(text, line)
+
+
+def _runtime_fault(text: str, line: int | None) -> ProgramFault:
+    kind, _, message = text.partition(": ")
+    if kind == "TimeoutError" and "time limit exceeded" in message:
+        return ProgramTimeError(
+            f"The program computed too long without a yield or a driving API ({message}).",
+            line=line,
+            hint="Every loop must reach a `yield autopilot()`.",
+        )
+    if kind == "TimeoutError" and "sleep limit" in message:
+        return ProgramTimeError(
+            "The program tried to sleep.", line=line, hint="Wait with `yield autopilot()`; each one lasts 0.1 s."
+        )
+    if kind == "MemoryError":
+        return ProgramMemoryError("The program used too much memory.", line=line, hint="Keep no long lists or texts.")
+    if kind == "RecursionError":
+        return ProgramRecursionError("The program calls itself too deeply.", line=line, hint="Use a loop.")
+    if kind == "NotImplementedError" and "monty syntax parser" in message:
+        return ProgramSyntaxError(f"The program uses Python that its language lacks: {message}.", line=line)
+    where = "" if line is None else f" in line {line}"
+    return ProgramRaisedError(f"The program raised {text}{where}.", exception=kind, line=line)
+
+
+def _unknown(state: monty.FunctionSnapshot) -> Callable[[], monty.SyncSnapshot]:
+    missing = NameError(f"name '{str(state.function_name)[:60]}' is not defined")
+    return lambda: state.resume({"exception": missing})
+
+
+def _host_function(name: str) -> Callable[[], None]:
+    """A function that only lends its name: the sandbox hands calls of it to the host instead of making them."""
+
+    def placeholder() -> None:
+        raise AssertionError("host functions are answered by SandboxRun")
+
+    placeholder.__name__ = name
+    return placeholder
+
+
+def _drop(_stream: str, _text: str) -> None:
+    """What a program prints is for nobody; it speaks to people with say()."""
+
+
+def _present_core() -> int | None:
+    try:
+        fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
+        return int(fields[36])
+    except (OSError, IndexError, ValueError):  # not Linux
+        return None
+
+
+@contextlib.contextmanager
+def _on_core(core: int | None) -> Any:
+    if core is None or not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {core})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def _confine(pid: int, core: int | None) -> None:
+    """Second fence around a worker, from outside: no core files, few open files, bounded address space, one core."""
+    with contextlib.suppress(OSError, AttributeError, ValueError):  # not Linux, or the worker is already gone
+        resource.prlimit(pid, resource.RLIMIT_CORE, (0, 0))
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (32, 32))
+        resource.prlimit(pid, resource.RLIMIT_AS, (2 << 30, 2 << 30))
+        if core is not None:
+            for thread in Path(f"/proc/{pid}/task").iterdir():
+                os.sched_setaffinity(int(thread.name), {core})

@@ -1,0 +1,35 @@
+"""Running checks: all of them, in order, and none can take the caller down."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+
+from chauffeur.concept import Limits, Plan, Snapshot, Verdict
+from chauffeur.safety.base import Check
+from chauffeur.safety.envelope import check_parameters
+from chauffeur.safety.format import check_format
+
+DEFAULT_CHECKS: tuple[Check, ...] = (check_format, check_parameters)
+"""The two checks of the seeds: format, then parameters in context."""
+
+_log = logging.getLogger(__name__)
+
+
+def run_checks(
+    plan: Plan, snapshot: Snapshot, limits: Limits, checks: Sequence[Check] = DEFAULT_CHECKS
+) -> tuple[Verdict, ...]:
+    """Every check's verdict, in order. A check that breaks has not vouched for the plan: its verdict is a refusal."""
+    return tuple(_judge(check, plan, snapshot, limits) for check in checks)
+
+
+def _judge(check: Check, plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:
+    try:
+        return check(plan, snapshot, limits)
+    except Exception as error:  # noqa: BLE001 - whatever a check dies of, the vehicle stays under control
+        name = getattr(check, "__name__", type(check).__name__)
+        _log.warning("safety check %s failed: %r", name, error)
+        return Verdict(
+            name, False, f"The check {name} could not judge this plan ({type(error).__name__}).", None,
+            "Ask again; if it stays so, the plan's values are of the wrong types.",
+        )  # fmt: skip

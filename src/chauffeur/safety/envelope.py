@@ -1,0 +1,218 @@
+"""`parameters-v1`: every number and manoeuvre of a plan fits the situation. The second of the seeds' safety checks.
+
+It judges what can be known before driving: constants in API calls, settings the planner relies on, lane moves and
+turns the road does not have. What only shows while driving is the shield's.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+from chauffeur.concept import ActionMatrix, Limits, Parameters, Plan, Program, Snapshot, Trajectory, Verdict
+from chauffeur.concept.units import M_PER_CAR_LENGTH
+from chauffeur.safety.reading import ApiUse, Reading, read_program
+from chauffeur.safety.words import speed_words
+
+PARAMETERS_CHECK = "parameters-v1"
+
+_ROUNDING = 1e-6
+"""Slack at every bound, so that a limit reached by way of km/h is not refused for its last bit."""
+
+_TURNS = {
+    "turn_left_at_next_intersection": "turn left",
+    "turn_right_at_next_intersection": "turn right",
+    "go_straight_at_next_intersection": "go straight on",
+}
+_SIDES = {-1: "left", 1: "right"}
+_MOVES = frozenset({"lane", "change", "overtake", "pass", "merge", "move"})
+
+
+@dataclass(frozen=True, slots=True)
+class _Fault:
+    reason: str
+    remedy: str
+    line: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Road:
+    """What the checks need of a snapshot. `lanes` and `index` are 0 where the ego is on no lane of the road."""
+
+    kind: str
+    lanes: int
+    index: int
+    limit_mps: float
+    following_mps: float
+
+
+def check_parameters(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:
+    """Whether every number and manoeuvre that can be read from the plan fits the road, the situation and the limits."""
+    road = _road(snapshot)
+    faults = [*_policy_faults(plan, road, limits), *_setting_faults(plan, road, limits), *_intent_faults(plan, road)]
+    if not faults:
+        return Verdict(PARAMETERS_CHECK, True, "Every number and manoeuvre that can be read fits the situation.")
+    faults.sort(key=lambda fault: math.inf if fault.line is None else fault.line)
+    reasons = list(dict.fromkeys(fault.reason for fault in faults))
+    return Verdict(PARAMETERS_CHECK, False, " ".join(reasons), faults[0].line, faults[0].remedy)
+
+
+def _road(snapshot: Snapshot) -> _Road:
+    here = snapshot.ego.lane
+    own = sorted((lane for lane in snapshot.lanes if here and lane.id[:2] == here[:2]), key=lambda lane: lane.id[2])
+    index = next((i for i, lane in enumerate(own) if lane.id == here), None)
+    if index is None:
+        # No lane, no sign to go by: the strictest sign of the whole road holds.
+        limit = min((lane.speed_limit_mps for lane in snapshot.lanes), default=0.0)
+    else:
+        limit = own[index].speed_limit_mps
+    following = snapshot.front.speed_mps if snapshot.front is not None else snapshot.ego.speed_mps
+    return _Road(snapshot.kind, 0 if index is None else len(own), index or 0, limit, max(following, 0.0))
+
+
+def _policy_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]:
+    match plan.policy:
+        case Program(source=source):
+            reading = read_program(source)
+            for use in reading.uses:
+                yield from _use_faults(use, road, limits)
+            yield from _move_faults(reading, road)
+        case Parameters() as values:
+            yield from _speed_faults("target speed", values.target_speed_mps, road, limits)
+            yield from _lane_faults(values.lane, road)
+            if not values.look_ahead_m > 0:
+                # A vehicle's path follower with a look-ahead of 0 m no longer stops at the end of its path.
+                yield _Fault(f"A look-ahead of {values.look_ahead_m:g} m is none.", "Look ahead more than 0 m.")
+            if not values.look_ahead_ratio >= 0:
+                yield _Fault(
+                    f"A look-ahead ratio of {values.look_ahead_ratio:g} s is negative.", "Use a ratio of 0 s or more."
+                )
+        case ActionMatrix(pid=pid, mpc=mpc):
+            if not all(value >= 0 for value in (*pid, *mpc)):
+                yield _Fault("The action matrix has a negative gain or weight.", "Use gains and weights of 0 or more.")
+        case Trajectory() as trajectory:
+            yield from _trajectory_faults(trajectory, road, limits)
+        case None:
+            pass
+
+
+def _use_faults(use: ApiUse, road: _Road, limits: Limits) -> Iterator[_Fault]:
+    if use.name == "set_target_speed":
+        for value in use.values:
+            yield from _speed_faults("target speed", value, road, limits, use.line)
+    elif use.name == "set_desired_time_headway":
+        for value in use.values:
+            yield from _headway_faults(value, limits, use.line)
+    elif use.name in _TURNS and road.kind != "intersection":
+        yield _Fault(
+            f"The program wants to {_TURNS[use.name]} at the next intersection, but there is no intersection ahead.",
+            "Leave out the turn.",
+            use.line,
+        )
+
+
+def _speed_faults(what: str, value: float, road: _Road, limits: Limits, line: int | None = None) -> Iterator[_Fault]:
+    allowed = road.limit_mps + limits.max_over_limit_mps
+    cap = math.inf if limits.max_speed_mps is None else limits.max_speed_mps
+    remedy = f"Use a speed from 0 to {speed_words(min(allowed, cap))}."
+    if not math.isfinite(value):
+        yield _Fault(f"The {what} is {value}, not a speed.", remedy, line)
+    elif value < 0:
+        yield _Fault(f"A {what} of {speed_words(value)} is negative.", remedy, line)
+    elif value > allowed + _ROUNDING:
+        yield _Fault(
+            f"A {what} of {speed_words(value)} is more than {speed_words(limits.max_over_limit_mps)} above the speed "
+            f"limit of {speed_words(road.limit_mps)} here.",
+            remedy,
+            line,
+        )
+    elif value > cap + _ROUNDING:
+        yield _Fault(f"A {what} of {speed_words(value)} is above the cap of {speed_words(cap)}.", remedy, line)
+
+
+def _headway_faults(value: float, limits: Limits, line: int | None = None) -> Iterator[_Fault]:
+    low, high = limits.min_time_headway_s, limits.max_time_headway_s
+    if not low - _ROUNDING <= value <= high + _ROUNDING:
+        yield _Fault(
+            f"A time headway of {value:g} s is outside {low:g} to {high:g} s.",
+            f"Use a time headway from {low:g} to {high:g} s.",
+            line,
+        )
+
+
+def _gap_faults(gap_m: float, road: _Road, limits: Limits) -> Iterator[_Fault]:
+    """A gap is counted centre to centre; what is left between the bumpers must take at least the smallest headway."""
+    clear_m = gap_m - M_PER_CAR_LENGTH
+    needed_m = limits.min_time_headway_s * road.following_mps
+    if math.isfinite(gap_m) and clear_m > 0 and clear_m >= needed_m - _ROUNDING:
+        return
+    yield _Fault(
+        f"A gap of {gap_m:g} m centre to centre leaves {clear_m:.1f} m between the bumpers; at "
+        f"{speed_words(road.following_mps)} at least {needed_m:.1f} m ({limits.min_time_headway_s:g} s) and more than "
+        "0 m are needed.",
+        f"Keep more than {M_PER_CAR_LENGTH + needed_m:.1f} m.",
+    )
+
+
+def _move_faults(reading: Reading, road: _Road) -> Iterator[_Fault]:
+    """Only the first lane move starts from the lane the ego is in now; later ones start from wherever that led."""
+    moves = [use for use in reading.uses if use.name == "set_target_lane"]
+    offsets = [use.lane_offset for use in moves]
+    if not moves or offsets[0] is None or offsets[0] in reading.sides_tested:
+        return
+    in_order = len({use.function for use in moves}) == 1
+    if in_order or len(set(offsets)) == 1:
+        yield from _lane_faults(offsets[0], road, moves[0].line)
+
+
+def _lane_faults(offset: int, road: _Road, line: int | None = None) -> Iterator[_Fault]:
+    if offset == 0 or (road.lanes and 0 <= road.index + offset < road.lanes):
+        return
+    side = _SIDES[offset]
+    if not road.lanes:
+        reason = f"It moves to the {side}, but which lane the ego is in is not known."
+    else:
+        reason = f"It moves to the {side}, but the ego is already in the {side}most lane."
+    yield _Fault(reason, f"Stay in the lane, or test first that the lane to the {side} is not None.", line)
+
+
+def _setting_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]:
+    for name, value in plan.settings:
+        if name == "target_speed_mps":
+            yield from _speed_faults("target speed", value, road, limits)
+        elif name == "time_headway_s":
+            yield from _headway_faults(value, limits)
+        elif name == "gap_m":
+            yield from _gap_faults(value, road, limits)
+        elif not math.isfinite(value):
+            yield _Fault(f"The setting {name} is {value}, not a number.", f"Give {name} as a plain number.")
+
+
+def _intent_faults(plan: Plan, road: _Road) -> Iterator[_Fault]:
+    if plan.policy is None:
+        return
+    tokens = re.split(r"[^a-z]+", plan.intent.lower())
+    if "turn" in tokens or "straight" in tokens:
+        if road.kind != "intersection":
+            yield _Fault(
+                "It was understood as a turn at an intersection, but there is no intersection ahead.",
+                "Ask for a lane change instead, or wait for an intersection.",
+            )
+    elif _MOVES.intersection(tokens):
+        for offset, side in _SIDES.items():
+            if tokens[-1] == side:
+                yield from _lane_faults(offset, road)
+
+
+def _trajectory_faults(trajectory: Trajectory, road: _Road, limits: Limits) -> Iterator[_Fault]:
+    """Speed between successive waypoints, the first leg from the ego itself; the fastest leg is judged."""
+    points = ((0.0, 0.0), *trajectory.waypoints_m)
+    if not trajectory.period_s > 0 or len(points) < 2:
+        return
+    legs = [math.dist(a, b) / trajectory.period_s for a, b in pairwise(points)]
+    yield from _speed_faults(
+        "speed along the trajectory", math.nan if any(map(math.isnan, legs)) else max(legs), road, limits
+    )

@@ -1,0 +1,95 @@
+"""`format-v1`: the plan holds a policy of a known form. The first of the seeds' two safety checks (Sec. V-A4)."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+
+from chauffeur.concept import ActionMatrix, Limits, Parameters, Plan, Program, Snapshot, Trajectory, Verdict
+
+FORMAT_CHECK = "format-v1"
+
+
+def check_format(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:  # noqa: ARG001 - one shape for all checks
+    """Whether the policy is present, of a known kind, accepted by the static gate, and made of finite numbers."""
+    match plan.policy:
+        case None:
+            return _fail(
+                plan.refusal or "The planner gave no policy.", "Say the wish in other words, or ask for less at once."
+            )
+        case Program(source=source):
+            return _program(source)
+        case Parameters() as values:
+            if values.lane not in (-1, 0, 1):
+                return _fail(f"The lane wish is {values.lane!r}.", "Give -1 (left), 0 (stay) or 1 (right).")
+            return _finite(
+                "parameters",
+                (
+                    ("target_speed_mps", values.target_speed_mps),
+                    ("look_ahead_m", values.look_ahead_m),
+                    ("look_ahead_ratio", values.look_ahead_ratio),
+                ),
+            )
+        case ActionMatrix(pid=pid, mpc=mpc):
+            if (len(pid), len(mpc)) != (3, 3):
+                return _fail(
+                    f"The action matrix has rows of {len(pid)} and {len(mpc)} numbers.",
+                    "Give [[Kp, Ki, Kd], [Wl, Wh, Ws]]: two rows of three numbers.",
+                )
+            return _finite("action matrix", zip(("Kp", "Ki", "Kd", "Wl", "Wh", "Ws"), (*pid, *mpc), strict=True))
+        case Trajectory() as trajectory:
+            return _trajectory(trajectory)
+        case other:  # pyright: ignore[reportUnnecessaryComparison] - planners are third-party code
+            return _fail(
+                f"The policy is a {type(other).__name__}, which no executor knows.",
+                "Give a program, parameters, an action matrix or a trajectory.",
+            )
+
+
+def _program(source: str) -> Verdict:
+    from chauffeur.programs.gate import check_source
+
+    findings = check_source(source).findings
+    if findings:
+        first = findings[0]
+        more = f" ({len(findings) - 1} more findings)" if len(findings) > 1 else ""
+        return Verdict(FORMAT_CHECK, False, f"{first.reason}{more}", first.line, first.remedy)
+    return _pass("The program keeps to the driving language.")
+
+
+def _trajectory(trajectory: Trajectory) -> Verdict:
+    points = trajectory.waypoints_m
+    if not points:
+        return _fail("The trajectory has no waypoints.", "Give at least one waypoint.")
+    if not (_is_finite(trajectory.period_s) and trajectory.period_s > 0):
+        return _fail(
+            f"The waypoints are {trajectory.period_s!r} s apart.", "Give a time between waypoints greater than 0 s."
+        )
+    for index, point in enumerate(points, start=1):
+        if len(point) != 2:
+            return _fail(f"Waypoint {index} has {len(point)} coordinates.", "Give (x forward, y left) in metres.")
+    return _finite(
+        "trajectory",
+        ((f"waypoint {i} {axis}", v) for i, p in enumerate(points, 1) for axis, v in zip("xy", p, strict=True)),
+    )
+
+
+def _finite(form: str, values: Iterable[tuple[str, object]]) -> Verdict:
+    """One verdict over named numbers. `object`, because a reply's JSON may hold anything where a number should be."""
+    for name, value in values:
+        if not _is_finite(value):
+            return _fail(f"{name} of the {form} is {value!r}, not a finite number.", f"Give {name} as a plain number.")
+    return _pass(f"All numbers of the {form} are finite.")
+
+
+def _is_finite(value: object) -> bool:
+    """Compared rather than converted: `math.isfinite` raises on integers beyond the float range."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+
+
+def _pass(reason: str) -> Verdict:
+    return Verdict(FORMAT_CHECK, True, reason)
+
+
+def _fail(reason: str, remedy: str) -> Verdict:
+    return Verdict(FORMAT_CHECK, False, reason, None, remedy)

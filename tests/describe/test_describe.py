@@ -1,0 +1,106 @@
+"""C in words and as values, for every branch a snapshot can take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from chauffeur.concept import Lead, ScenarioError, Snapshot
+from chauffeur.describe import describe
+from chauffeur.describe.road import ordinal
+
+Make = Callable[..., Snapshot]
+
+
+def test_highway_in_words_and_values(highway: Make) -> None:
+    context = describe(highway(lanes=4, index=1, front=Lead(3, 42.54, 28.06)))
+    assert context.text == (
+        "I am driving at 31.3 m/s. I am on a highway with 4 lanes in my direction, in the third lane from the right. "
+        "The speed limit of my lane is 31.3 m/s. "
+        "The car ahead of me in my lane is 42.5 m away and drives at 28.1 m/s."
+    )
+    situation = context.situation
+    assert (situation.world, situation.lane_count, situation.lane_index) == ("highway", 4, 1)
+    assert situation.speed_mps == 31.26
+    assert situation.speed_limit_mps == 31.2928
+    assert situation.front == Lead(3, 42.54, 28.06)
+    assert (situation.emergency_lane, situation.stop_sign_m, situation.turns) == (False, None, ())
+
+
+@pytest.mark.parametrize(("index", "word"), [(0, "fifth"), (3, "second"), (4, "first")])
+def test_the_emergency_lane_counts_from_the_right(highway: Make, index: int, word: str) -> None:
+    context = describe(highway(lanes=5, index=index, emergency=True))
+    assert f"in the {word} lane from the right. The right-most lane is an emergency lane." in context.text
+    assert context.situation.emergency_lane
+    assert context.situation.lane_count == 5
+
+
+@pytest.mark.parametrize(("distance", "seen"), [(99.99, True), (100.0, True), (100.01, False)])
+def test_sight_ends_at_100_m(highway: Make, distance: float, seen: bool) -> None:
+    context = describe(highway(front=Lead(1, distance, 20.0)))
+    assert (context.situation.front is not None) is seen
+    assert ("no car ahead of me in my lane within 100 m" in context.text) is not seen
+
+
+def test_a_single_lane_is_said_in_the_singular(highway: Make) -> None:
+    assert "with 1 lane in my direction, in the first lane" in describe(highway(lanes=1, index=0)).text
+
+
+def test_lanes_of_other_segments_and_directions_do_not_count(highway: Make) -> None:
+    assert describe(highway(lanes=2, index=0)).situation.lane_count == 2
+
+
+def test_intersection_in_words_and_values(crossing: Make) -> None:
+    context = describe(crossing())
+    assert context.text == (
+        "I am driving at 10.0 m/s. I am coming to an intersection on a two-way road with one lane per direction. "
+        "A stop sign stands 85 m ahead of me; the autopilot stops there by itself. I may recover from the stop only "
+        "once my speed is below 1 m/s and only when crossing is safe. At the intersection I may turn left, go straight "
+        "or turn right; the route has to be chosen before I get there. The speed limit of my lane is 10.0 m/s. "
+        "There is no car ahead of me in my lane within 100 m."
+    )
+    assert context.situation.turns == ("left", "straight", "right")
+    assert context.situation.stop_sign_m == 85.0
+
+
+def test_inside_and_past_the_junction_there_is_no_choice_left(crossing: Make) -> None:
+    for lane_id in (("ir0", "il1", 0), ("il1", "o1", 0)):
+        context = describe(crossing(on=lane_id, stop_sign=None))
+        assert context.situation.turns == ()
+        assert "I am at an intersection" in context.text
+        assert "stop sign" not in context.text
+        assert "I may" not in context.text
+
+
+def test_turns_follow_the_geometry_of_the_lanes(crossing: Make) -> None:
+    lanes = crossing().lanes
+    no_left = tuple(lane for lane in lanes if lane.id != ("ir0", "il1", 0))
+    context = describe(crossing(lanes=no_left))
+    assert context.situation.turns == ("straight", "right")
+    assert "I may go straight or turn right;" in context.text
+
+
+def test_a_way_straight_back_is_no_turn(crossing: Make) -> None:
+    lanes = tuple(lane for lane in crossing().lanes if lane.id[:2] in {("o0", "ir0"), ("ir0", "il2")})
+    back = lanes[0].__class__(("ir0", "o0", 0), 4.0, 10.0, 10.0, False, False, ((-2.0, 11.0), (-2.0, 111.0)))
+    context = describe(crossing(lanes=(*lanes, back)))
+    assert context.situation.turns == ("straight",)
+    assert "I may go straight;" in context.text
+
+
+def test_unknown_world_kind_is_refused_in_words(crossing: Make) -> None:
+    with pytest.raises(ScenarioError, match=r"'moon'.*Known kinds: highway, intersection"):
+        describe(crossing(kind="moon"))
+
+
+@pytest.mark.parametrize("lane_id", [None, ("x", "y", 0)])
+def test_an_ego_off_every_lane_is_refused_in_words(crossing: Make, lane_id: tuple[str, str, int] | None) -> None:
+    with pytest.raises(ScenarioError, match="not among the 6 lanes"):
+        describe(crossing(on=lane_id))
+
+
+def test_ordinals() -> None:
+    assert [ordinal(n) for n in (1, 10, 11, 12, 13, 21, 22, 23, 24, 111)] == [
+        "first", "tenth", "11th", "12th", "13th", "21st", "22nd", "23rd", "24th", "111th",
+    ]  # fmt: skip

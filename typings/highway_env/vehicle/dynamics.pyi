@@ -1,0 +1,3 @@
+from highway_env.vehicle.kinematics import Vehicle
+
+class BicycleVehicle(Vehicle): ...
