@@ -75,6 +75,7 @@ class Exchange(BaseHTTPRequestHandler):
 
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
+    request_queue_size = 128
     model: ModelServer
 
     def handle_error(self, request: object, client_address: object) -> None:
@@ -152,9 +153,7 @@ def events(*pieces: bytes, pause_s: float = 0.0) -> Answer:
 def stream(text: str, *, finish: str = "stop", size: int = 7, usage: tuple[int, int] = (1000, 200)) -> Answer:
     """A proper streamed reply."""
     parts = [text[i : i + size] for i in range(0, len(text), size)]
-    return events(
-        chunk(""), *(chunk(part) for part in parts), chunk(finish=finish), chunk(usage=usage), DONE
-    )
+    return events(chunk(""), *(chunk(part) for part in parts), chunk(finish=finish), chunk(usage=usage), DONE)
 
 
 def whole(text: str | None, *, finish: str = "stop", usage: tuple[int, int] = (1000, 200)) -> Answer:
@@ -177,7 +176,9 @@ def body(data: bytes, content_type: str) -> Answer:
     return answer
 
 
-def fails(status: int, message: str = "no", code: str | None = None, param: str | None = None, **headers: str) -> Answer:
+def fails(
+    status: int, message: str = "no", code: str | None = None, param: str | None = None, **headers: str
+) -> Answer:
     """An error in OpenAI's form."""
     data = json.dumps({"error": {"message": message, "type": "error", "param": param, "code": code}}).encode()
 

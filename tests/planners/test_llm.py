@@ -72,7 +72,9 @@ def test_a_display_that_fails_does_not_cost_the_plan(bench, caplog):
 def test_a_refused_program_is_repaired_once(server, bench):
     worse = REPLY.replace("25.0", "250.0")
     server.script(stream(worse), stream(REPLY))
-    plan = bench.plan(gate=lambda source: ["line 3: 250 m/s is too fast. Use at most 32 m/s."] if "250" in source else [])
+    plan = bench.plan(
+        gate=lambda source: ["line 3: 250 m/s is too fast. Use at most 32 m/s."] if "250" in source else []
+    )
     assert plan.policy == Program(PROGRAM)
     assert plan.usage.requests == 2 and plan.usage.prompt_tokens == 2000
     turns = server.requests[1].body["messages"]
@@ -161,7 +163,9 @@ def test_parameters_a_server_does_not_take_are_adapted_once(server, bench, make_
     assert bench.waits == []
 
 
-@pytest.mark.parametrize("text", ["", "   \n", "I would rather talk about the weather.", "{\"a\": [1, 2", "```python\n```"])
+@pytest.mark.parametrize(
+    "text", ["", "   \n", "I would rather talk about the weather.", '{"a": [1, 2', "```python\n```"]
+)
 def test_a_reply_without_a_program_is_asked_for_again_and_then_given_up(server, bench, text):
     server.script(stream(text))
     plan = bench.plan()
@@ -180,7 +184,11 @@ def test_an_answer_cut_at_the_token_limit_is_not_driven(server, bench):
 def test_counts_that_arrive_twice_count_once(server, bench):
     from server import DONE, chunk
 
-    server.script(events(chunk(REPLY), chunk(finish="stop"), chunk(finish="stop"), chunk(usage=(10, 5)), chunk(usage=(10, 5)), DONE))
+    server.script(
+        events(
+            chunk(REPLY), chunk(finish="stop"), chunk(finish="stop"), chunk(usage=(10, 5)), chunk(usage=(10, 5)), DONE
+        )
+    )
     plan = bench.plan()
     assert (plan.usage.prompt_tokens, plan.usage.completion_tokens) == (10, 5)
 

@@ -137,13 +137,14 @@ def run_episode(
     said: list[tuple[float, str]] = []
     failure: ChauffeurError | None = None
     fallback: Wishes | None = None
+    held = driver.initial_wishes()
     idle = 0
     ticks = 0
     limit = round(max_s / world.dt_s)
     end = limit
     while ticks < end:
         at_s = ticks * world.dt_s
-        tick = policy.tick() if fallback is None else HeldWishes(fallback, state="failed")
+        tick = _ask(policy, held) if fallback is None else HeldWishes(fallback, state="failed")
         said.extend((at_s, text) for text in tick.said)
         if tick.error is not None and fallback is None:
             failure = tick.error
@@ -153,6 +154,7 @@ def run_episode(
         wishes = driver.settle(tick.wishes)
         if adjust is not None:
             wishes = adjust(wishes)
+        held = wishes
         requested = driver.command(wishes)
         before = world.snapshot() if record else None
         applied = world.step(requested)
@@ -184,6 +186,14 @@ def run_episode(
         said=tuple(said),
         success=success,
     )
+
+
+def _ask(policy: RunningPolicy, held: Wishes) -> PolicyTick:
+    """The policy's tick; a broken sandbox is a failed tick with the wishes held, never an exception at the wheel."""
+    try:
+        return policy.tick()
+    except SandboxError as error:
+        return HeldWishes(held, state="failed", error=error)
 
 
 def _safe(world: World, wishes: Wishes) -> Wishes:

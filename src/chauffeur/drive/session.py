@@ -31,7 +31,7 @@ from chauffeur.concept import (
 )
 from chauffeur.concept.registry import load_plugin
 from chauffeur.describe import describe
-from chauffeur.drive.episode import Episode, HeldWishes, Referee, RunningPolicy, run_episode
+from chauffeur.drive.episode import Episode, HeldWishes, Referee, run_episode
 from chauffeur.drive.loop import Memory, Stages, drive
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.planners.base import Planner
@@ -169,8 +169,8 @@ def drive_program(
 ) -> Episode:
     """Run a checked program on a world just reset."""
     with ProgramExecutor() as executor:
-        policy: RunningPolicy = executor.start(source, world)
-        return run_episode(world, policy, referee, max_s=max_s, record=record, watch=watch)
+        executor.start(source, world)
+        return run_episode(world, executor, referee, max_s=max_s, record=record, watch=watch)
 
 
 def drive_without_program(world: World, referee: Referee | None, max_s: float, **options: Any) -> Episode:

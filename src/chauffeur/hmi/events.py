@@ -8,6 +8,7 @@ from typing import Literal
 
 from chauffeur.concept import Frame, Snapshot
 from chauffeur.drive.recording import RecordedTrip
+from chauffeur.hmi.view import instants_of
 
 EventKind = Literal["said", "lane_change", "stopped", "finished", "failed", "collision", "off_road"]
 
@@ -30,15 +31,9 @@ class Event:
     label: str
 
 
-def snapshots_of(recorded: RecordedTrip) -> tuple[Snapshot, ...]:
-    """Every instant of a trip, the one after the last command included."""
-    instants = tuple(frame.snapshot for frame in recorded.frames)
-    return (*instants, recorded.final) if recorded.final is not None else instants
-
-
 def events_of(recorded: RecordedTrip) -> tuple[Event, ...]:
     """All marks of a trip, in order of time."""
-    events = [*_program_events(recorded.frames), *_drive_events(snapshots_of(recorded))]
+    events = [*_program_events(recorded.frames), *_drive_events(instants_of(recorded))]
     events.extend(Event(f.snapshot.time_s, "said", text) for f in recorded.frames for text in f.said)
     return tuple(sorted(events, key=lambda event: event.time_s))
 

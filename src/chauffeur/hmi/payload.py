@@ -24,14 +24,12 @@ from chauffeur.concept import (
 )
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
-from chauffeur.hmi.events import events_of, snapshots_of
+from chauffeur.hmi.events import events_of
 from chauffeur.hmi.road import Box, Road, draw_road, track_box
+from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 
 _SIGHT_M = 260.0
 """Nothing farther from the ego's path than this is ever on the screen."""
-_FIXED_MARGIN_M = 14.0
-_FLAT_ROAD_M = 40.0
-"""A road that spreads less than this across +x is shown lengthwise, with the camera moving along."""
 
 Json = dict[str, Any]
 
@@ -133,30 +131,6 @@ def program_tokens(source: str) -> list[list[tuple[str, str]]]:
     return [[("" if name == "i" else name, text) for name, text in line] for line in lines]
 
 
-def camera_box(instants: Iterable[Snapshot]) -> tuple[bool, Box]:
-    """How to look at a drive: (whether the camera moves along the road, the box that must be seen).
-
-    For a moving camera only the box's height counts.
-    """
-    shots = tuple(instants)
-    path = track_box(tuple((s.ego.x_m, s.ego.y_m) for s in shots))
-    if shots[0].kind == "intersection":
-        return False, path.grown(_FIXED_MARGIN_M)
-    beside = path.grown(60.0)
-    rows = [
-        y + side * lane.width_m / 2.0
-        for lane in shots[0].lanes
-        for (x0, _), (x1, _) in [(lane.centre_m[0], lane.centre_m[-1])]
-        if min(x0, x1) <= beside.x1 and max(x0, x1) >= beside.x0
-        for _, y in lane.centre_m
-        for side in (-1, 1)
-    ]
-    low, high = min([*rows, path.y0]), max([*rows, path.y1])
-    if high - low > _FLAT_ROAD_M:
-        return False, path.grown(_FIXED_MARGIN_M)
-    return True, Box(path.x0, low, path.x1, high)
-
-
 def _program_lines(policy: Policy | None) -> list[list[tuple[str, str]]] | None:
     return program_tokens(policy.source.rstrip("\n")) if isinstance(policy, Program) else None
 
@@ -175,7 +149,7 @@ def _history_item(item: HistoryItem) -> Json:
 
 def _drive(recorded: RecordedTrip) -> Json | None:
     """The moving part: one column per quantity, one entry per instant."""
-    shots = snapshots_of(recorded)
+    shots = facing_right(instants_of(recorded))
     if not shots:
         return None
     frames = recorded.frames
@@ -183,12 +157,12 @@ def _drive(recorded: RecordedTrip) -> Json | None:
     rows: tuple[Frame | None, ...] = frames + (frames[-1:] or (None,)) * (len(shots) - len(frames))
     lanes = shots[0].lanes
     limits = {lane.id: lane.speed_limit_mps for lane in lanes}
-    moving, box = camera_box(shots)
+    camera = frame_drive(shots)
     sight = track_box(tuple((s.ego.x_m, s.ego.y_m) for s in shots)).grown(_SIGHT_M)
     road = draw_road(lanes, shots[0].objects, sight)
     return {
         "time": [round(s.time_s, 2) for s in shots],
-        "camera": {"along": moving, "box": [round(v, 2) for v in (box.x0, box.y0, box.x1, box.y1)]},
+        "camera": {"along": camera.along, "box": [round(edge, 2) for edge in camera.box.edges]},
         "road": _road(road),
         "obstacles": [_body(o) for o in shots[0].objects if o.kind == "obstacle"],
         "ego": {**_column([s.ego for s in shots]), "first": 0, "l": shots[0].ego.length_m, "w": shots[0].ego.width_m},
@@ -288,4 +262,4 @@ def _lane_words(shot: Snapshot, lanes: Iterable[Any]) -> str:
     if any(lane.emergency and lane.id[2] == place for lane in abreast):
         return "emergency lane"
     count = sum(not lane.emergency for lane in abreast)
-    return f"lane {place + 1} of {count} from the left"
+    return f"lane {place + 1} of {count}"

@@ -72,6 +72,11 @@ class Box:
     x1: float
     y1: float
 
+    @property
+    def edges(self) -> tuple[float, float, float, float]:
+        """(x0, y0, x1, y1)."""
+        return self.x0, self.y0, self.x1, self.y1
+
     def grown(self, margin_m: float) -> Box:
         """The box, larger by a margin on every side."""
         return Box(self.x0 - margin_m, self.y0 - margin_m, self.x1 + margin_m, self.y1 + margin_m)

@@ -269,7 +269,5 @@ def program_findings(source: str) -> list[str]:
     """What the gate of `chauffeur.programs` finds in a program, in words."""
     from chauffeur.programs.gate import check_source
 
-    return [
-        f"{f'line {finding.line}: ' if finding.line else ''}{finding.reason} {finding.remedy}".strip()
-        for finding in check_source(source).findings
-    ]
+    report = check_source(source)
+    return [] if report.passed else [str(finding) for finding in report.findings]

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from chauffeur.concept import ApiCall, LaneId, Turn, Wishes
 from chauffeur.programs.catalogue import APIS, MAX_SAY_CHARS, Api, Param, argument_problem
+from chauffeur.programs.errors import BadArgumentTypeError, BadArgumentValueError
 from chauffeur.programs.handles import HandleTable, describe
 from chauffeur.worlds.base import EGO, Driver, Perception
 
@@ -75,13 +76,13 @@ class DrivingApis:
             Numbers, texts, handles and lists of handles only.
 
         Raises:
-            TypeError: Wrong number, name or type of arguments.
-            ValueError: A value that cannot be: unknown handle, vehicle gone, not finite, text too long.
+            BadArgumentTypeError: Wrong number, name or type of arguments.
+            BadArgumentValueError: A value that cannot be: unknown handle, vehicle gone, not finite, text too long.
         """
         api = APIS[name]
         problem = argument_problem(api, len(arguments), keywords.keys())
         if problem is not None:
-            raise TypeError(problem)
+            raise BadArgumentTypeError(problem)
         values: list[Any] = []
         shown: list[str] = []
         for index, param in enumerate(api.params):
@@ -92,7 +93,9 @@ class DrivingApis:
         try:
             result = self._encode(api, self._methods[name](*values))
         except KeyError as error:
-            raise ValueError(f"{name}: vehicle veh:{error.args[0]} is no longer on the road") from None
+            if not (error.args and isinstance(error.args[0], int)):
+                raise
+            raise BadArgumentValueError(f"{name}: vehicle veh:{error.args[0]} is no longer on the road") from None
         self._calls.append(ApiCall(name, ", ".join(shown), _show(result)))
         return result
 
@@ -151,7 +154,7 @@ class DrivingApis:
 
     def _set_target_lane(self, target_lane: LaneId) -> None:
         if not self._perception.has_lane(target_lane):
-            raise ValueError("set_target_lane: this lane is no longer part of the road")
+            raise BadArgumentValueError("set_target_lane: this lane is no longer part of the road")
         self.wishes = replace(self.wishes, target_lane=target_lane)
 
     def _autopilot(self) -> list[float]:
@@ -227,13 +230,13 @@ class DrivingApis:
 def _number(given: Any, param: Param, where: str) -> float:
     if isinstance(given, bool) or not isinstance(given, int | float):
         unit = f" in {param.unit}" if param.unit else ""
-        raise TypeError(f"{where} must be a number{unit}, not {describe(given)}")
+        raise BadArgumentTypeError(f"{where} must be a number{unit}, not {describe(given)}")
     try:
         value = float(given)
     except OverflowError:
-        raise ValueError(f"{where} is too large a number") from None
+        raise BadArgumentValueError(f"{where} is too large a number") from None
     if not math.isfinite(value):
-        raise ValueError(f"{where} must be a finite number, not {value}")
+        raise BadArgumentValueError(f"{where} must be a finite number, not {value}")
     if param.clip is not None:
         value = min(max(value, param.clip[0]), param.clip[1])
     return value
@@ -245,9 +248,9 @@ def _text(given: Any, where: str) -> str:
     if isinstance(given, int) and given.bit_length() <= 64:
         return str(given)
     if not isinstance(given, str):
-        raise TypeError(f"{where} must be a text, not {describe(given)}")
+        raise BadArgumentTypeError(f"{where} must be a text, not {describe(given)}")
     if len(given) > MAX_SAY_CHARS:
-        raise ValueError(f"{where} takes at most {MAX_SAY_CHARS} characters, not {len(given)}")
+        raise BadArgumentValueError(f"{where} takes at most {MAX_SAY_CHARS} characters, not {len(given)}")
     return given
 
 

@@ -1,7 +1,7 @@
 """The driving APIs: one table, three readers.
 
-Prompt documentation (`render_docs`), the static gate's signatures (`argument_problem`) and the run-time binding all read
-`CATALOGUE`. Names and meanings are those of the public LaMPilot benchmark, so its programs run unchanged;
+Prompt documentation (`render_docs`), the static gate's signatures (`argument_problem`) and the run-time binding all
+read `CATALOGUE`. Names and meanings are those of the public LaMPilot benchmark, so its programs run unchanged;
 `get_speed_limit` is ours. A vehicle or lane is an opaque handle: a program passes it on, compares it with `==` or tests
 it for None, and can do nothing else with it.
 """
@@ -44,8 +44,8 @@ class Param:
         default: `required`, a number, or None (the API's documented fallback).
         optional: Whether an explicit None is accepted.
         low, high: Range in which a constant written in a program makes sense; outside it is a slip of unit or sign.
-        clip: Range a number is silently clipped to at run time, as LaMPilot does; None raises outside low..high
-            only for values that are not finite.
+        clip: Range a number is clipped to at run time, as LaMPilot clips the headway; None for no clipping. Numbers
+            that are not finite are refused in any case.
     """
 
     name: str
@@ -156,9 +156,7 @@ CATALOGUE: Final[tuple[Api, ...]] = (
         "Clipped to 0.01..2.0 s.",
         "nothing",
         "set_desired_time_headway(1.2)",
-        params=(
-            Param("desired_time_headway", "number", "time headway", "s", low=0.0, high=10.0, clip=(0.01, 2.0)),
-        ),
+        params=(Param("desired_time_headway", "number", "time headway", "s", low=0.0, high=10.0, clip=(0.01, 2.0)),),
         effect="wish",
     ),
     Api(

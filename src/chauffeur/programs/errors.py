@@ -5,7 +5,7 @@ from __future__ import annotations
 from chauffeur.concept import ProgramError
 
 
-class ProgramFault(ProgramError):
+class ProgramFaultError(ProgramError):
     """A program failed.
 
     Attributes:
@@ -17,15 +17,15 @@ class ProgramFault(ProgramError):
         self.line = line
 
 
-class ProgramRefusedError(ProgramFault):
+class ProgramRefusedError(ProgramFaultError):
     """The static gate found something the language does not allow; nothing ran."""
 
 
-class ProgramSyntaxError(ProgramFault):
+class ProgramSyntaxError(ProgramFaultError):
     """The text is not a program of the language; nothing ran."""
 
 
-class ProgramRaisedError(ProgramFault):
+class ProgramRaisedError(ProgramFaultError):
     """The program raised an exception and did not catch it.
 
     Attributes:
@@ -37,21 +37,29 @@ class ProgramRaisedError(ProgramFault):
         self.exception = exception
 
 
-class ProgramTimeError(ProgramFault):
+class ProgramTimeError(ProgramFaultError):
     """The program computed for longer than one control period allows."""
 
 
-class ProgramMemoryError(ProgramFault):
+class ProgramMemoryError(ProgramFaultError):
     """The program asked for more memory than its budget."""
 
 
-class ProgramRecursionError(ProgramFault):
+class ProgramRecursionError(ProgramFaultError):
     """The program called itself too deeply."""
 
 
-class ProgramCallsError(ProgramFault):
+class ProgramCallsError(ProgramFaultError):
     """The program made more driving-API calls in one control period than its budget."""
 
 
-class ProgramCrashError(ProgramFault):
+class ProgramCrashError(ProgramFaultError):
     """The program brought its sandbox worker down; the worker is replaced and nothing else was touched."""
+
+
+class BadArgumentTypeError(TypeError):
+    """A driving API was called with arguments of the wrong shape or type; raised inside the program as TypeError."""
+
+
+class BadArgumentValueError(ValueError):
+    """A driving API was given a value that cannot be; raised inside the program as ValueError."""

@@ -9,7 +9,12 @@ from typing import Any, Final, Self
 from chauffeur.concept import ApiCall, ProgramError, ProgramState, SandboxError, Wishes
 from chauffeur.programs.binding import DrivingApis, starting_wishes
 from chauffeur.programs.catalogue import APIS
-from chauffeur.programs.errors import ProgramFault, ProgramRefusedError
+from chauffeur.programs.errors import (
+    BadArgumentTypeError,
+    BadArgumentValueError,
+    ProgramFaultError,
+    ProgramRefusedError,
+)
 from chauffeur.programs.gate import check_source
 from chauffeur.programs.rewrite import TICK, prepare
 from chauffeur.programs.sandbox import Budget, Sandbox, SandboxRun
@@ -106,7 +111,7 @@ class ProgramExecutor:
                     raise ProgramRefusedError(first.reason, line=first.line, hint=first.remedy)
             self._run = self._open().start(prepare(source, self._library), APIS)
             self._state = "running"
-        except ProgramFault as error:
+        except ProgramFaultError as error:
             self._fail(error)
         return self._state
 
@@ -123,7 +128,7 @@ class ProgramExecutor:
         if self._run is not None:
             try:
                 self._advance(self._run, apis)
-            except ProgramFault as error:
+            except ProgramFaultError as error:
                 self._fail(error)
             except BaseException:  # the world's own fault: give the worker back, then let it be known
                 self._end_run()
@@ -137,8 +142,10 @@ class ProgramExecutor:
         while call is not None and call.name != TICK:
             try:
                 value: Any = apis.call(call.name, call.arguments, call.keywords)
-            except (TypeError, ValueError) as error:
-                call = run.refuse(error)
+            except BadArgumentTypeError as error:
+                call = run.refuse(TypeError(str(error)))
+            except BadArgumentValueError as error:
+                call = run.refuse(ValueError(str(error)))
             else:
                 call = run.answer(value)
         if call is None:
@@ -159,11 +166,10 @@ class ProgramExecutor:
         vehicles, lanes = self._apis.handles.issued()
         wishes = self._apis.wishes
         head = {
-            "format": _FORMAT,
             "line": self._line,
             "vehicles": vehicles,
             "lanes": lanes,
-            "wishes": {
+            _FORMAT: {
                 "target_speed_mps": wishes.target_speed_mps,
                 "time_headway_s": wishes.time_headway_s,
                 "target_lane": wishes.target_lane,
@@ -183,9 +189,7 @@ class ProgramExecutor:
         head_text, _, rest = state.partition(b"\n")
         try:
             head: dict[str, Any] = json.loads(head_text)
-            if head["format"] != _FORMAT:
-                raise ValueError(head["format"])
-            kept = head["wishes"]
+            kept = head[_FORMAT]
             wishes = Wishes(
                 target_speed_mps=kept["target_speed_mps"],
                 time_headway_s=kept["time_headway_s"],
@@ -215,7 +219,7 @@ class ProgramExecutor:
         self._state, self._line, self._error = "none", None, None
         return apis
 
-    def _fail(self, error: ProgramFault) -> None:
+    def _fail(self, error: ProgramFaultError) -> None:
         self._end_run()
         self._state, self._error = "failed", error
         self._line = error.line if error.line is not None else self._line

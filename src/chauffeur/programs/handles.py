@@ -1,7 +1,7 @@
 """Opaque handles: what a program holds instead of a vehicle or a lane.
 
-A handle is a string that the host gave to this very program. It carries no authority of its own: the host looks it up in
-the table of what it handed out, so a made-up one is refused, and there is no object behind it to reach into.
+A handle is a string that the host gave to this very program. It carries no authority of its own: the host looks it up
+in the table of what it handed out, so a made-up one is refused, and there is no object behind it to reach into.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 from chauffeur.concept import LaneId
+from chauffeur.programs.errors import BadArgumentTypeError, BadArgumentValueError
 
 VEHICLE_PREFIX: Final = "veh:"
 LANE_PREFIX: Final = "lane:"
@@ -56,17 +57,19 @@ class HandleTable:
             where: API and parameter, for the message.
 
         Raises:
-            TypeError: It is not a vehicle handle.
-            ValueError: It looks like one, but was never handed out.
+            BadArgumentTypeError: It is not a vehicle handle.
+            BadArgumentValueError: It looks like one, but was never handed out.
         """
         if isinstance(handle, str):
             known = self._vehicles.get(handle)
             if known is not None:
                 return known
             if handle.startswith(VEHICLE_PREFIX):
-                raise ValueError(f"{where}: {handle[:40]!r} is no vehicle this program was given")
-        raise TypeError(f"{where} must be a vehicle, not {describe(handle)}; vehicles come from get_ego_vehicle() "
-                        "or detect_front_vehicle_in()")
+                raise BadArgumentValueError(f"{where}: {handle[:40]!r} is no vehicle this program was given")
+        raise BadArgumentTypeError(
+            f"{where} must be a vehicle, not {describe(handle)}; vehicles come from get_ego_vehicle() "
+            "or detect_front_vehicle_in()"
+        )
 
     def lane(self, handle: object, where: str) -> LaneId:
         """Lane behind a handle.
@@ -76,17 +79,19 @@ class HandleTable:
             where: API and parameter, for the message.
 
         Raises:
-            TypeError: It is not a lane handle.
-            ValueError: It looks like one, but was never handed out.
+            BadArgumentTypeError: It is not a lane handle.
+            BadArgumentValueError: It looks like one, but was never handed out.
         """
         if isinstance(handle, str):
             known = self._lanes.get(handle)
             if known is not None:
                 return known
             if handle.startswith(LANE_PREFIX):
-                raise ValueError(f"{where}: {handle[:40]!r} is no lane this program was given")
-        raise TypeError(f"{where} must be a lane, not {describe(handle)}; lanes come from get_lane_of(), "
-                        "get_left_lane() or get_right_lane()")
+                raise BadArgumentValueError(f"{where}: {handle[:40]!r} is no lane this program was given")
+        raise BadArgumentTypeError(
+            f"{where} must be a lane, not {describe(handle)}; lanes come from get_lane_of(), "
+            "get_left_lane() or get_right_lane()"
+        )
 
     def issued(self) -> tuple[list[int], list[LaneId]]:
         """Vehicles and lanes handed out, for a snapshot."""

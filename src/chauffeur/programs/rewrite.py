@@ -175,11 +175,17 @@ def _rewrite(source: str, tree: ast.Module, library_generators: frozenset[str], 
         keyword = _YIELD_FROM.match(text, start)
         assert keyword is not None  # the node starts with these two words
         opening, closing = "(", ")"
-        if isinstance(node.value, ast.Call) and isinstance(node.value.func, ast.Name) and not in_library \
-                and node.value.func.id in library_generators:
+        if (
+            isinstance(node.value, ast.Call)
+            and isinstance(node.value.func, ast.Name)
+            and not in_library
+            and node.value.func.id in library_generators
+        ):
             # A tick inside the library reports the program line that called it.
             opening, closing = f"({_SITE}.update({{0: {node.lineno}}}), (", "))[1]"
         edits += [(start, keyword.end(), opening.encode()), (end, end, closing.encode())]
-    for start, end, replacement in sorted(edits, key=lambda edit: edit[:2], reverse=True):  # offsets before it stay true
+    for start, end, replacement in sorted(
+        edits, key=lambda edit: edit[:2], reverse=True
+    ):  # offsets before it stay true
         text = text[:start] + replacement + text[end:]
     return text.decode()

@@ -10,31 +10,20 @@ from __future__ import annotations
 
 import contextlib
 import datetime
-import os
-import resource
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final, Self
 
 import pydantic_monty as monty
 
 from chauffeur.concept import SandboxError
-from chauffeur.programs.errors import (
-    ProgramCallsError,
-    ProgramCrashError,
-    ProgramFault,
-    ProgramMemoryError,
-    ProgramRaisedError,
-    ProgramRecursionError,
-    ProgramSyntaxError,
-    ProgramTimeError,
-)
+from chauffeur.programs.errors import ProgramCallsError, ProgramRaisedError, ProgramTimeError
+from chauffeur.programs.faults import MAX_MESSAGE_CHARS, fault_of
 from chauffeur.programs.rewrite import TICK, Prepared
+from chauffeur.programs.workers import confine, on_core, present_core
 
 _EPOCH: Final = datetime.datetime(2000, 1, 1, tzinfo=datetime.UTC)
-_MAX_MESSAGE_CHARS: Final = 300
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +89,7 @@ class Sandbox:
         """
         self.budget = Budget() if budget is None else budget
         self._clock = clock
-        self._core = _present_core() if pin else None
+        self._core = present_core() if pin else None
         self._pool = monty.Monty(
             min_processes=workers,
             max_processes=max_workers,
@@ -109,7 +98,7 @@ class Sandbox:
             turn_duration_limit_grace=self.budget.grace_s,
         )
         try:
-            with _on_core(self._core):  # the pool's threads and workers inherit it
+            with on_core(self._core):  # the pool's threads and workers inherit it
                 self._pool.__enter__()
         except (OSError, monty.MontyError) as error:
             raise SandboxError(
@@ -137,7 +126,7 @@ class Sandbox:
             names: Host functions it may call.
 
         Raises:
-            ProgramFault: The program itself is to blame.
+            ProgramFaultError: The program itself is to blame.
             SandboxError: No worker can be had.
         """
         run = self._checkout()
@@ -188,7 +177,7 @@ class Sandbox:
         except (OSError, monty.MontyError) as error:
             raise SandboxError(f"No sandbox worker can be had: {error}.", retryable=True) from error
         if session.worker_pid is not None:
-            _confine(session.worker_pid, self._core)
+            confine(session.worker_pid, self._core)
         return SandboxRun(session, budget, self._clock)
 
 
@@ -218,7 +207,7 @@ class SandboxRun:
         self._deadline = self._clock() + self._budget.tick_s
 
     def load(self, prepared: Prepared, names: Iterable[str]) -> None:
-        """Read library and program, and run to the first tick. Raises ProgramFault."""
+        """Read library and program, and run to the first tick. Raises ProgramFaultError."""
         self._names = frozenset((TICK, *names))
         self._calls = 0
         self._deadline = self._clock() + self._budget.start_s
@@ -238,14 +227,13 @@ class SandboxRun:
 
     def restore(self, state: bytes) -> None:
         """Take over a dumped program. Raises SandboxError."""
-        names_end = state.index(b"\n")
-        feed_end = state.index(b"\n", names_end + 1)
-        self._names = frozenset(state[:names_end].decode().split())
-        self._program_feed = state[names_end + 1 : feed_end].decode()
         try:
-            snapshot = self._session.load_snapshot(state[feed_end + 1 :], print_callback=_drop)
+            names, feed, rest = state.split(b"\n", 2)
+            self._names = frozenset(names.decode().split())
+            self._program_feed = feed.decode()
+            snapshot = self._session.load_snapshot(rest, print_callback=_drop)
         except (monty.MontyError, ValueError) as error:
-            raise SandboxError(f"The snapshot cannot be loaded: {str(error)[:_MAX_MESSAGE_CHARS]}.") from error
+            raise SandboxError(f"The snapshot cannot be loaded: {str(error)[:MAX_MESSAGE_CHARS]}.") from error
         if not isinstance(snapshot, monty.FunctionSnapshot):
             raise SandboxError("The snapshot does not wait for its host.")
         self._snapshot = snapshot
@@ -261,7 +249,7 @@ class SandboxRun:
         """Give the result of the waiting call; returns the next call, or None when the program has ended.
 
         Raises:
-            ProgramFault: The program failed; the run is closed.
+            ProgramFaultError: The program failed; the run is closed.
         """
         snapshot = self._waiting()
         return self._advance(lambda: snapshot.resume({"return_value": value}))
@@ -295,7 +283,7 @@ class SandboxRun:
                 if isinstance(state, monty.NameLookupSnapshot):
                     step = state.resume  # left undefined: NameError in the program
                 elif isinstance(state, monty.FutureSnapshot):
-                    raise ProgramRaisedError("The program waits for something that never comes.", exception="RuntimeError")
+                    step = _never(state)
                 elif state.is_os_function:
                     step = state.resume_not_handled  # PermissionError or ModuleNotFoundError in the program
                 elif state.function_name in self._names:
@@ -305,7 +293,7 @@ class SandboxRun:
                     step = _unknown(state)
         except monty.MontyError as error:
             self.close()
-            raise self._fault(error) from None
+            raise fault_of(error, self._program_feed) from None
         except BaseException:
             self.close()
             raise
@@ -330,46 +318,15 @@ class SandboxRun:
             return None
         return self._text.count(b"\n", 0, position.start) + 1
 
-    def _fault(self, error: monty.MontyError) -> ProgramFault:
-        if isinstance(error, monty.MontyCrashedError):
-            if error.timed_out:
-                return ProgramTimeError("The program did not stop in time; its worker was killed.")
-            return ProgramCrashError("The program brought its sandbox worker down; the worker was replaced.")
-        line = None
-        if isinstance(error, monty.MontyRuntimeError | monty.MontySyntaxError):
-            lines = [frame.line for frame in error.traceback() if frame.filename == self._program_feed]
-            line = lines[-1] if lines else None
-        text = str(error)[:_MAX_MESSAGE_CHARS]
-        if isinstance(error, monty.MontySyntaxError):
-            return ProgramSyntaxError(f"The program cannot be read: {text}.", line=line)
-        return _runtime_fault(text, line)
-
-
-def _runtime_fault(text: str, line: int | None) -> ProgramFault:
-    kind, _, message = text.partition(": ")
-    if kind == "TimeoutError" and "time limit exceeded" in message:
-        return ProgramTimeError(
-            f"The program computed too long without a yield or a driving API ({message}).",
-            line=line,
-            hint="Every loop must reach a `yield autopilot()`.",
-        )
-    if kind == "TimeoutError" and "sleep limit" in message:
-        return ProgramTimeError(
-            "The program tried to sleep.", line=line, hint="Wait with `yield autopilot()`; each one lasts 0.1 s."
-        )
-    if kind == "MemoryError":
-        return ProgramMemoryError("The program used too much memory.", line=line, hint="Keep no long lists or texts.")
-    if kind == "RecursionError":
-        return ProgramRecursionError("The program calls itself too deeply.", line=line, hint="Use a loop.")
-    if kind == "NotImplementedError" and "monty syntax parser" in message:
-        return ProgramSyntaxError(f"The program uses Python that its language lacks: {message}.", line=line)
-    where = "" if line is None else f" in line {line}"
-    return ProgramRaisedError(f"The program raised {text}{where}.", exception=kind, line=line)
-
 
 def _unknown(state: monty.FunctionSnapshot) -> Callable[[], monty.SyncSnapshot]:
     missing = NameError(f"name '{str(state.function_name)[:60]}' is not defined")
     return lambda: state.resume({"exception": missing})
+
+
+def _never(state: monty.FutureSnapshot) -> Callable[[], monty.SyncSnapshot]:
+    refusal = RuntimeError("nothing to await: programs wait with yield autopilot()")
+    return lambda: state.resume({call: {"exception": refusal} for call in state.pending_call_ids})
 
 
 def _host_function(name: str) -> Callable[[], None]:
@@ -384,35 +341,3 @@ def _host_function(name: str) -> Callable[[], None]:
 
 def _drop(_stream: str, _text: str) -> None:
     """What a program prints is for nobody; it speaks to people with say()."""
-
-
-def _present_core() -> int | None:
-    try:
-        fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
-        return int(fields[36])
-    except (OSError, IndexError, ValueError):  # not Linux
-        return None
-
-
-@contextlib.contextmanager
-def _on_core(core: int | None) -> Any:
-    if core is None or not hasattr(os, "sched_setaffinity"):
-        yield
-        return
-    before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {core})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, before)
-
-
-def _confine(pid: int, core: int | None) -> None:
-    """Second fence around a worker, from outside: no core files, few open files, bounded address space, one core."""
-    with contextlib.suppress(OSError, AttributeError, ValueError):  # not Linux, or the worker is already gone
-        resource.prlimit(pid, resource.RLIMIT_CORE, (0, 0))
-        resource.prlimit(pid, resource.RLIMIT_NOFILE, (32, 32))
-        resource.prlimit(pid, resource.RLIMIT_AS, (2 << 30, 2 << 30))
-        if core is not None:
-            for thread in Path(f"/proc/{pid}/task").iterdir():
-                os.sched_setaffinity(int(thread.name), {core})

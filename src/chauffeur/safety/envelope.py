@@ -81,21 +81,22 @@ def _policy_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]:
                 yield from _use_faults(use, road, limits)
             yield from _move_faults(reading, road)
         case Parameters() as values:
-            yield from _speed_faults("target speed", values.target_speed_mps, road, limits)
-            yield from _lane_faults(values.lane, road)
-            if not values.look_ahead_m > 0:
+            yield from _speed_faults("target speed", _number(values.target_speed_mps), road, limits)
+            if values.lane in _SIDES:
+                yield from _lane_faults(values.lane, road)
+            if not _number(values.look_ahead_m) > 0:
                 # A vehicle's path follower with a look-ahead of 0 m no longer stops at the end of its path.
-                yield _Fault(f"A look-ahead of {values.look_ahead_m:g} m is none.", "Look ahead more than 0 m.")
-            if not values.look_ahead_ratio >= 0:
+                yield _Fault(f"A look-ahead of {values.look_ahead_m} m is none.", "Look ahead more than 0 m.")
+            if not _number(values.look_ahead_ratio) >= 0:
                 yield _Fault(
-                    f"A look-ahead ratio of {values.look_ahead_ratio:g} s is negative.", "Use a ratio of 0 s or more."
+                    f"A look-ahead ratio of {values.look_ahead_ratio} s is negative.", "Use a ratio of 0 s or more."
                 )
         case ActionMatrix(pid=pid, mpc=mpc):
-            if not all(value >= 0 for value in (*pid, *mpc)):
+            if not all(_number(value) >= 0 for value in (*pid, *mpc)):
                 yield _Fault("The action matrix has a negative gain or weight.", "Use gains and weights of 0 or more.")
         case Trajectory() as trajectory:
             yield from _trajectory_faults(trajectory, road, limits)
-        case None:
+        case _:
             pass
 
 
@@ -173,14 +174,15 @@ def _lane_faults(offset: int, road: _Road, line: int | None = None) -> Iterator[
         return
     side = _SIDES[offset]
     if not road.lanes:
-        reason = f"It moves to the {side}, but which lane the ego is in is not known."
+        reason = f"It moves to the {side}, but it is not known which lane the ego is in."
     else:
         reason = f"It moves to the {side}, but the ego is already in the {side}most lane."
     yield _Fault(reason, f"Stay in the lane, or test first that the lane to the {side} is not None.", line)
 
 
 def _setting_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]:
-    for name, value in plan.settings:
+    for name, said in plan.settings:
+        value = _number(said)
         if name == "target_speed_mps":
             yield from _speed_faults("target speed", value, road, limits)
         elif name == "time_headway_s":
@@ -188,7 +190,7 @@ def _setting_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]
         elif name == "gap_m":
             yield from _gap_faults(value, road, limits)
         elif not math.isfinite(value):
-            yield _Fault(f"The setting {name} is {value}, not a number.", f"Give {name} as a plain number.")
+            yield _Fault(f"The setting {name} is {said!r}, not a number.", f"Give {name} as a plain number.")
 
 
 def _intent_faults(plan: Plan, road: _Road) -> Iterator[_Fault]:
@@ -210,9 +212,14 @@ def _intent_faults(plan: Plan, road: _Road) -> Iterator[_Fault]:
 def _trajectory_faults(trajectory: Trajectory, road: _Road, limits: Limits) -> Iterator[_Fault]:
     """Speed between successive waypoints, the first leg from the ego itself; the fastest leg is judged."""
     points = ((0.0, 0.0), *trajectory.waypoints_m)
-    if not trajectory.period_s > 0 or len(points) < 2:
-        return
+    if len(points) < 2 or any(len(point) != 2 for point in points) or not _number(trajectory.period_s) > 0:
+        return  # `format-v1` refuses these; there is no speed to read from them
     legs = [math.dist(a, b) / trajectory.period_s for a, b in pairwise(points)]
     yield from _speed_faults(
         "speed along the trajectory", math.nan if any(map(math.isnan, legs)) else max(legs), road, limits
     )
+
+
+def _number(value: object) -> float:
+    """A planner's reply may hold anything where a number should be; what is none becomes NaN and fits no bound."""
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan

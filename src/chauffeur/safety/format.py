@@ -52,7 +52,8 @@ def _program(source: str) -> Verdict:
     findings = check_source(source).findings
     if findings:
         first = findings[0]
-        more = f" ({len(findings) - 1} more findings)" if len(findings) > 1 else ""
+        rest = len(findings) - 1
+        more = f" ({rest} more finding{'s' if rest > 1 else ''})" if rest else ""
         return Verdict(FORMAT_CHECK, False, f"{first.reason}{more}", first.line, first.remedy)
     return _pass("The program keeps to the driving language.")
 

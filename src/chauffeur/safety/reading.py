@@ -18,7 +18,7 @@ _MAX_CHARS = 100_000
 _MAX_DEPTH = 40
 _MAX_VALUES = 16
 _MAX_STEPS = 50_000
-"""Nodes looked at per program beyond the first pass: names used twice, level upon level, would otherwise cost 2^levels."""
+"""Nodes looked at beyond the first pass: names used twice, level upon level, would otherwise cost 2^levels."""
 
 
 @dataclass(slots=True)

@@ -112,5 +112,5 @@ class World(Protocol):
         ...
 
     def driver(self) -> Driver:
-        """A fresh low-level driver for the present trip."""
+        """The low-level driver of the present trip; the same object until the next reset."""
         ...

@@ -107,8 +107,12 @@ def read_clause(text: str, quantities: list[Quantity], *, hard: bool) -> Clause 
     """Evidence of one clause; None when it has no words."""
     if not re.search(r"[a-z#]", text):
         return None
+    hits = [m for m in _NEGATOR.finditer(text) if not _LONE_STOP.match(text, m.start())]
+    negators = [m.start() for m in hits]
     masked = text
-    negators = [m.start() for m in _NEGATOR.finditer(text) if not _LONE_STOP.match(text, m.start())]
+    for hit in hits:
+        if hit[0] in ("stop", "quit", "cease"):  # "stop tailgating" halts nothing
+            masked = masked[: hit.start()] + _MASK * len(hit[0]) + masked[hit.end() :]
     found: list[Evidence] = []
     for cue in CUES:
         for match in cue.pattern.finditer(masked):
@@ -127,12 +131,9 @@ def read_clause(text: str, quantities: list[Quantity], *, hard: bool) -> Clause 
 def _evidence(cue: Cue, match: re.Match[str], text: str, negators: list[int]) -> Evidence:
     groups = match.groupdict()
     side = groups.get("side") or groups.get("side2") or cue.side
-    inside = cue.pattern.pattern.startswith(r"\bnot") or cue.pattern.pattern.startswith(r"\b(?:not")
     start = match.start()
     # a negator that the cue itself contains is part of its meaning ("not feeling well") and negates nothing more
-    governing = 0 if inside and match[0].startswith(("not", "never", "no", "without")) else 0
-    governing += sum(1 for at in negators if at < start)
-    negated = governing % 2 == 1
+    negated = sum(1 for at in negators if at < start) % 2 == 1
     return Evidence(cue, start, match.end(), text[start : match.end()], _side(side), negated)
 
 

@@ -65,7 +65,7 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     (r"\bpass(?:ing)?\b(?! me| us the| the salt)", "act", "overtake", 0, "", 1.2),
     (r"\b(?:stuck|trapped|sitting|crawling|dawdling) behind\b|\b(?:complain|tired of|sick of|fed up with) (?:follow\w+|be\w* behind|sit\w* behind|stay\w* behind)\b", "act", "overtake", 0, "hint", 0.9),
     (rf"\b(?:{_NOUNS})(?: ahead)?(?: (?:is|are|drives?|goes|seems?|going|driving|moving))+ (?:\w+ ){{0,3}}?(?:slow\w*|crawling|dawdling|a snail|creeping)\b", "act", "overtake", 0, "hint", 0.9),
-    (rf"\b(?:he|she|they) (?:is|are|drives?|goes)(?: (?:driving|going))? (?:\w+ ){{0,3}}?(?:slow\w*|crawling|dawdling)\b", "act", "overtake", 0, "hint", 0.9),
+    (r"\b(?:he|she|they) (?:is|are|drives?|goes)(?: (?:driving|going))? (?:\w+ ){0,3}?(?:slow\w*|crawling|dawdling)\b", "act", "overtake", 0, "hint", 0.9),
     (rf"\bslowpokes?\b (?:ahead|there)|\b(?:slow|crawling) (?:{_NOUNS}) ahead\b", "act", "overtake", 0, "hint", 0.9),
     # the shoulder
     (r"\b(?:leave|leaving|off|out of|from) the shoulder\b|\bback on(?:to)? the (?:road|highway|motorway)\b", "act", "lane", 0, "return", 1.5),
@@ -106,7 +106,7 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     # gaps: changes
     (rf"\b(?:give|leave|allow) (?:\w+ ){{0,6}}?less (?:\w+ )?{_ROOM}\b|\bclos(?:e|ing) (?:up |down )?(?:the|that|this|our) (?:\w+ )?{_ROOM}\b|\bclose(?:r|st)\b|\bnearer\b|\bclose (?:in|up)\b(?: on)?|\bclosing in\b|\bcatch(?:ing)? up\b|\btighten(?: (?:it )?up)?\b|\bmove up(?: on| behind)?\b|\btailgate\b|\bget (?:right |up )+behind\b|\bsnug\w*\b", "act", "gap", -1, "", 1.2),
     (rf"\b(?:giv|leav|allow|mak)(?:e|ing)? (?:\w+ ){{0,7}}?{_ROOM}\b|\b(?:further|farther)\b(?: (?:back|away|behind|off|apart|from))?|\bback(?:ing)? (?:off|away)\b|\b(?:drop|fall|hang|pull|hold|stay|keep|ease|step|stand|slip|lay)(?:ping|ing)? (?:\w+ ){{0,3}}?back\b(?! (?:on|in|into|to (?:the )?(?:left|right|lane)))|\bkeep (?:\w+ ){{0,3}}distance\b(?! (?:of|at|to)\b| #)|\b(?:keep|stay|get) (?:well |far )?away\b|\bdistance (?:yourself|us|ourselves)\b|\bopen(?:ing)? (?:up )?(?:the|a|some|that) (?:\w+ )?(?:gap|space|room|distance)\b|\bbreathing (?:room|space)\b|\bsafer? (?:following )?distance\b(?! of)|\bdistance from\b(?! #)|\b{_SOME} {_ROOM}\b(?= please|$| [.,!]| behind| between| to| from| ahead)", "act", "gap", 1, "", 1.2),
-    (rf"\bfollow(?:ing)? {VEHICLE}(?! \w*(?:close|closely|tight))|\b(?:stay|remain|keep|stick|tuck in|sit|wait)(?:ing)? behind\b", "act", "follow", 0, "", 0.9),
+    (rf"\bfollow(?:ing)? {VEHICLE}(?! (?:\w+ ){0,2}(?:close|tight))|\b(?:stay|remain|keep|stick|tuck in|sit|wait)(?:ing)? behind\b", "act", "follow", 0, "", 0.9),
     # halting
     (r"\b(?:stop|halt|freeze|standstill)(?:ping|ped|s)?\b|\bcome to (?:a )?(?:rest|stop|halt)\b|\bemergency (?:stop|brake|braking)\b|\bslam on the brakes\b|\bwait (?:here|at)\b|\bpull up\b|\bstopsign\b", "act", "stop", 0, "", 1.0),
     # feelings and ways of driving

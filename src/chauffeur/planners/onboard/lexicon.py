@@ -130,25 +130,6 @@ def rewrite(line: str) -> str:
 
 
 FILLERS = frozenset(
-    """
-    a an the this that these those it its i me my mine we us our you your he him his she her hers they them their who
-    am is are was were be been being do does did have has had having will would shall should can could may might must
-    to of in on at by with from for as into onto out off up over under about around than then so and or but because if
-    when while once until after before unless whether just please kindly thanks thank hey hi hello ok well now here
-    there again also too very really quite rather pretty much more most some any all one two other another bit little
-    lot touch tad slightly somewhat way kind sort like feel feeling feels think believe guess hope want wish need
-    needs like prefer lets let make get got getting go going gone drive driving driver car vehicle truck van bus lorry
-    bike motorcycle suv guy one buddy dude man woman person thing road highway motorway freeway street way traffic
-    speed velocity pace cruise lane lanes side gap distance space spacing room buffer headway behind ahead back front
-    between next near along course path route direction journey trip ride current currently present same normal usual
-    usually always still yet even maybe perhaps possible possibly able could today tonight morning right left straight
-    swift whensafe shoulder junction edge toward towards further keep keeping hold holding maintain maintaining stay
-    staying set setting adjust adjusting control regulate fix arrange establish change changing take taking give
-    giving put turn turning move moving bring come coming use using utilizing utilising navigate navigating head
-    follow following reach reaching stop stopped stopping no not never without complain what how why which where
-    chauffeur autopilot mate sir madam darling honey dear actually honestly basically probably seems seem looks look
-    bit everyone everybody anybody somebody someone something anything everything people others own leading lead
-    i'd ahead us try trying start starting continue minute second time times moment only enough such that's
-    """.split()
+    ["a", "an", "the", "this", "that", "these", "those", "it", "its", "i", "me", "my", "mine", "we", "us", "our", "you", "your", "he", "him", "his", "she", "her", "hers", "they", "them", "their", "who", "am", "is", "are", "was", "were", "be", "been", "being", "do", "does", "did", "have", "has", "had", "having", "will", "would", "shall", "should", "can", "could", "may", "might", "must", "to", "of", "in", "on", "at", "by", "with", "from", "for", "as", "into", "onto", "out", "off", "up", "over", "under", "about", "around", "than", "then", "so", "and", "or", "but", "because", "if", "when", "while", "once", "until", "after", "before", "unless", "whether", "just", "please", "kindly", "thanks", "thank", "hey", "hi", "hello", "ok", "well", "now", "here", "there", "again", "also", "too", "very", "really", "quite", "rather", "pretty", "much", "more", "most", "some", "any", "all", "one", "two", "other", "another", "bit", "little", "lot", "touch", "tad", "slightly", "somewhat", "way", "kind", "sort", "like", "feel", "feeling", "feels", "think", "believe", "guess", "hope", "want", "wish", "need", "needs", "like", "prefer", "lets", "let", "make", "get", "got", "getting", "go", "going", "gone", "drive", "driving", "driver", "car", "vehicle", "truck", "van", "bus", "lorry", "bike", "motorcycle", "suv", "guy", "one", "buddy", "dude", "man", "woman", "person", "thing", "road", "highway", "motorway", "freeway", "street", "way", "traffic", "speed", "velocity", "pace", "cruise", "lane", "lanes", "side", "gap", "distance", "space", "spacing", "room", "buffer", "headway", "behind", "ahead", "back", "front", "between", "next", "near", "along", "course", "path", "route", "direction", "journey", "trip", "ride", "current", "currently", "present", "same", "normal", "usual", "usually", "always", "still", "yet", "even", "maybe", "perhaps", "possible", "possibly", "able", "could", "today", "tonight", "morning", "right", "left", "straight", "swift", "whensafe", "shoulder", "junction", "edge", "toward", "towards", "further", "keep", "keeping", "hold", "holding", "maintain", "maintaining", "stay", "staying", "set", "setting", "adjust", "adjusting", "control", "regulate", "fix", "arrange", "establish", "change", "changing", "take", "taking", "give", "giving", "put", "turn", "turning", "move", "moving", "bring", "come", "coming", "use", "using", "utilizing", "utilising", "navigate", "navigating", "head", "follow", "following", "reach", "reaching", "stop", "stopped", "stopping", "no", "not", "never", "without", "complain", "what", "how", "why", "which", "where", "chauffeur", "autopilot", "mate", "sir", "madam", "darling", "honey", "dear", "actually", "honestly", "basically", "probably", "seems", "seem", "looks", "look", "bit", "everyone", "everybody", "anybody", "somebody", "someone", "something", "anything", "everything", "people", "others", "own", "leading", "lead", "i'd", "ahead", "us", "try", "trying", "start", "starting", "continue", "minute", "second", "time", "times", "moment", "only", "enough", "such", "that's"]
 )
 """Words that carry no manoeuvre of their own; whatever is neither here nor in a cue counts as unknown."""

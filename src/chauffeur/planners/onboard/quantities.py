@@ -14,13 +14,12 @@ from chauffeur.planners.onboard.meaning import Dimension
 _ONES = {
     word: float(value)
     for value, word in enumerate(
-        "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen "
-        "seventeen eighteen nineteen".split()
+        ["zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "thirteen", "fourteen", "fifteen", "sixteen", "seventeen", "eighteen", "nineteen"]
     )
 }
 _TENS = {
     word: 10.0 * (2 + k)
-    for k, word in enumerate("twenty thirty forty fifty sixty seventy eighty ninety".split())
+    for k, word in enumerate(["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"])
 }
 _TENS["fourty"] = 40.0
 _VAGUE = {"couple": 2.0, "few": 3.0, "several": 4.0, "dozen": 12.0}
@@ -148,7 +147,7 @@ def _unit(tokens: list[str], k: int) -> tuple[Dimension, float, int] | None:
 
 def _digits(token: str) -> float | None:
     """Value of a numeral; None for other tokens and for numbers too long to mean anything."""
-    if not token or len(token) > 12 or not token[0].isdigit() and token[0] != ".":
+    if not token or len(token) > 12 or (not token[0].isdigit() and token[0] != "."):
         return None
     if not token.isascii() or not token.replace(".", "", 1).isdigit():
         return None

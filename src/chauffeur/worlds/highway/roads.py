@@ -269,7 +269,9 @@ def _intersection(config: RoadConfig, rng: np.random.Generator) -> Scene:
         start = rotation @ np.array([LANE_WIDTH_M / 2, access + outer])
         end = rotation @ np.array([LANE_WIDTH_M / 2, outer])
         network.add_lane(
-            f"o{corner}", into, StraightLane(start, end, line_types=(striped, continuous), priority=priority, speed_limit=10)
+            f"o{corner}",
+            into,
+            StraightLane(start, end, line_types=(striped, continuous), priority=priority, speed_limit=10),
         )
         network.add_lane(
             into,
@@ -300,7 +302,9 @@ def _intersection(config: RoadConfig, rng: np.random.Generator) -> Scene:
         )
         start = rotation @ np.array([LANE_WIDTH_M / 2, outer])
         end = rotation @ np.array([LANE_WIDTH_M / 2, -outer])
-        network.add_lane(into, ahead, StraightLane(start, end, line_types=(none, none), priority=priority, speed_limit=10))
+        network.add_lane(
+            into, ahead, StraightLane(start, end, line_types=(none, none), priority=priority, speed_limit=10)
+        )
         start = rotation @ np.flip([LANE_WIDTH_M / 2, access + outer], axis=0)
         end = rotation @ np.flip([LANE_WIDTH_M / 2, outer], axis=0)
         network.add_lane(

@@ -23,6 +23,7 @@ class HighwayWorld:
     def __init__(self) -> None:
         self._scene: Scene | None = None
         self._perception: HighwayPerception | None = None
+        self._driver: HighwayDriver | None = None
         self._lanes: tuple[LaneView, ...] = ()
         self._tick = 0
         self._clock_s = 0.0
@@ -53,6 +54,7 @@ class HighwayWorld:
         for _ in range(scene.warm_up_steps):
             self._advance(Command(0.0, 0.0))
         self._perception = HighwayPerception(scene)
+        self._driver = None
         self._lanes = _lane_views(scene)
         self._tick = 0
         ego = scene.ego
@@ -118,8 +120,10 @@ class HighwayWorld:
         return self._perception
 
     def driver(self) -> HighwayDriver:
-        """A fresh low-level driver."""
-        return HighwayDriver(self.scene, self.perception())
+        """The low-level driver of the present trip; the same until the next reset."""
+        if self._driver is None:
+            self._driver = HighwayDriver(self.scene, self.perception())
+        return self._driver
 
 
 def _lane_views(scene: Scene) -> tuple[LaneView, ...]:

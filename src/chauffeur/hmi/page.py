@@ -1,0 +1,98 @@
+"""One self-contained HTML page that plays a recorded trip: no build step, no server, no request to anywhere.
+
+Three doors keep what people and models wrote inert: the trip travels as JSON in a data block with every `<` escaped,
+the script sets text only through `textContent`, and a content security policy admits nothing but the page's own
+style and script, by hash.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import re
+import secrets
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from chauffeur.concept import DataError
+from chauffeur.drive.recording import RecordedTrip
+from chauffeur.hmi.payload import page_payload
+
+_STYLES = ("trip.css", "panels.css")
+_SCRIPTS = ("panels.js", "stage.js", "charts.js", "player.js")
+_SLOT = re.compile(r"\{\{(\w+)\}\}")
+
+
+def write_page(path: Path, recorded: RecordedTrip) -> Path:
+    """Write the page of a trip; the file appears whole or not at all.
+
+    Args:
+        path: The `.html` file; its folder is made if need be.
+        recorded: The trip.
+
+    Raises:
+        DataError: The file cannot be written.
+    """
+    text = render_page(recorded)
+    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise DataError(
+            f"The page cannot be written to {path}: {error.strerror or error}.", hint="Choose another folder."
+        ) from error
+    return path
+
+
+def render_page(recorded: RecordedTrip) -> str:
+    """The page of a trip as text."""
+    payload = page_payload(recorded)
+    style = "\n".join(_asset(name) for name in _STYLES)
+    script = "(() => {\n'use strict';\n" + "\n".join(_asset(name) for name in _SCRIPTS) + "\n})();"
+    policy = f"default-src 'none'; img-src data:; style-src {_hash(style)}; script-src {_hash(script)}"
+    return _fill(
+        _asset("trip.html"),
+        {
+            "policy": html.escape(policy),
+            "title": html.escape(f"“{_printable(payload['wish'])}” – {payload['outcome']['label']}"),
+            "wish": html.escape(_printable(payload["wish"])),
+            "outcome": html.escape(payload["outcome"]["label"]),
+            "simulated": html.escape(payload["simulated"]),
+            "style": style,
+            "script": script,
+            "data": embed_json(payload),
+        },
+    )
+
+
+def embed_json(value: Any) -> str:
+    """JSON that cannot end the script element it stands in, nor begin another."""
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    for character in "<>&\u2028\u2029":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    # Lone surrogates are legal in a string and not in UTF-8.
+    return text.encode("utf-8", "replace").decode()
+
+
+def _fill(template: str, values: Mapping[str, str]) -> str:
+    """Fill every slot in one pass: what is put in is never looked at again."""
+    return _SLOT.sub(lambda match: values[match.group(1)], template)
+
+
+def _asset(name: str) -> str:
+    return resources.files("chauffeur.hmi").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def _printable(text: str) -> str:
+    return text.encode("utf-8", "replace").decode()

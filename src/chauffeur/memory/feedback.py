@@ -1,0 +1,110 @@
+"""What a passenger's words about a drive mean, and which of several verdicts holds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from chauffeur.concept import Feedback, History, HistoryItem
+from chauffeur.memory.phrases import Topic, Want, read_wants
+from chauffeur.memory.quantities import Dimension, read_quantities
+from chauffeur.memory.words import even
+
+_MILD, _PLAIN, _STRONG = 0.35, 0.6, 1.0
+_MILD_WORDS = re.compile(
+    r"\b(?:(?:a|the) (?:tiny |little |wee |small )?(?:bit|little|touch|tad|smidge|hair|notch)|slightly|somewhat|little bit"
+    r"|kind of|kinda|sort of|marginally|just a)\b"
+)
+_STRONG_WORDS = re.compile(
+    r"\b(?:way|far(?= too)|(?<!too )(?<!not )much|a lot|lots|really|very|extremely|super|terribly|awfully|incredibly"
+    r"|significantly|considerably|drastically|dangerously)\b"
+)
+_FULL: dict[Dimension, float] = {"speed": 5.5, "length": 20.0, "time": 1.5}
+"""A change of this much is as strong as "much": about 20 km/h, four car lengths, or one and a half seconds."""
+
+TOPICS: tuple[Literal["speed", "gap", "comfort"], ...] = ("speed", "gap", "comfort")
+
+
+def interpret_feedback(text: str) -> Feedback:
+    """What is meant, by rule and offline; words that say nothing of the drive give a neutral feedback.
+
+    Args:
+        text: The passenger's words, kept as they are in the result.
+
+    Returns:
+        Signs as in `Feedback`: "too fast" and "slower, please" are both speed -1. Contradictory remarks on one topic
+        cancel out. A plain complaint counts as dislike; a mild one, or a request, does not.
+    """
+    wants = read_wants(text)
+    praised = any(want.topic == "approval" and want.sign > 0 for want in wants)
+    blamed = any(want.topic == "approval" and want.sign < 0 for want in wants)
+    wants = tuple(want for want in wants if not (want.manner == "remark" and praised))
+    about = [want for want in wants if want.topic != "approval"]
+    signs = {topic: _sign(want.sign for want in about if want.topic == topic) for topic in TOPICS}
+    telling = [want for want in about if signs.get(_known(want.topic), 0)]
+    strength = max((_strength(want) for want in telling), default=0.0)
+    complained = any(want.manner not in ("request", "plea") and _strength(want) >= _PLAIN for want in telling)
+
+    approval: Literal[-1, 0, 1] = 0
+    if praised and not blamed and not telling:
+        approval = 1
+    elif (blamed and not praised) or (complained and not praised):
+        approval = -1
+    if approval < 0 and not telling:
+        strength = _PLAIN
+    return Feedback(text, signs["speed"], signs["gap"], signs["comfort"], approval, strength)
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """The verdict that holds on one topic, and the older ones it overrules.
+
+    Attributes:
+        topic: `speed`, `gap` or `comfort`.
+        feedback: The most recent feedback on the topic.
+        when: ISO time of the trip it was given for.
+        overruled: Older feedback of the opposite sign, as (when, feedback), newest first.
+    """
+
+    topic: Literal["speed", "gap", "comfort"]
+    feedback: Feedback
+    when: str
+    overruled: tuple[tuple[str, Feedback], ...] = ()
+
+
+def standing_feedback(history: History) -> tuple[Standing, ...]:
+    """The conflict rule: on each topic the most recent feedback holds; what it contradicts is kept beside it."""
+    said = [(item.when, feedback) for item in sorted(history.items, key=_when) for feedback in item.feedback]
+    standings: list[Standing] = []
+    for topic in TOPICS:
+        own = [(when, feedback) for when, feedback in reversed(said) if getattr(feedback, topic)]
+        if own:
+            when, latest = own[0]
+            against = tuple((w, f) for w, f in own[1:] if getattr(f, topic) == -getattr(latest, topic))
+            standings.append(Standing(topic, latest, when, against))
+    return tuple(standings)
+
+
+def _when(item: HistoryItem) -> str:
+    return item.when
+
+
+def _known(topic: Topic) -> Literal["speed", "gap", "comfort"]:
+    return "speed" if topic == "approval" else topic
+
+
+def _sign(signs: Iterable[int]) -> Literal[-1, 0, 1]:
+    found = set(signs)
+    return 0 if len(found) != 1 else 1 if 1 in found else -1
+
+
+def _strength(want: Want) -> float:
+    amounts = [quantity.value / _FULL[quantity.dimension] for quantity in read_quantities(want.clause)]
+    if amounts:
+        return min(1.0, max(0.1, *amounts))
+    words = even(want.clause)
+    if _MILD_WORDS.search(words):
+        return _MILD
+    return _STRONG if _STRONG_WORDS.search(words) else _PLAIN

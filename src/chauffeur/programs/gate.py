@@ -1,0 +1,321 @@
+"""The static gate: reads a program and says what the language does not allow, before anything runs.
+
+Its findings are written for the model that has to repair the program. It is a courtesy and a filter, not the security
+boundary: that is the sandbox, which holds without it.
+"""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from chauffeur.programs.calls import CallChecks
+from chauffeur.programs.catalogue import APIS
+from chauffeur.programs.errors import ProgramSyntaxError
+from chauffeur.programs.findings import Finding
+from chauffeur.programs.loops import loop_findings
+from chauffeur.programs.rewrite import (
+    generator_names,
+    is_generator,
+    main_function,
+    parse,
+    takes_nothing,
+    unix_lines,
+)
+from chauffeur.programs.words import (
+    ALLOWED_NODES,
+    ATTRIBUTE_REMEDIES,
+    BUILTINS,
+    MATH_NAMES,
+    METHODS,
+    NODE_REASONS,
+    did_you_mean,
+)
+
+_MAX_FINDINGS: Final = 20
+"""More do not help a model to repair a program."""
+
+
+@dataclass(frozen=True, slots=True)
+class GateReport:
+    """What the gate thinks of a program.
+
+    Attributes:
+        findings: Everything found, errors and warnings, in line order.
+        main: Name of the main function, None when there is none.
+    """
+
+    findings: tuple[Finding, ...]
+    main: str | None
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        """Findings that refuse the program."""
+        return tuple(finding for finding in self.findings if finding.severity == "error")
+
+    @property
+    def passed(self) -> bool:
+        """Whether the program may run."""
+        return not self.errors
+
+    def for_model(self) -> str:
+        """The findings as text for a repair turn; empty when there are none."""
+        return "\n".join(str(finding) for finding in self.findings)
+
+
+def check_source(source: str, library: str = "") -> GateReport:
+    """Judge a program text. Never raises and never runs it.
+
+    Args:
+        source: Program text.
+        library: Helper functions the program may call with `yield from`.
+    """
+    try:
+        tree = parse(unix_lines(source))
+    except ProgramSyntaxError as error:
+        return GateReport((Finding(error.line, "syntax", error.message, error.hint),), None)
+    try:
+        helpers = parse(unix_lines(library), "library")
+    except ProgramSyntaxError as error:
+        return GateReport((Finding(None, "library", error.message, error.hint),), None)
+    main = main_function(tree)
+    findings = _Gate(tree, helpers).run()
+    findings += _main_findings(tree, main)
+    findings += loop_findings(tree)
+    unique = {(f.line, f.code, f.reason): f for f in findings}
+    ordered = sorted(unique.values(), key=lambda finding: (finding.line or 0, finding.code))
+    return GateReport(tuple(ordered[:_MAX_FINDINGS]), None if main is None else main.name)
+
+
+def _main_findings(tree: ast.Module, main: ast.FunctionDef | None) -> list[Finding]:
+    if main is not None:
+        return []
+    functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+    if not functions:
+        return [
+            Finding(
+                None, "no-main", "the program defines no function", "write one generator function without parameters"
+            )
+        ]
+    last = functions[-1]
+    if is_generator(last) and not takes_nothing(last):
+        return [
+            Finding(
+                last.lineno,
+                "no-main",
+                f"the main function {last.name} needs arguments",
+                "a main function takes none; get the ego with get_ego_vehicle()",
+            )
+        ]
+    return [
+        Finding(
+            last.lineno,
+            "no-main",
+            f"{last.name} never yields, so the car would never be driven",
+            "yield autopilot() once per control period, e.g. `while True: yield autopilot()`",
+        )
+    ]
+
+
+class _Gate:
+    """One walk over a program's tree."""
+
+    def __init__(self, tree: ast.Module, helpers: ast.Module) -> None:
+        self._tree = tree
+        self._findings: list[Finding] = []
+        self._bound = _bound_names(tree)
+        self._known = self._bound | _bound_names(helpers) | APIS.keys() | BUILTINS
+        self._math = {"math"} | _aliases_of_math(tree)
+        self._generators = generator_names(tree) | generator_names(helpers)
+        self._calls = CallChecks(tree, self._bound)
+
+    def run(self) -> list[Finding]:
+        delegated = {id(node.value) for node in ast.walk(self._tree) if isinstance(node, ast.YieldFrom)}
+        called_by_delegation: set[int] = set()
+        for node in ast.walk(self._tree):
+            self._check_allowed(node)
+            if isinstance(node, ast.Name):
+                self._check_name(node)
+            elif isinstance(node, ast.Attribute):
+                self._check_attribute(node)
+            elif isinstance(node, ast.Call):
+                self._findings += self._calls.check(node)
+                if id(node) in delegated:
+                    called_by_delegation.add(id(node.func))
+            elif isinstance(node, ast.Compare):
+                self._findings += self._calls.check_comparison(node)
+            elif isinstance(node, ast.Subscript | ast.BinOp):
+                self._findings += self._calls.check_handle_use(node)
+            elif isinstance(node, ast.Import | ast.ImportFrom):
+                self._check_import(node)
+            elif isinstance(node, ast.Constant):
+                self._check_constant(node)
+            elif isinstance(node, ast.YieldFrom):
+                self._check_delegation(node)
+        self._check_bindings()
+        self._check_generator_uses(called_by_delegation)
+        self._check_top_level()
+        return self._findings
+
+    def _add(
+        self, node: ast.AST, code: str, reason: str, remedy: str, severity: Literal["error", "warning"] = "error"
+    ) -> None:
+        self._findings.append(Finding(getattr(node, "lineno", None), code, reason, remedy, severity))
+
+    def _check_allowed(self, node: ast.AST) -> None:
+        if isinstance(node, ALLOWED_NODES):
+            return
+        name = type(node).__name__
+        reason, remedy = NODE_REASONS.get(type(node), (f"{name} is not part of the language", "leave it out"))
+        if hasattr(node, "lineno"):  # parts of a refused statement have no line of their own
+            self._add(node, "not-allowed", reason, remedy)
+
+    def _check_name(self, node: ast.Name) -> None:
+        if node.id.startswith("__"):
+            self._add(node, "reserved", f"the name {node.id[:40]} is reserved", "use another name")
+        elif isinstance(node.ctx, ast.Load) and node.id not in self._known:
+            self._add(node, "unknown-name", f"{node.id[:60]} is not defined", self._remedy_for(node.id))
+
+    def _remedy_for(self, name: str) -> str:
+        if name in {"open", "exec", "eval", "compile", "input", "globals", "locals", "getattr", "setattr", "vars"}:
+            return "programs cannot reach files, the interpreter or other objects; use only the driving APIs"
+        if name in {"time", "sleep"}:
+            return "wait with `yield autopilot()`; each one lasts 0.1 s"
+        if name == "math":
+            return "write `import math` first"
+        return did_you_mean(name, self._known)
+
+    def _check_attribute(self, node: ast.Attribute) -> None:
+        attr = node.attr
+        if attr.startswith("_"):
+            self._add(node, "attribute", f"the attribute {attr[:40]} is private", "use only the driving APIs")
+            return
+        if isinstance(node.value, ast.Name) and node.value.id in self._math:
+            if attr not in MATH_NAMES:
+                self._add(node, "attribute", f"math has no {attr[:40]}", did_you_mean(attr, MATH_NAMES))
+            return
+        if isinstance(node.ctx, ast.Load) and attr in METHODS:
+            return
+        remedy = ATTRIBUTE_REMEDIES.get(attr, "vehicles and lanes have no attributes; use the driving APIs")
+        if attr in APIS:
+            remedy = f"write {attr}(...)"
+        self._add(node, "attribute", f"nothing here has an attribute {attr[:40]}", remedy)
+
+    def _check_import(self, node: ast.Import | ast.ImportFrom) -> None:
+        names = [alias.name for alias in node.names]
+        modules = names if isinstance(node, ast.Import) else [node.module or ""]
+        for module in modules:
+            if module != "math":
+                self._add(
+                    node,
+                    "import",
+                    f"{module[:40] or 'a relative module'} cannot be imported",
+                    "only math can be imported; the driving APIs are there without an import",
+                )
+                return
+        if isinstance(node, ast.ImportFrom):
+            for name in names:
+                if name not in MATH_NAMES:
+                    self._add(node, "import", f"math has no {name[:40]}", did_you_mean(name, MATH_NAMES))
+
+    def _check_constant(self, node: ast.Constant) -> None:
+        value = node.value
+        if isinstance(value, str) and value.startswith(("veh:", "lane:")):
+            self._add(
+                node,
+                "handle",
+                "vehicles and lanes cannot be written down",
+                "get them from get_ego_vehicle(), detect_front_vehicle_in() or get_lane_of()",
+            )
+        elif isinstance(value, bytes | complex):
+            self._add(
+                node, "not-allowed", f"{type(value).__name__} values are not part of the language", "leave it out"
+            )
+
+    def _check_delegation(self, node: ast.YieldFrom) -> None:
+        value = node.value
+        if isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and value.func.id in self._generators:
+            return
+        self._add(
+            node,
+            "yield-from",
+            "`yield from` takes only a direct call of a generator function of this program or of the library",
+            "write `yield from helper(...)`, or `yield autopilot()` inside a loop",
+        )
+
+    def _check_bindings(self) -> None:
+        for node in ast.walk(self._tree):
+            for name in _binds(node):
+                if name.startswith("__"):
+                    self._add(node, "reserved", f"the name {name[:40]} is reserved", "use another name")
+                elif name in APIS:
+                    self._add(node, "shadow", f"{name} is a driving API and cannot be redefined", "use another name")
+                elif name in self._generators and not (isinstance(node, ast.FunctionDef) and is_generator(node)):
+                    self._add(
+                        node, "shadow", f"{name} is also the name of a generator function", "use another name for one"
+                    )
+
+    def _check_generator_uses(self, called_by_delegation: set[int]) -> None:
+        for node in ast.walk(self._tree):
+            if not isinstance(node, ast.Name) or not isinstance(node.ctx, ast.Load):
+                continue
+            if node.id in self._generators and id(node) not in called_by_delegation:
+                self._add(
+                    node,
+                    "generator-use",
+                    f"{node.id} is a generator function; it can only be called as `yield from {node.id}(...)`",
+                    f"write `yield from {node.id}(...)`; the main function is called for you",
+                )
+
+    def _check_top_level(self) -> None:
+        for node in self._tree.body:
+            if isinstance(node, ast.FunctionDef | ast.Import | ast.ImportFrom | ast.ClassDef | ast.AsyncFunctionDef):
+                continue
+            for inner in ast.walk(node):
+                if isinstance(inner, ast.Call) and isinstance(inner.func, ast.Name) and inner.func.id in APIS:
+                    self._add(
+                        inner,
+                        "top-level",
+                        f"{inner.func.id} is called outside a function, before the drive begins",
+                        "move it into the main function",
+                    )
+        for node in ast.walk(self._tree):
+            if isinstance(node, ast.Lambda) and any(
+                isinstance(inner, ast.Yield | ast.YieldFrom) for inner in ast.walk(node.body)
+            ):
+                self._add(node, "not-allowed", "a lambda cannot yield", "use a function")
+            if isinstance(node, ast.JoinedStr) and any(
+                isinstance(inner, ast.Yield | ast.YieldFrom) for inner in ast.walk(node)
+            ):
+                self._add(node, "not-allowed", "a yield cannot stand inside an f-string", "assign it to a name first")
+
+
+def _binds(node: ast.AST) -> list[str]:
+    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store | ast.Del):
+        return [node.id]
+    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+        return [node.name]
+    if isinstance(node, ast.arg):
+        return [node.arg]
+    if isinstance(node, ast.ExceptHandler) and node.name:
+        return [node.name]
+    if isinstance(node, ast.alias):
+        return [node.asname or node.name.partition(".")[0]]
+    if isinstance(node, ast.Global | ast.Nonlocal):
+        return list(node.names)
+    return []
+
+
+def _bound_names(tree: ast.Module) -> frozenset[str]:
+    return frozenset(name for node in ast.walk(tree) for name in _binds(node))
+
+
+def _aliases_of_math(tree: ast.Module) -> set[str]:
+    return {
+        alias.asname or alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Import)
+        for alias in node.names
+        if alias.name == "math"
+    }

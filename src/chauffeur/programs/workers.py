@@ -1,0 +1,48 @@
+"""What the operating system adds around a sandbox worker: one core, few files, no core dumps. Linux only."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Generator
+from pathlib import Path
+from typing import Final
+
+_ADDRESS_SPACE_BYTES: Final = 2 << 30
+_OPEN_FILES: Final = 32
+
+
+def present_core() -> int | None:
+    """Number of the core this process runs on just now, None where that cannot be known."""
+    try:
+        fields = Path("/proc/self/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+        return int(fields[36])
+    except (OSError, IndexError, ValueError):
+        return None
+
+
+@contextlib.contextmanager
+def on_core(core: int | None) -> Generator[None]:
+    """Keep this thread, and all it starts meanwhile, on a core. None does nothing."""
+    if core is None or not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {core})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def confine(pid: int, core: int | None) -> None:
+    """Put a second fence around a worker from outside, and keep it on a core."""
+    with contextlib.suppress(OSError, ValueError, ImportError):  # no such platform, or the worker is already gone
+        import resource
+
+        resource.prlimit(pid, resource.RLIMIT_CORE, (0, 0))
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (_OPEN_FILES, _OPEN_FILES))
+        resource.prlimit(pid, resource.RLIMIT_AS, (_ADDRESS_SPACE_BYTES, _ADDRESS_SPACE_BYTES))
+        if core is not None:
+            for thread in Path(f"/proc/{pid}/task").iterdir():
+                os.sched_setaffinity(int(thread.name), {core})

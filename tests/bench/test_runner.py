@@ -1,0 +1,160 @@
+"""The benchmark's stages on a tiny data set written here, driven for real."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from chauffeur.bench.lampilot.report import comparison_table, run_table, summarise
+from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig, choose_items
+from chauffeur.bench.store import RowStore
+from chauffeur.concept import ConfigError, DataError, Plan, PlannerError, PlanRequest, Program, Thoughts
+from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
+from chauffeur.worlds.highway.scenarios import BUILT_IN
+
+LEFT = """
+def change():
+    set_target_lane(get_left_lane(get_ego_vehicle()))
+    while True:
+        yield autopilot()
+"""
+DYING = """
+def change():
+    set_target_lane(get_left_lane(get_ego_vehicle()))
+    yield autopilot()
+    x = 1 / 0
+    yield autopilot()
+"""
+
+
+class ScriptedPlanner:
+    """Gives a fixed answer for each command; counts how often it is asked."""
+
+    id = "scripted"
+    model = "scripted-1"
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    async def plan(self, request: PlanRequest) -> Plan:
+        self.asked += 1
+        if request.instruction.text == "broken line":
+            raise PlannerError("No answer.", retryable=True)
+        if request.instruction.text == "say no":
+            return Plan(Thoughts("No."), None, refusal="I will not.")
+        source = DYING if request.instruction.text == "die" else LEFT
+        return Plan(Thoughts("Left."), Program(source), intent="lane.left")
+
+
+@pytest.fixture
+def dataset(tmp_path: Path) -> Dataset:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    scenario = next(s for s in BUILT_IN if s.id == "overtake")
+    sample = {"env": scenario.config, "eval": {"type": "LaneChangeEval", "direction": "left"}, "seed": scenario.seed}
+    bad = {**sample, "env": {"type": "ramp-merge-v0", "vehicles_density": 0}}
+    commands = ["go left", "left please", "say no", "die", "broken line"]
+    (folder / "left_lc.json").write_text(json.dumps({"commands": commands, "samples": [sample]}))
+    (folder / "broken.json").write_text(json.dumps({"commands": ["go left"], "samples": [bad]}))
+    return load_dataset(folder)
+
+
+def _quiet(stage: str, done: int, total: int) -> None:
+    pass
+
+
+def _run(tmp_path: Path, dataset: Dataset, planner: ScriptedPlanner) -> list[dict[str, object]]:
+    config = RunConfig("scripted", "few-shot", dataset.sha256, 0, 42)
+    return LampilotRun(tmp_path / "run", dataset, config, planner).run(1, _quiet)
+
+
+@pytest.mark.slow
+def test_outcomes_and_causes_are_apart_and_the_denominator_is_fixed(tmp_path: Path, dataset: Dataset) -> None:
+    planner = ScriptedPlanner()
+    rows = {row["item"]: row for row in _run(tmp_path, dataset, planner)}
+    assert len(rows) == 6
+    assert rows["left_lc_s0_c0"]["success"]
+    assert rows["left_lc_s0_c0"]["rollout_key"] == rows["left_lc_s0_c1"]["rollout_key"]
+    refused = rows["left_lc_s0_c2"]
+    assert (refused["outcome"], refused["refused"], refused["detail"]) == ("refused", True, "I will not.")
+    died = rows["left_lc_s0_c3"]
+    assert died["policy_failed"] and died["fallback_used"] and not died["success"]
+    assert died["score"] == 0.0, "what the fallback achieved is not the policy's"
+    silent = rows["left_lc_s0_c4"]
+    assert silent["infra_failed"] and silent["outcome"] == "not_driven"
+    assert rows["broken_s0_c0"]["infra_failed"]
+    summary = summarise("all", list(rows.values()))
+    assert (summary.items, summary.completion) == (6, pytest.approx(2 / 6))
+
+    # Resume: plans and rollouts are kept, only what failed for want of infrastructure is asked again.
+    asked = planner.asked
+    again = _run(tmp_path, dataset, planner)
+    assert {r["item"]: r for r in again} == rows
+    assert planner.asked == asked + 1
+    assert "lane change" in run_table(again)
+    assert "*paper:* Human driver" in comparison_table([("scripted", again)])
+
+
+def test_a_run_folder_keeps_its_configuration(tmp_path: Path, dataset: Dataset) -> None:
+    LampilotRun(tmp_path / "run", dataset, RunConfig("idm", "few-shot", dataset.sha256, 0, 42), None)
+    with pytest.raises(ConfigError, match="another configuration"):
+        LampilotRun(tmp_path / "run", dataset, RunConfig("mobil", "few-shot", dataset.sha256, 0, 42), None)
+    with pytest.raises(ConfigError, match="no baseline"):
+        LampilotRun(tmp_path / "other", dataset, RunConfig("magic", "few-shot", dataset.sha256, 0, 42), None)
+
+
+def test_items_are_drawn_as_the_origin_draws_them(dataset: Dataset) -> None:
+    items = dataset.items()
+    assert [i.id for i in choose_items(dataset, 0, 42)] == [i.id for i in items]
+    drawn = choose_items(dataset, 3, 42)
+    assert [i.id for i in drawn] == [i.id for i in choose_items(dataset, 3, 42)]
+    assert len({i.id for i in drawn}) == 3
+
+
+def test_store_survives_a_torn_last_line(tmp_path: Path) -> None:
+    path = tmp_path / "rows.jsonl"
+    with RowStore(path, "k") as store:
+        store.append({"k": "a", "v": 1})
+        store.append({"k": "b", "v": 2})
+    path.write_bytes(path.read_bytes()[:-5])
+    with RowStore(path, "k") as store:
+        assert set(store.rows) == {"a"}
+        store.append({"k": "b", "v": 3})
+    assert RowStore(path, "k").rows["b"]["v"] == 3
+
+
+def test_store_names_a_damaged_line(tmp_path: Path) -> None:
+    path = tmp_path / "rows.jsonl"
+    path.write_text('{"k": "a"}\nnot json\n{"k": "b"}\n')
+    with pytest.raises(DataError, match="line 2"):
+        RowStore(path, "k")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [("{", "not a DbLv1"), ("[]", "not a DbLv1"), ('{"commands": ["x"], "samples": [{"env": {}}]}', "not a DbLv1")],
+)
+def test_damaged_task_files_are_named(tmp_path: Path, content: str, message: str) -> None:
+    (tmp_path / "task.json").write_text(content)
+    with pytest.raises(DataError, match=message) as caught:
+        load_dataset(tmp_path)
+    assert "task.json" in str(caught.value)
+
+
+def test_missing_data_is_said(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="No such data folder"):
+        load_dataset(tmp_path / "nowhere")
+    with pytest.raises(DataError, match="no task files"):
+        load_dataset(tmp_path)
+    (tmp_path / "config_list.txt").write_text("gone.json")
+    with pytest.raises(DataError, match=r"gone\.json"):
+        load_dataset(tmp_path)
+
+
+def test_the_official_files_are_read_unchanged(lampilot_data: Path) -> None:
+    dataset = load_dataset(lampilot_data / "DbLv1-dev")
+    assert len(dataset.tasks) == 32
+    assert len(dataset.items()) == 3136
+    assert dataset.scenario("left_overtake_s0_c3") is dataset.scenario("left_overtake_s0")

@@ -1,0 +1,172 @@
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import chauffeur.worlds.highway.gym
+from chauffeur.concept import Command, Scenario, ScenarioError, Wishes
+from chauffeur.worlds.base import EGO, Driver, Perception, World
+from chauffeur.worlds.highway import HighwayWorld
+from chauffeur.worlds.highway.scenarios import BUILT_IN
+
+BY_ID = {s.id: s for s in BUILT_IN}
+
+
+def _drive(world: HighwayWorld, wishes: Wishes, steps: int) -> Wishes:
+    driver = world.driver()
+    for _ in range(steps):
+        wishes = driver.settle(wishes)
+        world.step(driver.command(wishes))
+    return wishes
+
+
+def test_contracts_are_met() -> None:
+    world = HighwayWorld()
+    world.reset(BY_ID["overtake"])
+    assert isinstance(world, World)
+    assert isinstance(world.perception(), Perception)
+    assert isinstance(world.driver(), Driver)
+
+
+@pytest.mark.parametrize("scenario", BUILT_IN, ids=lambda s: s.id)
+def test_built_in_scenarios_start_safe_and_repeat_bit_for_bit(scenario: Scenario) -> None:
+    first, second = HighwayWorld(), HighwayWorld()
+    start = first.reset(scenario)
+    assert start == second.reset(scenario)
+    assert not start.ended
+    assert scenario.wish
+    _drive(first, Wishes(), 30)
+    _drive(second, Wishes(), 30)
+    assert first.snapshot() == second.snapshot()
+    assert first.snapshot() != start
+
+
+def test_another_seed_is_another_traffic() -> None:
+    world = HighwayWorld()
+    assert world.reset(BY_ID["cruise"], 1).others != world.reset(BY_ID["cruise"], 2).others
+
+
+def test_huge_seeds_are_fine() -> None:
+    world = HighwayWorld()
+    assert world.reset(BY_ID["cruise"], 10**42) == world.reset(BY_ID["cruise"], 10**42)
+
+
+def test_snapshot_agrees_with_perception() -> None:
+    world = HighwayWorld()
+    snapshot = world.reset(BY_ID["following"])
+    perception = world.perception()
+    assert snapshot.ego == perception.vehicle(EGO)
+    assert snapshot.front is not None
+    front, _ = perception.neighbours(perception.lane_of(EGO))
+    assert front == snapshot.front.vehicle
+    assert perception.distance_along(EGO, front) == snapshot.front.distance_m
+    assert snapshot.front.speed_mps == perception.vehicle(front).speed_mps
+    assert {v.id for v in snapshot.others} | {o.id for o in snapshot.objects} | {EGO} == set(
+        range(len(snapshot.others) + len(snapshot.objects) + 1)
+    )
+
+
+def test_lane_edges() -> None:
+    world = HighwayWorld()
+    world.reset(BY_ID["emergency-lane"])
+    perception = world.perception()
+    lane = perception.lane_of(EGO)
+    assert lane == ("a", "b", 1)
+    assert perception.adjacent_lane(lane, -1) == ("a", "b", 0)
+    assert perception.adjacent_lane(("a", "b", 0), -1) is None
+    assert perception.adjacent_lane(("a", "b", 3), 1) is None
+    assert not perception.has_lane(("a", "b", 9))
+    assert not perception.has_lane(("nowhere", "b", 0))
+    emergency = [view for view in world.snapshot().lanes if view.emergency]
+    assert [view.id for view in emergency] == [("a", "b", 3)]
+    with pytest.raises(KeyError):
+        perception.vehicle(999)
+
+
+def test_lane_wish_is_followed() -> None:
+    world = HighwayWorld()
+    world.reset(BY_ID["emergency-lane"])
+    _drive(world, dataclasses.replace(world.driver().initial_wishes(), target_lane=("a", "b", 3)), 60)
+    assert world.perception().lane_of(EGO) == ("a", "b", 3)
+    assert abs(world.snapshot().ego.y_m - 12.0) < 0.3
+
+
+def test_intersection_stops_at_the_sign_until_it_is_served() -> None:
+    world = HighwayWorld()
+    snapshot = world.reset(BY_ID["quiet-intersection"])
+    assert snapshot.stop_sign_m == pytest.approx(85.0)
+    wishes = dataclasses.replace(world.driver().initial_wishes(), turn="straight")
+    wishes = _drive(world, wishes, 250)
+    waiting = world.snapshot()
+    assert abs(waiting.ego.speed_mps) < 1.0
+    assert waiting.stop_sign_m is not None
+    sign = world.perception().stop_sign_ahead(frozenset())
+    assert sign is not None
+    assert world.perception().stop_sign_ahead(frozenset({sign[0]})) is None
+    assert world.perception().front_blocker(frozenset()) == sign[0]
+
+
+def test_served_stop_lets_the_car_cross_straight() -> None:
+    world = HighwayWorld()
+    empty = {"type": "dt-intersection-v0", "num_vehicles_left": 0, "num_vehicles_right": 0}
+    world.reset(Scenario("empty", "highway", empty, 1))
+    sign = world.perception().stop_sign_ahead(frozenset())
+    assert sign is not None
+    driver = world.driver()
+    wishes = dataclasses.replace(driver.initial_wishes(), turn="straight", served_stops=frozenset({sign[0]}))
+    seen = set()
+    for _ in range(200):
+        wishes = driver.settle(wishes)
+        world.step(driver.command(wishes))
+        seen.add(world.perception().lane_of(EGO)[:2])
+        if world.ended:
+            break
+    assert ("il2", "o2") in seen
+
+
+@pytest.mark.parametrize(
+    ("config", "message"),
+    [
+        ({"type": "moon"}, "Unknown road type"),
+        ({"type": "ramp-merge-v0", "vehicles_density": 0}, "vehicles_density"),
+        ({"type": "ramp-merge-v0", "vehicels_count": 3}, "vehicels_count"),
+        ({"type": "ramp-merge-v0", "stage_length": [1, 2]}, "stage_length"),
+        ({"type": "dt-highway-v0", "vehicles_count": "many"}, "vehicles_count"),
+        (
+            {"type": "dt-highway-v0", "ego_vehicle": {"start_lane_index": ["x", "y", 0], "start_position": [0, 0]}},
+            "start lane",
+        ),
+    ],
+)
+def test_bad_scenarios_say_what_is_wrong(config: dict[str, object], message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        HighwayWorld().reset(Scenario("bad", "highway", config, 1))
+
+
+def test_world_before_reset_says_so() -> None:
+    with pytest.raises(ScenarioError, match="no scenario"):
+        HighwayWorld().perception()
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_command_must_be_finite(value: float) -> None:
+    world = HighwayWorld()
+    world.reset(BY_ID["cruise"])
+    with pytest.raises(ValueError, match="finite"):
+        world.step(Command(value, 0.0))
+
+
+@pytest.mark.parametrize("name", ["RampMerge", "MultiLane", "Intersection"])
+@pytest.mark.filterwarnings("ignore")
+def test_gymnasium_check(name: str) -> None:
+    assert chauffeur.worlds.highway.gym
+    env = gymnasium.make(f"chauffeur/{name}-v0")
+    check_env(env.unwrapped, skip_render_check=True)
+    observation, _ = env.reset(seed=3)
+    again, _ = env.reset(seed=3)
+    assert np.array_equal(observation, again)

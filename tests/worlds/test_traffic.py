@@ -1,0 +1,77 @@
+"""Our quicker physics against the plain highway-env package, bit for bit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from highway_env.road.lane import StraightLane
+from highway_env.road.regulation import RegulatedRoad
+from highway_env.road.road import Road, RoadNetwork
+from highway_env.vehicle.dynamics import BicycleVehicle
+
+from chauffeur.concept import Command, Scenario
+from chauffeur.worlds.highway import HighwayWorld, roads
+from chauffeur.worlds.highway.scenarios import BUILT_IN
+
+
+class _PlainNetwork(RoadNetwork):
+    def freeze(self) -> None:
+        pass
+
+
+class _PlainRoad(Road):
+    def forget_instant(self) -> None:
+        pass
+
+
+class _PlainRegulatedRoad(RegulatedRoad):
+    def forget_instant(self) -> None:
+        pass
+
+
+class _PlainDynamicEgo(BicycleVehicle):
+    MAX_SPEED = 15.0
+
+
+def _trace(scenario: Scenario, steps: int) -> list[Any]:
+    world = HighwayWorld()
+    world.reset(scenario)
+    driver = world.driver()
+    wishes = driver.initial_wishes()
+    rows = []
+    for _ in range(steps):
+        wishes = driver.settle(wishes)
+        world.step(driver.command(wishes))
+        rows.append([(v.position[0], v.position[1], v.heading, v.speed, v.crashed) for v in world.scene.road.vehicles])
+    return rows
+
+
+@pytest.mark.parametrize(
+    "scenario", [s for s in BUILT_IN if s.id in ("following", "emergency-lane", "intersection")], ids=lambda s: s.id
+)
+def test_same_as_plain_highway_env(scenario: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    quick = _trace(scenario, 80)
+    for name, plain in {
+        "AxisLane": StraightLane,
+        "FastNetwork": _PlainNetwork,
+        "FastRoad": _PlainRoad,
+        "FastRegulatedRoad": _PlainRegulatedRoad,
+        "DynamicEgo": _PlainDynamicEgo,
+    }.items():
+        monkeypatch.setattr(roads, name, plain)
+    assert _trace(scenario, 80) == quick
+
+
+def test_crash_is_felt_and_ends_the_trip() -> None:
+    scenario = next(s for s in BUILT_IN if s.id == "following")
+    world = HighwayWorld()
+    world.reset(scenario)
+    for _ in range(300):
+        world.step(Command(5.0, 0.0))
+        if world.ended:
+            break
+    final = world.snapshot()
+    assert final.ego.crashed
+    assert any(other.crashed for other in final.others)
+    assert final.ended
