@@ -8,14 +8,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 from chauffeur.concept import Feedback, History, HistoryItem
-from chauffeur.memory.phrases import Topic, Want, read_wants
+from chauffeur.memory.phrasebook import Topic
+from chauffeur.memory.phrases import Want, read_wants
 from chauffeur.memory.quantities import Dimension, read_quantities
 from chauffeur.memory.words import even
 
 _MILD, _PLAIN, _STRONG = 0.35, 0.6, 1.0
 _MILD_WORDS = re.compile(
-    r"\b(?:(?:a|the) (?:tiny |little |wee |small )?(?:bit|little|touch|tad|smidge|hair|notch)|slightly|somewhat|little bit"
-    r"|kind of|kinda|sort of|marginally|just a)\b"
+    r"\b(?:(?:a|the) (?:tiny |little |wee |small )?(?:bit|little|touch|tad|smidge|hair|notch)|slightly|somewhat"
+    r"|little bit|kind of|kinda|sort of|marginally|just a)\b"
 )
 _STRONG_WORDS = re.compile(
     r"\b(?:way|far(?= too)|(?<!too )(?<!not )much|a lot|lots|really|very|extremely|super|terribly|awfully|incredibly"

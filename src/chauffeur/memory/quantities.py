@@ -21,15 +21,16 @@ _UNITS: tuple[tuple[str, Dimension, float], ...] = (
     (r"car[ -]lengths?", "length", M_PER_CAR_LENGTH),
     (r"seconds?|secs?|s", "time", 1.0),
 )
-_WORDS = {
-    word: value
-    for value, word in enumerate(
-        "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen seventeen "
-        "eighteen nineteen twenty".split()  # noqa: SIM905 - reads better than twenty-one quoted words
-    )
-} | {"thirty": 30, "forty": 40, "fifty": 50, "sixty": 60, "seventy": 70, "eighty": 80, "ninety": 90, "hundred": 100}
+_ONES = (
+    "zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "thirteen",
+    "fourteen", "fifteen", "sixteen", "seventeen", "eighteen", "nineteen",
+)  # fmt: skip
+_TENS = ("twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety", "hundred")
+_WORDS = {word: float(value) for value, word in enumerate(_ONES)} | {
+    word: 10.0 * value for value, word in enumerate(_TENS, start=2)
+}
 _NUMBER = rf"(?P<number>\d+(?:[.,]\d+)?|\b(?:{'|'.join(_WORDS)}))"
-_PATTERNS = tuple(
+_PATTERNS: tuple[tuple[re.Pattern[str], Dimension, float], ...] = tuple(
     (re.compile(rf"{_NUMBER} ?(?:{unit})(?![\w/])"), dimension, factor) for unit, dimension, factor in _UNITS
 )
 
@@ -50,6 +51,6 @@ def read_quantities(text: str) -> tuple[Quantity, ...]:
         while (match := pattern.search(left)) is not None:
             left = left[: match.start()] + " " + left[match.end() :]
             number = match["number"]
-            value = float(_WORDS[number]) if number in _WORDS else float(number.replace(",", "."))
+            value = _WORDS[number] if number in _WORDS else float(number.replace(",", "."))
             found.append(Quantity(dimension, value * factor))
     return tuple(found)

@@ -11,6 +11,7 @@ import re
 import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -26,36 +27,42 @@ DIMENSIONS = 384
 Vector = npt.NDArray[np.float32]
 
 _STOP = frozenset(
-    "a an the i you me my your we us it is am are be to of in on at do can could would will please just now this that and "
-    "so there here have has".split()  # noqa: SIM905 - reads better than forty quoted words
+    re.findall(
+        r"\w+",
+        "a an the i you me my your we us it is am are be to of in on at do can could would will please just now this "
+        "that and so there here have has",
+    )
 )
 _WORD = re.compile(r"[^\W_]+(?:\.\d+)?")
 _WEIGHT_WORD, _WEIGHT_STOP, _WEIGHT_PAIR, _WEIGHT_LETTERS = 1.0, 0.15, 0.6, 0.25
 
+_MOVE_TAGS = ("lane.left", "lane.right", "turn.left", "turn.right", "turn.straight", "overtake", "stop")
 TAGS = (
-    "speed+", "speed-", "gap+", "gap-", "comfort+", "comfort-",
-    "lane.left", "lane.right", "turn.left", "turn.right", "turn.straight", "overtake", "stop",
-    "not.lane.left", "not.lane.right", "not.turn.left", "not.turn.right", "not.turn.straight", "not.overtake", "not.stop",
-)  # fmt: skip
+    *(f"{topic}{sign}" for topic in ("speed", "gap", "comfort") for sign in "+-"),
+    *_MOVE_TAGS,
+    *(f"not.{tag}" for tag in _MOVE_TAGS),
+)
 _BIT = {tag: 1 << index for index, tag in enumerate(TAGS)}
 _OPPOSITES = (
     *((f"{topic}+", f"{topic}-") for topic in ("speed", "gap", "comfort")),
-    ("lane.left", "lane.right"), ("turn.left", "turn.right"), ("turn.left", "turn.straight"),
-    ("turn.right", "turn.straight"), *((tag.removeprefix("not."), tag) for tag in TAGS if tag.startswith("not.")),
-)  # fmt: skip
+    *((tag, f"not.{tag}") for tag in _MOVE_TAGS),
+    ("lane.left", "lane.right"),
+    ("turn.left", "turn.right"),
+    ("turn.left", "turn.straight"),
+    ("turn.right", "turn.straight"),
+)
 _AGAINST = {tag: sum(_BIT[b if a == tag else a] for a, b in _OPPOSITES if tag in (a, b)) for tag in TAGS}
 
-_MOVES = tuple(
-    (re.compile(rf"\b(?:{phrase})\b"), tag)
-    for phrase, tag in (
-        (r"(?:turn|take a|make a|go) (?:\w+ )?(?P<side>left|right)|(?P<side2>left|right) turn", "turn."),
-        (r"(?:go |drive |keep |continue )?straight|(?:go|drive) (?:across|through)", "turn.straight"),
-        (r"(?P<side>left|right)(?: ?hand)?(?: ?most)? lane|lane (?:\w+ ){0,3}(?P<side2>left|right)|leftmost|rightmost", "lane."),
-        (r"(?:move|merge|change|switch|shift|get|pull|steer) (?:\w+ ){0,4}(?P<side>left|right)", "lane."),
-        (r"overtak\w+|pass (?:the|this|that|him|her|them|it)|get (?:past|ahead of|around|by)", "overtake"),
-        (r"pull over|stop|park|halt", "stop"),
-    )
-)  # fmt: skip
+_PHRASES = (
+    (r"(?:turn|take a|make a|go) (?:\w+ )?(?P<side>left|right)|(?P<side2>left|right) turn", "turn."),
+    (r"(?:go |drive |keep |continue )?straight|(?:go|drive) (?:across|through)", "turn.straight"),
+    (r"(?P<side>left|right)(?: ?hand)?(?: ?most)? lane|lane (?:\w+ ){0,3}(?P<side2>left|right)", "lane."),
+    (r"(?:move|merge|change|switch|shift|get|pull|steer) (?:\w+ ){0,4}(?P<side>left|right)", "lane."),
+    (r"(?P<side>left|right)most", "lane."),
+    (r"overtak\w+|pass (?:the|this|that|him|her|them|it)|get (?:past|ahead of|around|by)", "overtake"),
+    (r"pull over|stop|park|halt", "stop"),
+)
+_MOVES = tuple((re.compile(rf"\b(?:{phrase})\b"), tag) for phrase, tag in _PHRASES)
 _NEGATED = re.compile(r"\b(?:not|never|no|without|avoid|instead of)\b(?: \w+){0,4} ?$")
 
 _CONFLICT = 0.15
@@ -135,7 +142,7 @@ def _features(text: str) -> Iterator[tuple[str, float]]:
             for start in range(len(padded) - 3):
                 yield f"l:{padded[start : start + 4]}", _WEIGHT_LETTERS
     telling = [word for word in words if word not in _STOP]
-    for first, second in zip(telling, telling[1:], strict=False):
+    for first, second in pairwise(telling):
         yield f"p:{first} {second}", _WEIGHT_PAIR
 
 
@@ -147,7 +154,7 @@ def _moves(clause: str) -> Iterator[str]:
             continue
         left = left[: match.start()] + "#" + left[match.end() :]
         sides = match.groupdict()
-        side = sides.get("side") or sides.get("side2") or ("left" if "left" in match[0] else "right")
+        side = sides.get("side") or sides.get("side2")
         full = f"{tag}{side}" if tag.endswith(".") else tag
         yield f"not.{full}" if _NEGATED.search(clause[: match.start()]) else full
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 import unicodedata
 
-_EVEN = (
+_EVEN: tuple[tuple[re.Pattern[str], str], ...] = (
     (re.compile(r"[\u2019\u02bc`]"), "'"),
     (re.compile(r"\bwon't\b"), "will not"),
     (re.compile(r"\bcan(?:'t|not)\b"), "can not"),
     (re.compile(r"n't\b"), " not"),
-    (re.compile(r"\b(dont|didnt|wasnt|isnt)\b"), lambda m: m[1][:-2] + " not"),
+    (re.compile(r"\b(do|did|was|is)nt\b"), r"\1 not"),
     (re.compile(r"'d\b"), " would"),
     (re.compile(r"'m\b"), " am"),
     (re.compile(r"'re\b"), " are"),

@@ -59,7 +59,7 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     (rf"\bmake (?:some |more )?(?:room|space|way) for {VEHICLE}|\byield(?: to {VEHICLE})?\b|\bgive way\b", "act", "yield", 0, "", 1.5),
     # overtaking
     (r"\b(?:overtak\w+|over take|leapfrog\w*|outrun|surpass\w*|bypass\w*)\b", "act", "overtake", 0, "", 2.0),
-    (rf"\b{_MOVE} (?:us |me |it |your way |yourself )?(?:on )?(?:past|around|by|round|ahead of|ahead(?= the| that| this))(?! now)\b", "act", "overtake", 0, "", 1.5),
+    (rf"\b{_MOVE} (?:us |me |it |your way |yourself )?(?:on )?(?:past|around|by|round|ahead of|ahead(?= the| that| this))\b(?! #| (?:an?|about|at least|around|half|double|now)\b)", "act", "overtake", 0, "", 1.5),
     (rf"\bpast {VEHICLE}|\bleav(?:e|ing) {VEHICLE} behind|\bget rid of {VEHICLE}|\blose (?:this|that|him|the) (?:guy|slowpoke|truck|car)", "act", "overtake", 0, "", 1.5),
     (rf"\b(?:get|move|be|pull|go) ahead(?: of)?(?= {VEHICLE}|$)", "act", "overtake", 0, "", 1.2),
     (r"\bpass(?:ing)?\b(?! me| us the| the salt)", "act", "overtake", 0, "", 1.2),
@@ -76,7 +76,7 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     # straight on
     (r"\bnot (?:\w+ )?(?:deviate|stray|leave|depart|diverge|swerve|divert|veer)\w*(?: off)?(?: from)? (?:\w+ ){0,2}?(?:path|course|route|direction|way|heading)\b", "act", "turn", 0, "straight", 2.5),
     (r"\b(?:not|never|no|without|avoid|refrain from)(?: \w+){0,2}? (?:tak(?:e|ing) |mak(?:e|ing) )?(?:any |a )?(?:turn|turns|turning)\b(?! (?:\w+ ){0,3}(?:left|right)| it| up| down| on| off| around)", "act", "turn", 0, "straight", 2.0),
-    (r"\b(?:keep|hold|maintain|stay(?:ing)?|follow)(?: on| to)? (?:your|the|this|our|my|same|present|current)(?: \w+)? (?:course|path|route|heading|direction|trajectory)(?: straight)?\b|\bstay the course\b|\bstay on (?:course|track|path)\b", "act", "turn", 0, "straight", 0.8),
+    (r"\b(?:keep|hold|maintain|stay(?:ing)?|follow)(?: on| to)? (?:your|the|this|our|my|same|present|current)(?: (?!left|right)\w+)? (?:course|path|route|heading|direction|trajectory)(?: straight)?\b|\bstay the course\b|\bstay on (?:course|track|path)\b", "act", "turn", 0, "straight", 0.8),
     (r"\b(?:go|get|drive|pass|proceed|continue|keep|head|carry|move|travel|run|cut)(?:ing)? (?:on |right |directly |clean )?(?:through|across|over) (?:the |this |that )?(?:\w+ )?junction\b|\bcross(?:ing)?(?: over)? (?:the |this )?(?:\w+ )?junction\b", "act", "turn", 0, "straight", 1.5),
     (r"\b(?:directly|dead) (?:ahead|forward)\b|\bahead only\b|\b(?:proceed|continue|go|keep going|head|carry on|move|drive|keep|keep moving|keep driving)(?: on)? (?:ahead|forwards?|onwards?)\b(?! of)", "act", "turn", 0, "straight", 1.0),
     # lanes and sides (patterns with a side)

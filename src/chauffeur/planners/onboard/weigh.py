@@ -43,7 +43,7 @@ _BIG: frozenset[Manoeuvre] = frozenset({"lane", "overtake", "turn", "pull_over",
 def meanings_of(clause: Clause) -> list[Meaning]:
     """Everything the clause asks for, in its order; empty when it says nothing complete alone."""
     out: list[Meaning] = []
-    for meaning in (*_acts(clause), *_pairs(clause), *_states(clause), *_quantities_alone(clause, out)):
+    for meaning in (*_acts(clause), *_pairs(clause), *_states(clause)):
         _put(out, meaning)
     if not out or not any(m.manoeuvre not in ("speed", "gap", "follow") for m in out):
         for meaning in _quantities_alone(clause, out):
