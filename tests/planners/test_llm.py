@@ -83,6 +83,13 @@ def test_a_refused_program_is_repaired_once(server, bench):
     assert "| - line 3: 250 m/s is too fast." in turns[3]["content"]
 
 
+def test_the_gate_of_the_driving_language_is_the_default(server, bench):
+    server.script(stream(REPLY.replace("set_target_speed", "set_speed")), stream(REPLY))
+    plan = bench.plan(gate=None)
+    assert plan.policy == Program(PROGRAM)
+    assert "| - line 3: set_speed is not defined; did you mean" in server.requests[1].body["messages"][3]["content"]
+
+
 def test_a_program_refused_twice_is_handed_on_for_the_checks_to_refuse(server, bench):
     plan = bench.plan(gate=lambda source: ["line 1: no"])
     assert plan.policy == Program(PROGRAM)

@@ -73,9 +73,21 @@ def test_a_cut_answer_counts_only_when_its_program_is_closed():
 
 @pytest.mark.parametrize(
     "text",
-    ["`" * 5_000_000, "```\n" * 500_000, "REFUSE" * 500_000, "* " * 2_000_000, "\n" * 5_000_000, "REFUSE:" + " " * 3_000_000,
-     "<think>" * 500_000, "def f():\n" * 300_000, "_" * 3_000_000, "(" * 1_000_000, "Thoughts" + " *" * 1_000_000],
-)  # fmt: skip
+    [
+        "`" * 5_000_000,
+        "```\n" * 500_000,
+        "REFUSE" * 500_000,
+        "* " * 2_000_000,
+        "\n" * 5_000_000,
+        "REFUSE:" + " " * 3_000_000,
+        "<think>" * 500_000,
+        "def f():\n" * 300_000,
+        "_" * 3_000_000,
+        "(" * 1_000_000,
+        "Thoughts" + " *" * 1_000_000,
+        "def f():\n" + "    x = 1\n" * 100_000 + "and that is it\n" * 100,
+    ],
+)
 def test_floods_take_no_time(text):
     started = time.process_time()
     reply = read_reply(text)

@@ -37,7 +37,7 @@ class Finding:
 
 @dataclass
 class Report:
-    findings: tuple[Finding, ...]
+    errors: tuple[Finding, ...]
 
 
 @pytest.fixture
@@ -72,12 +72,38 @@ def test_a_program_the_gate_accepts_passes(snap: Snap, plan: Make, gate: Callabl
 
 
 def test_the_gate_s_first_finding_is_the_reason(snap: Snap, plan: Make, gate: Callable[..., None]) -> None:
-    gate(Finding(3, "It imports os.", "Leave it out."))
+    gate(Finding(3, "it imports os", "leave it out"))
     assert judge(plan(Program("x")), snap()) == Verdict("format-v1", False, "It imports os.", 3, "Leave it out.")
     gate(Finding(3, "It imports os.", "Leave it out."), Finding(9, "b", "c"), Finding(9, "b", "c"))
-    assert judge(plan(Program("x")), snap()).reason == "It imports os. (2 more findings)"
+    assert judge(plan(Program("x")), snap()).reason == "It imports os. (2 more findings.)"
     gate(Finding(3, "It imports os.", "Leave it out."), Finding(9, "b", "c"))
-    assert judge(plan(Program("x")), snap()).reason == "It imports os. (1 more finding)"
+    assert judge(plan(Program("x")), snap()).reason == "It imports os. (1 more finding.)"
+
+
+def test_the_language_s_own_gate_is_asked(snap: Snap, plan: Make) -> None:
+    good = Program("def policy():\n    set_target_speed(25)\n    while True:\n        yield autopilot()\n")
+    assert judge(plan(good), snap()).passed
+    verdict = judge(plan(Program("def policy():\n    fly()\n    while True:\n        yield autopilot()\n")), snap())
+    assert (verdict.passed, verdict.line) == (False, 2)
+    assert "fly" in verdict.reason
+
+
+def test_the_envelope_watches_apis_that_exist() -> None:
+    from chauffeur.programs.catalogue import APIS
+    from chauffeur.safety.envelope import _TURNS
+    from chauffeur.safety.reading import _LANE_STEPS
+
+    watched = {
+        *_TURNS,
+        *_LANE_STEPS,
+        "set_target_speed",
+        "set_desired_time_headway",
+        "set_target_lane",
+        "is_safe_enter",
+    }
+    assert watched <= set(APIS)
+    assert APIS["set_target_speed"].params[0].unit == "m/s"
+    assert APIS["set_desired_time_headway"].params[0].unit == "s"
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from typing import Literal
 
-
 Topic = Literal["speed", "gap", "comfort", "approval"]
 Manner = Literal["complaint", "request", "remark", "opinion", "fixed", "plea", "nothing"]
 """How a phrase takes a negation, and what it weighs.
@@ -36,7 +35,10 @@ _MID = r"(?:[\w']+ ){0,3}"
 _ROUGH = (
     r"(?:harsh(?:ly)?|hard|rough(?:ly)?|jerky|abrupt(?:ly)?|sudden(?:ly)?|aggressive(?:ly)?|sharp(?:ly)?|sporty|wild)"
 )
-_TIMID = r"(?:timid|cautious(?:ly)?|careful(?:ly)?|hesitant|gentl[ey]|soft|conservative(?:ly)?|passive|tame|defensive(?:ly)?)"
+_TIMID = (
+    r"(?:timid|cautious(?:ly)?|careful(?:ly)?|hesitant|gentl[ey]|soft|conservative(?:ly)?|passive|tame"
+    r"|defensive(?:ly)?)"
+)
 
 PHRASE_BOOK: tuple[tuple[Topic, Literal[-1, 1], Manner, tuple[str, ...]], ...] = (
     # Negations that are part of the phrase, and look-alikes, come first: what they match is used up.

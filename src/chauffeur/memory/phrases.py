@@ -14,7 +14,7 @@ _PATTERNS: tuple[tuple[re.Pattern[str], Topic, Literal[-1, 1], Manner], ...] = t
 )
 _NEGATED = re.compile(r"\b(?<!why )(?:not|never|no|nothing|hardly|without|neither|nor)\b(?: [\w']+){0,4} ?$")
 _ORDERED = re.compile(
-    r"^(?:(?:please|just|so|next time|ok|okay) )*(?:do not|never|avoid|stop)(?! (?:think|find|feel|believe|mind|know))\b"
+    r"^(?:(?:please|just|so|next time|okay) )*(?:do not|never|avoid|stop)(?! (?:think|find|feel|believe|mind|know))\b"
     r"|\b(?:should|must|may|ought|try|rather|prefer) not\b"
 )
 

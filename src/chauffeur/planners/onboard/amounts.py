@@ -9,13 +9,17 @@ from chauffeur.planners.onboard.meaning import Amount, Bound, Change, Dimension,
 from chauffeur.planners.onboard.quantities import Quantity
 
 _LESS = r"(?:less|closer|nearer|shorter|lower|smaller|tighter|slower|narrower|fewer|down|below|under)"
-_MORE = r"(?:more|further|farther|higher|longer|greater|larger|bigger|wider|faster|quicker|extra|additional|up|above|over)"
+_MORE = (
+    r"(?:more|further|farther|higher|longer|greater|larger|bigger|wider|faster|quicker|extra|additional|up|above|over)"
+)
 _AFTER_LESS = re.compile(rf"^(?: (?:any|much|to be))? {_LESS}\b(?! (?:the )?speedlimit)")
 _AFTER_MORE = re.compile(rf"^(?: (?:any|much|to be))? {_MORE}\b(?! (?:the )?speedlimit)")
 _AWAY = re.compile(r"^ (?:further )?(?:back|away|off|apart)\b")
 _RESTING = re.compile(r"\b(?:keep|stay|hold|remain|maintain|follow|leave|sit|set|drive)\w*\b")
 _BY = re.compile(r"\b(?:by|another|additional|extra|an extra)(?: (?:about|around|roughly|some|another|an?))* $")
-_TO = re.compile(r"\b(?:to|of|at|within|until|is|be|doing|do|down to|up to)(?: (?:about|around|roughly|exactly|be|a|just|some))* $")
+_TO = re.compile(
+    r"\b(?:to|of|at|within|until|is|be|doing|do|down to|up to)(?: (?:about|around|roughly|exactly|be|a|just|some))* $"
+)
 _AT_MOST = re.compile(
     r"\b(?:at most|up to a maximum of|maximum(?: of)?|max(?: of)?|under|below|not (?:\w+ ){0,3}?(?:exceed|above|over|past|more than"
     r"|faster than|further than)|no (?:more|faster|higher|further|farther|longer) than|slower than|less than|(?:not|never) (?:\w+ ){0,3}?"
@@ -27,7 +31,9 @@ _AT_LEAST = re.compile(
     r"|drop below)|(?:no|not) (?:less|slower|closer|nearer|lower) than|faster than|more than|above|over|further than"
     r"|farther than)(?: (?:about|around))? $"
 )
-_OVER_LIMIT = re.compile(r"^ (?P<how>over|above|under|below|faster than|slower than|less than|more than) (?:the )?(?:speedlimit|limit|sign)")
+_OVER_LIMIT = re.compile(
+    r"^ (?P<how>over|above|under|below|faster than|slower than|less than|more than) (?:the )?(?:speedlimit|limit|sign)"
+)
 _NUDGE = re.compile(r"\b(?:add|subtract|deduct|knock|shave|take off|gain|scrub|shed)\w*\b")
 _FACTORS = (
     (re.compile(r"\b(?:by|in) half\b|\bhalf(?: of)?(?: (?:the|this|that|your|our|my|as))?\b|\bhalv\w+\b"), 0.5),

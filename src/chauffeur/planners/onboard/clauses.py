@@ -21,8 +21,12 @@ _NEGATOR = re.compile(
 )
 _LONE_STOP = re.compile(r"\bstop (?:driving|moving|rolling)(?= ?$)")
 _AFTER = re.compile(r"^(?:after|once|as soon as) (?P<first>[^,]+?) ?, (?P<second>.+)$")
-_THEN_AFTER = re.compile(r"^(?P<second>.+?) (?:after|once) (?P<first>(?:you|we|passing|overtaking|turning|changing|that|i) .+)$")
-_BEFORE = re.compile(r"^(?P<first>.+?) before (?P<second>(?:you |we )?(?:turn|chang|overtak|pass|pull|stop|merg|speed|slow)\w* ?.*)$")
+_THEN_AFTER = re.compile(
+    r"^(?P<second>.+?) (?:after|once) (?P<first>(?:you|we|passing|overtaking|turning|changing|that|i) .+)$"
+)
+_BEFORE = re.compile(
+    r"^(?P<first>.+?) before (?P<second>(?:you |we )?(?:turn|chang|overtak|pass|pull|stop|merg|speed|slow)\w* ?.*)$"
+)
 _MARK = re.compile(r"#(\d+)")
 _MASK = "~"
 

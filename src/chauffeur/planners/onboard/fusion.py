@@ -42,7 +42,9 @@ def fuse(found: list[Meaning], hard: list[bool]) -> list[Meaning] | NotUnderstoo
 
 def _without_reasons(steps: list[tuple[Meaning, bool]]) -> list[tuple[Meaning, bool]]:
     """A feeling beside a plain wish is its reason; what leaves things as they are gives way to what changes them."""
-    firm = [s for s in steps if s[0].manoeuvre not in ("style", "keep", "resume") and s[0].variant not in ("hint", "not")]
+    firm = [
+        s for s in steps if s[0].manoeuvre not in ("style", "keep", "resume") and s[0].variant not in ("hint", "not")
+    ]
     if firm:
         manner = next((_MANNERS[m.variant] for m, _ in steps if m.variant in _MANNERS), "")
         kept = [s for s in steps if s in firm or s[0].variant == "not" or (s[1] and s[0].manoeuvre == "style")]

@@ -101,7 +101,9 @@ class Meaning:
         return {1: "increase", -1: "decrease", 0: "hold"}[self.change]
 
 
-Why = Literal["empty", "symbols", "language", "off_topic", "question", "ambiguous", "unknown", "unsupported", "too_long"]
+Why = Literal[
+    "empty", "symbols", "language", "off_topic", "question", "ambiguous", "unknown", "unsupported", "too_long"
+]
 
 
 @dataclass(frozen=True, slots=True)

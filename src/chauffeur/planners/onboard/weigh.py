@@ -17,7 +17,9 @@ _MUCH = re.compile(
     r"\b(?:much|a lot|lots|way|far (?=more|less|too|faster|slower|closer)|considerably|significantly|substantially|drastically"
     r"|extremely|massively|hugely|dramatically|really|a great deal|very|ridiculously|seriously|tons|loads)\b"
 )
-_GENTLE = re.compile(r"\b(?:gently|gradually|smoothly|softly|slowly|carefully|safely|cautiously|nice and easy|gentle)\b")
+_GENTLE = re.compile(
+    r"\b(?:gently|gradually|smoothly|softly|slowly|carefully|safely|cautiously|nice and easy|gentle)\b"
+)
 _SWIFT = re.compile(r"\b(?:swift|quickly|fast|quick|rapidly|hurry|promptly|hard)\b")
 _TOO = re.compile(
     r"\b(?:too|overly|excessively|awfully|terribly|ridiculously|painfully|insanely|dangerously|so|this|that|such|such a)"
@@ -28,11 +30,17 @@ _STATEMENT = re.compile(
     r"(?: \w+){0,2}? (?:am|is|are|was|were|have|has|feels?|seems?|looks?|drive|drives|driving|going|keep|follow)\b"
 )
 _WISH = re.compile(r"\b(?:should|could|can|would|want|wish|need|please|like to|prefer|lets|better|may|might)\b")
-_COMPLAINT = re.compile(r"\b(?:complain|why|hate|how come|tired of|fed up|sick of|have to|must (?:you|we)|stop being)\b|^(?:do|does|must) (?:you|we|it)\b")
+_COMPLAINT = re.compile(
+    r"\b(?:complain|why|hate|how come|tired of|fed up|sick of|have to|must (?:you|we)|stop being)\b|^(?:do|does|must) (?:you|we|it)\b"
+)
 _BE_NOT = re.compile(r"\b(?:are|is|am|were|was) not(?: (?:driving|going|moving|really|exactly|very))* $")
 _HOLD = re.compile(r"\b(?:keep|maintain|hold|stay|remain|stick|retain|preserve|continue|sustain)\w*\b")
-_GAP_WORDS = re.compile(r"\b(?:behind|following|back|away|from|closer|headway|gap|distance|between|ahead|follow|within)\b")
-_SPEED_WORDS = re.compile(r"\b(?:do|doing|go|going|drive|driving|hit|run|cruise|cruising|speed|at|faster|slower|hold|keep|travel)\b")
+_GAP_WORDS = re.compile(
+    r"\b(?:behind|following|back|away|from|closer|headway|gap|distance|between|ahead|follow|within)\b"
+)
+_SPEED_WORDS = re.compile(
+    r"\b(?:do|doing|go|going|drive|driving|hit|run|cruise|cruising|speed|at|faster|slower|hold|keep|travel)\b"
+)
 _TOO_MUCH = re.compile(r"\btoo much\b")
 _TOO_LITTLE = re.compile(r"\b(?:too little|not (?:\w+ )?enough|not much|no)\b")
 _SPEED_DIMS: tuple[Dimension, ...] = ("speed", "share", "bare")
@@ -265,7 +273,9 @@ def _styles(clause: Clause) -> Iterator[Meaning]:
             change = _state_change(e, clause)
             yield _meaning(clause, e, variant="sporty" if change > 0 else "careful", change=0)
         elif e.negated:
-            flipped = {"hurry": "relax", "relax": "hurry", "sporty": "careful", "eco": ""}.get(e.cue.variant, e.cue.variant)
+            flipped = {"hurry": "relax", "relax": "hurry", "sporty": "careful", "eco": ""}.get(
+                e.cue.variant, e.cue.variant
+            )
             if flipped:
                 yield _meaning(clause, e, variant=flipped)
         else:

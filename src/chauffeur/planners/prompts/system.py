@@ -26,7 +26,7 @@ _PLAIN = {
     ),
     "thoughts_overtake": (
         "Thoughts: The passenger wants to pass the slower car 31.5 m ahead on its left. I wait until the left lane is "
-        "safe, move over, and drive 5 m/s faster than that car until it is 15 m behind."
+        "safe, move over, and drive up to 5 m/s faster than that car until it is 15 m behind."
     ),
     "thoughts_straight": (
         "Thoughts: The passenger wants to cross straight ahead; there is a stop sign. I choose the route now, let the "
@@ -49,7 +49,7 @@ _STEPS = {
         "1. Situation: 24.6 m/s in the middle lane of three; a car ahead at 31.5 m with the same speed.\n"
         "2. Wish: pass that car on its left.\n"
         "3. Risks: a car beside or behind in the left lane. I enter only when it is safe and give up after 30 s.\n"
-        "4. Plan: wait for a safe left lane, move over, drive 5 m/s faster than the car until it is 15 m behind."
+        "4. Plan: wait for a safe left lane, move over, drive up to 5 m/s faster than the car until it is 15 m behind."
     ),
     "thoughts_straight": (
         "Thoughts:\n"
@@ -86,7 +86,7 @@ def describe_limits(limits: Limits) -> str:
 
 
 def _exemplars(limits: Limits, chain_of_thought: bool) -> str:
-    # The numbers of the first example keep to the same limits that the model is held to.
+    # The numbers of the examples keep to the same limits that the model is held to.
     numbers = {
         "headway": f"{max(limits.min_time_headway_s, _CLOSE_HEADWAY_S):g}",
         "over": f"{min(limits.max_over_limit_mps, _OVER_LIMIT_MPS):g}",
