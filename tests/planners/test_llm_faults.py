@@ -113,6 +113,14 @@ def test_a_stream_that_drips_for_ever_is_bounded_as_a_whole(server, bench):
     assert time.monotonic() - started < 2.0
 
 
+def test_a_plan_has_a_budget_for_everything_together(server, bench):
+    server.script(silent(5.0))
+    started = time.monotonic()
+    error = failure(bench, timeout_s=0.1, budget_s=0.25)
+    assert error.kind == "timeout" and "0.25 s" in error.message
+    assert time.monotonic() - started < 2.0
+
+
 def test_a_slow_stream_within_the_time_is_fine(server, bench):
     server.script(
         events(*(chunk(REPLY[i : i + 20]) for i in range(0, len(REPLY), 20)), chunk(finish="stop"), DONE, pause_s=0.01)

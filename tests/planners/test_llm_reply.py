@@ -45,11 +45,16 @@ def test_thoughts_and_program_are_told_apart(text, thoughts):
         "**REFUSE:** Not here.",
         f"{FENCED}\nREFUSE: Not here.",
         "  > REFUSE : Not here.",
+        "REFUSE:\n\n**Not here.**",
     ],
 )
 def test_a_refusal_is_taken_at_its_word(text):
     reply = read_reply(text)
     assert (reply.refusal, reply.source, reply.problem) == ("Not here.", None, "")
+
+
+def test_a_refusal_without_a_reason_is_still_one():
+    assert "without giving a reason" in read_reply("REFUSE:").refusal
 
 
 def test_a_refusal_inside_a_program_or_a_sentence_is_none():

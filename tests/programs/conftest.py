@@ -7,10 +7,7 @@ from collections.abc import Iterator
 import pytest
 from straight_road import StraightRoad
 
-from chauffeur.programs import Budget, ProgramExecutor, Sandbox
-
-PATIENT = Budget(turn_s=1.0, tick_s=2.0, grace_s=1.0, start_s=5.0)
-"""For tests of meaning: a busy machine must not fail them. Tests of the budgets use the defaults."""
+from chauffeur.programs import UNHURRIED, ProgramExecutor, Sandbox
 
 
 @pytest.fixture
@@ -21,8 +18,8 @@ def road() -> StraightRoad:
 
 @pytest.fixture(scope="session")
 def sandbox() -> Iterator[Sandbox]:
-    """One patient sandbox for all tests of meaning."""
-    with Sandbox(PATIENT) as shared:
+    """One unhurried sandbox for all tests of meaning."""
+    with Sandbox(UNHURRIED) as shared:
         yield shared
 
 

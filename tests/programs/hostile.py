@@ -1,7 +1,7 @@
 """Hostile and broken programs, as data. None may escape, stop the host, or delay a control period.
 
-Each entry: name, the outcomes that contain it when the static gate is off (several where the machine's speed decides),
-and the text. `harmless`: it runs or ends without having reached anything.
+Each entry: name, the outcomes that contain it when the static gate is off (several where the interpreter's or the
+machine's speed decides), and the text. `harmless`: it runs or ends without having reached anything.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ OS_ACCESS = [
         pickle="import pickle\npickle.loads(b\"cos\\nsystem\\n(S'id'\\ntR.\")",
         chauffeur="import chauffeur.worlds\nsay(str(chauffeur))",
         exec_os="exec('import os; os.system(\"touch /tmp/chauffeur-canary\")')",
-        eval_import="eval('__import__(\"os\").system(\"id\")')",
+        eval_import='eval(\'__import__("os").system("id")\')',
         compile_it="exec(compile('1', 'x', 'exec'))",
         input_it="say(input())",
         breakpoint_it="breakpoint()",
@@ -80,7 +80,6 @@ OBJECT_GRAPH = [
         builtins="say(str(__builtins__))",
         loader="say(str(__loader__))",
         globals_call="globals()['say'] = None",
-        locals_call="say(str(locals()))",
         vars_call="say(str(vars(attack)))",
         getattr_class="getattr((), '__cla' + 'ss__').__base__",
         getattr_globals="getattr(say, '__glo' + 'bals__')",
@@ -105,17 +104,15 @@ OBJECT_GRAPH = [
 CPU = [
     *_make(
         "cpu",
-        "time",
+        "time memory",
         spin="while True:\n    pass",
         spin_except="while True:\n    try:\n        while True:\n            pass\n    except:\n        pass",
         spin_finally="try:\n    while True:\n        pass\nfinally:\n    while True:\n        pass",
         sum_range="sum(range(10 ** 13))",
         nested_for="for a in range(10 ** 6):\n    for b in range(10 ** 6):\n        c = a * b",
-        sorted_big="sorted(range(10 ** 9))",
         all_range="all(range(1, 10 ** 12))",
         max_gen="max(x * x for x in range(10 ** 12))",
         zip_range="for a, b in zip(range(10 ** 12), range(10 ** 12)):\n    pass",
-        in_range_float="1.5 in range(10 ** 12)",
         map_loop="len(list(map(lambda x: None, range(10 ** 9))))",
         any_filter="any(filter(lambda x: False, range(10 ** 12)))",
         collatz="n = 27\nwhile n > 0:\n    n = n // 2 if n % 2 == 0 else 3 * n + 1",
@@ -128,7 +125,9 @@ CPU = [
     ),
     *_make(
         "cpu",
-        "time memory raised",
+        "time memory raised recursion harmless",
+        sorted_big="sorted(range(10 ** 9))",
+        in_range_float="1.5 in range(10 ** 12)",
         power_tower="9 ** 9 ** 9",
         power_str="str(7 ** 4000000)",
         shift="1 << (1 << 40)",
@@ -234,7 +233,9 @@ CONTROL_FLOW = [
     Hostile(
         "flow/swallow_all",
         frozenset({"calls"}),
-        _body("while True:\n    try:\n        autopilot()\n        raise ValueError\n    except BaseException:\n        continue"),
+        _body(
+            "while True:\n    try:\n        autopilot()\n        raise ValueError\n    except BaseException:\n        continue"
+        ),
     ),
     Hostile(
         "flow/finally_loop",
@@ -248,25 +249,43 @@ CONTROL_FLOW = [
         "def helper():\n    yield 1\n" + _body("for x in helper():\n    say(str(x))"),
     ),
     Hostile("flow/next_of_generator", frozenset({"raised"}), "def h():\n    yield 1\n" + _body("next(h())")),
-    Hostile("flow/yield_everything", frozenset({"harmless"}), "def attack():\n    while True:\n        yield [0] * 10 ** 4\n"),
+    Hostile(
+        "flow/yield_everything",
+        frozenset({"harmless"}),
+        "def attack():\n    while True:\n        yield [0] * 10 ** 4\n",
+    ),
     Hostile("flow/async", frozenset({"syntax"}), "async def attack():\n    yield 1\n"),
-    Hostile("flow/await", frozenset({"syntax", "raised"}), "import asyncio\n" + _body("asyncio.sleep(1)\nasyncio.run(asyncio.sleep(9))")),
+    Hostile(
+        "flow/await",
+        frozenset({"time", "raised"}),
+        "import asyncio\n" + _body("asyncio.sleep(1)\nasyncio.run(asyncio.sleep(9))"),
+    ),
 ]
 
 TAMPERING = [
     Hostile("tamper/tick_call", frozenset({"harmless"}), _body("__tick__(7, None)\n__tick__('x' * 100, None)")),
     Hostile("tamper/tick_no_args", frozenset({"harmless"}), _body("__tick__()")),
     Hostile("tamper/tick_flood", frozenset({"harmless"}), _body("while True:\n    __tick__(-1, [[]])")),
-    Hostile("tamper/tick_redefined", frozenset({"raised", "time"}), "def __tick__(line, value):\n    pass\n" + _body("while True:\n    yield")),
+    Hostile(
+        "tamper/tick_redefined",
+        frozenset({"raised", "time"}),
+        "def __tick__(line, value):\n    pass\n" + _body("while True:\n    yield"),
+    ),
     Hostile("tamper/tick_none", frozenset({"raised"}), "__tick__ = None\n" + _body("pass")),
     Hostile("tamper/api_redefined", frozenset({"raised"}), "autopilot = None\n" + _body("pass")),
-    Hostile("tamper/api_shadowed", frozenset({"harmless"}), "def is_safe_enter(lane):\n    return True\n" + _body("pass")),
+    Hostile(
+        "tamper/api_shadowed", frozenset({"harmless"}), "def is_safe_enter(lane):\n    return True\n" + _body("pass")
+    ),
     Hostile("tamper/forged_vehicle", frozenset({"raised"}), _body("say(str(get_speed_of('veh:9')))")),
     Hostile("tamper/forged_unknown", frozenset({"raised"}), _body("get_speed_of('veh:99999999999999999999')")),
     Hostile("tamper/forged_negative", frozenset({"raised"}), _body("get_speed_of('veh:-1')")),
     Hostile("tamper/forged_lane", frozenset({"raised"}), _body("set_target_lane('lane:a:b:2')")),
     Hostile("tamper/forged_lane_far", frozenset({"raised"}), _body("set_target_lane('lane:x:y:7')")),
-    Hostile("tamper/arithmetic_handle", frozenset({"raised"}), _body("set_target_lane(get_lane_of(get_ego_vehicle())[:-1] + '2')")),
+    Hostile(
+        "tamper/arithmetic_handle",
+        frozenset({"raised"}),
+        _body("set_target_lane(get_lane_of(get_ego_vehicle())[:-1] + '2')"),
+    ),
     Hostile("tamper/tuple_lane", frozenset({"raised"}), _body("set_target_lane(('a', 'b', 2))")),
     Hostile("tamper/int_vehicle", frozenset({"raised"}), _body("get_speed_of(0)")),
     Hostile("tamper/list_vehicle", frozenset({"raised"}), _body("get_speed_of([get_ego_vehicle()])")),
@@ -278,11 +297,23 @@ TAMPERING = [
     Hostile("tamper/flag_speed", frozenset({"raised"}), _body("set_target_speed(True)")),
     Hostile("tamper/text_speed", frozenset({"raised"}), _body("set_target_speed('fast')")),
     Hostile("tamper/nan_headway", frozenset({"raised"}), _body("set_desired_time_headway(float('nan'))")),
-    Hostile("tamper/deep_argument", frozenset({"raised"}), _body("a = []\nfor _ in range(3000):\n    a = [a]\nget_speed_of(a)")),
-    Hostile("tamper/shared_argument", frozenset({"raised"}), _body("a = [0] * 10\nfor _ in range(40):\n    a = [a] * 10\nget_speed_of(a)")),
+    Hostile(
+        "tamper/deep_argument",
+        frozenset({"raised"}),
+        _body("a = []\nfor _ in range(3000):\n    a = [a]\nget_speed_of(a)"),
+    ),
+    Hostile(
+        "tamper/shared_argument",
+        frozenset({"raised"}),
+        _body("a = [0] * 10\nfor _ in range(40):\n    a = [a] * 10\nget_speed_of(a)"),
+    ),
     Hostile("tamper/cyclic_argument", frozenset({"raised"}), _body("a = []\na.append(a)\nsay(a)")),
     Hostile("tamper/many_arguments", frozenset({"raised", "memory", "time"}), _body("say(*range(10 ** 5))")),
-    Hostile("tamper/many_keywords", frozenset({"raised", "memory", "time"}), _body("say(**{'a' + str(i): i for i in range(10 ** 4)})")),
+    Hostile(
+        "tamper/many_keywords",
+        frozenset({"raised", "memory", "time"}),
+        _body("say(**{'a' + str(i): i for i in range(10 ** 4)})"),
+    ),
     Hostile("tamper/long_keyword", frozenset({"raised"}), _body("say(**{'a' * 10 ** 5: 1})")),
     Hostile("tamper/large_integer", frozenset({"raised"}), _body("say(2 ** 5000000)")),
     Hostile("tamper/surrogate", frozenset({"raised", "harmless"}), _body("say('\\ud800')")),
@@ -291,6 +322,7 @@ TAMPERING = [
 ]
 
 LEAKS = [
+    Hostile("leak/locals", frozenset({"harmless"}), _body("say(str(locals()))")),
     Hostile("leak/api_repr", frozenset({"harmless"}), _body("say(str(autopilot))")),
     Hostile("leak/function_repr", frozenset({"harmless"}), _body("say(repr(attack))")),
     Hostile("leak/id", frozenset({"harmless"}), _body("say(str(id(autopilot)))")),
@@ -317,19 +349,31 @@ BROKEN = [
     Hostile("broken/deep_unary", frozenset({"syntax"}), f"def attack():\n    yield {'-' * 9000}1\n"),
     Hostile("broken/deep_lists", frozenset({"syntax"}), f"def attack():\n    yield {'[' * 90}{']' * 90}\n"),
     Hostile("broken/long_sum", frozenset({"syntax"}), f"def attack():\n    yield {'1+' * 4000}1\n"),
-    Hostile("broken/deep_blocks", frozenset({"syntax"}), "def attack():\n" + "".join(f"{' ' * (i + 1)}if 1:\n" for i in range(90)) + " " * 95 + "yield\n"),
+    Hostile(
+        "broken/deep_blocks",
+        frozenset({"syntax"}),
+        "def attack():\n" + "".join(f"{' ' * (i + 1)}if 1:\n" for i in range(90)) + " " * 95 + "yield\n",
+    ),
     Hostile("broken/huge_integer", frozenset({"syntax"}), f"def attack():\n    yield {'9' * 9000}\n"),
-    Hostile("broken/many_functions", frozenset({"syntax"}), "".join(f"def f{i}(): pass\n" for i in range(1000)) + "def attack():\n    yield\n"),
+    Hostile(
+        "broken/many_functions",
+        frozenset({"harmless"}),
+        "".join(f"def f{i}(): pass\n" for i in range(1000)) + "def attack():\n    yield\n",
+    ),
     Hostile("broken/unknown_api", frozenset({"raised"}), _body("change_lane_left()")),
     Hostile("broken/unknown_method", frozenset({"raised"}), _body("get_ego_vehicle().accelerate(3)")),
     Hostile("broken/too_many_arguments", frozenset({"raised"}), _body("get_speed_of(get_ego_vehicle(), 3)")),
     Hostile("broken/missing_argument", frozenset({"raised"}), _body("get_speed_of()")),
     Hostile("broken/unknown_keyword", frozenset({"raised"}), _body("set_target_speed(speed_kmh=100)")),
-    Hostile("broken/none_vehicle", frozenset({"raised"}), _body("get_speed_of(detect_front_vehicle_in(get_left_lane(), 1))")),
+    Hostile(
+        "broken/none_vehicle", frozenset({"raised"}), _body("get_speed_of(detect_front_vehicle_in(get_left_lane(), 1))")
+    ),
     Hostile("broken/none_lane", frozenset({"raised"}), _body("set_target_lane(None)")),
     Hostile("broken/divide_by_zero", frozenset({"raised"}), _body("set_target_speed(1 / 0)")),
     Hostile("broken/class", frozenset({"harmless", "raised"}), "class Planner:\n    pass\n" + _body("Planner()")),
-    Hostile("broken/inheritance", frozenset({"syntax", "raised"}), "class Planner(dict):\n    pass\n" + _body("Planner()")),
+    Hostile(
+        "broken/inheritance", frozenset({"syntax", "raised"}), "class Planner(dict):\n    pass\n" + _body("Planner()")
+    ),
     Hostile("broken/del", frozenset({"syntax"}), _body("x = 1\ndel x")),
     Hostile("broken/with", frozenset({"raised", "syntax"}), _body("with autopilot() as a:\n    pass")),
     Hostile("broken/yield_in_lambda", frozenset({"harmless", "raised"}), _body("f = lambda: (yield 1)\nf()")),

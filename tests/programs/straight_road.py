@@ -14,6 +14,7 @@ LIMIT_MPS = 31.0
 LANES: tuple[LaneId, ...] = (("a", "b", 0), ("a", "b", 1), ("a", "b", 2))
 CROSS: tuple[LaneId, ...] = (("w", "e", 0), ("e", "x", 0))
 
+
 @dataclass(frozen=True)
 class Car:
     """A car or sign on the straight road; `x_m` along it, `lane` counted from the left."""

@@ -72,12 +72,12 @@ def test_a_program_the_gate_accepts_passes(snap: Snap, plan: Make, gate: Callabl
 
 
 def test_the_gate_s_first_finding_is_the_reason(snap: Snap, plan: Make, gate: Callable[..., None]) -> None:
-    gate(Finding(3, "it imports os", "leave it out"))
+    gate(Finding(3, "It imports os.", "Leave it out."))
     assert judge(plan(Program("x")), snap()) == Verdict("format-v1", False, "It imports os.", 3, "Leave it out.")
     gate(Finding(3, "It imports os.", "Leave it out."), Finding(9, "b", "c"), Finding(9, "b", "c"))
-    assert judge(plan(Program("x")), snap()).reason == "It imports os. (2 more findings.)"
+    assert judge(plan(Program("x")), snap()).reason == "It imports os. (and 2 more findings)"
     gate(Finding(3, "It imports os.", "Leave it out."), Finding(9, "b", "c"))
-    assert judge(plan(Program("x")), snap()).reason == "It imports os. (1 more finding.)"
+    assert judge(plan(Program("x")), snap()).reason == "It imports os. (and 1 more finding)"
 
 
 def test_the_language_s_own_gate_is_asked(snap: Snap, plan: Make) -> None:

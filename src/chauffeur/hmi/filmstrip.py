@@ -8,6 +8,7 @@ import secrets
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
@@ -31,6 +32,7 @@ _SCALE = 9.0
 _EGO_PLACE = 0.36
 _BESIDE_M = 2.5
 _COLUMNS = 3
+_SHOWN_WITHIN_S = 0.15
 _SUPERSAMPLE = 2
 
 _PAPER, _INK, _MUTED = "#f4f2ec", "#1c1f24", "#59606a"
@@ -143,7 +145,7 @@ def choose_moments(times: Sequence[float], events: Sequence[Event], count: int) 
         pinned = slot in (0, count - 1) and count > 1
         at = middle if event is None or pinned else event.time_s
         index = min(bisect_left(times, at - 1e-6), len(times) - 1)
-        shown = event if event is not None and abs(times[index] - event.time_s) < 0.75 else None
+        shown = event if event is not None and abs(times[index] - event.time_s) <= _SHOWN_WITHIN_S else None
         chosen.setdefault(index, shown)
     return tuple(Moment(index, event) for index, event in sorted(chosen.items()))
 
@@ -256,7 +258,7 @@ class _Panel:
         self._draw.line(pixels, fill=ink, width=max(2, round(width_m * self._scale)), joint="curve")
 
     def _hatch(self, centre: Sequence[tuple[float, float]], half_m: float) -> None:
-        for (x0, y0), (x1, y1) in zip(centre, centre[1:], strict=False):
+        for (x0, y0), (x1, y1) in pairwise(centre):
             length = math.dist((x0, y0), (x1, y1))
             ux, uy = (x1 - x0) / length, (y1 - y0) / length
             inner = half_m * 0.86
@@ -300,7 +302,7 @@ class _Panel:
 def _dashes(points: Sequence[tuple[float, float]]) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     """3 m of paint, 6 m without, along a line."""
     pieces: list[tuple[tuple[float, float], tuple[float, float]]] = []
-    for (x0, y0), (x1, y1) in zip(points, points[1:], strict=False):
+    for (x0, y0), (x1, y1) in pairwise(points):
         length = math.dist((x0, y0), (x1, y1))
         ux, uy = (x1 - x0) / length, (y1 - y0) / length
         start = 0.0

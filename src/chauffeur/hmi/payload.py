@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, cast
 
 from chauffeur.concept import (
     ActionMatrix,
@@ -81,8 +81,9 @@ def provenance(trip: Trip) -> list[tuple[str, str]]:
         ("scenario", trip.scenario),
         ("seed", str(trip.seed)),
         ("trip", trip.id),
-        *((name, value if isinstance(value, str) else json.dumps(value, default=str)) for name, value in trip.record),
     ]
+    known = {name for name, _ in rows}
+    rows.extend((name.replace("_", " "), _words(value)) for name, value in trip.record if name not in known)
     return [(name, value) for name, value in rows if value]
 
 
@@ -129,6 +130,24 @@ def program_tokens(source: str) -> list[list[tuple[str, str]]]:
             if piece:
                 lines[-1].append((name, piece))
     return [[("" if name == "i" else name, text) for name, text in line] for line in lines]
+
+
+def _words(value: Any) -> str:
+    """A value of the provenance as a line of text."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, dict):
+        parts: list[str] = []
+        for name, item in cast("Json", value).items():
+            if isinstance(item, int | float) and not isinstance(item, bool):
+                label, text = words.setting(name, float(item))
+                parts.append(f"{label} {text}")
+            elif item is not None:
+                parts.append(str(item))
+        return ", ".join(parts)
+    return json.dumps(value, default=str)
 
 
 def _program_lines(policy: Policy | None) -> list[list[tuple[str, str]]] | None:

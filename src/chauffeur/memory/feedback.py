@@ -43,8 +43,10 @@ def interpret_feedback(text: str) -> Feedback:
     blamed = any(want.topic == "approval" and want.sign < 0 for want in wants)
     wants = tuple(want for want in wants if not (want.manner == "remark" and praised))
     about = [want for want in wants if want.topic != "approval"]
-    signs = {topic: _sign(want.sign for want in about if want.topic == topic) for topic in TOPICS}
-    telling = [want for want in about if signs.get(_known(want.topic), 0)]
+    signs: dict[Topic, Literal[-1, 0, 1]] = {
+        topic: _sign(want.sign for want in about if want.topic == topic) for topic in TOPICS
+    }
+    telling = [want for want in about if signs.get(want.topic, 0)]
     strength = max((_strength(want) for want in telling), default=0.0)
     complained = any(want.manner not in ("request", "plea") and _strength(want) >= _PLAIN for want in telling)
 
@@ -92,13 +94,11 @@ def _when(item: HistoryItem) -> str:
     return item.when
 
 
-def _known(topic: Topic) -> Literal["speed", "gap", "comfort"]:
-    return "speed" if topic == "approval" else topic
-
-
 def _sign(signs: Iterable[int]) -> Literal[-1, 0, 1]:
     found = set(signs)
-    return 0 if len(found) != 1 else 1 if 1 in found else -1
+    if len(found) != 1:
+        return 0
+    return 1 if 1 in found else -1
 
 
 def _strength(want: Want) -> float:

@@ -226,7 +226,8 @@ PHRASE_BOOK: tuple[tuple[Topic, Literal[-1, 1], Manner, tuple[str, ...]], ...] =
         1,
         "request",
         (
-            r"more (?:aggressive(?:ly)?|assertive(?:ly)?|confident(?:ly)?|decisive(?:ly)?|dynamic(?:ally)?|sporty|spirited)",
+            r"more (?:aggressive|assertive|confident|decisive|dynamic)(?:al)?(?:ly)?",
+            r"more (?:sporty|spirited)",
             rf"less {_TIMID}",
             r"sportier",
             r"bolder",

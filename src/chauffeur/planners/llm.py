@@ -15,6 +15,7 @@ from chauffeur.concept import ConfigError, InstructionError, Plan, PlanRequest, 
 from chauffeur.planners.cache import Completion, ReplyCache, default_cache_dir, endpoint_key
 from chauffeur.planners.llm_address import Address, parse_address
 from chauffeur.planners.llm_endpoint import Endpoint, Sampling
+from chauffeur.planners.llm_errors import timed_out
 from chauffeur.planners.llm_reply import MAX_REPLY_CHARS, Reply, read_reply
 from chauffeur.planners.llm_retry import RetryPolicy, with_retries
 from chauffeur.planners.pricing import cost_usd
@@ -62,6 +63,7 @@ class LlmPlanner:
         timeout_s: For one whole reply.
         retry: How often and how patiently to try again.
         repairs: How often the model may correct an answer the gate refused.
+        budget_s: For a whole plan, retries, waits and repairs included.
         cache: Where to keep replies; None keeps nothing.
         gate: Checks a program's text; default is the gate of `chauffeur.programs`.
         on_text: Gets the reply as it is written.
@@ -81,6 +83,7 @@ class LlmPlanner:
         timeout_s: float = 60.0,
         retry: RetryPolicy | None = None,
         repairs: int = 1,
+        budget_s: float = 180.0,
         cache: ReplyCache | None = None,
         gate: Gate | None = None,
         on_text: OnText | None = None,
@@ -95,6 +98,7 @@ class LlmPlanner:
         self._sampling = sampling or Sampling()
         self._retry = retry or RetryPolicy()
         self._repairs = repairs
+        self._budget_s = budget_s
         self._cache = cache
         self._gate = gate or program_findings
         self._on_text = on_text
@@ -115,6 +119,8 @@ class LlmPlanner:
         max_tokens: int = 4096,
         timeout_s: float = 60.0,
         attempts: int = 4,
+        repairs: int = 1,
+        budget_s: float = 180.0,
         cache: bool = True,
         cache_dir: str | Path | None = None,
         stream: bool = True,
@@ -131,6 +137,8 @@ class LlmPlanner:
             max_tokens: Most tokens the model may write.
             timeout_s: For one whole reply.
             attempts: Requests at most per answer.
+            repairs: How often the model may correct an answer the gate refused; 0 for a single shot.
+            budget_s: For a whole plan, retries, waits and repairs included.
             cache: Whether to keep replies on disk and use kept ones.
             cache_dir: Where; default is the user's cache folder.
             stream: Ask for the reply piece by piece.
@@ -148,6 +156,8 @@ class LlmPlanner:
             ("max_tokens", max_tokens, max_tokens > 0),
             ("timeout_s", timeout_s, timeout_s > 0.0),
             ("attempts", attempts, attempts > 0),
+            ("repairs", repairs, 0 <= repairs <= 5),
+            ("budget_s", budget_s, budget_s > 0.0),
         ):
             if not fits:
                 raise ConfigError(f"{name} = {value} is out of range.")
@@ -161,6 +171,8 @@ class LlmPlanner:
             sampling=Sampling(temperature=temperature, seed=seed, max_tokens=max_tokens),
             timeout_s=timeout_s,
             retry=RetryPolicy(attempts=attempts),
+            repairs=repairs,
+            budget_s=budget_s,
             cache=ReplyCache(root) if cache else None,
             gate=gate,
             on_text=on_text,
@@ -188,14 +200,11 @@ class LlmPlanner:
             raise InstructionError("The instruction is empty.", hint="Say what you want the car to do.")
         started_s = self._clock()
         bill = _Bill()
-        messages = build_messages(request)
-        completion, reply, findings = await self._answer(messages, bill)
-        for _ in range(self._repairs):
-            if not findings:
-                break
-            _log.info("%s: asking for a repair: %s", self.id, "; ".join(findings))
-            messages = [*messages, *repair_turns(completion.text, findings)]
-            completion, reply, findings = await self._answer(messages, bill)
+        try:
+            async with asyncio.timeout(self._budget_s):
+                completion, reply = await self._converse(build_messages(request), bill)
+        except TimeoutError:
+            raise timed_out(self._address.url, self._budget_s) from None
         return Plan(
             thoughts=Thoughts(reply.thoughts),
             # A program that the gate still refuses is handed on: the checks of the loop refuse it on the record.
@@ -212,6 +221,16 @@ class LlmPlanner:
     async def close(self) -> None:
         """Close the connections to the endpoint."""
         await self._endpoint.close()
+
+    async def _converse(self, messages: list[Message], bill: _Bill) -> tuple[Completion, Reply]:
+        completion, reply, findings = await self._answer(messages, bill)
+        for _ in range(self._repairs):
+            if not findings:
+                break
+            _log.info("%s: asking for a repair: %s", self.id, "; ".join(findings))
+            messages = [*messages, *repair_turns(completion.text, findings)]
+            completion, reply, findings = await self._answer(messages, bill)
+        return completion, reply
 
     async def _answer(self, messages: list[Message], bill: _Bill) -> tuple[Completion, Reply, list[str]]:
         completion = await self._complete(messages, bill)

@@ -12,7 +12,7 @@ MAX_REPLY_CHARS = 200_000
 """Longest reply read, reasoning in front of the answer included; the answer itself has a few thousand characters."""
 
 _FENCE = re.compile(r"^[ \t]*(?:`{3,}|~{3,})", re.MULTILINE)
-_REFUSE = re.compile(r"^[ \t>*_#]*REFUSE[*_ \t]*:[*_ \t]*(\S[^\n]{0,600})", re.MULTILINE)
+_REFUSE = re.compile(r"^[ \t>*_#]*REFUSE[*_ \t]*:[*_\s]{0,20}([^\n]{0,600})", re.MULTILINE)
 _LABEL = re.compile(r"\A[\s*_#]*Thoughts?[*_ \t]*:[*_ \t]*", re.IGNORECASE)
 _THINK_END = "</think>"
 _THINK_START = "<think>"
@@ -49,7 +49,8 @@ def read_reply(text: str, *, cut: bool = False) -> Reply:
     refusal = _REFUSE.search(prose)
     if refusal:
         # A program beside a refusal is one the model itself does not stand by.
-        return Reply(thoughts=_tidy(_REFUSE.sub("", prose)), refusal=refusal[1].strip(" *_"))
+        reason = refusal[1].strip(" *_") or "The model declined without giving a reason."
+        return Reply(thoughts=_tidy(_REFUSE.sub("", prose)), refusal=reason)
     if cut and not complete:
         return Reply(_tidy(prose), problem="the answer was cut off at its length limit; answer more briefly")
     if not visible.strip():

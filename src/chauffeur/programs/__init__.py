@@ -17,11 +17,12 @@ from chauffeur.programs.executor import ProgramExecutor, TickResult
 from chauffeur.programs.extract import Extracted, extract_program
 from chauffeur.programs.findings import Finding
 from chauffeur.programs.gate import GateReport, check_source
-from chauffeur.programs.sandbox import Budget, Sandbox
+from chauffeur.programs.sandbox import UNHURRIED, Budget, Sandbox
 
 __all__ = [
     "APIS",
     "CATALOGUE",
+    "UNHURRIED",
     "Api",
     "Budget",
     "DrivingApis",

@@ -80,24 +80,31 @@ class DrivingApis:
             BadArgumentValueError: A value that cannot be: unknown handle, vehicle gone, not finite, text too long.
         """
         api = APIS[name]
+        shown: list[str] = []
+        try:
+            result = self._make(api, arguments, keywords, shown)
+        except (BadArgumentTypeError, BadArgumentValueError) as error:
+            self._calls.append(ApiCall(name, ", ".join(shown), f"refused: {error}"))
+            raise
+        self._calls.append(ApiCall(name, ", ".join(shown), _show(result)))
+        return result
+
+    def _make(self, api: Api, arguments: Sequence[Any], keywords: Mapping[str, Any], shown: list[str]) -> Any:
         problem = argument_problem(api, len(arguments), keywords.keys())
         if problem is not None:
             raise BadArgumentTypeError(problem)
         values: list[Any] = []
-        shown: list[str] = []
         for index, param in enumerate(api.params):
             given = arguments[index] if index < len(arguments) else keywords.get(param.name, param.default)
             values.append(self._decode(api, param, given))
             if index < len(arguments) or param.name in keywords:
                 shown.append(_show(given))
         try:
-            result = self._encode(api, self._methods[name](*values))
+            return self._encode(api, self._methods[api.name](*values))
         except KeyError as error:
             if not (error.args and isinstance(error.args[0], int)):
                 raise
-            raise BadArgumentValueError(f"{name}: vehicle veh:{error.args[0]} is no longer on the road") from None
-        self._calls.append(ApiCall(name, ", ".join(shown), _show(result)))
-        return result
+            raise BadArgumentValueError(f"{api.name}: vehicle veh:{error.args[0]} is no longer on the road") from None
 
     def _decode(self, api: Api, param: Param, given: Any) -> Any:
         where = f"{api.name}({param.name})"
@@ -251,7 +258,8 @@ def _text(given: Any, where: str) -> str:
         raise BadArgumentTypeError(f"{where} must be a text, not {describe(given)}")
     if len(given) > MAX_SAY_CHARS:
         raise BadArgumentValueError(f"{where} takes at most {MAX_SAY_CHARS} characters, not {len(given)}")
-    return given
+    # Control characters would speak to a terminal, not to a passenger.
+    return "".join(char if char.isprintable() else " " for char in given)
 
 
 def _show(value: Any) -> str:

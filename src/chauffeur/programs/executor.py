@@ -109,8 +109,9 @@ class ProgramExecutor:
                 if not report.passed:
                     first = report.errors[0]
                     raise ProgramRefusedError(first.reason, line=first.line, hint=first.remedy)
-            self._run = self._open().start(prepare(source, self._library), APIS)
-            self._state = "running"
+            prepared = prepare(source, self._library)
+            self._run = self._open().start(prepared, APIS)
+            self._state, self._line = "running", prepared.main_line
         except ProgramFaultError as error:
             self._fail(error)
         return self._state

@@ -36,6 +36,9 @@ from chauffeur.programs.words import (
 _MAX_FINDINGS: Final = 20
 """More do not help a model to repair a program."""
 
+_MAX_COLLECTED: Final = 200
+"""Beyond it the text is no honest attempt, and looking for similar names in it would take seconds."""
+
 
 @dataclass(frozen=True, slots=True)
 class GateReport:
@@ -161,7 +164,8 @@ class _Gate:
     def _add(
         self, node: ast.AST, code: str, reason: str, remedy: str, severity: Literal["error", "warning"] = "error"
     ) -> None:
-        self._findings.append(Finding(getattr(node, "lineno", None), code, reason, remedy, severity))
+        if len(self._findings) < _MAX_COLLECTED:
+            self._findings.append(Finding(getattr(node, "lineno", None), code, reason, remedy, severity))
 
     def _check_allowed(self, node: ast.AST) -> None:
         if isinstance(node, ALLOWED_NODES):
@@ -178,6 +182,8 @@ class _Gate:
             self._add(node, "unknown-name", f"{node.id[:60]} is not defined", self._remedy_for(node.id))
 
     def _remedy_for(self, name: str) -> str:
+        if len(self._findings) >= _MAX_COLLECTED:
+            return ""
         if name in {"open", "exec", "eval", "compile", "input", "globals", "locals", "getattr", "setattr", "vars"}:
             return "programs cannot reach files, the interpreter or other objects; use only the driving APIs"
         if name in {"time", "sleep"}:

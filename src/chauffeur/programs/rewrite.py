@@ -36,11 +36,13 @@ class Prepared:
         library: Rewritten helper functions, fed first; empty without a library.
         program: Rewritten program, ending in the call of its main function.
         main: Name of the main function.
+        main_line: Line it begins at.
     """
 
     library: str
     program: str
     main: str
+    main_line: int
 
 
 def parse(source: str, what: str = "program") -> ast.Module:
@@ -150,7 +152,7 @@ def prepare(source: str, library: str = "") -> Prepared:
         helpers = f"{_rewrite(library, library_tree, frozenset(), in_library=True)}\n{_SITE} = {{0: 0}}\n"
     program = _rewrite(source, tree, library_generators, in_library=False)
     # The first tick stands before the main call: a started program has run its top level and waits like a generator.
-    return Prepared(helpers, f"{program}\n{TICK}(0, None)\n{main.name}()\n", main.name)
+    return Prepared(helpers, f"{program}\n{TICK}(0, None)\n{main.name}()\n", main.name, main.lineno)
 
 
 def _rewrite(source: str, tree: ast.Module, library_generators: frozenset[str], *, in_library: bool) -> str:

@@ -42,11 +42,15 @@ class Budget:
 
     turn_s: float = 0.02
     tick_s: float = 0.05
-    grace_s: float = 0.03
+    grace_s: float = 0.02
     start_s: float = 0.25
     calls: int = 200
     memory_bytes: int = 16 * 1024 * 1024
     recursion: int = 100
+
+
+UNHURRIED: Final = Budget(turn_s=1.0, tick_s=2.0, grace_s=1.0, start_s=5.0)
+"""For simulated time, which waits for the program: how busy the machine is must not change what a program does."""
 
 
 @dataclass(frozen=True, slots=True)

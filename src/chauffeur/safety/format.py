@@ -52,8 +52,8 @@ def _program(source: str) -> Verdict:
     errors = check_source(source).errors
     if errors:
         first, rest = errors[0], len(errors) - 1
-        more = f" ({rest} more finding{'s' if rest > 1 else ''}.)" if rest else ""
-        return Verdict(FORMAT_CHECK, False, _sentence(first.reason) + more, first.line, _sentence(first.remedy))
+        more = f" (and {rest} more finding{'s' if rest > 1 else ''})" if rest else ""
+        return Verdict(FORMAT_CHECK, False, first.reason + more, first.line, first.remedy)
     return _pass("The program keeps to the driving language.")
 
 
@@ -80,11 +80,6 @@ def _finite(form: str, values: Iterable[tuple[str, object]]) -> Verdict:
         if not _is_finite(value):
             return _fail(f"{name} of the {form} is {value!r}, not a finite number.", f"Give {name} as a plain number.")
     return _pass(f"All numbers of the {form} are finite.")
-
-
-def _sentence(words: str) -> str:
-    """The gate's findings are half sentences that stand behind a line number; a verdict is read on its own."""
-    return words[:1].upper() + words[1:] + ("" if words.endswith((".", "`")) else ".")
 
 
 def _is_finite(value: object) -> bool:

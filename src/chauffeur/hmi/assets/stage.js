@@ -21,7 +21,7 @@ function makeStage() {
     if (camera.along) {
       const metres = Math.min(170, Math.max(90, view.width / 7.5));
       view.scale = view.width / metres;
-      view.height = Math.min(520, Math.max(250, (boxY1 - boxY0 + 12) * view.scale));
+      view.height = Math.min(520, Math.max(200, (boxY1 - boxY0 + 12) * view.scale));
     } else {
       view.height = Math.min(640, Math.max(360, view.width * 0.62));
       view.scale = Math.min(view.width / (boxX1 - boxX0), view.height / (boxY1 - boxY0));

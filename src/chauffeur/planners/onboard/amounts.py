@@ -20,16 +20,26 @@ _BY = re.compile(r"\b(?:by|another|additional|extra|an extra)(?: (?:about|around
 _TO = re.compile(
     r"\b(?:to|of|at|within|until|is|be|doing|do|down to|up to)(?: (?:about|around|roughly|exactly|be|a|just|some))* $"
 )
-_AT_MOST = re.compile(
-    r"\b(?:at most|up to a maximum of|maximum(?: of)?|max(?: of)?|under|below|not (?:\w+ ){0,3}?(?:exceed|above|over|past|more than"
-    r"|faster than|further than)|no (?:more|faster|higher|further|farther|longer) than|slower than|less than|(?:not|never) (?:\w+ ){0,3}?"
-    r"(?:faster|quicker|higher|farther) than|exceed(?:ing)?|closer than|within|capped? (?:\w+ )?at|limit (?:\w+ ){0,2}?to)"
-    r"(?: (?:about|around))? $"
-)
-_AT_LEAST = re.compile(
-    r"\b(?:at least|minimum(?: of)?|min(?: of)?|not (?:\w+ ){0,4}?(?:below|under|less than|slower than|closer than|nearer than"
-    r"|drop below)|(?:no|not) (?:less|slower|closer|nearer|lower) than|faster than|more than|above|over|further than"
-    r"|farther than)(?: (?:about|around))? $"
+_ABOUT = r"(?: (?:about|around))? $"
+_BOUNDS: tuple[tuple[re.Pattern[str], Bound], ...] = tuple(
+    (re.compile(pattern + _ABOUT), bound)
+    for pattern, bound in (
+        (
+            r"\b(?:not|never|no) (?:\w+ ){0,4}?(?:(?:faster|quicker|higher|more|further|farther|longer) than|exceed\w*|above"
+            r"|over|past)",
+            "at_most",
+        ),
+        (
+            r"\b(?:not|never|no) (?:\w+ ){0,4}?(?:(?:slower|less|closer|nearer|lower|shorter) than|below|under)",
+            "at_least",
+        ),
+        (
+            r"\b(?:at most|up to a maximum of|maximum(?: of)?|max(?: of)?|under|below|slower than|less than|closer than"
+            r"|within|capp?e?d? (?:\w+ ){0,2}at|limit (?:\w+ ){0,2}?to|without exceeding)",
+            "at_most",
+        ),
+        (r"\b(?:at least|minimum(?: of)?|min(?: of)?|faster than|more than|above|over|further than|farther than)", "at_least"),
+    )
 )
 _OVER_LIMIT = re.compile(
     r"^ (?P<how>over|above|under|below|faster than|slower than|less than|more than) (?:the )?(?:speedlimit|limit|sign)"
@@ -46,7 +56,7 @@ _SMALL: dict[Dimension, float] = {"speed": 10.0, "distance": 30.0, "time": 0.0, 
 
 
 def amount_of(
-    clause: Clause, wanted: tuple[Dimension, ...], change: Change, *, verb: bool
+    clause: Clause, wanted: tuple[Dimension, ...], change: Change, *, verb: bool, factors: bool = True
 ) -> tuple[Amount, Change] | None:
     """The clause's quantity of one of the wanted dimensions, and the direction of change it says or inherits.
 
@@ -55,12 +65,13 @@ def amount_of(
         wanted: Dimensions in order of preference.
         change: Direction the rest of the clause asks for.
         verb: Whether a word of change ("slow down", "increase") governs the quantity.
+        factors: Whether "half" and "twice" count.
     """
     for dimension in wanted:
         held = [(at, quantity) for at, quantity in clause.quantities if quantity.dimension == dimension]
         if held:
             return _framed(clause.text, _chosen(clause.text, held), change, verb=verb)
-    for pattern, factor in _FACTORS:
+    for pattern, factor in _FACTORS if factors else ():
         if pattern.search(clause.text):
             said = pattern.search(clause.text)
             assert said is not None
@@ -87,12 +98,8 @@ def _framed(text: str, item: tuple[int, Quantity], change: Change, *, verb: bool
     if over is not None:
         sign: Change = 1 if over["how"] in ("over", "above", "faster than", "more than") else -1
         return Amount(sign * value, dimension, "over_limit", "exact", quantity.said), sign
-    bound: Bound = "exact"
-    if _AT_LEAST.search(before):
-        bound = "at_least"
-    elif _AT_MOST.search(before):
-        bound = "at_most"
-    if bound != "exact":
+    bound = next((bound for pattern, bound in _BOUNDS if pattern.search(before)), None)
+    if bound is not None:
         return Amount(value, dimension, "absolute", bound, quantity.said), 0
     frame, sign = _frame(before, after, quantity, change, verb=verb)
     if dimension == "share":
@@ -104,7 +111,7 @@ def _frame(before: str, after: str, quantity: Quantity, change: Change, *, verb:
     trailing = _trailing(after, quantity.inner)
     if trailing:
         return "relative", trailing
-    if _AWAY.match(after) and not _RESTING.search(before):
+    if quantity.dimension == "distance" and _AWAY.match(after) and not _RESTING.search(before):
         return "relative", 1
     if _BY.search(before) or _NUDGE.search(before):
         return "relative", change

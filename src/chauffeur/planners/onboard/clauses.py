@@ -12,7 +12,7 @@ from chauffeur.planners.onboard.quantities import Quantity, mark_quantities
 
 _BREAK = re.compile(
     r"\s*(?P<hard>[.;!?]|\b(?:and then|then|after that|afterwards?|followed by|next(?= (?:turn|change|pull|overtake)))\b)\s*"
-    r"|\s*(?P<soft>,|\b(?:and|but|because|since|so that|so(?= (?:please|go|slow|speed|drive|can|could|do|i|we|you|he))|"
+    r"|\s*(?P<soft>,|\b(?:and|but|because|since|so that|so(?= (?:please|go|speed up|drive|can|could|do|i|we|you|he))|"
     r"although|though|while|until|just|instead(?! of)|rather(?! (?:slow|fast|close|far|than|not)))\b)\s*"
 )
 _NEGATOR = re.compile(

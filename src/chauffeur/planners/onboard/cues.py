@@ -46,7 +46,7 @@ VEHICLE = (
     r"|vehicle ahead|him|her|it|them|that|this|everyone|everybody|traffic|slowpokes?|others?)"
 )
 _SIDE = r"(?P<side>left|right)"
-_SOME = r"(?:some|more|a (?:bit|little|lot|tad|touch)(?: of)?(?: more)?|plenty of|extra|enough|much more|lots of)"
+_SOME = r"(?:some|more|a (?:bit|little|lot|tad|touch)(?: of)?(?: more)?|plenty of|extra|much more|lots of)"
 _ROOM = r"(?:space|room|distance|gap|air|buffer|clearance|headway|cushion|spacing)"
 _MOVE = (
     r"(?:go|get|move|drive|navigate|swing|steer|zip|slip|scoot|squeeze|blow|zoom|speed|cruise|race|shoot|run|make|cut"
@@ -59,7 +59,7 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     (rf"\bmake (?:some |more )?(?:room|space|way) for {VEHICLE}|\byield(?: to {VEHICLE})?\b|\bgive way\b", "act", "yield", 0, "", 1.5),
     # overtaking
     (r"\b(?:overtak\w+|over take|leapfrog\w*|outrun|surpass\w*|bypass\w*)\b", "act", "overtake", 0, "", 2.0),
-    (rf"\b{_MOVE} (?:us |me |it |your way |yourself )?(?:on )?(?:past|around|by|round|ahead of|ahead(?= the| that| this))\b(?! #| (?:an?|about|at least|around|half|double|now)\b)", "act", "overtake", 0, "", 1.5),
+    (rf"\b{_MOVE} (?:us |me |it |your way |yourself )?(?:on )?(?:past|around|by|round|ahead of|ahead(?= the| that| this))\b(?! #| (?:an?|about|at least|around|half|double|now)\b)(?: {VEHICLE})?", "act", "overtake", 0, "", 1.5),
     (rf"\bpast {VEHICLE}|\bleav(?:e|ing) {VEHICLE} behind|\bget rid of {VEHICLE}|\blose (?:this|that|him|the) (?:guy|slowpoke|truck|car)", "act", "overtake", 0, "", 1.5),
     (rf"\b(?:get|move|be|pull|go) ahead(?: of)?(?= {VEHICLE}|$)", "act", "overtake", 0, "", 1.2),
     (r"\bpass(?:ing)?\b(?! me| us the| the salt)", "act", "overtake", 0, "", 1.2),
@@ -80,6 +80,8 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     (r"\b(?:go|get|drive|pass|proceed|continue|keep|head|carry|move|travel|run|cut)(?:ing)? (?:on |right |directly |clean )?(?:through|across|over) (?:the |this |that )?(?:\w+ )?junction\b|\bcross(?:ing)?(?: over)? (?:the |this )?(?:\w+ )?junction\b", "act", "turn", 0, "straight", 1.5),
     (r"\b(?:directly|dead) (?:ahead|forward)\b|\bahead only\b|\b(?:proceed|continue|go|keep going|head|carry on|move|drive|keep|keep moving|keep driving)(?: on)? (?:ahead|forwards?|onwards?)\b(?! of)", "act", "turn", 0, "straight", 1.0),
     # lanes and sides (patterns with a side)
+    (r"\bnot (?:\w+ )?(?:leave|leaving|depart|exit)(?: from)? (?:\w+ ){0,2}?lane\b", "act", "lane", 0, "hold", 1.5),
+    (rf"#\d+ (?:over )?to (?:the |your )?{_SIDE}\b", "act", "lane", 0, "", 1.4),
     (rf"\b(?:edge )?{_SIDE} (?:hand )?(?:side )?lanes?\b(?: change)?", "act", "lane", 0, "", 1.5),
     (rf"\b{_SIDE} lane change\b|\blanes? (?:change |changing |over )?(?:to|toward|towards|on|onto|into)? ?(?:the |your |our )?{_SIDE.replace('side', 'side2')}\b", "act", "lane", 0, "", 1.5),
     (rf"\b(?:chang|switch|shift|swap)\w* lanes? (?:\w+ ){{0,3}}?{_SIDE}\b", "act", "lane", 0, "", 1.5),
@@ -88,7 +90,7 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     (rf"\bturn(?:ing|s)? (?:\w+ ){{0,3}}?{_SIDE}\b|\b{_SIDE.replace('side', 'side2')} turn\b", "act", "turn", 0, "", 1.5),
     (rf"\b(?:hang|make|tak(?:e|ing)|bang|hook|do|pull|need|want|making) (?:a |an |the |another |your |that |this )(?:hard |sharp |quick |slight |gentle |next |first |second |u )?{_SIDE}(?: turn| here| there)?\b", "act", "turn", 0, "", 1.4),
     (rf"\b(?:make|take|hang) {_SIDE}\b", "act", "turn", 0, "", 1.2),
-    (rf"\b(?:mov|shift|slid|scoot|switch|drift|slip|hop|get|pull|go|goe|eas|nudg|com|jump|head|veer|steer|swing|bear|proceed|keep|stay|chang|squeez|step|stick|remain|swerv|cut|lean|work|guid|tak|bring)(?:e|es|ing|ting)? (?:it |us |me |over |across |back |one |further |more |slightly |yourself |the car |the vehicle |your way )*(?:to |toward |towards |on |into |in )?(?:the |your |our )?{_SIDE}(?: side)?\b", "act", "lane", 0, "loose", 1.1),
+    (rf"\b(?:mov|shift|slid|scoot|switch|drift|slip|hop|get|pull|go|goe|eas|nudg|com|jump|head|veer|steer|swing|bear|proceed|keep|stay|chang|squeez|step|stick|remain|swerv|cut|lean|work|guid|tak|bring)(?:e|es|ing|ting)? (?:it |us |me |over |across |back |one |#\d+ |further |more |slightly |yourself |the car |the vehicle |your way )*(?:to |toward |towards |on |into |in )?(?:the |your |our )?{_SIDE}(?: side)?\b", "act", "lane", 0, "loose", 1.1),
     (r"\bstraight (?:away)\b", "resume", "resume", 0, "", 0.1),
     (r"\bstraight\b(?: (?:ahead|on|through|forward|over|across))*", "act", "turn", 0, "straight", 1.5),
     (r"\b(?:chang|switch|swap|shift)\w* (?:\w+ )?lanes?\b|\blane change\b|\b(?:other|next|adjacent|neighbou?ring|another|different|faster|quicker|free|clear|emptier) lane\b|\b(?:move|get|scoot|shift|slide) over\b", "act", "lane", 0, "", 1.2),
@@ -105,7 +107,7 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     (r"\bslow(?:ing|s)? (?:it |us |things |the \w+ |her |this thing |your \w+ |that |a (?:bit|little|touch) )?down\b|\b(?:slower|decelerat(?:e|es|ing|ion)|slacken|brak(?:e|es|ing)|slow up)\b|\b(?:back|eas(?:e|ing)|lift|let|lay|take (?:your |the )?foot|come) (?:up |off )(?:on |of )?(?:the )?(?:gas|throttle|accelerator|pedal|speed)\b|\beas(?:e|ing) (?:up|off)\b|\blet up\b|\b(?:off|less) (?:the )?(?:gas|throttle)\b|\btake it down\b|\bcool it\b|\bhold your horses\b|\bwhoa\b|\bthrottle (?:back|down)\b|\bdial (?:it|things) (?:back|down)\b|\btake (?:it|things) slow(?:ly|er)?\b|^slow(?: [.,!]|$)|\bturn it down\b", "act", "speed", -1, "", 1.2),
     # gaps: changes
     (rf"\b(?:give|leave|allow) (?:\w+ ){{0,6}}?less (?:\w+ )?{_ROOM}\b|\bclos(?:e|ing) (?:up |down )?(?:the|that|this|our) (?:\w+ )?{_ROOM}\b|\bclose(?:r|st)\b|\bnearer\b|\bclose (?:in|up)\b(?: on)?|\bclosing in\b|\bcatch(?:ing)? up\b|\btighten(?: (?:it )?up)?\b|\bmove up(?: on| behind)?\b|\btailgate\b|\bget (?:right |up )+behind\b|\bsnug\w*\b", "act", "gap", -1, "", 1.2),
-    (rf"\b(?:giv|leav|allow|mak)(?:e|ing)? (?:\w+ ){{0,7}}?{_ROOM}\b|\b(?:further|farther)\b(?: (?:back|away|behind|off|apart|from))?|\bback(?:ing)? (?:off|away)\b|\b(?:drop|fall|hang|pull|hold|stay|keep|ease|step|stand|slip|lay)(?:ping|ing)? (?:\w+ ){{0,3}}?back\b(?! (?:on|in|into|to (?:the )?(?:left|right|lane)))|\bkeep (?:\w+ ){{0,3}}distance\b(?! (?:of|at|to)\b| #)|\b(?:keep|stay|get) (?:well |far )?away\b|\bdistance (?:yourself|us|ourselves)\b|\bopen(?:ing)? (?:up )?(?:the|a|some|that) (?:\w+ )?(?:gap|space|room|distance)\b|\bbreathing (?:room|space)\b|\bsafer? (?:following )?distance\b(?! of)|\bdistance from\b(?! #)|\b{_SOME} {_ROOM}\b(?= please|$| [.,!]| behind| between| to| from| ahead)", "act", "gap", 1, "", 1.2),
+    (rf"\b(?:giv|leav|allow|mak)(?:e|ing)? (?:\w+ ){{0,7}}?{_ROOM}\b|\b(?:further|farther)\b(?: (?:back|away|behind|off|apart|from))?|\bback(?:ing)? (?:off|away)\b|\b(?:drop|fall|hang|pull|hold|stay|keep|ease|step|stand|slip|lay)(?:ping|ing)? (?:\w+ ){{0,3}}?back\b(?! (?:on|in|into|to (?:the )?(?:left|right|lane)))|\bkeep (?:your|some|more|a|safe|good|proper|a safe|a good|a proper|a bit of) distance\b(?! (?:of|at|to)\b| #)|\b(?:keep|stay|get) (?:well |far )?away\b|\bdistance (?:yourself|us|ourselves)\b|\bopen(?:ing)? (?:up )?(?:the|a|some|that) (?:\w+ )?(?:gap|space|room|distance)\b|\bbreathing (?:room|space)\b|\bsafer? (?:following )?distance\b(?! of)|\bdistance from\b(?! #)|\b{_SOME} {_ROOM}\b(?= please|$| [.,!]| behind| between| to| from| ahead)", "act", "gap", 1, "", 1.2),
     (rf"\bfollow(?:ing)? {VEHICLE}(?! (?:\w+ ){0,2}(?:close|tight))|\b(?:stay|remain|keep|stick|tuck in|sit|wait)(?:ing)? behind\b", "act", "follow", 0, "", 0.9),
     # halting
     (r"\b(?:stop|halt|freeze|standstill)(?:ping|ped|s)?\b|\bcome to (?:a )?(?:rest|stop|halt)\b|\bemergency (?:stop|brake|braking)\b|\bslam on the brakes\b|\bwait (?:here|at)\b|\bpull up\b|\bstopsign\b", "act", "stop", 0, "", 1.0),
@@ -125,7 +127,7 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     (r"\b(?:far (?:back|behind|away|off|from)|far|distant|lagging|falling behind)\b(?! (?:more|less|faster|slower|too|better))", "state", "gap", 1, "", 1.0),
     # changes that need a noun
     (r"\b(?:increas\w+|rais(?:e|ing)|boost\w*|bump(?:ing)? (?:\w+ )?up|bump|ramp(?:ing)? (?:\w+ )?up|enhanc\w+|elevat\w+|grow|enlarg\w+|expand\w*|extend\w*|widen\w*|lengthen\w*|stretch\w*|add(?:ing)?|gain\w*|augment\w*|escalat\w+|heighten\w*|amplif\w+|magnif\w+|(?:turn|crank|push|bring|jack|nudge|dial|notch|take) (?:\w+ ){0,3}?up|(?:go|get) up|up(?= (?:the|your|our|my|it|to|by))|double|triple|grow\w*|broaden\w*|more|greater|bigger|larger|higher|longer|wider|additional|extra)\b", "verb", "speed", 1, "", 1.0),
-    (r"\b(?:decreas\w+|reduc\w+|lower\w*|lessen\w*|cut(?:ting)?|drop(?:ping)?|diminish\w*|shrink\w*|shorten\w*|shorter|narrow\w*|trim\w*|subtract\w*|deduct\w*|(?:take|knock|shave|scrub) (?:\w+ )?off|(?:bring|dial|turn|push|take|wind|notch|go|get|come) (?:\w+ ){0,3}?down|down(?= (?:to|by))|scale back|minimi[sz]\w*|contract\w*|curtail\w*|moderat\w+|halv\w+|less|smaller|lower|tighter|fewer|compress\w*|drop|shed(?:ding)?)\b", "verb", "speed", -1, "", 1.0),
+    (r"\b(?:decreas\w+|reduc\w+|lower\w*|lessen\w*|cut(?:ting)?|drop(?:ping)?|diminish\w*|shrink\w*|shorten\w*|shorter|narrow\w*|trim\w*|subtract\w*|deduct\w*|(?:take|knock|shave|scrub) (?:[\w#]+ )?off|(?:bring|dial|turn|push|take|wind|notch|go|get|come) (?:\w+ ){0,3}?down|down(?= (?:to|by))|scale back|minimi[sz]\w*|contract\w*|curtail\w*|moderat\w+|halv\w+|less|smaller|lower|tighter|fewer|compress\w*|drop|shed(?:ding)?)\b", "verb", "speed", -1, "", 1.0),
     (r"\b(?:speed|velocity|pace|cruise|cruising|tempo|speedometer)\b", "noun", "speed", 0, "", 0.6),
     (rf"\b(?:following |time |safety )*(?:{_ROOM}s?|separation|interval|margin|distance)\b", "noun", "gap", 0, "", 0.6),
     (r"\b(?:big|large|huge|wide|long|great|high|generous|excessive|enormous)\b", "adj", "speed", 1, "", 0.8),

@@ -22,11 +22,11 @@ _OFF_TOPIC = re.compile(
     r"|homework|stock|bitcoin|code|door|doors|trunk|hotel|write|who are you|your name|how old|fast food|breakfast)\b"
 )
 _DRIVING = re.compile(
-    r"\b(?:lane|speed up|slow|slower|faster|overtake|brak\w+|accelerate|turn (?:left|right)|pull over|stop the car"
+    r"\b(?:lane|speed up|slow down|(?:go|drive|move) \w{0,6} ?(?:slow|slower|faster)|overtake|brak\w+|accelerate|turn (?:left|right)|pull over|stop the car"
     r"|distance|gap|drive|driving|shoulder|merge|tailgat\w+|mph)\b"
 )
 _UNSUPPORTED = (
-    (re.compile(r"\b(?:u ?turn|turn (?:around|back)|make a u|go back|head back)\b"), "I do not turn round on the road."),
+    (re.compile(r"\b(?:u ?turn|turn (?:around|back)|make a u|go back home|go back(?= ?$))\b"), "I do not turn round on the road."),
     (re.compile(r"\b(?:reverse|back up|drive backwards?|in reverse)\b(?! (?:from|off))"), "I do not drive backwards here."),
     (
         re.compile(r"\b(?:take|bring|drive|get) (?:me|us) (?:\w+ )?(?:home|to (?!the (?:left|right|shoulder|side|other|edge|middle|next lane)|a (?:stop|halt|standstill)|\d|my (?:left|right))\w+)"
@@ -47,6 +47,10 @@ _UNSUPPORTED = (
     (re.compile(r"\b(?:on|into|in) the (?:oncoming|wrong|opposite) (?:lane|side|traffic)\b|\bwrong way\b"), "I do not drive against the traffic."),
     (re.compile(r"\bclose your eyes\b|\b(?:turn|switch) (?:off|yourself off|the engine off)\b|\bengine off\b|\bshut down\b"), "I keep driving the car while we are on the road."),
 )  # fmt: skip
+_EITHER = re.compile(
+    r"\b(left|right|faster|slower|speed up|slow down|closer|further) or (?:to )?(?:the )?"
+    r"(left|right|faster|slower|speed up|slow down|closer|further)\b(?! away| back)"
+)
 _FOREIGN = frozenset(
     """
     der die das und ist nicht bitte ich wir schneller langsamer fahr fahre fahren links rechts abstand spur halte auf
@@ -87,7 +91,7 @@ def doubt_before(text: str, max_chars: int) -> NotUnderstood | None:
     if len(text) > max_chars:
         return NotUnderstood("too_long", "That was too long for me. Please tell me in a sentence what you want.")
     letters = [c for c in text if c.isalpha()]
-    if not letters:
+    if not letters and not any(c.isdigit() for c in text):
         return NotUnderstood("symbols", f"I understand words only. {CAN_DO}")
     if _foreign(text, letters):
         return NotUnderstood("language", f"I understand English only. {CAN_DO}")
@@ -96,6 +100,9 @@ def doubt_before(text: str, max_chars: int) -> NotUnderstood | None:
     for pattern, why in _UNSUPPORTED:
         if pattern.search(words) or pattern.search(line):
             return NotUnderstood("unsupported", f"{why} {CAN_DO}")
+    either = _EITHER.search(words)
+    if either is not None:
+        return NotUnderstood("ambiguous", f"{either[1].capitalize()} or {either[2]}: which one do you want?")
     if _OFF_TOPIC.search(words) and not _DRIVING.search(words):
         return NotUnderstood("off_topic", f"I only drive. {CAN_DO}")
     return None
@@ -126,6 +133,8 @@ def is_question(text: str, found: list[Meaning]) -> bool:
 
 
 def _foreign(text: str, letters: list[str]) -> bool:
+    if not letters:
+        return False
     latin = sum(1 for c in letters if "LATIN" in unicodedata.name(c, ""))
     if latin < 0.7 * len(letters):
         return True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from chauffeur.planners.onboard.meaning import Manoeuvre, Meaning, NotUnderstood
+from chauffeur.planners.onboard.meaning import BIT, Manoeuvre, Meaning, NotUnderstood
 
 _MANNERS = {"hurry": "swift", "comfort": "gentle", "careful": "gentle", "relax": "gentle"}
 _ENDS_OF_SLOWING: frozenset[Manoeuvre] = frozenset({"turn", "stop", "pull_over", "yield", "follow"})
@@ -100,6 +100,8 @@ def _same(a: Meaning, b: Meaning, *, later: bool) -> Meaning | NotUnderstood | N
     if a.change * b.change < 0:
         if later:
             return None
+        if b.variant == "bounded":  # "faster, but not too fast"
+            return replace(a, degree=BIT, evidence=a.evidence + b.evidence)
         pair = ("faster or slower", "speed") if a.manoeuvre == "speed" else ("closer or further back", "gap")
         return NotUnderstood("ambiguous", f"I heard two opposite wishes. Do you want {pair[0]}?")
     if a.manoeuvre in ("lane", "turn", "overtake") and a.direction and b.direction and a.direction != b.direction:

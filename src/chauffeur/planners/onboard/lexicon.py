@@ -89,7 +89,7 @@ REWRITES: tuple[tuple[str, str], ...] = (
     (r"\bdo not (?:be (?:afraid|scared|shy) (?:to|of)|hesitate to|forget to|fail to|wait to)\b", "please"),
     (r"\bdo not (?:worry|mind|bother me|get me wrong)\b|\bno (?:problem|worries|doubt|kidding|joke|matter)\b", " "),
     (r"\bnot (?:only|bad|sure)\b|\bwhether or not\b|\bif not\b|\bcan not (?:wait|help)\b", " "),
-    (r"\b(?:can not|could not|do not) (?:stand|bear|take|tolerate)\b", "complain"),
+    (r"\b(?:can not|could not) (?:stand|bear|take|tolerate)\b", "complain"),
     (r"^no(?= [,.!])|(?<=[,.!?] )no(?= [,.!])|^no(?= (?:go|please|turn|speed|slow|drive))", " "),
     (r"\bno longer\b", "not"),
     (r"\bas (?:soon|quick(?:ly)?|fast|promptly) as (?:(?:you|we) (?:safely )?can|possible)(?= (?:turn|change|pull|over|stop|get))", "swift"),

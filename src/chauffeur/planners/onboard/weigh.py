@@ -25,11 +25,12 @@ _TOO = re.compile(
     r"\b(?:too|overly|excessively|awfully|terribly|ridiculously|painfully|insanely|dangerously|so|this|that|such|such a)"
     r"(?: (?:damn|darn|freaking|bloody|very|much))? $"
 )
+_NOT_TOO = re.compile(r"\bnot too $")
 _STATEMENT = re.compile(
     r"\b(?:you|we|i|it|this|that|they|he|she|car|vehicle|truck|driving|speed|pace|ride|there|gap|distance|everything)\b"
     r"(?: \w+){0,2}? (?:am|is|are|was|were|have|has|feels?|seems?|looks?|drive|drives|driving|going|keep|follow)\b"
 )
-_WISH = re.compile(r"\b(?:should|could|can|would|want|wish|need|please|like to|prefer|lets|better|may|might)\b")
+_WISH = re.compile(r"\b(?:should|could|can|would|want|wish|need|like to|prefer|lets|better|may|might)\b")
 _COMPLAINT = re.compile(
     r"\b(?:complain|why|hate|how come|tired of|fed up|sick of|have to|must (?:you|we)|stop being)\b|^(?:do|does|must) (?:you|we|it)\b"
 )
@@ -246,7 +247,8 @@ def _states(clause: Clause) -> Iterator[Meaning]:
         if found is not None and (found[0].frame != "factor" or change):
             yield _meaning(clause, e, change=found[1] or change, amount=found[0])
         else:
-            yield _meaning(clause, e, change=change, variant="" if change else "hold")
+            bounded = e.negated and _NOT_TOO.search(clause.text[: e.start]) is not None
+            yield _meaning(clause, e, change=change, variant="bounded" if bounded else "" if change else "hold")
 
 
 def _state_change(e: Evidence, clause: Clause) -> Change:
@@ -259,7 +261,7 @@ def _state_change(e: Evidence, clause: Clause) -> Change:
     if e.negated:
         return state if _BE_NOT.search(before) and not _TOO.search(before) else opposite
     others = [o.end for o in clause.evidence if o.end <= e.start and o.cue.kind in ("act", "style")]
-    near = before[max(others, default=0) :]
+    near = before[max(others, default=0) :].rpartition("please ")[2]
     said = [m.end() for m in _STATEMENT.finditer(near)]
     stated = bool(said) and not _WISH.search(near)
     return opposite if _TOO.search(before) or _COMPLAINT.search(before) or stated else state
@@ -286,24 +288,17 @@ def _quantities_alone(clause: Clause, out: list[Meaning]) -> Iterator[Meaning]:
     """A speed is a wish by itself; a distance is one beside words of following; a bare number beside words of driving."""
     if any(m.amount is not None for m in out):
         return
-    for at, quantity in clause.quantities:
-        e = _at(clause, at)
-        if quantity.dimension == "speed":
-            what, dims = "speed", ("speed",)
-        elif quantity.dimension in ("distance", "time") and _GAP_WORDS.search(clause.text):
-            what, dims = "gap", ("distance", "time")
-        elif quantity.dimension == "bare" and _SPEED_WORDS.search(clause.text) and not out:
-            what, dims = "speed", ("bare",)
-        else:
-            continue
-        found = amount_of(clause, dims, 0, verb=False)
+    dimensions: tuple[tuple[Manoeuvre, Dimension, bool], ...] = (
+        ("speed", "speed", True),
+        ("gap", "distance", _GAP_WORDS.search(clause.text) is not None),
+        ("gap", "time", _GAP_WORDS.search(clause.text) is not None),
+        ("speed", "bare", _SPEED_WORDS.search(clause.text) is not None and not out),
+    )
+    for what, dimension, fits in dimensions:
+        found = amount_of(clause, (dimension,), 0, verb=False, factors=False) if fits else None
         if found is not None:
-            yield Meaning(what, amount=found[0], change=found[1], evidence=(quantity.said, e), score=1.0)
+            yield Meaning(what, amount=found[0], change=found[1], evidence=(found[0].said,), score=1.0)
             return
-
-
-def _at(clause: Clause, at: int) -> str:
-    return clause.text[max(0, at - 20) : at].strip()
 
 
 def _sides(clause: Clause, out: list[Meaning]) -> None:

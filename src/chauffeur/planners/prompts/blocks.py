@@ -42,10 +42,8 @@ def clean(text: str) -> str:
 
 
 def cap(text: str, limit: int) -> str:
-    """At most `limit` characters of text, with a note of how many were left out."""
-    if len(text) <= limit:
-        return text
-    return f"{text[:limit]} [... {len(text) - limit} characters left out]"
+    """At most `limit` characters of text, with a note where more were left out."""
+    return text if len(text) <= limit else f"{text[:limit]} [... the rest is left out]"
 
 
 def defuse(text: str) -> str:

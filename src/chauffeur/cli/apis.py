@@ -1,0 +1,55 @@
+"""`chauffeur apis`: what a program may ask of the car."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+EXAMPLES = """
+Examples:
+
+    chauffeur apis
+
+    chauffeur apis is_safe_enter
+"""
+
+
+def apis(
+    name: Annotated[str, typer.Argument(help="One of them, in full; all in short without it.")] = "",
+) -> None:
+    """List the driving APIs: the whole language in which a program may speak to the car."""
+    from rich.padding import Padding
+    from rich.syntax import Syntax
+    from rich.text import Text
+
+    from chauffeur.cli.console import columns, stdout
+    from chauffeur.concept import ConfigError
+    from chauffeur.programs.catalogue import APIS, CATALOGUE
+
+    console = stdout()
+    if not name:
+        effects = {"read": "Ask", "wish": "Wish", "say": "Say"}
+        for effect, heading in effects.items():
+            console.print(heading, style="bold")
+            for api in CATALOGUE:
+                if api.effect == effect:
+                    console.print(Padding(Text(api.signature, "cyan"), (0, 0, 0, 2)))
+                    console.print(Padding(Text(api.meaning), (0, 0, 0, 6)))
+        console.print("\nA program is a generator function; `yield autopilot()` lets 0.1 s pass.", style="dim")
+        return
+    if name not in APIS:
+        import difflib
+
+        near = difflib.get_close_matches(name, list(APIS), n=1)
+        raise ConfigError(
+            f"There is no driving API {name!r}.", hint=f"Did you mean {near[0]}?" if near else "Run: chauffeur apis"
+        )
+    api = APIS[name]
+    console.print(Syntax(api.signature, "python", theme="ansi_dark", background_color="default"))
+    console.print(api.meaning)
+    rows = [(p.name, f"{p.meaning}{f', in {p.unit}' if p.unit else ''}") for p in api.params]
+    if api.result:
+        rows.append(("gives", api.result))
+    rows.append(("example", api.example))
+    console.print(columns(rows))

@@ -1,0 +1,110 @@
+"""`chauffeur drive`: one wish, from the words to the last metre."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from chauffeur.drive.recording import RecordedTrip
+
+EXAMPLES = """
+Examples:
+
+    chauffeur drive "Overtake the car in front of you."
+
+    chauffeur drive "I'm really in a hurry now." --as ana --save trips/hurry --open
+
+    chauffeur drive "Turn left." --scenario intersection --seed 7
+
+    chauffeur drive "Keep 30 m to the car ahead" --planner openai/gpt-4o --setting zero-shot
+
+    chauffeur drive "Speed up" --planner openai/qwen2.5 --base-url http://localhost:11434/v1
+
+Exit code 1 says that the wish was refused or not done. Every drive is simulated.
+"""
+
+_DONE = ("success", "ended")
+
+
+def drive(
+    wish: Annotated[str, typer.Argument(help="What you want, in your own words.")],
+    scenario: Annotated[
+        str | None, typer.Option(help="Where to drive; default one that suits the wish. See `chauffeur scenarios`.")
+    ] = None,
+    planner: Annotated[
+        str, typer.Option(help="`onboard`, `keyword`, `openai/<model>`, `replay/<file>`, or an installed one.")
+    ] = "onboard",
+    person: Annotated[str, typer.Option("--as", help="Whose wish it is; their history is recalled and kept.")] = "",
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the traffic; default the scenario's own.")] = None,
+    save: Annotated[Path | None, typer.Option(help="Folder for recording, page and filmstrip.")] = None,
+    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    setting: Annotated[str, typer.Option(help="Prompt: `few-shot` or `zero-shot`.")] = "few-shot",
+    limits: Annotated[str, typer.Option(help="Bounds no plan may cross: `default` or `lampilot`.")] = "default",
+    data: Annotated[Path | None, typer.Option(help="LaMPilot's DbLv1 folder, for its own samples.")] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the outcome only.")] = False,
+    browser: Annotated[
+        bool, typer.Option("--open/--no-open", help="Open the page of the drive; without --save in ./trips.")
+    ] = False,
+) -> None:
+    """Drive a wish: plan it, check it, drive it, score it."""
+    import asyncio
+
+    from chauffeur.cli.console import stdout
+    from chauffeur.cli.failures import FAILED
+    from chauffeur.cli.parts import limits_named, memory_named, planner_named, referee_for, setting_named
+    from chauffeur.cli.show import Quiet, Teller
+    from chauffeur.concept import PersonId
+    from chauffeur.drive.scenarios import find, suiting
+    from chauffeur.drive.session import Forgetful, Session, parse_wish
+
+    instruction = parse_wish(wish, PersonId(person.strip()))
+    bounds = limits_named(limits)
+    prompt = setting_named(setting)
+    place = suiting(instruction.text) if scenario is None else find(scenario, data)
+    console = stdout()
+    teller = Quiet(console) if quiet else Teller(console)
+    session = Session(
+        planner=planner_named(planner, base_url),
+        memory=memory_named() if instruction.person else Forgetful(),
+        referee=referee_for,
+        tell=teller.tell,
+        few_shot=prompt == "few-shot",
+    )
+    teller.begin(place, place.seed if seed is None else seed)
+    with teller:
+        recorded = asyncio.run(session.drive(instruction, place, place.seed if seed is None else seed, bounds))
+    teller.end(recorded)
+    if browser and save is None:
+        save = Path("trips") / recorded.trip.id
+    if save is not None:
+        teller.wrote(save_trip(save, recorded))
+        if browser:
+            typer.launch((save / "trip.html").resolve().as_uri())
+    if recorded.trip.outcome not in _DONE:
+        raise typer.Exit(FAILED)
+
+
+def save_trip(folder: Path, recorded: RecordedTrip) -> list[Path]:
+    """Write recording, page and, if anything was driven, filmstrip into a folder."""
+    from chauffeur.drive.recording import write_trip
+    from chauffeur.hmi.page import write_page
+
+    written = [
+        write_trip(
+            folder / "trip.mcap",
+            recorded.trip,
+            recorded.frames,
+            recorded.scenario,
+            system=recorded.system,
+            final=recorded.final,
+        ),
+        write_page(folder / "trip.html", recorded),
+    ]
+    if recorded.frames:
+        from chauffeur.hmi.filmstrip import write_filmstrip
+
+        written.append(write_filmstrip(folder / "filmstrip.png", recorded))
+    return written

@@ -1,0 +1,69 @@
+"""The `chauffeur` command. Importing this module is cheap: what drives, draws or talks is imported inside commands."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from chauffeur import __version__
+from chauffeur.cli import apis, doctor, drive, feedback, page, replay, scenarios
+from chauffeur.cli.bench import bench_app
+from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
+
+EXAMPLES = """
+Examples:
+
+    chauffeur drive "Overtake the car in front of you."
+
+    chauffeur drive "I'm in a hurry" --as ana --save trips/hurry --open
+
+    chauffeur feedback "A bit too close for me." --as ana
+
+    chauffeur replay trips/hurry/trip.mcap
+
+Every drive is simulated. Exit codes: 0 done, 1 refused or failed, 2 bad input, 130 stopped with Ctrl-C.
+"""
+
+app = typer.Typer(
+    cls=FriendlyGroup,
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=EXAMPLES,
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"chauffeur {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def chauffeur(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and leave.")
+    ] = False,
+) -> None:
+    """A passenger says what they want; the car does it, safely, says why, and remembers how they liked it."""
+    del version
+
+
+app.command(epilog=drive.EXAMPLES)(drive.drive)
+app.command(epilog=feedback.EXAMPLES)(feedback.feedback)
+app.command(epilog=scenarios.EXAMPLES)(scenarios.scenarios)
+app.command(epilog=apis.EXAMPLES)(apis.apis)
+app.command(epilog=replay.EXAMPLES)(replay.replay)
+app.command(epilog=page.EXAMPLES)(page.page)
+app.command(epilog=doctor.EXAMPLES)(doctor.doctor)
+app.add_typer(bench_app, name="bench")
+
+
+def run() -> None:
+    """Entry point of the `chauffeur` script."""
+    if not debugging():
+        sys.excepthook = show_crash
+    app()

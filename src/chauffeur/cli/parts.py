@@ -1,0 +1,59 @@
+"""The exchangeable parts a command line can name: planner, memory, limits, referee."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, Plan, Scenario
+
+if TYPE_CHECKING:
+    from chauffeur.drive.episode import Referee
+    from chauffeur.memory.base import Memory
+    from chauffeur.planners.base import Planner
+    from chauffeur.worlds.base import World
+
+Setting = Literal["few-shot", "zero-shot"]
+
+_LIMITS = {"default": Limits(), "lampilot": LAMPILOT_LIMITS}
+
+
+def limits_named(name: str) -> Limits:
+    """Limits by name. Raises ConfigError for an unknown one."""
+    if name not in _LIMITS:
+        raise ConfigError(f"Unknown limits {name!r}.", hint=f"Use one of: {', '.join(_LIMITS)}.")
+    return _LIMITS[name]
+
+
+def setting_named(name: str) -> Setting:
+    """Prompt setting by name. Raises ConfigError for an unknown one."""
+    if name not in ("few-shot", "zero-shot"):
+        raise ConfigError(f"Unknown setting {name!r}.", hint="Use few-shot or zero-shot.")
+    return name
+
+
+def planner_named(spec: str, base_url: str | None) -> Planner:
+    """Planner by specification. Raises ConfigError for an unknown one, or one that takes no endpoint."""
+    from chauffeur.planners.registry import make_planner
+
+    return make_planner(spec) if base_url is None else make_planner(spec, base_url=base_url)
+
+
+def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
+    """LaMPilot's referee where the scenario has a goal; none for a free drive."""
+    del plan
+    if not scenario.goal:
+        return None
+    from chauffeur.bench.lampilot.referee import LampilotReferee
+    from chauffeur.worlds.highway import HighwayWorld
+
+    if not isinstance(world, HighwayWorld):
+        raise ConfigError(f"The goal of {scenario.id} can only be judged on a highway world.")
+    return LampilotReferee(world, scenario)
+
+
+def memory_named(name: str = "vault") -> Memory:
+    """The memory of this installation."""
+    from chauffeur.concept.registry import load_plugin
+
+    memory: Memory = load_plugin("chauffeur.memories", name)()
+    return memory

@@ -1,0 +1,50 @@
+"""`chauffeur scenarios`: where one can drive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+EXAMPLES = """
+Examples:
+
+    chauffeur scenarios
+
+    chauffeur scenarios --data DbLv1 --find overtake
+"""
+
+_SHOWN = 40
+
+
+def scenarios(
+    data: Annotated[Path | None, typer.Option(help="Folder with LaMPilot's DbLv1 task files.")] = None,
+    find: Annotated[str, typer.Option(help="Only those whose name or title contains this.")] = "",
+    every: Annotated[bool, typer.Option("--all", help="All of them, however many.")] = False,
+) -> None:
+    """List the scenarios: the built-in ones and, with a data folder, LaMPilot's own samples."""
+    from rich.table import Table
+
+    from chauffeur.cli.console import plain, stdout
+    from chauffeur.concept import ScenarioError
+    from chauffeur.drive.scenarios import DATA_VARIABLE, list_scenarios
+
+    console = stdout()
+    wanted = find.casefold()
+    found = [s for s in list_scenarios(data) if wanted in s.id.casefold() or wanted in s.title.casefold()]
+    if not found:
+        raise ScenarioError(f"No scenario matches {find!r}.", hint="Run `chauffeur scenarios` for the whole list.")
+    shown = found if every else found[:_SHOWN]
+    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+    for heading in ("Scenario", "Road", "A wish it shows well"):
+        table.add_column(heading, no_wrap=heading == "Scenario", overflow="fold")
+    for scenario in shown:
+        table.add_row(plain(scenario.id), plain(scenario.title), plain(scenario.wish))
+    console.print(table)
+    if len(shown) < len(found):
+        console.print(f"... and {len(found) - len(shown)} more: add --all, or --find WORD.")
+    if data is None and not any(s.goal for s in found):
+        console.print(
+            f"LaMPilot's 490 samples: add --data DIR (its DbLv1 folder), or set {DATA_VARIABLE}.", style="dim"
+        )

@@ -1,0 +1,82 @@
+"""A remembered trip as JSON, there and back."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Any, Literal
+
+from chauffeur.concept import Feedback, HistoryItem, Program, Trip
+
+MAX_CHARS = 20_000
+"""Longest text kept per field: a runaway model reply must not fill a profile."""
+
+
+def body_of(trip: Trip) -> str:
+    """What is kept of a trip, as JSON. ASCII only, so that any string survives, lone surrogates included."""
+    plan, policy = trip.plan, trip.plan.policy
+    if policy is None:
+        text = ""
+    elif isinstance(policy, Program):
+        text = policy.source
+    else:
+        text = json.dumps(asdict(policy))
+    return json.dumps(
+        {
+            "instruction": _cut(trip.instruction.text),
+            "context": _cut(trip.context.text),
+            "intent": _cut(plan.intent),
+            "thoughts": _cut(plan.thoughts.text or plan.refusal),
+            "policy": _cut(text),
+            "settings": [[name, value] for name, value in plan.settings],
+            "outcome": trip.outcome,
+        }
+    )
+
+
+def feedback_body(feedback: Feedback) -> str:
+    """Feedback as JSON."""
+    return json.dumps(asdict(feedback) | {"text": _cut(feedback.text)})
+
+
+def item_of(
+    trip_id: str, when: str, world: str, body: str, feedback: tuple[str, ...], similarity: float = 0.0
+) -> HistoryItem:
+    """A history item from its stored parts."""
+    fields: dict[str, Any] = json.loads(body)
+    return HistoryItem(
+        trip_id=trip_id,
+        when=when,
+        instruction=fields["instruction"],
+        context=fields["context"],
+        world=world,
+        intent=fields["intent"],
+        thoughts=fields["thoughts"],
+        policy=fields["policy"],
+        settings=tuple((name, value) for name, value in fields["settings"]),
+        feedback=tuple(_feedback(one) for one in feedback),
+        outcome=fields["outcome"],
+        similarity=similarity,
+    )
+
+
+def _feedback(body: str) -> Feedback:
+    fields: dict[str, Any] = json.loads(body)
+    return Feedback(
+        text=fields["text"],
+        speed=_sign(fields["speed"]),
+        gap=_sign(fields["gap"]),
+        comfort=_sign(fields["comfort"]),
+        approval=_sign(fields["approval"]),
+        strength=fields["strength"],
+    )
+
+
+def _sign(value: float) -> Literal[-1, 0, 1]:
+    if value == 0:
+        return 0
+    return 1 if value > 0 else -1
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= MAX_CHARS else text[: MAX_CHARS - 1] + "…"
