@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 from chauffeur.concept import (
     ApiCall,
@@ -63,18 +64,32 @@ def _trip(wish: str, frames: list[Frame], scenario: str, program: str, **more: o
         "history": History(
             (
                 HistoryItem(
-                    "71aa", "2026-11-02T08:15:00Z", "Could you go a bit faster?", "highway", "highway",
-                    "speed.increase", "She likes brisk driving.", "set_target_speed(30)",
-                    (("target_speed_mps", 30.0),), (Feedback("A bit too close for me.", gap=-1, strength=0.35),),
-                    "success", 0.83,
+                    "71aa",
+                    "2026-11-02T08:15:00Z",
+                    "Could you go a bit faster?",
+                    "highway",
+                    "highway",
+                    "speed.increase",
+                    "She likes brisk driving.",
+                    "set_target_speed(30)",
+                    (("target_speed_mps", 30.0),),
+                    (Feedback("A bit too close for me.", gap=-1, strength=0.35),),
+                    "success",
+                    0.83,
                 ),
             )
         ),
         "plan": Plan(
-            Thoughts("The passenger is in a hurry and the car ahead is slow. The left lane is open; I pass and keep a "
-                     "headway of 1.5 s."),
-            Program(program), intent="overtake.left", settings=(("target_speed_mps", 33.0),), planner="onboard",
-            model="onboard-v1", latency_s=0.042,
+            Thoughts(
+                "The passenger is in a hurry and the car ahead is slow. The left lane is open; I pass and keep a "
+                "headway of 1.5 s."
+            ),
+            Program(program),
+            intent="overtake.left",
+            settings=(("target_speed_mps", 33.0),),
+            planner="onboard",
+            model="onboard-v1",
+            latency_s=0.042,
         ),
         "verdicts": (
             Verdict("format-v1", True, "One generator function over the driving APIs."),
@@ -85,8 +100,8 @@ def _trip(wish: str, frames: list[Frame], scenario: str, program: str, **more: o
         "causes": Causes(detail=""),
         "metrics": (
             Metric("lampilot-ttc-v1", 89.4, "points"),
-            Metric("lampilot-sv-v1", 91.2, "points"),
-            Metric("lampilot-te-v1", 66.7, "points"),
+            Metric("lampilot-speed-variance-v1", 91.2, "points"),
+            Metric("lampilot-time-efficiency-v1", 66.7, "points"),
             Metric("lampilot-score-v1", 85.3, "points"),
             Metric("stop-compliance-v1", math.nan, "points", False),
         ),
@@ -100,7 +115,12 @@ def _trip(wish: str, frames: list[Frame], scenario: str, program: str, **more: o
 
 
 def highway_trip(
-    wish: str = "I'm really in a hurry now.", seconds: float = 20.0, cars: int = 40, *, crash: bool = False, **more: object
+    wish: str = "I'm really in a hurry now.",
+    seconds: float = 20.0,
+    cars: int = 40,
+    *,
+    crash: bool = False,
+    **more: object,
 ) -> RecordedTrip:
     """Three lanes and an emergency lane; the ego changes to the left lane at 6 s."""
     lanes = tuple(
@@ -120,8 +140,12 @@ def highway_trip(
             ego = VehicleState(0, "car", x, y, 0.1, speed, 5.0, 2.0, ego.lane, crashed=True)
         others = tuple(
             _vehicle(
-                i, 40.0 + 37.0 * i + (20.0 + 0.137 * (i * 7 % 13) + 0.4 * math.sin(time + i)) * time, 4.0 * (i % 3),
-                0.0, 20.0 + 0.137 * (i * 7 % 13) + 0.4 * math.sin(time + i), ("a", "b", i % 3),
+                i,
+                40.0 + 37.0 * i + (20.0 + 0.137 * (i * 7 % 13) + 0.4 * math.sin(time + i)) * time,
+                4.0 * (i % 3),
+                0.0,
+                20.0 + 0.137 * (i * 7 % 13) + 0.4 * math.sin(time + i),
+                ("a", "b", i % 3),
             )
             for i in range(1, cars + 1)
         )
@@ -129,17 +153,26 @@ def highway_trip(
         lead = min(ahead, key=lambda o: o.x_m, default=None)
         front = Lead(lead.id, lead.x_m - x, lead.speed_mps) if lead else None
         running = time < seconds - 3
+        said: tuple[str, ...] = ()
+        calls: tuple[ApiCall, ...] = ()
+        if tick == 60:
+            said = ("Changing to the left lane.",)
+        elif not running and frames and frames[-1].program == "running":
+            said = ("Passed. Thank you for waiting.",)
+        if running:
+            calls = (ApiCall("get_distance_between_vehicles", "lead, ego", f"{30 - 2 * time:.1f}"),)
+            if 0.4 <= time < 6:
+                calls = (ApiCall("is_safe_enter", "left", "False"), ApiCall("autopilot", "", "(0.3, 0.0)"))
         frames.append(
             Frame(
                 Snapshot(time, tick, "highway", ego, others, (), lanes, front, None, False, False),
                 Wishes(target, 1.5, ("a", "b", 0 if time >= 6 else 1)),
-                Command(acceleration * 1.1, 0.0), Command(acceleration, 0.001 * tick),
+                Command(acceleration * 1.1, 0.0),
+                Command(acceleration, 0.001 * tick),
                 "running" if running else "finished",
                 (6 if time < 0.4 else 8 if time < 6 else 12) if running else None,
-                ("Changing to the left lane.",) if tick == 60 else ("Passed. Thank you for waiting.",) if running is False
-                and frames[-1].program == "running" else (),
-                (ApiCall("is_safe_enter", "left", "False"), ApiCall("autopilot", "", "(0.3, 0.0)")) if 0.4 <= time < 6
-                else (ApiCall("get_distance_between_vehicles", "lead, ego", f"{30 - 2 * time:.1f}"),) if running else (),
+                said,
+                calls,
             )
         )
         x, speed = x + speed * 0.1, speed + acceleration * 0.1
@@ -159,7 +192,7 @@ def intersection_trip(wish: str = "Take the next left, please.", seconds: float 
             return (x * c - y * s, x * s + y * c)
 
         def road(a: str, b: str, points: list[tuple[float, float]]) -> None:
-            length = sum(math.dist(p, q) for p, q in zip(points, points[1:], strict=False))
+            length = sum(math.dist(p, q) for p, q in pairwise(points))
             lanes.append(LaneView((a, b, 0), 4.0, length, 10.0, False, False, tuple(points)))
 
         road(f"o{arm}", f"ir{arm}", [rot(2, 111), rot(2, 11)])
@@ -190,19 +223,23 @@ def intersection_trip(wish: str = "Take the next left, please.", seconds: float 
             _vehicle(i, sgn * (-70 - 22 * i + 8.2 * time), sgn * 2, 0 if sgn > 0 else math.pi, 8.2, ("o1", "ir1", 0))
             for i, sgn in ((1, 1), (2, 1), (3, -1), (4, -1))
         )
-        frames.append(
-            Frame(
-                Snapshot(
-                    time, tick, "intersection", ego, others, (sign,), tuple(lanes), None, max(85.0 - travelled, 0.0) or None,
-                    False, False,
-                ),
-                Wishes(8.0, 1.5, None, "left", frozenset({1000}) if time > 13 else frozenset()),
-                Command(acceleration, 0.0), Command(acceleration, 0.0), "running", 5 if time < 13 else 8,
-                ("Waiting for the crossing traffic.",) if tick == 110 else (), (),
-            )
-        )
+        stop_m = max(85.0 - travelled, 0.0) or None
+        shot = Snapshot(time, tick, "intersection", ego, others, (sign,), tuple(lanes), None, stop_m, False, False)
+        command = Command(acceleration, 0.0)
+        served = frozenset({1000}) if time > 13 else frozenset[int]()
+        said = ("Waiting for the crossing traffic.",) if tick == 110 else ()
+        wishes = Wishes(8.0, 1.5, None, "left", served)
+        frames.append(Frame(shot, wishes, command, command, "running", 5 if time < 13 else 8, said, ()))
         speed = max(0.0, speed + acceleration * 0.1)
         travelled += speed * 0.1
     program = OVERTAKE.replace("overtake_left", "turn_left")
-    trip = _trip(wish, frames, "intersection_left", program, outcome="timeout", causes=Causes(fallback_used=True, detail="The program ended early; the autopilot drove on."))
+    causes = Causes(fallback_used=True, detail="The program ended early; the autopilot drove on.")
+    trip = _trip(wish, frames, "intersection_left", program, outcome="timeout", causes=causes)
     return RecordedTrip(trip, tuple(frames), Scenario("intersection_left", "highway", {}, 7))
+
+
+def refused_trip(wish: str = "Drive through the wall.") -> RecordedTrip:
+    """Nothing was driven: no frame, no program."""
+    plan = Plan(Thoughts(""), None, refusal="There is a wall.", planner="onboard", model="onboard-v1")
+    trip = _trip(wish, [], "overtake", "", plan=plan, outcome="refused", verdicts=(), metrics=())
+    return RecordedTrip(trip, (), Scenario("overtake", "highway", {}, 17))

@@ -13,7 +13,7 @@ from server import ModelServer
 
 from chauffeur.concept import Context, Instruction, Plan, PlanRequest, Situation, SystemMessage
 from chauffeur.planners.llm import LlmPlanner
-from chauffeur.planners.llm_address import parse_address
+from chauffeur.planners.llm_address import Address, parse_address
 
 SECRET = "sk-test-0123456789abcdef-secret"
 
@@ -33,14 +33,16 @@ class Bench:
     waits: list[float] = field(default_factory=list)
     environ: dict[str, str] = field(default_factory=lambda: {"CHAUFFEUR_API_KEY": SECRET})
 
-    def planner(self, model: str = "m", url: str | None = None, **options: Any) -> LlmPlanner:
+    def planner(
+        self, model: str = "m", url: str | None = None, address: Address | None = None, **options: Any
+    ) -> LlmPlanner:
         async def sleep(seconds: float) -> None:
             self.waits.append(seconds)
 
         settings: dict[str, Any] = {"gate": lambda source: [], "timeout_s": 5.0} | options
         return LlmPlanner(
             model,
-            parse_address(url or self.url, {}),
+            address or parse_address(url or self.url, {}),
             rng=np.random.default_rng(1),
             environ=self.environ,
             sleep=sleep,

@@ -47,14 +47,15 @@ class Exchange(BaseHTTPRequestHandler):
     def log_message(self, format: str, *args: object) -> None:
         pass
 
-    def head(self, status: int, content_type: str, **headers: str) -> None:
+    def head(self, status: int, content_type: str, *, close: bool = True, **headers: str) -> None:
         self.send_response(status)
         self.send_header("Content-Type", content_type)
         for name, value in headers.items():
             self.send_header(name.replace("_", "-"), value)
-        self.send_header("Connection", "close")
+        if close:
+            self.send_header("Connection", "close")
         self.end_headers()
-        self.close_connection = True
+        self.close_connection = close
 
     def write(self, data: bytes) -> None:
         try:
@@ -170,7 +171,7 @@ def body(data: bytes, content_type: str) -> Answer:
     """A successful answer with any body."""
 
     def answer(exchange: Exchange) -> None:
-        exchange.head(200, content_type, Content_Length=str(len(data)))
+        exchange.head(200, content_type, close=False, Content_Length=str(len(data)))
         exchange.write(data)
 
     return answer

@@ -9,7 +9,9 @@ import pytest
 from server import PROGRAM, REPLY, events, fails, stream, whole
 
 from chauffeur.concept import Feedback, History, HistoryItem, InstructionError, Program, Round
+from chauffeur.planners.cache import ReplyCache
 from chauffeur.planners.llm import INTENT_DECLINED, INTENT_UNUSABLE
+from chauffeur.planners.llm_address import Address
 from chauffeur.planners.llm_endpoint import Sampling
 
 pytestmark = pytest.mark.server
@@ -25,6 +27,15 @@ def test_a_streamed_reply_becomes_a_plan_with_its_costs(server, bench):
     assert (plan.usage.prompt_tokens, plan.usage.completion_tokens, plan.usage.requests) == (1000, 200, 1)
     assert plan.usage.cost_usd is None and not plan.usage.cached
     assert plan.latency_s > 0.0
+
+
+def test_a_priced_model_says_what_it_cost_and_a_kept_reply_costs_nothing(server, bench, make_request, tmp_path):
+    planner = bench.planner(
+        "gpt-4o", address=Address(server.url, "api.openai.com", local=True), cache=ReplyCache(tmp_path)
+    )
+    first, kept = (asyncio.run(planner.plan(make_request("go"))).usage for _ in range(2))
+    assert first.cost_usd == pytest.approx((1000 * 2.5 + 200 * 10.0) / 1e6)
+    assert kept.cost_usd == 0.0
 
 
 def test_a_whole_reply_gives_the_same_plan(server, bench):
@@ -140,9 +151,11 @@ def test_many_plans_at_once_on_one_planner(server, bench, make_request):
 
 
 def test_a_planner_outlives_its_event_loop(server, bench, make_request):
-    planner = bench.planner()
+    server.script(whole(REPLY))
+    planner = bench.planner(stream=False)
     for _ in range(2):
         assert asyncio.run(planner.plan(make_request("x"))).policy is not None
+    assert bench.waits == []
 
 
 @pytest.mark.parametrize(

@@ -91,6 +91,6 @@ def test_entry_points_that_are_no_planners_are_refused(third_party):
     third_party(
         broken="no.such.module:X", absent=f"{__name__}:Absent", five=f"{__name__}:Nothing", plain=f"{__name__}:pytest"
     )
-    for name in ("broken", "five", "plain"):
+    for name in ("broken", "absent", "five", "plain"):
         with pytest.raises(ConfigError, match=name):
             make_planner(name)

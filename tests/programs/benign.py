@@ -483,4 +483,65 @@ def main():
         yield autopilot()
     yield autopilot()
 """,
+    "keys_that_ask_the_road": """
+def main():
+    ego = get_ego_vehicle()
+    lanes = [lane for lane in (get_left_lane(ego), get_lane_of(ego), get_right_lane(ego)) if lane is not None]
+
+    def room(lane):
+        front = detect_front_vehicle_in(lane)
+        return 1000.0 if front is None else get_distance_between_vehicles(front, ego)
+
+    best = max(lanes, key=room)
+    worst = min(lanes, key=lambda lane: room(lane))
+    ordered = sorted(lanes, key=room, reverse=True)
+    lanes.sort(key=room)
+    (lanes).sort(reverse=True, key=lambda lane: (is_safe_enter(lane), room(lane)))
+    say(f"{best == ordered[0]} {worst == ordered[-1]} {[room(lane) for lane in lanes]}")
+    safe = list(filter(is_safe_enter, lanes))
+    rooms = list(map(room, safe))
+    say(f"{len(safe)} {rooms} {max(rooms, default=0)} {min([], key=room, default=None)} {sum(map(room, lanes)):.3f}")
+    set_target_lane(best)
+    yield autopilot()
+""",
+    "lazy_searches": """
+def main():
+    ego = get_ego_vehicle()
+    lanes = [get_left_lane(ego), get_lane_of(ego), get_right_lane(ego)]
+    free = next((lane for lane in lanes if lane is not None and is_safe_enter(lane)), None)
+    say("none free" if free is None else "one free")
+    first = next(get_speed_of(v) for v in [ego, ego] if get_speed_of(v) >= 0)
+    say(f"{first:.2f}")
+    everyone = all(
+        front is None or get_distance_between_vehicles(front, ego) > gap  # a comment
+        for gap, lane in zip((5, 10, 20), lanes)
+        if lane is not None
+        for front in [detect_front_vehicle_in(lane)]
+    )
+    anyone = any(all(is_safe_enter(lane, decel) for lane in lanes if lane) for decel in (9, 5, 1))
+    nobody = not any([is_safe_enter(lane) for lane in lanes])
+    say(f"{everyone} {anyone} {nobody} {any(())} {all([])} {any(map(bool, lanes))}")
+    while not any(is_safe_enter(lane) for lane in lanes if lane is not None): yield autopilot()
+    try:
+        next(lane for lane in lanes if lane == "nowhere")
+    except StopIteration:
+        say("nowhere")
+    yield autopilot()
+    set_target_speed(next(speed for speed in (20, 21) if speed > 20))
+""",
+    "sorting": """
+def main():
+    rows = [("b", 2), ("a", 2), ("c", 1)]
+    say(str(sorted(rows, key=lambda row: row[1], reverse=True)) + str(sorted(rows, key=lambda row: -row[1])))
+    say(f"{sorted([3, 1, 2])} {sorted('bca', reverse=True)} {min(3, 1)} {max('b', 'a', key=ord_of)} {min(rows)}")
+    rows.sort()
+    say(str(rows))
+    rows.sort(key=lambda row: row[1])
+    rows.sort(reverse=True)
+    say(str(rows))
+    yield autopilot()
+
+def ord_of(letter):
+    return "abc".index(letter)
+""",
 }

@@ -174,7 +174,7 @@ MEMORY = [
         repr_shared="a = [0] * 10\nfor _ in range(12):\n    a = [a] * 10\ns = repr(a)",
         say_shared="a = [0] * 10\nfor _ in range(30):\n    a = [a] * 10\nsay(a)",
         closures="fs = []\nwhile True:\n    fs.append(lambda: fs)",
-        exceptions="es = []\nwhile True:\n    try:\n        1 / 0\n    except ZeroDivisionError as e:\n        es.append(e)",
+        exceptions="es = []\nwhile True:\n    try:\n        1 / 0\n    except Exception as e:\n        es.append(e)",
     )
 ]
 
@@ -233,9 +233,7 @@ CONTROL_FLOW = [
     Hostile(
         "flow/swallow_all",
         frozenset({"calls"}),
-        _body(
-            "while True:\n    try:\n        autopilot()\n        raise ValueError\n    except BaseException:\n        continue"
-        ),
+        _body("while True:\n    try:\n        autopilot()\n        raise ValueError\n    except:\n        continue"),
     ),
     Hostile(
         "flow/finally_loop",

@@ -35,7 +35,7 @@ class BareRunner:
         main = main_function(parse(source))
         assert main is not None
         # The reference is CPython itself, and the texts are the tests' own.
-        exec(compile(source, "program", "exec"), names)  # noqa: TID251
+        exec(compile(source, "program", "exec"), names)
         self._generator: Generator[Any, None, None] | None = names[main.name]()
 
     def _bound(self, name: str) -> Any:

@@ -66,4 +66,5 @@ def run() -> None:
     """Entry point of the `chauffeur` script."""
     if not debugging():
         sys.excepthook = show_crash
-    app()
+    # Calling `app` itself would put Typer's own exception hook in the place of ours.
+    typer.main.get_command(app)()

@@ -29,5 +29,5 @@ def load_plugin(group: str, name: str) -> Any:
         raise ConfigError(f"Unknown {kind} {name!r}.", hint=hint)
     try:
         return found[0].load()
-    except ImportError as error:
+    except (ImportError, AttributeError) as error:
         raise ConfigError(f"The {kind} {name!r} cannot be loaded: {error}.", hint="Run: chauffeur doctor") from error

@@ -178,6 +178,13 @@ def drive_without_program(world: World, referee: Referee | None, max_s: float, *
     return run_episode(world, HeldWishes(world.driver().initial_wishes()), referee, max_s=max_s, **options)
 
 
+def unusable(plan: Plan, verdicts: tuple[Verdict, ...]) -> bool:
+    """Whether a plan that is not driven failed as a policy (no program, or not of the language), not as a wish."""
+    if plan.refusal:
+        return plan.intent == "unusable"
+    return bool(verdicts) and not verdicts[0].passed
+
+
 def declined(plan: Plan, verdicts: tuple[Verdict, ...]) -> str:
     """Why a plan is not driven, in words; empty when it may be."""
     if plan.refusal:
@@ -198,8 +205,8 @@ def make_trip(
     """File what happened, with its provenance."""
     record = provenance(plan, scenario, seed, request.limits)
     if episode is None:
-        gate_failed = not plan.refusal and bool(verdicts) and not verdicts[0].passed
-        causes = Causes(refused=True, policy_failed=gate_failed, detail=refusal)
+        failed = unusable(plan, verdicts)
+        causes = Causes(refused=not failed, policy_failed=failed, detail=refusal)
     else:
         causes = episode.causes
     return Trip(
@@ -271,4 +278,5 @@ __all__ = [
     "provenance",
     "scenario_hash",
     "trip_id",
+    "unusable",
 ]

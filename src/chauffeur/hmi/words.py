@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Literal
 
 from chauffeur.concept import Causes, Feedback, Metric, Outcome
@@ -22,10 +23,12 @@ _OUTCOMES: dict[Outcome, tuple[str, Tone]] = {
     "not_driven": ("Not driven", "neutral"),
 }
 
+_VERSION = re.compile(r"-v\d+$")
+
 _METRICS = {
     "ttc": "Time-to-collision score",
-    "sv": "Smooth-speed score",
-    "te": "Time-efficiency score",
+    "speed-variance": "Smooth-speed score",
+    "time-efficiency": "Time-efficiency score",
     "score": "Driving score",
 }
 
@@ -62,9 +65,8 @@ def cause_words(causes: Causes) -> tuple[str, ...]:
 
 def metric_name(metric_id: str) -> str:
     """A versioned metric id as a name: `lampilot-ttc-v1` is the time-to-collision score."""
-    parts = [part for part in metric_id.split("-") if not (part.startswith("v") and part[1:].isdigit())]
-    known = _METRICS.get(parts[-1]) if parts else None
-    return known or " ".join(parts).capitalize()
+    name = _VERSION.sub("", metric_id).removeprefix("lampilot-")
+    return _METRICS.get(name) or name.replace("-", " ").capitalize()
 
 
 def metric_value(metric: Metric) -> str:

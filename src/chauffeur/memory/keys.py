@@ -34,7 +34,7 @@ class KeyRing:
         self._directory = directory
         self._passphrase = passphrase or None
         self._salt: bytes | None = None
-        self._opened: dict[str, bytes] = {}
+        self._opened: dict[str, tuple[bytes, bytes]] = {}
 
     def alias(self, person: PersonId) -> str:
         """File name for a person: a keyed hash, so that neither the name nor a guess of it can be read from it."""
@@ -58,12 +58,15 @@ class KeyRing:
             return None
         except OSError as error:
             raise _bad(self.path(alias), f"cannot be read ({error.strerror})") from error
-        if alias not in self._opened:
+        # Opening a seal is slow on purpose; the file itself tells whether the key is still the one opened before.
+        seen, key = self._opened.get(alias, (b"", b""))
+        if seen != text:
             key, sealed = self._unpack(text, self.path(alias))
             if self._passphrase is not None and not sealed:
-                publish(self.path(alias), self._pack(key))
-            self._opened[alias] = key
-        return self._opened[alias]
+                text = self._pack(key)
+                publish(self.path(alias), text)
+            self._opened[alias] = (text, key)
+        return key
 
     def find_or_make(self, alias: str) -> bytes:
         """A person's key, made now if there is none; it is on disk on return.

@@ -30,7 +30,7 @@ _SO = r"(?:so|that|this|as|quite so)"
 _VERY = (
     r"(?:so|this|that|very|really|pretty|quite|rather|awfully|uncomfortably|dangerously|a bit|a little|little bit|bit)"
 )
-_BE = r"(?:was|were|is|are|felt|been|seemed)"
+_WAS = r"(?:was|were|is|are|felt|seemed)"
 _MID = r"(?:[\w']+ ){0,3}"
 _ROUGH = (
     r"(?:harsh(?:ly)?|hard|rough(?:ly)?|jerky|abrupt(?:ly)?|sudden(?:ly)?|aggressive(?:ly)?|sharp(?:ly)?|sporty|wild)"
@@ -46,7 +46,7 @@ PHRASE_BOOK: tuple[tuple[Topic, Literal[-1, 1], Manner, tuple[str, ...]], ...] =
         "speed",
         1,
         "nothing",
-        (rf"{_BE} not (?:\w+ )?(?:so|that|very|really|particularly|all that) (?:{_FAST}|{_SLOW}|{_CLOSE})",),
+        (rf"{_WAS} not (?:\w+ )?(?:so|that|very|really|particularly|all that) (?:{_FAST}|{_SLOW}|{_CLOSE})",),
     ),
     ("approval", 1, "fixed", (r"could not (?:be|have been) (?:better|happier|nicer|smoother)",)),
     ("speed", 1, "fixed", (rf"not {_MID}{_FAST} enough",)),
@@ -161,7 +161,7 @@ PHRASE_BOOK: tuple[tuple[Topic, Literal[-1, 1], Manner, tuple[str, ...]], ...] =
     ),
     ("speed", -1, "complaint", (r"(?:faster|quicker) (?:\w+ ){0,3}than (?:i|we|my)",)),
     ("speed", 1, "complaint", (r"(?:slower|more slowly) (?:\w+ ){0,3}than (?:i|we|my)",)),
-    ("speed", 1, "nothing", (rf"{_BE} (?:\w+ ){{0,2}}(?:faster|quicker|slower|closer|smoother)",)),
+    ("speed", 1, "nothing", (rf"{_WAS} (?:\w+ ){{0,2}}(?:faster|quicker|slower|closer|smoother)",)),
     (
         "speed",
         -1,

@@ -117,13 +117,12 @@ class Profile:
             self._connection.execute("DELETE FROM trips WHERE id = ?", (rows[0][0],))
         return item
 
-    def entries(self, keep_from: str) -> tuple[Entry, ...]:
-        """The index: every trip from `keep_from` on, oldest first."""
+    def entries(self) -> tuple[Entry, ...]:
+        """The index: every trip, oldest first."""
         rows = self._all(
             "SELECT t.id, t.world, t.at, m.encoder, m.vector, m.tags, m.quantities, "
             "EXISTS (SELECT 1 FROM feedback f WHERE f.trip = t.id) "
-            "FROM trips t JOIN marks m ON m.id = t.id WHERE t.at >= ? ORDER BY t.id",
-            keep_from,
+            "FROM trips t JOIN marks m ON m.id = t.id ORDER BY t.id"
         )
         return tuple(
             Entry(row, self._mark(row, *marked), world, datetime.fromisoformat(at), bool(judged))

@@ -112,7 +112,7 @@ class VaultMemory:
             return None if profile is None else profile.forget_last()
 
     def erase(self, person: PersonId) -> bool:
-        """As `Memory.erase`: the key goes first, so that nothing can be read from then on. Works on damaged profiles."""
+        """As `Memory.erase`, of damaged profiles too: the key goes first, so nothing can be read from then on."""
         if not _is_somebody(person) or not self._profiles.exists():
             return False
         with self._guard, self._errors(person), locked(self._lock, alone=True):
@@ -131,11 +131,8 @@ class VaultMemory:
         found: list[PersonId] = []
         for path in sorted(self._profiles.glob("*.db")):
             try:
-                with self._guard, self._errors(path.stem), locked(self._lock, alone=False):
-                    key = self._ring.find(path.stem)
-                    if key is None:
-                        raise ProfileError(f"The profile {path} has no key.")
-                    with open_profile(path, key) as profile:
+                with self._open(path.stem, path.stem) as profile:
+                    if profile is not None:
                         found.append(profile.person)
             except ProfileError as error:
                 _log.warning("profile left out: %s", error)
@@ -151,14 +148,16 @@ class VaultMemory:
     def _entries(self, profile: Profile, person: PersonId) -> tuple[Entry, ...]:
         """The index of a profile, read again only after somebody wrote to it."""
         alias = self._ring.alias(person)
-        cached = self._indexes.pop(alias, None)
-        if cached is None or cached[0] != profile.edition:
-            cached = (profile.edition, profile.entries(""))
-        self._indexes[alias] = cached
+        edition, entries = self._indexes.pop(alias, ("", ()))
+        if edition != profile.edition:
+            entries = profile.entries()
+        self._indexes[alias] = (profile.edition, entries)
         while len(self._indexes) > _CACHED_PEOPLE:
             del self._indexes[next(iter(self._indexes))]
-        keep_from = self._keep_from()
-        return tuple(entry for entry in cached[1] if _stamp(entry.when) >= keep_from) if keep_from else cached[1]
+        if self._retention is None:
+            return entries
+        keep_from = self._clock() - self._retention
+        return tuple(entry for entry in entries if entry.when >= keep_from)
 
     def _ensure(self, person: PersonId) -> None:
         """Make the profile unless it is there. Key first: a profile without one is never on disk."""
@@ -186,8 +185,12 @@ class VaultMemory:
         if not _is_somebody(person) or not self._profiles.exists():
             yield None
             return
+        with self._open(self._ring.alias(person), person) as profile:
+            yield profile
+
+    @contextmanager
+    def _open(self, alias: str, person: str) -> Generator[Profile | None]:
         with self._guard, self._errors(person), locked(self._lock, alone=False):
-            alias = self._ring.alias(person)
             path = self._profiles / f"{alias}.db"
             if not path.exists():
                 yield None
@@ -196,8 +199,8 @@ class VaultMemory:
             if key is None:
                 raise ProfileError(
                     f"The profile of {person!r} has no key ({self._ring.path(alias)} is missing).",
-                    hint="Restore the key from a backup, or erase the profile to start afresh. Other profiles are not "
-                    "affected.",
+                    hint="Restore the key from a backup, or erase the profile to start afresh. "
+                    "Other profiles are not affected.",
                 )
             with open_profile(path, key) as profile:
                 yield profile
@@ -209,9 +212,9 @@ class VaultMemory:
         except (DatabaseError, OSError) as error:
             raise ProfileError(
                 f"The profile of {person!r} in {self._profiles} cannot be used: {error}.",
-                hint="If it is damaged or not a profile, restore it from a backup or erase it to start afresh; if the disk "
-                "is full or the file is busy, try again. Other profiles are not affected.",
-                retryable="locked" in str(error) or "full" in str(error) or isinstance(error, OSError),
+                hint="If it is damaged or not a profile, restore it from a backup or erase it to start afresh; if the "
+                "file is busy or the disk full, try again. Other profiles are not affected.",
+                retryable=isinstance(error, OSError) or any(word in str(error) for word in ("locked", "full")),
             ) from error
 
 

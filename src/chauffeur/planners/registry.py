@@ -39,7 +39,7 @@ def make_planner(spec: str, **options: object) -> Planner:
         ConfigError: Unknown name or setting, a setting the planner refuses, or a planner that cannot be imported.
     """
     name, _, argument = spec.strip().partition("/")
-    build = _builder(name, load_plugin(GROUP, name))
+    build = _builder(name)
     _check_options(name, build, argument, options)
     planner = build(argument, **options)
     if not isinstance(planner, Planner):
@@ -47,7 +47,11 @@ def make_planner(spec: str, **options: object) -> Planner:
     return planner
 
 
-def _builder(name: str, target: object) -> Callable[..., object]:
+def _builder(name: str) -> Callable[..., object]:
+    try:
+        target = load_plugin(GROUP, name)
+    except AttributeError as error:
+        raise ConfigError(f"The planner {name!r} cannot be loaded: {error}.", hint="Run: chauffeur doctor") from error
     build = getattr(target, "from_spec", None)
     if not callable(build):
         raise ConfigError(f"The entry point {name!r} has no from_spec(argument, **options).")

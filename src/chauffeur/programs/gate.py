@@ -14,7 +14,9 @@ from chauffeur.programs.calls import CallChecks
 from chauffeur.programs.catalogue import APIS
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.findings import Finding
+from chauffeur.programs.lazy import lazy_findings
 from chauffeur.programs.loops import loop_findings
+from chauffeur.programs.lower import SEARCHES
 from chauffeur.programs.rewrite import (
     generator_names,
     is_generator,
@@ -86,6 +88,7 @@ def check_source(source: str, library: str = "") -> GateReport:
     findings = _Gate(tree, helpers).run()
     findings += _main_findings(tree, main)
     findings += loop_findings(tree)
+    findings += lazy_findings(tree)
     unique = {(f.line, f.code, f.reason): f for f in findings}
     ordered = sorted(unique.values(), key=lambda finding: (finding.line or 0, finding.code))
     return GateReport(tuple(ordered[:_MAX_FINDINGS]), None if main is None else main.name)
@@ -156,6 +159,8 @@ class _Gate:
                 self._check_constant(node)
             elif isinstance(node, ast.YieldFrom):
                 self._check_delegation(node)
+            elif isinstance(node, ast.FunctionDef) and node.decorator_list:
+                self._add(node, "not-allowed", "decorators are not part of the language", "leave them out")
         self._check_bindings()
         self._check_generator_uses(called_by_delegation)
         self._check_top_level()
@@ -257,6 +262,8 @@ class _Gate:
                     self._add(node, "reserved", f"the name {name[:40]} is reserved", "use another name")
                 elif name in APIS:
                     self._add(node, "shadow", f"{name} is a driving API and cannot be redefined", "use another name")
+                elif name in SEARCHES:
+                    self._add(node, "shadow", f"{name} is a built-in function and cannot be redefined", "rename it")
                 elif name in self._generators and not (isinstance(node, ast.FunctionDef) and is_generator(node)):
                     self._add(
                         node, "shadow", f"{name} is also the name of a generator function", "use another name for one"
@@ -275,9 +282,13 @@ class _Gate:
                 )
 
     def _check_top_level(self) -> None:
+        early: list[ast.AST] = []
         for node in self._tree.body:
-            if isinstance(node, ast.FunctionDef | ast.Import | ast.ImportFrom | ast.ClassDef | ast.AsyncFunctionDef):
-                continue
+            if isinstance(node, ast.FunctionDef):
+                early += [default for default in (*node.args.defaults, *node.args.kw_defaults) if default is not None]
+            elif not isinstance(node, ast.AsyncFunctionDef | ast.ClassDef):
+                early.append(node)
+        for node in early:
             for inner in ast.walk(node):
                 if isinstance(inner, ast.Call) and isinstance(inner.func, ast.Name) and inner.func.id in APIS:
                     self._add(

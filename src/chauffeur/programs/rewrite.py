@@ -1,8 +1,8 @@
 """Makes a generator program runnable where there are no generators, and tells the host where it stands.
 
 `yield E` becomes `__tick__(line, (E))`, a call that the host answers one control period later; `yield from f(...)`
-becomes `f(...)`, since the helper's own yields reach the host by themselves. Only those few characters change: every
-token keeps its line, so the sandbox's tracebacks name the lines the model wrote. The model's text itself is kept.
+becomes `f(...)`, since the helper's own yields reach the host by themselves. Only those few characters change, and what
+`lower` does: every statement keeps its line, so the sandbox's tracebacks name the lines the model wrote.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from chauffeur.programs.errors import ProgramSyntaxError
+from chauffeur.programs.lower import PRELUDE, Lowering, apply_edits, needs_prelude
 
 TICK: Final = "__tick__"
 """The host call that a yield turns into."""
@@ -33,13 +34,13 @@ class Prepared:
     """A program ready for the sandbox.
 
     Attributes:
-        library: Rewritten helper functions, fed first; empty without a library.
+        helpers: What the program needs before it: rewritten library functions, Python bodies of built-ins; or empty.
         program: Rewritten program, ending in the call of its main function.
         main: Name of the main function.
         main_line: Line it begins at.
     """
 
-    library: str
+    helpers: str
     program: str
     main: str
     main_line: int
@@ -144,12 +145,11 @@ def prepare(source: str, library: str = "") -> Prepared:
             "The program has no main function.",
             hint="Write a function without parameters that yields autopilot() once per control period.",
         )
-    helpers = ""
-    library_generators: frozenset[str] = frozenset()
-    if library.strip():
-        library_tree = parse(library, "library")
-        library_generators = generator_names(library_tree) - generator_names(tree)
-        helpers = f"{_rewrite(library, library_tree, frozenset(), in_library=True)}\n{_SITE} = {{0: 0}}\n"
+    library_tree = parse(library, "library")
+    library_generators = generator_names(library_tree) - generator_names(tree)
+    helpers = PRELUDE if needs_prelude(tree) or needs_prelude(library_tree) else ""
+    if library_tree.body:
+        helpers += f"{_rewrite(library, library_tree, frozenset(), in_library=True)}\n{_SITE} = {{0: 0}}\n"
     program = _rewrite(source, tree, library_generators, in_library=False)
     # The first tick stands before the main call: a started program has run its top level and waits like a generator.
     return Prepared(helpers, f"{program}\n{TICK}(0, None)\n{main.name}()\n", main.name, main.lineno)
@@ -157,37 +157,27 @@ def prepare(source: str, library: str = "") -> Prepared:
 
 def _rewrite(source: str, tree: ast.Module, library_generators: frozenset[str], *, in_library: bool) -> str:
     text = source.encode()
-    starts = [0]
-    for line in text.split(b"\n"):
-        starts.append(starts[-1] + len(line) + 1)
-    edits: list[tuple[int, int, bytes]] = []
+    lowering = Lowering(text, tree)
+    edits = lowering.edits()
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr) and any(isinstance(n, ast.Yield | ast.YieldFrom) for n in ast.walk(node)):
             raise ProgramSyntaxError("A yield cannot stand inside an f-string.", line=node.lineno)
-        if not isinstance(node, ast.Yield | ast.YieldFrom):
-            continue
-        assert node.end_lineno is not None and node.end_col_offset is not None  # ast.parse always sets them
-        start = starts[node.lineno - 1] + node.col_offset
-        end = starts[node.end_lineno - 1] + node.end_col_offset
-        tick = _LIBRARY_TICK if in_library else f"{TICK}({node.lineno}, ("
         if isinstance(node, ast.Yield):
+            start, end = lowering.span(node)
+            tick = _LIBRARY_TICK if in_library else f"{TICK}({node.lineno}, ("
             value = "" if node.value is not None else "None"
             edits += [(start, start + len(b"yield"), (tick + value).encode()), (end, end, b"))")]
-            continue
-        keyword = _YIELD_FROM.match(text, start)
-        assert keyword is not None  # the node starts with these two words
-        opening, closing = "(", ")"
-        if (
-            isinstance(node.value, ast.Call)
-            and isinstance(node.value.func, ast.Name)
-            and not in_library
-            and node.value.func.id in library_generators
-        ):
-            # A tick inside the library reports the program line that called it.
-            opening, closing = f"({_SITE}.update({{0: {node.lineno}}}), (", "))[1]"
-        edits += [(start, keyword.end(), opening.encode()), (end, end, closing.encode())]
-    for start, end, replacement in sorted(
-        edits, key=lambda edit: edit[:2], reverse=True
-    ):  # offsets before it stay true
-        text = text[:start] + replacement + text[end:]
-    return text.decode()
+        elif isinstance(node, ast.YieldFrom):
+            start, end = lowering.span(node)
+            keyword = _YIELD_FROM.match(text, start)
+            assert keyword is not None  # the node starts with these two words
+            opening, closing = "(", ")"
+            if not in_library and _called_name(node.value) in library_generators:
+                # A tick inside the library reports the program line that called it.
+                opening, closing = f"({_SITE}.update({{0: {node.lineno}}}), (", "))[1]"
+            edits += [(start, keyword.end(), opening.encode()), (end, end, closing.encode())]
+    return apply_edits(text, edits).decode()
+
+
+def _called_name(node: ast.expr) -> str | None:
+    return node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else None

@@ -211,14 +211,14 @@ class SandboxRun:
         self._deadline = self._clock() + self._budget.tick_s
 
     def load(self, prepared: Prepared, names: Iterable[str]) -> None:
-        """Read library and program, and run to the first tick. Raises ProgramFaultError."""
+        """Read helpers and program, and run to the first tick. Raises ProgramFaultError."""
         self._names = frozenset((TICK, *names))
         self._calls = 0
         self._deadline = self._clock() + self._budget.start_s
         inputs = {name: _host_function(name) for name in sorted(self._names)}
-        if prepared.library:
+        if prepared.helpers:
             self._program_feed = "<python-input-1>"
-            self._advance(lambda: self._session.feed_start(prepared.library, inputs=inputs, print_callback=_drop))
+            self._advance(lambda: self._session.feed_start(prepared.helpers, inputs=inputs, print_callback=_drop))
             inputs = {}
         self._text = prepared.program.encode()
         call = self._advance(lambda: self._session.feed_start(prepared.program, inputs=inputs, print_callback=_drop))

@@ -11,7 +11,7 @@ from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.concept import ChauffeurError, Context, Limits, Plan, Program, Scenario, Wishes
 from chauffeur.describe import describe
 from chauffeur.drive.episode import Episode
-from chauffeur.drive.session import declined, drive_program, drive_without_program
+from chauffeur.drive.session import declined, drive_program, drive_without_program, unusable
 from chauffeur.safety import run_checks
 from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
 
@@ -73,8 +73,8 @@ def roll_out(job: RolloutJob) -> dict[str, Any]:
     row["verdicts"] = [asdict(v) for v in verdicts]
     refusal = declined(plan, verdicts)
     if refusal:
-        unusable = not plan.refusal and not verdicts[0].passed
-        return row | _not_driven("refused", refusal, refused=True, policy_failed=unusable)
+        failed = unusable(plan, verdicts)
+        return row | _not_driven("refused", refusal, refused=not failed, policy_failed=failed)
     assert isinstance(plan.policy, Program)
     try:
         episode = drive_program(world, plan.policy.source, referee, MAX_EPISODE_S, record=False)

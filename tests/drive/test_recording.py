@@ -1,0 +1,321 @@
+"""A recording gives back the same values, bit for bit, and refuses what is not one."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.writer import Writer
+
+from chauffeur.concept import (
+    ApiCall,
+    Causes,
+    Command,
+    Context,
+    DataError,
+    Feedback,
+    Frame,
+    History,
+    HistoryItem,
+    Instruction,
+    LaneView,
+    Lead,
+    Metric,
+    PersonId,
+    Plan,
+    Program,
+    Scenario,
+    Situation,
+    Snapshot,
+    SystemMessage,
+    Thoughts,
+    Trip,
+    Usage,
+    VehicleState,
+    Verdict,
+    Wishes,
+)
+from chauffeur.drive.mcap_schemas import CHANNELS
+from chauffeur.drive.recording import RecordedTrip, compare_trips, read_trip, write_trip
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+any_numbers = st.floats()
+texts = st.text(st.characters(exclude_categories=("Cs",)), max_size=30)
+lane_ids = st.tuples(texts, texts, st.integers(0, 9))
+vehicles = st.builds(
+    VehicleState,
+    st.integers(0, 999),
+    st.sampled_from(["car", "obstacle", "stop_sign"]),
+    *[any_numbers] * 6,
+    lane=st.none() | lane_ids,
+    crashed=st.booleans(),
+)
+roads = st.lists(
+    st.builds(
+        LaneView,
+        lane_ids,
+        numbers,
+        numbers,
+        numbers,
+        st.booleans(),
+        st.booleans(),
+        st.lists(st.tuples(numbers, numbers), max_size=4).map(tuple),
+    ),
+    max_size=3,
+).map(tuple)
+snapshots = st.builds(
+    Snapshot,
+    st.floats(0, 1e6),
+    st.integers(0, 10**6),
+    texts,
+    vehicles,
+    st.lists(vehicles, max_size=3).map(tuple),
+    st.lists(vehicles, max_size=2).map(tuple),
+    roads,
+    st.none() | st.builds(Lead, st.integers(0, 99), numbers, numbers),
+    st.none() | numbers,
+    st.booleans(),
+    st.booleans(),
+)
+wishes = st.builds(
+    Wishes,
+    st.none() | any_numbers,
+    numbers,
+    st.none() | lane_ids,
+    st.sampled_from([None, "left", "straight", "right"]),
+    st.frozensets(st.integers(0, 99), max_size=3),
+)
+commands = st.builds(Command, any_numbers, any_numbers)
+frames = st.builds(
+    Frame,
+    snapshots,
+    wishes,
+    commands,
+    commands,
+    st.sampled_from(["none", "running", "finished", "failed"]),
+    st.none() | st.integers(1, 99),
+    st.lists(texts, max_size=2).map(tuple),
+    st.lists(st.builds(ApiCall, texts, texts, texts), max_size=2).map(tuple),
+)
+
+
+def bits(value: Any) -> Any:
+    """A value with its floats as exact text, so that NaN equals itself and -0.0 does not equal 0.0."""
+    if isinstance(value, float):
+        return value.hex()
+    if is_dataclass(value):
+        return {field.name: bits(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, tuple | list):
+        return [bits(item) for item in value]
+    return value
+
+
+def a_trip(**changes: Any) -> Trip:
+    front = Lead(3, 42.0, 22.0)
+    trip = Trip(
+        id="9f2c",
+        instruction=Instruction("Überhol ihn – 快点", PersonId("ana"), "speech"),
+        context=Context("C", Situation("highway", 25.0, 31.3, 3, 1, True, front, None, ("left",), (("rain", "no"),))),
+        history=History((HistoryItem("1", "2026", "I", "C", "w", "x", "R", "P", (("v", 0.1),), (Feedback("f"),)),)),
+        plan=Plan(Thoughts("R"), Program("def f():\n    yield\n"), settings=(("v_mps", 0.1),), usage=Usage(1, 2, 0.3)),
+        verdicts=(Verdict("format-v1", True, "fine", 3, "none"),),
+        outcome="success",
+        causes=Causes(fallback_used=True, detail="d"),
+        metrics=(Metric("a-v1", 0.1 + 0.2, "m"), Metric("b-v1", math.nan, "m", False)),
+        duration_s=0.1,
+        scenario="s",
+        seed=10**41,
+        said=((0.1, "hello"),),
+        record=(("version", "0.1"), ("limits", {"name": "x", "cap": None}), ("n", 10**30)),
+    )
+    return replace(trip, **changes)
+
+
+def a_scenario() -> Scenario:
+    return Scenario("s", "highway", {"env": {"lanes": [1, 2.5], "seed": 10**42}}, 10**41, {"value": 1}, "wish", "title")
+
+
+def a_snapshot(tick: int, lanes: tuple[LaneView, ...], *, cars: int = 3) -> Snapshot:
+    def car(number: int) -> VehicleState:
+        x, speed = 10.0 * number + math.sin(number + tick) * tick, 20 + math.sin(tick * number)
+        return VehicleState(number, "car", x, 4.0, 0.01 * math.cos(tick), speed, 5.0, 2.0, ("a", "b", 1))
+
+    others = tuple(car(number) for number in range(1, cars + 1))
+    return Snapshot(tick / 10, tick, "highway", car(0), others, (), lanes, None, None, False, False)
+
+
+def a_drive(ticks: int = 5, cars: int = 3) -> RecordedTrip:
+    lanes = tuple(
+        LaneView(("a", "b", i), 4.0, 2e3, 31.3, False, False, ((0.0, 4.0 * i), (2e3, 4.0 * i))) for i in (0, 1)
+    )
+    command = Command(0.1, -0.2)
+    taken = tuple(
+        Frame(a_snapshot(t, lanes, cars=cars), Wishes(), command, command, "running", 1) for t in range(ticks)
+    )
+    return RecordedTrip(
+        a_trip(duration_s=ticks / 10), taken, a_scenario(), SystemMessage("S", "few-shot"), a_snapshot(ticks, lanes)
+    )
+
+
+def save(path: Path, recorded: RecordedTrip) -> Path:
+    return write_trip(
+        path, recorded.trip, recorded.frames, recorded.scenario, system=recorded.system, final=recorded.final
+    )
+
+
+def test_a_trip_comes_back_whole(tmp_path: Path) -> None:
+    drive = a_drive()
+    back = read_trip(save(tmp_path / "deep" / "trip.mcap", drive))
+    assert bits(back) == bits(drive)
+    assert compare_trips(drive, back) is None
+    assert [p.name for p in (tmp_path / "deep").iterdir()] == ["trip.mcap"]
+
+
+@given(st.lists(frames, max_size=4), st.none() | snapshots)
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_any_frames_come_back_bit_for_bit(tmp_path: Path, taken: list[Frame], final: Snapshot | None) -> None:
+    path = write_trip(tmp_path / "trip.mcap", a_trip(), taken, a_scenario(), final=final)
+    back = read_trip(path)
+    assert bits(back.frames) == bits(tuple(taken))
+    assert bits(back.final) == bits(final)
+    assert compare_trips(RecordedTrip(a_trip(), tuple(taken), a_scenario(), final=final), back) is None
+
+
+def test_the_same_trip_gives_the_same_bytes(tmp_path: Path) -> None:
+    first, second = save(tmp_path / "a.mcap", a_drive()), save(tmp_path / "b.mcap", a_drive())
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_twenty_seconds_among_forty_cars_are_below_a_megabyte(tmp_path: Path) -> None:
+    assert save(tmp_path / "trip.mcap", a_drive(200, 40)).stat().st_size < 1_000_000
+
+
+def test_lanes_are_stored_once_and_shared(tmp_path: Path) -> None:
+    path = save(tmp_path / "trip.mcap", a_drive())
+    with path.open("rb") as stream:
+        topics = [channel.topic for _, channel, _ in make_reader(stream).iter_messages()]
+    assert topics.count("/lanes") == 1
+    back = read_trip(path)
+    assert back.final is not None
+    assert all(frame.snapshot.lanes is back.final.lanes for frame in back.frames)
+
+
+def test_other_viewers_find_json_with_schemas(tmp_path: Path) -> None:
+    path = save(tmp_path / "trip.mcap", a_drive())
+    with path.open("rb") as stream:
+        reader = make_reader(stream)
+        summary = reader.get_summary()
+        messages = [(schema, channel, json.loads(m.data)) for schema, channel, m in reader.iter_messages()]
+    assert summary is not None
+    assert {channel.topic for channel in summary.channels.values()} == {c.topic for c in CHANNELS}
+    assert {channel.message_encoding for channel in summary.channels.values()} == {"json"}
+    assert {schema.encoding for schema in summary.schemas.values()} == {"jsonschema"}
+    for schema, channel, payload in messages:
+        assert schema is not None
+        declared = json.loads(schema.data)["properties"]
+        assert set(payload) <= set(declared), channel.topic
+    scene = [payload for schema, _, payload in messages if schema and schema.name == "foxglove.SceneUpdate"]
+    assert [entity["id"] for entity in scene[0]["entities"]] == ["ego", "traffic", "road", "objects"]
+    assert [entity["id"] for entity in scene[1]["entities"]] == ["ego", "traffic"], "the road is sent once"
+    ego = scene[0]["entities"][0]["cubes"][0]
+    assert ego["pose"]["position"]["y"] == -4.0, "Foxglove's y grows to the left"
+
+
+def test_damage_is_told_in_words(tmp_path: Path) -> None:
+    path = save(tmp_path / "trip.mcap", a_drive())
+    whole = path.read_bytes()
+    for damaged in (b"", b"hello", whole[:20], whole[: len(whole) // 2], whole[:-9], whole[:200] + whole[300:]):
+        path.write_bytes(damaged)
+        with pytest.raises(DataError, match="not a usable recording"):
+            read_trip(path)
+
+
+@given(st.data())
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_any_flipped_byte_is_either_harmless_or_told_in_words(tmp_path: Path, data: st.DataObject) -> None:
+    drive = a_drive(2, 1)
+    content = bytearray(save(tmp_path / "whole.mcap", drive).read_bytes())
+    position = data.draw(st.integers(0, len(content) - 1))
+    content[position] ^= data.draw(st.integers(1, 255))
+    path = tmp_path / "flipped.mcap"
+    path.write_bytes(bytes(content))
+    try:
+        back = read_trip(path)
+    except DataError:
+        return
+    assert bits(back.frames) == bits(drive.frames)
+
+
+def test_a_foreign_file_is_told_apart(tmp_path: Path) -> None:
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        writer.finish()
+    with pytest.raises(DataError, match="not a recorded trip of Chauffeur"):
+        read_trip(path)
+    with pytest.raises(DataError, match="There is no recording"):
+        read_trip(tmp_path / "absent.mcap")
+    with pytest.raises(DataError, match="cannot be read"):
+        read_trip(tmp_path)
+
+
+def test_a_newer_format_asks_for_an_upgrade(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("chauffeur.drive.recording.FORMAT", 2)
+    path = save(tmp_path / "trip.mcap", a_drive())
+    monkeypatch.undo()
+    with pytest.raises(DataError, match="format 2"):
+        read_trip(path)
+
+
+def test_nothing_half_written_stays(tmp_path: Path) -> None:
+    path = save(tmp_path / "trip.mcap", a_drive())
+    before = path.read_bytes()
+    scenario = replace(a_scenario(), config={"bad": math.nan})
+    with pytest.raises(DataError, match="cannot store"):
+        write_trip(path, a_trip(), (), scenario)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["trip.mcap"]
+    with pytest.raises(DataError, match="cannot be written"):
+        write_trip(path / "inside-a-file.mcap", a_trip(), (), a_scenario())
+
+
+def test_a_difference_names_tick_field_and_values() -> None:
+    drive = a_drive()
+    frame = drive.frames[3]
+    ego = replace(frame.snapshot.ego, speed_mps=math.nextafter(frame.snapshot.ego.speed_mps, 99.0))
+    other = replace(frame, snapshot=replace(frame.snapshot, ego=ego))
+    changed = replace(drive, frames=(*drive.frames[:3], other, *drive.frames[4:]))
+    found = compare_trips(drive, changed)
+    assert found is not None
+    assert (found.tick, found.field) == (3, "snapshot.ego.speed_mps")
+    assert found.first != found.second
+    assert "tick 3" in str(found)
+
+
+def test_differences_outside_the_frames_are_found() -> None:
+    drive = a_drive()
+    shorter = compare_trips(drive, replace(drive, frames=drive.frames[:-1]))
+    assert shorter is not None
+    assert shorter.field == "number of frames"
+    outcome = compare_trips(drive, replace(drive, trip=replace(drive.trip, outcome="timeout")))
+    assert outcome is not None
+    assert (outcome.tick, outcome.field) == (None, "outcome")
+    renamed = replace(drive, trip=replace(drive.trip, record=(("version", "9"),), plan=Plan(Thoughts(""), None)))
+    assert compare_trips(drive, renamed) is None, "provenance is not part of the drive"
+
+
+def test_zero_and_minus_zero_differ() -> None:
+    drive = a_drive(1)
+    frame = replace(drive.frames[0], applied=Command(0.0, 0.0))
+    minus = replace(drive.frames[0], applied=Command(-0.0, 0.0))
+    found = compare_trips(replace(drive, frames=(frame,)), replace(drive, frames=(minus,)))
+    assert found is not None
+    assert found.field == "applied.acceleration_mps2"

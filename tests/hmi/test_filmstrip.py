@@ -1,0 +1,68 @@
+"""The strip of pictures: right size, right instants, the ego in every picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from sample_trips import HOSTILE, highway_trip, intersection_trip, refused_trip
+
+from chauffeur.concept import DataError
+from chauffeur.hmi.events import Event
+from chauffeur.hmi.filmstrip import choose_moments, render_filmstrip, write_filmstrip
+
+EGO = (255, 178, 36)
+"""Amber, and nothing but the ego is amber."""
+
+
+def ego_rows(image: Image.Image) -> int:
+    """How many separate stretches of pixel rows show the ego."""
+    width, height = image.size
+    pixels = image.load()
+    assert pixels is not None
+    hits = [any(pixels[x, y] == EGO for x in range(width)) for y in range(height)]
+    return sum(hit and not before for before, hit in zip([False, *hits], hits, strict=False))
+
+
+@pytest.mark.parametrize("make", [highway_trip, intersection_trip])
+def test_both_roads_are_drawn_at_readme_width(make: object, tmp_path: Path) -> None:
+    path = write_filmstrip(tmp_path / "trip.png", make())  # type: ignore[operator]
+    with Image.open(path) as image:
+        assert image.format == "PNG"
+        assert image.width == 1600
+    assert path.stat().st_size < 1_000_000
+    assert [p.name for p in tmp_path.iterdir()] == ["trip.png"]
+
+
+def test_the_ego_is_in_every_picture_of_a_highway() -> None:
+    # A window splits the car's paint in rows at most; six pictures stand apart.
+    assert ego_rows(render_filmstrip(highway_trip(seconds=6.0), 4)) >= 4
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_fewer_pictures_make_a_lower_strip(count: int) -> None:
+    trip = highway_trip(seconds=3.0)
+    assert render_filmstrip(trip, count).height < render_filmstrip(trip, count + 1).height
+
+
+def test_instants_go_to_what_happened() -> None:
+    times = [t / 10 for t in range(101)]
+    events = (Event(4.4, "said", "hello"), Event(5.5, "lane_change", "left"), Event(0.3, "said", "early"))
+    moments = choose_moments(times, events, 5)
+    assert [times[m.index] for m in moments] == [0.0, 2.5, 5.5, 7.5, 10.0]
+    assert [m.event.label if m.event else "" for m in moments] == ["", "", "left", "", ""]
+
+
+def test_more_pictures_than_instants_gives_each_instant_once() -> None:
+    assert [m.index for m in choose_moments([0.0, 0.1], (), 6)] == [0, 1]
+
+
+@pytest.mark.parametrize("wish", [HOSTILE, "x" * 3000, "走快一点", "", "two\nlines"])
+def test_any_wish_can_be_a_caption(wish: str) -> None:
+    assert render_filmstrip(highway_trip(wish=wish, seconds=1.0, cars=3), 2).width == 1600
+
+
+def test_nothing_driven_has_no_strip(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="Nothing was driven"):
+        write_filmstrip(tmp_path / "trip.png", refused_trip())

@@ -1,0 +1,159 @@
+"""The page: complete in itself, and whatever a person or a model wrote stays text."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sample_trips import HOSTILE, highway_trip, intersection_trip, refused_trip
+
+from chauffeur.concept import DataError
+from chauffeur.hmi.page import embed_json, render_page, write_page
+
+
+class Reader(HTMLParser):
+    """Collects what a browser would make of a page: elements with attributes, and the text of scripts and styles."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.raw: dict[str, list[str]] = {"script": [], "style": [], "title": [], "h1": []}
+        self._inside = ""
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        self._inside = tag
+        if tag in self.raw:
+            self.raw[tag].append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        self._inside = ""
+
+    def handle_data(self, data: str) -> None:
+        if self._inside in self.raw:
+            self.raw[self._inside][-1] += data
+
+    @property
+    def tags(self) -> list[str]:
+        return [tag for tag, _ in self.elements]
+
+
+def payload_of(text: str) -> dict[str, object]:
+    return json.loads(Reader(text).raw["script"][0])
+
+
+@pytest.fixture(scope="module")
+def highway_page() -> str:
+    return render_page(highway_trip())
+
+
+def test_it_asks_for_nothing_from_outside(highway_page: str) -> None:
+    reader = Reader(highway_page)
+    for tag, attributes in reader.elements:
+        assert "src" not in attributes, f"<{tag}> loads something"
+        assert not (attributes.get("href") or "#").startswith(("http", "//", "data:", "file:"))
+        assert tag not in {"link", "iframe", "object", "embed", "base", "form"}
+    style = "".join(reader.raw["style"])
+    assert "url(" not in style
+    assert "@import" not in style
+    script = reader.raw["script"][1]
+    assert not re.search(r"fetch\(|XMLHttpRequest|WebSocket|EventSource|sendBeacon|import\(|importScripts", script)
+    outside = set(re.findall(r"https?://[^\s\"'`]+", highway_page))
+    assert outside <= {"http://www.w3.org/2000/svg"}, "a namespace is a name, nothing else may be an address"
+
+
+def test_its_policy_admits_its_own_style_and_script_and_nothing_else(highway_page: str) -> None:
+    reader = Reader(highway_page)
+    policy = next(a["content"] for t, a in reader.elements if t == "meta" and a.get("http-equiv")) or ""
+    assert policy.startswith("default-src 'none'")
+    for text in (reader.raw["script"][1], reader.raw["style"][0]):
+        digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        assert f"'sha256-{digest}'" in policy
+    assert "unsafe" not in policy
+    for _, attributes in reader.elements:
+        assert "style" not in attributes, "the policy would block it"
+        assert not any(name.startswith("on") for name in attributes)
+
+
+def test_the_script_never_makes_markup_of_text(highway_page: str) -> None:
+    script = Reader(highway_page).raw["script"][1]
+    for door in ("innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval(", "new Function"):
+        assert door not in script
+
+
+def test_hostile_words_are_inert_everywhere() -> None:
+    trip = highway_trip(wish=HOSTILE, seconds=2.0, said=((0.0, HOSTILE),), record=((HOSTILE, HOSTILE),))
+    text = render_page(trip)
+    reader = Reader(text)
+    assert reader.tags == Reader(render_page(highway_trip(seconds=2.0))).tags, "the words made or ate an element"
+    assert payload_of(text)["wish"] == HOSTILE
+    assert reader.raw["h1"] == [HOSTILE]
+    assert HOSTILE in reader.raw["title"][0]
+    assert "<img" not in text
+
+
+@given(st.text())
+@settings(max_examples=200, deadline=None)
+def test_embedded_json_gives_back_any_text_and_cannot_leave_its_element(text: str) -> None:
+    embedded = embed_json({"wish": text})
+    assert json.loads(embedded)["wish"] == text.encode("utf-8", "replace").decode()
+    assert not set("<>&\u2028\u2029") & set(embedded)
+
+
+def test_slots_in_words_are_not_filled() -> None:
+    page = render_page(highway_trip(wish="{{data}} {{script}}", seconds=1.0))
+    assert Reader(page).raw["h1"] == ["{{data}} {{script}}"]
+
+
+@pytest.mark.parametrize(("make", "along"), [(highway_trip, True), (intersection_trip, False)])
+def test_both_roads_are_played(make: object, along: bool) -> None:
+    trip = make()  # type: ignore[operator]
+    drive = payload_of(render_page(trip))["drive"]
+    assert isinstance(drive, dict)
+    assert drive["camera"]["along"] is along
+    assert drive["road"]["surfaces"]
+    count = len(trip.frames)
+    for column in ("time", "speed", "target", "limit", "gap", "line", "state", "calls", "lane", "goal"):
+        assert len(drive[column]) == count, column
+    assert len(drive["ego"]["x"]) == count
+
+
+def test_what_a_person_needs_to_see_is_there(highway_page: str) -> None:
+    payload = payload_of(highway_page)
+    assert payload["intent"] == "overtake.left"
+    assert ["target speed", "33.0 m/s (119 km/h)"] in payload["settings"]  # type: ignore[operator]
+    assert [v["passed"] for v in payload["verdicts"]] == [True, False, True]  # type: ignore[attr-defined]
+    values = [m["value"] for m in payload["metrics"]]  # type: ignore[attr-defined]
+    assert values == ["89.4 points", "91.2 points", "66.7 points", "85.3 points", "does not apply"]
+    names = [name for name, _ in payload["provenance"]]  # type: ignore[attr-defined]
+    assert {"planner", "model", "seed", "highway-env", "limits"} <= set(names)
+    assert "Simulated drive (highway-env physics)" in highway_page
+
+
+def test_a_refused_wish_has_a_page_too() -> None:
+    payload = payload_of(render_page(refused_trip()))
+    assert payload["drive"] is None
+    assert payload["refusal"] == "There is a wall."
+
+
+def test_a_page_of_half_a_minute_is_below_two_megabytes() -> None:
+    assert len(render_page(highway_trip(seconds=30.0)).encode()) < 2_000_000
+
+
+def test_writing_leaves_a_whole_file_or_none(tmp_path: Path) -> None:
+    trip = highway_trip(seconds=1.0)
+    path = write_page(tmp_path / "deep" / "trip.html", trip)
+    assert path.read_text(encoding="utf-8") == render_page(trip)
+    assert [p.name for p in path.parent.iterdir()] == ["trip.html"]
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(DataError, match="cannot be written"):
+        write_page(tmp_path / "file" / "trip.html", trip)

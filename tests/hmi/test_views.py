@@ -1,0 +1,125 @@
+"""Road markings, events, framing and words: what page and filmstrip both rely on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from sample_trips import OVERTAKE, highway_trip, intersection_trip
+
+from chauffeur.concept import Causes, Feedback, LaneView, Metric, Parameters
+from chauffeur.hmi import words
+from chauffeur.hmi.events import events_of
+from chauffeur.hmi.payload import policy_words, program_tokens
+from chauffeur.hmi.road import Box, draw_road
+from chauffeur.hmi.view import facing_right, frame_drive, instants_of
+
+EVERYWHERE = Box(-500, -500, 500, 500)
+
+
+def straight(index: int, *, emergency: bool = False, road: tuple[str, str] = ("a", "b")) -> LaneView:
+    centre = ((0.0, 4.0 * index), (200.0, 4.0 * index))
+    return LaneView((*road, index), 4.0, 200.0, 30.0, emergency, emergency, centre)
+
+
+def test_lines_of_a_highway() -> None:
+    road = draw_road((straight(0), straight(1), straight(2, emergency=True)), (), EVERYWHERE)
+    assert sorted((line.points_m[0][1], line.style) for line in road.lines) == [
+        (-2.0, "solid"),
+        (2.0, "dashed"),
+        (6.0, "solid"),
+        (10.0, "solid"),
+    ]
+
+
+def test_opposite_lanes_share_one_centre_line() -> None:
+    there = LaneView(("a", "b", 0), 4.0, 100.0, 10.0, False, False, ((0.0, 2.0), (100.0, 2.0)))
+    back = LaneView(("b", "a", 0), 4.0, 100.0, 10.0, False, False, ((100.0, -2.0), (0.0, -2.0)))
+    styles = sorted(line.style for line in draw_road((there, back), (), EVERYWHERE).lines)
+    assert styles == ["centre", "solid", "solid"]
+
+
+def test_the_inside_of_an_intersection_is_clear() -> None:
+    shot = intersection_trip().frames[0].snapshot
+    road = draw_road(shot.lanes, shot.objects, EVERYWHERE)
+    inside = [p for line in road.lines for p in line.points_m if max(abs(p[0]), abs(p[1])) < 3.9]
+    assert not inside
+    sign = road.stop_signs[0]
+    assert sign.post_m[0] > 4.0, "the post stands to the right of the lane, beside the road"
+    assert math.dist(*sign.line_m) == pytest.approx(3.6)
+
+
+def test_a_stretch_of_road_out_of_sight_is_left_out() -> None:
+    road = draw_road((straight(0),), (), Box(50, -10, 80, 10))
+    xs = [x for surface in road.surfaces for x, _ in surface.centre_m]
+    assert min(xs) >= 50
+    assert max(xs) <= 80
+
+
+def test_events_of_a_highway_drive() -> None:
+    kinds = [event.kind for event in events_of(highway_trip())]
+    assert kinds == ["said", "lane_change", "finished", "said"]
+
+
+def test_the_next_stretch_of_road_is_no_lane_change() -> None:
+    trip = highway_trip(seconds=1.0)
+    last = trip.frames[-1].snapshot
+    final = replace(last, ego=replace(last.ego, lane=("b", "c", 2)))
+    assert [e.kind for e in events_of(replace(trip, final=final))] == [e.kind for e in events_of(trip)]
+
+
+def test_a_collision_shows_though_it_comes_after_the_last_command() -> None:
+    trip = highway_trip(seconds=1.0)
+    last = trip.frames[-1].snapshot
+    final = replace(last, time_s=1.0, off_road=True, ego=replace(last.ego, crashed=True))
+    assert [e.kind for e in events_of(replace(trip, final=final))][-2:] == ["collision", "off_road"]
+
+
+def test_a_stop_is_marked_once() -> None:
+    assert [e.kind for e in events_of(intersection_trip())].count("stopped") == 1
+
+
+def test_the_car_sets_off_to_the_right() -> None:
+    shots = facing_right(instants_of(intersection_trip()))
+    assert shots[0].ego.heading_rad == pytest.approx(0.0)
+    assert shots[20].ego.x_m > shots[0].ego.x_m
+    assert shots[-1].ego.y_m < shots[0].ego.y_m, "a left turn goes up"
+    assert not frame_drive(shots).along
+
+
+def test_a_highway_is_looked_at_as_it_is() -> None:
+    shots = instants_of(highway_trip(seconds=1.0))
+    assert facing_right(shots) is shots
+    camera = frame_drive(shots)
+    assert camera.along
+    assert (camera.box.y0, camera.box.y1) == (-2.0, 14.0)
+
+
+def test_tokens_give_back_the_program_line_by_line() -> None:
+    for source in (OVERTAKE, "\n\nx = 1", "def (", "", "'''open", "\tif a:\r\n\t\tb()"):
+        lines = program_tokens(source)
+        joined = ["".join(text for _, text in line) for line in lines]
+        assert joined == source.replace("\r\n", "\n").split("\n")
+    kinds = {text: kind for line in program_tokens(OVERTAKE) for kind, text in line}
+    assert (kinds["while"], kinds["is_safe_enter"], kinds["overtake_left"], kinds["left"]) == ("k", "a", "d", "")
+
+
+def test_numbers_carry_their_units() -> None:
+    assert words.speed(28.0) == "28.0 m/s (101 km/h)"
+    assert words.setting("target_speed_mps", 28.0) == ("target speed", "28.0 m/s (101 km/h)")
+    assert words.setting("time_headway_s", 1.5) == ("time headway", "1.5 s")
+    assert words.setting("gap_m", 30.0) == ("gap", "30 m")
+    assert words.setting("lanes", 2) == ("lanes", "2")
+    assert words.metric_value(Metric("x-v1", math.nan, "points", False)) == "does not apply"
+    assert words.metric_value(Metric("x-v1", 10.0, "m/s")) == "10.0 m/s (36 km/h)"
+    assert words.metric_name("lampilot-time-efficiency-v1") == "Time-efficiency score"
+    assert words.metric_name("stop-compliance-v2") == "Stop compliance"
+    assert "10.0 m/s (36 km/h)" in policy_words(Parameters(10.0, 5.0, 0.5))
+
+
+def test_causes_and_feedback_in_words() -> None:
+    assert words.cause_words(Causes()) == ()
+    assert len(words.cause_words(Causes(policy_failed=True, fallback_used=True, detail="line 3"))) == 3
+    assert words.feedback_words(Feedback("", speed=1, gap=-1)) == "wants it faster, wants a larger gap"
+    assert words.feedback_words(Feedback("")) == "no change wanted"

@@ -1,0 +1,164 @@
+"""What passengers say, and what it means."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chauffeur.concept import Feedback, History, HistoryItem
+from chauffeur.memory import Standing, interpret_feedback, standing_feedback
+from chauffeur.memory.quantities import Quantity, read_quantities
+
+# words -> speed, gap, comfort, approval, strength
+SAID: list[tuple[str, int, int, int, int, float]] = [
+    # Speed.
+    ("too fast", -1, 0, 0, -1, 0.6),
+    ("a bit too fast", -1, 0, 0, 0, 0.35),
+    ("slightly too quick for my taste", -1, 0, 0, 0, 0.35),
+    ("way too fast!", -1, 0, 0, -1, 1.0),
+    ("That was much too slow.", 1, 0, 0, -1, 1.0),
+    ("too slow for me", 1, 0, 0, -1, 0.6),
+    ("far too slow", 1, 0, 0, -1, 1.0),
+    ("We were crawling", 1, 0, 0, -1, 0.6),
+    ("not fast enough", 1, 0, 0, -1, 0.6),
+    ("you didn't slow down", -1, 0, 0, -1, 0.6),
+    ("you did not speed up", 1, 0, 0, -1, 0.6),
+    ("faster than I like", -1, 0, 0, -1, 0.6),
+    ("that was really fast", -1, 0, 0, -1, 1.0),
+    ("a little slow", 1, 0, 0, 0, 0.35),
+    ("could be quicker", 1, 0, 0, 0, 0.6),
+    ("should have been slower", -1, 0, 0, 0, 0.6),
+    ("slow down a bit next time", -1, 0, 0, 0, 0.35),
+    ("speed up a lot", 1, 0, 0, 0, 1.0),
+    ("drive 10 km/h slower", -1, 0, 0, 0, 0.505),
+    ("drive 20 km/h faster", 1, 0, 0, 0, 1.0),
+    ("one km/h slower", -1, 0, 0, 0, 0.1),
+    # Negation.
+    ("not too fast", 0, 0, 0, 0, 0.0),
+    ("it wasn’t too fast", 0, 0, 0, 0, 0.0),
+    ("I don't think it was too fast", 0, 0, 0, 0, 0.0),
+    ("it was not that fast", 0, 0, 0, 0, 0.0),
+    ("do not drive too fast", -1, 0, 0, 0, 0.6),
+    ("you should not drive too fast", -1, 0, 0, 0, 0.6),
+    ("not too fast please", -1, 0, 0, 0, 0.6),
+    ("don't drive so fast", -1, 0, 0, 0, 0.6),
+    ("Not so close!", 0, -1, 0, 0, 0.6),
+    ("never go faster", -1, 0, 0, 0, 0.6),
+    ("do not slow down", 1, 0, 0, 0, 0.6),
+    ("why not go faster", 1, 0, 0, 0, 0.6),
+    ("no rush", -1, 0, 0, 0, 0.6),
+    ("I am not in a hurry", -1, 0, 0, 0, 0.6),
+    ("I'm really in a hurry now", 1, 0, 0, 0, 1.0),
+    ("not too fast but too close", 0, -1, 0, -1, 0.6),
+    # Gap.
+    ("way too close", 0, -1, 0, -1, 1.0),
+    ("you were tailgating", 0, -1, 0, -1, 0.6),
+    ("not enough room", 0, -1, 0, -1, 0.6),
+    ("the gap was too small", 0, -1, 0, -1, 0.6),
+    ("the gap was a bit too big", 0, 1, 0, 0, 0.35),
+    ("too much distance", 0, 1, 0, -1, 0.6),
+    ("too far behind the truck", 0, 1, 0, -1, 0.6),
+    ("next time leave more room", 0, -1, 0, 0, 0.6),
+    ("please keep your distance", 0, -1, 0, 0, 0.6),
+    ("I would have liked a bit more space", 0, -1, 0, 0, 0.35),
+    ("increase the following distance by 10 m", 0, -1, 0, 0, 0.5),
+    ("closer next time", 0, 1, 0, 0, 0.6),
+    ("reduce the gap", 0, 1, 0, 0, 0.6),
+    ("leave half a second more headway", 0, -1, 0, 0, 0.6),
+    # Comfort.
+    ("I felt sick", 0, 0, -1, -1, 0.6),
+    ("you braked too hard", 0, 0, -1, -1, 0.6),
+    ("a little uncomfortable", 0, 0, -1, 0, 0.35),
+    ("I did not feel safe", 0, 0, -1, -1, 0.6),
+    ("smoother please", 0, 0, -1, 0, 0.6),
+    ("be less aggressive", 0, 0, -1, 0, 0.6),
+    ("too timid", 0, 0, 1, -1, 0.6),
+    ("like my grandma", 0, 0, 1, -1, 0.6),
+    ("drive more assertively", 0, 0, 1, 0, 0.6),
+    # Approval.
+    ("perfect", 0, 0, 0, 1, 0.0),
+    ("loved it", 0, 0, 0, 1, 0.0),
+    ("nice and smooth", 0, 0, 0, 1, 0.0),
+    ("couldn't be better", 0, 0, 0, 1, 0.0),
+    ("not bad", 0, 0, 0, 1, 0.0),
+    ("really fast, I loved it", 0, 0, 0, 1, 0.0),
+    ("It was slower this time, great", 0, 0, 0, 1, 0.0),
+    ("not good", 0, 0, 0, -1, 0.6),
+    ("hated it", 0, 0, 0, -1, 0.6),
+    ("I don't like this", 0, 0, 0, -1, 0.6),
+    ("great but too fast", -1, 0, 0, 0, 0.6),
+    ("it was good, it was bad", 0, 0, 0, 0, 0.0),
+    ("slower would be nice", -1, 0, 0, 0, 0.6),
+    # Several topics, contradictions, nothing.
+    ("way too fast and too close", -1, -1, 0, -1, 1.0),
+    ("too fast at first, then too slow", 0, 0, 0, 0, 0.0),
+    ("", 0, 0, 0, 0, 0.0),
+    ("hello there", 0, 0, 0, 0, 0.0),
+    ("no complaints", 0, 0, 0, 0, 0.0),
+]
+
+
+@pytest.mark.parametrize(("text", "speed", "gap", "comfort", "approval", "strength"), SAID)
+def test_what_is_meant(text: str, speed: int, gap: int, comfort: int, approval: int, strength: float) -> None:
+    feedback = interpret_feedback(text)
+    assert (feedback.speed, feedback.gap, feedback.comfort, feedback.approval) == (speed, gap, comfort, approval)
+    assert feedback.strength == pytest.approx(strength, abs=1e-3)
+    assert feedback.text == text
+
+
+@given(st.text())
+def test_any_words_at_all_are_read(text: str) -> None:
+    feedback = interpret_feedback(text)
+    assert feedback.text == text
+    assert 0.0 <= feedback.strength <= 1.0
+
+
+@pytest.mark.parametrize("text", ["not " * 5000, "too " * 5000, "a bit " * 5000, "x" * 50_000, "lane to the " * 3000])
+def test_long_words_take_no_long_time(text: str) -> None:
+    interpret_feedback(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("80 km/h", [("speed", 80 / 3.6)]),
+        ("50 miles per hour", [("speed", 22.352)]),
+        ("28.5 meters per second", [("speed", 28.5)]),
+        ("28,5 m/s", [("speed", 28.5)]),
+        ("25 m", [("length", 25.0)]),
+        ("twenty metres and 2 seconds", [("length", 20.0), ("time", 2.0)]),
+        ("three car lengths", [("length", 15.0)]),
+        ("60 feet, 10 yards", [("length", 18.288), ("length", 9.144)]),
+        ("25 minutes", []),
+        ("lane 2", []),
+    ],
+)
+def test_numbers_with_units(text: str, expected: list[tuple[str, float]]) -> None:
+    found = read_quantities(text)
+    assert [(q.dimension, pytest.approx(q.value)) for q in found] == expected
+    assert all(isinstance(q, Quantity) for q in found)
+
+
+def item(when: str, *feedback: Feedback) -> HistoryItem:
+    return HistoryItem(when, when, "", "", "highway", "", "", "", (), feedback)
+
+
+def test_the_most_recent_verdict_on_a_topic_holds_and_the_others_are_shown() -> None:
+    fast, slow, close = Feedback("too fast", speed=-1), Feedback("too slow", speed=1), Feedback("too close", gap=-1)
+    history = History((item("2026-03-02", slow), item("2026-03-03", close), item("2026-03-01", fast)))
+    assert standing_feedback(history) == (
+        Standing("speed", slow, "2026-03-02", (("2026-03-01", fast),)),
+        Standing("gap", close, "2026-03-03"),
+    )
+
+
+def test_of_two_verdicts_on_one_trip_the_later_holds() -> None:
+    fast, slow, again = Feedback("too fast", speed=-1), Feedback("too slow", speed=1), Feedback("slower", speed=-1)
+    (standing,) = standing_feedback(History((item("2026-03-01", fast, slow, again),)))
+    assert standing.feedback is again
+    assert standing.overruled == (("2026-03-01", slow),)
+
+
+def test_no_verdicts_no_standing() -> None:
+    assert standing_feedback(History((item("2026-03-01", Feedback("hm")),))) == ()

@@ -1,0 +1,131 @@
+"""Nearness of wishes: same meaning near, opposite meaning far, same bits everywhere."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chauffeur.memory.retrieval import Entry, rank
+from chauffeur.memory.similarity import DIMENSIONS, encode, likeness, mark, tags_of
+
+NOW = datetime(2026, 3, 1, tzinfo=UTC)
+
+
+def like(a: str, b: str) -> float:
+    wish, other = mark(a), mark(b)
+    return next(likeness(wish, np.stack([other.vector]) @ wish.vector, [other]))
+
+
+@pytest.mark.parametrize(
+    ("text", "tags"),
+    [
+        ("Can you drive faster?", {"speed+"}),
+        ("You are driving a little bit slow now", {"speed+"}),
+        ("I do not think we should drive this slow", {"speed+"}),
+        ("I'm really in a hurry now", {"speed+"}),
+        ("I am not in a hurry", {"speed-"}),
+        ("Drive as fast as you can", {"speed+"}),
+        ("Slow down please", {"speed-"}),
+        ("Keep more distance", {"gap-"}),
+        ("Get closer to the car ahead", {"gap+"}),
+        ("I feel a bit motion-sick right now", {"comfort-"}),
+        ("Change to the left lane", {"lane.left"}),
+        ("Switch to the lane on your right", {"lane.right"}),
+        ("Move to the rightmost lane", {"lane.right"}),
+        ("Turn left", {"turn.left"}),
+        ("Do not turn left", {"not.turn.left"}),
+        ("Take a right turn at the junction", {"turn.right"}),
+        ("Go straight ahead", {"turn.straight"}),
+        ("Overtake this truck on the left", {"overtake"}),
+        ("Pull over", {"stop"}),
+        ("Do not overtake", {"not.overtake"}),
+        ("What a lovely day", set()),
+    ],
+)
+def test_tags(text: str, tags: set[str]) -> None:
+    assert tags_of(text) == tags
+
+
+@pytest.mark.parametrize(
+    ("a", "b"),
+    [
+        ("drive faster", "drive slower"),
+        ("change to the left lane", "change to the right lane"),
+        ("turn left", "do not turn left"),
+        ("turn left", "turn right"),
+        ("keep more distance", "keep less distance"),
+        ("I am in a hurry", "I am not in a hurry"),
+        ("overtake the truck", "do not overtake the truck"),
+    ],
+)
+def test_opposite_wishes_do_not_match_and_equal_ones_do(a: str, b: str) -> None:
+    assert like(a, b) < 0.15
+    assert like(b, a) < 0.15
+    assert like(a, a) == pytest.approx(1.0)
+
+
+def test_the_same_meaning_in_other_words_is_near() -> None:
+    assert like("Can you drive faster?", "I'm really in a hurry now") > 0.55
+    assert like("Can you drive faster?", "Change to the left lane") < 0.2
+
+
+def test_numbers_draw_wishes_together() -> None:
+    near = like("keep a distance of 20 meters", "keep a distance of 21 meters")
+    far = like("keep a distance of 20 meters", "keep a distance of 80 meters")
+    assert near > far
+    assert like("drive at 0 km/h", "drive at 0 km/h") == pytest.approx(1.0)
+
+
+def test_the_code_of_a_text_never_changes() -> None:
+    """Vectors are stored: other bits for the same text would need a new encoder version."""
+    vector = encode("Drive faster, please")
+    assert vector.shape == (DIMENSIONS,)
+    assert np.flatnonzero(vector).tolist() == [72, 78, 111, 122, 125, 130, 135, 181, 186, 296, 297, 330, 350]
+    assert np.linalg.norm(vector) == pytest.approx(1.0)
+
+
+@given(st.text())
+def test_any_text_can_be_encoded(text: str) -> None:
+    vector = encode(text)
+    assert np.isfinite(vector).all()
+    assert np.array_equal(vector, encode(text))
+
+
+def entry(row: int, text: str, *, days: float = 1.0, world: str = "highway", judged: bool = False) -> Entry:
+    return Entry(row, mark(text), world, NOW - timedelta(days=days), judged)
+
+
+def rows(entries: list[Entry], k: int = 2, text: str = "drive faster") -> list[int]:
+    return [row for row, _ in rank(mark(text), "highway", NOW, entries, k)]
+
+
+def test_recent_and_same_world_come_first() -> None:
+    assert rows([entry(1, "drive faster", days=90), entry(2, "drive faster", days=1)]) == [2, 1]
+    assert rows([entry(1, "drive faster"), entry(2, "drive faster", world="intersection")]) == [1, 2]
+    assert rows([entry(1, "drive faster", days=-5)]) == [1]
+
+
+def test_unrelated_and_opposite_wishes_are_left_out() -> None:
+    assert rows([entry(1, "drive slower"), entry(2, "play some music")]) == []
+
+
+def test_the_latest_verdict_is_always_among_the_chosen() -> None:
+    entries = [entry(1, "drive faster"), entry(2, "drive faster"), entry(3, "please hurry up a bit", judged=True)]
+    assert rows(entries) == [2, 3]
+    entries.append(entry(4, "drive faster", judged=True))
+    assert rows(entries) == [4, 2]
+
+
+def test_nothing_asked_nothing_found() -> None:
+    assert rows([], 3) == []
+    assert rows([entry(1, "drive faster")], 0) == []
+    assert rows([entry(1, "drive faster")], -1) == []
+
+
+def test_similarity_stays_between_0_and_1() -> None:
+    ((_, similarity),) = rank(mark("drive faster"), "highway", NOW, [entry(1, "drive faster", days=0)], 1)
+    assert similarity == pytest.approx(1.0)

@@ -1,0 +1,293 @@
+"""What is remembered, of whom, and what is left on the disk."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from chauffeur.concept import (
+    NOBODY,
+    ActionMatrix,
+    Feedback,
+    History,
+    Instruction,
+    Parameters,
+    PersonId,
+    Trajectory,
+)
+from chauffeur.memory import Memory, VaultMemory, interpret_feedback
+from chauffeur.memory.files import data_home
+from chauffeur.memory.records import MAX_CHARS
+from conftest import Clock, context, trip
+
+ANN, BEN = PersonId("Ann"), PersonId("Ben")
+Wishes = Callable[..., list[str]]
+
+
+def recall(vault: VaultMemory, person: PersonId, text: str = "drive faster", k: int = 3) -> History:
+    return vault.recall(person, Instruction(text), context(), k)
+
+
+def test_it_is_a_memory(vault: VaultMemory) -> None:
+    assert isinstance(vault, Memory)
+
+
+def test_a_trip_comes_back_whole(vault: VaultMemory, clock: Clock) -> None:
+    vault.remember(trip("Ann", "Drive faster", thoughts="They are late."), Feedback("too fast", speed=-1, strength=0.6))
+    clock.pass_by(minutes=5)
+    assert vault.attach_feedback(ANN, Feedback("way too close", gap=-1, approval=-1, strength=1.0))
+    (item,) = recall(vault, ANN).items
+    assert item.trip_id == "t1"
+    assert item.when == "2026-03-01T12:00:00.000+00:00"
+    assert (item.instruction, item.context) == ("Drive faster", "I am driving at 30.0 m/s.")
+    assert (item.world, item.intent, item.thoughts) == ("highway", "x", "They are late.")
+    assert item.policy.startswith("def p():")
+    assert item.settings == (("target_speed_mps", 28.0),)
+    assert [one.text for one in item.feedback] == ["too fast", "way too close"]
+    assert item.feedback[1] == Feedback("way too close", gap=-1, approval=-1, strength=1.0)
+    assert item.outcome == "success"
+    assert item.similarity == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("policy", "text"),
+    [
+        (Parameters(15.0, 10.0, 2.0, -1), '"target_speed_mps": 15.0'),
+        (ActionMatrix((1.0, 0.1, 0.0), (1.0, 2.0, 3.0)), '"mpc": [1.0, 2.0, 3.0]'),
+        (Trajectory(((1.0, 0.0),), 0.5), '"period_s": 0.5'),
+    ],
+)
+def test_policies_other_than_programs_are_kept_as_json(vault: VaultMemory, policy: Parameters, text: str) -> None:
+    vault.remember(trip("Ann", "drive faster", policy=policy))
+    assert text in recall(vault, ANN).items[0].policy
+
+
+def test_a_refused_wish_is_kept_with_its_refusal(vault: VaultMemory) -> None:
+    from dataclasses import replace
+
+    one = trip("Ann", "drive faster")
+    vault.remember(replace(one, plan=replace(one.plan, policy=None, refusal="I do not fly.")))
+    (item,) = recall(vault, ANN).items
+    assert (item.policy, item.thoughts) == ("", "I do not fly.")
+
+
+def test_feedback_changes_only_that_person(vault: VaultMemory, tmp_path: Path) -> None:
+    vault.remember(trip("Ann", "drive faster"))
+    before = vault.export(ANN), recall(vault, ANN)
+    files = {path: path.read_bytes() for path in (tmp_path / "home").rglob("*.db")}
+    vault.remember(trip("Ben", "drive faster"), Feedback("too slow", speed=1))
+    assert vault.attach_feedback(BEN, Feedback("too close", gap=-1), "t1")
+    vault.forget_last(BEN)
+    vault.erase(BEN)
+    assert (vault.export(ANN), recall(vault, ANN)) == before
+    assert {path: path.read_bytes() for path in files} == files
+
+
+def test_feedback_goes_to_the_last_trip_or_to_the_one_named(vault: VaultMemory) -> None:
+    vault.remember(trip("Ann", "drive faster", id="a"))
+    vault.remember(trip("Ann", "drive faster", id="b"))
+    vault.remember(trip("Ann", "drive faster", id="a"))
+    assert vault.attach_feedback(ANN, Feedback("last"))
+    assert vault.attach_feedback(ANN, Feedback("second"), "b")
+    assert vault.attach_feedback(ANN, Feedback("a again"), "a")
+    assert not vault.attach_feedback(ANN, Feedback("lost"), "c")
+    assert not vault.attach_feedback(BEN, Feedback("lost"))
+    trips = json.loads(vault.export(ANN))["trips"]
+    assert [[one["text"] for one in kept["feedback"]] for kept in trips] == [[], ["second"], ["last", "a again"]]
+
+
+def test_both_sides_of_a_conflict_come_back_with_their_dates(vault: VaultMemory, clock: Clock) -> None:
+    vault.remember(trip("Ann", "drive faster"), Feedback("too fast", speed=-1))
+    clock.pass_by(days=3)
+    vault.remember(trip("Ann", "drive a bit faster"), Feedback("too slow", speed=1))
+    items = recall(vault, ANN).items
+    assert {item.when[:10]: item.feedback[0].speed for item in items} == {"2026-03-01": -1, "2026-03-04": 1}
+
+
+def test_opposite_wishes_are_not_recalled(vault: VaultMemory, wishes: Wishes) -> None:
+    vault.remember(trip("Ann", "Drive slower"))
+    vault.remember(trip("Ann", "Please hurry up"))
+    assert wishes(vault, "Ann", "Can you drive faster?") == ["Please hurry up"]
+
+
+def test_recall_of_nobody_and_of_strangers_writes_nothing(vault: VaultMemory, tmp_path: Path) -> None:
+    for person in (NOBODY, PersonId("  "), ANN):
+        assert recall(vault, person) == History()
+        assert not vault.attach_feedback(person, Feedback("x"))
+        assert vault.forget_last(person) is None
+        assert not vault.erase(person)
+        assert json.loads(vault.export(person))["trips"] == []
+    vault.remember(trip("", "drive faster"))
+    vault.remember(trip(" \t", "drive faster"))
+    assert vault.people() == ()
+    assert not (tmp_path / "home").exists()
+
+
+def test_forget_last_tells_what_it_forgot(vault: VaultMemory, wishes: Wishes) -> None:
+    vault.remember(trip("Ann", "drive faster", id="a"))
+    vault.remember(trip("Ann", "drive a lot faster", id="b"), Feedback("no"))
+    forgotten = vault.forget_last(ANN)
+    assert forgotten is not None
+    assert (forgotten.trip_id, forgotten.feedback) == ("b", (Feedback("no"),))
+    assert wishes(vault, "Ann") == ["drive faster"]
+    vault.forget_last(ANN)
+    assert vault.forget_last(ANN) is None
+    assert vault.people() == (ANN,)
+
+
+def test_erase_leaves_no_file_and_no_trip(vault: VaultMemory, tmp_path: Path) -> None:
+    vault.remember(trip("Ann", "drive faster"))
+    vault.remember(trip("Ben", "drive faster"))
+    assert vault.erase(ANN)
+    assert not vault.erase(ANN)
+    assert vault.people() == (BEN,)
+    assert recall(vault, ANN) == History()
+    assert len(list((tmp_path / "home").rglob("*.key"))) == len(list((tmp_path / "home").rglob("*.db"))) == 1
+    vault.remember(trip("Ann", "hurry up"))
+    assert [item.instruction for item in recall(vault, ANN).items] == ["hurry up"]
+
+
+def test_no_word_is_readable_on_the_disk(vault: VaultMemory, tmp_path: Path) -> None:
+    words = ["Annabelle", "xylophone", "marmalade", "quicksand", "hippopotamus", "zeppelin"]
+    vault.remember(
+        trip(words[0], f"drive {words[1]}", id=words[5], thoughts=words[2], where=words[3]), Feedback(words[4])
+    )
+    vault.attach_feedback(PersonId(words[0]), Feedback(f"more {words[4]}"))
+    for path in (tmp_path / "home").rglob("*"):
+        text = (path.read_bytes() if path.is_file() else b"").lower() + str(path).lower().encode()
+        for word in words:
+            for code in ("utf-8", "utf-16-le", "utf-16-be"):
+                assert word.lower().encode(code) not in text
+
+
+def test_files_are_for_their_owner_alone(vault: VaultMemory, tmp_path: Path) -> None:
+    vault.remember(trip("Ann", "drive faster"))
+    modes = {path.suffix: path.stat().st_mode & 0o777 for path in (tmp_path / "home").rglob("*") if path.is_file()}
+    assert set(modes.values()) == {0o600}
+    assert (tmp_path / "home" / "keys").stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize(
+    "name", ["../../etc/passwd", "/etc/passwd", "a/b", "..", "\x00", "ü" * 400, "CON", "*", "\ud800"]
+)
+def test_any_name_is_only_a_name(vault: VaultMemory, tmp_path: Path, wishes: Wishes, name: str) -> None:
+    vault.remember(trip(name, "drive faster"))
+    assert wishes(vault, name) == ["drive faster"]
+    assert vault.people() == (PersonId(name),)
+    assert {path.parent.name for path in tmp_path.rglob("*") if path.is_file()} == {"profiles", "keys"}
+    assert vault.erase(PersonId(name))
+
+
+def test_the_same_name_in_other_code_points_is_the_same_person(vault: VaultMemory, wishes: Wishes) -> None:
+    vault.remember(trip("Zoe\u0308", "drive faster"))
+    assert wishes(vault, " Zo\u00eb ") == ["drive faster"]
+
+
+def test_retention_hides_at_once_and_deletes_at_the_next_write(tmp_path: Path, clock: Clock, wishes: Wishes) -> None:
+    vault = VaultMemory(tmp_path, clock=clock, retention=timedelta(days=90))
+    vault.remember(trip("Ann", "drive faster"))
+    clock.pass_by(days=89)
+    vault.remember(trip("Ann", "drive much faster"))
+    assert len(wishes(vault, "Ann")) == 2
+    clock.pass_by(days=2)
+    assert wishes(vault, "Ann") == ["drive much faster"]
+    assert len(json.loads(vault.export(ANN))["trips"]) == 2
+    vault.remember(trip("Ann", "hurry up"))
+    assert len(json.loads(vault.export(ANN))["trips"]) == 2
+
+
+def test_a_runaway_text_is_cut(vault: VaultMemory) -> None:
+    vault.remember(trip("Ann", "drive faster", thoughts="x" * (MAX_CHARS + 1), where="y" * MAX_CHARS))
+    (item,) = recall(vault, ANN).items
+    assert len(item.thoughts) == MAX_CHARS
+    assert item.thoughts.endswith("…")
+    assert item.context == "y" * MAX_CHARS
+
+
+def test_the_export_is_json_with_everything(vault: VaultMemory, clock: Clock) -> None:
+    vault.remember(trip("Ann", "drive faster"))
+    clock.pass_by(hours=1)
+    vault.attach_feedback(ANN, interpret_feedback("a bit too fast"))
+    document = json.loads(vault.export(ANN))
+    assert (document["format"], document["person"]) == ("chauffeur-profile-1", "Ann")
+    (kept,) = document["trips"]
+    assert kept["instruction"] == "drive faster"
+    assert kept["feedback"] == [
+        {"when": "2026-03-01T13:00:00.000+00:00", "text": "a bit too fast", "speed": -1, "gap": 0, "comfort": 0,
+         "approval": 0, "strength": 0.35}
+    ]  # fmt: skip
+
+
+def test_two_memories_see_each_other_s_writes(tmp_path: Path, clock: Clock, wishes: Wishes) -> None:
+    one, two = VaultMemory(tmp_path, clock=clock), VaultMemory(tmp_path, clock=clock)
+    one.remember(trip("Ann", "drive faster"))
+    assert wishes(two, "Ann") == ["drive faster"]
+    two.remember(trip("Ann", "hurry up"))
+    assert sorted(wishes(one, "Ann")) == ["drive faster", "hurry up"]
+    one.erase(ANN)
+    assert wishes(two, "Ann") == []
+    one.remember(trip("Ann", "speed up"))
+    assert wishes(two, "Ann") == ["speed up"]
+
+
+def test_indexes_of_many_people_do_not_pile_up(vault: VaultMemory, wishes: Wishes) -> None:
+    for number in range(12):
+        vault.remember(trip(f"p{number}", "drive faster"))
+        assert wishes(vault, f"p{number}") == ["drive faster"]
+    assert len(vault._indexes) == 8
+
+
+def test_vectors_of_another_encoder_are_made_anew(
+    vault: VaultMemory, wishes: Wishes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr("chauffeur.memory.profile.ENCODER", "older-v0")
+        vault.remember(trip("Ann", "drive faster"))
+    assert wishes(vault, "Ann") == ["drive faster"]
+
+
+def test_the_data_directory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("CHAUFFEUR_HOME", str(tmp_path / "own"))
+    assert data_home() == tmp_path / "own"
+    VaultMemory().remember(trip("Ann", "drive faster"))
+    assert (tmp_path / "own" / "profiles").is_dir()
+    monkeypatch.delenv("CHAUFFEUR_HOME")
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "share"))
+    assert data_home() == tmp_path / "share" / "chauffeur"
+    monkeypatch.delenv("XDG_DATA_HOME")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert data_home() == tmp_path / ".local" / "share" / "chauffeur"
+
+
+TEXT = st.text(st.characters(codec=None), max_size=60)
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(name=TEXT.filter(lambda name: name.strip() != ""), text=TEXT, thoughts=TEXT, said=TEXT, trip_id=TEXT)
+def test_any_unicode_goes_there_and_back(
+    tmp_path: Path, name: str, text: str, thoughts: str, said: str, trip_id: str
+) -> None:
+    vault = VaultMemory(tmp_path / "any")
+    vault.erase(PersonId(name))
+    vault.remember(trip(name, text, id=trip_id, thoughts=thoughts), Feedback(said))
+    assert vault.attach_feedback(PersonId(name), Feedback(said * 2), trip_id)
+    (kept,) = json.loads(vault.export(PersonId(name)))["trips"]
+    assert (kept["instruction"], kept["thoughts"]) == (text, thoughts)
+    assert [one["text"] for one in kept["feedback"]] == [said, said * 2]
+    assert PersonId(name) in vault.people()
+    forgotten = vault.forget_last(PersonId(name))
+    assert forgotten is not None
+    assert forgotten.instruction == text
+
+
+def test_importing_memory_brings_no_heavy_library() -> None:
+    code = "import sys, chauffeur.memory; print([m for m in ('torch', 'openai', 'highway_env') if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
