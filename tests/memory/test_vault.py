@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from memory_trips import Clock, context, trip
 
 from chauffeur.concept import (
     NOBODY,
@@ -26,7 +27,6 @@ from chauffeur.concept import (
 from chauffeur.memory import Memory, VaultMemory, interpret_feedback
 from chauffeur.memory.files import data_home
 from chauffeur.memory.records import MAX_CHARS
-from conftest import Clock, context, trip
 
 ANN, BEN = PersonId("Ann"), PersonId("Ben")
 Wishes = Callable[..., list[str]]

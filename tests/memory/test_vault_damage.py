@@ -13,12 +13,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from memory_trips import context, trip
 
 from chauffeur.concept import Feedback, Instruction, PersonId, ProfileError
 from chauffeur.memory import VaultMemory, files, keys, profile
 from chauffeur.memory.cipher import DatabaseError
 from chauffeur.memory.keys import KeyRing
-from conftest import context, trip
 
 ANN, BEN = PersonId("Ann"), PersonId("Ben")
 Wishes = Callable[..., list[str]]
@@ -265,7 +265,7 @@ WRITER = """
 import sys
 sys.path.insert(0, sys.argv[1])
 from pathlib import Path
-from conftest import trip
+from memory_trips import trip
 from chauffeur.memory import VaultMemory
 vault = VaultMemory(Path(sys.argv[2]))
 for number in range(int(sys.argv[5])):

@@ -262,6 +262,7 @@ CONTROL_FLOW = [
 
 TAMPERING = [
     Hostile("tamper/tick_call", frozenset({"harmless"}), _body("__tick__(7, None)\n__tick__('x' * 100, None)")),
+    Hostile("tamper/drive_call", frozenset({"harmless"}), _body("__drive__(7)\n__drive__([[]], 3)\n__drive__()")),
     Hostile("tamper/tick_no_args", frozenset({"harmless"}), _body("__tick__()")),
     Hostile("tamper/tick_flood", frozenset({"harmless"}), _body("while True:\n    __tick__(-1, [[]])")),
     Hostile(

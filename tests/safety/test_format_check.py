@@ -88,6 +88,15 @@ def test_the_language_s_own_gate_is_asked(snap: Snap, plan: Make) -> None:
     assert "fly" in verdict.reason
 
 
+def test_a_program_too_long_to_be_read_is_refused_here(snap: Snap, plan: Make) -> None:
+    from chauffeur.safety.reading import _MAX_CHARS
+
+    body = "def policy():\n    set_target_speed(99)\n    while True:\n        yield autopilot()\n"
+    long = Program(body + "#" * (_MAX_CHARS - len(body) + 1))
+    assert check_parameters(plan(long), snap(), LIMITS).passed
+    assert not judge(plan(long), snap()).passed
+
+
 def test_the_envelope_watches_apis_that_exist() -> None:
     from chauffeur.programs.catalogue import APIS
     from chauffeur.safety.envelope import _TURNS
@@ -139,6 +148,7 @@ def test_reasons_name_the_thing_and_the_value(snap: Snap, plan: Make) -> None:
     assert reason(Parameters(math.nan, 1.0, 1.0)) == ("target_speed_mps of the parameters is nan, not a finite number.")
     assert reason(Trajectory(((0.0, 0.0), (1.0, math.inf)), 0.1)).startswith("waypoint 2 y of the trajectory is inf")
     assert reason(ActionMatrix((1.0, 1.0, 1.0), (1.0, math.nan, 1.0))).startswith("Wh of the action matrix is nan")
+    assert reason(Trajectory(((0.0, 0.0), (1.0,)), 0.1)) == "Waypoint 2 has 1 coordinates."
     assert reason("go") == "The policy is a str, which no executor knows."
     assert reason(Parameters(1.0, 1.0, 1.0, 7)) == "The lane wish is 7."
 

@@ -97,7 +97,7 @@ class Episode:
 
 @dataclass(frozen=True, slots=True)
 class HeldWishes:
-    """A policy without a program: the same wishes throughout. It is the IDM baseline and the fallback."""
+    """A period without a policy: the wishes held last go on."""
 
     wishes: Wishes
     state: ProgramState = "none"
@@ -106,14 +106,10 @@ class HeldWishes:
     calls: tuple[ApiCall, ...] = ()
     error: ChauffeurError | None = None
 
-    def tick(self) -> PolicyTick:
-        """Itself."""
-        return self
-
 
 def run_episode(
     world: World,
-    policy: RunningPolicy,
+    policy: RunningPolicy | None,
     referee: Referee | None,
     *,
     max_s: float,
@@ -125,7 +121,7 @@ def run_episode(
 
     Args:
         world: A world just reset.
-        policy: What states the wishes.
+        policy: What states the wishes; None leaves the world's own driver alone (the IDM baseline).
         referee: Judge of the goal; None drives freely.
         max_s: Bound of the trip in simulated time.
         record: Whether to keep frames (a benchmark does not need them).
@@ -136,7 +132,6 @@ def run_episode(
     frames: list[Frame] = []
     said: list[tuple[float, str]] = []
     failure: ChauffeurError | None = None
-    fallback: Wishes | None = None
     held = driver.initial_wishes()
     idle = 0
     ticks = 0
@@ -144,12 +139,12 @@ def run_episode(
     end = limit
     while ticks < end:
         at_s = ticks * world.dt_s
-        tick = _ask(policy, held) if fallback is None else HeldWishes(fallback, state="failed")
+        tick = _ask(policy, held) if failure is None else HeldWishes(held, state="failed")
         said.extend((at_s, text) for text in tick.said)
-        if tick.error is not None and fallback is None:
+        if tick.error is not None:
             failure = tick.error
-            fallback = _safe(world, tick.wishes)
-            tick = HeldWishes(fallback, state="failed", line=tick.line, said=tick.said, calls=tick.calls)
+            safe = _safe(world, tick.wishes)
+            tick = HeldWishes(safe, state="failed", line=tick.line, said=tick.said, calls=tick.calls)
             end = min(end, ticks + round(FALLBACK_S / world.dt_s))
         wishes = driver.settle(tick.wishes)
         if adjust is not None:
@@ -188,8 +183,10 @@ def run_episode(
     )
 
 
-def _ask(policy: RunningPolicy, held: Wishes) -> PolicyTick:
+def _ask(policy: RunningPolicy | None, held: Wishes) -> PolicyTick:
     """The policy's tick; a broken sandbox is a failed tick with the wishes held, never an exception at the wheel."""
+    if policy is None:
+        return HeldWishes(held)
     try:
         return policy.tick()
     except SandboxError as error:

@@ -57,12 +57,17 @@ def _stamp(time_s: float) -> dict[str, int]:
 
 
 def _point(x_m: float, y_m: float, z_m: float) -> dict[str, float]:
-    return {"x": round(x_m, 2), "y": round(-y_m, 2), "z": z_m}
+    return {"x": _round(x_m, 2), "y": _round(-y_m, 2), "z": z_m}
 
 
 def _rotation(heading_rad: float) -> dict[str, float]:
-    half = -heading_rad / 2.0
+    half = -_round(heading_rad, 4) / 2.0
     return {"x": 0.0, "y": 0.0, "z": round(math.sin(half), 4), "w": round(math.cos(half), 4)}
+
+
+def _round(value: float, digits: int) -> float:
+    """Rounded; what is not a number (a failed simulation) is drawn at the origin, the lossless channels keep it."""
+    return round(value, digits) if math.isfinite(value) else 0.0
 
 
 def _entity(name: str, stamp: dict[str, int], **primitives: list[dict[str, Any]]) -> dict[str, Any]:
@@ -91,7 +96,7 @@ def _cube(body: VehicleState, color: dict[str, float]) -> dict[str, Any]:
             "position": _point(body.x_m, body.y_m, _HEIGHT_M / 2.0),
             "orientation": _rotation(body.heading_rad),
         },
-        "size": {"x": round(body.length_m, 2), "y": round(body.width_m, 2), "z": _HEIGHT_M},
+        "size": {"x": _round(body.length_m, 2), "y": _round(body.width_m, 2), "z": _HEIGHT_M},
         "color": color,
     }
 

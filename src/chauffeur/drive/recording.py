@@ -10,6 +10,7 @@ Values typed `Any` in the nouns (provenance, scenario mappings) are JSON values:
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import math
 import secrets
@@ -21,7 +22,7 @@ from typing import Any, cast
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from chauffeur.concept import (
     DataError,
@@ -41,6 +42,19 @@ FORMAT = 1
 _PROFILE = "chauffeur"
 _METADATA = "chauffeur.recording"
 _CHUNK_BYTES = 4 << 20
+_MAX_BYTES = 1 << 30
+
+_UNREADABLE = (
+    McapError,
+    ArithmeticError,
+    LookupError,
+    MemoryError,
+    RecursionError,
+    TypeError,
+    ValueError,
+    struct.error,
+)
+"""What the MCAP, JSON and value readers raise on damaged bytes."""
 
 _system = TypeAdapter(SystemMessage)
 _scenario = TypeAdapter(Scenario)
@@ -139,15 +153,10 @@ def read_trip(path: Path) -> RecordedTrip:
         DataError: The file is missing, damaged, not a recorded trip, or of a newer format.
     """
     try:
-        with path.open("rb") as stream:
-            return _read(path, stream)
+        return _read(path, _content(path))
     except DataError:
         raise
-    except FileNotFoundError as error:
-        raise DataError(f"There is no recording at {path}.", hint="Check the path.") from error
-    except OSError as error:
-        raise DataError(f"{path} cannot be read: {error.strerror or error}.") from error
-    except (McapError, ValidationError, ValueError, KeyError, TypeError, struct.error, RecursionError) as error:
+    except _UNREADABLE as error:
         raise _damaged(path, _first_line(error)) from error
     except Exception as error:
         # The decompressors raise their own types, and import nothing common to catch them by.
@@ -181,9 +190,6 @@ def compare_trips(first: RecordedTrip, second: RecordedTrip) -> Difference | Non
     return None
 
 
-# --- writing ---------------------------------------------------------------------------------------------------------
-
-
 def _write(
     writer: Writer,
     trip: Trip,
@@ -202,7 +208,7 @@ def _write(
         data = json.dumps(payload, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
         writer.add_message(ids[channel.topic], log_time, data, log_time, sequence)
 
-    whole = _trip.dump_python(trip, mode="json")
+    whole = _trip.dump_python(trip)
     put(channels.INSTRUCTION, _storable(whole["instruction"]))
     put(channels.CONTEXT, _storable(whole["context"]))
     if system is not None:
@@ -210,7 +216,7 @@ def _write(
     put(channels.HISTORY, _storable(whole["history"]))
     put(channels.PLAN, _storable(whole["plan"]))
     put(channels.VERDICTS, {"verdicts": whole["verdicts"]})
-    put(channels.SCENARIO, _scenario.dump_python(scenario, mode="json"))
+    put(channels.SCENARIO, _scenario.dump_python(scenario))
     put(channels.TRIP, _storable({key: value for key, value in whole.items() if key not in _OWN_CHANNEL}))
 
     snapshots = [frame.snapshot for frame in frames] + ([final] if final is not None else [])
@@ -253,10 +259,7 @@ def _storable(value: Any) -> Any:
     return value
 
 
-# --- reading ---------------------------------------------------------------------------------------------------------
-
-
-def _read(path: Path, stream: Any) -> RecordedTrip:
+def _read(path: Path, stream: io.BytesIO) -> RecordedTrip:
     reader = make_reader(stream, validate_crcs=True)
     if reader.get_header().profile != _PROFILE:
         raise DataError(
@@ -310,6 +313,18 @@ def _read(path: Path, stream: Any) -> RecordedTrip:
     )
 
 
+def _content(path: Path) -> io.BytesIO:
+    """The whole file: a damaged length field then meets the end of the data, not a gigantic allocation."""
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise _damaged(path, f"it is larger than {_MAX_BYTES} bytes")
+        return io.BytesIO(path.read_bytes())
+    except FileNotFoundError as error:
+        raise DataError(f"There is no recording at {path}.", hint="Check the path.") from error
+    except OSError as error:
+        raise DataError(f"{path} cannot be read: {error.strerror or error}.") from error
+
+
 def _read_snapshots(messages: dict[str, list[tuple[int, Any]]]) -> list[Snapshot]:
     roads = {index: _lanes.validate_python(road["lanes"]) for index, road in messages[channels.LANES.topic]}
     lanes: tuple[LaneView, ...] = ()
@@ -354,15 +369,12 @@ def _first_line(error: Exception) -> str:
     return text[0].rstrip(".") if text else type(error).__name__
 
 
-# --- comparing -------------------------------------------------------------------------------------------------------
-
-
 def _difference(one: Any, other: Any, path: str = "") -> tuple[str, str, str] | None:
-    """(path, first, second) of the first unequal value; floats are compared by their bits."""
+    """(path, first, second) of the first unequal value; floats are compared exactly, and NaN equals NaN."""
     if one is other:
         return None
     if isinstance(one, float) and isinstance(other, float):
-        return None if struct.pack("d", one) == struct.pack("d", other) else (path, repr(one), repr(other))
+        return None if one.hex() == other.hex() else (path, repr(one), repr(other))
     if type(one) is not type(other):
         # A whole number read from JSON is an int; where the nouns say float it is the same value.
         numbers = {type(one), type(other)} == {int, float}

@@ -31,12 +31,13 @@ from chauffeur.concept import (
 )
 from chauffeur.concept.registry import load_plugin
 from chauffeur.describe import describe
-from chauffeur.drive.episode import Episode, HeldWishes, Referee, run_episode
+from chauffeur.drive.episode import Episode, Referee, run_episode
 from chauffeur.drive.loop import Memory, Stages, drive
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import build_system_message
 from chauffeur.programs import ProgramExecutor
+from chauffeur.programs.sandbox import UNHURRIED
 from chauffeur.safety import run_checks
 from chauffeur.worlds.base import World
 
@@ -167,15 +168,18 @@ def drive_program(
     *,
     record: bool = True,
 ) -> Episode:
-    """Run a checked program on a world just reset."""
-    with ProgramExecutor() as executor:
+    """Run a checked program on a world just reset.
+
+    Simulated time waits for the program, so its budgets are wide: how busy the machine is must not change a trip.
+    """
+    with ProgramExecutor(budget=UNHURRIED) as executor:
         executor.start(source, world)
         return run_episode(world, executor, referee, max_s=max_s, record=record, watch=watch)
 
 
 def drive_without_program(world: World, referee: Referee | None, max_s: float, **options: Any) -> Episode:
     """Let the world's own driver keep its initial wishes: the IDM baseline."""
-    return run_episode(world, HeldWishes(world.driver().initial_wishes()), referee, max_s=max_s, **options)
+    return run_episode(world, None, referee, max_s=max_s, **options)
 
 
 def unusable(plan: Plan, verdicts: tuple[Verdict, ...]) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import math
-import secrets
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from chauffeur.concept import DataError, Snapshot, VehicleState
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import Event, EventKind, events_of
+from chauffeur.hmi.files import publish
 from chauffeur.hmi.road import Box, Road, draw_road, track_box
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 
@@ -77,17 +77,7 @@ def write_filmstrip(path: Path, recorded: RecordedTrip, frames: int = 6) -> Path
     image = render_filmstrip(recorded, frames)
     buffer = io.BytesIO()
     image.save(buffer, "PNG", optimize=True)
-    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_bytes(buffer.getvalue())
-        partial.replace(path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise DataError(
-            f"The filmstrip cannot be written to {path}: {error.strerror or error}.", hint="Choose another folder."
-        ) from error
-    return path
+    return publish(path, buffer.getvalue(), "filmstrip")
 
 
 def render_filmstrip(recorded: RecordedTrip, frames: int = 6) -> Image.Image:

@@ -12,14 +12,13 @@ import hashlib
 import html
 import json
 import re
-import secrets
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from chauffeur.concept import DataError
 from chauffeur.drive.recording import RecordedTrip
+from chauffeur.hmi.files import publish
 from chauffeur.hmi.payload import page_payload
 
 _STYLES = ("trip.css", "panels.css")
@@ -37,18 +36,7 @@ def write_page(path: Path, recorded: RecordedTrip) -> Path:
     Raises:
         DataError: The file cannot be written.
     """
-    text = render_page(recorded)
-    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise DataError(
-            f"The page cannot be written to {path}: {error.strerror or error}.", hint="Choose another folder."
-        ) from error
-    return path
+    return publish(path, render_page(recorded).encode(), "page")
 
 
 def render_page(recorded: RecordedTrip) -> str:

@@ -59,14 +59,13 @@ class KeyRing:
         except OSError as error:
             raise _bad(self.path(alias), f"cannot be read ({error.strerror})") from error
         # Opening a seal is slow on purpose; the file itself tells whether the key is still the one opened before.
-        seen, key = self._opened.get(alias, (b"", b""))
-        if seen != text:
+        if alias not in self._opened or self._opened[alias][0] != text:
             key, sealed = self._unpack(text, self.path(alias))
             if self._passphrase is not None and not sealed:
                 text = self._pack(key)
                 publish(self.path(alias), text)
             self._opened[alias] = (text, key)
-        return key
+        return self._opened[alias][1]
 
     def find_or_make(self, alias: str) -> bytes:
         """A person's key, made now if there is none; it is on disk on return.

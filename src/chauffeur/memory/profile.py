@@ -158,15 +158,11 @@ class Profile:
 
     @contextmanager
     def _writing(self) -> Generator[None]:
+        """One transaction. An error leaves it open, and closing the file then undoes it."""
         self._connection.execute("BEGIN IMMEDIATE")
-        try:
-            yield
-            self._connection.execute("UPDATE about SET value = CAST(value AS INTEGER) + 1 WHERE name = 'writes'")
-            self._connection.execute("COMMIT")
-        except BaseException:
-            if self._connection.in_transaction:
-                self._connection.execute("ROLLBACK")
-            raise
+        yield
+        self._connection.execute("UPDATE about SET value = CAST(value AS INTEGER) + 1 WHERE name = 'writes'")
+        self._connection.execute("COMMIT")
 
     def _all(self, query: str, *values: Any) -> list[Any]:
         return self._connection.execute(query, values).fetchall()

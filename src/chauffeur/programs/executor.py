@@ -16,11 +16,12 @@ from chauffeur.programs.errors import (
     ProgramRefusedError,
 )
 from chauffeur.programs.gate import check_source
-from chauffeur.programs.rewrite import TICK, prepare
+from chauffeur.programs.rewrite import DRIVE, TICK, prepare
 from chauffeur.programs.sandbox import Budget, Sandbox, SandboxRun
 from chauffeur.worlds.base import World
 
 _FORMAT: Final = "chauffeur-program-1"
+_PERIOD_ENDS: Final = frozenset({TICK, DRIVE})
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +91,11 @@ class ProgramExecutor:
         """State of the program."""
         return self._state
 
+    @property
+    def worker_pid(self) -> int | None:
+        """Process id of the program's worker, for diagnostics; None when no program runs."""
+        return None if self._run is None else self._run.worker_pid
+
     def start(self, source: str, world: World, *, wishes: Wishes | None = None) -> ProgramState:
         """Read a program; its main function starts with the first tick.
 
@@ -140,7 +146,7 @@ class ProgramExecutor:
     def _advance(self, run: SandboxRun, apis: DrivingApis) -> None:
         run.begin_tick()
         call = run.answer(None)
-        while call is not None and call.name != TICK:
+        while call is not None and call.name not in _PERIOD_ENDS:
             try:
                 value: Any = apis.call(call.name, call.arguments, call.keywords)
             except BadArgumentTypeError as error:
@@ -153,6 +159,8 @@ class ProgramExecutor:
             self._end_run()
             self._state, self._line = "finished", None
             return
+        if call.name == DRIVE:
+            apis.call("autopilot", (), {})
         line = call.arguments[0] if call.arguments else None
         self._line = line if isinstance(line, int) and line > 0 else None
 

@@ -18,6 +18,8 @@ from chauffeur.programs.lazy import lazy_findings
 from chauffeur.programs.loops import loop_findings
 from chauffeur.programs.lower import SEARCHES
 from chauffeur.programs.rewrite import (
+    binds,
+    bound_names,
     generator_names,
     is_generator,
     main_function,
@@ -130,8 +132,8 @@ class _Gate:
     def __init__(self, tree: ast.Module, helpers: ast.Module) -> None:
         self._tree = tree
         self._findings: list[Finding] = []
-        self._bound = _bound_names(tree)
-        self._known = self._bound | _bound_names(helpers) | APIS.keys() | BUILTINS
+        self._bound = bound_names(tree)
+        self._known = self._bound | bound_names(helpers) | APIS.keys() | BUILTINS
         self._math = {"math"} | _aliases_of_math(tree)
         self._generators = generator_names(tree) | generator_names(helpers)
         self._calls = CallChecks(tree, self._bound)
@@ -191,8 +193,6 @@ class _Gate:
             return ""
         if name in {"open", "exec", "eval", "compile", "input", "globals", "locals", "getattr", "setattr", "vars"}:
             return "programs cannot reach files, the interpreter or other objects; use only the driving APIs"
-        if name in {"time", "sleep"}:
-            return "wait with `yield autopilot()`; each one lasts 0.1 s"
         if name == "math":
             return "write `import math` first"
         return did_you_mean(name, self._known)
@@ -257,7 +257,7 @@ class _Gate:
 
     def _check_bindings(self) -> None:
         for node in ast.walk(self._tree):
-            for name in _binds(node):
+            for name in binds(node):
                 if name.startswith("__"):
                     self._add(node, "reserved", f"the name {name[:40]} is reserved", "use another name")
                 elif name in APIS:
@@ -306,26 +306,6 @@ class _Gate:
                 isinstance(inner, ast.Yield | ast.YieldFrom) for inner in ast.walk(node)
             ):
                 self._add(node, "not-allowed", "a yield cannot stand inside an f-string", "assign it to a name first")
-
-
-def _binds(node: ast.AST) -> list[str]:
-    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store | ast.Del):
-        return [node.id]
-    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-        return [node.name]
-    if isinstance(node, ast.arg):
-        return [node.arg]
-    if isinstance(node, ast.ExceptHandler) and node.name:
-        return [node.name]
-    if isinstance(node, ast.alias):
-        return [node.asname or node.name.partition(".")[0]]
-    if isinstance(node, ast.Global | ast.Nonlocal):
-        return list(node.names)
-    return []
-
-
-def _bound_names(tree: ast.Module) -> frozenset[str]:
-    return frozenset(name for node in ast.walk(tree) for name in _binds(node))
 
 
 def _aliases_of_math(tree: ast.Module) -> set[str]:

@@ -2,7 +2,8 @@
 
 The sandbox evaluates a generator expression at once, and its built-in functions cannot call back to the host. So
 `any(...)`, `all(...)` and `next(...)` over a generator expression become calls of `__find__` with a lambda,
-`X.sort(key=K)` becomes `__sort__(X, key=K)`, and `sorted`, `min`, `max`, `map` and `filter` get a Python body: `PRELUDE`.
+`X.sort(key=K)` becomes `__sort__(X, key=K)`, and `sorted`, `min`, `max`, `map` and `filter` get a Python body
+(`PRELUDE`).
 """
 
 from __future__ import annotations

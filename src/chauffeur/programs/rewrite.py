@@ -1,8 +1,9 @@
 """Makes a generator program runnable where there are no generators, and tells the host where it stands.
 
-`yield E` becomes `__tick__(line, (E))`, a call that the host answers one control period later; `yield from f(...)`
-becomes `f(...)`, since the helper's own yields reach the host by themselves. Only those few characters change, and what
-`lower` does: every statement keeps its line, so the sandbox's tracebacks name the lines the model wrote.
+`yield E` becomes `__tick__(line, (E))`, a call that the host answers one control period later; `yield autopilot()`, the
+commonest, becomes `__drive__(line)`, which is both calls in one; `yield from f(...)` becomes `f(...)`, since the
+helper's own yields reach the host by themselves. Only those few characters change, and what `lower` does: every
+statement keeps its line, so the sandbox's tracebacks name the lines the model wrote.
 """
 
 from __future__ import annotations
@@ -20,13 +21,15 @@ from chauffeur.programs.lower import PRELUDE, Lowering, apply_edits, needs_prelu
 TICK: Final = "__tick__"
 """The host call that a yield turns into."""
 
+DRIVE: Final = "__drive__"
+"""The host call that `yield autopilot()` turns into: `autopilot()`, then the yield."""
+
 MAX_SOURCE_CHARS: Final = 20_000
 MAX_NODES: Final = 5_000
 MAX_DEPTH: Final = 40
 
 _SITE: Final = "__site__"
 _YIELD_FROM: Final = re.compile(rb"yield(?:\s|\\\n|#[^\n]*\n)+from")
-_LIBRARY_TICK: Final = f"{TICK}({_SITE}[0], ("
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +125,28 @@ def main_function(tree: ast.Module) -> ast.FunctionDef | None:
     return None
 
 
+def binds(node: ast.AST) -> list[str]:
+    """Names that a node itself binds."""
+    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store | ast.Del):
+        return [node.id]
+    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+        return [node.name]
+    if isinstance(node, ast.arg):
+        return [node.arg]
+    if isinstance(node, ast.ExceptHandler) and node.name:
+        return [node.name]
+    if isinstance(node, ast.alias):
+        return [node.asname or node.name.partition(".")[0]]
+    if isinstance(node, ast.Global | ast.Nonlocal):
+        return list(node.names)
+    return []
+
+
+def bound_names(tree: ast.Module) -> frozenset[str]:
+    """Names that a text binds, at any depth."""
+    return frozenset(name for node in ast.walk(tree) for name in binds(node))
+
+
 def generator_names(tree: ast.Module) -> frozenset[str]:
     """Names of all generator functions a text defines, at any depth."""
     return frozenset(n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef) and is_generator(n))
@@ -159,14 +184,19 @@ def _rewrite(source: str, tree: ast.Module, library_generators: frozenset[str], 
     text = source.encode()
     lowering = Lowering(text, tree)
     edits = lowering.edits()
+    redefined = "autopilot" in bound_names(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr) and any(isinstance(n, ast.Yield | ast.YieldFrom) for n in ast.walk(node)):
             raise ProgramSyntaxError("A yield cannot stand inside an f-string.", line=node.lineno)
         if isinstance(node, ast.Yield):
             start, end = lowering.span(node)
-            tick = _LIBRARY_TICK if in_library else f"{TICK}({node.lineno}, ("
-            value = "" if node.value is not None else "None"
-            edits += [(start, start + len(b"yield"), (tick + value).encode()), (end, end, b"))")]
+            line = f"{_SITE}[0]" if in_library else f"{node.lineno}"
+            if node.value is not None and not redefined and _is_autopilot(node.value):
+                breaks = "\n" * text.count(b"\n", start, end)
+                edits.append((start, end, f"{DRIVE}({line}{breaks})".encode()))
+            else:
+                value = "" if node.value is not None else "None"
+                edits += [(start, start + len(b"yield"), f"{TICK}({line}, ({value}".encode()), (end, end, b"))")]
         elif isinstance(node, ast.YieldFrom):
             start, end = lowering.span(node)
             keyword = _YIELD_FROM.match(text, start)
@@ -177,6 +207,10 @@ def _rewrite(source: str, tree: ast.Module, library_generators: frozenset[str], 
                 opening, closing = f"({_SITE}.update({{0: {node.lineno}}}), (", "))[1]"
             edits += [(start, keyword.end(), opening.encode()), (end, end, closing.encode())]
     return apply_edits(text, edits).decode()
+
+
+def _is_autopilot(node: ast.expr) -> bool:
+    return _called_name(node) == "autopilot" and isinstance(node, ast.Call) and not node.args and not node.keywords
 
 
 def _called_name(node: ast.expr) -> str | None:

@@ -20,7 +20,7 @@ import pydantic_monty as monty
 from chauffeur.concept import SandboxError
 from chauffeur.programs.errors import ProgramCallsError, ProgramRaisedError, ProgramTimeError
 from chauffeur.programs.faults import MAX_MESSAGE_CHARS, fault_of
-from chauffeur.programs.rewrite import TICK, Prepared
+from chauffeur.programs.rewrite import DRIVE, TICK, Prepared
 from chauffeur.programs.workers import confine, on_core, present_core
 
 _EPOCH: Final = datetime.datetime(2000, 1, 1, tzinfo=datetime.UTC)
@@ -53,7 +53,7 @@ UNHURRIED: Final = Budget(turn_s=1.0, tick_s=2.0, grace_s=1.0, start_s=5.0)
 """For simulated time, which waits for the program: how busy the machine is must not change what a program does."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class HostCall:
     """A program waiting for its host's answer. `arguments` and `keywords` are untrusted values of any type and size."""
 
@@ -66,8 +66,8 @@ class Sandbox:
     """A warm pool of worker processes. One per process that runs programs; use it as a context manager or close it.
 
     A program and its host take turns and never run at once, so they are fastest on one core: with `pin`, workers stay
-    on the core that opened the pool (a call takes a third of the time, measured by benchmarks/program_tick.py). Pin
-    the policy process itself to that core where latency matters.
+    on the core that opened the pool. Where latency matters, keep the process that runs programs on that core as well
+    (`os.sched_setaffinity` before the sandbox is opened): benchmarks/program_tick.py shows what it is worth.
     """
 
     def __init__(
@@ -212,7 +212,7 @@ class SandboxRun:
 
     def load(self, prepared: Prepared, names: Iterable[str]) -> None:
         """Read helpers and program, and run to the first tick. Raises ProgramFaultError."""
-        self._names = frozenset((TICK, *names))
+        self._names = frozenset((TICK, DRIVE, *names))
         self._calls = 0
         self._deadline = self._clock() + self._budget.start_s
         inputs = {name: _host_function(name) for name in sorted(self._names)}

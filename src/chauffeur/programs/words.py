@@ -75,7 +75,19 @@ ALLOWED_NODES: Final[tuple[type[ast.AST], ...]] = (
 )  # fmt: skip
 
 
+_INVENTED: Final = (
+    (("change_lane", "lane_change", "switch_lane"), "ask is_safe_enter(lane), then set_target_lane(lane)"),
+    (("accelerat", "decelerat", "brake", "slow", "speed_up"), "use set_target_speed(speed in m/s)"),
+    (("sleep", "wait"), "wait with `yield autopilot()`; each one lasts 0.1 s"),
+    (("stop", "pull_over", "halt"), "use set_target_speed(0) and yield autopilot()"),
+)
+"""Parts of names that models invent, and what there is instead."""
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """A remedy for an unknown name: the nearest known one, or nothing to offer."""
-    near = difflib.get_close_matches(name[:60], list(known), n=1, cutoff=0.6)
+    for parts, remedy in _INVENTED:
+        if any(part in name.lower() for part in parts):
+            return remedy
+    near = difflib.get_close_matches(name[:60], list(known), n=1, cutoff=0.7)
     return f"did you mean {near[0]}?" if near else "use only the driving APIs, your own functions and Python's basics"

@@ -43,6 +43,8 @@ def confine(pid: int, core: int | None) -> None:
         resource.prlimit(pid, resource.RLIMIT_CORE, (0, 0))
         resource.prlimit(pid, resource.RLIMIT_NOFILE, (_OPEN_FILES, _OPEN_FILES))
         resource.prlimit(pid, resource.RLIMIT_AS, (_ADDRESS_SPACE_BYTES, _ADDRESS_SPACE_BYTES))
-        if core is not None:
-            for thread in Path(f"/proc/{pid}/task").iterdir():
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            # Never real time, even if the host is: a spinning program must not keep its own watchdog from running.
+            os.sched_setscheduler(int(thread.name), os.SCHED_OTHER, os.sched_param(0))
+            if core is not None:
                 os.sched_setaffinity(int(thread.name), {core})

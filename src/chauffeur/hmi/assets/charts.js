@@ -1,4 +1,5 @@
 /* Speed and gap over the same time axis as the time line. */
+const FAR_M = 120;
 const SVG = 'http://www.w3.org/2000/svg';
 
 function svg(tag, attributes, text) {
@@ -95,8 +96,9 @@ function makeCharts(total, onSeek) {
   const top = Math.max(...known);
   const low = Math.max(0, Math.floor(Math.min(...known) - Math.max(1, top * 0.05)));
   const limits = drive.limit.some((v) => v !== null);
+  const gaps = drive.gap.filter((v) => v !== null && v <= FAR_M);
   const charts = [makeChart({
-    element: $('speed-chart'), legend: $('speed-legend'), unit: 'm/s', total, onSeek,
+    element: $('speed-chart'), legend: $('speed-legend'), unit: 'm/s', total, onSeek, timeAxis: !gaps.length,
     right: { unit: 'km/h', of: (v) => (v * 3.6).toFixed(0) },
     low, high: Math.ceil(top + Math.max(1, top * 0.04)),
     series: [
@@ -105,12 +107,11 @@ function makeCharts(total, onSeek) {
       ...(limits ? [{ name: 'Speed limit', className: 'c-limit', values: drive.limit }] : []),
     ],
   })];
-  const gaps = drive.gap.filter((v) => v !== null);
   if (gaps.length) {
     $('gap-chart').classList.add('low');
     charts.push(makeChart({
       element: $('gap-chart'), legend: $('gap-legend'), unit: 'm', total, onSeek, timeAxis: true,
-      low: 0, high: Math.min(120, Math.ceil(Math.max(...gaps) / 10) * 10),
+      low: 0, high: Math.ceil(Math.max(...gaps) / 10) * 10,
       series: [{ name: 'Gap to the vehicle ahead, centre to centre', className: 'c-gap', values: drive.gap, broken: drive.lead }],
     }));
   } else {

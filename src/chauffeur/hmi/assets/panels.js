@@ -65,7 +65,7 @@ function fillProgram() {
 }
 
 function fillVerdicts() {
-  if (!trip.verdicts.length) $('verdicts').append(make('li', 'No check was run.'));
+  if (!trip.verdicts.length) $('verdicts').append(make('li', 'No check was run.', 'none'));
   for (const verdict of trip.verdicts) {
     const item = make('li', null, verdict.passed ? 'pass' : 'fail');
     const icon = make('b', verdict.passed ? '✓' : '✕');

@@ -188,5 +188,5 @@ if (drive) {
   $('calls').hidden = true;
   $('calls-title').hidden = true;
   $('empty').hidden = false;
-  $('empty').textContent = `Nothing was driven. ${trip.refusal}`;
+  $('empty').textContent = `Nothing was driven. ${trip.refusal || trip.outcome.causes.join(' ')}`;
 }

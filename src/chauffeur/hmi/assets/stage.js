@@ -1,4 +1,7 @@
 /* The road from above. World metres, y down the screen (to the right of +x), scaled by `view.scale` px/m. */
+const CAPTION_PX = 66;
+const POSTS_PX = 46;
+
 function makeStage() {
   const canvas = $('road');
   const ctx = canvas.getContext('2d');
@@ -21,13 +24,15 @@ function makeStage() {
     if (camera.along) {
       const metres = Math.min(170, Math.max(90, view.width / 7.5));
       view.scale = view.width / metres;
-      view.height = Math.min(520, Math.max(200, (boxY1 - boxY0 + 12) * view.scale));
+      // Room for the caption above the road and for the distance posts below it.
+      view.height = (boxY1 - boxY0) * view.scale + CAPTION_PX + POSTS_PX;
+      view.y = boxY0 + (view.height / 2 - CAPTION_PX) / view.scale;
     } else {
       view.height = Math.min(640, Math.max(360, view.width * 0.62));
       view.scale = Math.min(view.width / (boxX1 - boxX0), view.height / (boxY1 - boxY0));
       view.x = (boxX0 + boxX1) / 2;
+      view.y = (boxY0 + boxY1) / 2;
     }
-    view.y = (boxY0 + boxY1) / 2;
     const ratio = window.devicePixelRatio || 1;
     canvas.width = Math.round(view.width * ratio);
     canvas.height = Math.round(view.height * ratio);
@@ -147,10 +152,11 @@ function makeStage() {
     ctx.fillText(words, x, y);
   }
 
+  /* Words on a plate that begins at x, or as far left of it as it must to be seen whole. */
   function label(words, x, y) {
     ctx.font = `600 12px ${colour.sans}`;
     const width = ctx.measureText(words).width + 14;
-    const left = Math.min(Math.max(x - width / 2, 4), view.width - width - 4);
+    const left = Math.min(Math.max(x, 4), view.width - width - 4);
     ctx.fillStyle = colour['label-back'];
     ctx.beginPath();
     ctx.roundRect(left, y - 10, width, 20, 6);
@@ -233,15 +239,10 @@ function makeStage() {
     ctx.stroke();
     ctx.setLineDash([]);
     return () => {
-      const away = sx(there.x) - sx(ego.x);
-      const words = `${drive.gap[index].toFixed(0)} m`;
-      if (camera.along && sx(there.x) > view.width) {
-        label(`${words} →`, view.width, sy(there.y));
-        return;
-      }
-      if (camera.along && away > 150) label(words, sx(ego.x) + away / 2, (sy(ego.y) + sy(there.y)) / 2);
-      const above = sy(there.y) - (1 + 0.4) * view.scale - 13;
-      label(`${there.v.toFixed(0)} m/s (${(there.v * 3.6).toFixed(0)} km/h)`, sx(there.x), above);
+      const words = `${drive.gap[index].toFixed(0)} m · ${there.v.toFixed(0)} m/s (${(there.v * 3.6).toFixed(0)} km/h)`;
+      const front = sx(there.x) + (car.l / 2) * view.scale + 8;
+      if (front < view.width) label(words, front, sy(there.y));
+      else label(`${words} →`, view.width, sy(there.y));
     };
   }
 

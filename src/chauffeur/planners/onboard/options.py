@@ -1,0 +1,164 @@
+"""What a choice has to go by, and what comes out of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from chauffeur.concept import Limits, Situation
+from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH, kmh, mph
+from chauffeur.planners.onboard.exemplars import Filled
+from chauffeur.planners.onboard.exemplars.library import number
+from chauffeur.planners.onboard.meaning import Amount
+from chauffeur.planners.onboard.personal import Leaning
+
+USUAL_HEADWAY_S = 1.5
+"""Time headway the car keeps when nobody asked for another."""
+
+API_MAX_HEADWAY_S = 2.0
+"""Largest time headway the driving APIs keep."""
+
+SAFE_HEADWAY_S = 0.8
+"""Smallest headway the planner chooses by itself while it follows, however low the limits are."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """A step settled.
+
+    Attributes:
+        filled: Exemplar with its numbers.
+        intent: Tag, e.g. `speed.set`.
+        does: What the program does, as a clause after "I": "slow down to 20.0 m/s and hold it".
+        assumed: What was taken for granted, full sentences.
+        settings: Numbers the program relies on.
+        lanes_moved: Lanes to the right (negative: left) that the step ends from where it began.
+    """
+
+    filled: Filled
+    intent: str
+    does: str
+    assumed: tuple[str, ...] = ()
+    settings: tuple[tuple[str, float], ...] = ()
+    lanes_moved: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Declined:
+    """Why not, for the person."""
+
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Situation, limits and leaning, with the numbers that follow from them.
+
+    Attributes:
+        situation: Where we are, moved on by earlier steps of the same wish.
+        limits: Bounds for the planner's own choices.
+        leaning: What the person's history says.
+        front_known: False once an earlier step has changed the lane: who is ahead then shows while driving.
+    """
+
+    situation: Situation
+    limits: Limits
+    leaning: Leaning = field(default_factory=Leaning)
+    front_known: bool = True
+
+    def with_leaning(self, leaning: Leaning) -> Options:
+        """The same with another leaning."""
+        return replace(self, leaning=leaning)
+
+    def after(self, step: Chosen) -> Options:
+        """The situation as it will be when a step is done."""
+        speed = dict(step.settings).get("target_speed_mps", self.speed)
+        stays = step.lanes_moved == 0 and not step.intent.startswith(("overtake", "turn"))
+        situation = replace(
+            self.situation,
+            lane_index=self.situation.lane_index + step.lanes_moved,
+            speed_mps=self.speed if step.intent.startswith("overtake") else speed,
+            front=self.situation.front if stays else None,
+            turns=() if step.intent.startswith("turn") else self.situation.turns,
+        )
+        return replace(self, situation=situation, front_known=self.front_known and stays)
+
+    @property
+    def speed(self) -> float:
+        """Speed now, m/s."""
+        return self.situation.speed_mps
+
+    @property
+    def sign_mps(self) -> float:
+        """Speed limit of the lane, m/s."""
+        return self.situation.speed_limit_mps
+
+    @property
+    def cap_mps(self) -> float:
+        """Speed the limits allow, m/s."""
+        allowed = self.sign_mps + self.limits.max_over_limit_mps
+        return allowed if self.limits.max_speed_mps is None else min(allowed, self.limits.max_speed_mps)
+
+    @property
+    def own_cap_mps(self) -> float:
+        """Highest speed the planner chooses by itself: the sign, or the person's own cap below it."""
+        return min(self.sign_mps, self.cap_mps)
+
+    @property
+    def last_lane(self) -> int:
+        """Index of the rightmost lane that is no emergency lane."""
+        return self.situation.lane_count - (2 if self.situation.emergency_lane else 1)
+
+    def headway(self, wanted_s: float) -> float:
+        """A headway of the planner's own choice, s, inside the limits."""
+        low = max(self.limits.min_time_headway_s, 0.01)
+        return max(low, min(wanted_s, self.limits.max_time_headway_s))
+
+    def helpers(self, manner: str) -> dict[str, float]:
+        """Numbers that helper functions of the exemplars use."""
+        rate = {"gentle": 2.0, "swift": 5.0}.get(manner, 3.5)
+        if self.leaning.gentle:
+            rate = min(rate, 2.0)
+        return {
+            "headway_s": self.headway(0.01),
+            "follow_s": self.headway(1.0),
+            "rest_headway_s": self.headway(USUAL_HEADWAY_S),
+            "headway_lane_s": self.headway(0.5),
+            "speed_cap_mps": self.cap_mps,
+            "rate_mps2": rate,
+        }
+
+    def filled(self, exemplar: str, manner: str, **numbers: float) -> Filled:
+        """An exemplar with its own numbers and those of the helpers."""
+        values: Mapping[str, float] = {**self.helpers(manner), **numbers}
+        return Filled(exemplar, values)
+
+
+def speed_words(speed_mps: float) -> str:
+    """A speed for people, e.g. `25.0 m/s (56 mph, 90 km/h)`."""
+    return f"{number(speed_mps)} m/s ({mph(speed_mps):.0f} mph, {kmh(speed_mps):.0f} km/h)"
+
+
+def speed_of(amount: Amount, options: Options) -> tuple[float, tuple[str, ...]]:
+    """Speed or speed difference of an amount, m/s, with what had to be assumed about its unit."""
+    if amount.dimension != "bare":
+        return amount.value, ()
+    unit, factor = _unit_of_signs(options.sign_mps)
+    value = amount.value * factor
+    return value, (f"You named no unit: I take {number(amount.value)} as {unit}, the unit of the signs on this road.",)
+
+
+def _unit_of_signs(limit_mps: float) -> tuple[str, float]:
+    """Unit in which the limit of this road is a round number."""
+    for unit, factor, step in (("mph", MPS_PER_MPH, 5.0), ("km/h", MPS_PER_KMH, 10.0)):
+        shown = limit_mps / factor
+        if abs(shown - step * round(shown / step)) < 0.05:
+            return unit, factor
+    return "m/s", 1.0
+
+
+def distance_of(amount: Amount) -> tuple[float, tuple[str, ...]]:
+    """Distance of an amount, m, with what had to be assumed about its unit."""
+    if amount.dimension != "bare":
+        return amount.value, ()
+    return amount.value, (f"You named no unit: I take {number(amount.value)} as metres.",)

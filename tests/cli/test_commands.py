@@ -1,0 +1,255 @@
+"""The command line: what it prints, how it fails, what it leaves unimported."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner, Result
+
+from chauffeur import __version__
+from chauffeur.cli.doctor import install_command, installed_parts
+from chauffeur.cli.failures import show_crash
+from chauffeur.cli.main import app
+from chauffeur.concept import ChauffeurError, PlannerError, ScenarioError
+from chauffeur.drive.recording import read_trip, write_trip
+
+COMMANDS = ["drive", "feedback", "scenarios", "apis", "replay", "page", "doctor"]
+
+WISH = "Overtake the car in front of you."
+PROGRAM = """def overtake():
+    left = get_left_lane(get_ego_vehicle())
+    while not is_safe_enter(left):
+        yield autopilot()
+    say("Changing to the [bold]left[/] lane.")
+    set_target_lane(left)
+    for _ in range(20):
+        yield autopilot()
+"""
+DECLINED = "Fly over them."
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Specification of a planner that needs no model."""
+    path = tmp_path_factory.mktemp("answers") / "answers.jsonl"
+    plan = {"thoughts": {"text": "Left is free."}, "policy": {"kind": "program", "source": PROGRAM}, "intent": "pass"}
+    no = {"thoughts": {"text": ""}, "policy": None, "refusal": "A car cannot fly."}
+    lines = [{"version": 1, "instruction": w, "plan": p} for w, p in ((WISH, plan), (DECLINED, no))]
+    path.write_text("\n".join(json.dumps(line) for line in lines))
+    return f"replay/{path}"
+
+
+def invoke(*arguments: str) -> Result:
+    return CliRunner().invoke(app, list(arguments))
+
+
+@pytest.fixture
+def driven(answers: str, tmp_path: Path) -> Path:
+    """Folder of a saved drive."""
+    folder = tmp_path / "trip"
+    assert invoke("drive", WISH, "--planner", answers, "--save", str(folder), "--quiet").exit_code == 0
+    return folder
+
+
+def test_help_has_examples_everywhere() -> None:
+    for command in ([], *([name] for name in COMMANDS)):
+        result = invoke(*command, "--help")
+        assert result.exit_code == 0, command
+        assert "Examples:" in result.output, command
+        assert "chauffeur" in result.output
+
+
+def test_no_command_has_more_than_twelve_options() -> None:
+    group = typer.main.get_command(app)
+    for name, command in group.commands.items():  # type: ignore[attr-defined]
+        options = [p for p in command.params if p.param_type_name == "option" and p.name != "help"]
+        assert len(options) <= 12, name
+
+
+def test_version() -> None:
+    assert invoke("--version").output.strip() == f"chauffeur {__version__}"
+
+
+def test_importing_the_command_line_loads_nothing_heavy() -> None:
+    simulation = ["highway_env", "gymnasium", "pandas", "matplotlib", "pygame", "numpy", "PIL"]
+    heavy = [*simulation, "openai", "httpx", "pydantic", "pydantic_monty", "mcap", "sqlcipher3"]
+    script = f"import sys, chauffeur.cli.main; print([m for m in {heavy!r} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_wish_is_driven_and_everything_is_said(answers: str) -> None:
+    result = invoke("drive", WISH, "--planner", answers)
+    assert result.exit_code == 0, result.output
+    for words in (WISH, "Left is free.", "def overtake():", "✓", "Drive ended after", "simulated drive", "replay/"):
+        assert words in result.output
+    assert "Changing to the [bold]left[/] lane." in result.output, "a program's words are not markup"
+    assert "\x1b" not in result.output, "no colour and no moving cursor in a pipe"
+
+
+def test_quiet_says_one_line(answers: str) -> None:
+    assert len(invoke("drive", WISH, "--planner", answers, "-q").output.strip().splitlines()) == 1
+
+
+def test_a_saved_drive_replays_bit_for_bit(driven: Path) -> None:
+    assert {p.name for p in driven.iterdir()} == {"trip.mcap", "trip.html", "filmstrip.png"}
+    result = invoke("replay", str(driven / "trip.mcap"))
+    assert result.exit_code == 0, result.output
+    assert "The same, bit for bit" in result.output
+
+
+def test_a_changed_recording_is_noticed(driven: Path) -> None:
+    path = driven / "trip.mcap"
+    recorded = read_trip(path)
+    frame = recorded.frames[4]
+    ego = replace(frame.snapshot.ego, x_m=frame.snapshot.ego.x_m + 1e-9)
+    frames = list(recorded.frames)
+    frames[4] = replace(frame, snapshot=replace(frame.snapshot, ego=ego))
+    trip = replace(recorded.trip, record=(*recorded.trip.record[1:], ("chauffeur", "0.0.1")))
+    write_trip(path, trip, frames, recorded.scenario, final=recorded.final)
+    result = invoke("replay", str(path))
+    assert result.exit_code == 1
+    assert "tick 4, snapshot.ego.x_m" in result.output
+    assert "recorded with chauffeur 0.0.1" in result.output
+
+
+def test_a_page_is_rendered_again(driven: Path) -> None:
+    page, strip = driven / "again.html", driven / "again.png"
+    result = invoke("page", str(driven / "trip.mcap"), "--out", str(page), "--filmstrip", str(strip), "--pictures", "2")
+    assert result.exit_code == 0, result.output
+    assert page.read_text(encoding="utf-8") == (driven / "trip.html").read_text(encoding="utf-8")
+    assert strip.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_refusal_is_explained_and_is_a_failure(answers: str, tmp_path: Path) -> None:
+    result = invoke("drive", DECLINED, "--planner", answers, "--save", str(tmp_path))
+    assert result.exit_code == 1
+    assert "A car cannot fly." in result.output
+    assert "Refused" in result.output
+    assert {p.name for p in tmp_path.iterdir() if p.suffix} == {"trip.mcap", "trip.html"}
+    replayed = invoke("replay", str(tmp_path / "trip.mcap"))
+    assert replayed.exit_code == 2
+    assert "holds no drive" in replayed.output
+
+
+def test_feedback_reaches_the_last_trip(answers: str) -> None:
+    before = invoke("feedback", "Too close for me.", "--as", "ana")
+    assert before.exit_code == 2
+    assert "Drive first" in before.output
+    assert invoke("drive", WISH, "--planner", answers, "--as", "ana", "-q").exit_code == 0
+    after = invoke("feedback", "Too close for me.", "--as", "ana")
+    assert after.exit_code == 0, after.output
+    assert "wants a larger gap" in after.output
+    again = invoke("drive", WISH, "--planner", answers, "--as", "ana")
+    assert "wants a larger gap" in again.output, "what was said is part of the next drive's history"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["drive", "  "], "The wish is empty"),
+        (["drive", "go", "--scenario", "overtak"], "Did you mean overtake?"),
+        (["drive", "go", "--planner", "onbord"], "Did you mean 'onboard'?"),
+        (["drive", "go", "--limits", "none"], "Use one of: default, lampilot"),
+        (["drive", "go", "--setting", "five-shot"], "few-shot or zero-shot"),
+        (["drive", "go", "--scenario", "left_overtake_s0"], "--data DIR"),
+        (["drive", "go", "--seed", "-1"], "--seed"),
+        (["drive"], "Missing argument"),
+        (["replay", "absent.mcap"], "There is no recording at absent.mcap"),
+        (["page", "absent.mcap"], "There is no recording at absent.mcap"),
+        (["feedback", " ", "--as", "ana"], "The feedback is empty"),
+        (["feedback", "fine"], "--as"),
+        (["apis", "is_safe_entr"], "Did you mean is_safe_enter?"),
+        (["scenarios", "--find", "moon"], "No scenario matches"),
+        (["scenarios", "--data", "absent"], "absent"),
+        (["dirve"], "No such command"),
+    ],
+)
+def test_bad_input_is_told_in_words(arguments: list[str], says: str) -> None:
+    result = invoke(*arguments)
+    assert result.exit_code == 2, result.output
+    assert says in " ".join(result.output.replace("│", " ").split())
+    assert "Traceback" not in result.output
+
+
+def test_tracebacks_are_for_those_who_ask(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CHAUFFEUR_DEBUG", "1")
+    assert isinstance(invoke("drive", "go", "--scenario", "overtak").exception, ScenarioError)
+
+
+def test_a_fault_of_ours_can_be_reported(capsys: pytest.CaptureFixture[str]) -> None:
+    show_crash(ValueError, ValueError("[red]oops[/]\x1b[2J"), None)
+    message = capsys.readouterr().err
+    assert "Chauffeur itself failed: ValueError: [red]oops[/][2J" in message
+    assert "CHAUFFEUR_DEBUG=1" in message
+
+
+def test_a_planner_that_is_down_is_a_failure_not_bad_input(answers: str) -> None:
+    result = invoke("drive", "Something nobody has answered.", "--planner", answers)
+    assert result.exit_code == 1
+    assert "holds no answer" in result.output
+    assert "Traceback" not in result.output
+
+
+def test_ctrl_c_is_130(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("chauffeur.drive.scenarios.suiting", stop)
+    assert invoke("drive", "go").exit_code == 130
+
+
+def test_scenarios_and_apis_are_listed() -> None:
+    listed = invoke("scenarios").output
+    assert "intersection" in listed
+    assert "--data DIR" in listed
+    assert "set_target_speed(target_speed: float)" in invoke("apis").output
+    one = invoke("apis", "set_target_speed").output
+    assert "m/s" in one
+    assert "example" in one
+
+
+def test_official_samples_are_listed_too(lampilot_data: Path) -> None:
+    result = invoke("scenarios", "--data", str(lampilot_data / "DbLv1-dev"), "--find", "pull_over")
+    assert result.exit_code == 0, result.output
+    assert "pull_over_s0" in result.output
+
+
+def test_doctor_names_what_is_missing_and_how_to_get_it() -> None:
+    result = invoke("doctor")
+    assert result.exit_code == 0, result.output
+    core, extras = installed_parts()
+    assert all(part.installed for part in core)
+    assert {"town", "models", "speech"} <= set(extras)
+    assert not {"dev", "docs"} & set(extras)
+    flat = "".join(result.output.split())
+    for extra, parts in extras.items():
+        if any(part.installed is None for part in parts):
+            assert "".join(install_command(extra).split()) in flat, extra
+
+
+def test_doctor_never_shows_a_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret")
+    output = invoke("doctor").output
+    assert "sk-very-secret" not in output
+    assert "OPENAI_API_KEY" in output
+
+
+def test_a_broken_core_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("chauffeur.cli.doctor._installed", lambda name: None if name == "mcap" else "1.0")
+    result = invoke("doctor")
+    assert result.exit_code == 1
+    assert "Driving cannot work without mcap" in result.output
+
+
+def test_every_own_error_has_an_exit_code() -> None:
+    from chauffeur.cli.failures import exit_code
+
+    assert {exit_code(kind("x")) for kind in ChauffeurError.__subclasses__()} == {1, 2}
+    assert exit_code(PlannerError("down")) == 1

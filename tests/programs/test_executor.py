@@ -1,0 +1,341 @@
+"""The executor: one step per control period, faults as values, snapshots, and workers that die."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+
+import pytest
+from straight_road import LANES, StraightRoad
+
+from chauffeur.concept import LaneId, SandboxError, Wishes
+from chauffeur.programs import (
+    Budget,
+    ProgramCallsError,
+    ProgramCrashError,
+    ProgramExecutor,
+    ProgramRaisedError,
+    ProgramRecursionError,
+    ProgramRefusedError,
+    ProgramTimeError,
+    Sandbox,
+)
+
+COUNTING = """
+def helper(n):
+    for i in range(n):
+        set_target_speed(20 + i)
+        yield autopilot()
+
+def main():
+    ego = get_ego_vehicle()
+    left = get_left_lane(ego)
+    seen = []
+    yield from helper(3)
+    set_target_lane(left)
+    while True:
+        seen.append(round(get_speed_of(ego), 3))
+        say(f"{len(seen)} {sum(seen):.3f}")
+        yield autopilot()
+"""
+
+
+def _run(executor: ProgramExecutor, road: StraightRoad, ticks: int) -> list[object]:
+    results: list[object] = []
+    for _ in range(ticks):
+        result = executor.tick()
+        results.append(result)
+        road.step(road.command(result.wishes))
+    return results
+
+
+def test_a_program_waits_for_the_first_tick(executor: ProgramExecutor, road: StraightRoad) -> None:
+    assert executor.state == "none"
+    assert executor.start("def main():\n    say('hello')\n    yield\n    say('bye')\n", road) == "running"
+    first = executor.tick()
+    assert (first.state, first.line, first.said) == ("running", 3, ("hello",))
+    second = executor.tick()
+    assert (second.state, second.line, second.said) == ("finished", None, ("bye",))
+    third = executor.tick()
+    assert (third.state, third.said, third.calls, third.error) == ("finished", (), (), None)
+
+
+def test_wishes_stay_when_a_program_has_finished_or_failed(executor: ProgramExecutor, road: StraightRoad) -> None:
+    for end, state in (("return", "finished"), ("raise ValueError('no')", "failed")):
+        executor.start(f"def main():\n    set_target_speed(29)\n    yield\n    {end}\n", road)
+        executor.tick()
+        for _ in range(3):
+            result = executor.tick()
+            assert result.state == state
+            assert result.wishes == Wishes(29.0, 1.5, LANES[1])
+
+
+def test_a_program_can_take_over_anothers_wishes(executor: ProgramExecutor, road: StraightRoad) -> None:
+    held = Wishes(28.0, 0.9, LANES[2], "left", frozenset({9}))
+    executor.start("def main():\n    say(str(get_desired_time_headway()))\n    yield\n", road, wishes=held)
+    result = executor.tick()
+    assert result.wishes == held
+    assert result.said == ("0.9",)
+
+
+def test_tick_without_a_program_says_so(executor: ProgramExecutor) -> None:
+    with pytest.raises(SandboxError, match="Call start"):
+        executor.tick()
+
+
+def test_failure_names_line_and_reason(executor: ProgramExecutor, road: StraightRoad) -> None:
+    executor.start("def main():\n    yield\n    x = [1]\n\n    y = x[3]\n    yield\n", road)
+    executor.tick()
+    result = executor.tick()
+    assert isinstance(result.error, ProgramRaisedError)
+    assert result.error.exception == "IndexError"
+    assert result.line == result.error.line == 5
+    assert "line 5" in str(result.error)
+    assert executor.tick().error is result.error
+
+
+def test_failure_in_a_helper_names_the_innermost_program_line(executor: ProgramExecutor, road: StraightRoad) -> None:
+    executor.start("def f():\n    return 1 / 0\ndef main():\n    x = max([1], key=lambda v: f())\n    yield\n", road)
+    assert executor.tick().line == 2
+
+
+def test_refusal_names_line_and_remedy(executor: ProgramExecutor, road: StraightRoad) -> None:
+    assert executor.start("def main():\n    get_sped_of(1)\n    yield\n", road) == "failed"
+    result = executor.tick()
+    assert isinstance(result.error, ProgramRefusedError)
+    assert result.line == 2
+    assert "did you mean get_speed_of?" in str(result.error)
+    assert result.wishes.target_speed_mps == 25.0
+
+
+def test_time_without_a_line_falls_back_to_where_it_waited(road: StraightRoad) -> None:
+    with ProgramExecutor(gate=False) as executor:
+        executor.start("def main():\n    yield\n    while True:\n        pass\n", road)
+        assert executor.tick().line == 2
+        result = executor.tick()
+    assert isinstance(result.error, ProgramTimeError)
+    assert result.line == 2
+
+
+def test_budgets_are_arguments(road: StraightRoad) -> None:
+    source = "def main():\n    for _ in range(10):\n        get_target_speed()\n    yield\n"
+    with ProgramExecutor(budget=Budget(calls=5, turn_s=1.0, tick_s=1.0)) as executor:
+        executor.start(source, road)
+        result = executor.tick()
+    assert isinstance(result.error, ProgramCallsError)
+    assert result.line == 3
+    deep = "def f(n):\n    return 0 if n == 0 else f(n - 1)\ndef main():\n    f(40)\n    yield\n"
+    for depth, failed in ((30, True), (60, False)):
+        with ProgramExecutor(budget=Budget(recursion=depth, turn_s=1.0, tick_s=1.0)) as executor:
+            executor.start(deep, road)
+            assert isinstance(executor.tick().error, ProgramRecursionError) == failed
+
+
+def test_the_tick_budget_counts_slow_answers(road: StraightRoad) -> None:
+    class SlowRoad(StraightRoad):
+        def lane_of(self, vehicle_id: int) -> LaneId:
+            time.sleep(0.02)
+            return super().lane_of(vehicle_id)
+
+    source = "def main():\n    for _ in range(20):\n        get_lane_of(get_ego_vehicle())\n    yield\n"
+    with ProgramExecutor() as executor:
+        executor.start(source, SlowRoad())
+        before = time.perf_counter()
+        result = executor.tick()
+    assert isinstance(result.error, ProgramTimeError)
+    assert time.perf_counter() - before < 0.2
+
+
+def test_a_dumped_program_goes_on_exactly_as_if_nothing_had_happened(sandbox: Sandbox) -> None:
+    straight, stopped = StraightRoad(), StraightRoad()
+    with ProgramExecutor(sandbox=sandbox) as executor:
+        executor.start(COUNTING, straight)
+        expected = _run(executor, straight, 20)
+    with ProgramExecutor(sandbox=sandbox) as executor:
+        executor.start(COUNTING, stopped)
+        got = _run(executor, stopped, 2)
+        state = executor.dump()
+    assert len(state) < 64_000
+    with Sandbox() as fresh, ProgramExecutor(sandbox=fresh) as executor:
+        executor.load(state, stopped)
+        assert executor.state == "running"
+        got += _run(executor, stopped, 7)
+        state = executor.dump()
+        got += _run(executor, stopped, 11)
+    assert got == expected
+    assert b"veh:" not in state.split(b"\n", 1)[0]
+
+
+def test_a_resumed_program_has_the_same_limits(sandbox: Sandbox, road: StraightRoad) -> None:
+    source = "def main():\n    yield\n    while True:\n        pass\n    yield\n"
+    with Sandbox() as strict:
+        with ProgramExecutor(sandbox=strict, gate=False) as executor:
+            executor.start(source, road)
+            executor.tick()
+            state = executor.dump()
+        with ProgramExecutor(sandbox=strict, gate=False) as executor:
+            executor.load(state, road)
+            before = time.perf_counter()
+            result = executor.tick()
+            assert time.perf_counter() - before < 0.25
+    assert isinstance(result.error, ProgramTimeError)
+
+
+@pytest.mark.parametrize("junk", [b"", b"\n", b"{}\n", b"junk", b'{"chauffeur-program-1": 3}\nx', b"\xff\xfe\n"])
+def test_junk_is_no_dump(junk: bytes, executor: ProgramExecutor, road: StraightRoad) -> None:
+    with pytest.raises(SandboxError):
+        executor.load(junk, road)
+
+
+def test_a_damaged_dump_is_refused(executor: ProgramExecutor, road: StraightRoad) -> None:
+    executor.start(COUNTING, road)
+    executor.tick()
+    state = executor.dump()
+    with pytest.raises(SandboxError):
+        executor.load(state[:-40], road)
+    assert executor.start(COUNTING, road) == "running"
+
+
+def test_only_a_running_program_is_dumped(executor: ProgramExecutor, road: StraightRoad) -> None:
+    executor.start("def main():\n    yield\n", road)
+    executor.tick()
+    executor.tick()
+    with pytest.raises(SandboxError):
+        executor.dump()
+
+
+def test_a_killed_worker_is_a_typed_error_and_the_next_program_starts_at_once(road: StraightRoad) -> None:
+    with Sandbox() as sandbox, ProgramExecutor(sandbox=sandbox) as executor:
+        for _ in range(5):
+            executor.start(COUNTING, road)
+            assert executor.tick().state == "running"
+            pid = executor.worker_pid
+            assert pid is not None
+            os.kill(pid, signal.SIGKILL)
+            before = time.perf_counter()
+            result = executor.tick()
+            assert isinstance(result.error, ProgramCrashError)
+            executor.start(COUNTING, road)
+            assert executor.tick().state == "running"
+            assert time.perf_counter() - before < 0.5
+
+
+def test_a_stopped_worker_does_not_stop_the_host(road: StraightRoad) -> None:
+    with ProgramExecutor() as executor:
+        executor.start(COUNTING, road)
+        executor.tick()
+        pid = executor.worker_pid
+        assert pid is not None
+        os.kill(pid, signal.SIGSTOP)
+        before = time.perf_counter()
+        result = executor.tick()
+        assert time.perf_counter() - before < 0.5
+        assert isinstance(result.error, ProgramTimeError)
+
+
+def test_closing_leaves_no_workers(road: StraightRoad) -> None:
+    executor = ProgramExecutor()
+    executor.start(COUNTING, road)
+    pid = executor.worker_pid
+    assert pid is not None
+    executor.close()
+    executor.close()
+    for _ in range(100):
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            break
+        time.sleep(0.01)
+    else:
+        pytest.fail("the worker outlived its executor")
+    with pytest.raises(SandboxError, match="closed"):
+        executor.start(COUNTING, road)
+
+
+def test_more_programs_than_workers_is_said(road: StraightRoad) -> None:
+    with Sandbox(workers=1, max_workers=1) as sandbox:
+        first, second = ProgramExecutor(sandbox=sandbox), ProgramExecutor(sandbox=sandbox)
+        first.start(COUNTING, road)
+        with pytest.raises(SandboxError, match="busy") as caught:
+            second.start(COUNTING, road)
+        assert caught.value.retryable
+        first.close()
+        assert second.start(COUNTING, road) == "running"
+        second.close()
+
+
+def test_two_programs_side_by_side_share_nothing(sandbox: Sandbox) -> None:
+    source = (
+        "total = [0]\ndef main():\n    while True:\n        total[0] += 1\n        say(str(total[0]))\n        yield\n"
+    )
+    with ProgramExecutor(sandbox=sandbox) as one, ProgramExecutor(sandbox=sandbox) as other:
+        one.start(source, StraightRoad())
+        other.start(source, StraightRoad())
+        said = [(one.tick().said, other.tick().said) for _ in range(3)]
+        one.start(source, StraightRoad())
+        assert said == [(("1",), ("1",)), (("2",), ("2",)), (("3",), ("3",))]
+        assert one.tick().said == ("1",)
+
+
+def test_library_functions_are_called_with_yield_from(sandbox: Sandbox, road: StraightRoad) -> None:
+    library = (
+        "import math\n\ndef inner(n):\n    for _ in range(n):\n        yield autopilot()\n"
+        "def wait(seconds):\n    yield from inner(math.ceil(seconds * 10))\n    return 'waited'\n"
+        "def main():\n    say('not me')\n    yield\n"
+    )
+    source = "def drive():\n    x = yield from wait(0.2)\n    say(x)\n    yield\n    yield from wait(0.1)\n"
+    with ProgramExecutor(sandbox=sandbox, library=library) as executor:
+        executor.start(source, road)
+        results = [executor.tick() for _ in range(5)]
+    assert [r.line for r in results] == [2, 2, 4, 5, None]
+    assert [r.said for r in results] == [(), (), ("waited",), (), ()]
+    assert results[-1].state == "finished"
+
+
+def test_an_error_in_the_library_names_the_programs_line(sandbox: Sandbox, road: StraightRoad) -> None:
+    with ProgramExecutor(sandbox=sandbox, library="def bad():\n    yield\n    1 / 0\n") as executor:
+        executor.start("def drive():\n\n\n    yield from bad()\n", road)
+        executor.tick()
+        result = executor.tick()
+    assert isinstance(result.error, ProgramRaisedError)
+    assert result.line == 4
+
+
+def test_prints_go_nowhere(executor: ProgramExecutor, road: StraightRoad, capfd: pytest.CaptureFixture[str]) -> None:
+    executor.start("def main():\n    print('debug', 3)\n    yield\n", road)
+    assert executor.tick().said == ()
+    assert capfd.readouterr().out == ""
+
+
+def test_no_clock_and_no_chance(sandbox: Sandbox, road: StraightRoad) -> None:
+    source = (
+        "import random\nimport time\ndef main():\n"
+        "    say(f'{random.random()} {time.time()} {hash(\"a\")}')\n    yield\n"
+    )
+    said: set[tuple[str, ...]] = set()
+    for _ in range(2):
+        with ProgramExecutor(sandbox=sandbox, gate=False) as executor:
+            executor.start(source, road)
+            said.add(executor.tick().said)
+    assert len(said) == 1
+
+
+def test_a_failing_world_is_not_hidden(sandbox: Sandbox) -> None:
+    class Broken(StraightRoad):
+        broken = False
+
+        def lane_of(self, vehicle_id: int) -> LaneId:
+            if self.broken:
+                raise ZeroDivisionError("the world's own fault")
+            return super().lane_of(vehicle_id)
+
+    world = Broken()
+    with ProgramExecutor(sandbox=sandbox) as executor:
+        executor.start("def main():\n    yield\n    get_lane_of(get_ego_vehicle())\n    yield\n", world)
+        executor.tick()
+        world.broken = True
+        with pytest.raises(ZeroDivisionError):
+            executor.tick()
+        world.broken = False
+        assert executor.start("def main():\n    yield\n", world) == "running"

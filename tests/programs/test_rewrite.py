@@ -1,0 +1,118 @@
+"""The rewrite keeps every statement on its line and changes only what it must."""
+
+from __future__ import annotations
+
+import ast
+
+import pytest
+
+from chauffeur.programs import ProgramSyntaxError
+from chauffeur.programs.lower import PRELUDE, needs_prelude
+from chauffeur.programs.rewrite import MAX_SOURCE_CHARS, parse, prepare
+
+
+def _rewritten(statement: str) -> str:
+    source = f"def main():\n    yield\n    {statement}\n"
+    prepared = prepare(source)
+    ast.parse(prepared.program)
+    assert prepared.program.count("\n") == source.count("\n") + 3
+    return prepared.program.split("\n", 2)[2].rsplit("\n\n", 1)[0].strip()
+
+
+@pytest.mark.parametrize(
+    ("statement", "expected"),
+    [
+        ("yield", "__tick__(3, (None))"),
+        ("yield autopilot()", "__drive__(3)"),
+        ("yield(autopilot(\n))", "__drive__(3\n)"),
+        ("x = yield autopilot()", "x = __drive__(3)"),
+        ("yield autopilot(), 1", "__tick__(3, ( autopilot(), 1))"),
+        ("yield autopilot(1)", "__tick__(3, ( autopilot(1)))"),
+        ("yield autopilot", "__tick__(3, ( autopilot))"),
+        ("autopilot = 3; yield autopilot()", "autopilot = 3; __tick__(3, ( autopilot()))"),
+        ("x = yield a", "x = __tick__(3, ( a))"),
+        ("x = (yield)", "x = (__tick__(3, (None)))"),
+        ("yield a, b", "__tick__(3, ( a, b))"),
+        ("yield *a,", "__tick__(3, ( *a,))"),
+        ("yield(a)", "__tick__(3, ((a)))"),
+        ("yield [\n    a,\n]", "__tick__(3, ( [\n    a,\n]))"),
+        ("yield \\\n    a", "__tick__(3, ( \\\n    a))"),
+        ("if a: yield 1; yield 2", "if a: __tick__(3, ( 1)); __tick__(3, ( 2))"),
+        ("f((yield 1))", "f((__tick__(3, ( 1))))"),
+        ("'é'; yield 'yield'", "'é'; __tick__(3, ( 'yield'))"),
+        ("yield (yield 1)", "__tick__(3, ( (__tick__(3, ( 1)))))"),
+        ("x.sort(key=k)", "__sort__(x, key=k)"),
+        ("x.sort()", "x.sort()"),
+        ("x.sort(\n    key=k)", "__sort__(x, \n    key=k)"),
+        ("x[0].sort(key=k)", "__sort__(x[0], key=k)"),
+        ("y = any(f(x) for x in z)", "y = (__find__(lambda x: True if (f(x)) else None, (z)) is not None)"),
+        ("y = all(x for x in z if c)", "y = (__find__(lambda x: True if (c) and not (x) else None, (z)) is None)"),
+        ("y = next(x for x in z)", "y = __take__(__find__(lambda x: ((x),), (z)))"),
+        ("y = next((x for x in z if c), 3)", "y = __take__(__find__(lambda x: ((x),) if (c) else None, (z)), (3))"),
+        (
+            "y = any(a for a, b in z)",
+            "y = (__find__(lambda __row__: (lambda a, b: True if (a) else None)(*__row__), (z)) is not None)",
+        ),
+        (
+            "y = any(\n    x\n    for x in z\n)",
+            "y = (__find__(lambda x: True if (x) else None, (z)) is not None\n\n\n)",
+        ),
+        ("y = any([x for x in z])", "y = any([x for x in z])"),
+    ],
+)
+def test_statements(statement: str, expected: str) -> None:
+    assert _rewritten(statement) == expected
+
+
+def test_delegation_becomes_a_call() -> None:
+    source = "def h(a):\n    yield a\ndef main():\n    x = yield from h(1)\n    yield  from h(2)\n"
+    assert "x = ( h(1))" in prepare(source).program
+    assert "    ( h(2))" in prepare(source).program
+
+
+def test_library_ticks_report_the_programs_line() -> None:
+    prepared = prepare("def main():\n    yield from wait(3)\n    yield\n", "def wait(n):\n    yield n\n")
+    assert "__tick__(__site__[0], ( n))" in prepared.helpers
+    assert "(__site__.update({0: 2}), ( wait(3)))[1]" in prepared.program
+
+
+def test_a_program_with_a_parenthesised_sort_still_parses() -> None:
+    prepared = prepare("def main():\n    (x).sort(key=k)\n    (x.y[0] or z).sort(\n        key=k)\n    yield\n")
+    ast.parse(prepared.program)
+
+
+def test_main_and_its_line() -> None:
+    prepared = prepare("import math\n\ndef a():\n    yield\n\ndef b():\n    yield\n\ndef c(x):\n    yield x\n")
+    assert (prepared.main, prepared.main_line) == ("b", 6)
+    assert prepared.program.endswith("__tick__(0, None)\nb()\n")
+    assert prepared.helpers == ""
+
+
+def test_prelude_is_python_and_comes_only_when_needed() -> None:
+    ast.parse(PRELUDE)
+    assert not needs_prelude(ast.parse("x = sorted([1]); y = max(1, 2)"))
+    for text in ("max(x, key=f)", "x.sort(key=f)", "map(f, x)", "any(x)", "sorted(x, **o)"):
+        assert needs_prelude(ast.parse(text))
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("x" * (MAX_SOURCE_CHARS + 1), "characters"),
+        ("def main(:", "not valid Python"),
+        ("x = " + "(" * 300, "not valid Python"),
+        ("x = " + "-" * 15_000 + "1", "nested too deeply"),
+        ("x = " + "[" * 60 + "]" * 60, "nested too deeply"),
+        ("x = [" + "1," * 6000 + "]", "too long"),
+        ("x = '\x00'", "not valid Python"),
+        ("x = '\ud800'", "not valid Python"),
+    ],
+)
+def test_size_limits(source: str, words: str) -> None:
+    with pytest.raises(ProgramSyntaxError, match=words):
+        parse(source)
+
+
+def test_a_text_without_a_main_function() -> None:
+    with pytest.raises(ProgramSyntaxError, match="no main function"):
+        prepare("def main(ego):\n    yield\n")
