@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import re
 import shutil
 import sys
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import PackageNotFoundError, distribution, requires, version
+from typing import Any
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import typer
 
@@ -101,8 +105,20 @@ def installed_parts() -> tuple[tuple[Part, ...], dict[str, tuple[Part, ...]]]:
 
 
 def install_command(extra: str) -> str:
-    """The exact command that adds an extra to the Python that runs now."""
-    return f'{sys.executable} -m pip install "chauffeur[{extra}]"'
+    """The exact command that adds an extra to the Python that runs now, from where Chauffeur itself came."""
+    editable, source = _origin()
+    option = "-e " if editable else ""
+    return f'{sys.executable} -m pip install {option}"{source}[{extra}]"'
+
+
+def _origin() -> tuple[bool, str]:
+    """(whether it is an editable install, the folder it came from or the package's name)."""
+    text = distribution("chauffeur").read_text("direct_url.json")
+    found: dict[str, Any] = json.loads(text) if text else {}
+    url = str(found.get("url", ""))
+    if not url.startswith("file://"):
+        return False, "chauffeur"
+    return bool(found.get("dir_info", {}).get("editable")), url2pathname(urlsplit(url).path)
 
 
 def _installed(name: str) -> str | None:

@@ -39,16 +39,10 @@ def planner_named(spec: str, base_url: str | None) -> Planner:
 
 
 def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
-    """LaMPilot's referee where the scenario has a goal; none for a free drive."""
-    del plan
-    if not scenario.goal:
-        return None
-    from chauffeur.bench.lampilot.referee import LampilotReferee
-    from chauffeur.worlds.highway import HighwayWorld
+    """LaMPilot's referee: by the scenario's own goal, else by what the planner understood, else none."""
+    from chauffeur.bench.lampilot.understood import referee_for as judge
 
-    if not isinstance(world, HighwayWorld):
-        raise ConfigError(f"The goal of {scenario.id} can only be judged on a highway world.")
-    return LampilotReferee(world, scenario)
+    return judge(world, scenario, plan)
 
 
 def memory_named(name: str = "vault") -> Memory:
