@@ -40,9 +40,10 @@ def test_nothing_runs_model_text_in_this_interpreter() -> None:
     for path in SOURCE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-                assert node.func.id not in {"exec", "eval", "compile", "__import__"}, f"{path}:{node.lineno}"
+                reason = "model text never runs in this interpreter: use chauffeur.programs.sandbox"
+                assert node.func.id not in {"exec", "eval", "compile", "__import__"}, f"{path}:{node.lineno}: {reason}"
             if isinstance(node, ast.keyword) and node.arg == "shell":
-                raise AssertionError(f"shell= in {path}:{node.value.lineno}")
+                raise AssertionError(f"{path}:{node.value.lineno}: no shell; Talk2Drive's model text reached one")
 
 
 def test_the_loop_fits_on_a_page() -> None:
