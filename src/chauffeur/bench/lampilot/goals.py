@@ -127,6 +127,11 @@ def _lane_beside(world: HighwayWorld, direction: str) -> tuple[LaneId, Any]:
     return lane, network.get_lane(lane)
 
 
+def _heading_error_rad(ego: Any, lane: Any) -> float:
+    """Absolute heading difference to a lane where the ego is along it, not wrapped (as the origin compares it)."""
+    return abs(float(ego.heading) - float(lane.heading_at(lane.local_coordinates(ego.position)[0])))
+
+
 class LaneChangeGoal:
     """Be in the lane beside the start lane, heading within 5 degrees of it (`LaneChangeEval`)."""
 
@@ -138,10 +143,8 @@ class LaneChangeGoal:
         """See Goal. There is no time limit but the environment's."""
         del elapsed_s
         ego = self._world.scene.ego
-        if ego.lane_index != self._lane:
-            return "open"
-        s = self._geometry.local_coordinates(ego.position)[0]
-        return "success" if abs(ego.heading - self._geometry.heading_at(s)) < np.deg2rad(5) else "open"
+        aligned = ego.lane_index == self._lane and _heading_error_rad(ego, self._geometry) < np.deg2rad(5)
+        return "success" if aligned else "open"
 
 
 class OvertakeGoal:
@@ -196,8 +199,7 @@ class RouteGoal:
         ego = self._world.scene.ego
         if ego.lane_index != self._lane:
             return "open"
-        s = self._geometry.local_coordinates(ego.position)[0]
-        error = abs(ego.heading - self._geometry.heading_at(s))
+        error = _heading_error_rad(ego, self._geometry)
         aligned = error < np.deg2rad(0.1) or abs(error - 2 * np.pi) <= 1e-3 + 1e-5 * 2 * np.pi
         return "success" if aligned else "open"
 

@@ -63,7 +63,7 @@ def roll_out(job: RolloutJob) -> dict[str, Any]:
         snapshot = world.reset(job.scenario)
         referee = LampilotReferee(world, job.scenario)
     except ChauffeurError as error:
-        return row | _not_driven("not_driven", str(error), infra_failed=True)
+        return row | not_driven("not_driven", str(error), infra_failed=True)
     if job.baseline:
         adjust = None if job.baseline == "idm" else _mobil(world)
         episode = drive_without_program(world, referee, MAX_EPISODE_S, record=False, adjust=adjust)
@@ -74,12 +74,12 @@ def roll_out(job: RolloutJob) -> dict[str, Any]:
     refusal = declined(plan, verdicts)
     if refusal:
         failed = unusable(plan, verdicts)
-        return row | _not_driven("refused", refusal, refused=not failed, policy_failed=failed)
+        return row | not_driven("refused", refusal, refused=not failed, policy_failed=failed)
     assert isinstance(plan.policy, Program)
     try:
         episode = drive_program(world, plan.policy.source, referee, MAX_EPISODE_S, record=False)
     except ChauffeurError as error:
-        return row | _not_driven("not_driven", str(error), infra_failed=True)
+        return row | not_driven("not_driven", str(error), infra_failed=True)
     return row | _driven(episode, referee)
 
 
@@ -107,7 +107,8 @@ def _driven(episode: Episode, referee: LampilotReferee) -> dict[str, Any]:
     }
 
 
-def _not_driven(outcome: str, detail: str, **flags: bool) -> dict[str, Any]:
+def not_driven(outcome: str, detail: str, **flags: bool) -> dict[str, Any]:
+    """Result columns of a job that was not driven, with its causes."""
     return {
         "outcome": outcome,
         "success": False,

@@ -30,6 +30,7 @@ from chauffeur.bench.lampilot.rollout import (
     RolloutJob,
     context_adapter,
     describe_sample,
+    not_driven,
     roll_out,
 )
 from chauffeur.bench.store import Row, RowStore, write_text
@@ -237,8 +238,7 @@ class LampilotRun:
         }
         job = self._job(item)
         if job is None:
-            failed = {"infra_failed": True, "detail": self._plans.rows[item.id]["error"]}
-            return base | _EMPTY_RESULT | failed
+            return base | not_driven("not_driven", self._plans.rows[item.id]["error"], infra_failed=True)
         plan = job.plan or {}
         usage = plan.get("usage", {})
         rollout = {k: v for k, v in self._rollouts.rows[job.key].items() if k not in ("key", "sample", "verdicts")}
@@ -261,22 +261,6 @@ class LampilotRun:
             "python": platform.python_version(),
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} CPUs",
         }
-
-
-_EMPTY_RESULT: Row = {
-    "outcome": "not_driven",
-    "success": False,
-    "collision": False,
-    "ttc": None,
-    "speed_variance": None,
-    "time_efficiency": None,
-    "score": 0.0,
-    "steps": 0,
-    "policy_failed": False,
-    "infra_failed": False,
-    "refused": False,
-    "fallback_used": False,
-}
 
 
 def choose_items(dataset: Dataset, count: int, seed: int) -> Sequence[Item]:

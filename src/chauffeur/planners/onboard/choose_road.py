@@ -115,7 +115,7 @@ def choose_overtake(meaning: Meaning, options: Options) -> Chosen | Declined:
             "that is not enough to overtake it."
         )
     side = meaning.direction if meaning.direction in ("left", "right") else None
-    numbers = {"target_speed_mps": target, "headway_pass_s": options.headway(0.5), "clear_m": _CLEAR_M}
+    numbers = {"target_speed_mps": target, "headway_pass_s": options.headway(0.2), "clear_m": _CLEAR_M}
     settings = (("target_speed_mps", round(target, 2)),)
     does = f"at up to {speed_words(target)}, until we are {number(_CLEAR_M)} m ahead of it"
     if side is None:
