@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from chauffeur.bench.lampilot.report import comparison_table, run_table, summarise
+from chauffeur.bench.lampilot.report import comparison_lines, family_lines, markdown, summarise
 from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig, choose_items
 from chauffeur.bench.store import RowStore
 from chauffeur.concept import ConfigError, DataError, Plan, PlannerError, PlanRequest, Program, Thoughts
@@ -93,8 +93,8 @@ def test_outcomes_and_causes_are_apart_and_the_denominator_is_fixed(tmp_path: Pa
     again = _run(tmp_path, dataset, planner)
     assert {r["item"]: r for r in again} == rows
     assert planner.asked == asked + 1
-    assert "lane change" in run_table(again)
-    assert "*paper:* Human driver" in comparison_table([("scripted", again)])
+    assert "lane change" in markdown(*family_lines(again))
+    assert "paper: Human driver" in markdown(*comparison_lines("scripted", again))
 
 
 def test_a_run_folder_keeps_its_configuration(tmp_path: Path, dataset: Dataset) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -56,16 +56,14 @@ def lampilot(
     concurrency: Annotated[int, typer.Option(min=1, help="Planner calls in flight.")] = 8,
 ) -> None:
     """LaMPilot-Bench (seed Tab. IV): completion, collisions and scores of a planner that follows instructions."""
-    from rich.console import Console
-    from rich.markdown import Markdown
-
-    from chauffeur.bench.lampilot.report import comparison_table, run_table
+    from chauffeur.bench.lampilot.report import comparison_lines, family_lines
     from chauffeur.bench.lampilot.rollout import BASELINES
     from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
+    from chauffeur.cli.console import stdout
     from chauffeur.planners.registry import make_planner
     from chauffeur.worlds.highway.dblv1 import load_dataset
 
-    console = Console()
+    console = stdout()
     if setting not in ("few-shot", "zero-shot"):
         raise ConfigError(f"Unknown setting {setting!r}.", hint="Use few-shot or zero-shot.")
     dataset = load_dataset(data)
@@ -88,14 +86,28 @@ def lampilot(
             bar.stop()
             console.print(f"Stopped. What is done is kept in {folder}; run the same command to go on.")
             raise typer.Exit(130) from None
-    console.print(Markdown(run_table(rows)))
-    console.print(Markdown(comparison_table([(planner, rows)])))
+    _table(console, "By task family", *family_lines(rows))
+    _table(
+        console, "Beside the rows that the paper printed (its own items and machines)", *comparison_lines(planner, rows)
+    )
     model = "" if maker is None else f", model {maker.model}"
     console.print(
         f"Planner {planner}{model}; data sha256 {dataset.sha256[:12]}; draw seed {seed}; limits {config.limits.name}; "
         "scores in points, rates in %; simulated drives (highway-env). Rows marked *paper* are the paper's own."
     )
     console.print(f"Rows: {folder / 'results.jsonl'}")
+
+
+def _table(console: Console, title: str, header: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    for i, name in enumerate(header):
+        table.add_column(name.replace(" ", "\n"), justify="right" if i else "left", vertical="bottom", no_wrap=True)
+    for line in lines:
+        table.add_row(*line)
+    console.print(table)
+    console.print()
 
 
 @contextmanager

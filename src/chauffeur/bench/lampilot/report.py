@@ -110,20 +110,24 @@ def markdown(header: Iterable[str], lines: Iterable[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in [names, rule, *lines])
 
 
-def run_table(rows: Sequence[Row]) -> str:
+Table = tuple[tuple[str, ...], list[list[str]]]
+"""(header, lines) of a table, every cell as text."""
+
+
+def family_lines(rows: Sequence[Row]) -> Table:
     """A run by family, with causes."""
     lines = [
         [s.label, str(s.items), *cells(s), *map(str, (s.policy_failed, s.infra_failed, s.refused, s.fallback_used))]
         for s in summaries(rows)
     ]
-    return markdown(("Family", "Items", *COLUMNS, *_CAUSES), lines)
+    return ("Family", "Items", *COLUMNS, *_CAUSES), lines
 
 
-def comparison_table(runs: Sequence[tuple[str, Sequence[Row]]]) -> str:
+def comparison_lines(name: str, rows: Sequence[Row], *more: tuple[str, Sequence[Row]]) -> Table:
     """Runs in the columns of the seed's Tab. IV, the published rows below them, marked as the paper's."""
-    lines = [[name, str(len(rows)), *cells(summarise(name, rows))] for name, rows in runs]
+    lines = [[label, str(len(found)), *cells(summarise(label, found))] for label, found in [(name, rows), *more]]
     for method, setting, collision, *points in TABLE_IV:
         label = method if setting == "-" else f"{method}, {setting}"
         items = "110" if setting == "human feedback" else "98"
-        lines.append([f"*paper:* {label}", items, f"{collision:.2f}", *(f"{p:.1f}" for p in points)])
-    return markdown(("Method", "Items", *COLUMNS), lines)
+        lines.append([f"paper: {label}", items, f"{collision:.2f}", *(f"{p:.1f}" for p in points)])
+    return ("Method", "Items", *COLUMNS), lines

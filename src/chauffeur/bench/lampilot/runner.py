@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from chauffeur.bench.lampilot.families import family_of
-from chauffeur.bench.lampilot.report import run_table
+from chauffeur.bench.lampilot.report import family_lines, markdown
 from chauffeur.bench.lampilot.rollout import (
     BASELINES,
     ROLLOUT_VERSION,
@@ -132,6 +132,8 @@ class LampilotRun:
             self._roll_out(pool, progress)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
+            for worker in multiprocessing.active_children():  # a rollout cut short is done again; do not wait for it
+                worker.terminate()
             raise
         else:
             pool.shutdown()
@@ -219,7 +221,7 @@ class LampilotRun:
         rows = [self._result(item) for item in self.items]
         write_text(self.folder / "results.jsonl", "".join(json.dumps(r, ensure_ascii=False) + "\n" for r in rows))
         write_text(self.folder / "provenance.json", json.dumps(self.provenance(), indent=1))
-        write_text(self.folder / "table.md", run_table(rows) + "\n")
+        write_text(self.folder / "table.md", markdown(*family_lines(rows)) + "\n")
         return rows
 
     def _result(self, item: Item) -> Row:

@@ -50,7 +50,7 @@ _SOME = r"(?:some|more|a (?:bit|little|lot|tad|touch)(?: of)?(?: more)?|plenty o
 _ROOM = r"(?:space|room|distance|gap|air|buffer|clearance|headway|cushion|spacing)"
 _MOVE = (
     r"(?:go|get|move|drive|navigate|swing|steer|zip|slip|scoot|squeeze|blow|zoom|speed|cruise|race|shoot|run|make|cut"
-    r"|push|maneuver|manoeuvre|fly|slide|hop|nip|whip|dart|work|take|bring)(?:ing|s)?"
+    r"|push|maneuver|manoeuvre|fly|slide|hop|nip|whip|dart|work|take|bring|jump|leap)(?:ing|s)?"
 )
 
 _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
@@ -72,7 +72,7 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     (r"\bpull(?:ing|s)? (?:\w+ ){0,3}?over\b|\bpull(?:ing)? (?:off|aside|in)\b|\bpull (?:to|on to|onto|into) (?:the )?(?:side|shoulder)\b", "act", "pull_over", 0, "", 2.0),
     (r"\bshoulder\b", "act", "pull_over", 0, "", 1.5),
     (r"\b(?:drop|let|put) (?:me|us|him|her|them|my \w+) (?:off|out|here)\b|\bdropp?(?:ing)? (?:me|us)\b|\bget (?:me )?off (?:the |this )?(?:road|highway|motorway|freeway)\b|\b(?:want|need|like|have) to get out\b", "act", "pull_over", 0, "", 1.5),
-    (r"\bpark(?:ing|ed)?\b|\bmove to the side\b|\bget out of the car\b", "act", "pull_over", 0, "", 1.2),
+    (r"\bpark(?:ing|ed)?\b|\bmove to the side\b|\b(?:stop|park|halt) (?:\w+ ){0,3}?(?:on|at|to) the side\b|\b(?:place|spot) to (?:stop|park)\b(?: on the side)?|\bget out of the car\b", "act", "pull_over", 0, "", 1.2),
     # straight on
     (r"\bnot (?:\w+ )?(?:deviate|stray|leave|depart|diverge|swerve|divert|veer)\w*(?: off)?(?: from)? (?:\w+ ){0,2}?(?:path|course|route|direction|way|heading)\b", "act", "turn", 0, "straight", 2.5),
     (r"\b(?:not|never|no|without|avoid|refrain from)(?: \w+){0,2}? (?:tak(?:e|ing) |mak(?:e|ing) )?(?:any |a )?(?:turn|turns|turning)\b(?! (?:\w+ ){0,3}(?:left|right)| it| up| down| on| off| around)", "act", "turn", 0, "straight", 2.0),
@@ -80,6 +80,8 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     (r"\b(?:go|get|drive|pass|proceed|continue|keep|head|carry|move|travel|run|cut)(?:ing)? (?:on |right |directly |clean )?(?:through|across|over) (?:the |this |that )?(?:\w+ )?junction\b|\bcross(?:ing)?(?: over)? (?:the |this )?(?:\w+ )?junction\b", "act", "turn", 0, "straight", 1.5),
     (r"\b(?:directly|dead) (?:ahead|forward)\b|\bahead only\b|\b(?:proceed|continue|go|keep going|head|carry on|move|drive|keep|keep moving|keep driving)(?: on)? (?:ahead|forwards?|onwards?)\b(?! of)", "act", "turn", 0, "straight", 1.0),
     # lanes and sides (patterns with a side)
+    (r"\b(?:return|(?:go|come|move|get|merge|pull|steer|switch|change) back|back)(?: over)?(?: in| into| to)? (?:your|our|the|this|my) ?(?:own |original |previous |old |first |same |initial )?lane\b|\b(?:go|come|move|pull|merge) back in\b", "act", "lane", 0, "home", 1.2),
+    (r"\b(?:get|move|come|pull) out of (?:this|the|our) lane\b|\bmerge(?: (?:in|into|with|onto))?(?: the)?(?: traffic| highway| motorway| road)?$", "act", "lane", 0, "", 1.0),
     (r"\bnot (?:\w+ )?(?:leave|leaving|depart|exit)(?: from)? (?:\w+ ){0,2}?lane\b", "act", "lane", 0, "hold", 1.5),
     (rf"#\d+ (?:over )?to (?:the |your )?{_SIDE}\b", "act", "lane", 0, "", 1.4),
     (rf"\b(?:edge )?{_SIDE} (?:hand )?(?:side )?lanes?\b(?: change)?", "act", "lane", 0, "", 1.5),
@@ -96,6 +98,8 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     (r"\b(?:chang|switch|swap|shift)\w* (?:\w+ )?lanes?\b|\blane change\b|\b(?:other|next|adjacent|neighbou?ring|another|different|faster|quicker|free|clear|emptier) lane\b|\b(?:move|get|scoot|shift|slide) over\b", "act", "lane", 0, "", 1.2),
     (r"\b(?:stay|keep|remain|stick|hold|continue)(?:ing)?(?: on| to| with)? (?:in )?(?:the |this |that |your |our |my |same |current |present |own )*lane\b|\blane keeping\b|\bkeep lane\b|\bno lane changes?\b", "act", "lane", 0, "hold", 1.5),
     (r"\b(?:middle|cent(?:er|re)) lane\b", "act", "lane", 0, "middle", 1.2),
+    # pedals used harshly
+    (r"\b(?:brak|accelerat)\w* (?:\w+ )?(?:so |too |that |this |very )(?:hard|harshly|abruptly|suddenly|late)\b|\b(?:hard|harsh|sudden) (?:braking|acceleration|stops)\b", "style", "style", 0, "comfort", 1.0),
     # speed: named targets
     (r"\bas fast as (?:is |it is |you are |we are )?(?:allowed|legal(?:ly)?(?: possible| allowed)?|permitted)\b", "act", "speed", 0, "limit", 1.5),
     (rf"\bas (?:fast|quick|slow) as {VEHICLE}|\bsame (?:speed|pace) as\b|\bmatch(?:ing)?\b(?: \w+){{0,4}}? (?:{_NOUNS}|speed|pace|flow)\b(?: of {VEHICLE})?|\bkeep(?:ing)? (?:up|pace) with\b|\b(?:with )?the flow(?: of traffic)?\b|\bflow of traffic\b|\b(?:at )?the (?:speed|pace) of {VEHICLE}|\blike every(?:one|body) else\b|\badapt to (?:the )?traffic\b", "act", "speed", 0, "match", 1.5),
@@ -107,7 +111,7 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     (r"\bslow(?:ing|s)? (?:it |us |things |the \w+ |her |this thing |your \w+ |that |a (?:bit|little|touch) )?down\b|\b(?:slower|decelerat(?:e|es|ing|ion)|slacken|brak(?:e|es|ing)|slow up)\b|\b(?:back|eas(?:e|ing)|lift|let|lay|take (?:your |the )?foot|come) (?:up |off )(?:on |of )?(?:the )?(?:gas|throttle|accelerator|pedal|speed)\b|\beas(?:e|ing) (?:up|off)\b|\blet up\b|\b(?:off|less) (?:the )?(?:gas|throttle)\b|\btake it down\b|\bcool it\b|\bhold your horses\b|\bwhoa\b|\bthrottle (?:back|down)\b|\bdial (?:it|things) (?:back|down)\b|\btake (?:it|things) slow(?:ly|er)?\b|^slow(?: [.,!]|$)|\bturn it down\b", "act", "speed", -1, "", 1.2),
     # gaps: changes
     (rf"\b(?:give|leave|allow) (?:\w+ ){{0,6}}?less (?:\w+ )?{_ROOM}\b|\bclos(?:e|ing) (?:up |down )?(?:the|that|this|our) (?:\w+ )?{_ROOM}\b|\bclose(?:r|st)\b|\bnearer\b|\bclose (?:in|up)\b(?: on)?|\bclosing in\b|\bcatch(?:ing)? up\b|\btighten(?: (?:it )?up)?\b|\bmove up(?: on| behind)?\b|\btailgate\b|\bget (?:right |up )+behind\b|\bsnug\w*\b", "act", "gap", -1, "", 1.2),
-    (rf"\b(?:giv|leav|allow|mak)(?:e|ing)? (?:\w+ ){{0,7}}?{_ROOM}\b|\b(?:further|farther)\b(?: (?:back|away|behind|off|apart|from))?|\bback(?:ing)? (?:off|away)\b|\b(?:drop|fall|hang|pull|hold|stay|keep|ease|step|stand|slip|lay)(?:ping|ing)? (?:\w+ ){{0,3}}?back\b(?! (?:on|in|into|to (?:the )?(?:left|right|lane)))|\bkeep (?:your|some|more|a|safe|good|proper|a safe|a good|a proper|a bit of) distance\b(?! (?:of|at|to)\b| #)|\b(?:keep|stay|get) (?:well |far )?away\b|\bdistance (?:yourself|us|ourselves)\b|\bopen(?:ing)? (?:up )?(?:the|a|some|that) (?:\w+ )?(?:gap|space|room|distance)\b|\bbreathing (?:room|space)\b|\bsafer? (?:following )?distance\b(?! of)|\bdistance from\b(?! #)|\b{_SOME} {_ROOM}\b(?= please|$| [.,!]| behind| between| to| from| ahead)", "act", "gap", 1, "", 1.2),
+    (rf"\b(?:giv|leav|allow)(?:e|ing)? (?:\w+ ){{0,7}}?{_ROOM}\b(?! (?:\w+ )?(?:less|smaller|shorter|tighter|narrower))|\bmak(?:e|ing) (?:some |more )(?:room|space)\b|\b(?:further|farther)\b(?: (?:back|away|behind|off|apart|from))?|\bback(?:ing)? (?:off|away)\b|\b(?:drop|fall|hang|pull|hold|stay|keep|ease|step|stand|slip|lay)(?:ping|ing)? (?:(?!so|too|that|this|far)\w+ ){{0,3}}?back\b(?! (?:on|in|into|to (?:the )?(?:left|right|lane)))|\bkeep (?:your|some|more|a|safe|good|proper|a safe|a good|a proper|a bit of) distance\b(?! (?:of|at|to)\b| #)|\b(?:keep|stay|get) (?:well |far )?away\b|\bdistance (?:yourself|us|ourselves)\b|\bopen(?:ing)? (?:up )?(?:the|a|some|that) (?:\w+ )?(?:gap|space|room|distance)\b|\bbreathing (?:room|space)\b|\bsafer? (?:following )?distance\b(?! of)|\bdistance from\b(?! #)|(?<!there is )(?<!have )\b{_SOME} {_ROOM}\b(?= please|$| [.,!]| behind| between| to| from| ahead)", "act", "gap", 1, "", 1.2),
     (rf"\bfollow(?:ing)? {VEHICLE}(?! (?:\w+ ){0,2}(?:close|tight))|\b(?:stay|remain|keep|stick|tuck in|sit|wait)(?:ing)? behind\b", "act", "follow", 0, "", 0.9),
     # halting
     (r"\b(?:stop|halt|freeze|standstill)(?:ping|ped|s)?\b|\bcome to (?:a )?(?:rest|stop|halt)\b|\bemergency (?:stop|brake|braking)\b|\bslam on the brakes\b|\bwait (?:here|at)\b|\bpull up\b|\bstopsign\b", "act", "stop", 0, "", 1.0),
@@ -126,8 +130,8 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     (r"\b(?:close|closely|near|tight|tightly|tailgating|glued|hugging|kissing|crowding|bumper to bumper|breathing down|sniffing|cramped)\b|\b(?:on|up|riding|in) (?:\w+ ){0,2}(?:bumper|tail|heels|rear end|backside|trunk|exhaust)\b|\bon top of (?:him|her|them|that|this|the|it)\b|\bbumper\b", "state", "gap", -1, "", 1.0),
     (r"\b(?:far (?:back|behind|away|off|from)|far|distant|lagging|falling behind)\b(?! (?:more|less|faster|slower|too|better))", "state", "gap", 1, "", 1.0),
     # changes that need a noun
-    (r"\b(?:increas\w+|rais(?:e|ing)|boost\w*|bump(?:ing)? (?:\w+ )?up|bump|ramp(?:ing)? (?:\w+ )?up|enhanc\w+|elevat\w+|grow|enlarg\w+|expand\w*|extend\w*|widen\w*|lengthen\w*|stretch\w*|add(?:ing)?|gain\w*|augment\w*|escalat\w+|heighten\w*|amplif\w+|magnif\w+|(?:turn|crank|push|bring|jack|nudge|dial|notch|take) (?:\w+ ){0,3}?up|(?:go|get) up|up(?= (?:the|your|our|my|it|to|by))|double|triple|grow\w*|broaden\w*|more|greater|bigger|larger|higher|longer|wider|additional|extra)\b", "verb", "speed", 1, "", 1.0),
-    (r"\b(?:decreas\w+|reduc\w+|lower\w*|lessen\w*|cut(?:ting)?|drop(?:ping)?|diminish\w*|shrink\w*|shorten\w*|shorter|narrow\w*|trim\w*|subtract\w*|deduct\w*|(?:take|knock|shave|scrub) (?:[\w#]+ )?off|(?:bring|dial|turn|push|take|wind|notch|go|get|come) (?:\w+ ){0,3}?down|down(?= (?:to|by))|scale back|minimi[sz]\w*|contract\w*|curtail\w*|moderat\w+|halv\w+|less|smaller|lower|tighter|fewer|compress\w*|drop|shed(?:ding)?)\b", "verb", "speed", -1, "", 1.0),
+    (r"\b(?:increas\w+|rais(?:e|ing)|lift(?:ing)?(?! off)|hik(?:e|ing)|(?:step|scale) up|boost\w*|bump(?:ing)? (?:\w+ )?up|bump|ramp(?:ing)? (?:\w+ )?up|enhanc\w+|elevat\w+|grow|enlarg\w+|expand\w*|extend\w*|widen\w*|lengthen\w*|stretch\w*|add(?:ing)?|gain\w*|augment\w*|escalat\w+|heighten\w*|amplif\w+|magnif\w+|(?:turn|crank|push|bring|jack|nudge|dial|notch|take) (?:\w+ ){0,3}?up|(?:go|get) up|up(?= (?:the|your|our|my|it|to|by))|double|triple|grow\w*|broaden\w*|more|greater|bigger|larger|higher|longer|wider|additional|extra)\b", "verb", "speed", 1, "", 1.0),
+    (r"\b(?:decreas\w+|reduc\w+|lower\w*|lessen\w*|cut(?:ting)?|drop(?:ping)?|diminish\w*|shrink\w*|shorten\w*|shorter|narrow\w*|trim\w*|subtract\w*|deduct\w*|slash\w*|(?:scale|tone) down|eas(?:e|ing)(?= (?:the |your |our )?speed)|(?:knock|pull|bring|throttle) (?:\w+ ){0,2}back|(?:take|knock|shave|scrub) (?:[\w#]+ )?off|(?:bring|dial|turn|push|take|wind|notch|go|get|come) (?:\w+ ){0,3}?down|down(?= (?:to|by))|scale back|minimi[sz]\w*|contract\w*|curtail\w*|moderat\w+|halv\w+|less|smaller|lower|tighter|fewer|compress\w*|drop|shed(?:ding)?)\b", "verb", "speed", -1, "", 1.0),
     (r"\b(?:speed|velocity|pace|cruise|cruising|tempo|speedometer)\b", "noun", "speed", 0, "", 0.6),
     (rf"\b(?:following |time |safety )*(?:{_ROOM}s?|separation|interval|margin|distance)\b", "noun", "gap", 0, "", 0.6),
     (r"\b(?:big|large|huge|wide|long|great|high|generous|excessive|enormous)\b", "adj", "speed", 1, "", 0.8),
@@ -137,7 +141,7 @@ _ROWS: tuple[tuple[str, Kind, Manoeuvre, Change, str, float], ...] = (
     (r"\bjunction\b", "place", "turn", 0, "", 0.1),
     # leaving things
     (r"\b(?:resume|carry on|as you were|back to normal|normal driving|drive normal(?:ly)?|never ?mind|cancel(?: that| it)?|forget (?:it|that|about it)|undo(?: that)?|lets (?:go|roll|drive)|start (?:driving|moving)|drive on|as before|move on|go ahead|keep (?:going|driving|moving|rolling)|go on|continue|proceed|forget what i said|scratch that)\b|^go$|^drive$", "resume", "resume", 0, "", 0.7),
-    (r"\bkeep (?:it |things |everything )?(?:like (?:this|that)|this way|as (?:it )?is|steady|constant|the same|exactly)\b|\b(?:stay|drive|just) (?:like (?:this|that)|as you are|put)\b|\b(?:this|that|it) is (?:\w+ )?(?:fine|good|perfect|great|nice|ok|lovely)\b|\b(?:leave it|do nothing|change nothing|nothing|hold steady|perfect|no changes?|keep it up|steady)\b|\bnot change (?:a thing|anything)\b", "keep", "keep", 0, "", 0.7),
+    (r"\bkeep (?:it |things |everything )?(?:there|like (?:this|that)|this way|as (?:it )?is|steady|constant|the same|exactly)\b|\b(?:stay|drive|just) (?:like (?:this|that)|as you are|put)\b|\b(?:this|that|it) is (?:\w+ )?(?:fine|good|perfect|great|nice|ok|lovely)\b|\b(?:leave it|do nothing|change nothing|nothing|hold steady|perfect|no changes?|keep it up|steady)\b|\bnot change (?:a thing|anything)\b", "keep", "keep", 0, "", 0.7),
 )  # fmt: skip
 
 

@@ -57,6 +57,8 @@ def _without_reasons(steps: list[tuple[Meaning, bool]]) -> list[tuple[Meaning, b
 def _without_exclusions(steps: list[tuple[Meaning, bool]]) -> list[tuple[Meaning, bool]]:
     """ "Not left, right": the excluded side falls away; "don't change lanes, just slow down": so does the held lane."""
     steps = [s for s in steps if s[0].variant != "not"]
+    if any(m.manoeuvre not in ("speed", "gap") for m, _ in steps):
+        steps = [s for s in steps if s[0].variant != "bounded"]  # "without speeding, get past him"
     active = [s for s in steps if s[0].variant not in ("hold", "no overtaking")]
     held = {m.manoeuvre for m, _ in active}
     if not active:
@@ -87,6 +89,8 @@ def _join(a: Meaning, b: Meaning, *, later: bool) -> Meaning | NotUnderstood | N
             return _into(a, b, (kinds - {"speed"}).pop())
     if kinds == {"speed", "overtake"} and a.manoeuvre == "speed" and a.change > 0 and a.amount is None and not later:
         return replace(_into(a, b, "overtake"), manner="swift")
+    if kinds == {"yield", "gap"}:
+        return _into(a, b, "yield")
     if kinds == {"follow", "gap"}:
         return _into(a, b, "gap")
     if kinds == {"follow", "speed"} and not later:
@@ -132,6 +136,8 @@ def _same(a: Meaning, b: Meaning, *, later: bool) -> Meaning | NotUnderstood | N
 def _lane_and_overtake(a: Meaning, b: Meaning, *, later: bool) -> Meaning | NotUnderstood | None:
     """A lane named before the overtaking is the way past; one named after it is the way back, if it differs."""
     overtake, lane = (a, b) if a.manoeuvre == "overtake" else (b, a)
+    if lane.variant == "home":
+        return replace(_into(a, b, "overtake"), variant="return")
     if overtake is a and (later or lane.variant == "return") and lane.direction != a.direction:
         return None
     if overtake.direction is not None and lane.direction not in (None, overtake.direction):

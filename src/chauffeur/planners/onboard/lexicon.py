@@ -49,7 +49,7 @@ REWRITES: tuple[tuple[str, str], ...] = (
     (r"\bstop sign\b", "stopsign"),
     (r"\bspeed (?:bumps?|cameras?)\b|\bspeeding tickets?\b", "obstacle"),
     (r"\b(?:adaptive )?cruise control\b|\badaptive cruise\b|\bacc\b", "cruise"),
-    (r"\b(?:t )?(?:intersections?|crossroads?|cross roads?|junctions?|crossings?|four way)\b", "junction"),
+    (r"\b(?:t )?(?:intersections?|crossroads?|cross roads?|junctions?|crossings?|four way|forks?|roundabouts?)\b", "junction"),
     (r"\b(?:traffic|red|green|stop) (?:lights?|signals?)\b|(?<=the )(?:next )?(?:lights?|signals?|corner|side street)\b", "junction"),
     (
         r"\b(?:emergency|breakdown|stopping|safety) (?:lane|bay|strip|area)\b|\bhard shoulder\b|\bshoulder lane\b"
@@ -81,7 +81,7 @@ REWRITES: tuple[tuple[str, str], ...] = (
     (r"\b(?:i|we|he|she|they|have|has|had|just) left (?=my|our|the|his|her|home|late|without|for|at|from|something)", " "),
     # politeness and rhetoric: a "not" in them negates nothing
     (r"\bwould you mind not\b|\bdo you mind not\b", "please not"),
-    (r"\b(?:would|do) you mind\b|\bif you (?:do|would) not mind\b|\bi (?:would|do) not mind if\b|\bif i may\b", "please"),
+    (r"\b(?:would|do) you mind\b|\bif you (?:do|would) not mind\b|\bi (?:would|do) not mind(?: if|(?= (?:go|driv|chang|overtak|turn|slow|speed)\w*ing\b))|\bif i may\b", "please"),
     (r"\bwhy (?:not|do not (?:you|we)|can not (?:you|we)|are not (?:you|we)(?= (?:overtak|pass|chang|turn)))\b", "please"),
     (r"\bwhy do(?:es)? not\b", "please"),
     (r"\b(?:can|could|will|would|should|shall) not (?:you|we)\b|\b(?:can|could|will|would|should) (?:you|we) not just\b", "please"),
@@ -99,6 +99,7 @@ REWRITES: tuple[tuple[str, str], ...] = (
 )  # fmt: skip
 """Applied in order to the token string; later rules and the cues see the replacement."""
 
+_MINUS = re.compile(r"(?<![\w.])[-−](?=\d)")
 _NUMBER_COMMA = re.compile(r"(?<=\d),(?=\d{3}\b)")
 _REWRITES = tuple((re.compile(pattern), by) for pattern, by in REWRITES)
 _CONTRACT = tuple((re.compile(pattern), by) for pattern, by in _CONTRACTIONS)
@@ -109,6 +110,7 @@ def plain(text: str) -> str:
     """Lower case, straight quotes, no accents, contractions written out, hyphens and slashes opened."""
     text = unicodedata.normalize("NFKC", text).lower()
     text = text.replace("’", "'").replace("‘", "'").replace("`", "'").replace("…", " . ").replace("—", " , ")
+    text = _MINUS.sub("minus ", text)
     text = "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
     text = _NUMBER_COMMA.sub("", text)
     for pattern, by in (*_CONTRACT, *_UNITS):

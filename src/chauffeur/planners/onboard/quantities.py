@@ -178,6 +178,9 @@ def _digits(token: str) -> float | None:
 def _number(tokens: list[str], i: int) -> tuple[float, int, bool] | None:
     """Number at i as (value, next index, whether it counts without a unit)."""
     word = tokens[i]
+    if word in ("minus", "negative") and i + 1 < len(tokens) and tokens[i + 1] not in ("minus", "negative"):
+        positive = _number(tokens, i + 1)
+        return None if positive is None else (-positive[0], positive[1], positive[2])
     value = _digits(word)
     if value is not None:
         return _tail(tokens, value, i + 1, sure=True)

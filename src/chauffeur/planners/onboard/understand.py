@@ -30,9 +30,9 @@ def understand(text: str) -> Reading | NotUnderstood:
     found: list[Meaning] = []
     hard: list[bool] = []
     for clause in clauses:
-        for meaning in meanings_of(clause):
+        for index, meaning in enumerate(meanings_of(clause)):
             found.append(meaning)
-            hard.append(clause.hard and len(found) > 1)
+            hard.append(clause.hard and index == 0 and len(found) > 1)
     if not found:
         return doubt_without_meaning(text, clauses)
     if is_question(text, found):

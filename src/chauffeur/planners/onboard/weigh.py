@@ -25,7 +25,7 @@ _TOO = re.compile(
     r"\b(?:too|overly|excessively|awfully|terribly|ridiculously|painfully|insanely|dangerously|so|this|that|such|such a)"
     r"(?: (?:damn|darn|freaking|bloody|very|much))? $"
 )
-_NOT_TOO = re.compile(r"\bnot too $")
+_MERE_BOUND = re.compile(r"\b(?:not too|without(?: being| going| driving)?(?: too)?) $")
 _STATEMENT = re.compile(
     r"\b(?:you|we|i|it|this|that|they|he|she|car|vehicle|truck|driving|speed|pace|ride|there|gap|distance|everything)\b"
     r"(?: \w+){0,2}? (?:am|is|are|was|were|have|has|feels?|seems?|looks?|drive|drives|driving|going|keep|follow)\b"
@@ -39,6 +39,7 @@ _HOLD = re.compile(r"\b(?:keep|maintain|hold|stay|remain|stick|retain|preserve|c
 _GAP_WORDS = re.compile(
     r"\b(?:behind|following|back|away|from|closer|headway|gap|distance|between|ahead|follow|within)\b"
 )
+_LEAVE = re.compile(r"\b(?:leave|leaving|allow)\b")
 _SPEED_WORDS = re.compile(
     r"\b(?:do|doing|go|going|drive|driving|hit|run|cruise|cruising|speed|at|faster|slower|hold|keep|travel)\b"
 )
@@ -54,9 +55,8 @@ def meanings_of(clause: Clause) -> list[Meaning]:
     out: list[Meaning] = []
     for meaning in (*_acts(clause), *_pairs(clause), *_states(clause)):
         _put(out, meaning)
-    if not out or not any(m.manoeuvre not in ("speed", "gap", "follow") for m in out):
-        for meaning in _quantities_alone(clause, out):
-            _put(out, meaning)
+    for meaning in _quantities_alone(clause, out):
+        _put(out, meaning)
     _sides(clause, out)
     big = any(m.manoeuvre in _BIG or (m.manoeuvre in ("speed", "gap") and m.score >= 1.2) for m in out)
     for meaning in _styles(clause):
@@ -235,7 +235,8 @@ def _noun_for(verb: Evidence, nouns: list[Evidence], clause: Clause) -> Manoeuvr
 
 
 def _states(clause: Clause) -> Iterator[Meaning]:
-    acts = {e.cue.manoeuvre for e in clause.evidence if e.cue.kind in ("act", "verb")}
+    nouns = any(e.cue.kind == "noun" and e.cue.weight >= 0.5 for e in clause.evidence)
+    acts = any(e.cue.kind == "act" or (e.cue.kind == "verb" and nouns) for e in clause.evidence)
     for e in clause.evidence:
         if e.cue.kind != "state" or e.cue.manoeuvre == "style":
             continue
@@ -247,7 +248,7 @@ def _states(clause: Clause) -> Iterator[Meaning]:
         if found is not None and (found[0].frame != "factor" or change):
             yield _meaning(clause, e, change=found[1] or change, amount=found[0])
         else:
-            bounded = e.negated and _NOT_TOO.search(clause.text[: e.start]) is not None
+            bounded = e.negated and _MERE_BOUND.search(clause.text[: e.start]) is not None
             yield _meaning(clause, e, change=change, variant="bounded" if bounded else "" if change else "hold")
 
 
@@ -258,6 +259,8 @@ def _state_change(e: Evidence, clause: Clause) -> Change:
     before, after = clause.text[: e.start], clause.text[e.end :]
     if after.startswith(" enough"):
         return state if e.negated else 0
+    if before.endswith("less ") and not e.negated:
+        return opposite
     if e.negated:
         return state if _BE_NOT.search(before) and not _TOO.search(before) else opposite
     others = [o.end for o in clause.evidence if o.end <= e.start and o.cue.kind in ("act", "style")]
@@ -288,10 +291,12 @@ def _quantities_alone(clause: Clause, out: list[Meaning]) -> Iterator[Meaning]:
     """A speed is a wish by itself; a distance is one beside words of following; a bare number beside words of driving."""
     if any(m.amount is not None for m in out):
         return
+    big = any(m.manoeuvre not in ("speed", "gap", "follow") for m in out)
+    near = not big and _GAP_WORDS.search(clause.text) is not None
     dimensions: tuple[tuple[Manoeuvre, Dimension, bool], ...] = (
         ("speed", "speed", True),
-        ("gap", "distance", _GAP_WORDS.search(clause.text) is not None),
-        ("gap", "time", _GAP_WORDS.search(clause.text) is not None),
+        ("gap", "distance", near),
+        ("gap", "time", near or (not big and _LEAVE.search(clause.text) is not None)),
         ("speed", "bare", _SPEED_WORDS.search(clause.text) is not None and not out),
     )
     for what, dimension, fits in dimensions:

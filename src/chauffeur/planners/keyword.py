@@ -1,0 +1,155 @@
+"""The seeds' rule-based baseline: lists of substrings, each with a fixed answer (Talk2Drive's baseline condition).
+
+It is kept as a baseline to compare with, faults included: it looks for substrings, is blind to "not", to case and to
+word borders, and knows no numbers. "Do not speed up" makes it faster, "Is that right?" changes lanes, "It is breakfast
+time" contains "fast". Its original controls a vehicle by scripts with fixed numbers; here the same rules write programs
+over the driving APIs with the same numbers, 40, 50 and 30 km/h on a highway and 20, 30 and 15 km/h at an intersection.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
+from chauffeur.concept.units import MPS_PER_KMH
+
+VERSION = "keyword-v1"
+
+
+@dataclass(frozen=True, slots=True)
+class _Rule:
+    """Any of the substrings in the text means the intent."""
+
+    substrings: tuple[str, ...]
+    intent: str
+
+
+_HIGHWAY = (
+    _Rule(("left",), "lane.left"),
+    _Rule(("right",), "lane.right"),
+    _Rule(("fast", "speed up", "hurry", "accelerate", "quick", "rush", "late"), "speed.increase"),
+    _Rule(("slow", "brake", "decelerate", "careful", "sick"), "speed.decrease"),
+)
+_INTERSECTION = (
+    _Rule(("stop", "yield"), "stop"),
+    _Rule(("turn right", "right turn"), "turn.right"),
+    _Rule(("turn", "left"), "turn.left"),
+    _Rule(("straight",), "turn.straight"),
+    _Rule(("fast", "speed up", "hurry", "accelerate", "quick", "rush", "late"), "speed.increase"),
+    _Rule(("slow", "brake", "decelerate", "careful", "sick"), "speed.decrease"),
+)
+"""First rule that matches wins."""
+
+_SPEEDS_KMH = {
+    "highway": {"speed.increase": 50.0, "speed.decrease": 30.0, "": 40.0},
+    "intersection": {"speed.increase": 30.0, "speed.decrease": 15.0, "": 20.0},
+}
+
+_SPEED_PROGRAM = """def drive():
+    # Fixed speed of the rule.
+    set_target_speed({speed:.2f})
+    while True:
+        yield autopilot()
+"""
+_LANE_PROGRAM = """def drive():
+    # One lane to the {side}, when it is free.
+    ego = get_ego_vehicle()
+    set_target_speed({speed:.2f})
+    lane = get_{side}_lane(ego)
+    while not is_safe_enter(lane):
+        yield autopilot()
+    set_target_lane(lane)
+    while True:
+        yield autopilot()
+"""
+_TURN_PROGRAM = """def drive():
+    # Over the junction once the lanes that cross are free.
+    ego = get_ego_vehicle()
+    {api}()
+    set_target_speed({speed:.2f})
+    lanes = get_left_to_right_cross_traffic_lanes() + get_right_to_left_cross_traffic_lanes()
+    while True:
+        if get_speed_of(ego) < 1.0:
+            free = True
+            for lane in lanes:
+                if not is_safe_enter(lane):
+                    free = False
+            if free:
+                recover_from_stop()
+        yield autopilot()
+"""
+_STOP_PROGRAM = """def drive():
+    # Halt and stay.
+    set_target_speed(0.0)
+    while True:
+        yield autopilot()
+"""
+_TURN_APIS = {
+    "turn.left": "turn_left_at_next_intersection",
+    "turn.right": "turn_right_at_next_intersection",
+    "turn.straight": "go_straight_at_next_intersection",
+}
+
+
+class KeywordPlanner:
+    """Baseline planner: substring rules with fixed numbers."""
+
+    @classmethod
+    def from_spec(cls, argument: str) -> KeywordPlanner:
+        """The planner named `keyword`. Raises ConfigError for an argument: it has no variants."""
+        if argument:
+            raise ConfigError(f"The keyword planner has no variant {argument!r}.", hint="Write just: keyword")
+        return cls()
+
+    @property
+    def id(self) -> str:
+        """Registry name."""
+        return "keyword"
+
+    @property
+    def model(self) -> str:
+        """Rule set with its version."""
+        return VERSION
+
+    async def plan(self, request: PlanRequest) -> Plan:
+        """One plan by the first rule whose substring occurs; without one the speed stays what the scenario sets."""
+        begun = time.perf_counter()
+        text = request.instruction.text
+        world = "intersection" if request.context.situation.world == "intersection" else "highway"
+        intent, found = keyword_intent(text, world)
+        speeds = _SPEEDS_KMH[world]
+        speed = speeds.get(intent, speeds[""]) * MPS_PER_KMH
+        settings = (("target_speed_mps", 0.0 if intent == "stop" else round(speed, 2)),)
+        if found:
+            thoughts = f'The words contain "{found}", and the rule for it is {intent}.'
+        else:
+            thoughts = f"No rule matches; the fixed speed for this road is {speed:.2f} m/s."
+        return Plan(
+            thoughts=Thoughts(thoughts),
+            policy=Program(_program(intent, speed)),
+            intent=intent,
+            settings=settings,
+            planner=self.id,
+            model=self.model,
+            latency_s=time.perf_counter() - begun,
+        )
+
+
+def keyword_intent(text: str, world: str) -> tuple[str, str]:
+    """Intent of the first rule that matches and the substring that did; empty strings when none does."""
+    for rule in _INTERSECTION if world == "intersection" else _HIGHWAY:
+        for substring in rule.substrings:
+            if substring in text:
+                return rule.intent, substring
+    return "", ""
+
+
+def _program(intent: str, speed_mps: float) -> str:
+    if intent in _TURN_APIS:
+        return _TURN_PROGRAM.format(api=_TURN_APIS[intent], speed=speed_mps)
+    if intent.startswith("lane."):
+        return _LANE_PROGRAM.format(side=intent.removeprefix("lane."), speed=speed_mps)
+    if intent == "stop":
+        return _STOP_PROGRAM
+    return _SPEED_PROGRAM.format(speed=speed_mps)

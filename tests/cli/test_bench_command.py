@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from chauffeur.cli.main import app
+from chauffeur.worlds.highway.scenarios import BUILT_IN
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    scenario = next(s for s in BUILT_IN if s.id == "following")
+    samples = [
+        {"env": scenario.config, "eval": {"type": "ACCEvalbySpeed", "speed": 5}, "seed": seed}
+        for seed in (9, 19, 23, 24, 25, 29)
+    ]
+    (folder / "dec_abs_speed5.json").write_text(json.dumps({"commands": ["Go at 5 m/s."], "samples": samples}))
+    return folder
+
+
+def test_bad_options_are_named(data: Path, tmp_path: Path) -> None:
+    runner = CliRunner()
+    for arguments in (
+        ["--data", str(tmp_path / "nowhere")],
+        ["--data", str(data), "--planner", "onbord"],
+        ["--data", str(data), "--setting", "ten-shot"],
+    ):
+        assert runner.invoke(app, ["bench", "lampilot", *arguments]).exit_code != 0
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(data: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    command = [sys.executable, "-c", "from chauffeur.cli.main import run; run()", "bench", "lampilot"]
+    command += ["--data", str(data), "--planner", "idm", "--out", str(out), "--workers", "1"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    rows = out / "rollout.jsonl"
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and not (rows.exists() and rows.read_text().count("\n") >= 2):
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    text, _ = process.communicate(timeout=60)
+    assert process.returncode == 130, text
+    assert "run the same command to go on" in " ".join(text.split())
+    kept = rows.read_text().splitlines()
+    assert 2 <= len(kept) < 6
+
+    done = subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert rows.read_text().splitlines()[: len(kept)] == kept
+    results = [json.loads(line) for line in (out / "results.jsonl").read_text().splitlines()]
+    assert len(results) == 6
+    assert "Driving score" in done.stdout
