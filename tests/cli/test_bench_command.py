@@ -59,4 +59,4 @@ def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(data: Path, tmp_
     assert rows.read_text().splitlines()[: len(kept)] == kept
     results = [json.loads(line) for line in (out / "results.jsonl").read_text().splitlines()]
     assert len(results) == 6
-    assert "Driving score" in done.stdout
+    assert "paper: Human driver" in done.stdout

@@ -79,10 +79,10 @@ def summaries(rows: Sequence[Row]) -> list[Summary]:
 COLUMNS = (
     "Collision %",
     "Completion %",
-    "TTC points",
-    "SV points",
-    "TE points",
-    "Driving score points",
+    "TTC pt",
+    "SV pt",
+    "TE pt",
+    "Driving score pt",
 )
 _CAUSES = ("policy failed", "infra failed", "refused", "fallback used")
 

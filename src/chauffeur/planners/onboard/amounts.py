@@ -38,7 +38,10 @@ _BOUNDS: tuple[tuple[re.Pattern[str], Bound], ...] = tuple(
             r"|within|capp?e?d? (?:\w+ ){0,2}at|limit (?:\w+ ){0,2}?to|without exceeding)",
             "at_most",
         ),
-        (r"\b(?:at least|minimum(?: of)?|min(?: of)?|faster than|more than|above|over|further than|farther than)", "at_least"),
+        (
+            r"\b(?:at least|minimum(?: of)?|min(?: of)?|faster than|more than|above|over|further than|farther than)",
+            "at_least",
+        ),
     )
 )
 _OVER_LIMIT = re.compile(

@@ -49,7 +49,9 @@ def choose_gap(meaning: Meaning, options: Options) -> Chosen | Declined:
 def _named(meaning: Meaning, amount: Amount, now: float, options: Options) -> Chosen | Declined:
     value, assumed = distance_of(amount)
     if amount.bound == "at_most":
-        return _chosen(meaning, options, "gap.at_most", value, f"stay within {number(value)} m of the vehicle ahead", assumed)
+        return _chosen(
+            meaning, options, "gap.at_most", value, f"stay within {number(value)} m of the vehicle ahead", assumed
+        )
     if amount.bound == "at_least":
         does = f"never get closer than {number(value)} m to the vehicle ahead"
         return _chosen(meaning, options, "gap.at_least", value, does, assumed)
@@ -77,7 +79,9 @@ def _step(meaning: Meaning, now: float, options: Options) -> Chosen | Declined:
         factor, least = _WIDER.get(meaning.degree, _PLAIN_WIDER)
         gap = min(max(now * factor, now + least) + max(0.0, extra), _FARTHEST_M)
         if gap < now + 1.0:
-            return Declined(f"The vehicle ahead is {number(now)} m away already; further back I would lose sight of it.")
+            return Declined(
+                f"The vehicle ahead is {number(now)} m away already; further back I would lose sight of it."
+            )
         suffix = {BIT: "_bit", MUCH: "_much"}.get(meaning.degree, "")
         does = f"drop back from {number(now)} m to {number(gap)} m behind the vehicle ahead and keep that gap"
         return _chosen(meaning, options, f"gap.wider{suffix}", gap, does)
@@ -119,7 +123,9 @@ def choose_follow(meaning: Meaning, options: Options) -> Chosen | Declined:
     settings = (("time_headway_s", round(headway, 2)),)
     if meaning.variant == "no overtaking":
         filled = options.filled("follow.no_overtake", meaning.manner, time_headway_s=headway)
-        return Chosen(filled, "follow", f"stay in this lane and overtake nobody, {number(headway)} s behind", (), settings)
+        return Chosen(
+            filled, "follow", f"stay in this lane and overtake nobody, {number(headway)} s behind", (), settings
+        )
     if options.situation.front is None and options.front_known:
         return Declined(f"{_NOBODY} to follow.")
     filled = options.filled("follow.lead", meaning.manner, time_headway_s=headway)

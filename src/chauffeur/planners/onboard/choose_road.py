@@ -51,9 +51,7 @@ def choose_lane(meaning: Meaning, options: Options) -> Chosen | Declined:
     exemplar = f"lane.{side}_patient" if patient else f"lane.{side}"
     when = "as soon as nobody there has to brake noticeably" if patient else "as soon as there is room"
     does = f"change to the {side} lane {when}"
-    return Chosen(
-        options.filled(exemplar, meaning.manner), f"lane.{side}", does, assumed, lanes_moved=_STEPS[side]
-    )
+    return Chosen(options.filled(exemplar, meaning.manner), f"lane.{side}", does, assumed, lanes_moved=_STEPS[side])
 
 
 def _side(meaning: Meaning, options: Options) -> tuple[Literal["left", "right"] | None, tuple[str, ...]]:
@@ -168,9 +166,7 @@ def choose_turn(meaning: Meaning, options: Options) -> Chosen | Declined:
     }
     filled = options.filled(f"turn.{side}" + (f"_{manner}" if manner else ""), meaning.manner, **numbers)
     seen = "from the left and from the right"
-    does = (
-        f"halt at the stop sign, wait until nobody comes {seen}, and {_WORDS[side]} at {speed_words(target)}"
-    )
+    does = f"halt at the stop sign, wait until nobody comes {seen}, and {_WORDS[side]} at {speed_words(target)}"
     return Chosen(filled, f"turn.{side}", does, (), (("target_speed_mps", target),))
 
 
@@ -197,10 +193,14 @@ def choose_pull_over(meaning: Meaning, options: Options) -> Chosen | Declined:
     manner = meaning.manner if meaning.manner in ("gentle", "swift") else "smooth"
     rate = {"gentle": 1.8, "smooth": 2.5, "swift": 4.0}[manner]
     factor = {"gentle": 0.8, "smooth": 0.85, "swift": 1.0}[manner]
-    filled = options.filled(f"pull_over.{manner}", meaning.manner) 
+    filled = options.filled(f"pull_over.{manner}", meaning.manner)
     numbers = {**filled.numbers, "rate_mps2": rate, "factor": factor}
     moves = situation.lane_count - 1 - situation.lane_index
-    way = "halt here on the emergency lane" if moves == 0 else "move right to the emergency lane, lane by lane, and halt there"
+    way = (
+        "halt here on the emergency lane"
+        if moves == 0
+        else "move right to the emergency lane, lane by lane, and halt there"
+    )
     does = f"{way} with an even {number(rate)} m/s2"
     return Chosen(type(filled)(filled.id, numbers), "pull_over", does, (), (("target_speed_mps", 0.0),), moves)
 
@@ -220,7 +220,9 @@ def choose_stop(meaning: Meaning, options: Options) -> Chosen | Declined:
         does = f"halt at the stop sign, {number(situation.stop_sign_m)} m ahead, and stay there"
         return Chosen(filled, "stop", does, (), (("target_speed_mps", 0.0),))
     if situation.world == "highway":
-        return Declined("I do not stop in a lane of a highway, and there is no emergency lane. I can slow down if you want.")
+        return Declined(
+            "I do not stop in a lane of a highway, and there is no emergency lane. I can slow down if you want."
+        )
     filled = options.filled("stop.in_lane", meaning.manner, time_headway_s=headway)
     rate = number(filled.numbers["rate_mps2"])
     return Chosen(filled, "stop", f"halt here with an even {rate} m/s2", (), (("target_speed_mps", 0.0),))

@@ -75,9 +75,7 @@ def _named(meaning: Meaning, amount: Amount, options: Options) -> Chosen | Decli
         return _chosen(
             meaning, options, "speed.set_up", value, f"speed up to {speed_words(value)} and hold it", assumed
         )
-    return _chosen(
-        meaning, options, "speed.set_down", value, f"slow down to {speed_words(value)} and hold it", assumed
-    )
+    return _chosen(meaning, options, "speed.set_down", value, f"slow down to {speed_words(value)} and hold it", assumed)
 
 
 def _limit(meaning: Meaning, options: Options) -> Chosen:
@@ -135,7 +133,9 @@ def choose_style(meaning: Meaning, options: Options) -> Chosen | Declined:
     wanted = options.speed * share + options.leaning.speed_mps
     if share > 1.0:
         # In a hurry at the limit already, the gap is all that can be gained; never slower than now for a hurry
-        target = max(min(wanted, options.own_cap_mps), min(options.speed, options.cap_mps) + min(0.0, options.leaning.speed_mps))
+        target = max(
+            min(wanted, options.own_cap_mps), min(options.speed, options.cap_mps) + min(0.0, options.leaning.speed_mps)
+        )
     else:
         target = min(max(wanted, _SLOWEST_SHARE * options.sign_mps), options.speed, options.own_cap_mps)
     headway = min(options.headway(headway + options.leaning.headway_s), API_MAX_HEADWAY_S)
