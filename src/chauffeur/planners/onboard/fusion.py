@@ -84,9 +84,9 @@ def _join(a: Meaning, b: Meaning, *, later: bool) -> Meaning | NotUnderstood | N
     if kinds == {"speed", "gap"} and not (a.amount and b.amount):
         return _means(a, b)
     if "speed" in kinds and kinds & _ENDS_OF_SLOWING and not later:
-        speed = a if a.manoeuvre == "speed" else b
+        speed, end = (a, b) if a.manoeuvre == "speed" else (b, a)
         if speed.change < 0 and speed.amount is None:
-            return _into(a, b, (kinds - {"speed"}).pop())
+            return _into(a, b, end.manoeuvre)
     if kinds == {"speed", "overtake"} and a.manoeuvre == "speed" and a.change > 0 and a.amount is None and not later:
         return replace(_into(a, b, "overtake"), manner="swift")
     if kinds == {"yield", "gap"}:

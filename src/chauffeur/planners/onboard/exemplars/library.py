@@ -88,7 +88,7 @@ def _filled(step: Filled, *, whole: bool) -> str:
 
 
 def _sections(file: str) -> list[tuple[str, str]]:
-    text = resources.files(__package__).joinpath(f"{file}.lmp").read_text(encoding="utf-8")
+    text = resources.files("chauffeur.planners.onboard.exemplars").joinpath(f"{file}.lmp").read_text(encoding="utf-8")
     parts = re.split(r"^### (.+)\n", text, flags=re.MULTILINE)[1:]
     return list(zip(parts[::2], parts[1::2], strict=True))
 
