@@ -209,7 +209,9 @@ def test_what_the_person_names_is_not_edited() -> None:
 
 
 @pytest.mark.parametrize("limits", [Limits(), LAMPILOT_LIMITS, Limits(min_time_headway_s=0.9)])
-@pytest.mark.parametrize("words", ["faster", "closer", "15 m closer", "change lanes to the left", "overtake", "hurry up"])
+@pytest.mark.parametrize(
+    "words", ["faster", "closer", "15 m closer", "change lanes to the left", "overtake", "hurry up"]
+)
 def test_own_headways_stay_inside_the_limits(words: str, limits: Limits) -> None:
     text = source(plan(words, limits=limits))
     for line in text.splitlines():

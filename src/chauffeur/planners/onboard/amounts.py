@@ -21,29 +21,30 @@ _TO = re.compile(
     r"\b(?:to|of|at|within|until|is|be|doing|do|down to|up to)(?: (?:about|around|roughly|exactly|be|a|just|some))* $"
 )
 _ABOUT = r"(?: (?:about|around))? $"
-_BOUNDS: tuple[tuple[re.Pattern[str], Bound], ...] = tuple(
-    (re.compile(pattern + _ABOUT), bound)
-    for pattern, bound in (
-        (
-            r"\b(?:not|never|no) (?:\w+ ){0,4}?(?:(?:faster|quicker|higher|more|further|farther|longer) than|exceed\w*|above"
-            r"|over|past)",
-            "at_most",
+_NOT = r"\b(?:not|never|no) (?:\w+ ){0,4}?"
+_BOUNDS: tuple[tuple[re.Pattern[str], Bound], ...] = (
+    (
+        re.compile(
+            rf"{_NOT}(?:(?:faster|quicker|higher|more|further|farther|longer) than|exceed\w*|above|over|past){_ABOUT}"
         ),
-        (
-            r"\b(?:not|never|no) (?:\w+ ){0,4}?(?:(?:slower|less|closer|nearer|lower|shorter) than|below|under)",
-            "at_least",
+        "at_most",
+    ),
+    (re.compile(rf"{_NOT}(?:(?:slower|less|closer|nearer|lower|shorter) than|below|under){_ABOUT}"), "at_least"),
+    (
+        re.compile(
+            r"\b(?:at most|up to a maximum of|maximum(?: of)?|max(?: of)?|under|below|(?:slower|less|closer) than"
+            rf"|within|capp?e?d? (?:\w+ ){{0,2}}at|limit (?:\w+ ){{0,2}}?to|without exceeding){_ABOUT}"
         ),
-        (
-            r"\b(?:at most|up to a maximum of|maximum(?: of)?|max(?: of)?|under|below|slower than|less than|closer than"
-            r"|within|capp?e?d? (?:\w+ ){0,2}at|limit (?:\w+ ){0,2}?to|without exceeding)",
-            "at_most",
+        "at_most",
+    ),
+    (
+        re.compile(
+            r"\b(?:at least|minimum(?: of)?|min(?: of)?|(?:faster|more|further|farther) than|above|over)" + _ABOUT
         ),
-        (
-            r"\b(?:at least|minimum(?: of)?|min(?: of)?|faster than|more than|above|over|further than|farther than)",
-            "at_least",
-        ),
-    )
+        "at_least",
+    ),
 )
+"""The first that matches right before a number says whether it is a bound; negated forms come first."""
 _OVER_LIMIT = re.compile(
     r"^ (?P<how>over|above|under|below|faster than|slower than|less than|more than) (?:the )?(?:speedlimit|limit|sign)"
 )
@@ -52,8 +53,8 @@ _FACTORS = (
     (re.compile(r"\b(?:by|in) half\b|\bhalf(?: of)?(?: (?:the|this|that|your|our|my|as))?\b|\bhalv\w+\b"), 0.5),
     (re.compile(r"\b(?:double|twice|doubling)\b"), 2.0),
     (re.compile(r"\b(?:triple|tripling|treble)\b"), 3.0),
-    (re.compile(r"\b(?:by )?a quarter\b"), 0.75),
 )
+_QUARTER = re.compile(r"\bby a quarter\b|\ba quarter\b")
 _SMALL: dict[Dimension, float] = {"speed": 10.0, "distance": 30.0, "time": 0.0, "bare": 12.0}
 """Largest number, per dimension, that "slow down five metres a second" takes as a difference without a "by"."""
 
@@ -75,14 +76,12 @@ def amount_of(
         if held:
             return _framed(clause.text, _chosen(clause.text, held), change, verb=verb)
     for pattern, factor in _FACTORS if factors else ():
-        if pattern.search(clause.text):
-            said = pattern.search(clause.text)
-            assert said is not None
-            sign: Change = 1 if factor > 1 else -1
-            if factor == 0.75:
-                factor = 1.0 + 0.25 * (change or -1)
-                sign = change or -1
-            return Amount(factor, "share", "factor", "exact", said[0]), sign
+        said = pattern.search(clause.text)
+        if said is not None:
+            return Amount(factor, "share", "factor", "exact", said[0]), 1 if factor > 1 else -1
+    quarter = _QUARTER.search(clause.text) if factors and change else None
+    if quarter is not None:
+        return Amount(1.0 + 0.25 * change, "share", "factor", "exact", quarter[0]), change
     return None
 
 
@@ -101,7 +100,7 @@ def _framed(text: str, item: tuple[int, Quantity], change: Change, *, verb: bool
     if over is not None:
         sign: Change = 1 if over["how"] in ("over", "above", "faster than", "more than") else -1
         return Amount(sign * value, dimension, "over_limit", "exact", quantity.said), sign
-    bound = next((bound for pattern, bound in _BOUNDS if pattern.search(before)), None)
+    bound: Bound | None = next((bound for pattern, bound in _BOUNDS if pattern.search(before)), None)
     if bound is not None:
         return Amount(value, dimension, "absolute", bound, quantity.said), 0
     frame, sign = _frame(before, after, quantity, change, verb=verb)

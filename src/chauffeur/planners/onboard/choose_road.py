@@ -56,7 +56,7 @@ def choose_lane(meaning: Meaning, options: Options) -> Chosen | Declined:
 
 def _side(meaning: Meaning, options: Options) -> tuple[Literal["left", "right"] | None, tuple[str, ...]]:
     """The side meant; where none was named and only one is possible, that one, and the assumption in words."""
-    if meaning.direction == "left" or meaning.direction == "right":
+    if meaning.direction in ("left", "right"):
         return meaning.direction, ()
     possible: list[Literal["left", "right"]] = []
     if options.situation.lane_index > 0:
@@ -151,34 +151,39 @@ def choose_turn(meaning: Meaning, options: Options) -> Chosen | Declined:
     if side not in situation.turns:
         return Declined(f"At this junction one cannot {_WORDS[side]}. Possible: {_listed(situation.turns)}.")
     manner = meaning.manner if meaning.manner in ("gentle", "swift") else ""
-    target, go = _CROSSING[side][manner]
+    target, go, after = _CROSSING[side][manner]
+    near, far, stop = _ROOM[side]
     numbers = {
         "target_speed_mps": target,
         "go_mps2": go,
-        "approach_mps": 6.5 if manner == "gentle" else 7.5,
-        "brake_mps2": 3.0 if manner == "gentle" else 5.0,
-        "stop_m": 5.0,
-        "near_m": _ROOM[side][0],
-        "far_m": _ROOM[side][1],
+        "exit_mps": after,
+        "approach_mps": 6.5 if manner == "gentle" else 7.5 if side == "straight" else 7.0,
+        "brake_mps2": 3.0 if manner == "gentle" else 5.0 if side == "straight" else 4.0,
+        "stop_m": stop,
+        "near_m": near,
+        "far_m": far,
         "headway_turn_s": options.headway(0.01),
         "turn_cap_mps": options.cap_mps,
         "cross_ticks": 120,
     }
     filled = options.filled(f"turn.{side}" + (f"_{manner}" if manner else ""), meaning.manner, **numbers)
-    seen = "from the left and from the right"
+    seen = "from the left" if side == "right" else "from the left and from the right"
     does = f"halt at the stop sign, wait until nobody comes {seen}, and {_WORDS[side]} at {speed_words(target)}"
     return Chosen(filled, f"turn.{side}", does, (), (("target_speed_mps", target),))
 
 
-_CROSSING: dict[str, dict[str, tuple[float, float]]] = {
-    "straight": {"": (8.2, 5.0), "gentle": (7.0, 3.0), "swift": (9.0, 5.0)},
-    "left": {"": (7.0, 5.0), "gentle": (6.6, 3.0), "swift": (8.2, 5.0)},
-    "right": {"": (7.0, 3.0), "gentle": (6.6, 2.5), "swift": (7.5, 4.0)},
-}
-"""Speed over the junction, m/s, and how briskly it is reached, m/s2."""
+_HALTING = {"gentle": (1.8, 0.8), "smooth": (2.5, 0.85), "swift": (4.0, 1.0)}
+"""Even braking to the halt, m/s2, and share of the present speed while changing lanes."""
 
-_ROOM = {"straight": (60.0, 60.0), "left": (60.0, 60.0), "right": (60.0, 60.0)}
-"""How far traffic from the left and from the right must be away, m."""
+_CROSSING: dict[str, dict[str, tuple[float, float, float]]] = {
+    "straight": {"": (8.2, 5.0, 8.2), "gentle": (7.0, 3.0, 7.0), "swift": (9.0, 5.0, 9.0)},
+    "left": {"": (9.7, 4.0, 7.0), "gentle": (7.0, 3.0, 7.0), "swift": (9.7, 5.0, 8.0)},
+    "right": {"": (8.2, 5.0, 7.0), "gentle": (7.0, 3.0, 7.0), "swift": (8.2, 5.0, 7.5)},
+}
+"""Speed over the junction, m/s, how briskly it is reached, m/s2, and speed behind it, m/s."""
+
+_ROOM = {"straight": (40.0, 50.0, 5.0), "left": (45.0, 45.0, 5.4), "right": (50.0, 45.0, 5.4)}
+"""How far traffic from the left and from the right must be away, and where we halt before the sign, m."""
 
 
 def _listed(turns: tuple[str, ...]) -> str:
@@ -191,18 +196,12 @@ def choose_pull_over(meaning: Meaning, options: Options) -> Chosen | Declined:
     if not situation.emergency_lane:
         return Declined("There is no emergency lane here to pull over to. I can slow down if you want.")
     manner = meaning.manner if meaning.manner in ("gentle", "swift") else "smooth"
-    rate = {"gentle": 1.8, "smooth": 2.5, "swift": 4.0}[manner]
-    factor = {"gentle": 0.8, "smooth": 0.85, "swift": 1.0}[manner]
-    filled = options.filled(f"pull_over.{manner}", meaning.manner)
-    numbers = {**filled.numbers, "rate_mps2": rate, "factor": factor}
+    rate, factor = _HALTING[manner]
+    filled = options.filled(f"pull_over.{manner}", meaning.manner, rate_mps2=rate, factor=factor)
     moves = situation.lane_count - 1 - situation.lane_index
-    way = (
-        "halt here on the emergency lane"
-        if moves == 0
-        else "move right to the emergency lane, lane by lane, and halt there"
-    )
+    way = "move right to the emergency lane, lane by lane, and halt there" if moves else "halt on this emergency lane"
     does = f"{way} with an even {number(rate)} m/s2"
-    return Chosen(type(filled)(filled.id, numbers), "pull_over", does, (), (("target_speed_mps", 0.0),), moves)
+    return Chosen(filled, "pull_over", does, (), (("target_speed_mps", 0.0),), moves)
 
 
 def choose_stop(meaning: Meaning, options: Options) -> Chosen | Declined:

@@ -121,7 +121,7 @@ def _step(meaning: Meaning, options: Options) -> Chosen | Declined:
     target = max(options.speed - max(0.5, step - leaning), min(slowest, options.speed))
     if target > options.speed - 0.3:
         return Declined(
-            f"We only drive {speed_words(options.speed)}; slower than that I would be in the way of others. Shall I stop?"
+            f"We only drive {speed_words(options.speed)}; any slower and we are in the way of others. Shall I stop?"
         )
     does = f"go {amount}slower, from {number(options.speed)} to {speed_words(target)}"
     return _chosen(meaning, options, f"speed.down{name}", target, does)

@@ -1,4 +1,4 @@
-"""From a sentence to clauses with their evidence: where one wish ends, what is negated, which quantity belongs where."""
+"""From a sentence to clauses with their evidence: where one wish ends, what is negated, which quantity is where."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from chauffeur.planners.onboard.meaning import Side
 from chauffeur.planners.onboard.quantities import Quantity, mark_quantities
 
 _BREAK = re.compile(
-    r"\s*(?P<hard>[.;!?]|\b(?:and then|then|after that|afterwards?|followed by|next(?= (?:turn|change|pull|overtake)))\b)\s*"
+    r"\s*(?P<hard>[.;!?]|\b(?:and then|then|after that|afterwards?|followed by"
+    r"|next(?= (?:turn|change|pull|overtake)))\b)\s*"
     r"|\s*(?P<soft>,|\b(?:and|but|because|since|so that|so(?= (?:please|go|speed up|drive|can|could|do|i|we|you|he))|"
     r"although|though|while|until|just|instead(?! of)|rather(?! (?:slow|fast|close|far|than|not)))\b)\s*"
 )
@@ -84,7 +85,7 @@ def _parts(line: str) -> list[tuple[str, bool]]:
         for pattern in (_AFTER, _BEFORE, _THEN_AFTER):
             turned = pattern.match(sentence)
             if turned is not None:
-                parts += _split(turned["first"]) + [(turned["second"], True)]
+                parts += [*_split(turned["first"]), (turned["second"], True)]
                 break
         else:
             parts += _split(sentence)

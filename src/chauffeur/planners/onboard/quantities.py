@@ -1,4 +1,4 @@
-"""Numbers and units in words: "twenty-five metres", "65mph", "two and a half seconds", "half", "a couple of car lengths".
+"""Numbers and units in words: "twenty-five metres", "65mph", "two and a half seconds", "a couple of car lengths".
 
 Works on lower-case tokens. Each quantity found is replaced by a mark `#k`, so that later rules see where it stood
 without seeing its words.

@@ -27,7 +27,8 @@ def _situation(situation: Situation) -> str:
         if situation.stop_sign_m is not None
         else "no vehicle is near ahead"
     )
-    return f"We drive {number(situation.speed_mps)} m/s where {number(situation.speed_limit_mps)} m/s are allowed; {ahead}."
+    now, allowed = number(situation.speed_mps), number(situation.speed_limit_mps)
+    return f"We drive {now} m/s where {allowed} m/s are allowed; {ahead}."
 
 
 _FAMILIES = {

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from chauffeur.planners.onboard.clauses import Clause, clauses_of
 from chauffeur.planners.onboard.doubts import doubt_before, doubt_without_meaning, is_question
 from chauffeur.planners.onboard.fusion import fuse
-from chauffeur.planners.onboard.weigh import meanings_of
-
-from chauffeur.planners.onboard.clauses import Clause, clauses_of
 from chauffeur.planners.onboard.meaning import Meaning, NotUnderstood, Reading
+from chauffeur.planners.onboard.weigh import meanings_of
 
 MAX_CHARS = 1000
 """Longest wish that is read; spoken wishes are a tenth of it."""

@@ -14,16 +14,16 @@ _BIT = re.compile(
     r"\b(?:bit|a little|slightly|tad|touch|somewhat|smidgen?|hair|marginally|fraction|notch|kind of|sort of|a wee)\b"
 )
 _MUCH = re.compile(
-    r"\b(?:much|a lot|lots|way|far (?=more|less|too|faster|slower|closer)|considerably|significantly|substantially|drastically"
-    r"|extremely|massively|hugely|dramatically|really|a great deal|very|ridiculously|seriously|tons|loads)\b"
+    r"\b(?:much|a lot|lots|way|far (?=more|less|too|faster|slower|closer)|considerably|significantly|substantially"
+    r"|drastically|extremely|massively|hugely|dramatically|really|a great deal|very|ridiculously|seriously|tons|loads)\b"
 )
 _GENTLE = re.compile(
     r"\b(?:gently|gradually|smoothly|softly|slowly|carefully|safely|cautiously|nice and easy|gentle)\b"
 )
 _SWIFT = re.compile(r"\b(?:swift|quickly|fast|quick|rapidly|hurry|promptly|hard)\b")
 _TOO = re.compile(
-    r"\b(?:too|overly|excessively|awfully|terribly|ridiculously|painfully|insanely|dangerously|so|this|that|such|such a)"
-    r"(?: (?:damn|darn|freaking|bloody|very|much))? $"
+    r"\b(?:too|overly|excessively|awfully|terribly|ridiculously|painfully|insanely|dangerously|so|this|that|such"
+    r"|such a)(?: (?:damn|darn|freaking|bloody|very|much))? $"
 )
 _MERE_BOUND = re.compile(r"\b(?:not too|without(?: being| going| driving)?(?: too)?) $")
 _STATEMENT = re.compile(
@@ -32,7 +32,8 @@ _STATEMENT = re.compile(
 )
 _WISH = re.compile(r"\b(?:should|could|can|would|want|wish|need|like to|prefer|lets|better|may|might)\b")
 _COMPLAINT = re.compile(
-    r"\b(?:complain|why|hate|how come|tired of|fed up|sick of|have to|must (?:you|we)|stop being)\b|^(?:do|does|must) (?:you|we|it)\b"
+    r"\b(?:complain|why|hate|how come|tired of|fed up|sick of|have to|must (?:you|we)|stop being)\b"
+    r"|^(?:do|does|must) (?:you|we|it)\b"
 )
 _BE_NOT = re.compile(r"\b(?:are|is|am|were|was) not(?: (?:driving|going|moving|really|exactly|very))* $")
 _HOLD = re.compile(r"\b(?:keep|maintain|hold|stay|remain|stick|retain|preserve|continue|sustain)\w*\b")
@@ -288,7 +289,7 @@ def _styles(clause: Clause) -> Iterator[Meaning]:
 
 
 def _quantities_alone(clause: Clause, out: list[Meaning]) -> Iterator[Meaning]:
-    """A speed is a wish by itself; a distance is one beside words of following; a bare number beside words of driving."""
+    """A speed is a wish by itself, a distance beside words of following, a bare number beside words of driving."""
     if any(m.amount is not None for m in out):
         return
     big = any(m.manoeuvre not in ("speed", "gap", "follow") for m in out)
