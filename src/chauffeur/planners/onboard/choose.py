@@ -7,7 +7,7 @@ What the planner chooses itself stays inside the limits it was told.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from chauffeur.concept import Limits, Situation
 from chauffeur.planners.onboard.choose_gap import choose_follow, choose_gap, choose_yield
@@ -60,11 +60,23 @@ def choose(
     """
     steps: list[Chosen] = []
     options = Options(situation, limits, Leaning())
-    for meaning in reading.steps:
+    waiting = list(reading.steps)
+    while waiting:
+        meaning = waiting.pop(0)
         options = options.with_leaning(leaning(meaning.family))
         chosen = _CHOOSERS[meaning.manoeuvre](meaning, options)
+        if isinstance(chosen, Chosen) and waiting and _comes_back(chosen, waiting[0]):
+            # "overtake it, then move back right": one manoeuvre with its return
+            del waiting[0]
+            chosen = _CHOOSERS["overtake"](replace(meaning, variant="return"), options)
         if isinstance(chosen, Declined):
             return chosen
         steps.append(chosen)
         options = options.after(chosen)
     return Choice(tuple(steps), "+".join(step.intent for step in steps))
+
+
+def _comes_back(overtaking: Chosen, following: Meaning) -> bool:
+    """Whether a lane wish leads back to where the overtaking began."""
+    back = {"overtake.left": "right", "overtake.right": "left"}.get(overtaking.intent)
+    return back is not None and following.manoeuvre == "lane" and not following.variant and following.direction == back

@@ -128,7 +128,7 @@ def choose_follow(meaning: Meaning, options: Options) -> Chosen | Declined:
         )
     if options.situation.front is None and options.front_known:
         return Declined(f"{_NOBODY} to follow.")
-    filled = options.filled("follow.lead", meaning.manner, time_headway_s=headway)
+    filled = options.filled("follow.lead", meaning.manner, time_headway_s=headway, **_pace(meaning))
     return Chosen(filled, "follow", f"follow the vehicle ahead, {number(headway)} s behind it", (), settings)
 
 

@@ -94,9 +94,7 @@ def _match(meaning: Meaning, options: Options) -> Chosen:
     front = options.situation.front
     if front is not None:
         does = f"drive at the speed of the vehicle ahead, now {speed_words(front.speed_mps)}"
-        return _chosen(
-            meaning, options, "speed.match_lead", min(front.speed_mps, options.cap_mps), does, headway=headway
-        )
+        return _chosen(meaning, options, "speed.match_lead", min(front.speed_mps, options.cap_mps), does)
     does = "drive at the mean speed of the vehicles around us, not above the limit"
     return _chosen(meaning, options, "speed.match_traffic", options.own_cap_mps, does, headway=headway)
 

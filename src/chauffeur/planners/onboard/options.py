@@ -114,6 +114,16 @@ class Options:
         low = max(self.limits.min_time_headway_s, 0.01)
         return max(low, min(wanted_s, self.limits.max_time_headway_s))
 
+    @property
+    def keep_headway_s(self) -> float:
+        """Headway that does not open the present gap, s: the usual one, or less behind a vehicle that is closer."""
+        front = self.situation.front
+        if front is None or self.speed < 1.0:
+            return self.headway(USUAL_HEADWAY_S)
+        # the car keeps 6 m besides the headway, and a little of the rest is eaten by wanting more speed
+        now = 0.85 * (front.distance_m - 6.0) / self.speed
+        return self.headway(max(min(USUAL_HEADWAY_S, now), 0.5))
+
     def helpers(self, manner: str) -> dict[str, float]:
         """Numbers that helper functions of the exemplars use."""
         rate = {"gentle": 2.0, "swift": 5.0}.get(manner, 3.5)
@@ -123,6 +133,7 @@ class Options:
             "headway_s": self.headway(0.01),
             "follow_s": self.headway(1.0),
             "rest_headway_s": self.headway(USUAL_HEADWAY_S),
+            "keep_headway_s": self.keep_headway_s,
             "headway_lane_s": self.headway(0.5),
             "speed_cap_mps": self.cap_mps,
             "rate_mps2": rate,

@@ -15,7 +15,8 @@ _BIT = re.compile(
 )
 _MUCH = re.compile(
     r"\b(?:much|a lot|lots|way|far (?=more|less|too|faster|slower|closer)|considerably|significantly|substantially"
-    r"|drastically|extremely|massively|hugely|dramatically|really|a great deal|very|ridiculously|seriously|tons|loads)\b"
+    r"|drastically|extremely|massively|hugely|dramatically|really|a great deal|very|ridiculously|seriously|tons"
+    r"|loads)\b"
 )
 _GENTLE = re.compile(
     r"\b(?:gently|gradually|smoothly|softly|slowly|carefully|safely|cautiously|nice and easy|gentle)\b"
