@@ -6,9 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.concept import Feedback, History, HistoryItem
-from chauffeur.memory import Standing, interpret_feedback, standing_feedback
-from chauffeur.memory.quantities import Quantity, read_quantities
+from chauffeur.memory import interpret_feedback
 
 # words -> speed, gap, comfort, approval, strength
 SAID: list[tuple[str, int, int, int, int, float]] = [
@@ -65,7 +63,7 @@ SAID: list[tuple[str, int, int, int, int, float]] = [
     ("increase the following distance by 10 m", 0, -1, 0, 0, 0.5),
     ("closer next time", 0, 1, 0, 0, 0.6),
     ("reduce the gap", 0, 1, 0, 0, 0.6),
-    ("leave half a second more headway", 0, -1, 0, 0, 0.6),
+    ("leave half a second more headway", 0, -1, 0, 0, 1 / 3),
     # Comfort.
     ("I felt sick", 0, 0, -1, -1, 0.6),
     ("you braked too hard", 0, 0, -1, -1, 0.6),
@@ -117,48 +115,3 @@ def test_any_words_at_all_are_read(text: str) -> None:
 @pytest.mark.parametrize("text", ["not " * 5000, "too " * 5000, "a bit " * 5000, "x" * 50_000, "lane to the " * 3000])
 def test_long_words_take_no_long_time(text: str) -> None:
     interpret_feedback(text)
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("80 km/h", [("speed", 80 / 3.6)]),
-        ("50 miles per hour", [("speed", 22.352)]),
-        ("28.5 meters per second", [("speed", 28.5)]),
-        ("28,5 m/s", [("speed", 28.5)]),
-        ("25 m", [("length", 25.0)]),
-        ("twenty metres and 2 seconds", [("length", 20.0), ("time", 2.0)]),
-        ("three car lengths", [("length", 15.0)]),
-        ("60 feet, 10 yards", [("length", 18.288), ("length", 9.144)]),
-        ("25 minutes", []),
-        ("lane 2", []),
-    ],
-)
-def test_numbers_with_units(text: str, expected: list[tuple[str, float]]) -> None:
-    found = read_quantities(text)
-    assert [(q.dimension, pytest.approx(q.value)) for q in found] == expected
-    assert all(isinstance(q, Quantity) for q in found)
-
-
-def item(when: str, *feedback: Feedback) -> HistoryItem:
-    return HistoryItem(when, when, "", "", "highway", "", "", "", (), feedback)
-
-
-def test_the_most_recent_verdict_on_a_topic_holds_and_the_others_are_shown() -> None:
-    fast, slow, close = Feedback("too fast", speed=-1), Feedback("too slow", speed=1), Feedback("too close", gap=-1)
-    history = History((item("2026-03-02", slow), item("2026-03-03", close), item("2026-03-01", fast)))
-    assert standing_feedback(history) == (
-        Standing("speed", slow, "2026-03-02", (("2026-03-01", fast),)),
-        Standing("gap", close, "2026-03-03"),
-    )
-
-
-def test_of_two_verdicts_on_one_trip_the_later_holds() -> None:
-    fast, slow, again = Feedback("too fast", speed=-1), Feedback("too slow", speed=1), Feedback("slower", speed=-1)
-    (standing,) = standing_feedback(History((item("2026-03-01", fast, slow, again),)))
-    assert standing.feedback is again
-    assert standing.overruled == (("2026-03-01", slow),)
-
-
-def test_no_verdicts_no_standing() -> None:
-    assert standing_feedback(History((item("2026-03-01", Feedback("hm")),))) == ()

@@ -303,3 +303,29 @@ def test_same_request_same_plan_within_milliseconds(words: str) -> None:
     plans = [replace(plan(words, situation), latency_s=0.0) for _ in range(2)]
     assert plans[0] == plans[1]
     assert min(plan(words, situation).latency_s for _ in range(5)) < 0.005
+
+
+def test_a_bare_number_takes_the_unit_that_fits_the_direction() -> None:
+    # 80 mph would be a speed-up from 25 m/s; 80 km/h slows down, as the person said.
+    slower = plan("slow down to 80", EMPTY)
+    assert setting(slower, "target_speed_mps") == pytest.approx(80 / 3.6, abs=0.01)
+    assert "km/h" in slower.thoughts.text
+    faster = plan("speed up to 65", EMPTY)
+    assert setting(faster, "target_speed_mps") == pytest.approx(65 * 0.44704, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("words", "gap_m"), [("keep 4 car lengths", 20.0), ("leave fifty feet", 15.24), ("keep 30 metres", 30.0)]
+)
+def test_a_distance_to_keep_is_a_gap(words: str, gap_m: float) -> None:
+    assert setting(plan(words), "gap_m") == pytest.approx(gap_m, abs=0.01)
+
+
+def test_neither_side_is_straight_on() -> None:
+    assert plan("Turn neither left nor right.", CROSSING).intent == "turn.straight"
+
+
+def test_overtaking_keeps_to_the_sign_unless_the_operator_allows_more() -> None:
+    assert setting(plan("overtake on the left"), "target_speed_mps") == pytest.approx(31.29, abs=0.01)
+    wide = plan("overtake on the left", limits=LAMPILOT_LIMITS)
+    assert setting(wide, "target_speed_mps") > 31.3

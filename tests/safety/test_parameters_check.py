@@ -202,6 +202,7 @@ def test_parameter_lane_wish(snap: Snap, plan: Make, lane: int, index: int | Non
         ("overtake.left", 1, True), ("overtake.right", 2, False), ("lane.right", 1, True), ("overtake", 0, True),
         ("speed.increase", 0, True), ("look.left", 0, True), ("", 0, True), ("turn.left", 1, False),
         ("go.straight", 1, False),
+        ("lane.left+lane.right", 2, True), ("lane.right+lane.left", 2, False), ("overtake.left+speed.set", 0, False),
     ],
 )  # fmt: skip
 def test_the_intent_must_fit_the_road(snap: Snap, plan: Make, intent: str, index: int, passes: bool) -> None:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from chauffeur.concept import Feedback, History, HistoryItem
+from chauffeur.language import measured
 from chauffeur.memory.phrasebook import Topic
 from chauffeur.memory.phrases import Want, read_wants
-from chauffeur.memory.quantities import Dimension, read_quantities
 from chauffeur.memory.words import even
 
 _MILD, _PLAIN, _STRONG = 0.35, 0.6, 1.0
@@ -22,7 +22,7 @@ _STRONG_WORDS = re.compile(
     r"\b(?:way|far(?= too)|(?<!too )(?<!not )much|a lot|lots|really|very|extremely|super|terribly|awfully|incredibly"
     r"|significantly|considerably|drastically|dangerously)\b"
 )
-_FULL: dict[Dimension, float] = {"speed": 5.5, "length": 20.0, "time": 1.5}
+_FULL = {"speed": 5.5, "distance": 20.0, "time": 1.5}
 """A change of this much is as strong as "much": about 20 km/h, four car lengths, or one and a half seconds."""
 
 TOPICS: tuple[Literal["speed", "gap", "comfort"], ...] = ("speed", "gap", "comfort")
@@ -102,7 +102,7 @@ def _sign(signs: Iterable[int]) -> Literal[-1, 0, 1]:
 
 
 def _strength(want: Want) -> float:
-    amounts = [quantity.value / _FULL[quantity.dimension] for quantity in read_quantities(want.clause)]
+    amounts = [value / _FULL[dimension] for dimension, value in measured(want.clause)]
     if amounts:
         return min(1.0, max(0.1, *amounts))
     words = even(want.clause)

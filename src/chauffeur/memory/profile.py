@@ -15,7 +15,6 @@ import numpy as np
 
 from chauffeur.concept import Feedback, HistoryItem, PersonId, Trip
 from chauffeur.memory import cipher
-from chauffeur.memory.quantities import Quantity
 from chauffeur.memory.records import body_of, feedback_body, item_of
 from chauffeur.memory.retrieval import Entry
 from chauffeur.memory.similarity import DIMENSIONS, ENCODER, Mark, mark
@@ -91,7 +90,7 @@ class Profile:
                 "INSERT INTO trips (trip, at, world, body) VALUES (?, ?, ?, ?)",
                 (_storable(trip.id), when, _storable(trip.context.situation.world), body_of(trip)),
             ).lastrowid
-            numbers = json.dumps([[one.dimension, one.value] for one in wish.quantities])
+            numbers = json.dumps(wish.quantities)
             self._connection.execute(
                 "INSERT INTO marks VALUES (?, ?, ?, ?, ?)", (row, ENCODER, wish.vector.tobytes(), wish.tags, numbers)
             )
@@ -148,7 +147,7 @@ class Profile:
     def _mark(self, row: int, encoder: str, vector: bytes, tags: int, quantities: str) -> Mark:
         if encoder != ENCODER:
             return mark(self.item(row).instruction)
-        numbers = tuple(Quantity(dimension, value) for dimension, value in json.loads(quantities))
+        numbers = tuple((str(dimension), float(value)) for dimension, value in json.loads(quantities))
         return Mark(np.frombuffer(vector, dtype=np.float32, count=DIMENSIONS), tags, numbers)
 
     def _add_feedback(self, row: int | None, feedback: Feedback, when: str) -> None:

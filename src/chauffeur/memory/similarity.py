@@ -16,8 +16,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from chauffeur.language import measured
 from chauffeur.memory.phrases import read_wants
-from chauffeur.memory.quantities import Quantity, read_quantities
 from chauffeur.memory.words import clauses, even
 
 ENCODER = "hashed-ngrams-v1"
@@ -76,17 +76,17 @@ class Mark:
     Attributes:
         vector: Encoded text, of length 1 (or 0 for no words).
         tags: Bits of `TAGS`.
-        quantities: Numbers said.
+        quantities: Numbers said, as (dimension, SI value).
     """
 
     vector: Vector
     tags: int
-    quantities: tuple[Quantity, ...]
+    quantities: tuple[tuple[str, float], ...]
 
 
 def mark(text: str) -> Mark:
     """Encode and tag a wish."""
-    return Mark(encode(text), sum(_BIT[tag] for tag in tags_of(text)), read_quantities(text))
+    return Mark(encode(text), sum(_BIT[tag] for tag in tags_of(text)), measured(text))
 
 
 def encode(text: str) -> Vector:
@@ -159,9 +159,9 @@ def _moves(clause: str) -> Iterator[str]:
         yield f"not.{full}" if _NEGATED.search(clause[: match.start()]) else full
 
 
-def _numbers(a: tuple[Quantity, ...], b: tuple[Quantity, ...]) -> float | None:
+def _numbers(a: tuple[tuple[str, float], ...], b: tuple[tuple[str, float], ...]) -> float | None:
     """How near two wishes' numbers are, 0..1; None where they do not speak of the same thing."""
-    pairs = [(x.value, y.value) for x in a for y in b if x.dimension == y.dimension]
+    pairs = [(x, y) for of_a, x in a for of_b, y in b if of_a == of_b]
     if not pairs:
         return None
     return max(1.0 if x == y else math.exp(-3.0 * abs(x - y) / max(abs(x), abs(y))) for x, y in pairs)

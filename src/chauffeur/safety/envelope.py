@@ -196,7 +196,8 @@ def _setting_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]
 def _intent_faults(plan: Plan, road: _Road) -> Iterator[_Fault]:
     if plan.policy is None:
         return
-    tokens = re.split(r"[^a-z]+", plan.intent.lower())
+    # Of several steps joined by "+" only the first begins where the car is now.
+    tokens = re.split(r"[^a-z]+", plan.intent.lower().partition("+")[0])
     if "turn" in tokens or "straight" in tokens:
         if road.kind != "intersection":
             yield _Fault(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 
+from chauffeur.language.quantities import Quantity
 from chauffeur.planners.onboard.clauses import Clause
 from chauffeur.planners.onboard.meaning import Amount, Bound, Change, Dimension, Frame
-from chauffeur.planners.onboard.quantities import Quantity
 
 _LESS = r"(?:less|closer|nearer|shorter|lower|smaller|tighter|slower|narrower|fewer|down|below|under)"
 _MORE = (

@@ -108,10 +108,12 @@ def choose_overtake(meaning: Meaning, options: Options) -> Chosen | Declined:
     if options.last_lane < 1:
         return Declined("This road has one lane in our direction; I do not overtake through oncoming traffic.")
     lead_speed = lead.speed_mps if lead is not None else options.speed
-    target = min(max(lead_speed + _PASS_BY_MPS.get(meaning.manner, _PLAIN_PASS_BY_MPS), options.speed), options.cap_mps)
+    target = min(
+        max(lead_speed + _PASS_BY_MPS.get(meaning.manner, _PLAIN_PASS_BY_MPS), options.speed), options.pass_cap_mps
+    )
     if target < lead_speed + 1.0:
         return Declined(
-            f"The vehicle ahead drives {speed_words(lead_speed)}, and I may drive {speed_words(options.cap_mps)}: "
+            f"The vehicle ahead drives {speed_words(lead_speed)}, and I may drive {speed_words(options.pass_cap_mps)}: "
             "that is not enough to overtake it."
         )
     side = meaning.direction if meaning.direction in ("left", "right") else None

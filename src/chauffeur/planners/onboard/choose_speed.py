@@ -50,7 +50,7 @@ def choose_speed(meaning: Meaning, options: Options) -> Chosen | Declined:
 
 
 def _named(meaning: Meaning, amount: Amount, options: Options) -> Chosen | Declined:
-    value, assumed = speed_of(amount, options)
+    value, assumed = speed_of(amount, options, meaning.change)
     if amount.dimension in ("distance", "time", "lanes", "other"):
         return Declined("I cannot make a speed of that. Please name it in m/s, mph or km/h.")
     if amount.bound == "at_most":

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
+from chauffeur.language.quantities import Quantity, mark_quantities
+from chauffeur.language.tokens import tokens_of
 from chauffeur.planners.onboard.cues import CUES, Cue
-from chauffeur.planners.onboard.lexicon import FILLERS, rewrite, tokens_of
+from chauffeur.planners.onboard.lexicon import FILLERS, rewrite
 from chauffeur.planners.onboard.meaning import Side
-from chauffeur.planners.onboard.quantities import Quantity, mark_quantities
 
 _BREAK = re.compile(
     r"\s*(?P<hard>[.;!?]|\b(?:and then|then|after that|afterwards?|followed by"

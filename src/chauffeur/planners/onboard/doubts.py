@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 import unicodedata
 
+from chauffeur.language.tokens import plain
 from chauffeur.planners.onboard.clauses import Clause
-from chauffeur.planners.onboard.lexicon import plain, rewrite
+from chauffeur.planners.onboard.lexicon import rewrite
 from chauffeur.planners.onboard.meaning import Meaning, NotUnderstood
 from chauffeur.planners.onboard.words import words_file
 

@@ -1,77 +1,20 @@
 """Words: how people shorten, decorate and idiomatically bend what they say to a car, and how to undo it.
 
-`normalise` turns a sentence into plain lower-case words with a few fixed names for things (`shoulder`, `junction`,
-`ahead`, `cruise`). Meaning is read by `cues`; nothing here decides what is wanted.
+`rewrite` gives a few things fixed names (`shoulder`, `junction`, `ahead`, `cruise`). Meaning is read by `cues`;
+nothing here decides what is wanted.
 """
 
 from __future__ import annotations
 
 import re
-import unicodedata
 
 from chauffeur.planners.onboard.words import words_file
 
-_CONTRACTIONS = (
-    (r"\bcan't\b|\bcannot\b|\bcant\b", "can not"),
-    (r"\bwon't\b|\bwont\b", "will not"),
-    (r"\bshan't\b", "shall not"),
-    (r"\bain't\b|\baint\b", "is not"),
-    (r"\blet's\b|\blets\b", "lets"),
-    (r"\b(do|does|did|is|are|was|were|has|have|had|would|could|should|need|must|might)n't\b", r"\1 not"),
-    (r"\b(do|does|did|is|are|was|would|could|should|need)nt\b", r"\1 not"),
-    (r"\b(i)'?m\b", r"\1 am"),
-    (r"\b(you|we|they)'re\b|\b(you)re\b", r"\1\2 are"),
-    (r"\b(i|you|we|they)'ve\b", r"\1 have"),
-    (r"\b(i|you|we|they|he|she|it|that)'(?:ll)\b", r"\1 will"),
-    (r"\b(i|you|we|they|he|she|it)'d\b", r"\1 would"),
-    (r"\b(it|that|he|she|there|what|who|where|how|here)'s\b", r"\1 is"),
-    (r"\bgotta\b", "have to"),
-    (r"\bgonna\b", "going to"),
-    (r"\bwanna\b", "want to"),
-    (r"\bgimme\b", "give me"),
-    (r"\bkinda\b", "kind of"),
-    (r"\bpls\b|\bplz\b", "please"),
-    (r"\bokay\b", "ok"),
-    (r"\b(\w+)in'(?=\s|$)", r"\1ing"),
-    (r"'s\b|'", " "),
-)
-_GLUED_UNIT = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)(?=[a-z%])")
-_UNIT_FORMS = (
-    (r"\bmiles\s*/\s*h(?:ou)?r?\b", "mph"),
-    (r"\bm\s*/\s*s(?:ec)?\b", "m/s"),
-    (r"\b(?:km|k)\s*/\s*h(?:r|our)?\b", "km/h"),
-    (r"\bmet(?:er|re)s?\s*/\s*s(?:ec(?:ond)?)?\b", "m/s"),
-    (r"\bkilomet(?:er|re)s?\s*/\s*h(?:our)?\b", "km/h"),
-)
-_TOKEN = re.compile(r"m/s|km/h|mi/h|\d+(?:\.\d+)?|[a-z]+|%|[.,;:!?]")
-
-_MINUS = re.compile(r"(?<![\w.])[-−](?=\d)")
-_NUMBER_COMMA = re.compile(r"(?<=\d),(?=\d{3}\b)")
 _REWRITES = tuple(
     (re.compile("|".join(group[:-1])), group[-1].removeprefix("->").strip() or " ")
     for group in words_file("rewrites.txt")
 )
 """Applied in order to the token string; later rules and the cues see the replacement."""
-_CONTRACT = tuple((re.compile(pattern), by) for pattern, by in _CONTRACTIONS)
-_UNITS = tuple((re.compile(pattern), by) for pattern, by in _UNIT_FORMS)
-
-
-def plain(text: str) -> str:
-    """Lower case, straight quotes, no accents, contractions written out, hyphens and slashes opened."""
-    text = unicodedata.normalize("NFKC", text).lower()
-    text = text.replace("’", "'").replace("‘", "'").replace("`", "'").replace("…", " . ").replace("—", " , ")
-    text = _MINUS.sub("minus ", text)
-    text = "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
-    text = _NUMBER_COMMA.sub("", text)
-    for pattern, by in (*_CONTRACT, *_UNITS):
-        text = pattern.sub(by, text)
-    text = _GLUED_UNIT.sub(r"\1 ", text)
-    return text.replace("-", " ").replace("–", " ")
-
-
-def tokens_of(text: str) -> list[str]:
-    """Words, numerals and punctuation of a plain text."""
-    return _TOKEN.findall(plain(text))
 
 
 def rewrite(line: str) -> str:

@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from chauffeur.language.quantities import Dimension
+
 Manoeuvre = Literal[
     "speed", "gap", "lane", "overtake", "pull_over", "stop", "turn", "style", "keep", "resume", "follow", "yield"
 ]
@@ -16,9 +18,6 @@ Manoeuvre = Literal[
 
 Side = Literal["left", "right", "straight"]
 Change = Literal[-1, 0, 1]
-Dimension = Literal["speed", "distance", "time", "share", "lanes", "bare", "other"]
-"""`share` is a factor (half is 0.5), `bare` a number without unit, `other` a unit no manoeuvre takes (minutes)."""
-
 Frame = Literal["absolute", "relative", "factor", "over_limit"]
 """How an amount counts: as the new value, as a difference, as a multiple, or as a difference to the speed limit."""
 

@@ -9,7 +9,7 @@ from chauffeur.concept import Limits, Situation
 from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH, kmh, mph
 from chauffeur.planners.onboard.exemplars import Filled
 from chauffeur.planners.onboard.exemplars.library import number
-from chauffeur.planners.onboard.meaning import Amount
+from chauffeur.planners.onboard.meaning import Amount, Change
 from chauffeur.planners.onboard.personal import Leaning
 
 USUAL_HEADWAY_S = 1.5
@@ -105,6 +105,11 @@ class Options:
         return min(self.sign_mps, self.cap_mps)
 
     @property
+    def pass_cap_mps(self) -> float:
+        """Highest speed of an overtaking: the sign; more only under limits that allow more than a reading error."""
+        return self.own_cap_mps if self.limits.max_over_limit_mps <= _READING_ERROR_MPS else self.cap_mps
+
+    @property
     def last_lane(self) -> int:
         """Index of the rightmost lane that is no emergency lane."""
         return self.situation.lane_count - (2 if self.situation.emergency_lane else 1)
@@ -145,18 +150,32 @@ class Options:
         return Filled(exemplar, values)
 
 
+_READING_ERROR_MPS = 2.0
+"""Excess over the sign that limits tolerate without meaning it as leave to speed."""
+
+
 def speed_words(speed_mps: float) -> str:
     """A speed for people, e.g. `25.0 m/s (56 mph, 90 km/h)`."""
     return f"{number(speed_mps)} m/s ({mph(speed_mps):.0f} mph, {kmh(speed_mps):.0f} km/h)"
 
 
-def speed_of(amount: Amount, options: Options) -> tuple[float, tuple[str, ...]]:
-    """Speed or speed difference of an amount, m/s, with what had to be assumed about its unit."""
+def speed_of(amount: Amount, options: Options, change: Change = 0) -> tuple[float, tuple[str, ...]]:
+    """Speed or speed difference of an amount, m/s, with what had to be assumed about its unit.
+
+    A bare number is in the unit of the road's signs, unless only another unit makes a new speed of it that is slower
+    (`change` -1) or faster (+1) than now, as the person said.
+    """
     if amount.dimension != "bare":
         return amount.value, ()
     unit, factor = _unit_of_signs(options.sign_mps)
-    value = amount.value * factor
-    return value, (f"You named no unit: I take {number(amount.value)} as {unit}, the unit of the signs on this road.",)
+    value, why = amount.value * factor, "the unit of the signs on this road"
+    if change and amount.frame == "absolute" and (value - options.speed) * change < 0:
+        for other, scale in (("km/h", MPS_PER_KMH), ("mph", MPS_PER_MPH), ("m/s", 1.0)):
+            if (amount.value * scale - options.speed) * change > 0:
+                unit, value = other, amount.value * scale
+                why = "because only then it is " + ("faster than now" if change > 0 else "slower than now")
+                break
+    return value, (f"You named no unit: I take {number(amount.value)} as {unit}, {why}.",)
 
 
 def _unit_of_signs(limit_mps: float) -> tuple[str, float]:

@@ -42,6 +42,10 @@ _GAP_WORDS = re.compile(
     r"\b(?:behind|following|back|away|from|closer|headway|gap|distance|between|ahead|follow|within)\b"
 )
 _LEAVE = re.compile(r"\b(?:leave|leaving|allow)\b")
+_KEEP_IT = re.compile(
+    r"\b(?:keep|leave|leaving|allow|give|hold|maintain)(?: (?:a|an|about|at least|around|some|me))* #"
+)
+"""Verbs of keeping with a quantity as their object: "keep 4 car lengths"."""
 _SPEED_WORDS = re.compile(
     r"\b(?:do|doing|go|going|drive|driving|hit|run|cruise|cruising|speed|at|faster|slower|hold|keep|travel)\b"
 )
@@ -294,7 +298,7 @@ def _quantities_alone(clause: Clause, out: list[Meaning]) -> Iterator[Meaning]:
     if any(m.amount is not None for m in out):
         return
     big = any(m.manoeuvre not in ("speed", "gap", "follow") for m in out)
-    near = not big and _GAP_WORDS.search(clause.text) is not None
+    near = not big and (_GAP_WORDS.search(clause.text) or _KEEP_IT.search(clause.text)) is not None
     dimensions: tuple[tuple[Manoeuvre, Dimension, bool], ...] = (
         ("speed", "speed", True),
         ("gap", "distance", near),

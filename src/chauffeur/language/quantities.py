@@ -7,9 +7,13 @@ without seeing its words.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from chauffeur.concept import units
-from chauffeur.planners.onboard.meaning import Dimension
+from chauffeur.language.tokens import tokens_of
+
+Dimension = Literal["speed", "distance", "time", "share", "lanes", "bare", "other"]
+"""`share` is a factor (half is 0.5), `bare` a number without unit, `other` a unit no manoeuvre takes (minutes)."""
 
 _ONES = {
     word: float(value)
@@ -122,6 +126,17 @@ def mark_quantities(tokens: list[str]) -> tuple[list[str], list[Quantity]]:
             found.append(hit[0])
             i = hit[1]
     return out, found
+
+
+def read_quantities(text: str) -> tuple[Quantity, ...]:
+    """All quantities of a text, in order."""
+    return tuple(mark_quantities(tokens_of(text))[1])
+
+
+def measured(text: str) -> tuple[tuple[str, float], ...]:
+    """(dimension, SI value) of every speed, distance and time span in a text; other numbers are left out."""
+    kinds = ("speed", "distance", "time")
+    return tuple((q.dimension, q.value) for q in read_quantities(text) if q.dimension in kinds)
 
 
 def _quantity(tokens: list[str], i: int) -> tuple[Quantity, int] | None:

@@ -1,0 +1,6 @@
+"""Words as people say them: plain tokens, numbers and units. Knows language and nothing of driving."""
+
+from chauffeur.language.quantities import Dimension, Quantity, mark_quantities, measured, read_quantities
+from chauffeur.language.tokens import plain, tokens_of
+
+__all__ = ["Dimension", "Quantity", "mark_quantities", "measured", "plain", "read_quantities", "tokens_of"]
