@@ -135,8 +135,7 @@ def run_episode(
     held = driver.initial_wishes()
     idle = 0
     ticks = 0
-    limit = round(max_s / world.dt_s)
-    end = limit
+    end = round(max_s / world.dt_s)
     while ticks < end:
         at_s = ticks * world.dt_s
         tick = _ask(policy, held) if failure is None else HeldWishes(held, state="failed")
@@ -175,7 +174,7 @@ def run_episode(
         frames=tuple(frames),
         final=final,
         ticks=ticks,
-        outcome=_outcome(final, referee, failure, out_of_time=ticks >= limit),
+        outcome=_outcome(final, referee, failure),
         causes=_causes(failure),
         metrics=() if referee is None else referee.metrics() if failure is None else _void(referee.metrics()),
         said=tuple(said),
@@ -204,16 +203,14 @@ def _safe(world: World, wishes: Wishes) -> Wishes:
     )
 
 
-def _outcome(final: Snapshot, referee: Referee | None, failure: ChauffeurError | None, *, out_of_time: bool) -> Outcome:
+def _outcome(final: Snapshot, referee: Referee | None, failure: ChauffeurError | None) -> Outcome:
     if final.ego.crashed:
         return "collision"
     if final.off_road:
         return "off_road"
     if failure is not None:
         return "failure"
-    if referee is not None and referee.over:
-        return referee.outcome()
-    return "timeout" if out_of_time and referee is not None else "ended"
+    return "ended" if referee is None else referee.outcome()
 
 
 def _causes(failure: ChauffeurError | None) -> Causes:

@@ -17,7 +17,7 @@ _OUTCOMES: dict[Outcome, tuple[str, Tone]] = {
     "failure": ("Not done as asked", "bad"),
     "collision": ("Collision", "bad"),
     "off_road": ("Left the road", "bad"),
-    "timeout": ("Ran out of time", "bad"),
+    "timeout": ("Ran out of time or road", "bad"),
     "ended": ("Drive ended", "neutral"),
     "refused": ("Refused", "neutral"),
     "not_driven": ("Not driven", "neutral"),

@@ -35,7 +35,8 @@ class LampilotReferee:
         return bool(ego.crashed or not ego.on_road)
 
     def outcome(self) -> Outcome:
-        """What happened; a goal reached in the very instant of a collision is a collision."""
+        """What happened. A goal reached in the instant of a collision is a collision; one never decided, a timeout:
+        time or road ran out."""
         ego = self._world.scene.ego
         if ego.crashed:
             return "collision"
