@@ -67,7 +67,7 @@ def drive(
     console = stdout()
     teller = Quiet(console) if quiet else Teller(console)
     session = Session(
-        planner=planner_named(planner, base_url),
+        planner=planner_named(planner, base_url, teller.writing),
         memory=memory_named() if instruction.person else Forgetful(),
         referee=referee_for,
         tell=teller.tell,

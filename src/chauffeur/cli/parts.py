@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal
 
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, Plan, Scenario
 
@@ -31,11 +32,18 @@ def setting_named(name: str) -> Setting:
     return name
 
 
-def planner_named(spec: str, base_url: str | None) -> Planner:
-    """Planner by specification. Raises ConfigError for an unknown one, or one that takes no endpoint."""
+def planner_named(spec: str, base_url: str | None, on_text: Callable[[str, int], None] | None = None) -> Planner:
+    """Planner by specification; `on_text` gets a language model's reply as it is written.
+
+    Raises:
+        ConfigError: Unknown, or it takes no endpoint.
+    """
     from chauffeur.planners.registry import make_planner
 
-    return make_planner(spec) if base_url is None else make_planner(spec, base_url=base_url)
+    options: dict[str, Any] = {} if base_url is None else {"base_url": base_url}
+    if on_text is not None and spec.startswith("openai/"):
+        options["on_text"] = on_text
+    return make_planner(spec, **options)
 
 
 def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:

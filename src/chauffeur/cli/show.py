@@ -41,6 +41,9 @@ class Quiet:
     def tell(self, letter: str, value: object) -> None:
         """One of the loop's letters, or a frame."""
 
+    def writing(self, text: str, attempt: int) -> None:
+        """A piece of a model's reply as it is written."""
+
     def end(self, recorded: RecordedTrip) -> None:
         """What came of it."""
         trip = recorded.trip
@@ -62,6 +65,7 @@ class Teller(Quiet):
         # A line that rewrites itself makes sense on a terminal only.
         self._live = Live(console=console, transient=True, refresh_per_second=10) if console.is_terminal else None
         self._waiting = False
+        self._reply, self._attempt = "", 0
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -95,6 +99,13 @@ class Teller(Quiet):
                         self._verdict(verdict)
             case _:
                 return
+
+    def writing(self, text: str, attempt: int) -> None:
+        """Show the end of what the model has written so far; a new attempt begins anew."""
+        self._reply = text if attempt != self._attempt else self._reply + text
+        self._attempt = attempt
+        latest = " ".join(self._reply[-400:].split())[-160:]
+        self._live_line(Text.assemble(("planning ... ", "dim"), plain(latest)))
 
     def end(self, recorded: RecordedTrip) -> None:
         """Outcome, causes, scores, provenance."""
