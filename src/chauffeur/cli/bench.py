@@ -56,6 +56,7 @@ def lampilot(
     concurrency: Annotated[int, typer.Option(min=1, help="Planner calls in flight.")] = 8,
 ) -> None:
     """LaMPilot-Bench (seed Tab. IV): completion, collisions and scores of a planner that follows instructions."""
+    import chauffeur
     from chauffeur.bench.lampilot.report import comparison_lines, family_lines
     from chauffeur.bench.lampilot.rollout import BASELINES
     from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
@@ -92,8 +93,8 @@ def lampilot(
     )
     model = "" if maker is None else f", model {maker.model}"
     console.print(
-        f"Planner {planner}{model}; data sha256 {dataset.sha256[:12]}; draw seed {seed}; limits {config.limits.name}; "
-        "scores in points, rates in %; simulated drives (highway-env). Rows marked *paper* are the paper's own."
+        f"Chauffeur {chauffeur.__version__}; planner {planner}{model}; data sha256 {dataset.sha256[:12]}; draw seed {seed}; limits {config.limits.name}; "
+        "scores in points, rates in %; simulated drives (highway-env). Rows marked paper are its authors' own figures."
     )
     console.print(f"Rows: {folder / 'results.jsonl'}")
 

@@ -126,6 +126,9 @@ class Teller(Quiet):
             facts.append(f"{tokens} tokens")
         if trip.plan.usage.cost_usd is not None:
             facts.append(f"{trip.plan.usage.cost_usd:.4f} USD")
+        record = dict(trip.record)
+        facts.append(f"scenario {trip.scenario} (sha256 {str(record.get('scenario_sha256', ''))[:12]})")
+        facts += [f"seed {_short(trip.seed)}", f"chauffeur {record.get('chauffeur', '')}", f"trip {trip.id}"]
         self.console.print(Padding(plain(", ".join(facts)), (0, 0, 0, 2)), style="dim")
 
     def wrote(self, paths: list[Path]) -> None:
