@@ -93,8 +93,9 @@ def lampilot(
     )
     model = "" if maker is None else f", model {maker.model}"
     console.print(
-        f"Chauffeur {chauffeur.__version__}; planner {planner}{model}; data sha256 {dataset.sha256[:12]}; draw seed {seed}; limits {config.limits.name}; "
-        "scores in points, rates in %; simulated drives (highway-env). Rows marked paper are its authors' own figures."
+        f"Chauffeur {chauffeur.__version__}; planner {planner}{model}; data sha256 {dataset.sha256[:12]}; "
+        f"draw seed {seed}; limits {config.limits.name}; scores in points, rates in %; simulated drives "
+        "(highway-env). Rows marked paper are its authors' own figures."
     )
     console.print(f"Rows: {folder / 'results.jsonl'}")
 
