@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from chauffeur.concept import ApiCall, LaneId, Turn, Wishes
@@ -27,6 +27,28 @@ def starting_wishes(perception: Perception, time_headway_s: float = 1.5) -> Wish
     )
 
 
+@dataclass(frozen=True, slots=True)
+class MadeCall:
+    """A call as it was made. Putting it into words takes longer than making it, so that waits until somebody asks.
+
+    Attributes:
+        name: API name.
+        given: Arguments the program gave, in the catalogue's order.
+        result: What it got: numbers, texts, handles and lists of handles, none of which changes afterwards.
+        refused: Why it was refused.
+    """
+
+    name: str
+    given: list[Any]
+    result: Any
+    refused: Exception | None = None
+
+    def in_words(self) -> ApiCall:
+        """The call as text, cut to a readable length."""
+        result = _show(self.result) if self.refused is None else f"refused: {self.refused}"
+        return ApiCall(self.name, ", ".join(map(_show, self.given)), result)
+
+
 class DrivingApis:
     """The APIs as one program sees them. Reads the present instant, holds the wishes, records every call.
 
@@ -41,7 +63,7 @@ class DrivingApis:
         self._perception = perception
         self._driver = driver
         self._said: list[str] = []
-        self._calls: list[ApiCall] = []
+        self._calls: list[MadeCall] = []
         self._methods: dict[str, Callable[..., Any]] = {api: getattr(self, f"_{api}") for api in APIS}
 
     def begin_tick(self, perception: Perception) -> None:
@@ -60,9 +82,14 @@ class DrivingApis:
         return tuple(self._said)
 
     @property
-    def calls(self) -> tuple[ApiCall, ...]:
-        """Calls made in this control period."""
+    def made(self) -> tuple[MadeCall, ...]:
+        """Calls made in this control period, not yet put into words."""
         return tuple(self._calls)
+
+    @property
+    def calls(self) -> tuple[ApiCall, ...]:
+        """Calls made in this control period, in words."""
+        return tuple(call.in_words() for call in self._calls)
 
     def call(self, name: str, arguments: Sequence[Any], keywords: Mapping[str, Any]) -> Any:
         """Make one call for the program.
@@ -80,16 +107,16 @@ class DrivingApis:
             BadArgumentValueError: A value that cannot be: unknown handle, vehicle gone, not finite, text too long.
         """
         api = APIS[name]
-        shown: list[str] = []
+        given: list[Any] = []
         try:
-            result = self._make(api, arguments, keywords, shown)
+            result = self._make(api, arguments, keywords, given)
         except (BadArgumentTypeError, BadArgumentValueError) as error:
-            self._calls.append(ApiCall(name, ", ".join(shown), f"refused: {error}"))
+            self._calls.append(MadeCall(name, given, None, error))
             raise
-        self._calls.append(ApiCall(name, ", ".join(shown), _show(result)))
+        self._calls.append(MadeCall(name, given, result))
         return result
 
-    def _make(self, api: Api, arguments: Sequence[Any], keywords: Mapping[str, Any], shown: list[str]) -> Any:
+    def _make(self, api: Api, arguments: Sequence[Any], keywords: Mapping[str, Any], used: list[Any]) -> Any:
         problem = argument_problem(api, len(arguments), keywords.keys())
         if problem is not None:
             raise BadArgumentTypeError(problem)
@@ -98,7 +125,7 @@ class DrivingApis:
             given = arguments[index] if index < len(arguments) else keywords.get(param.name, param.default)
             values.append(self._decode(api, param, given))
             if index < len(arguments) or param.name in keywords:
-                shown.append(_show(given))
+                used.append(given)
         try:
             return self._encode(api, self._methods[api.name](*values))
         except KeyError as error:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Self
 
 from chauffeur.concept import ApiCall, ProgramError, ProgramState, SandboxError, Wishes
-from chauffeur.programs.binding import DrivingApis, starting_wishes
+from chauffeur.programs.binding import DrivingApis, MadeCall, starting_wishes
 from chauffeur.programs.catalogue import APIS
 from chauffeur.programs.errors import (
     BadArgumentTypeError,
@@ -33,7 +33,7 @@ class TickResult:
         state: State of the program after this period.
         line: Line (1-based) it waits at, or failed at; None when it has finished.
         said: Texts for the passenger.
-        calls: Driving-API calls made.
+        made: Driving-API calls made; `calls` puts them into words.
         error: Why it failed; on the failing period and all later ones.
     """
 
@@ -41,8 +41,13 @@ class TickResult:
     state: ProgramState
     line: int | None = None
     said: tuple[str, ...] = ()
-    calls: tuple[ApiCall, ...] = ()
+    made: tuple[MadeCall, ...] = ()
     error: ProgramError | None = None
+
+    @property
+    def calls(self) -> tuple[ApiCall, ...]:
+        """Driving-API calls made, in words."""
+        return tuple(call.in_words() for call in self.made)
 
 
 class ProgramExecutor:
@@ -141,7 +146,7 @@ class ProgramExecutor:
                 self._end_run()
                 raise
         apis.settle()
-        return TickResult(apis.wishes, self._state, self._line, apis.said, apis.calls, self._error)
+        return TickResult(apis.wishes, self._state, self._line, apis.said, apis.made, self._error)
 
     def _advance(self, run: SandboxRun, apis: DrivingApis) -> None:
         run.begin_tick()
