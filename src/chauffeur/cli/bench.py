@@ -59,8 +59,9 @@ def lampilot(
     import chauffeur
     from chauffeur.bench.lampilot.report import comparison_lines, family_lines
     from chauffeur.bench.lampilot.rollout import BASELINES
-    from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
+    from chauffeur.bench.lampilot.runner import RunConfig
     from chauffeur.cli.console import stdout
+    from chauffeur.concept.registry import load_plugin
     from chauffeur.planners.registry import make_planner
     from chauffeur.worlds.highway.dblv1 import load_dataset
 
@@ -72,7 +73,7 @@ def lampilot(
     maker = None if planner in BASELINES else make_planner(planner, **options)
     folder = out or Path("runs") / f"lampilot-{planner.replace('/', '-')}"
     config = RunConfig(planner, setting, dataset.sha256, items, seed, LAMPILOT_LIMITS)
-    run = LampilotRun(folder, dataset, config, maker)
+    run = load_plugin("chauffeur.benchmarks", "lampilot").open_run(folder, dataset, config, maker)
     console.print(f"LaMPilot-Bench: {len(run.items)} items, planner {planner}, run folder {folder}")
     with _progress(console) as (bar, tasks):
 

@@ -24,7 +24,6 @@ from chauffeur.concept import (
     PlanRequest,
     Program,
     Scenario,
-    Snapshot,
     SystemMessage,
     Trip,
     Verdict,
@@ -266,21 +265,3 @@ def provenance(plan: Plan, scenario: Scenario, seed: int, limits: Limits) -> tup
         ("limits", asdict(limits)),
         ("simulated", True),
     )
-
-
-__all__ = [
-    "MAX_TRIP_S",
-    "Forgetful",
-    "Session",
-    "Snapshot",
-    "declined",
-    "drive_program",
-    "drive_without_program",
-    "make_trip",
-    "make_world",
-    "parse_wish",
-    "provenance",
-    "scenario_hash",
-    "trip_id",
-    "unusable",
-]

@@ -96,7 +96,6 @@ class LampilotRun:
             raise ConfigError(f"{config.planner!r} is no baseline.", hint=f"Baselines: {', '.join(BASELINES)}.")
         self.folder = folder
         self.config = config
-        self._dataset = dataset
         self._planner = planner
         self.items = choose_items(dataset, config.items, config.seed)
         self._freeze_plan()
