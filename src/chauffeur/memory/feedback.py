@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal
 
-from chauffeur.concept import Feedback, History, HistoryItem
+from chauffeur.concept import Feedback
 from chauffeur.language import measured
 from chauffeur.memory.phrasebook import Topic
 from chauffeur.memory.phrases import Want, read_wants
@@ -58,40 +57,6 @@ def interpret_feedback(text: str) -> Feedback:
     if approval < 0 and not telling:
         strength = _PLAIN
     return Feedback(text, signs["speed"], signs["gap"], signs["comfort"], approval, strength)
-
-
-@dataclass(frozen=True, slots=True)
-class Standing:
-    """The verdict that holds on one topic, and the older ones it overrules.
-
-    Attributes:
-        topic: `speed`, `gap` or `comfort`.
-        feedback: The most recent feedback on the topic.
-        when: ISO time of the trip it was given for.
-        overruled: Older feedback of the opposite sign, as (when, feedback), newest first.
-    """
-
-    topic: Literal["speed", "gap", "comfort"]
-    feedback: Feedback
-    when: str
-    overruled: tuple[tuple[str, Feedback], ...] = ()
-
-
-def standing_feedback(history: History) -> tuple[Standing, ...]:
-    """The conflict rule: on each topic the most recent feedback holds; what it contradicts is kept beside it."""
-    said = [(item.when, feedback) for item in sorted(history.items, key=_when) for feedback in item.feedback]
-    standings: list[Standing] = []
-    for topic in TOPICS:
-        own = [(when, feedback) for when, feedback in reversed(said) if getattr(feedback, topic)]
-        if own:
-            when, latest = own[0]
-            against = tuple((w, f) for w, f in own[1:] if getattr(f, topic) == -getattr(latest, topic))
-            standings.append(Standing(topic, latest, when, against))
-    return tuple(standings)
-
-
-def _when(item: HistoryItem) -> str:
-    return item.when
 
 
 def _sign(signs: Iterable[int]) -> Literal[-1, 0, 1]:
