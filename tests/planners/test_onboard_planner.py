@@ -329,3 +329,21 @@ def test_overtaking_keeps_to_the_sign_unless_the_operator_allows_more() -> None:
     assert setting(plan("overtake on the left"), "target_speed_mps") == pytest.approx(31.29, abs=0.01)
     wide = plan("overtake on the left", limits=LAMPILOT_LIMITS)
     assert setting(wide, "target_speed_mps") > 31.3
+
+
+LEFTMOST = replace(HIGHWAY, lane_index=0)
+
+
+@pytest.mark.parametrize(
+    ("words", "situation", "intent"),
+    [
+        ("leave the right lane", HIGHWAY, "lane.left"),
+        ("get out of the left lane", LEFTMOST, "lane.right"),
+        ("don't stay in this lane", LEFTMOST, "lane.right"),
+        ("don't leave so much space", HIGHWAY, "gap.decrease"),
+        ("I wouldn't mind a slower ride", HIGHWAY, "speed.decrease"),
+        ("I wouldn't mind going a bit faster", HIGHWAY, "speed.increase"),
+    ],
+)
+def test_leaving_and_not_minding_keep_their_direction(words: str, situation: Situation, intent: str) -> None:
+    assert plan(words, situation).intent == intent
