@@ -6,24 +6,19 @@ import json
 import re
 from pathlib import Path
 
-import pytest
-
 from chauffeur.planners.onboard.meaning import Meaning, Reading
 from chauffeur.planners.onboard.understand import understand
 
-_DATA = Path("/work/shared/data/lampilot/DbLv1-dev")
-_FILES = sorted(_DATA.glob("*.json"))
 
-pytestmark = pytest.mark.skipif(not _FILES, reason=f"no LaMPilot data at {_DATA}")
-
-
-@pytest.mark.parametrize("file", _FILES, ids=lambda file: file.stem)
-def test_every_command_means_its_task(file: Path) -> None:
-    for command in json.loads(file.read_text())["commands"]:
-        result = understand(command)
-        assert isinstance(result, Reading), command
-        assert len(result.steps) == 1, command
-        assert _fits(result.steps[0], file.stem), (command, result.steps[0])
+def test_every_command_means_its_task(lampilot_data: Path) -> None:
+    files = sorted((lampilot_data / "DbLv1-dev").glob("*.json"))
+    assert files
+    for file in files:
+        for command in json.loads(file.read_text(encoding="utf-8"))["commands"]:
+            result = understand(command)
+            assert isinstance(result, Reading), command
+            assert len(result.steps) == 1, command
+            assert _fits(result.steps[0], file.stem), (command, result.steps[0])
 
 
 def _fits(step: Meaning, task: str) -> bool:
