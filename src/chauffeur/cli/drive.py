@@ -62,7 +62,6 @@ def drive(
 
     instruction = parse_wish(wish, PersonId(person.strip()))
     bounds = limits_named(limits)
-    prompt = setting_named(setting)
     place = suiting(instruction.text) if scenario is None else find(scenario, data)
     console = stdout()
     teller = Quiet(console) if quiet else Teller(console)
@@ -71,7 +70,7 @@ def drive(
         memory=memory_named() if instruction.person else Forgetful(),
         referee=referee_for,
         tell=teller.tell,
-        few_shot=prompt == "few-shot",
+        setting=setting_named(setting),
     )
     teller.begin(place, place.seed if seed is None else seed)
     with teller:

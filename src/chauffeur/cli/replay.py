@@ -67,7 +67,7 @@ def drive_again(recorded: RecordedTrip) -> RecordedTrip:
         outcome=episode.outcome,
         causes=episode.causes,
         metrics=episode.metrics,
-        duration_s=round(episode.ticks * world.dt_s, 3),
+        duration_s=episode.duration_s,
         said=episode.said,
     )
     return replace(recorded, trip=driven, frames=episode.frames, final=episode.final)

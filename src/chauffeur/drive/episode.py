@@ -23,7 +23,7 @@ from chauffeur.concept import (
     Snapshot,
     Wishes,
 )
-from chauffeur.worlds.base import World
+from chauffeur.worlds.base import EGO, World
 
 FALLBACK_S = 10.0
 """How long the fallback drives after a policy failed, before the trip is ended."""
@@ -80,6 +80,7 @@ class Episode:
         frames: One per control period; empty when not recorded.
         final: The last instant.
         ticks: Control periods driven.
+        duration_s: Simulated time driven.
         outcome, causes, metrics: What happened, why, and the scores.
         said: What the passenger was told, as (time s, text).
         success: The referee's success flag.
@@ -88,6 +89,7 @@ class Episode:
     frames: tuple[Frame, ...]
     final: Snapshot
     ticks: int
+    duration_s: float
     outcome: Outcome
     causes: Causes
     metrics: tuple[Metric, ...]
@@ -174,6 +176,7 @@ def run_episode(
         frames=tuple(frames),
         final=final,
         ticks=ticks,
+        duration_s=round(ticks * world.dt_s, 3),
         outcome=_outcome(final, referee, failure),
         causes=_causes(failure),
         metrics=() if referee is None else referee.metrics() if failure is None else _void(referee.metrics()),
@@ -194,7 +197,7 @@ def _ask(policy: RunningPolicy | None, held: Wishes) -> PolicyTick:
 
 def _safe(world: World, wishes: Wishes) -> Wishes:
     """The fallback: stay in the lane one is in, no faster than now, with a generous gap; routes are kept."""
-    ego = world.snapshot().ego
+    ego = world.perception().vehicle(EGO)
     return replace(
         wishes,
         target_speed_mps=max(0.0, ego.speed_mps),

@@ -34,7 +34,7 @@ from chauffeur.drive.episode import Episode, Referee, run_episode
 from chauffeur.drive.loop import Memory, Stages, drive
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.planners.base import Planner
-from chauffeur.planners.prompts import build_system_message
+from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.programs import ProgramExecutor
 from chauffeur.programs.sandbox import UNHURRIED
 from chauffeur.safety import run_checks
@@ -96,7 +96,7 @@ class Session:
         memory: Who remembers.
         referee: Makes the judge of a trip; returning None drives freely.
         tell: Called with the loop's letters as they come, and with `frame` for each control period.
-        few_shot: Whether S carries examples.
+        setting: Whether S carries examples.
         max_s: Bound of the trip in simulated time.
     """
 
@@ -104,7 +104,7 @@ class Session:
     memory: Memory = field(default_factory=Forgetful)
     referee: RefereeMaker = _no_referee
     tell: Callable[[str, object], None] = _silent
-    few_shot: bool = True
+    setting: Setting = "few-shot"
     max_s: float = MAX_TRIP_S
     _episode: Episode | None = None
     _system: SystemMessage | None = None
@@ -115,6 +115,7 @@ class Session:
         Raises:
             ChauffeurError: No plan could be had, or the scenario cannot be set up. The simulated car has not moved.
         """
+        self._episode = None  # a wish that is refused must not be filed with the drive before it
         world = make_world(scenario)
         stages = Stages(
             world=world,
@@ -137,7 +138,7 @@ class Session:
         )
 
     def _build_system(self, limits: Limits) -> SystemMessage:
-        self._system = build_system_message("few-shot" if self.few_shot else "zero-shot", limits=limits)
+        self._system = build_system_message(self.setting, limits=limits)
         return self._system
 
     def _execute(
@@ -222,7 +223,7 @@ def make_trip(
         outcome="refused" if episode is None else episode.outcome,
         causes=causes,
         metrics=() if episode is None else episode.metrics,
-        duration_s=0.0 if episode is None else round(episode.ticks * 0.1, 3),
+        duration_s=0.0 if episode is None else episode.duration_s,
         scenario=scenario.id,
         seed=seed,
         said=() if episode is None else episode.said,

@@ -48,11 +48,7 @@ def make_planner(spec: str, **options: object) -> Planner:
 
 
 def _builder(name: str) -> Callable[..., object]:
-    try:
-        target = load_plugin(GROUP, name)
-    except AttributeError as error:
-        raise ConfigError(f"The planner {name!r} cannot be loaded: {error}.", hint="Run: chauffeur doctor") from error
-    build = getattr(target, "from_spec", None)
+    build = getattr(load_plugin(GROUP, name), "from_spec", None)
     if not callable(build):
         raise ConfigError(f"The entry point {name!r} has no from_spec(argument, **options).")
     return build
