@@ -6,11 +6,11 @@ import os
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chauffeur.concept import LAMPILOT_LIMITS, ConfigError
+from chauffeur.concept import LAMPILOT_LIMITS
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -61,18 +61,16 @@ def lampilot(
     from chauffeur.bench.lampilot.rollout import BASELINES
     from chauffeur.bench.lampilot.runner import RunConfig
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.parts import planner_named, setting_named
     from chauffeur.concept.registry import load_plugin
-    from chauffeur.planners.registry import make_planner
     from chauffeur.worlds.highway.dblv1 import load_dataset
 
     console = stdout()
-    if setting not in ("few-shot", "zero-shot"):
-        raise ConfigError(f"Unknown setting {setting!r}.", hint="Use few-shot or zero-shot.")
+    prompt = setting_named(setting)
     dataset = load_dataset(data)
-    options: dict[str, Any] = {} if base_url is None else {"base_url": base_url}
-    maker = None if planner in BASELINES else make_planner(planner, **options)
+    maker = None if planner in BASELINES else planner_named(planner, base_url)
     folder = out or Path("runs") / f"lampilot-{planner.replace('/', '-')}"
-    config = RunConfig(planner, setting, dataset.sha256, items, seed, LAMPILOT_LIMITS)
+    config = RunConfig(planner, prompt, dataset.sha256, items, seed, LAMPILOT_LIMITS)
     run = load_plugin("chauffeur.benchmarks", "lampilot").open_run(folder, dataset, config, maker)
     console.print(f"LaMPilot-Bench: {len(run.items)} items, planner {planner}, run folder {folder}")
     with _progress(console) as (bar, tasks):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, Plan, Scenario
 
@@ -11,9 +11,8 @@ if TYPE_CHECKING:
     from chauffeur.drive.episode import Referee
     from chauffeur.memory.base import Memory
     from chauffeur.planners.base import Planner
+    from chauffeur.planners.prompts import Setting
     from chauffeur.worlds.base import World
-
-Setting = Literal["few-shot", "zero-shot"]
 
 _LIMITS = {"default": Limits(), "lampilot": LAMPILOT_LIMITS}
 

@@ -13,7 +13,8 @@ import json
 import multiprocessing
 import os
 import platform
-from collections.abc import Callable, Sequence
+import signal
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
@@ -46,7 +47,7 @@ from chauffeur.concept import (
 )
 from chauffeur.drive.session import scenario_hash
 from chauffeur.planners.base import Planner
-from chauffeur.planners.prompts import build_system_message
+from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.worlds.highway.dblv1 import Dataset, Item
 
 BENCH_VERSION = "lampilot-bench-v1"
@@ -69,7 +70,7 @@ class RunConfig:
     """
 
     planner: str
-    setting: str
+    setting: Setting
     data_sha256: str
     items: int
     seed: int
@@ -98,6 +99,8 @@ class LampilotRun:
         self.config = config
         self._planner = planner
         self.items = choose_items(dataset, config.items, config.seed)
+        samples = {item.scenario.id: item.scenario for item in self.items}
+        self._scenario_hashes = {name: scenario_hash(scenario) for name, scenario in samples.items()}
         self._freeze_plan()
         self._contexts = RowStore(folder / "contexts.jsonl", "sample")
         self._plans = RowStore(folder / "generate.jsonl", "item")
@@ -143,14 +146,7 @@ class LampilotRun:
 
     def _describe(self, pool: ProcessPoolExecutor, progress: Progress) -> None:
         samples = {item.scenario.id: item.scenario for item in self.items}
-        todo = [scenario for name, scenario in samples.items() if name not in self._contexts.rows]
-        futures = [pool.submit(describe_sample, scenario) for scenario in todo]
-        done = len(samples) - len(todo)
-        progress("describe", done, len(samples))
-        for future in as_completed(futures):
-            self._contexts.append(future.result())
-            done += 1
-            progress("describe", done, len(samples))
+        _spread(pool, describe_sample, samples, self._contexts, lambda done: progress("describe", done, len(samples)))
 
     async def _generate(self, planner: Planner, progress: Progress, concurrency: int) -> None:
         # A failed call is tried again on resume; a plan, or a planner's refusal, is kept.
@@ -158,8 +154,7 @@ class LampilotRun:
         gate = asyncio.Semaphore(concurrency)
         done = len(self.items) - len(todo)
         progress("generate", done, len(self.items))
-        setting = "zero-shot" if self.config.setting == "zero-shot" else "few-shot"
-        system = build_system_message(setting, limits=self.config.limits)
+        system = build_system_message(self.config.setting, limits=self.config.limits)
 
         async def one(item: Item) -> None:
             nonlocal done
@@ -201,23 +196,23 @@ class LampilotRun:
         decisive: Any = baseline
         if plan is not None:
             decisive = [plan["policy"], plan["refusal"], plan["intent"], plan["settings"]]
-        parts = [ROLLOUT_VERSION, scenario_hash(scenario), decisive, asdict(self.config.limits)]
+        parts = [ROLLOUT_VERSION, self._scenario_hashes[scenario.id], decisive, asdict(self.config.limits)]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:24]
 
     def _roll_out(self, pool: ProcessPoolExecutor, progress: Progress) -> None:
         jobs = {job.key: job for item in self.items if (job := self._job(item)) is not None}
-        todo = [job for key, job in jobs.items() if key not in self._rollouts.rows]
-        done = len(jobs) - len(todo)
-        progress("rollout", done, len(jobs))
-        futures = [pool.submit(roll_out, job) for job in todo]
-        for future in as_completed(futures):
-            self._rollouts.append(future.result())
-            done += 1
-            progress("rollout", done, len(jobs))
+        _spread(pool, roll_out, jobs, self._rollouts, lambda done: progress("rollout", done, len(jobs)))
 
     def score(self) -> list[Row]:
         """One row per planned item, written to `results.jsonl`, with the table in `table.md`."""
-        rows = [self._result(item) for item in self.items]
+        about: Row = {
+            "schema": "lampilot-results-v1",
+            "planner": self.config.planner,
+            "model": "" if self._planner is None else self._planner.model,
+            "data_sha256": self.config.data_sha256,
+            "chauffeur": version("chauffeur"),
+        }
+        rows = [about | self._result(item) for item in self.items]
         write_text(self.folder / "results.jsonl", "".join(json.dumps(r, ensure_ascii=False) + "\n" for r in rows))
         write_text(self.folder / "provenance.json", json.dumps(self.provenance(), indent=1))
         write_text(self.folder / "table.md", markdown(*family_lines(rows)) + "\n")
@@ -225,17 +220,12 @@ class LampilotRun:
 
     def _result(self, item: Item) -> Row:
         base: Row = {
-            "schema": "lampilot-results-v1",
             "item": item.id,
             "task": item.task,
             "family": family_of(item.task),
             "sample": item.scenario.id,
             "scenario_seed": str(item.scenario.seed),
             "command": item.command,
-            "planner": self.config.planner,
-            "model": "" if self._planner is None else self._planner.model,
-            "data_sha256": self.config.data_sha256,
-            "chauffeur": version("chauffeur"),
         }
         job = self._job(item)
         if job is None:
@@ -264,6 +254,23 @@ class LampilotRun:
         }
 
 
+def _spread(
+    pool: ProcessPoolExecutor,
+    work: Callable[[Any], Row],
+    jobs: Mapping[str, Any],
+    store: RowStore,
+    done: Callable[[int], None],
+) -> None:
+    """Do the jobs whose key the store does not have, storing each row as it comes and saying how many are done."""
+    futures = [pool.submit(work, job) for key, job in jobs.items() if key not in store.rows]
+    finished = len(jobs) - len(futures)
+    done(finished)
+    for future in as_completed(futures):
+        store.append(future.result())
+        finished += 1
+        done(finished)
+
+
 def choose_items(dataset: Dataset, count: int, seed: int) -> Sequence[Item]:
     """All items in order, or the first `count` of a permutation (NumPy's legacy generator, as LaMPilot draws them)."""
     items = dataset.items()
@@ -274,9 +281,7 @@ def choose_items(dataset: Dataset, count: int, seed: int) -> Sequence[Item]:
 
 
 def _worker_setup() -> None:
-    # One process per core: numeric libraries must not start threads of their own, and Ctrl-C is the parent's business.
-    import signal
-
+    # Ctrl-C is the parent's business.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
