@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from chauffeur.concept import Context, Situation, Snapshot
+from chauffeur.concept import Context, Snapshot
 from chauffeur.describe.road import (
     ego_lane,
-    front_in_sight,
     front_sentence,
     limit_sentence,
     ordinal,
-    own_direction,
+    situation_of,
     speed_sentence,
 )
 
@@ -23,29 +22,15 @@ def describe_highway(snapshot: Snapshot) -> Context:
     Raises:
         ScenarioError: The ego is on no lane of the road.
     """
-    lane = ego_lane(snapshot)
-    lanes = own_direction(snapshot)
-    index = lanes.index(lane)
-    front = front_in_sight(snapshot)
-    emergency = lanes[-1].emergency
-    count = "1 lane" if len(lanes) == 1 else f"{len(lanes)} lanes"
+    situation = situation_of(snapshot)
+    lanes = situation.lane_count
+    count = "1 lane" if lanes == 1 else f"{lanes} lanes"
+    place = ordinal(lanes - situation.lane_index)
     sentences = [
         speed_sentence(snapshot),
-        f"I am on a highway with {count} in my direction, in the {ordinal(len(lanes) - index)} lane from the right.",
+        f"I am on a highway with {count} in my direction, in the {place} lane from the right.",
     ]
-    if emergency:
+    if situation.emergency_lane:
         sentences.append("The right-most lane is an emergency lane.")
-    sentences += [limit_sentence(lane), front_sentence(front)]
-    return Context(
-        text=" ".join(sentences),
-        situation=Situation(
-            world=snapshot.kind,
-            speed_mps=snapshot.ego.speed_mps,
-            speed_limit_mps=lane.speed_limit_mps,
-            lane_count=len(lanes),
-            lane_index=index,
-            emergency_lane=emergency,
-            front=front,
-            stop_sign_m=snapshot.stop_sign_m,
-        ),
-    )
+    sentences += [limit_sentence(ego_lane(snapshot)), front_sentence(situation.front)]
+    return Context(text=" ".join(sentences), situation=situation)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 
-from chauffeur.concept import Context, LaneView, Situation, Snapshot, Turn
+from chauffeur.concept import Context, LaneView, Snapshot, Turn
 from chauffeur.describe.road import (
     ego_lane,
-    front_in_sight,
     front_sentence,
     limit_sentence,
-    own_direction,
+    situation_of,
     speed_sentence,
 )
 
@@ -40,10 +39,8 @@ def describe_intersection(snapshot: Snapshot) -> Context:
     Raises:
         ScenarioError: The ego is on no lane of the road.
     """
-    lane = ego_lane(snapshot)
-    lanes = own_direction(snapshot)
     turns = allowed_turns(snapshot)
-    front = front_in_sight(snapshot)
+    situation = situation_of(snapshot, turns)
     sentences = [speed_sentence(snapshot)]
     if turns:
         sentences.append("I am coming to an intersection on a two-way road with one lane per direction.")
@@ -59,21 +56,8 @@ def describe_intersection(snapshot: Snapshot) -> Context:
         ways = [_WORDS[turn] for turn in turns]
         choice = ways[0] if len(ways) == 1 else f"{', '.join(ways[:-1])} or {ways[-1]}"
         sentences.append(f"At the intersection I may {choice}; the route has to be chosen before I get there.")
-    sentences += [limit_sentence(lane), front_sentence(front)]
-    return Context(
-        text=" ".join(sentences),
-        situation=Situation(
-            world=snapshot.kind,
-            speed_mps=snapshot.ego.speed_mps,
-            speed_limit_mps=lane.speed_limit_mps,
-            lane_count=len(lanes),
-            lane_index=lanes.index(lane),
-            emergency_lane=lanes[-1].emergency,
-            front=front,
-            stop_sign_m=snapshot.stop_sign_m,
-            turns=turns,
-        ),
-    )
+    sentences += [limit_sentence(ego_lane(snapshot)), front_sentence(situation.front)]
+    return Context(text=" ".join(sentences), situation=situation)
 
 
 def _heading(lane: LaneView) -> float:

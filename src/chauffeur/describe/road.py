@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from chauffeur.concept import LaneView, Lead, ScenarioError, Snapshot
+from chauffeur.concept import LaneView, Lead, ScenarioError, Situation, Snapshot, Turn
 
 SIGHT_M = 100.0
 """How far ahead a vehicle is mentioned: the range of the benchmark's own text."""
@@ -37,6 +37,22 @@ def front_in_sight(snapshot: Snapshot) -> Lead | None:
     """The vehicle ahead in the ego lane, if it is within sight."""
     front = snapshot.front
     return front if front is not None and front.distance_m <= SIGHT_M else None
+
+
+def situation_of(snapshot: Snapshot, turns: tuple[Turn, ...] = ()) -> Situation:
+    """C as values. Raises ScenarioError if the ego is on no lane of the road."""
+    lane, lanes = ego_lane(snapshot), own_direction(snapshot)
+    return Situation(
+        world=snapshot.kind,
+        speed_mps=snapshot.ego.speed_mps,
+        speed_limit_mps=lane.speed_limit_mps,
+        lane_count=len(lanes),
+        lane_index=lanes.index(lane),
+        emergency_lane=lanes[-1].emergency,
+        front=front_in_sight(snapshot),
+        stop_sign_m=snapshot.stop_sign_m,
+        turns=turns,
+    )
 
 
 def ordinal(number: int) -> str:

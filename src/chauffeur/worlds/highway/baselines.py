@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from chauffeur.concept import LaneId, Wishes
-from chauffeur.control import LAMPILOT_EGO, LaneChangeOutlook, MobilParameters, idm_acceleration, should_change
+from chauffeur.control import LAMPILOT_EGO, LaneChangeOutlook, MobilParameters, should_change
 from chauffeur.worlds.base import EGO
-from chauffeur.worlds.highway.perception import HighwayPerception, approach_rate
+from chauffeur.worlds.highway.perception import HighwayPerception
 from chauffeur.worlds.highway.traffic import IDMVehicle
 
 
@@ -52,15 +52,6 @@ class MobilBaseline:
         )
 
     def _own(self, front: int | None, wishes: Wishes) -> float:
-        ego = self._perception.ego
         assert wishes.target_speed_mps is not None
         blocker = self._perception.front_blocker(wishes.served_stops) if front is None else front
-        if blocker is None:
-            return idm_acceleration(float(ego.speed), wishes.target_speed_mps, LAMPILOT_EGO)
-        return idm_acceleration(
-            float(ego.speed),
-            wishes.target_speed_mps,
-            LAMPILOT_EGO,
-            self._perception.distance_along(EGO, blocker),
-            approach_rate(ego, self._perception.entity(blocker)),
-        )
+        return self._perception.idm(EGO, blocker, wishes.target_speed_mps, LAMPILOT_EGO.time_headway_s)

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 from chauffeur.concept import Command, LaneId, Turn, Wishes
 from chauffeur.control import (
-    LAMPILOT_EGO,
     LAMPILOT_STEERING,
     full_scale,
-    idm_acceleration,
     lane_keeping_steering,
 )
 from chauffeur.worlds.base import EGO
-from chauffeur.worlds.highway.perception import HighwayPerception, approach_rate, lane_id
+from chauffeur.worlds.highway.perception import HighwayPerception, lane_id
 from chauffeur.worlds.highway.roads import Scene
-from chauffeur.worlds.highway.traffic import StopSign
 
 _DESTINATIONS: dict[Turn, str] = {"left": "o1", "straight": "o2", "right": "o3"}
 
@@ -67,22 +63,8 @@ class HighwayDriver:
         return self._longitudinal(wishes, wishes.target_speed_mps), self._lateral(wishes.target_lane)
 
     def _longitudinal(self, wishes: Wishes, target_speed_mps: float) -> float:
-        ego = self._scene.ego
-        parameters = replace(LAMPILOT_EGO, time_headway_s=wishes.time_headway_s)
         blocker = self._perception.front_blocker(wishes.served_stops)
-        if blocker is None:
-            return idm_acceleration(float(ego.speed), target_speed_mps, parameters)
-        entity: Any = self._perception.entity(blocker)
-        # A sign has no length: LaMPilot lets the car stop half the jam distance closer to it.
-        shorten = parameters.jam_distance_m / 2 if isinstance(entity, StopSign) else 0.0
-        return idm_acceleration(
-            float(ego.speed),
-            target_speed_mps,
-            parameters,
-            self._perception.distance_along(EGO, blocker),
-            approach_rate(ego, entity),
-            shorten,
-        )
+        return self._perception.idm(EGO, blocker, target_speed_mps, wishes.time_headway_s)
 
     def _lateral(self, lane: LaneId) -> float:
         ego = self._scene.ego

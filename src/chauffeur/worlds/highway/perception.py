@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from chauffeur.concept import LaneId, VehicleState
-from chauffeur.control import LAMPILOT_EGO, IdmParameters, idm_acceleration
+from chauffeur.control import LAMPILOT_EGO, idm_acceleration
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.roads import Scene
 from chauffeur.worlds.highway.traffic import StopSign, Vehicle
@@ -16,11 +17,6 @@ from chauffeur.worlds.highway.traffic import StopSign, Vehicle
 def lane_id(index: tuple[Any, Any, Any]) -> LaneId:
     """A lane index with plain Python types; highway-env mixes in NumPy strings and integers."""
     return str(index[0]), str(index[1]), int(index[2])
-
-
-def approach_rate(follower: Any, leader: Any) -> float:
-    """Follower's speed minus leader's along the follower's heading, m/s."""
-    return float(np.dot(follower.velocity - leader.velocity, follower.direction))
 
 
 class HighwayPerception:
@@ -124,20 +120,23 @@ class HighwayPerception:
 
     def idm_entering(self, follower_id: int, leader_id: int, time_headway_s: float) -> float:
         """IDM acceleration, m/s2, of `follower` at its present speed if `leader` drove right ahead of it."""
-        follower, leader = self._by_id[follower_id], self._by_id[leader_id]
-        parameters = IdmParameters(
-            acceleration_mps2=LAMPILOT_EGO.acceleration_mps2,
-            deceleration_mps2=LAMPILOT_EGO.deceleration_mps2,
-            exponent=LAMPILOT_EGO.exponent,
-            jam_distance_m=LAMPILOT_EGO.jam_distance_m,
-            time_headway_s=time_headway_s,
-        )
+        return self.idm(follower_id, leader_id, float(self._by_id[follower_id].speed), time_headway_s)
+
+    def idm(self, follower_id: int, leader_id: int | None, target_speed_mps: float, time_headway_s: float) -> float:
+        """IDM acceleration, m/s2, of `follower` behind `leader` (None: free road), with LaMPilot's ego parameters."""
+        follower = self._by_id[follower_id]
+        parameters = replace(LAMPILOT_EGO, time_headway_s=time_headway_s)
+        if leader_id is None:
+            return idm_acceleration(float(follower.speed), target_speed_mps, parameters)
+        leader = self._by_id[leader_id]
         return idm_acceleration(
             float(follower.speed),
-            float(follower.speed),
+            target_speed_mps,
             parameters,
-            float(follower.lane_distance_to(leader)),
-            approach_rate(follower, leader),
+            self.distance_along(follower_id, leader_id),
+            float(np.dot(follower.velocity - leader.velocity, follower.direction)),
+            # A sign has no length: LaMPilot lets the car stop half the jam distance closer to it.
+            parameters.jam_distance_m / 2 if isinstance(leader, StopSign) else 0.0,
         )
 
 
