@@ -75,7 +75,7 @@ class Teller(Quiet):
     def begin(self, scenario: Scenario, seed: int) -> None:
         """Name the road."""
         title = plain(scenario.title or scenario.id)
-        self.console.print(Text.assemble(title, f" ({scenario.id}, seed {_short(seed)})", style="dim"))
+        self.console.print(Text.assemble(title, f" ({scenario.id}, seed {words.seed_words(seed)})", style="dim"))
 
     def tell(self, letter: str, value: object) -> None:
         """Print a letter as it comes; show a frame on the live line."""
@@ -128,7 +128,7 @@ class Teller(Quiet):
             facts.append(f"{trip.plan.usage.cost_usd:.4f} USD")
         record = dict(trip.record)
         facts.append(f"scenario {trip.scenario} (sha256 {str(record.get('scenario_sha256', ''))[:12]})")
-        facts += [f"seed {_short(trip.seed)}", f"chauffeur {record.get('chauffeur', '')}", f"trip {trip.id}"]
+        facts += [f"seed {words.seed_words(trip.seed)}", f"chauffeur {record.get('chauffeur', '')}", f"trip {trip.id}"]
         self.console.print(Padding(plain(", ".join(facts)), (0, 0, 0, 2)), style="dim")
 
     def wrote(self, paths: list[Path]) -> None:
@@ -201,8 +201,3 @@ class Teller(Quiet):
         if self._live is not None and self._waiting:
             self._live.stop()
             self._waiting = False
-
-
-def _short(seed: int) -> str:
-    text = str(seed)
-    return text if len(text) <= 12 else f"{text[:4]}...{text[-4:]}"

@@ -9,11 +9,9 @@ Values typed `Any` in the nouns (provenance, scenario mappings) are JSON values:
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
 import math
-import secrets
 import struct
 from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
@@ -34,6 +32,7 @@ from chauffeur.concept import (
     Trip,
 )
 from chauffeur.drive import mcap_schemas as channels
+from chauffeur.drive.files import publish
 from chauffeur.drive.foxglove import ego_transform, nanoseconds, scene_update
 
 FORMAT = 1
@@ -128,22 +127,12 @@ def write_trip(
     Raises:
         DataError: The folder cannot be written, or a value is not storable.
     """
-    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    stream = io.BytesIO()
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with partial.open("xb") as stream:
-            _write(Writer(stream, _CHUNK_BYTES, CompressionType.ZSTD), trip, frames, scenario, system, final)
-        partial.replace(path)
-    except OSError as error:
-        raise DataError(
-            f"The trip cannot be written to {path}: {error.strerror or error}.", hint="Choose another folder."
-        ) from error
+        _write(Writer(stream, _CHUNK_BYTES, CompressionType.ZSTD), trip, frames, scenario, system, final)
     except (TypeError, ValueError) as error:
         raise DataError(f"The trip holds a value that a recording cannot store: {error}.") from error
-    finally:
-        with contextlib.suppress(OSError):
-            partial.unlink(missing_ok=True)
-    return path
+    return publish(path, stream.getvalue(), "trip")
 
 
 def read_trip(path: Path) -> RecordedTrip:

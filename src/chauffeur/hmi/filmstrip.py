@@ -13,10 +13,10 @@ from pathlib import Path
 from PIL import Image, ImageDraw, ImageFont
 
 from chauffeur.concept import DataError, Snapshot, VehicleState
+from chauffeur.drive.files import publish
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import Event, EventKind, events_of
-from chauffeur.hmi.files import publish
 from chauffeur.hmi.road import Box, Road, draw_road, track_box
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 
@@ -173,15 +173,12 @@ def _title(draw: ImageDraw.ImageDraw, recorded: RecordedTrip) -> None:
     font = _font(_TITLE_PX)
     draw.text((_MARGIN * k, _MARGIN * k), _fit(draw, f'"{trip.instruction.text}"', font, room), _INK, font)
     label, _ = words.outcome_words(trip.outcome)
-    facts = f"{label}   |   {trip.plan.planner or 'no planner'}   |   {trip.scenario}, seed {_short(trip.seed)}"
+    facts = (
+        f"{label}   |   {trip.plan.planner or 'no planner'}   |   {trip.scenario}, seed {words.seed_words(trip.seed)}"
+    )
     small = _font(_HEAD_PX)
     line = _fit(draw, f"{facts}   |   {words.SIMULATED}", small, room)
     draw.text((_MARGIN * k, (_MARGIN + _TITLE_PX + 14) * k), line, _MUTED, small)
-
-
-def _short(seed: int) -> str:
-    text = str(seed)
-    return text if len(text) <= 12 else f"{text[:4]}...{text[-4:]}"
 
 
 def _head(draw: ImageDraw.ImageDraw, shot: Snapshot, event: Event | None, x: float, y: float, width: float) -> None:

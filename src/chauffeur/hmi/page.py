@@ -17,8 +17,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from chauffeur.drive.files import publish
 from chauffeur.drive.recording import RecordedTrip
-from chauffeur.hmi.files import publish
 from chauffeur.hmi.payload import page_payload
 
 _STYLES = ("trip.css", "panels.css")

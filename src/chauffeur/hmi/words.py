@@ -100,3 +100,9 @@ def feedback_words(feedback: Feedback) -> str:
     )
     said = [less if sign < 0 else more for sign, less, more in meanings if sign]
     return ", ".join(said) or "no change wanted"
+
+
+def seed_words(seed: int) -> str:
+    """A seed at a readable length; the origin's run to 43 digits."""
+    text = str(seed)
+    return text if len(text) <= 12 else f"{text[:4]}...{text[-4:]}"

@@ -6,13 +6,16 @@ in the table of what it handed out, so a made-up one is refused, and there is no
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Mapping
+from typing import Final, TypeVar
 
 from chauffeur.concept import LaneId
 from chauffeur.programs.errors import BadArgumentTypeError, BadArgumentValueError
 
 VEHICLE_PREFIX: Final = "veh:"
 LANE_PREFIX: Final = "lane:"
+
+_T = TypeVar("_T")
 
 
 def vehicle_handle(vehicle_id: int) -> str:
@@ -60,16 +63,8 @@ class HandleTable:
             BadArgumentTypeError: It is not a vehicle handle.
             BadArgumentValueError: It looks like one, but was never handed out.
         """
-        if isinstance(handle, str):
-            known = self._vehicles.get(handle)
-            if known is not None:
-                return known
-            if handle.startswith(VEHICLE_PREFIX):
-                raise BadArgumentValueError(f"{where}: {handle[:40]!r} is no vehicle this program was given")
-        raise BadArgumentTypeError(
-            f"{where} must be a vehicle, not {describe(handle)}; vehicles come from get_ego_vehicle() "
-            "or detect_front_vehicle_in()"
-        )
+        source = "vehicles come from get_ego_vehicle() or detect_front_vehicle_in()"
+        return _given(self._vehicles, handle, where, "vehicle", VEHICLE_PREFIX, source)
 
     def lane(self, handle: object, where: str) -> LaneId:
         """Lane behind a handle.
@@ -82,20 +77,23 @@ class HandleTable:
             BadArgumentTypeError: It is not a lane handle.
             BadArgumentValueError: It looks like one, but was never handed out.
         """
-        if isinstance(handle, str):
-            known = self._lanes.get(handle)
-            if known is not None:
-                return known
-            if handle.startswith(LANE_PREFIX):
-                raise BadArgumentValueError(f"{where}: {handle[:40]!r} is no lane this program was given")
-        raise BadArgumentTypeError(
-            f"{where} must be a lane, not {describe(handle)}; lanes come from get_lane_of(), "
-            "get_left_lane() or get_right_lane()"
-        )
+        source = "lanes come from get_lane_of(), get_left_lane() or get_right_lane()"
+        return _given(self._lanes, handle, where, "lane", LANE_PREFIX, source)
 
     def issued(self) -> tuple[list[int], list[LaneId]]:
         """Vehicles and lanes handed out, for a snapshot."""
         return list(self._vehicles.values()), list(self._lanes.values())
+
+
+def _given(table: Mapping[str, _T], handle: object, where: str, kind: str, prefix: str, source: str) -> _T:
+    """What was handed out under a handle; the errors are those of `HandleTable.vehicle` and `HandleTable.lane`."""
+    if isinstance(handle, str):
+        known = table.get(handle)
+        if known is not None:
+            return known
+        if handle.startswith(prefix):
+            raise BadArgumentValueError(f"{where}: {handle[:40]!r} is no {kind} this program was given")
+    raise BadArgumentTypeError(f"{where} must be a {kind}, not {describe(handle)}; {source}")
 
 
 def describe(value: object) -> str:

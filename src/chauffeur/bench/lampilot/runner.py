@@ -34,7 +34,7 @@ from chauffeur.bench.lampilot.rollout import (
     not_driven,
     roll_out,
 )
-from chauffeur.bench.store import Row, RowStore, write_text
+from chauffeur.bench.store import Row, RowStore
 from chauffeur.concept import (
     LAMPILOT_LIMITS,
     ChauffeurError,
@@ -45,6 +45,7 @@ from chauffeur.concept import (
     PlanRequest,
     Scenario,
 )
+from chauffeur.drive.files import publish
 from chauffeur.drive.session import scenario_hash
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
@@ -121,7 +122,7 @@ class LampilotRun:
                     hint="Continue it with the options it was started with, or choose another --out folder.",
                 )
             return
-        write_text(path, json.dumps(plan, indent=1, ensure_ascii=False))
+        publish(path, json.dumps(plan, indent=1, ensure_ascii=False).encode(), "run's plan")
 
     def run(self, workers: int, progress: Progress, concurrency: int = 8) -> list[Row]:
         """All stages that are not done yet; returns the result rows. Interrupting keeps everything finished."""
@@ -213,9 +214,13 @@ class LampilotRun:
             "chauffeur": version("chauffeur"),
         }
         rows = [about | self._result(item) for item in self.items]
-        write_text(self.folder / "results.jsonl", "".join(json.dumps(r, ensure_ascii=False) + "\n" for r in rows))
-        write_text(self.folder / "provenance.json", json.dumps(self.provenance(), indent=1))
-        write_text(self.folder / "table.md", markdown(*family_lines(rows)) + "\n")
+        files = {
+            "results.jsonl": "".join(json.dumps(row, ensure_ascii=False) + "\n" for row in rows),
+            "provenance.json": json.dumps(self.provenance(), indent=1),
+            "table.md": markdown(*family_lines(rows)) + "\n",
+        }
+        for name, text in files.items():
+            publish(self.folder / name, text.encode(), "run's result")
         return rows
 
     def _result(self, item: Item) -> Row:
