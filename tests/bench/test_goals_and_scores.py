@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chauffeur.bench.lampilot.goals import GIVE_UP_S, HOLD_S, _Held, make_goal
-from chauffeur.bench.lampilot.metrics import Scorer, driving_score
-from chauffeur.concept import Scenario, ScenarioError
+from chauffeur.bench.lampilot.metrics import PAPER, RULERS, driving_score, metrics_of, points
+from chauffeur.concept import ConfigError, Scenario, ScenarioError
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
@@ -58,8 +58,8 @@ def test_time_runs_out() -> None:
     ],
 )
 def test_goals_start_open(scenario: str, goal: dict[str, object]) -> None:
-    world = _world(scenario)
-    assert make_goal(world, _with_goal(scenario, **goal)).rule(0.1) == "open"
+    road = _world(scenario).perception()
+    assert make_goal(road, _with_goal(scenario, **goal)).rule(0.1, road.instant()) == "open"
 
 
 @pytest.mark.parametrize(
@@ -78,37 +78,83 @@ def test_goals_start_open(scenario: str, goal: dict[str, object]) -> None:
 )
 def test_goals_that_cannot_apply_say_so(scenario: str, goal: dict[str, object], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
-        make_goal(_world(scenario), _with_goal(scenario, **goal))
+        make_goal(_world(scenario).perception(), _with_goal(scenario, **goal))
 
 
-def _scorer(speeds: list[float], ttcs: list[float]) -> Scorer:
-    return Scorer(speeds_mps=list(speeds), ttcs_s=list(ttcs))
+def _drive(*, success: bool = True, **signals: object) -> dict[str, object]:
+    """A rollout row: 30 s at constant speed without any conflict, but for what is given."""
+    quiet = {
+        "steps": 300,
+        "ttc_along_s": None,
+        "ttc_plane_s": None,
+        "ttc_lane_s": None,
+        "speed_mean_mps": 20.0,
+        "speed_std_mps": 0.0,
+        "crashed": False,
+        "off_road": False,
+        "past_end": False,
+        "stop_speed_mps": None,
+        "fault": "",
+    }
+    return {"success": success, "signals": quiet | signals}
 
 
-def test_scores_on_analytic_cases() -> None:
-    scorer = _scorer([20.0] * 300, [-1.0] * 300)
-    assert scorer.ttc_score == 100.0
-    assert scorer.speed_variance_score == 100.0
-    assert scorer.time_efficiency_score == pytest.approx(50.0)
-    assert scorer.score(success=True) == pytest.approx(0.5 * 100 + 0.3 * 100 + 0.2 * 50)
-    assert scorer.score(success=False) == 0.0
+@pytest.mark.parametrize("ruler", RULERS)
+def test_scores_on_analytic_cases(ruler: str) -> None:
+    row = points(_drive(), ruler)
+    assert (row["ttc"], row["speed_variance"]) == (100.0, 100.0)
+    assert row["time_efficiency"] == pytest.approx(50.0)
+    assert row["score"] == pytest.approx(0.5 * 100 + 0.3 * 100 + 0.2 * 50)
+    assert points(_drive(success=False), ruler)["score"] == 0.0
+    assert row["metrics"] == RULERS[ruler]
 
 
-@pytest.mark.parametrize(("ttc", "points"), [(2.0, 99.5), (2.1, 100.0), (0.5, 98.0), (0.1, 90.0), (0.001, -100.0)])
-def test_ttc_score(ttc: float, points: float) -> None:
-    assert _scorer([20.0], [ttc]).ttc_score == pytest.approx(points)
+@pytest.mark.parametrize(("ttc", "expected"), [(2.0, 99.5), (2.1, 100.0), (0.5, 98.0), (0.1, 90.0), (0.001, -100.0)])
+def test_ttc_score(ttc: float, expected: float) -> None:
+    assert points(_drive(ttc_along_s=ttc), "origin")["ttc"] == pytest.approx(expected)
+    assert points(_drive(ttc_plane_s=ttc), "paper")["ttc"] == pytest.approx(max(0.0, expected))
+    assert points(_drive(ttc_along_s=ttc), "paper")["ttc"] == 100.0  # each ruler reads its own signal
+
+
+def test_rulers_differ_where_the_code_differs_from_the_print() -> None:
+    wild = _drive(speed_std_mps=12.0, steps=700)
+    assert points(wild, "origin")["speed_variance"] == pytest.approx(-20.0)
+    assert points(wild, "paper")["speed_variance"] == 0.0
+    assert points(wild, "origin")["success"]
+    assert not points(wild, "paper")["success"]  # after the time limit
+    over_the_end = _drive(success=False, off_road=True, past_end=True, fault="road_end")
+    assert points(over_the_end, "origin")["collision"]
+    assert not points(over_the_end, "paper")["collision"]
+    struck = _drive(crashed=True, fault="struck")
+    assert points(struck, "origin")["success"]
+    assert not points(struck, "paper")["success"]
+    with pytest.raises(ConfigError, match="Unknown ruler"):
+        points(wild, "mine")
+
+
+def test_what_was_not_driven_has_no_parts() -> None:
+    row = points({"success": False, "signals": None}, "origin")
+    assert row["ttc"] is None
+    assert row["score"] == 0.0
+
+
+@pytest.mark.parametrize(("speed", "word"), [(None, ""), (0.4, "stopped"), (1.0, "rolled"), (9.0, "rolled")])
+def test_stop_sign_column(speed: float | None, word: str) -> None:
+    assert points(_drive(stop_speed_mps=speed), "origin")["stop"] == word
 
 
 def test_metrics_of_a_failure_do_not_apply() -> None:
-    metrics = {m.id: m for m in _scorer([20.0], [1.0]).metrics(success=False)}
+    metrics = {m.id: m for m in metrics_of(_drive(success=False, ttc_along_s=1.0))}
     assert not metrics["lampilot-ttc-v1"].applies
     assert metrics["lampilot-score-v1"].applies
     assert metrics["lampilot-score-v1"].value == 0.0
+    assert "lampilot-paper-score-v1" in {m.id for m in metrics_of(_drive(), PAPER)}
 
 
-@given(st.lists(st.floats(0, 40), min_size=1, max_size=50), st.lists(st.floats(-1, 50), min_size=1, max_size=50))
-def test_score_is_never_negative_nor_above_100(speeds: list[float], ttcs: list[float]) -> None:
-    assert 0.0 <= _scorer(speeds, ttcs).score(success=True) <= 100.0
+@given(st.floats(0, 30), st.floats(1e-6, 50), st.integers(1, 10_000), st.sampled_from(sorted(RULERS)))
+def test_score_is_never_negative_nor_above_100(std: float, ttc: float, steps: int, ruler: str) -> None:
+    row = points(_drive(speed_std_mps=std, ttc_along_s=ttc, ttc_plane_s=ttc, steps=steps), ruler)
+    assert 0.0 <= row["score"] <= 100.0
 
 
 def test_paper_rows_follow_from_their_columns() -> None:

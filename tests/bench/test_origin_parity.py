@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from chauffeur.bench.lampilot.metrics import points
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
 from chauffeur.concept import LAMPILOT_LIMITS
 from chauffeur.worlds.highway.dblv1 import load_dataset
@@ -32,6 +33,7 @@ def test_baseline_outcomes_equal_the_origins(lampilot_data: Path, baseline: str,
     samples = [(task.name, s) for task in dataset.tasks for s in task.samples]
     for name, scenario in samples[part * 14 :: 56]:
         row = roll_out(RolloutJob("", scenario, baseline, None, LAMPILOT_LIMITS))
+        row |= points(row, "origin")
         peer = expected[f"{name}_{scenario.seed}"]
         assert (row["success"], row["collision"], row["steps"]) == (peer["success"], peer["collision"], peer["steps"])
         for theirs, ours in COLUMNS.items():

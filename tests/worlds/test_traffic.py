@@ -11,7 +11,8 @@ from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.dynamics import BicycleVehicle
 
 from chauffeur.concept import Command, Scenario
-from chauffeur.worlds.highway import HighwayWorld, roads
+from chauffeur.worlds.highway import roads
+from chauffeur.worlds.highway.reference import ReferenceWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
 
@@ -35,7 +36,7 @@ class _PlainDynamicEgo(BicycleVehicle):
 
 
 def _trace(scenario: Scenario, steps: int) -> list[Any]:
-    world = HighwayWorld()
+    world = ReferenceWorld()
     world.reset(scenario)
     driver = world.driver()
     wishes = driver.initial_wishes()
@@ -65,7 +66,7 @@ def test_same_as_plain_highway_env(scenario: Scenario, monkeypatch: pytest.Monke
 
 def test_crash_is_felt_and_ends_the_trip() -> None:
     scenario = next(s for s in BUILT_IN if s.id == "following")
-    world = HighwayWorld()
+    world = ReferenceWorld()
     world.reset(scenario)
     for _ in range(300):
         world.step(Command(5.0, 0.0))

@@ -38,6 +38,9 @@ class StraightLane(AbstractLane):
     ) -> None: ...
 
 class SineLane(StraightLane):
+    amplitude: float
+    pulsation: float
+    phase: float
     def __init__(
         self,
         start: ArrayLike,
@@ -53,6 +56,11 @@ class SineLane(StraightLane):
     ) -> None: ...
 
 class CircularLane(AbstractLane):
+    center: NDArray[np.float64]
+    radius: float
+    start_phase: float
+    end_phase: float
+    direction: int
     def __init__(
         self,
         center: ArrayLike,

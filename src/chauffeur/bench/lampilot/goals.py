@@ -12,8 +12,8 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from chauffeur.concept import LaneId, Scenario, ScenarioError
-from chauffeur.worlds.highway import HighwayWorld
-from chauffeur.worlds.highway.perception import lane_id
+from chauffeur.worlds.base import EGO
+from chauffeur.worlds.highway import Instant, RoadPerception
 
 Ruling = Literal["open", "success", "failure"]
 
@@ -23,12 +23,14 @@ GIVE_UP_S = 60.0
 """Speed and distance tasks fail after this."""
 SIGHT_M = 100.0
 """A vehicle further ahead than this does not count."""
+_PASSED_M = 10.0
+"""Two car lengths: how far behind an overtaken vehicle must be."""
 
 
 class Goal(Protocol):
     """A success condition, asked after every control period."""
 
-    def rule(self, elapsed_s: float) -> Ruling:
+    def rule(self, elapsed_s: float, now: Instant) -> Ruling:
         """Whether the task is done at the present instant, `elapsed_s` after it began."""
         ...
 
@@ -55,28 +57,31 @@ class _Held:
 class SpeedGoal:
     """Reach and hold a speed within 1 m/s, or match a slower vehicle less than 100 m ahead (`ACCEvalbySpeed`)."""
 
-    def __init__(self, world: HighwayWorld, spec: dict[str, Any]) -> None:
-        self._world = world
-        ego = world.scene.ego
-        self.target_mps = float(spec["speed"]) if "speed" in spec else float(ego.speed) + float(spec["rel_speed"])
+    def __init__(self, road: RoadPerception, spec: dict[str, Any]) -> None:
+        start = road.instant().speed_mps
+        self.target_mps = float(spec["speed"]) if "speed" in spec else start + float(spec["rel_speed"])
         self._held = _Held()
 
-    def rule(self, elapsed_s: float) -> Ruling:
+    def rule(self, elapsed_s: float, now: Instant) -> Ruling:
         """See Goal."""
-        ego = self._world.scene.ego
-        front = self._world.scene.road.neighbour_vehicles(ego, ego.lane_index)[0]
-        if front is not None and ego.lane_distance_to(front) > SIGHT_M:
-            front = None
-        off_target = abs(ego.speed - self.target_mps)
-        if front is None or front.speed > self.target_mps:
+        alone = now.front is None or now.gap_m > SIGHT_M
+        off_target = abs(now.speed_mps - self.target_mps)
+        if alone or now.front_speed_mps > self.target_mps:
             reached, lost = off_target < 1, off_target > 1
-        elif front.speed < self.target_mps:
-            off_front = abs(front.speed - ego.speed)
-            near = abs(ego.lane_distance_to(front)) < SIGHT_M
-            reached, lost = bool(off_front < 1 and near), off_front > 1
+        elif now.front_speed_mps < self.target_mps:
+            off_front = abs(now.front_speed_mps - now.speed_mps)
+            reached, lost = off_front < 1 and abs(now.gap_m) < SIGHT_M, off_front > 1
         else:  # equal speeds fall between LaMPilot's two cases
             reached = lost = False
-        return self._held.judge(elapsed_s, reached=bool(reached), lost=bool(lost))
+        return self._held.judge(elapsed_s, reached=reached, lost=lost)
+
+
+def _lead_at_start(road: RoadPerception, otherwise: str) -> int:
+    """Vehicle ahead within 100 m. Raises ScenarioError saying `otherwise`."""
+    now = road.instant()
+    if now.front is None or abs(now.gap_m) >= SIGHT_M:
+        raise ScenarioError(otherwise, hint="Choose another seed.")
+    return now.front
 
 
 class DistanceGoal:
@@ -87,119 +92,105 @@ class DistanceGoal:
     missing vehicle; here the clock stops instead.
     """
 
-    def __init__(self, world: HighwayWorld, spec: dict[str, Any]) -> None:
-        self._world = world
-        ego, road = world.scene.ego, world.scene.road
-        self._front = road.neighbour_vehicles(ego, ego.lane_index)[0]
-        if self._front is None or abs(ego.lane_distance_to(self._front)) >= SIGHT_M:
-            raise ScenarioError(
-                "This task is about the vehicle ahead, and there is none within 100 m.", hint="Choose another seed."
-            )
-        start = float(ego.lane_distance_to(self._front))
-        self.target_m = float(spec["distance"]) if "distance" in spec else start + float(spec["rel_distance"])
+    def __init__(self, road: RoadPerception, spec: dict[str, Any]) -> None:
+        self._road = road
+        self._front: int | None = _lead_at_start(
+            road, "This task is about the vehicle ahead, and there is none within 100 m."
+        )
+        now = road.instant()
+        self.target_m = float(spec["distance"]) if "distance" in spec else now.gap_m + float(spec["rel_distance"])
         self._tolerance_m = 0.3 * self.target_m
-        self._first_speed = float(ego.speed)
+        self._first_speed = now.speed_mps
         self._held = _Held()
 
-    def rule(self, elapsed_s: float) -> Ruling:
+    def rule(self, elapsed_s: float, now: Instant) -> Ruling:
         """See Goal."""
-        ego, road = self._world.scene.ego, self._world.scene.road
-        if self._front is None or self._front.lane_index != ego.lane_index:
-            self._front = road.neighbour_vehicles(ego, ego.lane_index)[0]
+        if self._front is None or self._road.lane_of(self._front) != now.lane:
+            self._front = now.front
         if self._front is None:
-            at_first_speed = math.isclose(ego.speed, self._first_speed, abs_tol=0.1)
+            at_first_speed = math.isclose(now.speed_mps, self._first_speed, abs_tol=0.1)
             return self._held.judge(elapsed_s, reached=at_first_speed, lost=at_first_speed)
-        distance = abs(ego.lane_distance_to(self._front))
+        distance = abs(self._road.distance_along(EGO, self._front))
         low, high = self.target_m - self._tolerance_m, self.target_m + self._tolerance_m
-        return self._held.judge(
-            elapsed_s, reached=bool(low < distance < high), lost=bool(distance < low or distance > high)
-        )
+        return self._held.judge(elapsed_s, reached=low < distance < high, lost=distance < low or distance > high)
 
 
-def _lane_beside(world: HighwayWorld, direction: str) -> tuple[LaneId, Any]:
+def _lane_beside(road: RoadPerception, direction: str) -> LaneId:
     """Lane to the left or right of the ego's start lane. Raises ScenarioError where there is none to drive on."""
     if direction not in ("left", "right"):
         raise ScenarioError(f"Goal direction must be 'left' or 'right', not {direction!r}.")
-    ego, network = world.scene.ego, world.scene.road.network
-    lane = world.perception().adjacent_lane(lane_id(ego.lane_index), -1 if direction == "left" else 1)
-    if lane is None or not network.get_lane(lane).is_reachable_from(ego.position):
+    lane = road.adjacent_lane(road.lane_of(EGO), -1 if direction == "left" else 1)
+    if lane is None or not road.reachable(lane):
         raise ScenarioError(f"There is no lane to the {direction} of the ego.", hint="Choose another scenario.")
-    return lane, network.get_lane(lane)
+    return lane
 
 
-def _heading_error_rad(ego: Any, lane: Any) -> float:
+def _heading_error_rad(now: Instant, road: RoadPerception, lane: LaneId) -> float:
     """Absolute heading difference to a lane where the ego is along it, not wrapped (as the origin compares it)."""
-    return abs(float(ego.heading) - float(lane.heading_at(lane.local_coordinates(ego.position)[0])))
+    return abs(now.heading_rad - road.lane_heading(lane))
 
 
 class LaneChangeGoal:
     """Be in the lane beside the start lane, heading within 5 degrees of it (`LaneChangeEval`)."""
 
-    def __init__(self, world: HighwayWorld, spec: dict[str, Any]) -> None:
-        self._world = world
-        self._lane, self._geometry = _lane_beside(world, str(spec["direction"]))
+    def __init__(self, road: RoadPerception, spec: dict[str, Any]) -> None:
+        self._road = road
+        self._lane = _lane_beside(road, str(spec["direction"]))
 
-    def rule(self, elapsed_s: float) -> Ruling:
+    def rule(self, elapsed_s: float, now: Instant) -> Ruling:
         """See Goal. There is no time limit but the environment's."""
         del elapsed_s
-        ego = self._world.scene.ego
-        aligned = ego.lane_index == self._lane and _heading_error_rad(ego, self._geometry) < np.deg2rad(5)
+        aligned = now.lane == self._lane and _heading_error_rad(now, self._road, self._lane) < np.deg2rad(5)
         return "success" if aligned else "open"
 
 
 class OvertakeGoal:
     """Be in the lane beside the start lane with the vehicle once ahead now more than 10 m behind (`OvertakeEval`)."""
 
-    def __init__(self, world: HighwayWorld, spec: dict[str, Any]) -> None:
-        self._world = world
-        self._lane, self._geometry = _lane_beside(world, str(spec["direction"]))
-        ego, road = world.scene.ego, world.scene.road
-        self._front = road.neighbour_vehicles(ego, ego.lane_index)[0]
-        if self._front is None or abs(ego.lane_distance_to(self._front)) >= SIGHT_M:
-            raise ScenarioError("There is no vehicle within 100 m ahead to overtake.", hint="Choose another seed.")
+    def __init__(self, road: RoadPerception, spec: dict[str, Any]) -> None:
+        self._road = road
+        self._lane = _lane_beside(road, str(spec["direction"]))
+        self._front = _lead_at_start(road, "There is no vehicle within 100 m ahead to overtake.")
 
-    def rule(self, elapsed_s: float) -> Ruling:
+    def rule(self, elapsed_s: float, now: Instant) -> Ruling:
         """See Goal. There is no time limit but the environment's."""
         del elapsed_s
-        ego = self._world.scene.ego
-        passed = ego.lane_distance_to(self._front, self._geometry) < -2 * ego.LENGTH
-        return "success" if ego.lane_index == self._lane and passed else "open"
+        if now.lane != self._lane:
+            return "open"
+        return "success" if self._road.distance_on(self._lane, self._front) < -_PASSED_M else "open"
 
 
 class PullOverGoal:
     """Stand (below 0.5 m/s) in the emergency lane (`PullOverEval`)."""
 
-    def __init__(self, world: HighwayWorld, spec: dict[str, Any]) -> None:
+    def __init__(self, road: RoadPerception, spec: dict[str, Any]) -> None:
         del spec
-        self._world = world
-        if not world.scene.emergency_lanes:
+        self._lanes = road.emergency_lanes
+        if not self._lanes:
             raise ScenarioError("This road has no emergency lane to pull over to.")
 
-    def rule(self, elapsed_s: float) -> Ruling:
+    def rule(self, elapsed_s: float, now: Instant) -> Ruling:
         """See Goal. There is no time limit but the environment's."""
         del elapsed_s
-        ego = self._world.scene.ego
-        in_lane = lane_id(ego.lane_index) in self._world.scene.emergency_lanes
-        return "success" if in_lane and abs(ego.speed) <= 0.5 else "open"
+        return "success" if now.lane in self._lanes and abs(now.speed_mps) <= 0.5 else "open"
 
 
 class RouteGoal:
     """Be in the wished exit lane of the intersection, heading within 0.1 degrees of it (`IntersectionEval`)."""
 
-    def __init__(self, world: HighwayWorld, spec: dict[str, Any]) -> None:
-        self._world = world
-        self._lane = lane_id(tuple(spec["direction"]))
-        if not world.perception().has_lane(self._lane):
+    def __init__(self, road: RoadPerception, spec: dict[str, Any]) -> None:
+        self._road = road
+        start, end, index = spec["direction"]
+        self._lane: LaneId = (str(start), str(end), int(index))
+        if not road.has_lane(self._lane):
             raise ScenarioError(f"Goal lane {self._lane} is not on this road.")
-        self._geometry = world.scene.road.network.get_lane(self._lane)
 
-    def rule(self, elapsed_s: float) -> Ruling:
+    def rule(self, elapsed_s: float, now: Instant) -> Ruling:
         """See Goal. There is no time limit but the environment's."""
         del elapsed_s
-        ego = self._world.scene.ego
-        if ego.lane_index != self._lane:
+        if now.lane != self._lane:
             return "open"
-        error = _heading_error_rad(ego, self._geometry)
+        error = _heading_error_rad(now, self._road, self._lane)
         aligned = error < np.deg2rad(0.1) or abs(error - 2 * np.pi) <= 1e-3 + 1e-5 * 2 * np.pi
         return "success" if aligned else "open"
 
@@ -214,8 +205,8 @@ _GOALS: dict[str, type[Any]] = {
 }
 
 
-def make_goal(world: HighwayWorld, scenario: Scenario) -> Goal:
-    """The scenario's goal, for a world just reset to it.
+def make_goal(road: RoadPerception, scenario: Scenario) -> Goal:
+    """The scenario's goal, on a road just reset to it.
 
     Raises:
         ScenarioError: The goal is unknown or malformed, or cannot apply to this start (no vehicle ahead, no such lane).
@@ -226,6 +217,6 @@ def make_goal(world: HighwayWorld, scenario: Scenario) -> Goal:
             f"Scenario {scenario.id!r} has the unknown goal type {kind!r}.", hint=f"Known: {', '.join(_GOALS)}."
         )
     try:
-        return _GOALS[kind](world, scenario.goal)
+        return _GOALS[kind](road, scenario.goal)
     except (KeyError, TypeError, ValueError) as error:
         raise ScenarioError(f"Goal of scenario {scenario.id!r} is malformed: {scenario.goal}.") from error

@@ -1,27 +1,36 @@
-"""Judges an episode on a highway world: goal, collision, scores. It watches and never acts."""
+"""Judges an episode on a highway world: goal, collision, signals for the scores. It watches and never acts."""
 
 from __future__ import annotations
 
+from typing import Any, Protocol
+
 from chauffeur.bench.lampilot.goals import Ruling, make_goal
-from chauffeur.bench.lampilot.metrics import Scorer
+from chauffeur.bench.lampilot.metrics import metrics_of
+from chauffeur.bench.lampilot.signals import SignalLog, Signals
 from chauffeur.concept import Metric, Outcome, Scenario
-from chauffeur.worlds.highway import HighwayWorld
+from chauffeur.worlds.highway import RoadPerception
+
+
+class HasRoad(Protocol):
+    """A world whose perception goals and scores can read: the compiled one or the reference."""
+
+    def perception(self) -> RoadPerception: ...
 
 
 class LampilotReferee:
     """Referee of one episode; make it right after the world was reset."""
 
-    def __init__(self, world: HighwayWorld, scenario: Scenario) -> None:
-        self._world = world
-        self._goal = make_goal(world, scenario)
-        self._scorer = Scorer()
+    def __init__(self, world: HasRoad, scenario: Scenario) -> None:
+        self._road = world.perception()
+        self._goal = make_goal(self._road, scenario)
+        self._log = SignalLog(self._road)
         self._ruling: Ruling = "open"
 
     def observe(self) -> None:
         """Look at the instant after a control period."""
-        scene = self._world.scene
-        self._scorer.observe(scene.ego, scene.road.vehicles)
-        self._ruling = self._goal.rule(len(self._scorer.speeds_mps) / 10)
+        now = self._road.instant()
+        self._log.observe(now)
+        self._ruling = self._goal.rule(self._log.steps / 10, now)
 
     @property
     def over(self) -> bool:
@@ -31,16 +40,16 @@ class LampilotReferee:
     @property
     def collided(self) -> bool:
         """LaMPilot's collision flag: crashed, or off the road."""
-        ego = self._world.scene.ego
-        return bool(ego.crashed or not ego.on_road)
+        now = self._road.instant()
+        return now.crashed or not now.on_road
 
     def outcome(self) -> Outcome:
         """What happened. A goal reached in the instant of a collision is a collision; one never decided, a timeout:
         time or road ran out."""
-        ego = self._world.scene.ego
-        if ego.crashed:
+        now = self._road.instant()
+        if now.crashed:
             return "collision"
-        if not ego.on_road:
+        if not now.on_road:
             return "off_road"
         if self._ruling == "success":
             return "success"
@@ -51,6 +60,11 @@ class LampilotReferee:
         """LaMPilot's success flag, independent of its collision flag."""
         return self._ruling == "success"
 
+    def signals(self) -> Signals:
+        """What the scores are made of, so far."""
+        return self._log.signals()
+
     def metrics(self) -> tuple[Metric, ...]:
-        """Scores so far."""
-        return self._scorer.metrics(success=self.success)
+        """Scores so far, by LaMPilot's own ruler."""
+        row: dict[str, Any] = {"success": self.success, "signals": self.signals().as_row()}
+        return metrics_of(row)

@@ -15,7 +15,7 @@ from chauffeur.drive.session import declined, drive_program, drive_without_progr
 from chauffeur.safety import run_checks
 from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
 
-ROLLOUT_VERSION = "lampilot-rollout-v1"
+ROLLOUT_VERSION = "lampilot-rollout-v2"
 """Changes whenever the same policy could drive differently."""
 
 MAX_EPISODE_S = 1000.0
@@ -93,31 +93,22 @@ def _mobil(world: HighwayWorld) -> Any:
 
 
 def _driven(episode: Episode, referee: LampilotReferee) -> dict[str, Any]:
-    values = {metric.id: metric.value for metric in episode.metrics}
     return {
         "outcome": episode.outcome,
         "success": episode.success,
-        "collision": referee.collided,
-        "ttc": values["lampilot-ttc-v1"],
-        "speed_variance": values["lampilot-speed-variance-v1"],
-        "time_efficiency": values["lampilot-time-efficiency-v1"],
-        "score": values["lampilot-score-v1"],
         "steps": episode.ticks,
+        "signals": referee.signals().as_row(),
         **_causes(asdict(episode.causes)),
     }
 
 
 def not_driven(outcome: str, detail: str, **flags: bool) -> dict[str, Any]:
-    """Result columns of a job that was not driven, with its causes."""
+    """Columns of a job that was not driven, with its causes."""
     return {
         "outcome": outcome,
         "success": False,
-        "collision": False,
-        "ttc": None,
-        "speed_variance": None,
-        "time_efficiency": None,
-        "score": 0.0,
         "steps": 0,
+        "signals": None,
         **_causes({**flags, "detail": detail}),
     }
 

@@ -1,8 +1,9 @@
-"""LaMPilot's roads on the highway-env package: ramp merge, multi-lane highway, intersection."""
+"""LaMPilot's roads: ramp merge, multi-lane highway, intersection."""
 
 from chauffeur.worlds.highway.baselines import MobilBaseline
 from chauffeur.worlds.highway.driver import HighwayDriver
+from chauffeur.worlds.highway.instant import Instant, RoadPerception
 from chauffeur.worlds.highway.perception import HighwayPerception
 from chauffeur.worlds.highway.world import HighwayWorld
 
-__all__ = ["HighwayDriver", "HighwayPerception", "HighwayWorld", "MobilBaseline"]
+__all__ = ["HighwayDriver", "HighwayPerception", "HighwayWorld", "Instant", "MobilBaseline", "RoadPerception"]

@@ -10,8 +10,7 @@ from dataclasses import replace
 from chauffeur.concept import LaneId, Wishes
 from chauffeur.control import LAMPILOT_EGO, LaneChangeOutlook, MobilParameters, should_change
 from chauffeur.worlds.base import EGO
-from chauffeur.worlds.highway.perception import HighwayPerception
-from chauffeur.worlds.highway.traffic import IDMVehicle
+from chauffeur.worlds.highway.instant import RoadPerception
 
 
 class MobilBaseline:
@@ -21,7 +20,7 @@ class MobilBaseline:
     lanes count as lanes, and there is no delay between changes.
     """
 
-    def __init__(self, perception: HighwayPerception, parameters: MobilParameters | None = None) -> None:
+    def __init__(self, perception: RoadPerception, parameters: MobilParameters | None = None) -> None:
         self._perception = perception
         self._parameters = parameters or MobilParameters()
 
@@ -39,11 +38,8 @@ class MobilBaseline:
         old_front, _ = self._perception.neighbours(self._perception.lane_of(EGO))
         follower_now = follower_after = None
         if new_rear is not None:
-            follower = self._perception.entity(new_rear)
-            if isinstance(follower, IDMVehicle):
-                front = None if new_front is None else self._perception.entity(new_front)
-                follower_now = float(follower.acceleration(ego_vehicle=follower, front_vehicle=front))
-                follower_after = float(follower.acceleration(ego_vehicle=follower, front_vehicle=self._perception.ego))
+            follower_now = self._perception.traffic_idm(new_rear, new_front)
+            follower_after = self._perception.traffic_idm(new_rear, EGO)
         return LaneChangeOutlook(
             own_now=self._own(old_front, wishes),
             own_after=self._own(new_front, wishes),

@@ -4,82 +4,77 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 from chauffeur.concept import Command, LaneId, Turn, Wishes
-from chauffeur.control import (
-    LAMPILOT_STEERING,
-    full_scale,
-    lane_keeping_steering,
-)
+from chauffeur.control import Actuation, full_scale
 from chauffeur.worlds.base import EGO
-from chauffeur.worlds.highway.perception import HighwayPerception, lane_id
-from chauffeur.worlds.highway.roads import Scene
+from chauffeur.worlds.highway.core import CoreRoad
+from chauffeur.worlds.highway.core import layout as at
+from chauffeur.worlds.highway.perception import HighwayPerception
 
-_DESTINATIONS: dict[Turn, str] = {"left": "o1", "straight": "o2", "right": "o3"}
+DESTINATIONS: dict[Turn, str] = {"left": "o1", "straight": "o2", "right": "o3"}
+
+
+def route_of(network: Any, here: LaneId, turn: Turn) -> list[tuple[str, str]]:
+    """Roads of the shortest way to the exit of a turn, the present one first; only that one where there is none."""
+    try:
+        path = network.shortest_path(here[1], DESTINATIONS[turn])
+    except KeyError:  # a road without that exit
+        path = []
+    return [here[:2], *((str(a), str(b)) for a, b in pairwise(path))]
 
 
 class HighwayDriver:
     """LaMPilot's autopilot. Its only state is the route, planned when a turn is first wished."""
 
-    def __init__(self, scene: Scene, perception: HighwayPerception) -> None:
-        self._scene = scene
+    def __init__(self, core: CoreRoad, perception: HighwayPerception, actuation: Actuation, network: Any) -> None:
+        self._core = core
         self._perception = perception
+        self._actuation = actuation
+        self._network = network
         self._turn: Turn | None = None
-        self._route: list[LaneId] = []
 
     def initial_wishes(self) -> Wishes:
         """Keep the present speed and lane."""
-        ego = self._scene.ego
-        return Wishes(target_speed_mps=float(ego.speed), target_lane=lane_id(ego.lane_index))
+        speed = float(self._core.floats[EGO, at.SPEED])
+        return Wishes(target_speed_mps=speed, target_lane=self._perception.lane_of(EGO))
 
     def settle(self, wishes: Wishes) -> Wishes:
         """Wishes with defaults filled in and the lane moved on to the next one where it ends."""
-        start = self.initial_wishes()
-        speed = start.target_speed_mps if wishes.target_speed_mps is None else wishes.target_speed_mps
-        lane = wishes.target_lane or start.target_lane
-        assert lane is not None
+        speed = wishes.target_speed_mps
+        if speed is None:
+            speed = float(self._core.floats[EGO, at.SPEED])
+        lane = wishes.target_lane or self._perception.lane_of(EGO)
         if wishes.turn is not None and wishes.turn != self._turn:
             self._plan_route(wishes.turn)
-        ego, network = self._scene.ego, self._scene.road.network
-        if network.get_lane(lane).after_end(ego.position):
-            lane = lane_id(network.next_lane(lane, route=self._route, position=ego.position))
-        if speed == wishes.target_speed_mps and lane == wishes.target_lane:
+        road = self._core.road
+        row = road.rows[lane]
+        onward = self._core.next_lane(row)
+        if onward == row and speed == wishes.target_speed_mps and lane == wishes.target_lane:
             return wishes
-        return replace(wishes, target_speed_mps=speed, target_lane=lane)
+        return replace(wishes, target_speed_mps=speed, target_lane=road.lane_ids[onward])
 
     def command(self, wishes: Wishes) -> Command:
         """Acceleration and steering for settled wishes, after LaMPilot's full-scale mapping (control/actuation.py)."""
-        actuation = self._scene.actuation
-        acceleration, steering = self.controls(wishes)
-        return Command(
-            acceleration_mps2=full_scale(acceleration, actuation.max_acceleration_mps2),
-            steering_rad=full_scale(steering, actuation.max_steering_rad),
-        )
-
-    def controls(self, wishes: Wishes) -> tuple[float, float]:
-        """IDM acceleration, m/s2, and lane-keeping steering angle, rad, before the full-scale mapping."""
         assert wishes.target_speed_mps is not None
         assert wishes.target_lane is not None
-        return self._longitudinal(wishes, wishes.target_speed_mps), self._lateral(wishes.target_lane)
-
-    def _longitudinal(self, wishes: Wishes, target_speed_mps: float) -> float:
         blocker = self._perception.front_blocker(wishes.served_stops)
-        return self._perception.idm(EGO, blocker, target_speed_mps, wishes.time_headway_s)
-
-    def _lateral(self, lane: LaneId) -> float:
-        ego = self._scene.ego
-        geometry = self._scene.road.network.get_lane(lane)
-        s, offset = geometry.local_coordinates(ego.position)
-        heading_ahead = geometry.heading_at(s + ego.speed * LAMPILOT_STEERING.preview_s)
-        return lane_keeping_steering(
-            float(ego.speed), float(ego.heading), float(offset), float(heading_ahead), LAMPILOT_STEERING
+        acceleration = self._perception.idm(EGO, blocker, wishes.target_speed_mps, wishes.time_headway_s)
+        steering = self._core.steer(self._core.road.rows[wishes.target_lane])
+        return Command(
+            acceleration_mps2=full_scale(acceleration, self._actuation.max_acceleration_mps2),
+            steering_rad=full_scale(steering, self._actuation.max_steering_rad),
         )
 
     def _plan_route(self, turn: Turn) -> None:
         self._turn = turn
-        here = lane_id(self._scene.ego.lane_index)
-        try:
-            path = self._scene.road.network.shortest_path(here[1], _DESTINATIONS[turn])
-        except KeyError:  # a road without that exit
-            path = []
-        self._route = [here, *((a, b, 0) for a, b in pairwise(path))]
+        rows = self._core.road.road_rows
+        legs = route_of(self._network, self._perception.lane_of(EGO), turn)
+        self._core.plan_route([rows[leg] for leg in legs])
+
+    def copy(self, core: CoreRoad, perception: HighwayPerception) -> HighwayDriver:
+        """The same driver for a copy of the road."""
+        twin = HighwayDriver(core, perception, self._actuation, self._network)
+        twin._turn = self._turn
+        return twin

@@ -62,7 +62,7 @@ class HighwayEnvironment(gymnasium.Env[FloatArray, FloatArray]):
 
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance 0.1 s."""
-        actuation = self._world.scene.actuation
+        actuation = self._world.actuation
         acceleration, steering = float(action[0]), float(action[1])
         self._world.step(
             Command(

@@ -2,88 +2,129 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
-
-import numpy as np
+import math
 
 from chauffeur.concept import LaneId, VehicleState
-from chauffeur.control import LAMPILOT_EGO, idm_acceleration
 from chauffeur.worlds.base import EGO
-from chauffeur.worlds.highway.roads import Scene
-from chauffeur.worlds.highway.traffic import StopSign, Vehicle
+from chauffeur.worlds.highway.core import CoreRoad
+from chauffeur.worlds.highway.core import layout as at
+from chauffeur.worlds.highway.instant import Instant
+
+_KINDS = ("car", "car", "obstacle", "stop_sign")
 
 
-def lane_id(index: tuple[Any, Any, Any]) -> LaneId:
-    """A lane index with plain Python types; highway-env mixes in NumPy strings and integers."""
-    return str(index[0]), str(index[1]), int(index[2])
+def _id_or_none(row: int) -> int | None:
+    return None if row < 0 else int(row)
 
 
 class HighwayPerception:
-    """Perception of the present instant of a scene; stays valid as the scene is stepped."""
+    """Perception of the present instant of a road in motion; stays valid as it is stepped."""
 
-    def __init__(self, scene: Scene) -> None:
-        self._scene = scene
-        self._road = scene.road
-        self._network = scene.road.network
-        others = [v for v in scene.road.vehicles if v is not scene.ego]
-        entities = [scene.ego, *others, *scene.road.objects]
-        self._by_id: dict[int, Any] = dict(enumerate(entities))
-        self._ids: dict[int, int] = {id(entity): i for i, entity in self._by_id.items()}
+    def __init__(self, core: CoreRoad, kind: str, emergency_lanes: frozenset[LaneId]) -> None:
+        self._core = core
+        self._kind = kind
+        self._emergency_lanes = emergency_lanes
+        self._rows = core.road.rows
+        self._names = core.road.lane_ids
+        self._roads = {name[:2]: sum(other[:2] == name[:2] for other in self._names) for name in self._names}
 
     @property
-    def ego(self) -> Any:
-        """highway-env's ego vehicle."""
-        return self._scene.ego
+    def emergency_lanes(self) -> frozenset[LaneId]:
+        """Lanes nobody but a car in distress may use."""
+        return self._emergency_lanes
 
-    def entity(self, vehicle_id: int) -> Any:
-        """highway-env's vehicle or object. Raises KeyError for an unknown id."""
-        return self._by_id[vehicle_id]
+    def instant(self) -> Instant:
+        """The ego as of the last step."""
+        core = self._core
+        out, ego = core.out.tolist(), core.floats[0].tolist()
+        front = int(out[at.OUT_FRONT])
+        return Instant(
+            ego[at.SPEED],
+            ego[at.HEADING],
+            ego[at.X],
+            ego[at.Y],
+            self._names[int(out[at.OUT_LANE])],
+            None if front < 0 else front,
+            out[at.OUT_GAP],
+            math.nan if front < 0 else float(core.floats[front, at.SPEED]),
+            out[at.OUT_CRASHED] != 0.0,
+            out[at.OUT_ON_ROAD] > 0.0,
+            out[at.OUT_ON_ROAD] < 0.0,
+            out[at.OUT_TTC_ALONG],
+            out[at.OUT_TTC_PLANE],
+            out[at.OUT_TTC_LANE],
+        )
 
-    def id_of(self, entity: Any) -> int:
-        """Id of one of highway-env's vehicles or objects."""
-        return self._ids[id(entity)]
+    def _row(self, vehicle_id: int) -> int:
+        if not 0 <= vehicle_id < len(self._core.floats):
+            raise KeyError(vehicle_id)
+        return vehicle_id
 
     def vehicle(self, vehicle_id: int) -> VehicleState:
         """State of a vehicle or object. Raises KeyError for an unknown id."""
-        return vehicle_state(vehicle_id, self._by_id[vehicle_id])
+        core, row = self._core, self._row(vehicle_id)
+        numbers, traits = core.floats[row].tolist(), core.ints[row]
+        return VehicleState(
+            id=vehicle_id,
+            kind=_KINDS[traits[at.KIND]],
+            x_m=numbers[at.X],
+            y_m=numbers[at.Y],
+            heading_rad=numbers[at.HEADING],
+            speed_mps=numbers[at.SPEED],
+            length_m=numbers[at.LENGTH],
+            width_m=numbers[at.WIDTH],
+            lane=self._names[traits[at.LANE]],
+            crashed=bool(traits[at.CRASHED]),
+        )
+
+    def others(self) -> tuple[VehicleState, ...]:
+        """Every vehicle and object but the ego."""
+        return tuple(self.vehicle(i) for i in range(1, len(self._core.floats)))
 
     def has_lane(self, lane: LaneId) -> bool:
         """Whether the road has this lane."""
-        lanes = self._network.graph.get(lane[0], {}).get(lane[1], ())
-        return 0 <= lane[2] < len(lanes)
+        return lane in self._rows
 
     def lane_of(self, vehicle_id: int) -> LaneId:
         """Closest lane of a vehicle."""
-        return lane_id(self._by_id[vehicle_id].lane_index)
+        return self._names[self._core.ints[self._row(vehicle_id), at.LANE]]
 
     def adjacent_lane(self, lane: LaneId, offset: int) -> LaneId | None:
         """Lane `offset` places to the right (negative: left); None beyond the edge."""
         index = lane[2] + offset
-        if offset == 0 or not 0 <= index < len(self._network.graph[lane[0]][lane[1]]):
+        if offset == 0 or not 0 <= index < self._roads[lane[0], lane[1]]:
             return None
         return lane[0], lane[1], index
 
     def speed_limit(self, lane: LaneId) -> float:
         """Speed limit, m/s."""
-        return float(self._network.get_lane(lane).speed_limit)
+        return float(self._core.road.lanes[self._rows[lane], at.LIMIT])
 
     def neighbours(self, lane: LaneId) -> tuple[int | None, int | None]:
         """Nearest vehicle or obstacle ahead of and behind the ego on a lane segment."""
-        front, rear = self._road.neighbour_vehicles(self.ego, lane)
-        return (
-            None if front is None else self.id_of(front),
-            None if rear is None else self.id_of(rear),
-        )
+        front, rear = self._core.neighbours(EGO, self._rows[lane])
+        return _id_or_none(front), _id_or_none(rear)
 
     def distance_along(self, from_id: int, to_id: int) -> float:
         """Signed centre-to-centre distance, m, along the first one's lane."""
-        origin, target = self._by_id[from_id], self._by_id[to_id]
-        return float(origin.lane_distance_to(target))
+        return self._core.gap(self._row(from_id), self._row(to_id))
+
+    def distance_on(self, lane: LaneId, to_id: int) -> float:
+        """Signed distance from the ego to another along a given lane, m."""
+        row = self._rows[lane]
+        return self._core.along(row, to_id) - self._core.along(row, EGO)
+
+    def lane_heading(self, lane: LaneId) -> float:
+        """Heading of a lane where the ego is along it, rad."""
+        return self._core.lane_heading(self._rows[lane], EGO)
+
+    def reachable(self, lane: LaneId) -> bool:
+        """Whether the ego may change to a lane from where it is."""
+        return self._core.reachable(self._rows[lane])
 
     def cross_traffic_lanes(self, from_left: bool) -> tuple[LaneId, ...]:
         """Lanes of the crossing traffic, in LaMPilot's order."""
-        if self._scene.kind != "intersection":
+        if self._kind != "intersection":
             return ()
         if from_left:
             return ("o1", "ir1", 0), ("ir1", "il3", 0), ("il3", "o3", 0)
@@ -91,67 +132,29 @@ class HighwayPerception:
 
     def stop_sign_ahead(self, served: frozenset[int]) -> tuple[int, float] | None:
         """(id, distance) of the nearest unserved stop sign ahead on the ego's lane."""
-        sign = self._nearest_ahead(served, vehicles=False)
-        return None if sign is None else (sign, self.distance_along(EGO, sign))
+        sign = self._core.blocker(self._bits(served), vehicles=False)
+        return None if sign < 0 else (sign, self.distance_along(EGO, sign))
 
     def front_blocker(self, served: frozenset[int]) -> int | None:
-        """Nearest vehicle or unserved stop sign ahead on the ego's lane."""
-        return self._nearest_ahead(served, vehicles=True)
+        """Nearest vehicle or unserved stop sign ahead on the ego's own lane."""
+        return _id_or_none(self._core.blocker(self._bits(served), vehicles=True))
 
-    def _nearest_ahead(self, served: frozenset[int], *, vehicles: bool) -> int | None:
-        """Objects come before vehicles and a later equal wins: LaMPilot's order."""
-        ego = self.ego
-        lane = self._network.get_lane(ego.lane_index)
-        s = lane.local_coordinates(ego.position)[0]
-        nearest: float | None = None
-        found: Any = None
-        candidates: list[Any] = [
-            o for o in self._road.objects if isinstance(o, StopSign) and self.id_of(o) not in served
-        ]
-        if vehicles:
-            candidates += [v for v in self._road.vehicles if v is not ego and isinstance(v, Vehicle)]
-        for candidate in candidates:
-            s_other, lateral = lane.local_coordinates(candidate.position)
-            if s_other < s or (nearest is not None and s_other > nearest):
-                continue
-            if lane.on_lane(candidate.position, s_other, lateral):
-                nearest, found = s_other, candidate
-        return None if found is None else self.id_of(found)
+    def _bits(self, served: frozenset[int]) -> int:
+        first = self._core.vehicles
+        return sum(1 << (sign - first) for sign in served if sign >= first)
 
     def idm_entering(self, follower_id: int, leader_id: int, time_headway_s: float) -> float:
         """IDM acceleration, m/s2, of `follower` at its present speed if `leader` drove right ahead of it."""
-        return self.idm(follower_id, leader_id, float(self._by_id[follower_id].speed), time_headway_s)
+        row = self._row(follower_id)
+        return self._core.follow(row, self._row(leader_id), float(self._core.floats[row, at.SPEED]), time_headway_s)
 
     def idm(self, follower_id: int, leader_id: int | None, target_speed_mps: float, time_headway_s: float) -> float:
         """IDM acceleration, m/s2, of `follower` behind `leader` (None: free road), with LaMPilot's ego parameters."""
-        follower = self._by_id[follower_id]
-        parameters = replace(LAMPILOT_EGO, time_headway_s=time_headway_s)
-        if leader_id is None:
-            return idm_acceleration(float(follower.speed), target_speed_mps, parameters)
-        leader = self._by_id[leader_id]
-        return idm_acceleration(
-            float(follower.speed),
-            target_speed_mps,
-            parameters,
-            self.distance_along(follower_id, leader_id),
-            float(np.dot(follower.velocity - leader.velocity, follower.direction)),
-            # A sign has no length: LaMPilot lets the car stop half the jam distance closer to it.
-            parameters.jam_distance_m / 2 if isinstance(leader, StopSign) else 0.0,
-        )
+        front = -1 if leader_id is None else leader_id
+        return self._core.follow(follower_id, front, target_speed_mps, time_headway_s)
 
-
-def vehicle_state(vehicle_id: int, entity: Any) -> VehicleState:
-    """Frozen state of one of highway-env's vehicles or objects."""
-    kind = "car" if isinstance(entity, Vehicle) else "stop_sign" if isinstance(entity, StopSign) else "obstacle"
-    return VehicleState(
-        id=vehicle_id,
-        kind=kind,
-        x_m=float(entity.position[0]),
-        y_m=float(entity.position[1]),
-        heading_rad=float(entity.heading),
-        speed_mps=float(entity.speed),
-        length_m=float(entity.LENGTH),
-        width_m=float(entity.WIDTH),
-        lane=None if entity.lane_index is None else lane_id(entity.lane_index),
-        crashed=bool(entity.crashed),
-    )
+    def traffic_idm(self, follower_id: int, leader_id: int | None) -> float | None:
+        """Acceleration, m/s2, that a car of the traffic would choose behind another; None if it is no such car."""
+        if self._core.ints[follower_id, at.KIND] != at.TRAFFIC:
+            return None
+        return self._core.traffic_idm(follower_id, -1 if leader_id is None else leader_id)

@@ -8,6 +8,7 @@ result is not used included.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 from highway_env.road.lane import CircularLane, LineType, SineLane, StraightLane
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from chauffeur.concept import ScenarioError
+from chauffeur.concept import LaneId, LaneView, ScenarioError
 from chauffeur.control import LAMPILOT_HIGHWAY, LAMPILOT_INTERSECTION, Actuation
 from chauffeur.worlds.highway.traffic import (
     AxisLane,
@@ -33,6 +34,7 @@ DT_S = 0.1
 HIGHWAY_LIMIT_MPS = 31.2928  # 70 mph
 RAMP_LIMIT_MPS = 24.5872  # 55 mph
 LANE_WIDTH_M = 4.0
+_CLEAR_M = 20.0
 
 
 class EgoConfig(BaseModel):
@@ -74,9 +76,10 @@ class Scene:
     Attributes:
         kind: `highway` or `intersection`.
         road: highway-env road.
-        ego: The ego vehicle, last in the road's vehicles.
+        ego: The ego vehicle; last in the road's vehicles once it has entered.
         emergency_lanes: Lanes nobody but a car in distress may use.
         actuation: Full-scale pedal and wheel values.
+        alone_steps: Steps of the traffic before the ego enters; 0 where it is there from the start.
         warm_up_steps: Steps with neutral controls before the trip begins.
         duration_s: Time limit of the environment, warm-up included.
         bounds: (min x, max x, min y): leaving them ends the trip.
@@ -89,7 +92,38 @@ class Scene:
     warm_up_steps: int
     duration_s: float
     bounds: tuple[float, float, float]
+    alone_steps: int = 0
     emergency_lanes: frozenset[tuple[str, str, int]] = field(default_factory=frozenset[tuple[str, str, int]])
+
+
+def lane_id(index: tuple[Any, Any, Any]) -> LaneId:
+    """A lane index with plain Python types; highway-env mixes in NumPy strings and integers."""
+    return str(index[0]), str(index[1]), int(index[2])
+
+
+def lane_views(scene: Scene) -> tuple[LaneView, ...]:
+    """The road as geometry for snapshots."""
+    views: list[LaneView] = []
+    lanes: dict[Any, Any] = scene.road.network.lanes_dict()
+    for index, lane in lanes.items():
+        length = float(lane.length)
+        straight = lane.heading_at(0.0) == lane.heading_at(length) == lane.heading_at(length / 2)
+        points = 2 if straight else max(9, round(length / 2))
+        centre = tuple(
+            (float(p[0]), float(p[1])) for p in (lane.position(s, 0.0) for s in np.linspace(0.0, length, points))
+        )
+        views.append(
+            LaneView(
+                id=lane_id(index),
+                width_m=float(lane.width_at(0.0)),
+                length_m=length,
+                speed_limit_mps=float(lane.speed_limit),
+                forbidden=bool(lane.forbidden),
+                emergency=lane_id(index) in scene.emergency_lanes,
+                centre_m=centre,
+            )
+        )
+    return tuple(views)
 
 
 def parse_config(config: dict[str, Any], scenario_id: str) -> RoadConfig:
@@ -336,19 +370,7 @@ def _intersection(config: RoadConfig, rng: np.random.Generator) -> Scene:
     ):
         for s in np.linspace(0, 100, count):
             _spawn_crossing(road, rng, (origin, goal), s, probability, position_deviation, speed_deviation)
-    for _ in range(30):
-        road.act()
-        road.step(DT_S)
     ego = DynamicEgo(road, approach.position(10, 0), speed=approach.speed_limit, heading=approach.heading_at(60))
-    road.vehicles.append(ego)
-    # LaMPilot removes cars near the ego while it walks the list, so the car after a removed one is not looked at.
-    i = 0
-    while i < len(road.vehicles):
-        vehicle = road.vehicles[i]
-        if vehicle is not ego and np.linalg.norm(vehicle.position - ego.position) < 20:
-            del road.vehicles[i]
-        i += 1
-    road.forget_instant()
     return Scene(
         kind="intersection",
         road=road,
@@ -357,7 +379,24 @@ def _intersection(config: RoadConfig, rng: np.random.Generator) -> Scene:
         warm_up_steps=0,
         duration_s=100.0,
         bounds=(-40.0, 40.0, -40.0),
+        alone_steps=30,
     )
+
+
+def crowded_rows(positions: Sequence[tuple[float, float]], ego: tuple[float, float]) -> list[int]:
+    """Cars that LaMPilot takes away when the ego enters: those within 20 m of it.
+
+    It removes them while it walks the list, so the car after a removed one is not looked at.
+    """
+    left = list(range(len(positions)))
+    removed: list[int] = []
+    i = 0
+    while i < len(left):
+        x, y = positions[left[i]]
+        if np.linalg.norm(np.array([x - ego[0], y - ego[1]])) < _CLEAR_M:
+            removed.append(left.pop(i))
+        i += 1
+    return removed
 
 
 def _spawn_crossing(

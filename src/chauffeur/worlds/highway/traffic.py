@@ -14,7 +14,7 @@ from bisect import bisect_left
 from typing import Any, ClassVar
 
 import numpy as np
-from highway_env.road.lane import StraightLane
+from highway_env.road.lane import CircularLane, SineLane, StraightLane
 from highway_env.road.regulation import RegulatedRoad
 from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.behavior import IDMVehicle
@@ -27,6 +27,7 @@ FloatArray = NDArray[np.float64]
 
 __all__ = [
     "AxisLane",
+    "CircularLane",
     "DynamicEgo",
     "FastNetwork",
     "FastRegulatedRoad",
@@ -34,6 +35,7 @@ __all__ = [
     "IDMVehicle",
     "KinematicEgo",
     "Obstacle",
+    "SineLane",
     "StopSign",
     "Vehicle",
 ]

@@ -1,30 +1,55 @@
-"""The highway world: LaMPilot's roads behind the `World` contract."""
+"""The highway world: LaMPilot's roads behind the `World` contract, stepped by the compiled core.
+
+`reference.ReferenceWorld` is the same world on the highway-env package itself; the two agree to rounding over whole
+trips (tests/worlds/test_core.py), which is what makes this one's results LaMPilot's.
+"""
 
 from __future__ import annotations
 
+import json
 import math
-from typing import Any
+from collections import OrderedDict
+from dataclasses import dataclass
 
 import numpy as np
 
 from chauffeur.concept import Command, LaneView, Lead, Scenario, ScenarioError, Snapshot
+from chauffeur.control import Actuation
 from chauffeur.worlds.base import EGO
+from chauffeur.worlds.highway.core import CoreRoad
+from chauffeur.worlds.highway.core import layout as at
 from chauffeur.worlds.highway.driver import HighwayDriver
-from chauffeur.worlds.highway.perception import HighwayPerception, lane_id, vehicle_state
-from chauffeur.worlds.highway.roads import DT_S, Scene, build_scene, parse_config
+from chauffeur.worlds.highway.perception import HighwayPerception
+from chauffeur.worlds.highway.roads import DT_S, Scene, build_scene, lane_views, parse_config
 
-_FOLLOW_WITHIN_M = 50.0
+FOLLOW_WITHIN_M = 50.0
 """LaMPilot starts the ego at the speed of a vehicle closer than this ahead, at the speed limit otherwise."""
+
+_KEPT_STARTS = 64
+
+
+@dataclass(frozen=True, slots=True)
+class _Start:
+    """A scene warmed up and ready; `core` is only ever copied."""
+
+    scene: Scene
+    core: CoreRoad
+    lanes: tuple[LaneView, ...]
+    clock_s: float
+
+
+_starts: OrderedDict[tuple[str, int], _Start] = OrderedDict()
+"""Start situations of this process: the commands of a benchmark sample share the costly part of a reset."""
 
 
 class HighwayWorld:
     """Ramp merge, multi-lane highway and intersection, stepped at 10 Hz."""
 
     def __init__(self) -> None:
-        self._scene: Scene | None = None
+        self._start: _Start | None = None
+        self._core: CoreRoad | None = None
         self._perception: HighwayPerception | None = None
         self._driver: HighwayDriver | None = None
-        self._lanes: tuple[LaneView, ...] = ()
         self._tick = 0
         self._clock_s = 0.0
 
@@ -34,84 +59,85 @@ class HighwayWorld:
         return DT_S
 
     @property
-    def scene(self) -> Scene:
-        """The scene being driven. Raises ScenarioError before the first reset."""
-        if self._scene is None:
+    def actuation(self) -> Actuation:
+        """Full-scale pedal and wheel values of the ego. Raises ScenarioError before the first reset."""
+        return self._started().scene.actuation
+
+    def _started(self) -> _Start:
+        if self._start is None:
             raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
-        return self._scene
+        return self._start
+
+    def _road(self) -> CoreRoad:
+        self._started()
+        assert self._core is not None
+        return self._core
 
     def reset(self, scenario: Scenario, seed: int | None = None) -> Snapshot:
         """Build road and traffic, let it warm up, and place the ego in the flow.
 
         Raises:
-            ScenarioError: The configuration is malformed, or the ego starts in a crash.
+            ScenarioError: The configuration is malformed.
         """
-        rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(scenario.seed if seed is None else seed)))
-        scene = build_scene(parse_config(scenario.config, scenario.id), rng)
-        self._scene = scene
+        start = _start_of(scenario, scenario.seed if seed is None else seed)
+        self._start = start
+        self._core = start.core.copy()
+        self._clock_s = start.clock_s
         self._tick = 0
-        self._clock_s = 0.0
-        for _ in range(scene.warm_up_steps):
-            self._advance(Command(0.0, 0.0))
-        self._perception = HighwayPerception(scene)
+        self._perception = HighwayPerception(self._core, start.scene.kind, start.scene.emergency_lanes)
         self._driver = None
-        self._lanes = _lane_views(scene)
-        self._tick = 0
-        ego = scene.ego
-        ego.speed = float(scene.road.network.get_lane(ego.lane_index).speed_limit)
-        front = scene.road.neighbour_vehicles(ego, ego.lane_index)[0]
-        if front is not None and ego.lane_distance_to(front) < _FOLLOW_WITHIN_M:
-            ego.speed = float(front.speed)
         return self.snapshot()
+
+    def copy(self) -> HighwayWorld:
+        """The same instant in a world of its own; stepping one leaves the other alone."""
+        twin = HighwayWorld()
+        twin._start = start = self._started()
+        twin._core = core = self._road().copy()
+        twin._clock_s, twin._tick = self._clock_s, self._tick
+        twin._perception = HighwayPerception(core, start.scene.kind, start.scene.emergency_lanes)
+        if self._driver is not None:
+            twin._driver = self._driver.copy(core, twin._perception)
+        return twin
 
     def step(self, command: Command) -> Command:
         """Advance 0.1 s under `command`; returns what the vehicle really applied."""
         if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
             raise ValueError(f"A command must be finite numbers, not {command}.")
-        applied = self._advance(command)
-        self._tick += 1
-        return applied
-
-    def _advance(self, command: Command) -> Command:
-        scene = self.scene
+        core = self._road()
         self._clock_s += DT_S
-        scene.ego.act({"acceleration": command.acceleration_mps2, "steering": command.steering_rad})
-        scene.road.act()
-        scene.road.step(DT_S)
-        return Command(float(scene.ego.action["acceleration"]), float(scene.ego.action["steering"]))
+        core.advance(command.acceleration_mps2, command.steering_rad)
+        self._tick += 1
+        return Command(float(core.out[at.OUT_ACCELERATION]), float(core.out[at.OUT_STEERING]))
 
     def snapshot(self) -> Snapshot:
         """The present instant as frozen values."""
-        scene, perception = self.scene, self.perception()
-        ego, road = scene.ego, scene.road
-        front = road.neighbour_vehicles(ego, ego.lane_index)[0]
-        lead = None
-        if front is not None:
-            lead = Lead(perception.id_of(front), float(ego.lane_distance_to(front)), float(front.speed))
+        start, core, perception = self._started(), self._road(), self.perception()
+        front, gap = int(core.out[at.OUT_FRONT]), float(core.out[at.OUT_GAP])
+        lead = None if front < 0 else Lead(front, gap, float(core.floats[front, at.SPEED]))
         sign = perception.stop_sign_ahead(frozenset())
         return Snapshot(
             time_s=self._tick * DT_S,
             tick=self._tick,
-            kind=scene.kind,
-            ego=vehicle_state(EGO, ego),
-            others=tuple(vehicle_state(perception.id_of(v), v) for v in road.vehicles if v is not ego),
-            objects=tuple(vehicle_state(perception.id_of(o), o) for o in road.objects),
-            lanes=self._lanes,
+            kind=start.scene.kind,
+            ego=perception.vehicle(EGO),
+            others=tuple(perception.vehicle(i) for i in range(1, core.vehicles)),
+            objects=tuple(perception.vehicle(i) for i in range(core.vehicles, len(core.floats))),
+            lanes=start.lanes,
             front=lead,
             stop_sign_m=None if sign is None else sign[1],
-            off_road=not ego.on_road,
+            off_road=core.out[at.OUT_ON_ROAD] <= 0.0,
             ended=self.ended,
         )
 
     @property
     def ended(self) -> bool:
         """Crash, off the road, end of the stretch, or out of time."""
-        scene = self.scene
-        ego = scene.ego
-        x, y = float(ego.position[0]), float(ego.position[1])
+        scene, core = self._started().scene, self._road()
+        if core.out[at.OUT_CRASHED] != 0.0 or core.out[at.OUT_ON_ROAD] <= 0.0:
+            return True
+        x, y = core.floats[EGO, at.X], core.floats[EGO, at.Y]
         min_x, max_x, min_y = scene.bounds
-        beyond = x < min_x or x > max_x or y < min_y
-        return bool(ego.crashed or not ego.on_road or beyond or self._clock_s >= scene.duration_s)
+        return bool(x < min_x or x > max_x or y < min_y or self._clock_s >= scene.duration_s)
 
     def perception(self) -> HighwayPerception:
         """Questions about the present instant."""
@@ -122,29 +148,39 @@ class HighwayWorld:
     def driver(self) -> HighwayDriver:
         """The low-level driver of the present trip; the same until the next reset."""
         if self._driver is None:
-            self._driver = HighwayDriver(self.scene, self.perception())
+            scene = self._started().scene
+            self._driver = HighwayDriver(self._road(), self.perception(), scene.actuation, scene.road.network)
         return self._driver
 
 
-def _lane_views(scene: Scene) -> tuple[LaneView, ...]:
-    views: list[LaneView] = []
-    lanes: dict[Any, Any] = scene.road.network.lanes_dict()
-    for index, lane in lanes.items():
-        length = float(lane.length)
-        straight = lane.heading_at(0.0) == lane.heading_at(length) == lane.heading_at(length / 2)
-        points = 2 if straight else max(9, round(length / 2))
-        centre = tuple(
-            (float(p[0]), float(p[1])) for p in (lane.position(s, 0.0) for s in np.linspace(0.0, length, points))
-        )
-        views.append(
-            LaneView(
-                id=lane_id(index),
-                width_m=float(lane.width_at(0.0)),
-                length_m=length,
-                speed_limit_mps=float(lane.speed_limit),
-                forbidden=bool(lane.forbidden),
-                emergency=lane_id(index) in scene.emergency_lanes,
-                centre_m=centre,
-            )
-        )
-    return tuple(views)
+def _start_of(scenario: Scenario, seed: int) -> _Start:
+    key = json.dumps(scenario.config, sort_keys=True, default=str), seed
+    start = _starts.get(key)
+    if start is None:
+        start = _starts[key] = _warm_up(scenario, seed)
+        if len(_starts) > _KEPT_STARTS:
+            _starts.popitem(last=False)
+    _starts.move_to_end(key)
+    return start
+
+
+def _warm_up(scenario: Scenario, seed: int) -> _Start:
+    rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed)))
+    scene = build_scene(parse_config(scenario.config, scenario.id), rng)
+    core = CoreRoad.of(scene)
+    clock_s = 0.0
+    if scene.alone_steps:
+        core.advance(0.0, 0.0, scene.alone_steps)
+        core.admit_ego()
+    if scene.warm_up_steps:
+        core.advance(0.0, 0.0, scene.warm_up_steps)
+        for _ in range(scene.warm_up_steps):
+            clock_s += DT_S
+    ego_lane = core.lane_of(EGO)
+    speed = float(core.road.lanes[ego_lane, at.LIMIT])
+    front, _ = core.neighbours(EGO, ego_lane)
+    if front >= 0 and core.gap(EGO, front) < FOLLOW_WITHIN_M:
+        speed = float(core.floats[front, at.SPEED])
+    core.floats[EGO, at.SPEED] = speed
+    core.report()
+    return _Start(scene, core, lane_views(scene), clock_s)

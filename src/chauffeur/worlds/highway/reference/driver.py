@@ -1,0 +1,80 @@
+"""The low-level driver of LaMPilot's roads: IDM along the lane, lane keeping across it, route following at its end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from chauffeur.concept import Command, LaneId, Turn, Wishes
+from chauffeur.control import (
+    LAMPILOT_STEERING,
+    full_scale,
+    lane_keeping_steering,
+)
+from chauffeur.worlds.base import EGO
+from chauffeur.worlds.highway.driver import route_of
+from chauffeur.worlds.highway.reference.perception import ReferencePerception
+from chauffeur.worlds.highway.roads import Scene, lane_id
+
+
+class ReferenceDriver:
+    """LaMPilot's autopilot. Its only state is the route, planned when a turn is first wished."""
+
+    def __init__(self, scene: Scene, perception: ReferencePerception) -> None:
+        self._scene = scene
+        self._perception = perception
+        self._turn: Turn | None = None
+        self._route: list[LaneId] = []
+
+    def initial_wishes(self) -> Wishes:
+        """Keep the present speed and lane."""
+        ego = self._scene.ego
+        return Wishes(target_speed_mps=float(ego.speed), target_lane=lane_id(ego.lane_index))
+
+    def settle(self, wishes: Wishes) -> Wishes:
+        """Wishes with defaults filled in and the lane moved on to the next one where it ends."""
+        start = self.initial_wishes()
+        speed = start.target_speed_mps if wishes.target_speed_mps is None else wishes.target_speed_mps
+        lane = wishes.target_lane or start.target_lane
+        assert lane is not None
+        if wishes.turn is not None and wishes.turn != self._turn:
+            self._plan_route(wishes.turn)
+        ego, network = self._scene.ego, self._scene.road.network
+        if network.get_lane(lane).after_end(ego.position):
+            lane = lane_id(network.next_lane(lane, route=self._route, position=ego.position))
+        if speed == wishes.target_speed_mps and lane == wishes.target_lane:
+            return wishes
+        return replace(wishes, target_speed_mps=speed, target_lane=lane)
+
+    def command(self, wishes: Wishes) -> Command:
+        """Acceleration and steering for settled wishes, after LaMPilot's full-scale mapping (control/actuation.py)."""
+        actuation = self._scene.actuation
+        acceleration, steering = self.controls(wishes)
+        return Command(
+            acceleration_mps2=full_scale(acceleration, actuation.max_acceleration_mps2),
+            steering_rad=full_scale(steering, actuation.max_steering_rad),
+        )
+
+    def controls(self, wishes: Wishes) -> tuple[float, float]:
+        """IDM acceleration, m/s2, and lane-keeping steering angle, rad, before the full-scale mapping."""
+        assert wishes.target_speed_mps is not None
+        assert wishes.target_lane is not None
+        return self._longitudinal(wishes, wishes.target_speed_mps), self._lateral(wishes.target_lane)
+
+    def _longitudinal(self, wishes: Wishes, target_speed_mps: float) -> float:
+        blocker = self._perception.front_blocker(wishes.served_stops)
+        return self._perception.idm(EGO, blocker, target_speed_mps, wishes.time_headway_s)
+
+    def _lateral(self, lane: LaneId) -> float:
+        ego = self._scene.ego
+        geometry = self._scene.road.network.get_lane(lane)
+        s, offset = geometry.local_coordinates(ego.position)
+        heading_ahead = geometry.heading_at(s + ego.speed * LAMPILOT_STEERING.preview_s)
+        return lane_keeping_steering(
+            float(ego.speed), float(ego.heading), float(offset), float(heading_ahead), LAMPILOT_STEERING
+        )
+
+    def _plan_route(self, turn: Turn) -> None:
+        self._turn = turn
+        here = lane_id(self._scene.ego.lane_index)
+        legs = route_of(self._scene.road.network, here, turn)
+        self._route = [here, *((a, b, 0) for a, b in legs[1:])]
