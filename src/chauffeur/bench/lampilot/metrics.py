@@ -1,7 +1,7 @@
 """The two rulers of LaMPilot-Bench: how the signals of a drive become points.
 
 `origin` is what LaMPilot's code computes, the ruler of all published rows. `paper` is seed Eq. 1-8 as printed. They
-differ in more than rounding (docs/benchmarks/lampilot.md lists every place), so a table is under one of them, and its
+differ in more than rounding (docs/rulers.md lists every place), so a table is under one of them, and its
 id says which.
 """
 
