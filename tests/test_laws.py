@@ -13,9 +13,8 @@ STEPS_A_WORLD = {"drive/episode.py"}
 """Law 1: the only module that hands a command to a world."""
 
 STEPS_ITS_OWN = {
-    "worlds/highway/world.py",
+    "worlds/highway/reference/world.py",
     "worlds/highway/traffic.py",
-    "worlds/highway/roads.py",
     "worlds/highway/gym.py",
 }
 """Inside a world: highway-env's vehicles and roads, and the gymnasium face of the world itself."""
@@ -34,6 +33,12 @@ def test_one_door_to_the_actuator() -> None:
     doors = {str(p.relative_to(SOURCE)) for p in SOURCE.rglob("*.py") if _calls(p, "step")}
     assert doors == STEPS_A_WORLD | STEPS_ITS_OWN
     assert len(_calls(SOURCE / "drive" / "episode.py", "step")) == 1
+
+
+def test_the_compiled_core_is_the_highway_worlds_own() -> None:
+    for path in SOURCE.rglob("*.py"):
+        if (SOURCE / "worlds" / "highway") not in path.parents:
+            assert "highway.core" not in path.read_text(encoding="utf-8"), f"{path}: ask the world, not its core"
 
 
 def test_nothing_runs_model_text_in_this_interpreter() -> None:
