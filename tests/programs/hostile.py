@@ -213,7 +213,8 @@ FLOODS = [
         prints_and_calls="while True:\n    print('x' * 100)\n    get_target_speed()",
     ),
     *_make("flood", "time memory calls", prints="while True:\n    print('x' * 1000)"),
-    *_make("flood", "raised", long_say="say('a' * 10 ** 6)", huge_say="say('a' * 10 ** 7)"),
+    *_make("flood", "raised", long_say="say('a' * 10 ** 6)"),
+    *_make("flood", "raised memory", huge_say="say('a' * 10 ** 7)"),
 ]
 
 CONTROL_FLOW = [
@@ -262,8 +263,21 @@ CONTROL_FLOW = [
 
 TAMPERING = [
     Hostile("tamper/tick_call", frozenset({"harmless"}), _body("__tick__(7, None)\n__tick__('x' * 100, None)")),
-    Hostile("tamper/drive_call", frozenset({"harmless"}), _body("__drive__(7)\n__drive__([[]], 3)\n__drive__()")),
-    Hostile("tamper/tick_no_args", frozenset({"harmless"}), _body("__tick__()")),
+    Hostile("tamper/drive_call", frozenset({"raised"}), _body("__drive__(7)\n__drive__([[]], 3)")),
+    Hostile("tamper/tick_no_args", frozenset({"raised"}), _body("__tick__()")),
+    Hostile(
+        "tamper/host_period_calls",
+        frozenset({"harmless"}),
+        _body("__drive_host__(7)\n__drive_host__([[]], 3)\n__drive_host__()\n__tick_host__()\n__tick_host__(1, 2, 3)"),
+    ),
+    Hostile(
+        "tamper/used_answers",
+        frozenset({"harmless"}),
+        _body("get_target_speed()\n__used__.extend([10 ** 30, True, None, 'x', -7, 0, 0, 1.5, [[]]])\nyield\n" * 3),
+    ),
+    Hostile("tamper/used_flood", frozenset({"calls"}), _body("yield\n__used__.extend([0] * 10 ** 5)\nyield\n" * 3)),
+    Hostile("tamper/end_early", frozenset({"harmless"}), _body("__end__(__used__)\nyield\n__end__([[]])")),
+    Hostile("tamper/no_answers", frozenset({"raised"}), "__facts__ = None\n" + _body("get_ego_vehicle()")),
     Hostile("tamper/tick_flood", frozenset({"harmless"}), _body("while True:\n    __tick__(-1, [[]])")),
     Hostile(
         "tamper/tick_redefined",

@@ -15,7 +15,7 @@ def _rewritten(statement: str) -> str:
     source = f"def main():\n    yield\n    {statement}\n"
     prepared = prepare(source)
     ast.parse(prepared.program)
-    assert prepared.program.count("\n") == source.count("\n") + 3
+    assert prepared.program.count("\n") == source.count("\n") + 4
     return prepared.program.split("\n", 2)[2].rsplit("\n\n", 1)[0].strip()
 
 
@@ -84,8 +84,9 @@ def test_a_program_with_a_parenthesised_sort_still_parses() -> None:
 def test_main_and_its_line() -> None:
     prepared = prepare("import math\n\ndef a():\n    yield\n\ndef b():\n    yield\n\ndef c(x):\n    yield x\n")
     assert (prepared.main, prepared.main_line) == ("b", 6)
-    assert prepared.program.endswith("__tick__(0, None)\nb()\n")
-    assert prepared.helpers == ""
+    assert prepared.program.endswith("__tick__(0, None)\nb()\n__end__(__used__)\n")
+    assert PRELUDE not in prepared.helpers
+    assert prepared.stood_in == frozenset()
 
 
 def test_prelude_is_python_and_comes_only_when_needed() -> None:

@@ -84,10 +84,17 @@ class Context:
 
 @dataclass(frozen=True, slots=True)
 class SystemMessage:
-    """S: role, rules, driving-API documentation and examples given to the model."""
+    """S: role, rules, driving-API documentation and examples given to the model.
+
+    Attributes:
+        text: The words.
+        setting: How the model learns the task.
+        library: Helper functions that the text offers; what a program uses of them travels with it.
+    """
 
     text: str
-    setting: Literal["zero-shot", "few-shot"] = "zero-shot"
+    setting: Literal["zero-shot", "few-shot", "human-feedback"] = "zero-shot"
+    library: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,10 +110,13 @@ class Program:
 
     Attributes:
         source: Program text exactly as the planner gave it.
+        library: Helper functions that it calls with `yield from`, e.g. of a policy repository; checked and driven
+            together with it.
     """
 
     source: str
     kind: Literal["program"] = "program"
+    library: str = ""
 
 
 @dataclass(frozen=True, slots=True)

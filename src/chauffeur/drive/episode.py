@@ -15,6 +15,7 @@ from chauffeur.concept import (
     ApiCall,
     Causes,
     ChauffeurError,
+    Command,
     Frame,
     Metric,
     Outcome,
@@ -54,6 +55,14 @@ class RunningPolicy(Protocol):
 
     def tick(self) -> PolicyTick:
         """Wishes for this period. Never raises for the policy's own faults; they come as `state` and `error`."""
+        ...
+
+
+class Hands(Protocol):
+    """A person at wheel and pedals, asked once per control period in the place of the world's driver."""
+
+    def command(self) -> Command | None:
+        """What wheel and pedals ask for in this period; None once the person has given up: the trip ends there."""
         ...
 
 
@@ -118,6 +127,7 @@ def run_episode(
     record: bool = True,
     adjust: Callable[[Wishes], Wishes] | None = None,
     watch: Callable[[Frame], None] | None = None,
+    hands: Hands | None = None,
 ) -> Episode:
     """Drive until the goal is decided, the world ends, the program has ended, or `max_s` simulated seconds passed.
 
@@ -129,6 +139,7 @@ def run_episode(
         record: Whether to keep frames (a benchmark does not need them).
         adjust: Baseline that rewrites settled wishes each period, e.g. MOBIL's lane choice.
         watch: Called with each recorded frame, for live display.
+        hands: A person who acts in the driver's place; `policy` is then None, and nobody's wishes are followed.
     """
     driver = world.driver()
     frames: list[Frame] = []
@@ -140,6 +151,8 @@ def run_episode(
     end = round(max_s / world.dt_s)
     while ticks < end:
         at_s = ticks * world.dt_s
+        if hands is not None:
+            held = driver.initial_wishes()  # a person tells nobody what they want: what is stands for it
         tick = _ask(policy, held) if failure is None else HeldWishes(held, state="failed")
         said.extend((at_s, text) for text in tick.said)
         if tick.error is not None:
@@ -151,7 +164,10 @@ def run_episode(
         if adjust is not None:
             wishes = adjust(wishes)
         held = wishes
-        requested = driver.command(wishes)
+        requested = driver.command(wishes) if hands is None else hands.command()
+        if requested is None:
+            failure = ChauffeurError(f"Given up by the driver after {at_s:.1f} s.")
+            break
         before = world.snapshot() if record else None
         applied = world.step(requested)
         ticks += 1
@@ -178,7 +194,7 @@ def run_episode(
         ticks=ticks,
         duration_s=round(ticks * world.dt_s, 3),
         outcome=_outcome(final, referee, failure),
-        causes=_causes(failure),
+        causes=_causes(failure, fallback_used=hands is None),
         metrics=() if referee is None else referee.metrics() if failure is None else _void(referee.metrics()),
         said=tuple(said),
         success=success,
@@ -216,11 +232,11 @@ def _outcome(final: Snapshot, referee: Referee | None, failure: ChauffeurError |
     return "ended" if referee is None else referee.outcome()
 
 
-def _causes(failure: ChauffeurError | None) -> Causes:
+def _causes(failure: ChauffeurError | None, *, fallback_used: bool) -> Causes:
     if failure is None:
         return Causes()
     infra = isinstance(failure, SandboxError)
-    return Causes(policy_failed=not infra, infra_failed=infra, fallback_used=True, detail=str(failure))
+    return Causes(policy_failed=not infra, infra_failed=infra, fallback_used=fallback_used, detail=str(failure))
 
 
 def _void(metrics: tuple[Metric, ...]) -> tuple[Metric, ...]:

@@ -124,7 +124,11 @@ INSTRUCTION = Channel(
     "/instruction", "chauffeur.Instruction", _object(text=_text("I: the wish"), person=_text(), source=_text())
 )
 CONTEXT = Channel("/context", "chauffeur.Context", _object(text=_text("C: the driving context"), situation=_ANY_OBJECT))
-SYSTEM = Channel("/system", "chauffeur.SystemMessage", _object(text=_text("S: the system message"), setting=_text()))
+SYSTEM = Channel(
+    "/system",
+    "chauffeur.SystemMessage",
+    _object(text=_text("S: the system message"), setting=_text(), library=_text("helper functions that S offers")),
+)
 HISTORY = Channel(
     "/history", "chauffeur.History", _object(items=_array(_ANY_OBJECT, "H: what memory recalled, nearest first"))
 )

@@ -36,7 +36,7 @@ from chauffeur.drive.recording import RecordedTrip
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.programs import ProgramExecutor
-from chauffeur.programs.sandbox import UNHURRIED
+from chauffeur.programs.sandbox import UNHURRIED, Sandbox
 from chauffeur.safety import run_checks
 from chauffeur.worlds.base import World
 
@@ -155,7 +155,9 @@ class Session:
             return make_trip(request, plan, verdicts, scenario, seed, None, refused)
         assert isinstance(plan.policy, Program)
         referee = self.referee(world, scenario, plan)
-        self._episode = drive_program(world, plan.policy.source, referee, self.max_s, lambda f: self.tell("frame", f))
+        self._episode = drive_program(
+            world, plan.policy.source, referee, self.max_s, partial(self.tell, "frame"), library=plan.policy.library
+        )
         return make_trip(request, plan, verdicts, scenario, seed, self._episode, "")
 
 
@@ -167,12 +169,15 @@ def drive_program(
     watch: Callable[[Frame], None] | None = None,
     *,
     record: bool = True,
+    library: str = "",
+    sandbox: Sandbox | None = None,
 ) -> Episode:
-    """Run a checked program on a world just reset.
+    """Run a checked program, with the helper functions it may call, on a world just reset.
 
     Simulated time waits for the program, so its budgets are wide: how busy the machine is must not change a trip.
+    `sandbox` lends one that is open already; otherwise one is opened for this drive.
     """
-    with ProgramExecutor(budget=UNHURRIED) as executor:
+    with ProgramExecutor(budget=UNHURRIED, library=library, sandbox=sandbox) as executor:
         executor.start(source, world)
         return run_episode(world, executor, referee, max_s=max_s, record=record, watch=watch)
 
@@ -233,7 +238,9 @@ def make_trip(
 
 def trip_id(request: PlanRequest, plan: Plan, scenario: Scenario, seed: int) -> str:
     """Content hash of what decides a trip: wish, scenario, seed, limits, planner and policy."""
-    policy = plan.policy.source if isinstance(plan.policy, Program) else str(plan.policy)
+    policy = str(plan.policy)
+    if isinstance(plan.policy, Program):
+        policy = "\0".join(text for text in (plan.policy.source, plan.policy.library) if text)
     parts = [
         request.instruction.text,
         str(request.instruction.person),

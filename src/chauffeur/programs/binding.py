@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any, Final
 
 from chauffeur.concept import ApiCall, LaneId, Turn, Wishes
 from chauffeur.programs.catalogue import APIS, MAX_SAY_CHARS, Api, Param, argument_problem
 from chauffeur.programs.errors import BadArgumentTypeError, BadArgumentValueError
+from chauffeur.programs.foresight import FORESEEABLE, OF_WISHES
 from chauffeur.programs.handles import HandleTable, describe
 from chauffeur.worlds.base import EGO, Driver, Perception
 
@@ -64,6 +66,8 @@ class DrivingApis:
         self._driver = driver
         self._said: list[str] = []
         self._calls: list[MadeCall] = []
+        self._asked: dict[tuple[str, tuple[Any, ...]], None] = {}
+        self._foreseen: list[MadeCall] = []
         self._methods: dict[str, Callable[..., Any]] = {api: getattr(self, f"_{api}") for api in APIS}
 
     def begin_tick(self, perception: Perception) -> None:
@@ -114,7 +118,57 @@ class DrivingApis:
             self._calls.append(MadeCall(name, given, None, error))
             raise
         self._calls.append(MadeCall(name, given, result))
+        if name in FORESEEABLE and not keywords:
+            self._asked[name, tuple(arguments)] = None
         return result
+
+    def foreseen(self) -> tuple[dict[Any, Any], dict[Any, Any]]:
+        """Answers to what was asked in the last period, as of now (foresight.py): (of the world, of the wishes).
+
+        Each is a dict (API name, arguments) -> (number, answer); a question that has no answer any more is left out.
+        """
+        facts: dict[Any, Any] = {}
+        moods: dict[Any, Any] = {}
+        self._foreseen = []
+        asked, self._asked = self._asked, {}
+        for name, arguments in asked:
+            given: list[Any] = []
+            try:
+                result = self._make(APIS[name], arguments, {}, given)
+            except (BadArgumentTypeError, BadArgumentValueError):
+                continue
+            table = moods if name in OF_WISHES else facts
+            table[name, arguments] = len(self._foreseen), result
+            self._foreseen.append(MadeCall(name, given, result))
+        return facts, moods
+
+    def account(self, used: object) -> int:
+        """Put the foreseen answers that a program used into this period's record, at their places.
+
+        Args:
+            used: The program's word: numbers of answers, and -1 for each call that reached the host. What makes no
+                sense is passed over.
+
+        Returns:
+            How many foreseen answers were used.
+        """
+        if not isinstance(used, list):
+            return 0
+        made, self._calls = self._calls, []
+        real = iter(made)
+        count = 0
+        for number in used:
+            if isinstance(number, bool) or not isinstance(number, int):
+                continue
+            if 0 <= number < len(self._foreseen):
+                count += 1
+                call = self._foreseen[number]
+                self._calls.append(call)
+                self._asked[call.name, tuple(call.given)] = None
+            elif number == -1:
+                self._calls.extend(islice(real, 1))
+        self._calls.extend(real)
+        return count
 
     def _make(self, api: Api, arguments: Sequence[Any], keywords: Mapping[str, Any], used: list[Any]) -> Any:
         problem = argument_problem(api, len(arguments), keywords.keys())

@@ -15,13 +15,14 @@ from chauffeur.programs.errors import (
     ProgramFaultError,
     ProgramRefusedError,
 )
+from chauffeur.programs.foresight import DRIVE, END, TICK
 from chauffeur.programs.gate import check_source
-from chauffeur.programs.rewrite import DRIVE, TICK, prepare
+from chauffeur.programs.rewrite import prepare
 from chauffeur.programs.sandbox import Budget, Sandbox, SandboxRun
 from chauffeur.worlds.base import World
 
-_FORMAT: Final = "chauffeur-program-1"
-_PERIOD_ENDS: Final = frozenset({TICK, DRIVE})
+_FORMAT: Final = "chauffeur-program-2"
+_PERIOD_ENDS: Final = frozenset({TICK, DRIVE, END})
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +142,7 @@ class ProgramExecutor:
             try:
                 self._advance(self._run, apis)
             except ProgramFaultError as error:
+                apis.account(self._run.used_at_fault)
                 self._fail(error)
             except BaseException:  # the world's own fault: give the worker back, then let it be known
                 self._end_run()
@@ -150,7 +152,7 @@ class ProgramExecutor:
 
     def _advance(self, run: SandboxRun, apis: DrivingApis) -> None:
         run.begin_tick()
-        call = run.answer(None)
+        call = run.answer(apis.foreseen())
         while call is not None and call.name not in _PERIOD_ENDS:
             try:
                 value: Any = apis.call(call.name, call.arguments, call.keywords)
@@ -160,6 +162,10 @@ class ProgramExecutor:
                 call = run.refuse(ValueError(str(error)))
             else:
                 call = run.answer(value)
+        if call is not None:
+            run.charge(apis.account(call.arguments[-1] if call.arguments else None))
+            if call.name == END:
+                call = run.answer(None)
         if call is None:
             self._end_run()
             self._state, self._line = "finished", None

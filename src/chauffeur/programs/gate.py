@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final, Literal
 
 from chauffeur.programs.calls import CallChecks
@@ -20,11 +21,15 @@ from chauffeur.programs.lower import SEARCHES
 from chauffeur.programs.rewrite import (
     binds,
     bound_names,
+    called_name,
     generator_names,
     is_generator,
     main_function,
+    own_nodes,
     parse,
     takes_nothing,
+    top_level_generators,
+    top_level_names,
     unix_lines,
 )
 from chauffeur.programs.words import (
@@ -71,12 +76,13 @@ class GateReport:
         return "\n".join(str(finding) for finding in self.findings)
 
 
+@lru_cache(maxsize=512)
 def check_source(source: str, library: str = "") -> GateReport:
-    """Judge a program text. Never raises and never runs it.
+    """Judge a program text. Never raises and never runs it. The verdict of a text judged before is remembered.
 
     Args:
         source: Program text.
-        library: Helper functions the program may call with `yield from`.
+        library: Helper functions the program may call with `yield from`; judged like the program.
     """
     try:
         tree = parse(unix_lines(source))
@@ -87,13 +93,30 @@ def check_source(source: str, library: str = "") -> GateReport:
     except ProgramSyntaxError as error:
         return GateReport((Finding(None, "library", error.message, error.hint),), None)
     main = main_function(tree)
-    findings = _Gate(tree, helpers).run()
+    findings = _library_findings(helpers)
+    findings += _Gate(tree, helpers).run()
     findings += _main_findings(tree, main)
     findings += loop_findings(tree)
     findings += lazy_findings(tree)
     unique = {(f.line, f.code, f.reason): f for f in findings}
     ordered = sorted(unique.values(), key=lambda finding: (finding.line or 0, finding.code))
     return GateReport(tuple(ordered[:_MAX_FINDINGS]), None if main is None else main.name)
+
+
+def _library_findings(helpers: ast.Module) -> list[Finding]:
+    """What refuses a library: whatever refuses a program, and top-level names that a program could not do without."""
+    found: list[Finding] = []
+    for node in helpers.body:
+        if not isinstance(node, ast.FunctionDef | ast.Import | ast.ImportFrom):
+            found.append(Finding(node.lineno, "library", "a library holds functions only", "move it into a function"))
+    for name in sorted(top_level_names(helpers) & BUILTINS):
+        found.append(Finding(None, "library", f"{name} is a built-in function", "rename it"))
+    found += _Gate(helpers, ast.Module([], [])).run() + loop_findings(helpers) + lazy_findings(helpers)
+    return [
+        Finding(None, "library", f"line {one.line or 1} of the library: {one.reason}", one.remedy)
+        for one in found
+        if one.severity == "error"
+    ]
 
 
 def _main_findings(tree: ast.Module, main: ast.FunctionDef | None) -> list[Finding]:
@@ -133,9 +156,10 @@ class _Gate:
         self._tree = tree
         self._findings: list[Finding] = []
         self._bound = bound_names(tree)
-        self._known = self._bound | bound_names(helpers) | APIS.keys() | BUILTINS
+        self._known = self._bound | top_level_names(helpers) | APIS.keys() | BUILTINS
         self._math = {"math"} | _aliases_of_math(tree)
-        self._generators = generator_names(tree) | generator_names(helpers)
+        self._offered = top_level_generators(helpers)
+        self._generators = generator_names(tree) | self._offered
         self._calls = CallChecks(tree, self._bound)
 
     def run(self) -> list[Finding]:
@@ -164,6 +188,7 @@ class _Gate:
             elif isinstance(node, ast.FunctionDef) and node.decorator_list:
                 self._add(node, "not-allowed", "decorators are not part of the language", "leave them out")
         self._check_bindings()
+        self._check_hidden_helpers()
         self._check_generator_uses(called_by_delegation)
         self._check_top_level()
         return self._findings
@@ -267,6 +292,23 @@ class _Gate:
                 elif name in self._generators and not (isinstance(node, ast.FunctionDef) and is_generator(node)):
                     self._add(
                         node, "shadow", f"{name} is also the name of a generator function", "use another name for one"
+                    )
+
+    def _check_hidden_helpers(self) -> None:
+        """A function named like a helper hides it; one that then delegates to that name only calls itself."""
+        for node in self._tree.body:
+            if not isinstance(node, ast.FunctionDef) or node.name not in self._offered:
+                continue
+            own = list(own_nodes(node))
+            if any(node.name in binds(inner) for inner in own):
+                continue
+            for inner in own:
+                if isinstance(inner, ast.YieldFrom) and called_name(inner.value) == node.name:
+                    self._add(
+                        inner,
+                        "shadow",
+                        f"this {node.name} hides the library's function of that name and only calls itself",
+                        "give your own function another name",
                     )
 
     def _check_generator_uses(self, called_by_delegation: set[int]) -> None:

@@ -13,16 +13,12 @@ import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 from chauffeur.programs.errors import ProgramSyntaxError
+from chauffeur.programs.foresight import DRIVE, TICK, apis_named, closing, stand_ins
 from chauffeur.programs.lower import PRELUDE, Lowering, apply_edits, needs_prelude
-
-TICK: Final = "__tick__"
-"""The host call that a yield turns into."""
-
-DRIVE: Final = "__drive__"
-"""The host call that `yield autopilot()` turns into: `autopilot()`, then the yield."""
 
 MAX_SOURCE_CHARS: Final = 20_000
 MAX_NODES: Final = 5_000
@@ -37,16 +33,19 @@ class Prepared:
     """A program ready for the sandbox.
 
     Attributes:
-        helpers: What the program needs before it: rewritten library functions, Python bodies of built-ins; or empty.
+        helpers: What is read before it: stand-ins for the driving APIs (foresight.py), Python bodies of built-ins,
+            rewritten library functions.
         program: Rewritten program, ending in the call of its main function.
         main: Name of the main function.
         main_line: Line it begins at.
+        stood_in: Driving APIs that have a stand-in.
     """
 
     helpers: str
     program: str
     main: str
     main_line: int
+    stood_in: frozenset[str]
 
 
 def parse(source: str, what: str = "program") -> ast.Module:
@@ -152,8 +151,21 @@ def generator_names(tree: ast.Module) -> frozenset[str]:
     return frozenset(n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef) and is_generator(n))
 
 
+def top_level_names(tree: ast.Module) -> frozenset[str]:
+    """Names that a library offers: its functions, and what it imports."""
+    functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+    imports = [alias for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom) for alias in node.names]
+    return frozenset(name for node in (*functions, *imports) for name in binds(node))
+
+
+def top_level_generators(tree: ast.Module) -> frozenset[str]:
+    """Names of the generator functions that a library offers; those inside its functions are its own business."""
+    return frozenset(node.name for node in tree.body if isinstance(node, ast.FunctionDef) and is_generator(node))
+
+
+@lru_cache(maxsize=512)
 def prepare(source: str, library: str = "") -> Prepared:
-    """Rewrite a program, and the library it may call, for the sandbox.
+    """Rewrite a program, and the library it may call, for the sandbox; a text rewritten before is remembered.
 
     Args:
         source: Program text.
@@ -171,13 +183,17 @@ def prepare(source: str, library: str = "") -> Prepared:
             hint="Write a function without parameters that yields autopilot() once per control period.",
         )
     library_tree = parse(library, "library")
-    library_generators = generator_names(library_tree) - generator_names(tree)
-    helpers = PRELUDE if needs_prelude(tree) or needs_prelude(library_tree) else ""
+    library_generators = top_level_generators(library_tree) - generator_names(tree)
+    stood_in = apis_named((tree, library_tree))
+    helpers = stand_ins(stood_in)
+    if needs_prelude(tree) or needs_prelude(library_tree):
+        helpers += PRELUDE
     if library_tree.body:
         helpers += f"{_rewrite(library, library_tree, frozenset(), in_library=True)}\n{_SITE} = {{0: 0}}\n"
     program = _rewrite(source, tree, library_generators, in_library=False)
     # The first tick stands before the main call: a started program has run its top level and waits like a generator.
-    return Prepared(helpers, f"{program}\n{TICK}(0, None)\n{main.name}()\n", main.name, main.lineno)
+    program = f"{program}\n{TICK}(0, None)\n{closing(main.name)}"
+    return Prepared(helpers, program, main.name, main.lineno, stood_in)
 
 
 def _rewrite(source: str, tree: ast.Module, library_generators: frozenset[str], *, in_library: bool) -> str:
@@ -202,7 +218,7 @@ def _rewrite(source: str, tree: ast.Module, library_generators: frozenset[str], 
             keyword = _YIELD_FROM.match(text, start)
             assert keyword is not None  # the node starts with these two words
             opening, closing = "(", ")"
-            if not in_library and _called_name(node.value) in library_generators:
+            if not in_library and called_name(node.value) in library_generators:
                 # A tick inside the library reports the program line that called it.
                 opening, closing = f"({_SITE}.update({{0: {node.lineno}}}), (", "))[1]"
             edits += [(start, keyword.end(), opening.encode()), (end, end, closing.encode())]
@@ -210,8 +226,9 @@ def _rewrite(source: str, tree: ast.Module, library_generators: frozenset[str], 
 
 
 def _is_autopilot(node: ast.expr) -> bool:
-    return _called_name(node) == "autopilot" and isinstance(node, ast.Call) and not node.args and not node.keywords
+    return called_name(node) == "autopilot" and isinstance(node, ast.Call) and not node.args and not node.keywords
 
 
-def _called_name(node: ast.expr) -> str | None:
+def called_name(node: ast.expr) -> str | None:
+    """The plain name that a call calls; None for anything else."""
     return node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else None

@@ -20,7 +20,8 @@ import pydantic_monty as monty
 from chauffeur.concept import SandboxError
 from chauffeur.programs.errors import ProgramCallsError, ProgramRaisedError, ProgramTimeError
 from chauffeur.programs.faults import MAX_MESSAGE_CHARS, fault_of
-from chauffeur.programs.rewrite import DRIVE, TICK, Prepared
+from chauffeur.programs.foresight import DRIVE, END, TICK, USED, hidden
+from chauffeur.programs.rewrite import Prepared
 from chauffeur.programs.workers import confine, on_core, present_core
 
 _EPOCH: Final = datetime.datetime(2000, 1, 1, tzinfo=datetime.UTC)
@@ -195,10 +196,10 @@ class SandboxRun:
         self._names: frozenset[str] = frozenset()
         self._snapshot: monty.FunctionSnapshot | None = None
         self._program_feed = "<python-input-0>"
-        self._text = b""
         self._calls = 0
         self._deadline = 0.0
         self._open = True
+        self.used_at_fault: object = None
 
     @property
     def worker_pid(self) -> int | None:
@@ -212,16 +213,14 @@ class SandboxRun:
 
     def load(self, prepared: Prepared, names: Iterable[str]) -> None:
         """Read helpers and program, and run to the first tick. Raises ProgramFaultError."""
-        self._names = frozenset((TICK, DRIVE, *names))
+        self._names = frozenset((TICK, DRIVE, END, *names))
         self._calls = 0
         self._deadline = self._clock() + self._budget.start_s
-        inputs = {name: _host_function(name) for name in sorted(self._names)}
-        if prepared.helpers:
-            self._program_feed = "<python-input-1>"
-            self._advance(lambda: self._session.feed_start(prepared.helpers, inputs=inputs, print_callback=_drop))
-            inputs = {}
-        self._text = prepared.program.encode()
-        call = self._advance(lambda: self._session.feed_start(prepared.program, inputs=inputs, print_callback=_drop))
+        stood_in = prepared.stood_in | {TICK, DRIVE}
+        inputs = {hidden(name) if name in stood_in else name: _host_function(name) for name in sorted(self._names)}
+        self._program_feed = "<python-input-1>"
+        self._advance(lambda: self._session.feed_start(prepared.helpers, inputs=inputs, print_callback=_drop))
+        call = self._advance(lambda: self._session.feed_start(prepared.program, print_callback=_drop))
         if call is None or call.name != TICK:
             raise ProgramRaisedError(
                 "The program calls a driving API outside its functions.",
@@ -263,6 +262,13 @@ class SandboxRun:
         snapshot = self._waiting()
         return self._advance(lambda: snapshot.resume({"exception": error}))
 
+    def charge(self, calls: int) -> None:
+        """Count calls that were answered inside the sandbox. Raises ProgramCallsError."""
+        self._calls += calls
+        if self._calls > self._budget.calls:
+            self.close()
+            raise self._too_many_calls(None)
+
     def close(self) -> None:
         """Give the worker back. May be called twice."""
         if self._open:
@@ -296,31 +302,45 @@ class SandboxRun:
                 else:
                     step = _unknown(state)
         except monty.MontyError as error:
+            self._read_used(error)
             self.close()
             raise fault_of(error, self._program_feed) from None
         except BaseException:
             self.close()
             raise
 
+    def _read_used(self, error: monty.MontyError) -> None:
+        """Ask a program that has just failed, if its worker still answers, which foreseen answers it had used."""
+        if isinstance(error, monty.MontyRuntimeError):
+            with contextlib.suppress(monty.MontyError, OSError, RuntimeError):  # or it is gone
+                self.used_at_fault = self._session.feed_run(USED)
+
     def _charge(self, state: monty.FunctionSnapshot | monty.NameLookupSnapshot | monty.FutureSnapshot) -> None:
         self._calls += 1
         if self._calls > self._budget.calls:
-            raise ProgramCallsError(
-                f"The program made more than {self._budget.calls} calls in one control period.",
-                line=self._line_at(state.position),
-                hint="Yield autopilot() once per pass through every loop.",
-            )
+            raise self._too_many_calls(self._line_of(state))
         if self._clock() > self._deadline:
             raise ProgramTimeError(
                 f"The program took more than {self._budget.tick_s * 1000:.0f} ms of one control period.",
-                line=self._line_at(state.position),
+                line=self._line_of(state),
                 hint="Compute less between two yields.",
             )
 
-    def _line_at(self, position: monty.SourceRange) -> int | None:
-        if position.filename != self._program_feed or not self._text:
-            return None
-        return self._text.count(b"\n", 0, position.start) + 1
+    def _too_many_calls(self, line: int | None) -> ProgramCallsError:
+        return ProgramCallsError(
+            f"The program made more than {self._budget.calls} calls in one control period.",
+            line=line,
+            hint="Yield autopilot() once per pass through every loop.",
+        )
+
+    def _line_of(self, state: monty.FunctionSnapshot | monty.NameLookupSnapshot | monty.FutureSnapshot) -> int | None:
+        """Line at which a program waits that will not go on: an error raised there tells; None if it is caught."""
+        if isinstance(state, monty.FunctionSnapshot):
+            try:
+                state.resume({"exception": RuntimeError("stopped")})
+            except monty.MontyError as error:
+                return fault_of(error, self._program_feed).line
+        return None
 
 
 def _unknown(state: monty.FunctionSnapshot) -> Callable[[], monty.SyncSnapshot]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from chauffeur.concept import ActionMatrix, Limits, Parameters, Plan, Program, Snapshot, Trajectory, Verdict
@@ -75,11 +75,15 @@ def _road(snapshot: Snapshot) -> _Road:
 
 def _policy_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]:
     match plan.policy:
-        case Program(source=source):
+        case Program(source=source, library=library):
             reading = read_program(source)
             for use in reading.uses:
                 yield from _use_faults(use, road, limits)
             yield from _move_faults(reading, road)
+            for use in read_program(library).uses:
+                for fault in _use_faults(use, road, limits):
+                    # Lines are counted in the program; a helper is known by its reason alone.
+                    yield replace(fault, reason=f"{fault.reason} (In a helper function.)", line=None)
         case Parameters() as values:
             yield from _speed_faults("target speed", _number(values.target_speed_mps), road, limits)
             if values.lane in _SIDES:

@@ -17,8 +17,8 @@ def check_format(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:  # 
             return _fail(
                 plan.refusal or "The planner gave no policy.", "Say the wish in other words, or ask for less at once."
             )
-        case Program(source=source):
-            return _program(source)
+        case Program(source=source, library=library):
+            return _program(source, library)
         case Parameters() as values:
             if values.lane not in (-1, 0, 1):
                 return _fail(f"The lane wish is {values.lane!r}.", "Give -1 (left), 0 (stay) or 1 (right).")
@@ -46,10 +46,10 @@ def check_format(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:  # 
             )
 
 
-def _program(source: str) -> Verdict:
+def _program(source: str, library: str) -> Verdict:
     from chauffeur.programs.gate import check_source
 
-    errors = check_source(source).errors
+    errors = (check_source(source, library) if library else check_source(source)).errors
     if errors:
         first, rest = errors[0], len(errors) - 1
         more = f" (and {rest} more finding{'s' if rest > 1 else ''})" if rest else ""

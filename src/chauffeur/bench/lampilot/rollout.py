@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
+import multiprocessing
+import os
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -12,6 +16,7 @@ from chauffeur.concept import ChauffeurError, Context, Limits, Plan, Program, Sc
 from chauffeur.describe import describe
 from chauffeur.drive.episode import Episode
 from chauffeur.drive.session import declined, drive_program, drive_without_program, unusable
+from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.safety import run_checks
 from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
 
@@ -77,10 +82,33 @@ def roll_out(job: RolloutJob) -> dict[str, Any]:
         return row | not_driven("refused", refusal, refused=not failed, policy_failed=failed)
     assert isinstance(plan.policy, Program)
     try:
-        episode = drive_program(world, plan.policy.source, referee, MAX_EPISODE_S, record=False)
+        episode = drive_program(
+            world,
+            plan.policy.source,
+            referee,
+            MAX_EPISODE_S,
+            record=False,
+            library=plan.policy.library,
+            sandbox=_sandbox(),
+        )
     except ChauffeurError as error:
         return row | not_driven("not_driven", str(error), infra_failed=True)
     return row | _driven(episode, referee)
+
+
+@lru_cache(maxsize=1)
+def _sandbox() -> Sandbox:
+    """This process's sandbox: opening one takes longer than most programs run.
+
+    A rollout process stays on one core, where its programs run too: they take turns, and changing cores costs more
+    than a turn.
+    """
+    if multiprocessing.parent_process() is not None and hasattr(os, "sched_setaffinity"):
+        cores = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, {cores[os.getpid() % len(cores)]})
+    sandbox = Sandbox(UNHURRIED)
+    atexit.register(sandbox.close)
+    return sandbox
 
 
 def _mobil(world: HighwayWorld) -> Any:
