@@ -38,7 +38,9 @@ OF_WISHES: Final = frozenset(
 )
 """Questions whose answer depends on what the program has wished."""
 
-FORESEEABLE: Final = frozenset(api.name for api in APIS.values() if api.effect == "read" and api.returns != "lanes")
+FORESEEABLE: Final = frozenset(
+    api.name for api in APIS.values() if api.effect == "read" and api.returns in {"number", "flag", "vehicle", "lane"}
+)
 """Questions that may be answered beforehand. A list is not: the program could change it and ask again."""
 
 _PERIOD = f"""

@@ -125,7 +125,7 @@ class HighwayWorld:
             lanes=start.lanes,
             front=lead,
             stop_sign_m=None if sign is None else sign[1],
-            off_road=core.out[at.OUT_ON_ROAD] <= 0.0,
+            off_road=bool(core.out[at.OUT_ON_ROAD] <= 0.0),
             ended=self.ended,
         )
 
