@@ -16,7 +16,8 @@ from chauffeur.bench.lampilot.report import comparison_lines, family_lines, mark
 
 
 def _rows(folder: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in (folder / "results.jsonl").read_text(encoding="utf-8").splitlines()]
+    lines = (folder / "results.jsonl").read_text(encoding="utf-8").split("\n")
+    return [json.loads(line) for line in lines if line]
 
 
 def main() -> None:

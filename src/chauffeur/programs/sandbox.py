@@ -50,7 +50,7 @@ class Budget:
     recursion: int = 100
 
 
-UNHURRIED: Final = Budget(turn_s=1.0, tick_s=2.0, grace_s=1.0, start_s=5.0)
+UNHURRIED: Final = Budget(turn_s=2.0, tick_s=20.0, grace_s=2.0, start_s=20.0)
 """For simulated time, which waits for the program: how busy the machine is must not change what a program does."""
 
 

@@ -168,6 +168,8 @@ def _warm_up(scenario: Scenario, seed: int) -> _Start:
     rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed)))
     scene = build_scene(parse_config(scenario.config, scenario.id), rng)
     core = CoreRoad.of(scene)
+    if not _starts:
+        core.make_ready()
     clock_s = 0.0
     if scene.alone_steps:
         core.advance(0.0, 0.0, scene.alone_steps)

@@ -41,6 +41,23 @@ class CoreRoad:
         road = map_network(scene.road.network)
         return cls(road, *place_entities(scene, road))
 
+    def make_ready(self) -> None:
+        """Have every kernel in machine code, on a copy: loading one takes longer than a control period may."""
+        twin = self.copy()
+        twin.advance(0.0, 0.0)
+        twin.neighbours(0, 0)
+        twin.lane_heading(0, 0)
+        twin.reachable(0)
+        twin.blocker(0, vehicles=True)
+        twin.follow(0, -1, 10.0, 1.5)
+        twin.traffic_idm(0, -1)
+        twin.gap(0, 0)
+        twin.steer(0)
+        x = float(twin.road.lanes[0, at.LANE_LENGTH]) + 1e4
+        twin.floats[0, at.X] = twin.floats[0, at.Y] = x
+        for lane in range(len(twin.road.lanes)):  # past the end of at least one of them
+            twin.next_lane(lane)
+
     def copy(self) -> Self:
         """The same instant, to be stepped on its own."""
         twin = object.__new__(type(self))
