@@ -7,23 +7,18 @@ style and script, by hash.
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import html
 import json
-import re
-from collections.abc import Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from chauffeur.drive.files import publish
 from chauffeur.drive.recording import RecordedTrip
+from chauffeur.hmi.document import asset, content_hash, fill, printable
 from chauffeur.hmi.payload import page_payload
 
 _STYLES = ("trip.css", "panels.css")
 _SCRIPTS = ("panels.js", "stage.js", "charts.js", "player.js")
-_SLOT = re.compile(r"\{\{(\w+)\}\}")
 
 
 def write_page(path: Path, recorded: RecordedTrip) -> Path:
@@ -42,15 +37,15 @@ def write_page(path: Path, recorded: RecordedTrip) -> Path:
 def render_page(recorded: RecordedTrip) -> str:
     """The page of a trip as text."""
     payload = page_payload(recorded)
-    style = "\n".join(_asset(name) for name in _STYLES)
-    script = "(() => {\n'use strict';\n" + "\n".join(_asset(name) for name in _SCRIPTS) + "\n})();"
-    policy = f"default-src 'none'; img-src data:; style-src {_hash(style)}; script-src {_hash(script)}"
-    return _fill(
-        _asset("trip.html"),
+    style = "\n".join(asset(name) for name in _STYLES)
+    script = "(() => {\n'use strict';\n" + "\n".join(asset(name) for name in _SCRIPTS) + "\n})();"
+    policy = f"default-src 'none'; img-src data:; style-src {content_hash(style)}; script-src {content_hash(script)}"
+    return fill(
+        asset("trip.html"),
         {
             "policy": html.escape(policy),
-            "title": html.escape(f"“{_printable(payload['wish'])}” – {payload['outcome']['label']}"),
-            "wish": html.escape(_printable(payload["wish"])),
+            "title": html.escape(f"“{printable(payload['wish'])}” – {payload['outcome']['label']}"),
+            "wish": html.escape(printable(payload["wish"])),
             "outcome": html.escape(payload["outcome"]["label"]),
             "simulated": html.escape(payload["simulated"]),
             "style": style,
@@ -66,21 +61,4 @@ def embed_json(value: Any) -> str:
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")
     # Lone surrogates are legal in a string and not in UTF-8.
-    return text.encode("utf-8", "replace").decode()
-
-
-def _fill(template: str, values: Mapping[str, str]) -> str:
-    """Fill every slot in one pass: what is put in is never looked at again."""
-    return _SLOT.sub(lambda match: values[match.group(1)], template)
-
-
-def _asset(name: str) -> str:
-    return resources.files("chauffeur.hmi").joinpath("assets", name).read_text(encoding="utf-8")
-
-
-def _hash(text: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
-
-
-def _printable(text: str) -> str:
     return text.encode("utf-8", "replace").decode()

@@ -92,7 +92,9 @@ def policy_words(policy: Policy | None) -> str:
     if policy is None:
         return ""
     if isinstance(policy, Program):
-        return policy.source
+        if not policy.library:
+            return policy.source
+        return f"{policy.source.rstrip()}\n\n\n# Helper functions that it may call:\n{policy.library.rstrip()}\n"
     if isinstance(policy, Parameters):
         names = ("target_speed_mps", "look_ahead_m", "look_ahead_ratio")
         rows = [words.setting(name, float(getattr(policy, name))) for name in names]
@@ -151,7 +153,7 @@ def _words(value: Any) -> str:
 
 
 def _program_lines(policy: Policy | None) -> list[list[tuple[str, str]]] | None:
-    return program_tokens(policy.source.rstrip("\n")) if isinstance(policy, Program) else None
+    return program_tokens(policy_words(policy).rstrip("\n")) if isinstance(policy, Program) else None
 
 
 def _history_item(item: HistoryItem) -> Json:
