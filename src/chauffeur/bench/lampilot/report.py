@@ -6,9 +6,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import fmean
 
+import numpy as np
+
 from chauffeur.bench.lampilot.families import FAMILIES
-from chauffeur.bench.lampilot.metrics import driving_score
-from chauffeur.bench.lampilot.paper import TABLE_IV
+from chauffeur.bench.lampilot.metrics import ORIGIN, Ruler, driving_score, ruler_named
+from chauffeur.bench.lampilot.paper import TABLE_IV, items_behind
+from chauffeur.bench.report.stats import DRAWS, Array, Estimator, Interval, bootstrap, cluster_totals
 from chauffeur.bench.store import Row
 
 
@@ -21,7 +24,7 @@ class Summary:
         items: How many were planned.
         collision, completion: Rates, 0..1.
         ttc, speed_variance, time_efficiency: Mean points over completed items; None when none was completed.
-        driving_score: LaMPilot's aggregate, points.
+        driving_score: The ruler's aggregate, points.
         policy_failed, infra_failed, refused, fallback_used: Counts.
     """
 
@@ -39,16 +42,28 @@ class Summary:
     fallback_used: int
 
 
+def ruler_of(rows: Sequence[Row]) -> Ruler:
+    """The ruler that rows were scored by; rows that name none are of the time when there was only LaMPilot's.
+
+    Raises:
+        ValueError: There are no rows, or they were scored by several rulers.
+    """
+    ids = {str(row.get("metrics", ORIGIN.id)) for row in rows}
+    if len(ids) != 1:
+        raise ValueError(f"rows of one ruler are needed, not of {sorted(ids)}")
+    return ruler_named(ids.pop())
+
+
 def summarise(label: str, rows: Sequence[Row]) -> Summary:
-    """Aggregate rows (one per planned item). Raises ValueError for no rows."""
-    if not rows:
-        raise ValueError(f"no items to summarise for {label!r}")
+    """Aggregate rows (one per planned item). Raises ValueError for no rows, or rows of several rulers."""
+    ruler = ruler_of(rows)
     done = [row for row in rows if row["success"]]
     completion = len(done) / len(rows)
     collision = fmean(bool(row["collision"]) for row in rows)
 
     def mean(column: str) -> float | None:
-        return fmean(float(row[column]) for row in done) if done else None
+        values = [float(row[column]) for row in done if row[column] is not None]
+        return fmean(values) if values else None
 
     return Summary(
         label=label,
@@ -58,7 +73,7 @@ def summarise(label: str, rows: Sequence[Row]) -> Summary:
         ttc=mean("ttc"),
         speed_variance=mean("speed_variance"),
         time_efficiency=mean("time_efficiency"),
-        driving_score=driving_score(completion, mean("score") or 0.0, collision),
+        driving_score=driving_score(completion, mean("score") or 0.0, collision, ruler),
         policy_failed=sum(bool(row["policy_failed"]) for row in rows),
         infra_failed=sum(bool(row["infra_failed"]) for row in rows),
         refused=sum(bool(row["refused"]) for row in rows),
@@ -68,12 +83,80 @@ def summarise(label: str, rows: Sequence[Row]) -> Summary:
 
 def summaries(rows: Sequence[Row]) -> list[Summary]:
     """One per family that occurs, then one for all."""
-    found: list[Summary] = []
-    for family in (*FAMILIES, "other"):
-        chosen = [row for row in rows if row["family"] == family]
-        if chosen:
-            found.append(summarise(family, chosen))
+    found = [summarise(family, [row for row in rows if row["family"] == family]) for family in families_in(rows)]
     return [*found, summarise("all", rows)]
+
+
+def families_in(rows: Iterable[Row]) -> list[str]:
+    """Families that occur: the seed's in its order, then any others as they come."""
+    names = dict.fromkeys(str(row["family"]) for row in rows)
+    return [*(f for f in FAMILIES if f in names), *(f for f in names if f not in FAMILIES)]
+
+
+_POINTS = ("ttc", "speed_variance", "time_efficiency")
+_ITEMS, _COLLISIONS, _SUCCESSES, _SCORE, _PENALTY, _FIRST_POINT = range(6)
+
+
+def scene_totals(rows: Sequence[Row]) -> Array:
+    """What MEASURES are made of, summed over each sample's items.
+
+    Returns:
+        Shape (samples, 11): items, collisions, successes, score, the ruler's penalty for collisions, then sum and
+        count of each kind of points over completed items. Samples stand in order of their first item, so runs over
+        the same items give the same rows.
+
+    Raises:
+        ValueError: See ruler_of.
+    """
+    weight = ruler_of(rows).collision_weight
+    values = np.zeros((len(rows), _FIRST_POINT + 2 * len(_POINTS)))
+    for line, row in zip(values, rows, strict=True):
+        line[_ITEMS] = 1.0
+        line[_COLLISIONS] = bool(row["collision"])
+        line[_PENALTY] = weight * bool(row["collision"])
+        if not row["success"]:
+            continue
+        line[_SUCCESSES] = 1.0
+        line[_SCORE] = row["score"] or 0.0
+        for place, name in enumerate(_POINTS):
+            if row[name] is not None:
+                at = _FIRST_POINT + 2 * place
+                line[at : at + 2] = row[name], 1.0
+    return cluster_totals([str(row["sample"]) for row in rows], values)
+
+
+def _rate(column: int) -> Estimator:
+    return lambda totals: totals[..., column] / totals[..., _ITEMS]
+
+
+def _mean_points(place: int) -> Estimator:
+    at = _FIRST_POINT + 2 * place
+
+    def mean(totals: Array) -> Array:
+        with np.errstate(invalid="ignore"):  # no completed item: 0 / 0, undefined
+            return totals[..., at] / totals[..., at + 1]
+
+    return mean
+
+
+def _driving_score(totals: Array) -> Array:
+    # completion x mean score of successes is the score summed over successes, over all items
+    return (totals[..., _SCORE] - totals[..., _PENALTY]) / totals[..., _ITEMS]
+
+
+MEASURES: dict[str, Estimator] = {
+    "collision": _rate(_COLLISIONS),
+    "completion": _rate(_SUCCESSES),
+    **{name: _mean_points(place) for place, name in enumerate(_POINTS)},
+    "driving_score": _driving_score,
+}
+"""The aggregates of a Summary, by field name, as functions of scene totals."""
+
+
+def intervals(rows: Sequence[Row], *, draws: int = DRAWS, seed: int = 0) -> dict[str, Interval]:
+    """The aggregates of `summarise` with 95 % intervals; samples are resampled, because the commands of a sample share
+    a scene. Raises ValueError for no rows, or rows of several rulers."""
+    return bootstrap(scene_totals(rows), MEASURES, draws=draws, seed=seed, rates=("collision", "completion"))
 
 
 COLUMNS = (
@@ -91,6 +174,25 @@ def _number(value: float | None) -> str:
     return "n/a" if value is None else f"{value:.1f}"
 
 
+def interval_cells(found: dict[str, Interval]) -> list[str]:
+    """Cells under COLUMNS with their intervals, e.g. `98.7 [97.4, 99.6]`."""
+    return [interval_text(found[name], *_FORMS.get(name, (1.0, 1))) for name in MEASURES]
+
+
+_FORMS = {"collision": (100.0, 2), "completion": (100.0, 1)}
+"""Factor and decimals of a measure in its column; points are shown as they are, with one."""
+
+
+def interval_text(interval: Interval, scale: float = 1.0, digits: int = 1) -> str:
+    """`98.7 [97.4, 99.6]`; without ends where there is no interval, `n/a` where there is no value."""
+    if interval.value is None:
+        return "n/a"
+    value = f"{scale * interval.value:.{digits}f}"
+    if interval.low is None or interval.high is None:
+        return value
+    return f"{value} [{scale * interval.low:.{digits}f}, {scale * interval.high:.{digits}f}]"
+
+
 def cells(summary: Summary) -> list[str]:
     """A summary's cells under COLUMNS."""
     return [
@@ -103,10 +205,10 @@ def cells(summary: Summary) -> list[str]:
     ]
 
 
-def markdown(header: Iterable[str], lines: Iterable[Sequence[str]]) -> str:
-    """A Markdown table; the first column is text, the others are numbers."""
+def markdown(header: Iterable[str], lines: Iterable[Sequence[str]], text_columns: int = 1) -> str:
+    """A Markdown table; the first columns are text, the others are numbers."""
     names = list(header)
-    rule = ["---", *("---:" for _ in names[1:])]
+    rule = ["---" if place < text_columns else "---:" for place in range(len(names))]
     return "\n".join("| " + " | ".join(line) + " |" for line in [names, rule, *lines])
 
 
@@ -114,20 +216,41 @@ Table = tuple[tuple[str, ...], list[list[str]]]
 """(header, lines) of a table, every cell as text."""
 
 
-def family_lines(rows: Sequence[Row]) -> Table:
-    """A run by family, with causes."""
+def family_lines(rows: Sequence[Row], *, draws: int = 0) -> Table:
+    """A run by family, with causes; with 95 % intervals from so many resamples where `draws` is not 0."""
     lines = [
-        [s.label, str(s.items), *cells(s), *map(str, (s.policy_failed, s.infra_failed, s.refused, s.fallback_used))]
+        [
+            s.label,
+            str(s.items),
+            *_cells(s, [row for row in rows if s.label in (row["family"], "all")], draws),
+            *map(str, (s.policy_failed, s.infra_failed, s.refused, s.fallback_used)),
+        ]
         for s in summaries(rows)
     ]
     return ("Family", "Items", *COLUMNS, *_CAUSES), lines
 
 
-def comparison_lines(name: str, rows: Sequence[Row], *more: tuple[str, Sequence[Row]]) -> Table:
-    """Runs in the columns of the seed's Tab. IV, the published rows below them, marked as the paper's."""
-    lines = [[label, str(len(found)), *cells(summarise(label, found))] for label, found in [(name, rows), *more]]
-    for method, setting, collision, *points in TABLE_IV:
+def _cells(summary: Summary, rows: Sequence[Row], draws: int) -> list[str]:
+    return interval_cells(intervals(rows, draws=draws)) if draws else cells(summary)
+
+
+def comparison_lines(name: str, rows: Sequence[Row], *more: tuple[str, Sequence[Row]], draws: int = 0) -> Table:
+    """Runs in the columns of the seed's Tab. IV, the published rows below them, marked as the paper's.
+
+    The published rows were measured by LaMPilot's code, so they stand below runs of that ruler only.
+
+    Args:
+        name, rows: The first run.
+        more: Further runs.
+        draws: Resamples for 95 % intervals of the runs; 0 for none.
+
+    Raises:
+        ValueError: A run is empty, or the runs were scored by several rulers.
+    """
+    runs = [(name, rows), *more]
+    ruler = ruler_of([row for _, found in runs for row in found])
+    lines = [[label, str(len(found)), *_cells(summarise(label, found), found, draws)] for label, found in runs]
+    for method, setting, collision, *points in TABLE_IV if ruler is ORIGIN else ():
         label = method if setting == "-" else f"{method}, {setting}"
-        items = "110" if setting == "human feedback" else "98"
-        lines.append([f"paper: {label}", items, f"{collision:.2f}", *(f"{p:.1f}" for p in points)])
+        lines.append([f"paper: {label}", str(items_behind(setting)), f"{collision:.2f}", *(f"{p:.1f}" for p in points)])
     return ("Method", "Items", *COLUMNS), lines

@@ -1,0 +1,108 @@
+"""`chauffeur report`: what came of benchmark runs, as one page, Markdown and LaTeX."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from chauffeur.bench.report.build import Choices
+
+EXAMPLES = """
+Examples:
+
+    chauffeur report runs/lampilot-onboard --open
+
+    chauffeur report runs/lampilot-onboard runs/lampilot-idm --metrics paper --out reports/baselines
+
+    chauffeur report runs/lampilot-onboard --inspect onboard.eval
+
+Several runs are compared on the items that all of them have. Every figure is of simulated drives.
+"""
+
+
+def report(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN", help="Run folders of chauffeur bench lampilot.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the report; default `report` in the run, or beside several runs.")
+    ] = None,
+    metrics: Annotated[
+        str | None, typer.Option(help="Score all runs by `origin` or `paper`; default the ruler they agree on.")
+    ] = None,
+    gallery: Annotated[
+        int | None, typer.Option(min=0, help="Failures shown of each run; default up to 12, fewer of many runs.")
+    ] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="DbLv1 folder, to show the drives of runs that kept no scenes.")
+    ] = None,
+    inspect: Annotated[
+        Path | None, typer.Option(metavar="FILE.eval", help="Also write the run as a log of Inspect AI (one run).")
+    ] = None,
+    browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = False,
+) -> None:
+    """Report benchmark runs: scores with intervals, comparisons, costs, and a gallery of failures."""
+    from rich.padding import Padding
+    from rich.text import Text
+
+    from chauffeur.bench.report.build import Choices, build_report
+    from chauffeur.bench.report.latex import render_latex
+    from chauffeur.bench.report.text import render_markdown
+    from chauffeur.cli.console import columns, path_text, plain, stdout
+    from chauffeur.concept import ConfigError
+    from chauffeur.drive.files import publish
+    from chauffeur.hmi.report_page import write_report_page
+
+    if inspect is not None and len(runs) != 1:
+        raise ConfigError("An Inspect log holds one run.", hint="Give --inspect with one RUN, once for each.")
+    console = stdout()
+    choices = Choices(metrics or "", data, gallery)
+    with _progress(console) as show:
+        made = build_report(runs, choices, show)
+    folder = out or (runs[0] if len(runs) == 1 else runs[0].resolve().parent) / "report"
+    page = write_report_page(folder / "report.html", made)
+    written = [("page", path_text(page))]
+    for name, text in (("report.md", render_markdown(made)), ("report.tex", render_latex(made))):
+        content = text.encode("utf-8", "replace")
+        written.append((name.removeprefix("report."), path_text(publish(folder / name, content, "report"))))
+    if inspect is not None:
+        written.append(("inspect", path_text(_write_log(inspect, runs[0], choices))))
+    console.print(plain(made.summary))
+    for line in made.headlines:
+        words = Text.assemble((plain(line.subject).plain, "bold"), ": ", plain(line.text))
+        console.print(Padding(words, (0, 0, 0, 2)))
+    for warning in made.warnings:
+        console.print(Padding(Text.assemble(("Note: ", "bold yellow"), plain(warning)), (0, 0, 0, 2)))
+    console.print(columns(written, indent=0))
+    if browser:
+        typer.launch(page.resolve().as_uri())
+
+
+def _write_log(path: Path, folder: Path, choices: Choices) -> Path:
+    from chauffeur.bench.report.inspect_log import write_inspect_log
+    from chauffeur.bench.report.rulers import under_one_ruler
+    from chauffeur.bench.report.runs import load_runs
+
+    (run,) = under_one_ruler(load_runs([folder]), choices.metrics)
+    return write_inspect_log(path, run, choices.how)
+
+
+@contextmanager
+def _progress(console: Console) -> Generator[Callable[[str, int, int], None]]:
+    """One bar for the part that takes time: driving failures again."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    with Progress(
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), console=console, transient=True
+    ) as bar:
+        task = bar.add_task("reading runs", total=None)
+
+        def show(what: str, done: int, total: int) -> None:
+            bar.update(task, description=what, completed=done, total=total)
+
+        yield show
