@@ -55,6 +55,7 @@ def play(planner: Planner, request) -> Plan:
     "policy",
     [
         Program(PROGRAM),
+        Program(PROGRAM, library="def helper():\n    yield autopilot()\n"),
         None,
         Parameters(20.0, 5.0, 0.4, -1),
         ActionMatrix((1.0, 0.0, 0.1), (1.0, 2.0, 3.0)),

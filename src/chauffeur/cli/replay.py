@@ -61,7 +61,8 @@ def drive_again(recorded: RecordedTrip) -> RecordedTrip:
         raise DataError(f"The recording holds no drive: its outcome is {trip.outcome}.", hint="Replay a driven trip.")
     world = make_world(scenario)
     world.reset(scenario, trip.seed)
-    episode = drive_program(world, policy.source, referee_for(world, scenario, trip.plan), MAX_TRIP_S)
+    referee = referee_for(world, scenario, trip.plan)
+    episode = drive_program(world, policy.source, referee, MAX_TRIP_S, library=policy.library)
     driven = replace(
         trip,
         outcome=episode.outcome,

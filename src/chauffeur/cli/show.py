@@ -155,7 +155,7 @@ class Teller(Quiet):
             return
         self._thoughts(plan.thoughts, plan.intent)
         if isinstance(plan.policy, Program):
-            source = plain(plan.policy.source.rstrip("\n")).plain
+            source = plain(policy_words(plan.policy).rstrip("\n")).plain
             code = Syntax(source, "python", theme="ansi_dark", background_color="default", word_wrap=True)
             self._letter("P", code)
         else:

@@ -54,7 +54,7 @@ _OPPOSITES = (
 _AGAINST = {tag: sum(_BIT[b if a == tag else a] for a, b in _OPPOSITES if tag in (a, b)) for tag in TAGS}
 
 _PHRASES = (
-    (r"(?:turn|take a|make a|go) (?:\w+ )?(?P<side>left|right)|(?P<side2>left|right) turn", "turn."),
+    (r"(?:turn|take a|make a|go) (?:\w+ )?(?P<side>left|right)(?! lane)|(?P<side2>left|right) turn", "turn."),
     (r"(?:go |drive |keep |continue )?straight|(?:go|drive) (?:across|through)", "turn.straight"),
     (r"(?P<side>left|right)(?: ?hand)?(?: ?most)? lane|lane (?:\w+ ){0,3}(?P<side2>left|right)", "lane."),
     (r"(?:move|merge|change|switch|shift|get|pull|steer) (?:\w+ ){0,4}(?P<side>left|right)", "lane."),

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from chauffeur.concept import Plan, PlanRequest
+from chauffeur.concept import Plan, PlanRequest, Usage
+from chauffeur.planners.prompts import Message
 
 
 @runtime_checkable
@@ -23,4 +26,30 @@ class Planner(Protocol):
 
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan. Raises PlannerError when no plan can be had; declining is a Plan with `refusal`."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Prose:
+    """Words a model wrote that are no plan.
+
+    Attributes:
+        text: The words, without the reasoning that some models put in front.
+        whole: Whether the model came to its end by itself.
+        model: Model as the endpoint names it.
+        usage: Cost.
+    """
+
+    text: str
+    whole: bool
+    model: str
+    usage: Usage
+
+
+@runtime_checkable
+class Writer(Protocol):
+    """A planner whose model can also be asked for prose, e.g. to describe a program."""
+
+    async def write(self, messages: Sequence[Message]) -> Prose:
+        """One reply to a conversation. Raises PlannerError when none can be had."""
         ...

@@ -6,17 +6,18 @@ import asyncio
 import logging
 import os
 import time
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chauffeur.concept import ConfigError, InstructionError, Plan, PlanRequest, Program, Thoughts, Usage
+from chauffeur.planners.base import Prose
 from chauffeur.planners.cache import Completion, ReplyCache, default_cache_dir, endpoint_key
 from chauffeur.planners.llm_address import Address, parse_address
 from chauffeur.planners.llm_endpoint import Endpoint, Sampling
 from chauffeur.planners.llm_errors import timed_out
-from chauffeur.planners.llm_reply import MAX_REPLY_CHARS, Reply, read_reply
+from chauffeur.planners.llm_reply import MAX_REPLY_CHARS, Reply, read_reply, without_thinking
 from chauffeur.planners.llm_retry import RetryPolicy, with_retries
 from chauffeur.planners.pricing import cost_usd
 from chauffeur.planners.prompts import Message, build_messages, repair_turns
@@ -31,6 +32,9 @@ OnText = Callable[[str, int], None]
 
 Gate = Callable[[str], list[str]]
 """What the static gate finds in a program, one message (line, reason, remedy) each; empty when it may drive."""
+
+_CUT = frozenset({"length", "capped"})
+"""How a reply ends that its model did not end."""
 
 INTENT_DECLINED = "declined"
 """`Plan.intent` when the model declined."""
@@ -100,7 +104,7 @@ class LlmPlanner:
         self._repairs = repairs
         self._budget_s = budget_s
         self._cache = cache
-        self._gate = gate or program_findings
+        self._gate = gate
         self._on_text = on_text
         self._sleep = sleep
         self._clock = clock
@@ -202,13 +206,13 @@ class LlmPlanner:
         bill = _Bill()
         try:
             async with asyncio.timeout(self._budget_s):
-                completion, reply = await self._converse(build_messages(request), bill)
+                completion, reply = await self._converse(build_messages(request), request.system.library, bill)
         except TimeoutError:
             raise timed_out(self._address.url, self._budget_s) from None
         return Plan(
             thoughts=Thoughts(reply.thoughts),
             # A program that the gate still refuses is handed on: the checks of the loop refuse it on the record.
-            policy=Program(reply.source) if reply.source is not None else None,
+            policy=_program(reply.source, request.system.library) if reply.source is not None else None,
             refusal=reply.refusal or (f"The model gave no usable program: {reply.problem}." if reply.problem else ""),
             intent=INTENT_DECLINED if reply.refusal else INTENT_UNUSABLE if reply.problem else "",
             planner=self.id,
@@ -218,26 +222,45 @@ class LlmPlanner:
             raw=completion.text,
         )
 
+    async def write(self, messages: Sequence[Message]) -> Prose:
+        """The model's words to a conversation, read as they are.
+
+        Raises:
+            EndpointError: The endpoint gave no reply that can be read; a `PlannerError`.
+        """
+        bill = _Bill()
+        try:
+            async with asyncio.timeout(self._budget_s):
+                completion = await self._complete(list(messages), bill)
+        except TimeoutError:
+            raise timed_out(self._address.url, self._budget_s) from None
+        text = without_thinking(completion.text[:MAX_REPLY_CHARS]).strip()
+        whole = completion.finish not in _CUT
+        return Prose(text, whole, completion.model or self._model, self._usage(bill))
+
     async def close(self) -> None:
         """Close the connections to the endpoint."""
         await self._endpoint.close()
 
-    async def _converse(self, messages: list[Message], bill: _Bill) -> tuple[Completion, Reply]:
-        completion, reply, findings = await self._answer(messages, bill)
+    async def _converse(self, messages: list[Message], library: str, bill: _Bill) -> tuple[Completion, Reply]:
+        completion, reply, findings = await self._answer(messages, library, bill)
         for _ in range(self._repairs):
             if not findings:
                 break
             _log.info("%s: asking for a repair: %s", self.id, "; ".join(findings))
             messages = [*messages, *repair_turns(completion.text, findings)]
-            completion, reply, findings = await self._answer(messages, bill)
+            completion, reply, findings = await self._answer(messages, library, bill)
         return completion, reply
 
-    async def _answer(self, messages: list[Message], bill: _Bill) -> tuple[Completion, Reply, list[str]]:
+    async def _answer(self, messages: list[Message], library: str, bill: _Bill) -> tuple[Completion, Reply, list[str]]:
         completion = await self._complete(messages, bill)
-        reply = read_reply(completion.text, cut=completion.finish in {"length", "capped"})
+        reply = read_reply(completion.text, cut=completion.finish in _CUT)
         if reply.problem:
             return completion, reply, [reply.problem]
-        return completion, reply, self._gate(reply.source) if reply.source is not None else []
+        return completion, reply, self._findings(reply.source, library) if reply.source is not None else []
+
+    def _findings(self, source: str, library: str) -> list[str]:
+        return program_findings(source, library) if self._gate is None else self._gate(source)
 
     async def _complete(self, messages: list[Message], bill: _Bill) -> Completion:
         bill.answers += 1
@@ -284,9 +307,18 @@ class LlmPlanner:
         )
 
 
-def program_findings(source: str) -> list[str]:
-    """What the gate of `chauffeur.programs` finds in a program, in words."""
+def _program(source: str, library: str) -> Program:
+    """P with the part of the offered library that it can come to use."""
+    if not library:
+        return Program(source)
+    from chauffeur.programs.library import needed
+
+    return Program(source, library=needed(source, library))
+
+
+def program_findings(source: str, library: str = "") -> list[str]:
+    """What the gate of `chauffeur.programs` finds in a program that may call a library, in words."""
     from chauffeur.programs.gate import check_source
 
-    report = check_source(source)
+    report = check_source(source, library)
     return [] if report.passed else [str(finding) for finding in report.findings]

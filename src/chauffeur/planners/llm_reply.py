@@ -44,7 +44,7 @@ def read_reply(text: str, *, cut: bool = False) -> Reply:
         text: The reply as it came.
         cut: Whether it ended at a token or length limit instead of by the model's own will.
     """
-    visible = _without_thinking(text[:MAX_REPLY_CHARS])[:_ANSWER_CHARS]
+    visible = without_thinking(text[:MAX_REPLY_CHARS])[:_ANSWER_CHARS]
     prose, complete = _split_fences(visible)
     refusal = _REFUSE.search(prose)
     if refusal:
@@ -67,7 +67,7 @@ def _tidy(prose: str) -> str:
     return _LABEL.sub("", prose).strip()[:_THOUGHTS_CHARS]
 
 
-def _without_thinking(text: str) -> str:
+def without_thinking(text: str) -> str:
     """The answer proper of models that write their reasoning in front of it, drafts of programs included."""
     end = text.rfind(_THINK_END)
     if end >= 0:

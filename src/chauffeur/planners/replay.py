@@ -62,7 +62,7 @@ def _policy(value: Mapping[str, Any] | None) -> Policy | None:
     fields = dict(value)
     kind = fields.pop("kind", "program")
     if kind == "program":
-        return Program(str(fields["source"]))
+        return Program(str(fields["source"]), library=str(fields.get("library", "")))
     if kind == "parameters":
         return Parameters(**fields)
     if kind == "action_matrix":

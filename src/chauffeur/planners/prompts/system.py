@@ -62,15 +62,17 @@ _STEPS = {
 
 
 @cache
-def _template(name: str) -> str:
+def template(name: str) -> str:
+    """A template's text, without its last line end."""
     return resources.files(__package__ or "").joinpath("templates", name).read_text(encoding="utf-8").rstrip("\n")
 
 
-def _fill(template: str, values: dict[str, str]) -> str:
+def fill(text: str, values: dict[str, str]) -> str:
+    """A template with its `{names}` replaced."""
     # Plain replacement: programs and documentation hold braces that str.format would trip over.
     for name, value in values.items():
-        template = template.replace("{" + name + "}", value)
-    return template
+        text = text.replace("{" + name + "}", value)
+    return text
 
 
 def describe_limits(limits: Limits) -> str:
@@ -91,7 +93,7 @@ def _exemplars(limits: Limits, chain_of_thought: bool) -> str:
         "headway": f"{max(limits.min_time_headway_s, _CLOSE_HEADWAY_S):g}",
         "over": f"{min(limits.max_over_limit_mps, _OVER_LIMIT_MPS):g}",
     }
-    return _fill(_template("exemplars.md"), {**(_STEPS if chain_of_thought else _PLAIN), **numbers})
+    return fill(template("exemplars.md"), {**(_STEPS if chain_of_thought else _PLAIN), **numbers})
 
 
 def build_system_message(
@@ -114,11 +116,11 @@ def build_system_message(
 
         api_docs = render_docs()
     bounds = limits or Limits()
-    text = _fill(
-        _template("rules.md"),
+    text = fill(
+        template("rules.md"),
         {
             "limits": describe_limits(bounds),
-            "answer": _template("answer_steps.md" if chain_of_thought else "answer_plain.md"),
+            "answer": template("answer_steps.md" if chain_of_thought else "answer_plain.md"),
             "api": api_docs.strip(),
         },
     )

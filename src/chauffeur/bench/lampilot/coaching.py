@@ -1,0 +1,418 @@
+"""Learning from a critic (seed Sec. IV-A, the human-feedback rows of Tab. IV).
+
+For each item: the model writes a program, it is checked and driven, and a critic says how it was. Words of critique go
+back to the model, with the last program, the command, the situation, and the programs of the repository that are
+nearest to command and critique. When the critic is content, the model describes the program, and it joins the
+repository, where the next items find it. Every attempt is on disk before the next begins.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import TypeAdapter
+
+from chauffeur.bench.lampilot.critic import Attempt, Critic, Judgement
+from chauffeur.bench.lampilot.description import FALLBACK_WORDS, usable_description
+from chauffeur.bench.lampilot.policy_aid import offer
+from chauffeur.bench.lampilot.understood import referee_for
+from chauffeur.bench.store import Row, RowStore, StorageError, sole_writer
+from chauffeur.concept import (
+    ChauffeurError,
+    DataError,
+    Instruction,
+    Limits,
+    Plan,
+    PlannerError,
+    PlanRequest,
+    Program,
+    ProgramError,
+    Round,
+    SandboxError,
+    Usage,
+)
+from chauffeur.describe import describe
+from chauffeur.drive.recording import RecordedTrip
+from chauffeur.drive.session import declined, drive_program, make_trip, make_world, scenario_hash
+from chauffeur.memory.policies import CRITIC_LABELS, PolicyRepository
+from chauffeur.memory.policies_entry import Describer, PolicyEntry, content_id, fitting_name
+from chauffeur.planners.base import Planner, Writer
+from chauffeur.planners.prompts import COACHED_PROMPT_VERSION, description_messages
+from chauffeur.planners.prompts.blocks import FEEDBACK_CHARS
+from chauffeur.programs.library import function_names, main_name, standalone
+from chauffeur.safety import run_checks
+from chauffeur.worlds.highway.dblv1 import Dataset, Item
+
+COACHING_VERSION = "lampilot-coaching-v1"
+
+DEMO_ITEMS = (
+    "dec_abs_dis25_s1_c0", "dec_abs_speed10_s0_c0", "dec_rel_dis15_s1_c0", "dec_rel_speed6_s0_c0", "go_straight_s1_c0",
+    "left_lc_s0_c0", "right_lc_s0_c0", "left_overtake_s0_c0", "right_overtake_s0_c0", "turn_left_s1_c0",
+    "turn_right_s1_c0", "pull_over_s0_c5",
+)  # fmt: skip
+"""The twelve items that LaMPilot's own human-feedback rows were coached on. They are also among the items scored."""
+
+MAX_EPISODE_S = 1000.0
+"""LaMPilot's own bound; each road ends its episodes earlier."""
+
+_CRITIQUES = 10
+"""Critiques kept with a program; the last ones, which brought it about."""
+
+_plan_adapter: TypeAdapter[Plan] = TypeAdapter(Plan)
+
+Ending = Literal["kept", "not_kept", "skipped", "given_up", "failed"]
+"""How an item ended: `given_up` after all rounds, `failed` for want of a plan or a sample."""
+
+Tell = Callable[[str, Any], None]
+"""Called with (`item`, Item), (`asking`, round), (`attempt`, Attempt), (`judged`, Judgement), (`ended`, Coached)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Coached:
+    """What coaching on one item came to.
+
+    Attributes:
+        item: Its id.
+        ending: How it ended.
+        rounds: Attempts made, earlier sessions included.
+        kept: Name of the program in the repository; empty without one.
+        detail: Why not, in words.
+        before: Whether it was done before this session.
+    """
+
+    item: str
+    ending: Ending
+    rounds: int
+    kept: str = ""
+    detail: str = ""
+    before: bool = False
+
+
+def items_named(dataset: Dataset, ids: Sequence[str]) -> tuple[Item, ...]:
+    """Items by id, in the order given. Raises DataError naming those that the data does not hold."""
+    known = {item.id: item for item in dataset.items()}
+    missing = [one for one in ids if one not in known]
+    if missing:
+        raise DataError(
+            f"The data in {dataset.path} holds no item {', '.join(missing[:5])}.",
+            hint="Items are called <task>_s<sample>_c<command>, e.g. left_lc_s0_c0.",
+        )
+    return tuple(known[one] for one in ids)
+
+
+def _silent(event: str, value: Any) -> None:
+    del event, value
+
+
+def _utc_now() -> datetime:
+    return datetime.now(UTC)
+
+
+@dataclass(slots=True)
+class Coach:
+    """One coaching of a model.
+
+    Attributes:
+        folder: Where its attempts are kept; the same folder goes on where it stopped.
+        planner: The model.
+        repository: Where programs go.
+        critic: Who judges.
+        limits: Bounds for the checks.
+        rounds: Attempts at most for each item.
+        tell: Is told of everything as it happens.
+        now: Clock of the entries.
+    """
+
+    folder: Path
+    planner: Planner
+    repository: PolicyRepository
+    critic: Critic
+    limits: Limits
+    rounds: int = 5
+    tell: Tell = _silent
+    now: Callable[[], datetime] = _utc_now
+    _log: RowStore = field(init=False)
+
+    def coach(self, items: Sequence[Item]) -> tuple[Coached, ...]:
+        """Go through the items, one after the other, until the critic stops or all are done.
+
+        An interrupt (KeyboardInterrupt) leaves what is finished on disk, the attempt that waits for its judgement
+        included.
+
+        Raises:
+            ChauffeurError: The folder or the repository cannot be written.
+        """
+        done: list[Coached] = []
+        store = RowStore(self.folder / "coaching.jsonl", "key")
+        # One event loop for all calls, so that connections are kept; between them nothing of asyncio is in the way of
+        # a person's Ctrl-C.
+        with sole_writer(self.folder), store as self._log, asyncio.Runner() as runner:
+            try:
+                for item in items:
+                    ended = self._ended(item)
+                    if ended is None:
+                        self.tell("item", item)
+                        ended = self._item(item, runner)
+                    if ended is None:
+                        break
+                    self.tell("ended", ended)
+                    done.append(ended)
+            finally:
+                runner.run(_close(self.planner))
+        return tuple(done)
+
+    def _item(self, item: Item, runner: asyncio.Runner) -> Coached | None:
+        """Coach on one item; None when the critic wants to stop."""
+        earlier: list[Round] = []
+        critiques: list[str] = []
+        for number in range(1, self.rounds + 1):
+            row = self._log.rows.get(self._key(item, number))
+            if row is not None and row["judgement"] == "critique":
+                earlier.append(Round(row["program"], row["feedback"]))
+                critiques.append(row["words"])
+                continue
+            try:
+                attempt = self._attempt(item, number, earlier, critiques, row, runner)
+            except StorageError:
+                raise
+            except ChauffeurError as error:  # no plan to be had, or the sample cannot be set up: tried again next time
+                return Coached(item.id, "failed", number - 1, detail=str(error))
+            self.tell("attempt", attempt)
+            judgement = self.critic.judge(attempt)
+            self.tell("judged", judgement)
+            match judgement.kind:
+                case "stop":
+                    return None
+                case "skip":
+                    self._judged(item, number, judgement)
+                    return self._close(item, number, "skipped", detail=judgement.words)
+                case "keep":
+                    return self._keep(attempt, critiques, judgement, runner)
+                case "critique":
+                    program, feedback = _program_text(attempt), self._feedback(attempt, judgement)
+                    self._judged(item, number, judgement, program=program, feedback=feedback)
+                    earlier.append(Round(program, feedback))
+                    critiques.append(judgement.words)
+        return self._close(item, self.rounds, "given_up", detail=critiques[-1] if critiques else "")
+
+    def _attempt(
+        self,
+        item: Item,
+        number: int,
+        earlier: Sequence[Round],
+        critiques: Sequence[str],
+        pending: Row | None,
+        runner: asyncio.Runner,
+    ) -> Attempt:
+        """Ask for a program and drive it; a program that only waits for its judgement is driven again, not asked for.
+
+        Raises:
+            PlannerError: There is no plan to be had.
+            ChauffeurError: The sample cannot be set up, or the sandbox is gone.
+        """
+        world = make_world(item.scenario)
+        snapshot = world.reset(item.scenario)
+        context = describe(snapshot)
+        critique = critiques[-1] if critiques else ""
+        used = self._used(item, number - 1)
+        system, entries = offer(self.repository, item.command, snapshot.kind, self.limits, critique=critique, also=used)
+        request = PlanRequest(
+            Instruction(item.command, source="benchmark"), context, system, rounds=tuple(earlier), limits=self.limits
+        )
+        if pending is None:
+            self.tell("asking", number)
+            plan = runner.run(self.planner.plan(request))
+            names = [entry.callable_name for entry in entries]
+            self._log.append(self._row(item, number) | {"plan": asdict(plan), "offered": names, "judgement": ""})
+        else:
+            plan, names = _plan_adapter.validate_python(pending["plan"]), pending["offered"]
+        verdicts = run_checks(plan, snapshot, self.limits)
+        refusal = declined(plan, verdicts)
+        if not refusal and not isinstance(plan.policy, Program):
+            refusal = "The planner gave no program."
+        episode = None
+        if not refusal:
+            assert isinstance(plan.policy, Program)
+            referee = referee_for(world, item.scenario, plan)
+            episode = drive_program(world, plan.policy.source, referee, MAX_EPISODE_S, library=plan.policy.library)
+            if episode.causes.infra_failed:  # says nothing about the program, so nobody judges it
+                raise SandboxError(episode.causes.detail)
+        trip = make_trip(request, plan, verdicts, item.scenario, item.scenario.seed, episode, refusal)
+        recorded = RecordedTrip(
+            trip,
+            () if episode is None else episode.frames,
+            item.scenario,
+            system if pending is None else None,  # what is offered now need not be what was offered then
+            None if episode is None else episode.final,
+        )
+        success = episode is not None and episode.success and episode.outcome == "success"
+        return Attempt(item, number, recorded, success, tuple(names))
+
+    def _used(self, item: Item, number: int) -> tuple[str, ...]:
+        """Names of the repository's programs that an earlier attempt called; its successor may go on calling them."""
+        policy = (self._log.rows.get(self._key(item, number), {}).get("plan") or {}).get("policy") or {}
+        return function_names(policy.get("library", ""))
+
+    def _feedback(self, attempt: Attempt, judgement: Judgement) -> str:
+        if self.critic.judge_id == "evaluator":
+            return f"The evaluator (a program, not a person) says: {judgement.words}"
+        if judgement.by_checks:
+            return judgement.words
+        causes = attempt.recorded.trip.causes
+        failed = f"The program failed while it ran: {causes.detail}\n" if causes.policy_failed else ""
+        return f"{failed}The passenger says: {judgement.words}"
+
+    def _keep(
+        self, attempt: Attempt, critiques: Sequence[str], judgement: Judgement, runner: asyncio.Runner
+    ) -> Coached:
+        item, number = attempt.item, attempt.number
+        try:
+            draft, usage = self._entry(attempt, critiques, runner)
+            entry = self.repository.commit(draft)
+        except ProgramError as error:
+            # The drive was good; that its program cannot be offered to others is no reason to ask for another one.
+            self._judged(item, number, judgement)
+            return self._close(item, number, "not_kept", detail=str(error))
+        self._judged(item, number, judgement, policy=entry.id, description_usage=asdict(usage))
+        return self._close(item, number, "kept", kept=entry.callable_name)
+
+    def _entry(self, attempt: Attempt, critiques: Sequence[str], runner: asyncio.Runner) -> tuple[PolicyEntry, Usage]:
+        """The attempt as an entry, and what its description cost.
+
+        Raises:
+            ProgramError: Its program cannot stand by itself.
+        """
+        trip, item = attempt.recorded.trip, attempt.item
+        policy = trip.plan.policy
+        assert isinstance(policy, Program)
+        name = fitting_name(main_name(policy.source))
+        source = standalone(policy.source, name, policy.library)
+        description, by, usage = self._description(item.command, trip.context.text, source, runner)
+        metrics = tuple((m.id, m.value) for m in trip.metrics if m.applies and math.isfinite(m.value))
+        judge = self.critic.judge_id
+        entry = PolicyEntry(
+            id=content_id(
+                source, item.command, trip.context.text, item.scenario.id, judge, trip.plan.planner, trip.plan.model
+            ),
+            name=name,
+            version=1,
+            description=description,
+            described_by=by,
+            source=source,
+            command=item.command,
+            context=trip.context.text,
+            world=trip.context.situation.world,
+            scenario=item.scenario.id,
+            item=item.id,
+            outcome=trip.outcome,
+            metrics=metrics,
+            judged_by=judge,
+            critiques=tuple(words[:FEEDBACK_CHARS] for words in critiques[-_CRITIQUES:]),
+            planner=trip.plan.planner,
+            model=trip.plan.model,
+            learned=self.now().isoformat(timespec="seconds"),
+            chauffeur=version("chauffeur"),
+        )
+        return entry, usage
+
+    def _description(
+        self, command: str, context: str, source: str, runner: asyncio.Runner
+    ) -> tuple[str, Describer, Usage]:
+        """Description, who wrote it, and what that cost."""
+        usage = Usage()
+        if isinstance(self.planner, Writer):
+            try:
+                prose = runner.run(self.planner.write(description_messages(command, context, source)))
+            except PlannerError:
+                prose = None
+            if prose is not None:
+                usage = prose.usage
+                words = usable_description(prose.text) if prose.whole else ""
+                if words:
+                    return words, "model", usage
+        return FALLBACK_WORDS.format(command=command[:400]), "fallback", usage
+
+    # What is on disk -------------------------------------------------------------------------------------------
+
+    @property
+    def _session(self) -> str:
+        """What decides a coaching; another model, critic, limit or repository begins anew."""
+        parts = [
+            COACHING_VERSION,
+            COACHED_PROMPT_VERSION,
+            self.planner.id,
+            self.planner.model,
+            self.critic.judge_id,
+            asdict(self.limits),
+            str(self.repository.folder.resolve()),
+        ]
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
+
+    def _key(self, item: Item, number: int | str) -> str:
+        return f"{self._session}/{scenario_hash(item.scenario)[:12]}/{item.id}/{number}"
+
+    def _row(self, item: Item, number: int | str) -> Row:
+        return {
+            "key": self._key(item, number),
+            "item": item.id,
+            "round": number,
+            "command": item.command,
+            "planner": self.planner.id,
+            "model": self.planner.model,
+            "critic": self.critic.judge_id,
+            "labels": [CRITIC_LABELS[self.critic.judge_id]],
+        }
+
+    def _judged(self, item: Item, number: int, judgement: Judgement, **more: Any) -> None:
+        row = self._log.rows[self._key(item, number)]
+        self._log.append(row | {"judgement": judgement.kind, "words": judgement.words, **more})
+
+    def _close(self, item: Item, rounds: int, ending: Ending, *, kept: str = "", detail: str = "") -> Coached:
+        ended = Coached(item.id, ending, rounds, kept, detail)
+        self._log.append(self._row(item, "end") | {"ended": asdict(ended), "limit": self.rounds})
+        return ended
+
+    def _ended(self, item: Item) -> Coached | None:
+        """How an item ended in an earlier session; None when it did not, or may go on with more rounds."""
+        row = self._log.rows.get(self._key(item, "end"))
+        if row is None:
+            return None
+        ended = Coached(**row["ended"] | {"before": True})
+        return None if ended.ending == "given_up" and ended.rounds < self.rounds else ended
+
+
+def _program_text(attempt: Attempt) -> str:
+    """P for the next round's eyes: the program, or the model's words where there was none."""
+    plan = attempt.recorded.trip.plan
+    return plan.policy.source if isinstance(plan.policy, Program) else plan.raw or plan.refusal or "(nothing)"
+
+
+async def _close(planner: Planner) -> None:
+    close = getattr(planner, "close", None)
+    if close is not None:
+        await close()
+
+
+def spent(rows: Iterable[Row]) -> Usage:
+    """What the plans and descriptions in a coaching's rows cost."""
+    usages = [
+        usage for row in rows if row.get("plan") for usage in (row["plan"]["usage"], row.get("description_usage"))
+    ]
+    usages = [usage for usage in usages if usage and not usage["cached"]]
+    prices = [usage["cost_usd"] for usage in usages]
+    known = [price for price in prices if price is not None]
+    return Usage(
+        prompt_tokens=sum(usage["prompt_tokens"] for usage in usages),
+        completion_tokens=sum(usage["completion_tokens"] for usage in usages),
+        cost_usd=math.fsum(known) if known and len(known) == len(prices) else None,
+        requests=sum(usage["requests"] for usage in usages),
+    )
