@@ -6,12 +6,26 @@ import json
 from pathlib import Path
 
 import pytest
+from small_run import Inline
 
+from chauffeur.bench.calls import Patience
 from chauffeur.bench.lampilot.report import comparison_lines, family_lines, markdown, summarise
-from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig, choose_items
-from chauffeur.bench.store import RowStore
-from chauffeur.concept import ConfigError, DataError, Plan, PlannerError, PlanRequest, Program, Thoughts
-from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
+from chauffeur.bench.lampilot.runner import Effort, LampilotRun, RunConfig, choose_items
+from chauffeur.bench.standing import Standing
+from chauffeur.concept import (
+    ConfigError,
+    Context,
+    DataError,
+    Instruction,
+    Plan,
+    PlannerError,
+    PlanRequest,
+    Program,
+    Round,
+    SystemMessage,
+    Thoughts,
+)
+from chauffeur.worlds.highway.dblv1 import Dataset, Item, load_dataset
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
 LEFT = """
@@ -61,13 +75,16 @@ def dataset(tmp_path: Path) -> Dataset:
     return load_dataset(folder)
 
 
-def _quiet(stage: str, done: int, total: int) -> None:
+def _quiet(standing: Standing) -> None:
     pass
+
+
+EFFORT = Effort(engine=Inline, patience=Patience(attempts=2, base_s=0.01))
 
 
 def _run(tmp_path: Path, dataset: Dataset, planner: ScriptedPlanner) -> list[dict[str, object]]:
     config = RunConfig("scripted", "few-shot", dataset.sha256, 0, 42)
-    return LampilotRun(tmp_path / "run", dataset, config, planner).run(1, _quiet)
+    return LampilotRun(tmp_path / "run", dataset, config, planner).run(_quiet, EFFORT)
 
 
 @pytest.mark.slow
@@ -92,7 +109,7 @@ def test_outcomes_and_causes_are_apart_and_the_denominator_is_fixed(tmp_path: Pa
     asked = planner.asked
     again = _run(tmp_path, dataset, planner)
     assert {r["item"]: r for r in again} == rows
-    assert planner.asked == asked + 1
+    assert planner.asked == asked + EFFORT.patience.attempts
     assert "lane change" in markdown(*family_lines(again))
     assert "paper: Human driver" in markdown(*comparison_lines("scripted", again))
 
@@ -105,31 +122,39 @@ def test_a_run_folder_keeps_its_configuration(tmp_path: Path, dataset: Dataset) 
         LampilotRun(tmp_path / "other", dataset, RunConfig("magic", "few-shot", dataset.sha256, 0, 42), None)
 
 
+@pytest.mark.slow
+def test_labels_stand_in_every_row_and_the_request_can_be_replaced(tmp_path: Path, dataset: Dataset) -> None:
+    class Coached:
+        """What a learning loop asks instead of the plain wish."""
+
+        async def request(self, item: Item, context: Context) -> PlanRequest:
+            rounds = (Round("def before(): ...", "Too slow."),)
+            return PlanRequest(Instruction("go left"), context, SystemMessage("S"), rounds=rounds)
+
+    class Labelled(ScriptedPlanner):
+        labels = ("critic: evaluator",)
+
+        async def plan(self, request: PlanRequest) -> Plan:
+            assert request.rounds[0].feedback == "Too slow."
+            return await super().plan(request)
+
+    config = RunConfig("scripted", "few-shot", dataset.sha256, 0, 42)
+    run = LampilotRun(tmp_path / "run", dataset, config, Labelled(), requests=Coached())
+    rows = run.run(_quiet, EFFORT)
+    assert {tuple(row["labels"]) for row in rows} == {("critic: evaluator",)}
+    assert sum(row["success"] for row in rows) == 5, "every command became the same wish; one sample is broken"
+    assert "critic: evaluator" in (run.folder / "table.md").read_text()
+    assert json.loads((run.folder / "provenance.json").read_text())["labels"] == ["critic: evaluator"]
+    with pytest.raises(ConfigError, match="another configuration"):
+        LampilotRun(tmp_path / "run", dataset, config, ScriptedPlanner())
+
+
 def test_items_are_drawn_as_the_origin_draws_them(dataset: Dataset) -> None:
     items = dataset.items()
     assert [i.id for i in choose_items(dataset, 0, 42)] == [i.id for i in items]
     drawn = choose_items(dataset, 3, 42)
     assert [i.id for i in drawn] == [i.id for i in choose_items(dataset, 3, 42)]
     assert len({i.id for i in drawn}) == 3
-
-
-def test_store_survives_a_torn_last_line(tmp_path: Path) -> None:
-    path = tmp_path / "rows.jsonl"
-    with RowStore(path, "k") as store:
-        store.append({"k": "a", "v": 1})
-        store.append({"k": "b", "v": 2})
-    path.write_bytes(path.read_bytes()[:-5])
-    with RowStore(path, "k") as store:
-        assert set(store.rows) == {"a"}
-        store.append({"k": "b", "v": 3})
-    assert RowStore(path, "k").rows["b"]["v"] == 3
-
-
-def test_store_names_a_damaged_line(tmp_path: Path) -> None:
-    path = tmp_path / "rows.jsonl"
-    path.write_text('{"k": "a"}\nnot json\n{"k": "b"}\n')
-    with pytest.raises(DataError, match="line 2"):
-        RowStore(path, "k")
 
 
 @pytest.mark.parametrize(

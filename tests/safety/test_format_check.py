@@ -88,6 +88,19 @@ def test_the_language_s_own_gate_is_asked(snap: Snap, plan: Make) -> None:
     assert "fly" in verdict.reason
 
 
+def test_the_helper_functions_of_a_program_are_judged_with_it(snap: Snap, plan: Make) -> None:
+    main = "def main():\n    yield from helper()\n"
+    good = Program(main, library="def helper():\n    set_target_speed(25)\n    yield autopilot()\n")
+    assert judge(plan(good), snap()).passed
+    assert all(verdict.passed for verdict in run_checks(plan(good), snap(), LIMITS))
+    assert "helper" in judge(plan(Program(main)), snap()).reason
+    bad = judge(plan(Program(main, library="def helper():\n    import os\n    yield\n")), snap())
+    assert (bad.passed, bad.line) == (False, None) and "of the library" in bad.reason
+    fast = Program(main, library=good.library.replace("25", "60"))
+    verdict = check_parameters(plan(fast), snap(), LIMITS)
+    assert (verdict.passed, verdict.line) == (False, None) and "(In a helper function.)" in verdict.reason
+
+
 def test_a_program_too_long_to_be_read_is_refused_here(snap: Snap, plan: Make) -> None:
     from chauffeur.safety.reading import _MAX_CHARS
 

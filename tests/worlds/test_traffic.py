@@ -5,34 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from highway_env.road.lane import StraightLane
-from highway_env.road.regulation import RegulatedRoad
-from highway_env.road.road import Road, RoadNetwork
-from highway_env.vehicle.dynamics import BicycleVehicle
 
 from chauffeur.concept import Command, Scenario
-from chauffeur.worlds.highway import roads
 from chauffeur.worlds.highway.reference import ReferenceWorld
+from chauffeur.worlds.highway.reference.plain import plain_highway_env
 from chauffeur.worlds.highway.scenarios import BUILT_IN
-
-
-class _PlainNetwork(RoadNetwork):
-    def freeze(self) -> None:
-        pass
-
-
-class _PlainRoad(Road):
-    def forget_instant(self) -> None:
-        pass
-
-
-class _PlainRegulatedRoad(RegulatedRoad):
-    def forget_instant(self) -> None:
-        pass
-
-
-class _PlainDynamicEgo(BicycleVehicle):
-    MAX_SPEED = 15.0
+from chauffeur.worlds.highway.traffic import FastRegulatedRoad
 
 
 def _trace(scenario: Scenario, steps: int) -> list[Any]:
@@ -51,17 +29,21 @@ def _trace(scenario: Scenario, steps: int) -> list[Any]:
 @pytest.mark.parametrize(
     "scenario", [s for s in BUILT_IN if s.id in ("following", "emergency-lane", "intersection")], ids=lambda s: s.id
 )
-def test_same_as_plain_highway_env(scenario: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_same_as_plain_highway_env(scenario: Scenario) -> None:
     quick = _trace(scenario, 80)
-    for name, plain in {
-        "AxisLane": StraightLane,
-        "FastNetwork": _PlainNetwork,
-        "FastRoad": _PlainRoad,
-        "FastRegulatedRoad": _PlainRegulatedRoad,
-        "DynamicEgo": _PlainDynamicEgo,
-    }.items():
-        monkeypatch.setattr(roads, name, plain)
-    assert _trace(scenario, 80) == quick
+    with plain_highway_env(record_history=True):
+        assert _trace(scenario, 80) == quick
+
+
+def test_the_quicker_classes_come_back() -> None:
+    scenario = next(s for s in BUILT_IN if s.id == "intersection")
+    world = ReferenceWorld()
+    with pytest.raises(RuntimeError), plain_highway_env():
+        world.reset(scenario)
+        assert not isinstance(world.scene.road, FastRegulatedRoad)
+        raise RuntimeError
+    world.reset(scenario)
+    assert isinstance(world.scene.road, FastRegulatedRoad)
 
 
 def test_crash_is_felt_and_ends_the_trip() -> None:

@@ -1,68 +1,165 @@
-"""Append-only rows on disk: what every stage of a benchmark writes and every resume reads."""
+"""Append-only rows on disk: what every stage of a benchmark writes and every resume reads.
+
+A row is one line of JSON that ends in a checksum of itself. What a crash, a full disk or a bad sector left behind is
+therefore seen: a damaged line is set aside, and what it was about is done again.
+"""
 
 from __future__ import annotations
 
 import json
+import os
+import queue
+import re
+import threading
+import zlib
+from collections.abc import Callable, Generator, Iterable
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from chauffeur.concept import DataError
+from chauffeur.concept import ChauffeurError, ConfigError
+from chauffeur.drive.files import publish
 
 Row = dict[str, Any]
 
+_SEAL = re.compile(rb',"crc32":"([0-9a-f]{8})"\}$')
+
+
+class StorageError(ChauffeurError):
+    """The disk did not take a row."""
+
+
+def seal(row: Row) -> bytes:
+    """A row as its line: compact JSON whose last field is the checksum of what stands before it.
+
+    Raises:
+        TypeError, ValueError: The row holds something that is no JSON.
+    """
+    # Lone surrogates, which a foreign planner may hand on, go through to the file and come back.
+    body = json.dumps(row, ensure_ascii=False, separators=(",", ":")).encode("utf-8", "surrogatepass")
+    return body[:-1] + b',"crc32":"%08x"}\n' % zlib.crc32(body)
+
+
+def unseal(line: bytes) -> Row:
+    """The row of a line. A line without a checksum, e.g. written by hand, is taken at its word.
+
+    Raises:
+        ValueError: The line is damaged.
+    """
+    found = _SEAL.search(line)
+    body = line if found is None else line[: found.start()] + b"}"
+    if found is not None and zlib.crc32(body) != int(found[1], 16):
+        raise ValueError("its checksum differs")
+    row = json.loads(body)
+    if not isinstance(row, dict):
+        raise TypeError("it is no object")
+    return row
+
 
 class RowStore:
-    """JSON lines keyed by one field; the last row of a key wins.
+    """Rows keyed by one field; the last row of a key wins. One process at a time may append.
 
-    A line cut off by a crash (only the last can be) is dropped when the file is opened, so a resume starts clean.
+    Reading changes nothing on disk. What is damaged is put right when the first row is appended.
+
+    Attributes:
+        path: The file.
+        rows: Present rows by key.
+        damaged: Numbers, from 1, of lines that cannot be read, the torn end of a crash not among them.
     """
 
     def __init__(self, path: Path, key: str) -> None:
+        """Read a store; an absent file is an empty one. Raises StorageError when it cannot be read."""
         self.path = path
-        self._key = key
         self.rows: dict[str, Row] = {}
+        self.damaged: list[int] = []
+        self._key = key
+        self._descriptor: int | None = None
+        self._size = 0
+        self._good: list[bytes] = []
+        self._bad: list[bytes] = []
+        self._torn = b""
         self._load()
-        self._stream = None
 
     def _load(self) -> None:
-        if not self.path.exists():
+        try:
+            content = self.path.read_bytes()
+        except FileNotFoundError:
             return
-        good = 0
-        content = self.path.read_bytes()
-        for number, line in enumerate(content.splitlines(keepends=True), start=1):
+        except OSError as error:
+            raise StorageError(f"Cannot read {self.path}: {error.strerror or error}.") from error
+        *lines, self._torn = content.split(b"\n")
+        good: list[bytes] = []
+        for number, line in enumerate(lines, start=1):
             try:
-                row: Row = json.loads(line)
-                key = str(row[self._key])
-            except (ValueError, KeyError, TypeError) as error:
-                if good + len(line) == len(content):
-                    break
-                raise DataError(
-                    f"{self.path}, line {number}, is not a row of this run.",
-                    hint="Delete that line (its item is then done again) or start in a new folder.",
-                ) from error
-            if not line.endswith(b"\n"):
-                break
-            good += len(line)
-            self.rows[key] = row
-        if good < len(content):
-            with self.path.open("r+b") as stream:
-                stream.truncate(good)
+                row = unseal(line)
+                self.rows[str(row[self._key])] = row
+                good.append(line)
+            except (ValueError, KeyError, TypeError, RecursionError):
+                self.damaged.append(number)
+                self._bad.append(line)
+        # Kept only where the file has to be written anew.
+        self._good = good if self._bad or self._torn else []
 
-    def append(self, row: Row) -> None:
-        """Write a row through to the file before returning."""
-        if self._stream is None:
+    def append(self, *rows: Row) -> None:
+        """Write rows through to the disk before returning: all of them or none.
+
+        Raises:
+            StorageError: The disk did not take them; the file is as it was.
+        """
+        self.write(b"".join(seal(row) for row in rows))
+        self.keep(*rows)
+
+    def keep(self, *rows: Row) -> None:
+        """Take rows that are, or are being, written."""
+        for row in rows:
+            self.rows[str(row[self._key])] = row
+
+    def write(self, lines: bytes) -> None:
+        """Append sealed lines. Raises StorageError as `append` does."""
+        try:
+            descriptor = self._open()
+        except OSError as error:
+            raise self._full(error) from error
+        try:
+            view = memoryview(lines)
+            while view:
+                view = view[os.write(descriptor, view) :]
+            os.fsync(descriptor)
+        except OSError as error:
+            with suppress(OSError):  # the part that was written must not be the start of the next line
+                os.ftruncate(descriptor, self._size)
+            raise self._full(error) from error
+        self._size += len(lines)
+
+    def _full(self, error: OSError) -> StorageError:
+        return StorageError(
+            f"Cannot write to {self.path}: {error.strerror or error}.",
+            hint="Make room on the disk and run the same command: it goes on where it stopped.",
+        )
+
+    def _open(self) -> int:
+        if self._descriptor is None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._stream = self.path.open("a", encoding="utf-8")
-        self._stream.write(json.dumps(row, ensure_ascii=False, separators=(",", ":")) + "\n")
-        self._stream.flush()
-        self.rows[str(row[self._key])] = row
+            self._mend()
+            self._descriptor = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
+            self._size = os.fstat(self._descriptor).st_size
+        return self._descriptor
+
+    def _mend(self) -> None:
+        if self._bad:
+            aside = self.path.with_name(f"{self.path.name}.damaged")
+            with aside.open("ab") as stream:
+                stream.write(b"\n".join(self._bad) + b"\n")
+        if self._bad or self._torn:
+            publish(self.path, b"".join(line + b"\n" for line in self._good), "mended rows")
+        self._good, self._bad, self._torn = [], [], b""
 
     def close(self) -> None:
         """Close the file; the rows stay readable."""
-        if self._stream is not None:
-            self._stream.close()
-            self._stream = None
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
 
     def __enter__(self) -> Self:
         return self
@@ -71,3 +168,91 @@ class RowStore:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+class Scribe:
+    """Writes rows of any store from a thread of its own, so that nobody waits for the disk; everything that has come
+    in meanwhile goes down in one write.
+
+    Args:
+        failed: Called from that thread, once, when the disk does not take a row. What comes later is not written.
+    """
+
+    def __init__(self, failed: Callable[[ChauffeurError], None]) -> None:
+        self._failed = failed
+        self._queue: queue.SimpleQueue[tuple[RowStore, bytes] | None] = queue.SimpleQueue()
+        self._error: ChauffeurError | None = None
+        self._thread = threading.Thread(target=self._work, name="chauffeur-scribe", daemon=True)
+        self._thread.start()
+
+    def write(self, store: RowStore, row: Row) -> None:
+        """Have a row written; the store shows it at once.
+
+        Raises:
+            TypeError, ValueError: The row holds something that is no JSON.
+        """
+        line = seal(row)
+        store.keep(row)
+        self._queue.put((store, line))
+
+    def close(self) -> None:
+        """Wait until all is written. Raises StorageError when the disk did not take it all."""
+        self._queue.put(None)
+        self._thread.join()
+        if self._error is not None:
+            raise self._error
+
+    def _work(self) -> None:
+        last = False
+        while not last:
+            waiting = [self._queue.get()]
+            with suppress(queue.Empty):
+                while True:
+                    waiting.append(self._queue.get_nowait())
+            last = None in waiting
+            if self._error is None:
+                self._write([entry for entry in waiting if entry is not None])
+
+    def _write(self, entries: Iterable[tuple[RowStore, bytes]]) -> None:
+        lines: dict[RowStore, list[bytes]] = {}
+        for store, line in entries:
+            lines.setdefault(store, []).append(line)
+        try:
+            for store, group in lines.items():
+                store.write(b"".join(group))
+        except ChauffeurError as error:
+            self._error = error
+            self._failed(error)
+
+
+@contextmanager
+def sole_writer(folder: Path) -> Generator[None]:
+    """Keep other processes from working in a run folder meanwhile. A process that dies gives it free.
+
+    Raises:
+        ConfigError: Another process works in it.
+        StorageError: The folder cannot be used.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows has no such lock; there the person has to see to it
+        yield
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise StorageError(f"Cannot use the run folder {folder}: {error.strerror or error}.") from error
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise ConfigError(
+                f"Another process is working in {folder}.", hint="Wait for it, or choose another --out folder."
+            ) from error
+        except OSError:  # file systems without locks
+            yield
+            return
+        yield
+    finally:
+        os.close(descriptor)

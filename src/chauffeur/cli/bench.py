@@ -1,20 +1,26 @@
-"""`chauffeur bench lampilot`: a planner on every item of a DbLv1 folder."""
+"""`chauffeur bench lampilot`: a planner on every item of a DbLv1 folder; `merge` puts shards of a run together."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from chauffeur.concept import LAMPILOT_LIMITS
+from chauffeur.concept import LAMPILOT_LIMITS, ConfigError
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress, TaskID
+
+    from chauffeur.bench.lampilot.runner import Effort, LampilotRun
+    from chauffeur.bench.store import Row
+    from chauffeur.planners.base import Planner
+
+UNFINISHED: Final = 3
+"""Exit code of a run that stopped at its budget: the same command with a larger one goes on."""
 
 bench_app = typer.Typer(
     no_args_is_help=True,
@@ -27,12 +33,36 @@ Examples:
 
     chauffeur bench lampilot --data DbLv1 --planner onboard
 
-    chauffeur bench lampilot --data DbLv1 --planner idm --out runs/idm
+    chauffeur bench lampilot --data DbLv1 --planner idm --metrics paper --out runs/idm
 
-    chauffeur bench lampilot --data DbLv1 --planner openai/gpt-4o --setting zero-shot --items 98
+    chauffeur bench lampilot --data DbLv1 --planner openai/gpt-4o --setting zero-shot --concurrency 64 --max-usd 5
+
+    chauffeur bench lampilot --data DbLv1 --planner onboard --out runs/big --shard 3/8
 
 The data set is LaMPilot's own (`DbLv1` in its public repository). Ctrl-C keeps what is done; the same command goes on.
+
+Exit codes: 0 done, 1 the endpoint or this machine gave up, 2 bad input, 3 the budget is used up, 130 Ctrl-C. Whatever
+the code, what was asked and driven is kept.
 """
+
+MERGE_EXAMPLES = """
+Examples:
+
+    chauffeur bench merge runs/big runs/big/shard-*
+
+    chauffeur bench merge runs/idm-paper runs/idm --metrics paper
+
+Points are computed anew from what was stored of every drive; nothing is asked or driven.
+"""
+
+_NAME: Final = 30
+"""Longest planner name that leaves a table its columns; of a longer one the end is shown."""
+
+_HOW = "Pace and budget (change no row)"
+_WHERE = "Where it runs (changes no row)"
+MetricsOption = Annotated[
+    str, typer.Option("--metrics", help="`origin` (LaMPilot's code) or `paper` (its equations as printed).")
+]
 
 
 @bench_app.callback()
@@ -45,58 +75,211 @@ def lampilot(
     data: Annotated[Path, typer.Option(help="Folder with LaMPilot's DbLv1 task files.")],
     planner: Annotated[
         str,
-        typer.Option(help="`onboard`, `keyword`, `openai/<model>`, `replay/<file>`, or the baselines `idm`, `mobil`."),
+        typer.Option(
+            help="`onboard`, `keyword`, `openai/<model>`, `replay/<file>`, or the baselines `idm`, `mobil`, `expert`."
+        ),
     ] = "onboard",
-    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/lampilot-<planner>.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/lampilot-PLANNER.")] = None,
     items: Annotated[int, typer.Option(min=0, help="How many items, drawn with --seed; 0 for all.")] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of that draw.")] = 42,
-    workers: Annotated[int | None, typer.Option(min=1, help="Simulation processes; default one per core.")] = None,
-    setting: Annotated[str, typer.Option(help="Prompt for language models: `few-shot` or `zero-shot`.")] = "few-shot",
+    setting: Annotated[
+        str, typer.Option(help="Prompt for language models: `few-shot`, `zero-shot` or `human-feedback`.")
+    ] = "few-shot",
+    repository: Annotated[Path | None, typer.Option(help="Policy repository, for --setting human-feedback.")] = None,
+    rehearse: Annotated[
+        int, typer.Option(min=0, help="Try this many variants of each program on copies of the scene first.")
+    ] = 0,
+    metrics: MetricsOption = "origin",
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
-    concurrency: Annotated[int, typer.Option(min=1, help="Planner calls in flight.")] = 8,
+    concurrency: Annotated[
+        int, typer.Option(min=1, help="Planner calls in flight at most; fewer while refused.", rich_help_panel=_HOW)
+    ] = 16,
+    max_usd: Annotated[
+        float | None, typer.Option(min=0.0, help="Budget of the run in USD.", rich_help_panel=_HOW)
+    ] = None,
+    max_requests: Annotated[
+        int | None, typer.Option(min=0, help="Budget of the run in requests to the endpoint.", rich_help_panel=_HOW)
+    ] = None,
+    price: Annotated[
+        str | None,
+        typer.Option(help="USD per million tokens, IN/OUT, where it is not known.", rich_help_panel=_HOW),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Simulation processes; default one per core.", rich_help_panel=_WHERE)
+    ] = None,
+    shard: Annotated[
+        str | None,
+        typer.Option(
+            help="Only part i of n: `3/8`, `auto` in a Slurm array, `auto/8` in an indexed job.", rich_help_panel=_WHERE
+        ),
+    ] = None,
+    ray: Annotated[
+        str | None,
+        typer.Option(
+            help="Simulate on a Ray cluster: `local`, `auto`, `ray://...` or host:port.", rich_help_panel=_WHERE
+        ),
+    ] = None,
 ) -> None:
     """LaMPilot-Bench (seed Tab. IV): completion, collisions and scores of a planner that follows instructions."""
-    import chauffeur
-    from chauffeur.bench.lampilot.report import comparison_lines, family_lines
-    from chauffeur.bench.lampilot.rollout import BASELINES
+    from chauffeur.bench.lampilot.policy_aid import HUMAN_FEEDBACK, aid_for
     from chauffeur.bench.lampilot.runner import RunConfig
+    from chauffeur.bench.shards import WHOLE, Shard
     from chauffeur.cli.console import stdout
-    from chauffeur.cli.parts import planner_named, setting_named
+    from chauffeur.cli.parts import setting_named
     from chauffeur.concept.registry import load_plugin
     from chauffeur.worlds.highway.dblv1 import load_dataset
 
     console = stdout()
-    prompt = setting_named(setting)
+    effort = _effort(workers, concurrency, max_usd, max_requests, price, ray)
+    part = WHOLE if shard is None else Shard.parse(shard, os.environ)
+    aid = aid_for(setting, repository, LAMPILOT_LIMITS)
+    prompt = HUMAN_FEEDBACK if aid is not None else setting_named(setting)
     dataset = load_dataset(data)
-    maker = None if planner in BASELINES else planner_named(planner, base_url)
-    folder = out or Path("runs") / f"lampilot-{planner.replace('/', '-')}"
-    config = RunConfig(planner, prompt, dataset.sha256, items, seed, LAMPILOT_LIMITS)
-    run = load_plugin("chauffeur.benchmarks", "lampilot").open_run(folder, dataset, config, maker)
-    console.print(f"LaMPilot-Bench: {len(run.items)} items, planner {planner}, run folder {folder}")
-    with _progress(console) as (bar, tasks):
-
-        def show(stage: str, done: int, total: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bar.add_task(stage, total=total)
-            bar.update(tasks[stage], completed=done)
-
-        try:
-            rows = run.run(workers or os.cpu_count() or 1, show, concurrency)
-        except KeyboardInterrupt:
-            bar.stop()
-            console.print(f"Stopped. What is done is kept in {folder}; run the same command to go on.")
-            raise typer.Exit(130) from None
-    _table(console, "By task family", *family_lines(rows))
-    _table(
-        console, "Beside the rows that the paper printed (its own items and machines)", *comparison_lines(planner, rows)
+    rehearsed = f"-rehearsed-{rehearse}" if rehearse else ""
+    folder = out or Path("runs") / f"lampilot-{planner.replace('/', '-')}{rehearsed}"
+    if part != WHOLE:
+        folder = folder / part.folder
+    asked = "" if aid is None else aid.id
+    config = RunConfig(planner, prompt, dataset.sha256, items, seed, LAMPILOT_LIMITS, rehearse, asked)
+    run: LampilotRun = load_plugin("chauffeur.benchmarks", "lampilot").open_run(
+        folder, dataset, config, _planner(planner, base_url), shard=part, requests=aid
     )
-    model = "" if maker is None else f", model {maker.model}"
+    _announce(console, run)
+    rows = _drive(console, run, effort, metrics)
+    _show(console, run, rows)
+    if run.halt is not None:
+        _stop(console, run)
+
+
+def _planner(spec: str, base_url: str | None) -> Planner | None:
+    """Who plans; None for the baselines.
+
+    A language model is asked whole replies, which cost less to read than pieces nobody looks at, and does not try again
+    by itself: the run does, which sees what all calls meet.
+    """
+    from chauffeur.bench.lampilot.rollout import BASELINES
+    from chauffeur.planners.registry import make_planner
+
+    if spec in BASELINES:
+        return None
+    options: dict[str, Any] = {} if base_url is None else {"base_url": base_url}
+    if spec.startswith("openai/"):
+        options |= {"attempts": 1, "stream": False}
+    return make_planner(spec, **options)
+
+
+def _effort(
+    workers: int | None,
+    concurrency: int,
+    max_usd: float | None,
+    max_requests: int | None,
+    price: str | None,
+    ray: str | None,
+) -> Effort:
+    from functools import partial
+
+    from chauffeur.bench.engine import LocalEngine
+    from chauffeur.bench.lampilot.runner import Effort
+    from chauffeur.bench.spending import Budget, Price
+
+    if ray is not None and workers is not None:
+        raise ConfigError("--workers is for this machine; a Ray cluster knows its own size.", hint="Leave one out.")
+    engine: Any = LocalEngine
+    if ray is not None:
+        from chauffeur.bench.cluster import RayEngine
+
+        engine = partial(RayEngine, ray)
+    return Effort(
+        workers=workers or 0,
+        concurrency=concurrency,
+        budget=Budget(max_usd, max_requests),
+        price=None if price is None else Price.parse(price),
+        engine=engine,
+    )
+
+
+def _announce(console: Console, run: LampilotRun) -> None:
+    shard = run.stages.frozen.shard
+    part = f", shard {shard}" if shard.count > 1 else ""
     console.print(
-        f"Chauffeur {chauffeur.__version__}; planner {planner}{model}; data sha256 {dataset.sha256[:12]}; "
-        f"draw seed {seed}; limits {config.limits.name}; scores in points, rates in %; simulated drives "
-        "(highway-env). Rows marked paper are its authors' own figures."
+        f"LaMPilot-Bench: {len(run.items)} items{part}, planner {run.config.planner}, run folder {run.folder}",
+        soft_wrap=True,
     )
-    console.print(f"Rows: {folder / 'results.jsonl'}")
+    for name, count in run.damaged.items():
+        console.print(
+            f"{name} has {count} damaged rows; they are set aside in {name}.damaged and their items are done again.",
+            soft_wrap=True,
+        )
+
+
+def _drive(console: Console, run: LampilotRun, effort: Effort, metrics: str) -> list[Row]:
+    from chauffeur.cli.bench_progress import shown
+
+    try:
+        with shown(console, time.monotonic) as watch:
+            return run.run(watch, effort, ruler=metrics)
+    except KeyboardInterrupt:
+        console.print(f"Stopped. What is done is kept in {run.folder}; run the same command to go on.", soft_wrap=True)
+        raise typer.Exit(130) from None
+
+
+def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
+    import chauffeur
+    from chauffeur.bench.lampilot.report import comparison_lines, family_lines
+
+    rated = [row for row, item in zip(rows, run.items, strict=True) if run.stages.asked(item)]
+    if not rated:
+        return
+    title = "By task family"
+    if len(rated) < len(rows):
+        title += f" (partial: the {len(rated)} of {len(rows)} items that were asked)"
+    planner = run.config.planner if len(run.config.planner) <= _NAME else f"...{run.config.planner[3 - _NAME :]}"
+    _table(console, title, *family_lines(rated))
+    _table(
+        console,
+        "Beside the rows that the paper printed (its own items and machines)",
+        *comparison_lines(planner, rated),
+    )
+    model = f", model {run.stages.frozen.model}" if run.stages.frozen.model else ""
+    labels = "".join(f"; {label}" for label in run.stages.frozen.labels)
+    console.print(
+        f"Chauffeur {chauffeur.__version__}; planner {run.config.planner}{model}{labels}; "
+        f"metrics {rows[0]['metrics']}; data sha256 {run.config.data_sha256[:12]}; draw seed {run.config.seed}; limits "
+        f"{run.config.limits.name}; scores in points, rates in %; simulated drives (highway-env). Rows marked paper "
+        "are its authors' own figures."
+    )
+    spoiled = sum(bool(row["infra_failed"]) for row in rated)
+    if spoiled:
+        console.print(f"{spoiled} items failed for want of infrastructure; the same command tries them again.")
+    console.print(f"Rows: {run.folder / 'results.jsonl'}", soft_wrap=True)
+
+
+def _stop(console: Console, run: LampilotRun) -> None:
+    from chauffeur.cli.failures import FAILED, show_error
+    from chauffeur.concept import PlannerError
+
+    assert run.halt is not None
+    show_error(PlannerError(run.halt.why, hint=run.halt.hint))
+    console.print(f"{run.unasked} of {len(run.items)} items have not been asked. What is done is kept in {run.folder}.")
+    raise typer.Exit(UNFINISHED if run.halt.budget else FAILED)
+
+
+@bench_app.command(epilog=MERGE_EXAMPLES)
+def merge(
+    out: Annotated[Path, typer.Argument(help="Folder for the whole run.")],
+    shards: Annotated[list[Path], typer.Argument(help="Folders of all its shards.")],
+    metrics: MetricsOption = "origin",
+) -> None:
+    """Put the shards of a run together, and score it as if it had been one."""
+    from chauffeur.bench.lampilot.merge import merge_shards
+    from chauffeur.bench.lampilot.report import family_lines
+    from chauffeur.cli.console import stdout
+
+    console = stdout()
+    rows = merge_shards(out, shards, metrics)
+    _table(console, "By task family", *family_lines(rows))
+    console.print(f"{len(rows)} items of {len(shards)} shards, metrics {rows[0]['metrics']}.")
+    console.print(f"Rows: {out / 'results.jsonl'}", soft_wrap=True)
 
 
 def _table(console: Console, title: str, header: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
@@ -109,13 +292,3 @@ def _table(console: Console, title: str, header: Sequence[str], lines: Sequence[
         table.add_row(*line)
     console.print(table)
     console.print()
-
-
-@contextmanager
-def _progress(console: Console) -> Generator[tuple[Progress, dict[str, TaskID]]]:
-    """Progress bars, one per stage."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description:>9}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console) as bar:
-        yield bar, {}

@@ -8,9 +8,11 @@ from typing import Annotated
 import typer
 
 from chauffeur import __version__
-from chauffeur.cli import apis, doctor, drive, feedback, page, replay, scenarios
+from chauffeur.cli import apis, coach, doctor, drive, feedback, page, replay, report, scenarios, wheel
 from chauffeur.cli.bench import bench_app
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
+from chauffeur.cli.policies import policies_app
+from chauffeur.cli.scenes import scenes_app
 
 EXAMPLES = """
 Examples:
@@ -58,8 +60,13 @@ app.command(epilog=scenarios.EXAMPLES)(scenarios.scenarios)
 app.command(epilog=apis.EXAMPLES)(apis.apis)
 app.command(epilog=replay.EXAMPLES)(replay.replay)
 app.command(epilog=page.EXAMPLES)(page.page)
+app.command(epilog=report.EXAMPLES)(report.report)
 app.command(epilog=doctor.EXAMPLES)(doctor.doctor)
+bench_app.command(epilog=wheel.EXAMPLES)(wheel.human)
+bench_app.command(epilog=coach.EXAMPLES)(coach.coach)
 app.add_typer(bench_app, name="bench")
+app.add_typer(policies_app, name="policies")
+app.add_typer(scenes_app, name="scenes")
 
 
 def run() -> None:

@@ -53,6 +53,10 @@ class _Held:
             self._since = -1.0
         return "failure" if elapsed_s > GIVE_UP_S else ruling
 
+    def left_s(self, elapsed_s: float) -> float:
+        """Least time until it may be success."""
+        return max(0.0, HOLD_S - (0.0 if self._since == -1 else elapsed_s - self._since))
+
 
 class SpeedGoal:
     """Reach and hold a speed within 1 m/s, or match a slower vehicle less than 100 m ahead (`ACCEvalbySpeed`)."""
@@ -74,6 +78,10 @@ class SpeedGoal:
         else:  # equal speeds fall between LaMPilot's two cases
             reached = lost = False
         return self._held.judge(elapsed_s, reached=reached, lost=lost)
+
+    def left_s(self, elapsed_s: float) -> float:
+        """Least time until it may be success."""
+        return self._held.left_s(elapsed_s)
 
 
 def _lead_at_start(road: RoadPerception, otherwise: str) -> int:
@@ -113,6 +121,10 @@ class DistanceGoal:
         distance = abs(self._road.distance_along(EGO, self._front))
         low, high = self.target_m - self._tolerance_m, self.target_m + self._tolerance_m
         return self._held.judge(elapsed_s, reached=low < distance < high, lost=distance < low or distance > high)
+
+    def left_s(self, elapsed_s: float) -> float:
+        """Least time until it may be success."""
+        return self._held.left_s(elapsed_s)
 
 
 def _lane_beside(road: RoadPerception, direction: str) -> LaneId:

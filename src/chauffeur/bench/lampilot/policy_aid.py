@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from pathlib import Path
+from typing import Final
 
 from chauffeur.concept import ConfigError, Context, Instruction, Limits, PlanRequest, SystemMessage
 from chauffeur.memory.policies import PolicyRepository
@@ -15,7 +16,7 @@ from chauffeur.memory.policies_entry import PolicyEntry
 from chauffeur.planners.prompts import COACHED_PROMPT_VERSION, Helper, build_coached_message
 from chauffeur.worlds.highway.dblv1 import Item
 
-HUMAN_FEEDBACK = "human-feedback"
+HUMAN_FEEDBACK: Final = "human-feedback"
 """Name of the setting on the command line and in results."""
 
 RECALLED = 3

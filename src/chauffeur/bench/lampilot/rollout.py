@@ -5,12 +5,13 @@ from __future__ import annotations
 import atexit
 import multiprocessing
 import os
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 from pydantic import TypeAdapter
 
+from chauffeur.bench.lampilot.expert import expert_program
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.concept import ChauffeurError, Context, Limits, Plan, Program, Scenario, Wishes
 from chauffeur.describe import describe
@@ -23,10 +24,14 @@ from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
 ROLLOUT_VERSION = "lampilot-rollout-v2"
 """Changes whenever the same policy could drive differently."""
 
+REHEARSAL_SEED = 0
+"""Seed of the variants that a rehearsal draws."""
+
 MAX_EPISODE_S = 1000.0
 """LaMPilot's own bound; each road ends its episodes earlier."""
 
-BASELINES = ("idm", "mobil")
+BASELINES = ("idm", "mobil", "expert")
+"""Methods that read no words: two drivers of traffic research, and the scripted expert, which is told the goal."""
 
 plan_adapter: TypeAdapter[Plan] = TypeAdapter(Plan)
 context_adapter: TypeAdapter[Context] = TypeAdapter(Context)
@@ -39,9 +44,10 @@ class RolloutJob:
     Attributes:
         key: Content hash of the job.
         scenario: The sample.
-        baseline: `idm` or `mobil`, or empty when `plan` drives.
+        baseline: One of BASELINES, or empty when `plan` drives.
         plan: JSON form of the plan.
         limits: Bounds for the checks.
+        rehearse: Variants of the program to try on copies of the scene first; 0 drives the program itself.
     """
 
     key: str
@@ -49,6 +55,7 @@ class RolloutJob:
     baseline: str
     plan: dict[str, Any] | None
     limits: Limits
+    rehearse: int = 0
 
 
 def describe_sample(scenario: Scenario) -> dict[str, Any]:
@@ -69,31 +76,54 @@ def roll_out(job: RolloutJob) -> dict[str, Any]:
         referee = LampilotReferee(world, job.scenario)
     except ChauffeurError as error:
         return row | not_driven("not_driven", str(error), infra_failed=True)
-    if job.baseline:
+    if job.baseline in ("idm", "mobil"):
         adjust = None if job.baseline == "idm" else _mobil(world)
         episode = drive_without_program(world, referee, MAX_EPISODE_S, record=False, adjust=adjust)
         return row | _driven(episode, referee)
-    plan = plan_adapter.validate_python(job.plan)
-    verdicts = run_checks(plan, snapshot, job.limits)
-    row["verdicts"] = [asdict(v) for v in verdicts]
-    refusal = declined(plan, verdicts)
-    if refusal:
-        failed = unusable(plan, verdicts)
-        return row | not_driven("refused", refusal, refused=not failed, policy_failed=failed)
-    assert isinstance(plan.policy, Program)
     try:
+        if job.baseline:
+            program = Program(expert_program(job.scenario.goal))
+        else:
+            plan = plan_adapter.validate_python(job.plan)
+            verdicts = run_checks(plan, snapshot, job.limits)
+            row["verdicts"] = [asdict(v) for v in verdicts]
+            refusal = declined(plan, verdicts)
+            if refusal:
+                failed = unusable(plan, verdicts)
+                return row | not_driven("refused", refusal, refused=not failed, policy_failed=failed)
+            assert isinstance(plan.policy, Program)
+            program = plan.policy
+        if job.rehearse:
+            program, row["rehearsal"] = _rehearsed(job, world, program)
         episode = drive_program(
             world,
-            plan.policy.source,
+            program.source,
             referee,
             MAX_EPISODE_S,
             record=False,
-            library=plan.policy.library,
+            library=program.library,
             sandbox=_sandbox(),
         )
     except ChauffeurError as error:
         return row | not_driven("not_driven", str(error), infra_failed=True)
     return row | _driven(episode, referee)
+
+
+def _rehearsed(job: RolloutJob, world: HighwayWorld, program: Program) -> tuple[Program, dict[str, int]]:
+    """The variant to drive, and which of how many it was. Raises ScenarioError, SandboxError."""
+    from chauffeur.bench.lampilot.rehearse import candidates, rehearsed
+
+    written = "" if job.baseline else program.source
+    sources = candidates(job.scenario.goal, job.rehearse, REHEARSAL_SEED, written)
+    if not job.baseline:
+        plan = plan_adapter.validate_python(job.plan)
+        sources = [s for s in sources if _passes(replace(plan, policy=replace(program, source=s)), world, job.limits)]
+    choice = rehearsed(world, job.scenario, sources, library=program.library)
+    return replace(program, source=choice.source), {"tried": len(sources), "chosen": choice.index}
+
+
+def _passes(plan: Plan, world: HighwayWorld, limits: Limits) -> bool:
+    return all(verdict.passed for verdict in run_checks(plan, world.snapshot(), limits))
 
 
 @lru_cache(maxsize=1)

@@ -1,293 +1,226 @@
-"""LaMPilot-Bench as four stages on disk: plan -> generate -> rollout -> score.
+"""LaMPilot-Bench as stages on disk: plan -> generate -> rollout -> score.
 
 Each stage appends rows to its own file and skips what is there, so a run can be interrupted at any time and continued
 by the same command. Changing a metric costs no rollout, changing the simulator costs no token. Items whose planner gave
-the same policy for the same sample share one rollout.
+the same policy for the same sample share one rollout. This module puts a run together; `pipeline.py` is the run.
 """
 
 from __future__ import annotations
 
 import asyncio
-import hashlib
-import json
-import multiprocessing
 import os
-import platform
-import signal
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
-from importlib.metadata import version
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from chauffeur.bench.lampilot.families import family_of
-from chauffeur.bench.lampilot.report import family_lines, markdown
-from chauffeur.bench.lampilot.rollout import (
-    BASELINES,
-    ROLLOUT_VERSION,
-    RolloutJob,
-    context_adapter,
-    describe_sample,
-    not_driven,
-    roll_out,
-)
-from chauffeur.bench.store import Row, RowStore
-from chauffeur.concept import (
-    LAMPILOT_LIMITS,
-    ChauffeurError,
-    ConfigError,
-    Instruction,
-    Limits,
-    PlannerError,
-    PlanRequest,
-    Scenario,
-)
-from chauffeur.drive.files import publish
-from chauffeur.drive.session import scenario_hash
+from chauffeur.bench.calls import Caller, Halt, Patience
+from chauffeur.bench.engine import Engine, LocalEngine
+from chauffeur.bench.lampilot.asking import PlainRequests, Requests
+from chauffeur.bench.lampilot.frozen import BENCH_VERSION, Frozen, RunConfig, choose_items
+from chauffeur.bench.lampilot.metrics import ruler_named
+from chauffeur.bench.lampilot.pipeline import Pipeline, Watch
+from chauffeur.bench.lampilot.results import Stages, publish_results, results
+from chauffeur.bench.lampilot.rollout import BASELINES
+from chauffeur.bench.pace import Gate, Window
+from chauffeur.bench.shards import WHOLE, Shard
+from chauffeur.bench.spending import Bill, Budget, Price, Spending
+from chauffeur.bench.store import Row, Scribe, sole_writer
+from chauffeur.concept import ChauffeurError, ConfigError
+from chauffeur.drive.rehearsal import label
 from chauffeur.planners.base import Planner
-from chauffeur.planners.prompts import Setting, build_system_message
-from chauffeur.worlds.highway.dblv1 import Dataset, Item
+from chauffeur.worlds.highway.dblv1 import Dataset
 
-BENCH_VERSION = "lampilot-bench-v1"
-
-Progress = Callable[[str, int, int], None]
-"""Called as (stage, done, total)."""
+__all__ = ["BENCH_VERSION", "Effort", "LampilotBenchmark", "LampilotRun", "RunConfig", "choose_items"]
 
 
 @dataclass(frozen=True, slots=True)
-class RunConfig:
-    """What decides a run; stored with it, and compared when it is continued.
+class Effort:
+    """How hard a run works; none of it changes a result.
 
     Attributes:
-        planner: Planner spec, or a baseline's name.
-        setting: `few-shot` or `zero-shot`, for planners that read S.
-        data_sha256: Hash of the data set.
-        items: Number of items drawn, 0 for all.
-        seed: Seed of the draw.
-        limits: Bounds for the checks.
+        workers: Simulation processes; 0 for one a core.
+        concurrency: Planner calls in flight at most.
+        budget: What the planner may cost.
+        price: For endpoints whose price is not known.
+        requests_a_plan: Most requests one plan may take, for the budget.
+        patience: How often one plan is tried.
+        engine: Makes who simulates, given `workers`.
     """
 
-    planner: str
-    setting: Setting
-    data_sha256: str
-    items: int
-    seed: int
-    limits: Limits = LAMPILOT_LIMITS
+    workers: int = 0
+    concurrency: int = 16
+    budget: Budget = field(default_factory=Budget)
+    price: Price | None = None
+    requests_a_plan: int = 2
+    patience: Patience = field(default_factory=Patience)
+    engine: Callable[[int], Engine] = LocalEngine
 
 
 class LampilotRun:
-    """One run in one folder."""
+    """One run, or one shard of it, in one folder."""
 
-    def __init__(self, folder: Path, dataset: Dataset, config: RunConfig, planner: Planner | None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        dataset: Dataset,
+        config: RunConfig,
+        planner: Planner | None,
+        *,
+        shard: Shard = WHOLE,
+        requests: Requests | None = None,
+    ) -> None:
         """Open or continue a run.
 
         Args:
             folder: Where stages are stored.
             dataset: DbLv1 data.
             config: What decides the run.
-            planner: Who plans; None for the baselines.
+            planner: Who plans; None for the baselines. A planner's `labels`, where it has them, stand in every row.
+            shard: Which part of the run.
+            requests: What the planner is asked; None for the plain wish under `config.setting`.
 
         Raises:
             ConfigError: The folder holds a run with another configuration.
-            DataError: A stage file in it is damaged.
+            DataError: Its plan is damaged.
+            StorageError: The folder cannot be used.
         """
         if planner is None and config.planner not in BASELINES:
             raise ConfigError(f"{config.planner!r} is no baseline.", hint=f"Baselines: {', '.join(BASELINES)}.")
         self.folder = folder
         self.config = config
+        self.halt: Halt | None = None
         self._planner = planner
-        self.items = choose_items(dataset, config.items, config.seed)
-        samples = {item.scenario.id: item.scenario for item in self.items}
-        self._scenario_hashes = {name: scenario_hash(scenario) for name, scenario in samples.items()}
-        self._freeze_plan()
-        self._contexts = RowStore(folder / "contexts.jsonl", "sample")
-        self._plans = RowStore(folder / "generate.jsonl", "item")
-        self._rollouts = RowStore(folder / "rollout.jsonl", "key")
+        self._requests = requests or _plain(config)
+        labels: tuple[str, ...] = (*getattr(planner, "labels", ()), *getattr(requests, "labels", ()))
+        if config.rehearse:
+            if config.planner in ("idm", "mobil"):
+                raise ConfigError(f"{config.planner} has no program to rehearse.", hint="Leave --rehearse out.")
+            labels = (*labels, label(config.rehearse))
+        frozen = Frozen.make(dataset, config, "" if planner is None else planner.model, labels, shard)
+        with sole_writer(folder):
+            frozen.freeze(folder)
+        self.stages = Stages.open(folder, frozen)
 
-    def _freeze_plan(self) -> None:
-        plan = {
-            "bench": BENCH_VERSION,
-            "config": asdict(self.config),
-            "model": "" if self._planner is None else self._planner.model,
-            "items": [item.id for item in self.items],
-        }
-        path = self.folder / "plan.json"
-        if path.exists():
-            if json.loads(path.read_text(encoding="utf-8")) != json.loads(json.dumps(plan)):
-                raise ConfigError(
-                    f"{self.folder} holds a run with another configuration.",
-                    hint="Continue it with the options it was started with, or choose another --out folder.",
-                )
-            return
-        publish(path, json.dumps(plan, indent=1, ensure_ascii=False).encode(), "run's plan")
+    @property
+    def items(self) -> Any:
+        """The items of this run."""
+        return self.stages.frozen.items
 
-    def run(self, workers: int, progress: Progress, concurrency: int = 8) -> list[Row]:
-        """All stages that are not done yet; returns the result rows. Interrupting keeps everything finished."""
-        context = multiprocessing.get_context("spawn")
-        pool = ProcessPoolExecutor(max_workers=workers, mp_context=context, initializer=_worker_setup)
+    @property
+    def damaged(self) -> dict[str, int]:
+        """Damaged rows found when the run was opened, by file; their items are done again."""
+        return {store.path.name: len(store.damaged) for store in self.stages.stores if store.damaged}
+
+    @property
+    def unasked(self) -> int:
+        """Items that have been neither driven nor tried."""
+        return sum(not self.stages.asked(item) for item in self.items)
+
+    def run(self, watch: Watch, effort: Effort | None = None, *, ruler: str = "origin") -> list[Row]:
+        """Do all that is not done yet and score; afterwards `halt` says whether, and why, it stopped asking before
+        the end. Interrupting keeps everything finished.
+
+        Args:
+            watch: Is told where the run stands.
+            effort: How hard to work.
+            ruler: Short name or id of the ruler to score by.
+
+        Raises:
+            ConfigError: Another process works in this folder, or the ruler is unknown.
+            ChauffeurError: The disk is full, or no worker can be had. What was stored stays.
+        """
+        ruler = ruler_named(ruler).id
+        with sole_writer(self.folder):
+            try:
+                if not self.stages.settled:
+                    asyncio.run(self._work(watch, effort or Effort(), ruler))
+            except BaseExceptionGroup as group:
+                raise _first(group) from group
+            finally:
+                for store in self.stages.stores:
+                    store.close()
+            return self.score(ruler)
+
+    async def _work(self, watch: Watch, effort: Effort, ruler: str) -> None:
+        loop = asyncio.get_running_loop()
+        broken: asyncio.Future[None] = loop.create_future()
+
+        def fail(error: ChauffeurError) -> None:
+            loop.call_soon_threadsafe(lambda: None if broken.done() else broken.set_exception(error))
+
+        scribe = Scribe(fail)
+        engine = effort.engine(effort.workers or os.cpu_count() or 1)
+        caller = self._caller(effort)
+        whole = False
         try:
-            if self._planner is not None:
-                self._describe(pool, progress)
-                asyncio.run(self._generate(self._planner, progress, concurrency))
-            self._roll_out(pool, progress)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for worker in multiprocessing.active_children():  # a rollout cut short is done again; do not wait for it
-                worker.terminate()
-            raise
-        else:
-            pool.shutdown()
+            await engine.start()
+            pipeline = Pipeline(self.stages, engine, caller, self._requests, scribe, watch, ruler, effort.concurrency)
+            await pipeline.work(broken)
+            whole = True
         finally:
-            for store in (self._contexts, self._plans, self._rollouts):
-                store.close()
-        return self.score()
+            engine.close(now=not whole)
+            if broken.done() and not broken.cancelled():
+                broken.exception()  # it has been raised by whoever waited for it
+            self.halt = None if caller is None else caller.halt
+            try:
+                scribe.close()
+            finally:
+                await _close(self._planner)
 
-    def _describe(self, pool: ProcessPoolExecutor, progress: Progress) -> None:
-        samples = {item.scenario.id: item.scenario for item in self.items}
-        _spread(pool, describe_sample, samples, self._contexts, lambda done: progress("describe", done, len(samples)))
+    def _caller(self, effort: Effort) -> Caller | None:
+        if self._planner is None:
+            return None
+        total, dearest = Bill(), None
+        for row in self.stages.plans.rows.values():
+            total.add(Bill.read(row))
+            usage = (row.get("plan") or {}).get("usage") or {}
+            if usage.get("requests") and usage.get("cost_usd") is not None:
+                dearest = max(dearest or 0.0, float(usage["cost_usd"]))
+        return Caller(
+            self._planner,
+            Gate(Window(effort.concurrency)),
+            Spending(effort.budget, total, dearest, effort.requests_a_plan),
+            np.random.default_rng(self.config.seed),
+            effort.price,
+            effort.patience,
+        )
 
-    async def _generate(self, planner: Planner, progress: Progress, concurrency: int) -> None:
-        # A failed call is tried again on resume; a plan, or a planner's refusal, is kept.
-        todo = [i for i in self.items if not (row := self._plans.rows.get(i.id)) or row["error"]]
-        gate = asyncio.Semaphore(concurrency)
-        done = len(self.items) - len(todo)
-        progress("generate", done, len(self.items))
-        system = build_system_message(self.config.setting, limits=self.config.limits)
+    def score(self, ruler: str = "origin") -> list[Row]:
+        """One row per planned item, from what is stored; written to `results.jsonl`, the table to `table.md`.
 
-        async def one(item: Item) -> None:
-            nonlocal done
-            context = self._contexts.rows[item.scenario.id]
-            row: Row = {"item": item.id, "plan": None, "error": ""}
-            if context["error"]:
-                row["error"] = context["error"]
-            else:
-                request = PlanRequest(
-                    Instruction(item.command, source="benchmark"),
-                    context_adapter.validate_python(context["context"]),
-                    system,
-                    limits=self.config.limits,
-                )
-                async with gate:
-                    try:
-                        row["plan"] = asdict(await planner.plan(request))
-                    except PlannerError as error:
-                        row["error"] = str(error)
-            self._plans.append(row)
-            done += 1
-            progress("generate", done, len(self.items))
-
-        for start in range(0, len(todo), 256):
-            await asyncio.gather(*(one(item) for item in todo[start : start + 256]))
-
-    def _job(self, item: Item) -> RolloutJob | None:
-        """The item's rollout; None when it has no plan because its planner failed."""
-        plan: dict[str, Any] | None = None
-        if self._planner is not None:
-            plan = self._plans.rows[item.id]["plan"]
-            if plan is None:
-                return None
-        baseline = self.config.planner if self._planner is None else ""
-        return RolloutJob(self._key(item.scenario, plan, baseline), item.scenario, baseline, plan, self.config.limits)
-
-    def _key(self, scenario: Scenario, plan: dict[str, Any] | None, baseline: str) -> str:
-        """What decides a rollout: sample, policy, what the checks read of the plan, limits, versions."""
-        decisive: Any = baseline
-        if plan is not None:
-            decisive = [plan["policy"], plan["refusal"], plan["intent"], plan["settings"]]
-        parts = [ROLLOUT_VERSION, self._scenario_hashes[scenario.id], decisive, asdict(self.config.limits)]
-        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:24]
-
-    def _roll_out(self, pool: ProcessPoolExecutor, progress: Progress) -> None:
-        jobs = {job.key: job for item in self.items if (job := self._job(item)) is not None}
-        _spread(pool, roll_out, jobs, self._rollouts, lambda done: progress("rollout", done, len(jobs)))
-
-    def score(self) -> list[Row]:
-        """One row per planned item, written to `results.jsonl`, with the table in `table.md`."""
-        about: Row = {
-            "schema": "lampilot-results-v1",
-            "planner": self.config.planner,
-            "model": "" if self._planner is None else self._planner.model,
-            "data_sha256": self.config.data_sha256,
-            "chauffeur": version("chauffeur"),
-        }
-        rows = [about | self._result(item) for item in self.items]
-        files = {
-            "results.jsonl": "".join(json.dumps(row, ensure_ascii=False) + "\n" for row in rows),
-            "provenance.json": json.dumps(self.provenance(), indent=1),
-            "table.md": markdown(*family_lines(rows)) + "\n",
-        }
-        for name, text in files.items():
-            publish(self.folder / name, text.encode(), "run's result")
+        Raises:
+            DataError: They cannot be written.
+        """
+        rows = results(self.stages, ruler)
+        publish_results(self.folder, self.stages, rows)
         return rows
 
-    def _result(self, item: Item) -> Row:
-        base: Row = {
-            "item": item.id,
-            "task": item.task,
-            "family": family_of(item.task),
-            "sample": item.scenario.id,
-            "scenario_seed": str(item.scenario.seed),
-            "command": item.command,
-        }
-        job = self._job(item)
-        if job is None:
-            return base | not_driven("not_driven", self._plans.rows[item.id]["error"], infra_failed=True)
-        plan = job.plan or {}
-        usage = plan.get("usage", {})
-        rollout = {k: v for k, v in self._rollouts.rows[job.key].items() if k not in ("key", "sample", "verdicts")}
-        cost = {
-            "latency_s": plan.get("latency_s"),
-            "prompt_tokens": usage.get("prompt_tokens", 0),
-            "completion_tokens": usage.get("completion_tokens", 0),
-            "cost_usd": usage.get("cost_usd"),
-        }
-        return base | cost | {"rollout_key": job.key, "intent": plan.get("intent", "")} | rollout
 
-    def provenance(self) -> dict[str, Any]:
-        """Versions, hashes, seeds and the machine."""
-        return {
-            "bench": BENCH_VERSION,
-            "rollout": ROLLOUT_VERSION,
-            "config": asdict(self.config),
-            "model": "" if self._planner is None else self._planner.model,
-            "versions": {name: version(name) for name in ("chauffeur", "highway-env", "numpy", "pydantic-monty")},
-            "python": platform.python_version(),
-            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} CPUs",
-        }
+def _plain(config: RunConfig) -> Requests:
+    """Requests of a setting that needs nothing but words and situation. Raises ConfigError for another."""
+    if config.setting == "human-feedback":
+        raise ConfigError("The setting human-feedback needs the requests of a policy repository.")
+    return PlainRequests.of(config.setting, config.limits)
 
 
-def _spread(
-    pool: ProcessPoolExecutor,
-    work: Callable[[Any], Row],
-    jobs: Mapping[str, Any],
-    store: RowStore,
-    done: Callable[[int], None],
-) -> None:
-    """Do the jobs whose key the store does not have, storing each row as it comes and saying how many are done."""
-    futures = [pool.submit(work, job) for key, job in jobs.items() if key not in store.rows]
-    finished = len(jobs) - len(futures)
-    done(finished)
-    for future in as_completed(futures):
-        store.append(future.result())
-        finished += 1
-        done(finished)
+async def _close(planner: Planner | None) -> None:
+    """Close a planner that has connections to close."""
+    close: Any = getattr(planner, "close", None)
+    if close is not None:
+        with suppress(Exception):
+            await close()
 
 
-def choose_items(dataset: Dataset, count: int, seed: int) -> Sequence[Item]:
-    """All items in order, or the first `count` of a permutation (NumPy's legacy generator, as LaMPilot draws them)."""
-    items = dataset.items()
-    if count <= 0 or count >= len(items):
-        return items
-    order = np.random.RandomState(seed).permutation(len(items))
-    return [items[i] for i in order[:count]]
-
-
-def _worker_setup() -> None:
-    # Ctrl-C is the parent's business.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _first(group: BaseExceptionGroup[BaseException]) -> BaseException:
+    """The error that stopped the run, out of the groups that its tasks wrapped it in."""
+    error: BaseException = group
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    return error
 
 
 class LampilotBenchmark:
@@ -296,9 +229,8 @@ class LampilotBenchmark:
     id = BENCH_VERSION
 
     @staticmethod
-    def open_run(folder: Path, dataset: Dataset, config: RunConfig, planner: Planner | None) -> LampilotRun:
+    def open_run(
+        folder: Path, dataset: Dataset, config: RunConfig, planner: Planner | None, **options: Any
+    ) -> LampilotRun:
         """Open or continue a run; see LampilotRun. Raises ChauffeurError subclasses only."""
-        try:
-            return LampilotRun(folder, dataset, config, planner)
-        except OSError as error:
-            raise ChauffeurError(f"Cannot use the run folder {folder}: {error.strerror}.") from error
+        return LampilotRun(folder, dataset, config, planner, **options)

@@ -1,0 +1,1 @@
+"""Parts of benchmarks/lampilot_speed.py."""

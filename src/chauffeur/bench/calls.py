@@ -1,0 +1,221 @@
+"""Asking a planner on behalf of a run: paced, within a budget, again where that can help, and not for ever."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Final
+
+from chauffeur.bench.pace import Gate, Signal
+from chauffeur.bench.spending import Bill, Price, Room, Spending
+from chauffeur.concept import ChauffeurError, Plan, PlannerError, PlanRequest
+from chauffeur.planners.base import Planner
+from chauffeur.planners.llm_errors import EndpointError, Kind
+
+if TYPE_CHECKING:
+    import numpy as np
+
+_log = logging.getLogger(__name__)
+
+FRUITLESS: Final = 5
+"""Plans in a row given up by the endpoint's fault, none had in between, before a run stops asking."""
+FRUITLESS_BAD: Final = 20
+"""The same for requests it calls bad, which may be the items' own fault."""
+
+TOO_LONG_S: Final = 900.0
+"""An endpoint that asks to wait longer than this, e.g. for its next day, ends the asking."""
+
+_SIGNALS: Final[dict[Kind, Signal]] = {
+    "rate_limit": "refused",
+    "server": "overloaded",
+    "timeout": "slow",
+    "dns": "unreachable",
+    "unreachable": "unreachable",
+    "broken": "overloaded",
+    "truncated": "neither",
+    "garbage": "neither",
+}
+_WORKED: Final[frozenset[Kind]] = frozenset({"timeout", "truncated", "garbage", "broken"})
+_HOPELESS: Final[frozenset[Kind]] = frozenset(
+    {"no_key", "unauthorized", "forbidden", "not_found", "quota", "not_an_api"}
+)
+"""The next call would fail the same way, whatever is asked."""
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """How often one plan is tried in a run.
+
+    Attributes:
+        attempts: Calls that may fail in ways that pass.
+        refusals: Times the endpoint may turn it away (429), which says little about the plan: the window answers to it.
+        base_s: Wait after the first failure; doubles each time.
+        cap_s: Longest wait.
+    """
+
+    attempts: int = 6
+    refusals: int = 40
+    base_s: float = 0.5
+    cap_s: float = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Halt:
+    """Why a run stopped asking.
+
+    Attributes:
+        why: In words.
+        hint: What to do.
+        budget: Whether it was the budget; else the endpoint.
+    """
+
+    why: str
+    hint: str
+    budget: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A plan, or why there is none, and what that cost."""
+
+    plan: Plan | None
+    error: str
+    bill: Bill
+
+
+@dataclass(slots=True)
+class Caller:
+    """Asks a planner for plans.
+
+    Attributes:
+        planner: Who plans; it should not retry by itself, or its waits stay unseen here.
+        gate: Bounds what is in flight.
+        spending: The account.
+        rng: Jitter of the waits.
+        price: For planners that do not know what they cost.
+        patience: How often one plan is tried.
+        halt: Set once nothing more is sent.
+    """
+
+    planner: Planner
+    gate: Gate
+    spending: Spending
+    rng: np.random.Generator
+    price: Price | None = None
+    patience: Patience = field(default_factory=Patience)
+    halt: Halt | None = None
+    _fruitless: int = 0
+    _settled: asyncio.Event = field(default_factory=asyncio.Event)
+
+    async def ask(self, request: PlanRequest) -> Answer | None:
+        """One plan, or why there is none; None when it was not asked for, because the run has stopped asking.
+
+        No fault of planner or endpoint raises.
+        """
+        bill = Bill()
+        last = ""
+        failures = refusals = 0
+        while (sent_s := await self._turn()) is not None:
+            outcome = await self._call(request, sent_s, bill)
+            if isinstance(outcome, Plan):
+                self._fruitless = 0
+                return Answer(outcome, "", bill)
+            last = str(outcome)
+            refused = isinstance(outcome, EndpointError) and outcome.kind == "rate_limit"
+            refusals += refused
+            failures += not refused
+            again = failures < self.patience.attempts and refusals < self.patience.refusals
+            if not (outcome.retryable and again and _asked_s(outcome) <= TOO_LONG_S):
+                self._given_up(outcome)
+                return Answer(None, last, bill)
+            if not refused:
+                wait_s = min(self.patience.cap_s, self.patience.base_s * 2.0 ** (failures - 1))
+                await asyncio.sleep(wait_s * float(self.rng.uniform(0.5, 1.0)))
+        return Answer(None, last, bill) if last else None
+
+    async def _turn(self) -> float | None:
+        """Wait for a place and for room in the budget; when the call is sent, or None when none may be any more."""
+        sent_s = await self.gate.enter()
+        try:
+            while self.halt is None:
+                room = self.spending.room()
+                if room is Room.YES:
+                    self.spending.sent()
+                    return asyncio.get_running_loop().time()
+                if room is Room.NONE:
+                    self._stop(self.spending.spent(), "Go on with the same command and a larger budget.", budget=True)
+                    break
+                self._settled.clear()
+                await self._settled.wait()
+        except BaseException:
+            self.gate.leave("neither", sent_s)
+            raise
+        self.gate.leave("neither", sent_s)
+        return None
+
+    async def _call(self, request: PlanRequest, sent_s: float, bill: Bill) -> Plan | ChauffeurError:
+        signal: Signal = "neither"
+        asked_s = None
+        try:
+            outcome = await self._plan(request)
+        except BaseException:
+            self.spending.failed(0, worked=False)
+            self.gate.leave(signal, sent_s)
+            raise
+        if isinstance(outcome, Plan):
+            signal = "answered"
+            bill.add(self.spending.settled(outcome.usage))
+        elif isinstance(outcome, EndpointError):
+            signal = _SIGNALS.get(outcome.kind, "neither")
+            asked_s = outcome.retry_after_s
+            bill.add(self.spending.failed(1, worked=outcome.kind in _WORKED))
+        else:
+            self.spending.failed(0, worked=False)
+        self.gate.leave(signal, sent_s, asked_s)
+        self._settled.set()
+        return outcome
+
+    async def _plan(self, request: PlanRequest) -> Plan | ChauffeurError:
+        try:
+            return self._priced(await self.planner.plan(request))
+        except ChauffeurError as error:
+            return error
+        except Exception as error:  # noqa: BLE001 - a plug-in may raise anything, and one bad item never loses a run
+            _log.exception("the planner failed in a way of its own")
+            return PlannerError(f"The planner itself failed: {type(error).__name__}: {error}.")
+
+    def _priced(self, plan: Plan) -> Plan:
+        usage = plan.usage
+        if usage.cost_usd is None and self.price is not None:
+            return replace(plan, usage=replace(usage, cost_usd=self.price.of(usage)))
+        if usage.cost_usd is None and usage.requests and self.spending.budget.max_usd is not None:
+            self._stop(
+                f"What {plan.model or self.planner.id} costs is not known, so --max-usd cannot be kept.",
+                "Give its price with --price IN/OUT (USD per million tokens), or bound --max-requests.",
+                budget=True,
+            )
+        return plan
+
+    def _given_up(self, error: ChauffeurError) -> None:
+        """Stop asking when it is the endpoint that fails and not this request."""
+        if not isinstance(error, EndpointError):
+            return
+        self._fruitless += 1
+        bad = error.kind == "bad_request"
+        if _asked_s(error) > TOO_LONG_S:
+            self._stop(f"{error.message} It asks to wait {error.retry_after_s:.0f} s.", "Run the same command then.")
+        elif error.kind in _HOPELESS or self._fruitless >= (FRUITLESS_BAD if bad else FRUITLESS):
+            hint = error.hint or "Put it right and run the same command: it goes on where it stopped."
+            self._stop(error.message, hint)
+
+    def _stop(self, why: str, hint: str, *, budget: bool = False) -> None:
+        """Send nothing any more; the first reason stands. Whoever waits for a place or for room learns it."""
+        self.halt = self.halt or Halt(why, hint, budget)
+        self.gate.open()
+        self._settled.set()
+
+
+def _asked_s(error: ChauffeurError) -> float:
+    """How long the endpoint asked to wait."""
+    return error.retry_after_s or 0.0 if isinstance(error, EndpointError) else 0.0

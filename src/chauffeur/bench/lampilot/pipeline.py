@@ -1,0 +1,223 @@
+"""A run at work: every item goes its own way from words to wheels, so simulations run while calls are in flight.
+
+One event loop does the waiting; simulations run in the engine's processes, the disk is a thread's business. An item
+that fails is a row that says so; only a full disk, a dead engine or the person at the keyboard stops the run.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from typing import Any, Final
+
+from chauffeur.bench.calls import Caller
+from chauffeur.bench.engine import Engine, EngineError
+from chauffeur.bench.lampilot.asking import Requests
+from chauffeur.bench.lampilot.metrics import points
+from chauffeur.bench.lampilot.results import Stages
+from chauffeur.bench.lampilot.rollout import RolloutJob, context_adapter, describe_sample, not_driven, roll_out
+from chauffeur.bench.spending import Bill
+from chauffeur.bench.standing import Speedometer, Standing
+from chauffeur.bench.store import Row, Scribe
+from chauffeur.concept import ChauffeurError, Context
+from chauffeur.worlds.highway.dblv1 import Item
+
+Watch = Callable[[Standing], None]
+"""Is told where the run stands, a few times a second."""
+
+TELL_S: Final = 0.25
+_SPARE: Final = 32
+"""Items made ready beyond those that may be in flight, so that a place never waits for a description."""
+
+
+@dataclass(slots=True)
+class Pipeline:
+    """One run's work.
+
+    Attributes:
+        stages: Where everything is stored.
+        engine: Who simulates.
+        caller: Who asks the planner; None for the baselines.
+        requests: What it is asked.
+        scribe: Who writes.
+        watch: Who is told.
+        ruler: Id of the ruler of the running scores.
+        most: Planner calls in flight at most.
+    """
+
+    stages: Stages
+    engine: Engine
+    caller: Caller | None
+    requests: Requests
+    scribe: Scribe
+    watch: Watch
+    ruler: str
+    most: int
+    _contexts: dict[str, asyncio.Task[Row]] = field(default_factory=dict[str, "asyncio.Task[Row]"])
+    _drives: dict[str, asyncio.Task[Row]] = field(default_factory=dict[str, "asyncio.Task[Row]"])
+    _count: dict[str, int] = field(default_factory=dict[str, int])
+    _fresh: int = 0
+    _speed: Speedometer = field(default_factory=Speedometer)
+
+    async def work(self, broken: asyncio.Future[None]) -> None:
+        """Ask and drive all that is not done yet.
+
+        Args:
+            broken: Is given an exception when the disk does not take a row.
+
+        Raises:
+            ChauffeurError: The disk is full, or no worker can be had.
+        """
+        self._count = dict.fromkeys(("asked", "done", "driven", "successes", "collisions", "failed"), 0)
+        async with asyncio.TaskGroup() as always:
+            guards = [always.create_task(_await(broken)), always.create_task(self._tell())]
+            async with asyncio.TaskGroup() as group:
+                todo = deque(self._begin(group))
+                if self.caller is not None:
+                    for _ in range(min(len(todo), self.most + _SPARE)):
+                        group.create_task(self._ask(todo, self.caller, group))
+            for guard in guards:
+                guard.cancel()
+        self.watch(self.standing())
+
+    def _begin(self, group: asyncio.TaskGroup) -> Iterator[Item]:
+        """Set going what only has to be driven; gives what has to be asked: also what could not be had last time."""
+        for item in self.stages.frozen.items:
+            job = self.stages.job(item)
+            if job is None:
+                yield item
+                continue
+            self._count["asked"] += self.caller is not None
+            group.create_task(self._finish(job))
+
+    async def _ask(self, todo: deque[Item], caller: Caller, group: asyncio.TaskGroup) -> None:
+        while todo and caller.halt is None:
+            await asyncio.sleep(0)  # a planner that never waits must not keep the others from their turn
+            if not todo:
+                return
+            item = todo.popleft()
+            row = await self._plan(item, caller)
+            if row is None:
+                return
+            self._count["asked"] += 1
+            job = self.stages.job(item)
+            if job is None:
+                self._fresh += 1
+                self._count["done"] += 1
+                self._count["failed"] += 1
+            else:
+                group.create_task(self._finish(job))
+
+    async def _plan(self, item: Item, caller: Caller) -> Row | None:
+        """The item's plan, or why there is none, stored; None when the run has stopped asking."""
+        before = Bill.read(self.stages.plans.rows.get(item.id, {}))
+        row: Row = {"item": item.id, "plan": None, "error": ""}
+        try:
+            request = await self.requests.request(item, await self._context(item))
+            answer = await caller.ask(request)
+            if answer is None:
+                return None
+            before.add(answer.bill)
+            row["error"] = answer.error
+            if answer.plan is not None:
+                row["plan"] = asdict(answer.plan)
+        except EngineError:
+            raise
+        except Exception as error:  # noqa: BLE001 - whatever is wrong with an item, it is one item
+            row["error"] = _words(error)
+        row["spent"] = asdict(before)
+        try:
+            self.scribe.write(self.stages.plans, row)
+        except (TypeError, ValueError) as error:
+            row |= {"plan": None, "error": f"The planner's answer cannot be stored: {error}."}
+            self.scribe.write(self.stages.plans, row)
+        return row
+
+    async def _context(self, item: Item) -> Context:
+        """C of the item's sample. Raises ChauffeurError when the sample cannot be set up."""
+        sample = item.scenario.id
+        row = self.stages.contexts.rows.get(sample)
+        if row is None or row["error"]:
+            task = self._contexts.get(sample)
+            if task is None:
+                task = self._contexts[sample] = asyncio.create_task(self._describe(item))
+            row = await asyncio.shield(task)
+        if row["error"]:
+            raise ChauffeurError(row["error"])
+        return context_adapter.validate_python(row["context"])
+
+    async def _describe(self, item: Item) -> Row:
+        sample = item.scenario.id
+        try:
+            row = await self.engine.run(describe_sample, item.scenario, near=sample, urgent=True)
+        except EngineError:
+            raise
+        except Exception as error:  # noqa: BLE001 - a sample can break the simulator in any way; it is one sample
+            row = {"sample": sample, "context": None, "error": _words(error)}
+        self.scribe.write(self.stages.contexts, row)
+        return row
+
+    async def _finish(self, job: RolloutJob) -> None:
+        row = self.stages.rollouts.rows.get(job.key)
+        if row is None or row["infra_failed"]:  # what the machine spoiled is driven again
+            task = self._drives.get(job.key)
+            if task is None:
+                task = self._drives[job.key] = asyncio.create_task(self._drive(job))
+            row = await asyncio.shield(task)
+            self._fresh += 1
+        self._count["done"] += 1
+        self._count["failed"] += bool(row["infra_failed"])
+        self._count["driven"] += not row["infra_failed"]
+        scored = points(row, self.ruler)
+        self._count["successes"] += bool(scored["success"])
+        self._count["collisions"] += bool(scored["collision"])
+
+    async def _drive(self, job: RolloutJob) -> Row:
+        try:
+            row = await self.engine.run(roll_out, job, near=job.scenario.id)
+            self.scribe.write(self.stages.rollouts, row)
+        except EngineError:
+            raise
+        except Exception as error:  # noqa: BLE001 - see _describe
+            row = {"key": job.key, "sample": job.scenario.id}
+            row |= not_driven("not_driven", _words(error), infra_failed=True)
+            self.scribe.write(self.stages.rollouts, row)
+        return row
+
+    async def _tell(self) -> None:
+        while True:
+            self.watch(self.standing())
+            await asyncio.sleep(TELL_S)
+
+    def standing(self) -> Standing:
+        """Where the run stands now."""
+        planned = len(self.stages.frozen.items)
+        rate = self._speed.rate(asyncio.get_running_loop().time(), self._fresh)
+        left = planned - self._count["done"]
+        live: dict[str, Any] = {}
+        if self.caller is not None:
+            gate, total = self.caller.gate, self.caller.spending.total
+            live = {
+                "requests": total.requests,
+                "usd": total.usd,
+                "in_flight": gate.in_flight,
+                "window": int(gate.window.limit),
+                "held_s": gate.held_s,
+            }
+        return Standing(planned, **self._count, rate=rate, eta_s=left / rate if rate > 0.0 else None, **live)
+
+
+async def _await(broken: asyncio.Future[None]) -> None:
+    await broken
+
+
+def _words(error: Exception) -> str:
+    if isinstance(error, ChauffeurError):
+        return str(error)
+    text = f"{type(error).__name__}: {error}"
+    with suppress(IndexError):
+        text = text.splitlines()[0][:500]
+    return f"Failed in a way that was not foreseen: {text}."

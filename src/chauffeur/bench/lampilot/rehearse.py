@@ -1,0 +1,147 @@
+"""Rehearsal on the benchmark: the judge that knows LaMPilot's ruler, and the programs to choose from."""
+
+from __future__ import annotations
+
+import atexit
+import math
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+from chauffeur.bench.lampilot.expert import variants
+from chauffeur.bench.lampilot.goals import DistanceGoal, Ruling, SpeedGoal, make_goal
+from chauffeur.bench.lampilot.metrics import (
+    COLLISION_WEIGHT,
+    ORIGIN,
+    SPEED_STD_FULL_MPS,
+    TIME_LIMIT_S,
+    WEIGHTS,
+    points,
+)
+from chauffeur.concept import Metric, Outcome, Scenario
+from chauffeur.drive.rehearsal import Choice, CopyableWorld, rehearse
+from chauffeur.programs import UNHURRIED, Sandbox
+from chauffeur.programs.variants import perturbed
+from chauffeur.worlds.highway import RoadPerception
+
+MAX_TRY_S = 70.0
+"""Longest try: goals with a limit of their own have 60 s."""
+
+_WAIT_TICKS = 5
+"""How often a try's ceiling is computed."""
+
+
+class OriginJudge:
+    """What a trip is worth under LaMPilot's own ruler, collisions included, while it is driven."""
+
+    def __init__(self, road: RoadPerception, scenario: Scenario) -> None:
+        self._road = road
+        self._goal = make_goal(road, scenario)
+        self._ruling: Ruling = "open"
+        self._steps = 0
+        self._mean = self._squares = 0.0
+        self._least_s = math.inf
+        self._ceiling = math.inf
+
+    def observe(self) -> None:
+        """Look at the instant after a control period."""
+        now = self._road.instant()
+        self._steps += 1
+        off = now.speed_mps - self._mean
+        self._mean += off / self._steps
+        self._squares += off * (now.speed_mps - self._mean)
+        if 0 < now.ttc_along_s < self._least_s:
+            self._least_s = now.ttc_along_s
+        self._ruling = self._goal.rule(self._steps / 10, now)
+        if self._steps % _WAIT_TICKS == 0:
+            self._ceiling = self._highest()
+
+    @property
+    def over(self) -> bool:
+        """Whether the goal is decided."""
+        return self._ruling != "open"
+
+    @property
+    def success(self) -> bool:
+        """LaMPilot's success flag."""
+        return self._ruling == "success"
+
+    @property
+    def collided(self) -> bool:
+        """LaMPilot's collision flag: crashed, or off the road."""
+        now = self._road.instant()
+        return now.crashed or not now.on_road
+
+    @property
+    def worth(self) -> float:
+        """What the trip adds to 100 times the driving score of a run, per item."""
+        return self._score_after(self._steps) * self.success - COLLISION_WEIGHT * self.collided
+
+    @property
+    def ceiling(self) -> float:
+        """The score if the goal were reached at the best moment, at the mean speed, without another conflict."""
+        return self._ceiling
+
+    def outcome(self) -> Outcome:
+        """What happened."""
+        return "success" if self.success else "failure" if self._ruling == "failure" else "timeout"
+
+    def metrics(self) -> tuple[Metric, ...]:
+        """None: a rehearsal is not scored."""
+        return ()
+
+    def _highest(self) -> float:
+        # More steps at the mean speed lower the standard deviation and cost time; in between lies a best number.
+        per_mps = WEIGHTS["speed_variance"] * 100.0 / SPEED_STD_FULL_MPS
+        per_step = WEIGHTS["time_efficiency"] * 100.0 / (TIME_LIMIT_S * 10.0)
+        best = (per_mps * math.sqrt(self._squares) / (2.0 * per_step)) ** (2.0 / 3.0)
+        left_s = self._goal.left_s(self._steps / 10) if isinstance(self._goal, SpeedGoal | DistanceGoal) else 0.0
+        least = self._steps + math.floor(10.0 * left_s)
+        return max(self._score_after(max(least, math.floor(best))), self._score_after(max(least, math.ceil(best))))
+
+    def _score_after(self, steps: int) -> float:
+        """Score of a success after so many steps, the speeds so far and from now on their mean driven."""
+        signals = {
+            "steps": steps,
+            "ttc_along_s": self._least_s if math.isfinite(self._least_s) else None,
+            "speed_std_mps": math.sqrt(self._squares / max(1, steps)),
+            "crashed": False,
+            "off_road": False,
+            "stop_speed_mps": None,
+            "ttc_lane_s": None,
+            "fault": "",
+        }
+        return float(points({"success": True, "signals": signals}, ORIGIN.id)["score"])
+
+
+def candidates(goal: Mapping[str, Any], count: int, seed: int, source: str = "") -> list[str]:
+    """Programs to rehearse: a planner's program and variants of its numbers, or the expert's where there is none.
+
+    Raises:
+        ScenarioError: The expert is asked for and has no program for the goal.
+    """
+    return perturbed(source, count, seed) if source else variants(goal, count, seed)
+
+
+def rehearsed(
+    world: CopyableWorld, scenario: Scenario, sources: Sequence[str], *, library: str = "", threads: int = 1
+) -> Choice:
+    """The program to drive from the world's present instant, chosen by LaMPilot's own ruler.
+
+    Raises:
+        ScenarioError: The scenario's goal cannot be judged here.
+        SandboxError: No worker can be had.
+    """
+
+    def judge(copy: CopyableWorld) -> OriginJudge:
+        return OriginJudge(copy.perception(), scenario)
+
+    return rehearse(world, sources, judge, sandbox=_sandbox(), max_s=MAX_TRY_S, library=library, threads=threads)
+
+
+@cache
+def _sandbox() -> Sandbox:
+    """One pool of warm workers for all rehearsals of this process."""
+    sandbox = Sandbox(UNHURRIED)
+    atexit.register(sandbox.close)
+    return sandbox

@@ -1,0 +1,160 @@
+"""Whether a scene can be driven as wished: not spoilt at the start, not fulfilled by itself, solved by the expert."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from chauffeur.bench.lampilot.goals import GIVE_UP_S, Goal, Ruling
+from chauffeur.bench.lampilot.goals_more import make_any_goal
+from chauffeur.bench.lampilot.scenes.scripted import programs_for
+from chauffeur.concept import Metric, Outcome, SandboxError, Scenario, ScenarioError, Snapshot
+from chauffeur.describe import describe
+from chauffeur.drive.session import drive_program, drive_without_program
+from chauffeur.worlds.highway import HighwayWorld
+
+MAX_EPISODE_S = 130.0
+"""No goal takes longer: 60 s at most a step, and the roads end before that."""
+_EMPTY_WISHES = ("ACCEvalbySpeed", "ACCEvalbyDistance", "ChangeEval")
+"""Goals that a car may fulfil by driving on as it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Whether a scene is feasible.
+
+    Attributes:
+        feasible: The expert solves it without a collision, and it asks for something.
+        why: Why not, in a few words for counting; empty when it is.
+        ticks: Control periods the expert took, 0 when it was not driven.
+    """
+
+    feasible: bool
+    why: str = ""
+    ticks: int = 0
+
+
+class GoalReferee:
+    """Judge of a goal alone, without scores: what `drive` needs of a referee, and no more."""
+
+    def __init__(self, world: HighwayWorld, goal: Goal) -> None:
+        self._road = world.perception()
+        self._goal = goal
+        self._ticks = 0
+        self._ruling: Ruling = "open"
+        self._crashed = False
+
+    def observe(self) -> None:
+        """Look at the instant after a control period."""
+        self._ticks += 1
+        now = self._road.instant()
+        self._crashed = now.crashed
+        self._ruling = self._goal.rule(self._ticks / 10, now)
+
+    @property
+    def over(self) -> bool:
+        """Whether the goal is decided."""
+        return self._ruling != "open"
+
+    @property
+    def success(self) -> bool:
+        """Whether the goal is reached and nothing was hit in that instant."""
+        return self._ruling == "success" and not self._crashed
+
+    def outcome(self) -> Outcome:
+        """What happened; the episode itself tells collisions and leaving the road."""
+        return "success" if self.success else "failure" if self._ruling == "failure" else "timeout"
+
+    def metrics(self) -> tuple[Metric, ...]:
+        """None: nothing is scored here."""
+        return ()
+
+
+def start_of(world: HighwayWorld, scenario: Scenario) -> Snapshot | str:
+    """The first instant of a scene, or why it is spoilt already."""
+    try:
+        start = world.reset(scenario)
+    except ScenarioError:
+        return "the road cannot be set up"
+    if start.ego.crashed or start.off_road or start.ended:
+        return "starts in a crash"
+    if start.ego.lane is None or not _in_start_lane(scenario, start.ego.lane):
+        return "starts in another lane"
+    return start
+
+
+def _in_start_lane(scenario: Scenario, lane: tuple[str, str, int]) -> bool:
+    ego = scenario.config.get("ego_vehicle")
+    return ego is None or tuple(ego["start_lane_index"]) == lane
+
+
+def feasible(scenario: Scenario) -> Verdict:
+    """Judge a scene whose goal is to be driven.
+
+    Raises:
+        SandboxError: The sandbox failed; it says nothing about the scene.
+    """
+    world = HighwayWorld()
+    start = start_of(world, scenario)
+    if isinstance(start, str):
+        return Verdict(False, start)
+    try:
+        goal = make_any_goal(world.perception(), scenario)
+    except ScenarioError as error:
+        return Verdict(False, error.message)
+    programs = programs_for(scenario.goal, describe(start).situation)
+    if not programs:
+        return Verdict(False, "the expert has no program for it")
+    if _fulfilled_by_itself(world, scenario, goal):
+        return Verdict(False, "fulfilled without doing anything")
+    why = ""
+    for source in programs:
+        world.reset(scenario)
+        solved, why, ticks = _drive(world, scenario, source)
+        if solved:
+            return Verdict(True, ticks=ticks)
+    return Verdict(False, why)
+
+
+def _fulfilled_by_itself(world: HighwayWorld, scenario: Scenario, goal: Goal) -> bool:
+    """Whether a car that ignores the wish fulfils it; the world has just been reset."""
+    if scenario.goal["type"] not in _EMPTY_WISHES:
+        return False
+    referee = GoalReferee(world, goal)
+    return drive_without_program(world, referee, GIVE_UP_S + 1.0, record=False).outcome == "success"
+
+
+def _drive(world: HighwayWorld, scenario: Scenario, source: str) -> tuple[bool, str, int]:
+    referee = GoalReferee(world, make_any_goal(world.perception(), scenario))
+    episode = drive_program(world, source, referee, MAX_EPISODE_S, record=False)
+    if episode.causes.infra_failed:
+        raise SandboxError(f"The sandbox failed in scene {scenario.id!r}: {episode.causes.detail}", retryable=True)
+    if episode.causes.policy_failed:
+        return False, "the expert's program failed", episode.ticks
+    if episode.outcome == "success":
+        return True, "", episode.ticks
+    return False, _WORDS.get(episode.outcome, f"the expert ends in {episode.outcome}"), episode.ticks
+
+
+_WORDS = {
+    "collision": "the expert collides",
+    "off_road": "the expert leaves the road",
+    "failure": "the expert runs out of time",
+    "timeout": "the expert runs out of road",
+}
+
+
+def impossible(scenario: Scenario, wish: dict[str, Any]) -> bool:
+    """Whether the world itself says that a wish cannot be judged in a scene: no such lane, nobody ahead, no shoulder.
+
+    Raises:
+        ScenarioError: The scene cannot be set up.
+    """
+    world = HighwayWorld()
+    wanted = replace(scenario, goal=wish)
+    world.reset(wanted)
+    try:
+        make_any_goal(world.perception(), wanted)
+    except ScenarioError:
+        return True
+    return False

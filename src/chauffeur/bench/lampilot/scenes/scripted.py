@@ -1,0 +1,89 @@
+"""Programs that ought to solve a goal: the scripted expert that proves a scene feasible."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import Any
+
+from chauffeur.bench.lampilot.scenes.unambiguous import meaning_of
+from chauffeur.concept import LAMPILOT_LIMITS, Situation
+from chauffeur.planners.onboard.choose import Choice, choose
+from chauffeur.planners.onboard.exemplars import program_of
+from chauffeur.planners.onboard.meaning import Meaning, Reading
+from chauffeur.planners.onboard.personal import Leaning
+
+EXPERT = "onboard-exemplars-v1"
+"""Who proves scenes feasible; stands in the manifest."""
+
+
+def programs_for(goal: dict[str, Any], situation: Situation) -> tuple[str, ...]:
+    """Programs that may solve the goal, best first; a scene is feasible when one of them does.
+
+    They are `planners.onboard`'s exemplar programs, given the goal as a meaning and the situation at the start.
+    """
+    if goal["type"] == "SequenceEval" and "distance" in goal["steps"][0] and len(goal["steps"]) > 1:
+        return _gap_first(goal, situation)
+    out: list[str] = []
+    for meanings in _ways(goal):
+        choice = choose(Reading(meanings), situation, LAMPILOT_LIMITS, _no_leaning)
+        if isinstance(choice, Choice):
+            out.append(program_of([step.filled for step in choice.steps]))
+    return tuple(dict.fromkeys(out))
+
+
+_REACH_GAP = """\
+def reach_gap():
+    # Close up to a gap and go on to the next thing.
+    ego = get_ego_vehicle()
+    set_desired_time_headway(0.2)
+    for _ in range(500):
+        lead = detect_front_vehicle_in(get_lane_of(ego), 200.0)
+        if lead is None or get_distance_between_vehicles(lead, ego) < {gap}:
+            break
+        set_target_speed(get_speed_of(lead) + 4.0)
+        yield autopilot()
+
+
+{rest}
+
+def in_this_order():
+    # One after the other.
+    yield from reach_gap()
+    yield from {function}()
+"""
+"""The exemplar for a gap keeps it for ever; before another step it only has to be reached."""
+_FUNCTION = re.compile(r"^def (\w+)\(\):$", re.MULTILINE)
+
+
+def _gap_first(goal: dict[str, Any], situation: Situation) -> tuple[str, ...]:
+    """Programs for a gap to be closed and then other steps."""
+    gap = 1.2 * float(goal["steps"][0]["distance"])
+    rest = goal["steps"][1:]
+    after = rest[0] if len(rest) == 1 else goal | {"steps": rest}
+    return tuple(
+        _REACH_GAP.format(gap=round(gap, 1), rest=program, function=_FUNCTION.findall(program)[-1])
+        for program in programs_for(after, situation)
+    )
+
+
+def _no_leaning(family: str) -> Leaning:
+    del family
+    return Leaning()
+
+
+def _ways(goal: dict[str, Any]) -> list[tuple[Meaning, ...]]:
+    """Meanings that fulfil a goal."""
+    if goal["type"] == "SequenceEval":
+        steps = [meaning_of(step) for step in goal["steps"]]
+        return [tuple(step for step in steps if step is not None)] if None not in steps else []
+    meaning = meaning_of(goal)
+    if meaning is None:
+        return []
+    ways = [(meaning,)]
+    if goal["type"] == "ChangeEval" and meaning.manoeuvre == "speed" and meaning.change > 0:
+        # Held up by somebody: closing up, or getting past.
+        ways += [(Meaning("style", variant="hurry"),), (Meaning("overtake"),)]
+    if goal["type"] == "OvertakeEval":
+        ways.append((replace(meaning, manner="swift"),))
+    return ways

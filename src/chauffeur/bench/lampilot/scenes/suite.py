@@ -1,0 +1,153 @@
+"""A whole suite: made item by item on all cores, worded as one, written as DbLv1 folders with a manifest.
+
+What decides a suite is its plan (numbers, seed, generator version); it is stored first, and compared when a suite is
+continued. Each finished item is a row on disk, so Ctrl-C and a crash lose nothing, and the same command goes on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from chauffeur.bench.lampilot.scenes.choosing import choose_wordings, normal
+from chauffeur.bench.lampilot.scenes.kinds import plan_suite
+from chauffeur.bench.lampilot.scenes.making import Job, make_item
+from chauffeur.bench.lampilot.scenes.manifest import manifest_of
+from chauffeur.bench.lampilot.scenes.scripted import EXPERT
+from chauffeur.bench.lampilot.scenes.spreading import Progress, spread
+from chauffeur.bench.lampilot.scenes.writer import Item, folder_of, items_of, write_folder
+from chauffeur.bench.store import Row, RowStore
+from chauffeur.concept import ConfigError
+from chauffeur.drive.files import publish
+from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
+
+GENERATOR = "lampilot-scenes-v1"
+"""Changes whenever the same seed could give other scenes or other words."""
+
+PLAN, MANIFEST = "plan.json", "manifest.json"
+
+
+@dataclass(frozen=True, slots=True)
+class SuiteConfig:
+    """What decides a suite.
+
+    Attributes:
+        n: Items of the main suite.
+        seed: Seed of everything.
+        extras: Items beyond the original.
+        avoid_sha256: Hash of a data set whose instructions must not come up, empty for none.
+    """
+
+    n: int
+    seed: int
+    extras: int
+    avoid_sha256: str = ""
+
+
+class Suite:
+    """One suite in one folder."""
+
+    def __init__(self, folder: Path, config: SuiteConfig, avoid: Dataset | None = None) -> None:
+        """Begin or continue a suite.
+
+        Args:
+            folder: Where it is written.
+            config: What decides it.
+            avoid: Data set whose instructions must not come up, e.g. LaMPilot's own.
+
+        Raises:
+            ConfigError: The folder holds something else, or numbers are out of range.
+            StorageError: The folder cannot be read.
+        """
+        if config.seed < 0:
+            raise ConfigError(f"A seed is 0 or more, not {config.seed}.")
+        self.folder = folder
+        self.config = config
+        self.slots = plan_suite(config.n, config.seed, config.extras)
+        self._avoid: Set[str] = frozenset() if avoid is None else {normal(item.command) for item in avoid.items()}
+        self._freeze_plan()
+        self._rows = RowStore(folder / "scenes.jsonl", "index")
+
+    def _freeze_plan(self) -> None:
+        plan = {
+            "generator": GENERATOR,
+            "expert": EXPERT,
+            "config": asdict(self.config),
+            "versions": {name: version(name) for name in ("chauffeur", "highway-env", "numpy")},
+        }
+        path = self.folder / PLAN
+        if path.exists():
+            try:
+                begun = json.loads(path.read_text(encoding="utf-8"))
+            except ValueError:
+                begun = None
+            if begun != plan:
+                raise ConfigError(
+                    f"{self.folder} holds a suite with other options or of another version.",
+                    hint="Continue it with the options it was started with, or choose another --out folder.",
+                )
+            return
+        if self.folder.exists() and any(self.folder.iterdir()):
+            raise ConfigError(f"{self.folder} is not empty and holds no suite.", hint="Choose another --out folder.")
+        publish(path, json.dumps(plan, indent=1).encode(), "suite's plan")
+
+    @property
+    def made(self) -> int:
+        """Items made so far."""
+        return sum(str(slot.index) in self._rows.rows for slot in self.slots)
+
+    def generate(self, workers: int, progress: Progress) -> Mapping[str, Any]:
+        """Make what is not made yet and write the suite; returns its manifest. Interrupting keeps finished items.
+
+        Raises:
+            ScenarioError, InstructionError: An item cannot be made; a fault of the generator.
+            StorageError, DataError: The disk refuses a file.
+        """
+        try:
+            self._make(workers, progress)
+        finally:
+            self._rows.close()
+        rows = [self._rows.rows[str(slot.index)] for slot in self.slots]
+        return self._write(rows)
+
+    def _make(self, workers: int, progress: Progress) -> None:
+        jobs = [Job(self.config.seed, slot) for slot in self.slots if str(slot.index) not in self._rows.rows]
+        done = len(self.slots) - len(jobs)
+        progress(done, len(self.slots))
+        # A spread order, so that the time left can be told from the time taken.
+        jobs.sort(key=lambda job: hashlib.sha256(job.key.encode()).digest())
+
+        def take(row: Row) -> None:
+            nonlocal done
+            self._rows.append(row)
+            done += 1
+            progress(done, len(self.slots))
+
+        spread(make_item, jobs, workers, take)
+
+    def _write(self, rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+        choices = choose_wordings(rows, self.config.seed, self._avoid)
+        items = items_of(rows, choices)
+        folders: dict[str, list[Item]] = {}
+        for item in items:
+            folders.setdefault(folder_of(item), []).append(item)
+        datasets: dict[str, Dataset] = {}
+        for name in sorted(folders, key=_place):
+            write_folder(self.folder / name, folders[name])
+            datasets[name] = load_dataset(self.folder / name)
+        about = {"generator": GENERATOR, "expert": EXPERT, "config": asdict(self.config)}
+        text = json.dumps(about | manifest_of(rows, items, datasets), indent=1)
+        publish(self.folder / MANIFEST, f"{text}\n".encode(), "manifest")
+        manifest: Row = json.loads(text)
+        return manifest
+
+
+def _place(folder: str) -> tuple[int, str]:
+    """Order in which folders are named."""
+    order = ("train", "val", "test")
+    return (order.index(folder), "") if folder in order else (len(order), folder)

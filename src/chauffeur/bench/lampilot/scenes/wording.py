@@ -1,0 +1,135 @@
+"""Wordings of one wish to choose from: drawn from the grammar, read back, and kept when they say exactly the wish."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from chauffeur.bench.lampilot.scenes.kinds import Kind, Slot
+from chauffeur.bench.lampilot.scenes.phrasing import Wording, say, templates
+from chauffeur.bench.lampilot.scenes.unambiguous import MAX_WORDS, MIN_WORDS, fault_of, words_of
+from chauffeur.bench.lampilot.scenes.wishes import UNITS, Named, Wish
+from chauffeur.concept import InstructionError
+
+KEPT = 12
+"""Wordings kept for an item; the suite then picks one, so that lengths and repetition come out right."""
+MAX_SAID = 400
+"""Draws after which what was found must do."""
+EXTRA_MAX_WORDS = 24
+"""Longest wording of several steps; the original's kinds keep to its 14."""
+_SPREAD_WORDS = 1.9
+"""Spread of instruction lengths within a kind."""
+_SPELLED = 0.12
+"""Share of whole numbers that are said in words."""
+
+_ONES = [
+    "zero",
+    "one",
+    "two",
+    "three",
+    "four",
+    "five",
+    "six",
+    "seven",
+    "eight",
+    "nine",
+    "ten",
+    "eleven",
+    "twelve",
+    "thirteen",
+    "fourteen",
+    "fifteen",
+    "sixteen",
+    "seventeen",
+    "eighteen",
+    "nineteen",
+]
+_TENS = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"]
+
+
+@dataclass(frozen=True, slots=True)
+class Candidates:
+    """Wordings found for an item.
+
+    Attributes:
+        wordings: Distinct ones that say exactly the wish, most of about the wished length.
+        length: Number of words wished for this item.
+        said: Wordings of fitting length that were read back.
+        misread: Why wordings were thrown away, with counts.
+    """
+
+    wordings: tuple[Wording, ...]
+    length: int
+    said: int
+    misread: Counter[str] = field(default_factory=Counter[str])
+
+
+def word(wish: Wish, kind: Kind, slot: Slot, rng: np.random.Generator) -> Candidates:
+    """Wordings for a wish.
+
+    Raises:
+        InstructionError: The grammar has no wording that says exactly this wish.
+    """
+    longest = EXTRA_MAX_WORDS if kind.family in ("steps", "directness", "refusals") else MAX_WORDS
+    wanted = int(np.clip(round(float(rng.normal(kind.words, _SPREAD_WORDS))), MIN_WORDS, longest))
+    # Extras have no splits and hold nothing out.
+    held = None if slot.split == "extras" else slot.held
+    usable = [template for section in wish.sections for template in templates(section, held=held)]
+    kept: dict[str, Wording] = {}
+    misread: Counter[str] = Counter()
+    said = 0
+    for turn in range(MAX_SAID):
+        if len(kept) >= KEPT:
+            break
+        template = usable[int(rng.integers(len(usable)))]
+        wording = say(template, _spoken(wish, rng), rng)
+        length = words_of(wording.text)
+        # First those of about the wished length, later any: reading back is what costs time.
+        near = abs(length - wanted) <= 1 + 4 * turn // MAX_SAID or turn > MAX_SAID // 2
+        if not near or not MIN_WORDS <= length <= longest or wording.text in kept:
+            continue
+        said += 1
+        fault = fault_of(wording.text, wish, longest)
+        if fault:
+            misread[fault] += 1
+        else:
+            kept[wording.text] = wording
+    if not kept:
+        raise InstructionError(f"No wording says the wish of item {slot.index} ({kind.name}): {dict(misread)}.")
+    return Candidates(tuple(kept.values()), wanted, said, misread)
+
+
+def _spoken(wish: Wish, rng: np.random.Generator) -> dict[str, str]:
+    return {name: value if isinstance(value, str) else spoken(value, rng) for name, value in wish.slots}
+
+
+def spoken(named: Named, rng: np.random.Generator) -> str:
+    """A quantity as a person says or writes it."""
+    unit = UNITS[named.unit]
+    usual = rng.random() < 0.8
+    words = unit.words[: unit.usual] if usual else unit.words
+    said = words[int(rng.integers(len(words)))]
+    spelled = rng.random() < _SPELLED and named.count < 100
+    number = in_words(named.count) if spelled and len(said) > 3 else str(named.count)
+    if named.count == 1:
+        said = _singular(said)
+    return f"{number} {said}"
+
+
+def in_words(count: int) -> str:
+    """A whole number below 100 in words."""
+    if count < 20:
+        return _ONES[count]
+    tens, ones = divmod(count, 10)
+    return _TENS[tens - 2] + (f"-{_ONES[ones]}" if ones else "")
+
+
+def _singular(unit: str) -> str:
+    if unit == "feet":
+        return "foot"
+    head, _, rest = unit.partition("s ")
+    if rest:
+        return f"{head} {rest}"
+    return unit.removesuffix("s") if len(unit) > 2 and unit[-1] == "s" and unit not in ("m/s",) else unit

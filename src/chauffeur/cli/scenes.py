@@ -1,0 +1,204 @@
+"""`chauffeur scenes`: scenes and instructions of our own, in LaMPilot's format."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Generator, Iterable
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+scenes_app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    help="Make, check and count scenes with instructions (LaMPilot's DbLv1 format).",
+)
+
+GENERATE_EXAMPLES = """
+Examples:
+
+    chauffeur scenes generate --out suite
+
+    chauffeur scenes generate --n 490 --seed 7 --out small --extras 100
+
+    chauffeur scenes generate --out suite --avoid DbLv1
+
+Every scene is driven by a scripted expert before it is kept, and every instruction is read back. The same seed gives
+the same suite, whatever the machine. Ctrl-C keeps what is made; the same command goes on.
+"""
+
+CHECK_EXAMPLES = """
+Examples:
+
+    chauffeur scenes check suite
+
+    chauffeur scenes check DbLv1 --json faults.jsonl
+
+Exit code 1 when anything is wrong. LaMPilot's own data has scenes that are impossible or ask for nothing.
+"""
+
+STATS_EXAMPLES = """
+Examples:
+
+    chauffeur scenes stats suite
+
+    chauffeur scenes stats DbLv1
+"""
+
+_LINE_EVERY_S: Final = 10.0
+_SHOWN: Final = 20
+
+
+@scenes_app.command(epilog=GENERATE_EXAMPLES)
+def generate(
+    out: Annotated[Path, typer.Option(help="Folder to write; a suite begun there is continued.")],
+    n: Annotated[int, typer.Option("--n", min=1, help="Items of the main suite.")] = 4900,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    extras: Annotated[
+        int | None,
+        typer.Option(min=0, help="Items beyond the original: hints, several steps, refusals, units. Default n / 5."),
+    ] = None,
+    avoid: Annotated[
+        Path | None, typer.Option(help="DbLv1 folder whose instructions must not come up, e.g. LaMPilot's own.")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
+) -> None:
+    """A suite of our own with the statistics of LaMPilot-Bench (seed Tab. III), split for training and testing."""
+    from chauffeur.bench.lampilot.scenes.suite import Suite, SuiteConfig
+    from chauffeur.cli.console import stdout
+    from chauffeur.worlds.highway.dblv1 import load_dataset
+
+    console = stdout()
+    avoided = None if avoid is None else load_dataset(avoid)
+    config = SuiteConfig(n, seed, n // 5 if extras is None else extras, "" if avoided is None else avoided.sha256)
+    suite = Suite(out, config, avoided)
+    try:
+        with _progress(console, "made") as show:
+            manifest = suite.generate(workers or os.cpu_count() or 1, show)
+    except KeyboardInterrupt:
+        console.print(f"Stopped. {suite.made:,} items are kept in {out}; run the same command to go on.")
+        raise typer.Exit(130) from None
+    _summary(console, out, manifest)
+
+
+def _summary(console: Console, out: Path, manifest: dict[str, Any] | Any) -> None:
+    scenes, words = manifest["scenes"]["main"], manifest["words"]
+    console.print()
+    _table(console, ("Folder", "Items", "SHA-256"), _folders(manifest))
+    console.print()
+    console.print(f"Scenes: {scenes['drawn']:,} drawn, {scenes['kept']:,} kept. Left out:")
+    _table(console, ("", ""), [(why, f"{times:,}") for why, times in scenes["rejected"].items()])
+    console.print()
+    console.print("Wordings drawn, and thrown away because they were not read as what they say:")
+    rows = [(name, f"{held['drawn']:,}", f"{held['rejected_share']:.1%}") for name, held in words.items()]
+    _table(console, ("Family", "Drawn", "Thrown away"), rows)
+    console.print()
+    console.print(f"Next: chauffeur bench lampilot --data {out / 'test'} --planner onboard", soft_wrap=True)
+
+
+def _folders(manifest: Any) -> list[tuple[str, str, str]]:
+    hashes = manifest["sha256"]
+    return [(name, f"{count:,}", hashes[name]["tasks"][:12]) for name, count in manifest["items"].items()]
+
+
+@scenes_app.command(epilog=CHECK_EXAMPLES)
+def check(
+    data: Annotated[Path, typer.Argument(help="Suite, or any DbLv1 folder.")],
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
+    json_out: Annotated[Path | None, typer.Option("--json", help="Write every fault as a JSON line.")] = None,
+) -> None:
+    """Drive every scene with the scripted expert, and read every instruction back."""
+    from chauffeur.bench.lampilot.scenes.checking import as_row, counts
+    from chauffeur.bench.lampilot.scenes.checking import check as look_over
+    from chauffeur.cli.console import plain, stdout
+    from chauffeur.drive.files import publish
+
+    console = stdout()
+    with _progress(console, "checked") as show:
+        items, faults = look_over(data, workers or os.cpu_count() or 1, show)
+    if json_out is not None:
+        lines = "".join(json.dumps(as_row(fault), ensure_ascii=False) + "\n" for fault in faults)
+        publish(json_out, lines.encode(), "list of faults")
+    if not faults:
+        console.print(f"{items:,} items: every scene is solved by the expert, every instruction says its goal.")
+        return
+    console.print(f"{items:,} items, {len(faults):,} faults:")
+    _table(console, ("What", "Why", "Times"), [(what, plain(why), f"{n:,}") for what, why, n in counts(faults)])
+    console.print()
+    for fault in faults[:_SHOWN]:
+        said = f'  "{fault.text}"' if fault.text else ""
+        console.print(plain(f"{fault.where}: {fault.why}{said}"), soft_wrap=True)
+    if len(faults) > _SHOWN:
+        console.print(f"... and {len(faults) - _SHOWN:,} more: add --json FILE.")
+    raise typer.Exit(1)
+
+
+@scenes_app.command(epilog=STATS_EXAMPLES)
+def stats(data: Annotated[Path, typer.Argument(help="Suite, or any DbLv1 folder.")]) -> None:
+    """The columns of Tab. III for any DbLv1 folder, next to the paper's. Extras of a suite are counted apart."""
+    from chauffeur.bench.lampilot.scenes.checking import folders_of
+    from chauffeur.bench.lampilot.scenes.statistics import statistics_of, table
+    from chauffeur.cli.console import stdout
+    from chauffeur.worlds.highway.dblv1 import load_dataset
+
+    console = stdout()
+    folders = folders_of(data)
+    main = {name: folder for name, folder in folders.items() if not name.startswith("extras/")}
+    loaded = [load_dataset(folder) for folder in main.values()]
+    _table(console, ("Statistic", "Here", "Paper"), table(statistics_of(loaded)), right=(1, 2))
+    if len(folders) > 1:
+        console.print()
+        counts = [(name, f"{len(load_dataset(folder).items()):,}") for name, folder in folders.items()]
+        _table(console, ("Folder", "Items"), counts)
+
+
+def _table(
+    console: Console, headings: tuple[str, ...], rows: Iterable[tuple[Any, ...]], right: tuple[int, ...] = ()
+) -> None:
+    from rich.table import Table
+
+    shown = Table(box=None, padding=(0, 2, 0, 0), header_style="bold", show_header=any(headings))
+    for place, heading in enumerate(headings):
+        last = place == len(headings) - 1 and place > 0
+        justify = "right" if place in right or (last and not right) else "left"
+        shown.add_column(heading, justify=justify, overflow="fold")
+    for row in rows:
+        shown.add_row(*row)
+    console.print(shown)
+
+
+@contextmanager
+def _progress(console: Console, what: str) -> Generator[Callable[[int, int], None]]:
+    """A bar on a terminal, a line now and then elsewhere."""
+    if not console.is_terminal:
+        yield _lines(console, what)
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task(what)
+
+        def show(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        yield show
+
+
+def _lines(console: Console, what: str) -> Callable[[int, int], None]:
+    last_s = time.monotonic()
+
+    def show(done: int, total: int) -> None:
+        nonlocal last_s
+        if done == total or time.monotonic() - last_s >= _LINE_EVERY_S:
+            console.print(f"{done:,}/{total:,} {what}")
+            last_s = time.monotonic()
+
+    return show

@@ -1,0 +1,242 @@
+"""A run against a model behind a real HTTP server on loopback: paced, within its budget, going on after anything."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from coached_data import server_module
+from small_run import COMMANDS, FAST, LEFT, Inline, make_data, make_run, quiet
+
+from chauffeur.bench.lampilot.runner import Effort
+from chauffeur.bench.spending import Budget, Price
+from chauffeur.planners.registry import make_planner
+from chauffeur.worlds.highway.dblv1 import Dataset
+
+pytestmark = [pytest.mark.slow, pytest.mark.server]
+
+MODEL = server_module()
+REPLY = f"Thoughts: Left.\n\n```python{LEFT.format(patience=1)}```\n"
+
+
+@dataclass
+class Endpoint:
+    """Answers after a while, refuses more than so many at a time, and does as its script says first."""
+
+    latency_s: float = 0.0
+    cap: int = 10**9
+    faults: list[Any] = field(default_factory=list)
+    answered: int = 0
+    refused: int = 0
+    busiest: int = 0
+    _busy: int = 0
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def __call__(self, exchange: Any) -> None:
+        with self._lock:
+            fault = self.faults.pop(0) if self.faults else None
+            refuse = fault is None and self._busy >= self.cap
+            self.refused += refuse
+            self._busy += not refuse
+            self.busiest = max(self.busiest, self._busy)
+        if refuse:
+            MODEL.fails(429, "Too many at a time.")(exchange)
+            return
+        if fault is None:
+            exchange.pause(self.latency_s)
+        with self._lock:
+            self._busy -= 1  # before the client can know and send the next
+            self.answered += fault is None
+        (fault or MODEL.whole(REPLY))(exchange)
+
+
+@pytest.fixture
+def server() -> Iterator[Any]:
+    running = MODEL.ModelServer()
+    yield running
+    running.close()
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    return make_data(tmp_path_factory.mktemp("endpoint") / "data")
+
+
+@pytest.fixture(autouse=True)
+def no_replies_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "no-cache"))
+    kernels = Path.home() / ".cache" / "chauffeur"  # the compiled core is not what is tested here
+    (tmp_path / "no-cache").mkdir()
+    (tmp_path / "no-cache" / "chauffeur").mkdir()
+    for folder in kernels.glob("kernels-*"):
+        (tmp_path / "no-cache" / "chauffeur" / folder.name).symlink_to(folder)
+
+
+def _planner(server: Any) -> Any:
+    return make_planner("openai/m", base_url=server.url, attempts=1, stream=False, cache=False)
+
+
+def _rows(folder: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (folder / "results.jsonl").read_text().splitlines()]
+
+
+def test_an_endpoint_that_takes_few_at_a_time_loses_no_item(tmp_path: Path, server: Any, dataset: Dataset) -> None:
+    endpoint = Endpoint(0.05, cap=5)
+    server.script(endpoint)
+    run = make_run(tmp_path / "run", dataset, "openai/m", planner=_planner(server))
+    seen: list[Any] = []
+    rows = run.run(seen.append, Effort(engine=Inline, concurrency=64))
+    assert not any(row["infra_failed"] for row in rows) and run.halt is None
+    assert endpoint.busiest == 5 and endpoint.answered == 30
+    assert endpoint.refused < 60
+    assert {row["prompt_tokens"] for row in rows} == {1000}
+    assert all(row["latency_s"] >= 0.05 for row in rows)
+    assert seen[-1].done == seen[-1].planned == 30 and seen[-1].requests == 30 + endpoint.refused
+    assert seen[-1].completion == pytest.approx(sum(row["success"] for row in rows) / 30)
+
+
+def test_faults_that_pass_are_not_seen_in_the_results(tmp_path: Path, server: Any, dataset: Dataset) -> None:
+    clean = make_run(tmp_path / "clean", dataset, "openai/m", planner=_planner(server))
+    server.script(Endpoint())
+    expected = clean.run(quiet, Effort(engine=Inline))
+    endpoint = Endpoint(0.01)
+    endpoint.faults = [
+        MODEL.fails(429, "Slow down.", retry_after_ms="50"),
+        MODEL.fails(500, "Oops."),
+        MODEL.fails(503, "Overloaded."),
+        MODEL.body(b"{}", "application/json"),
+        MODEL.body(b"not json", "application/json"),
+        MODEL.reset_after(),
+        MODEL.whole(None),
+    ]
+    server.script(endpoint)
+    run = make_run(tmp_path / "run", dataset, "openai/m", planner=_planner(server))
+    rows = run.run(quiet, Effort(engine=Inline, patience=FAST, concurrency=4))
+    same = [name for name in rows[0] if name not in ("latency_s", "prompt_tokens", "completion_tokens")]
+    failed = [row for row in rows if row["infra_failed"]]
+    assert len(failed) <= 1, "two attempts are enough for all but one in a burst"
+    rows = make_run(tmp_path / "run", dataset, "openai/m", planner=_planner(server)).run(quiet, Effort(engine=Inline))
+    assert [[row[name] for name in same] for row in rows] == [[row[name] for name in same] for row in expected]
+
+
+def test_an_asked_wait_is_kept(tmp_path: Path, server: Any, dataset: Dataset) -> None:
+    endpoint = Endpoint(0.0, faults=[MODEL.fails(429, "Wait.", retry_after="2")])
+    server.script(endpoint)
+    run = make_run(tmp_path / "run", dataset, "openai/m", items=2, planner=_planner(server))
+    started = time.monotonic()
+    rows = run.run(quiet, Effort(engine=Inline, concurrency=1))
+    assert time.monotonic() - started >= 2.0
+    assert not any(row["infra_failed"] for row in rows)
+
+
+def test_budgets_in_requests_and_money_go_on_with_larger_ones(tmp_path: Path, server: Any, dataset: Dataset) -> None:
+    endpoint = Endpoint(0.01)
+    server.script(endpoint)
+    price = Price(100.0, 1000.0)  # 1000 tokens in, 200 out: 0.3 USD a plan
+    folder = tmp_path / "run"
+
+    def go(budget: Budget) -> Any:
+        run = make_run(folder, dataset, "openai/m", planner=_planner(server))
+        run.run(quiet, Effort(engine=Inline, budget=budget, price=price))
+        return run
+
+    first = go(Budget(max_requests=7))
+    assert first.halt is not None and first.halt.budget
+    assert endpoint.answered in (6, 7) and first.unasked == 30 - endpoint.answered
+    rows = _rows(folder)
+    assert len(rows) == 30, "one row per planned item, whatever happened"
+    assert sum(row["outcome"] == "not_driven" for row in rows) == first.unasked
+    assert all("Not asked" in row["detail"] for row in rows if row["outcome"] == "not_driven")
+    assert "partial" in (folder / "table.md").read_text()
+
+    second = go(Budget(max_usd=5.0))
+    assert second.halt is not None and "5 USD" in second.halt.why
+    assert endpoint.answered == 16, "what was spent before counts: 16 x 0.3 = 4.8"
+    last = go(Budget(max_usd=9.01, max_requests=30))
+    assert last.halt is None and last.unasked == 0 and endpoint.answered == 30
+    assert sum(row["cost_usd"] for row in _rows(folder)) == pytest.approx(9.0)
+    assert "partial" not in (folder / "table.md").read_text()
+
+
+def _command(dataset: Dataset, server: Any, out: Path, *more: str) -> list[str]:
+    start = [sys.executable, "-c", "from chauffeur.cli.main import run; run()", "bench", "lampilot"]
+    where = ["--data", str(dataset.path), "--planner", "openai/m", "--base-url", server.url, "--out", str(out)]
+    return [*start, *where, "--workers", "1", *more]
+
+
+def _said(process: subprocess.CompletedProcess[str]) -> str:
+    return " ".join((process.stdout + process.stderr).split())
+
+
+def _run(command: list[str], tmp_path: Path, name: str) -> subprocess.CompletedProcess[str]:
+    cache = tmp_path / name
+    cache.mkdir()
+    (cache / "chauffeur").symlink_to(tmp_path / "no-cache" / "chauffeur")
+    environ = {**os.environ, "XDG_CACHE_HOME": str(cache)}
+    return subprocess.run(command, capture_output=True, text=True, timeout=240, check=False, env=environ)
+
+
+def test_the_command_says_that_its_budget_is_used_up(tmp_path: Path, server: Any, dataset: Dataset) -> None:
+    server.script(Endpoint())
+    out = tmp_path / "run"
+    stopped = _run(_command(dataset, server, out, "--max-requests", "4"), tmp_path, "one")
+    assert stopped.returncode == 3, _said(stopped)
+    assert "The budget of 4 requests is used up" in _said(stopped)
+    assert "partial" in stopped.stdout and "have not been asked" in _said(stopped)
+    unpriced = _run(_command(dataset, server, out, "--max-usd", "1"), tmp_path, "two")
+    assert unpriced.returncode == 3 and "--price IN/OUT" in _said(unpriced)
+    done = _run(_command(dataset, server, out, "--max-usd", "1", "--price", "0.1/0.4"), tmp_path, "three")
+    assert done.returncode == 0, _said(done)
+    assert not any(row["infra_failed"] for row in _rows(out))
+
+
+def test_a_key_that_is_refused_stops_the_run_at_once(tmp_path: Path, server: Any, dataset: Dataset) -> None:
+    server.script(MODEL.fails(401, "Bad key."))
+    stopped = _run(_command(dataset, server, tmp_path / "run"), tmp_path, "one")
+    assert stopped.returncode == 1 and "401" in _said(stopped), _said(stopped)
+    assert len(server.requests) <= 16
+    server.script(Endpoint())
+    done = _run(_command(dataset, server, tmp_path / "run"), tmp_path, "two")
+    assert done.returncode == 0 and not any(row["infra_failed"] for row in _rows(tmp_path / "run"))
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_a_run_stopped_with_calls_in_flight_asks_for_nothing_twice(
+    tmp_path: Path, server: Any, dataset: Dataset, how: signal.Signals
+) -> None:
+    endpoint = Endpoint(0.4)
+    server.script(endpoint)
+    out = tmp_path / "run"
+    command = _command(dataset, server, out, "--concurrency", "4")
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    plans = out / "generate.jsonl"
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and not (plans.exists() and plans.read_bytes().count(b"\n") >= 9):
+        time.sleep(0.01)
+    process.send_signal(how)
+    text, _ = process.communicate(timeout=60)
+    assert process.returncode == (130 if how == signal.SIGINT else -9), text
+    if how == signal.SIGINT:
+        assert "run the same command to go on" in " ".join(text.split())
+    kept = plans.read_bytes().count(b"\n")
+    assert 9 <= kept < 30
+    time.sleep(0.5)
+    endpoint.answered, endpoint.latency_s = 0, 0.0
+    done = _run(command, tmp_path, "again")
+    assert done.returncode == 0, _said(done)
+    assert endpoint.answered <= 30 - kept, "what was answered and stored is not asked again"
+    asked = [json.loads(line)["item"] for line in plans.read_text().splitlines()]
+    assert len(asked) == len(set(asked)) == 30
+    rows = _rows(out)
+    assert len(rows) == 30 and not any(row["infra_failed"] for row in rows)
+    assert {row["command"] for row in rows if row["success"]} == set(COMMANDS)
