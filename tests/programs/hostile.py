@@ -275,7 +275,7 @@ TAMPERING = [
         frozenset({"harmless"}),
         _body("get_target_speed()\n__used__.extend([10 ** 30, True, None, 'x', -7, 0, 0, 1.5, [[]]])\nyield\n" * 3),
     ),
-    Hostile("tamper/used_flood", frozenset({"calls"}), _body("yield\n__used__.extend([0] * 10 ** 5)\nyield\n" * 3)),
+    Hostile("tamper/used_flood", frozenset({"harmless"}), _body("yield\n__used__.extend([0] * 10 ** 5)\nyield\n" * 3)),
     Hostile("tamper/end_early", frozenset({"harmless"}), _body("__end__(__used__)\nyield\n__end__([[]])")),
     Hostile("tamper/no_answers", frozenset({"raised"}), "__facts__ = None\n" + _body("get_ego_vehicle()")),
     Hostile("tamper/tick_flood", frozenset({"harmless"}), _body("while True:\n    __tick__(-1, [[]])")),

@@ -66,8 +66,10 @@ class DrivingApis:
         self._driver = driver
         self._said: list[str] = []
         self._calls: list[MadeCall] = []
-        self._asked: dict[tuple[str, tuple[Any, ...]], None] = {}
+        self._asked: dict[tuple[str, tuple[Any, ...]], list[Any]] = {}
         self._foreseen: list[MadeCall] = []
+        self._kept: dict[tuple[str, tuple[Any, ...]], list[Any]] = {}
+        self._decoded: list[Any] = []
         self._methods: dict[str, Callable[..., Any]] = {api: getattr(self, f"_{api}") for api in APIS}
 
     def begin_tick(self, perception: Perception) -> None:
@@ -119,7 +121,7 @@ class DrivingApis:
             raise
         self._calls.append(MadeCall(name, given, result))
         if name in FORESEEABLE and not keywords:
-            self._asked[name, tuple(arguments)] = None
+            self._asked[name, tuple(arguments)] = self._decoded
         return result
 
     def foreseen(self) -> tuple[dict[Any, Any], dict[Any, Any]]:
@@ -130,16 +132,19 @@ class DrivingApis:
         facts: dict[Any, Any] = {}
         moods: dict[Any, Any] = {}
         self._foreseen = []
+        self._kept = {}
         asked, self._asked = self._asked, {}
-        for name, arguments in asked:
-            given: list[Any] = []
+        for question, values in asked.items():
+            name, arguments = question
             try:
-                result = self._make(APIS[name], arguments, {}, given)
-            except (BadArgumentTypeError, BadArgumentValueError):
+                answer = self._methods[name](*values)
+            except (KeyError, BadArgumentValueError):  # e.g. the vehicle is gone: the program will hear it if it asks
                 continue
+            result = self._encode(APIS[name], answer)
             table = moods if name in OF_WISHES else facts
-            table[name, arguments] = len(self._foreseen), result
-            self._foreseen.append(MadeCall(name, given, result))
+            table[question] = len(self._foreseen), result
+            self._foreseen.append(MadeCall(name, list(arguments), result))
+            self._kept[question] = values
         return facts, moods
 
     def account(self, used: object) -> int:
@@ -164,7 +169,8 @@ class DrivingApis:
                 count += 1
                 call = self._foreseen[number]
                 self._calls.append(call)
-                self._asked[call.name, tuple(call.given)] = None
+                question = call.name, tuple(call.given)
+                self._asked[question] = self._kept[question]
             elif number == -1:
                 self._calls.extend(islice(real, 1))
         self._calls.extend(real)
@@ -180,6 +186,7 @@ class DrivingApis:
             values.append(self._decode(api, param, given))
             if index < len(arguments) or param.name in keywords:
                 used.append(given)
+        self._decoded = values
         try:
             return self._encode(api, self._methods[api.name](*values))
         except KeyError as error:

@@ -7,6 +7,7 @@ from typing import Final
 
 from chauffeur.programs.catalogue import APIS, Api, Param, argument_problem
 from chauffeur.programs.findings import Finding
+from chauffeur.programs.nodes import all_nodes
 
 _KMH_PER_MPS: Final = 3.6
 _HANDLE_KINDS: Final = frozenset({"vehicle", "lane"})
@@ -168,7 +169,7 @@ def _handle_kinds(tree: ast.Module) -> dict[str, str]:
             if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
                 kinds.setdefault(node.id, set()).add(kind)
 
-    for node in ast.walk(tree):
+    for node in all_nodes(tree):
         if isinstance(node, ast.Assign):
             kind = _call_kind(node.value)
             if isinstance(node.value, ast.Constant) and node.value.value is None:

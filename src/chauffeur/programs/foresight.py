@@ -18,6 +18,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from chauffeur.programs.catalogue import APIS
+from chauffeur.programs.nodes import all_nodes
 
 TICK: Final = "__tick__"
 """What a yield turns into, and the host call behind it."""
@@ -91,7 +92,7 @@ def hidden(name: str) -> str:
 def apis_named(trees: Iterable[ast.Module]) -> frozenset[str]:
     """Driving APIs whose name stands anywhere in the texts."""
     return frozenset(
-        node.id for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id in APIS
+        node.id for tree in trees for node in all_nodes(tree) if isinstance(node, ast.Name) and node.id in APIS
     )
 
 

@@ -18,6 +18,7 @@ from chauffeur.programs.findings import Finding
 from chauffeur.programs.lazy import lazy_findings
 from chauffeur.programs.loops import loop_findings
 from chauffeur.programs.lower import SEARCHES
+from chauffeur.programs.nodes import all_nodes
 from chauffeur.programs.rewrite import (
     binds,
     bound_names,
@@ -76,7 +77,6 @@ class GateReport:
         return "\n".join(str(finding) for finding in self.findings)
 
 
-@lru_cache(maxsize=512)
 def check_source(source: str, library: str = "") -> GateReport:
     """Judge a program text. Never raises and never runs it. The verdict of a text judged before is remembered.
 
@@ -84,6 +84,11 @@ def check_source(source: str, library: str = "") -> GateReport:
         source: Program text.
         library: Helper functions the program may call with `yield from`; judged like the program.
     """
+    return _judged(source, library)
+
+
+@lru_cache(maxsize=512)
+def _judged(source: str, library: str) -> GateReport:
     try:
         tree = parse(unix_lines(source))
     except ProgramSyntaxError as error:
@@ -163,9 +168,9 @@ class _Gate:
         self._calls = CallChecks(tree, self._bound)
 
     def run(self) -> list[Finding]:
-        delegated = {id(node.value) for node in ast.walk(self._tree) if isinstance(node, ast.YieldFrom)}
+        delegated = {id(node.value) for node in all_nodes(self._tree) if isinstance(node, ast.YieldFrom)}
         called_by_delegation: set[int] = set()
-        for node in ast.walk(self._tree):
+        for node in all_nodes(self._tree):
             self._check_allowed(node)
             if isinstance(node, ast.Name):
                 self._check_name(node)
@@ -281,7 +286,7 @@ class _Gate:
         )
 
     def _check_bindings(self) -> None:
-        for node in ast.walk(self._tree):
+        for node in all_nodes(self._tree):
             for name in binds(node):
                 if name.startswith("__"):
                     self._add(node, "reserved", f"the name {name[:40]} is reserved", "use another name")
@@ -312,7 +317,7 @@ class _Gate:
                     )
 
     def _check_generator_uses(self, called_by_delegation: set[int]) -> None:
-        for node in ast.walk(self._tree):
+        for node in all_nodes(self._tree):
             if not isinstance(node, ast.Name) or not isinstance(node.ctx, ast.Load):
                 continue
             if node.id in self._generators and id(node) not in called_by_delegation:
@@ -339,7 +344,7 @@ class _Gate:
                         f"{inner.func.id} is called outside a function, before the drive begins",
                         "move it into the main function",
                     )
-        for node in ast.walk(self._tree):
+        for node in all_nodes(self._tree):
             if isinstance(node, ast.Lambda) and any(
                 isinstance(inner, ast.Yield | ast.YieldFrom) for inner in ast.walk(node.body)
             ):
@@ -353,7 +358,7 @@ class _Gate:
 def _aliases_of_math(tree: ast.Module) -> set[str]:
     return {
         alias.asname or alias.name
-        for node in ast.walk(tree)
+        for node in all_nodes(tree)
         if isinstance(node, ast.Import)
         for alias in node.names
         if alias.name == "math"

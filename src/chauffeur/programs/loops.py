@@ -9,6 +9,7 @@ from typing import Final
 from chauffeur.programs.calls import constant_number
 from chauffeur.programs.catalogue import APIS
 from chauffeur.programs.findings import Finding
+from chauffeur.programs.nodes import all_nodes
 from chauffeur.programs.rewrite import own_nodes
 from chauffeur.programs.words import BUILTINS, MUTATING
 
@@ -21,7 +22,7 @@ _REMEDY: Final = "put `yield autopilot()` into the loop; nothing on the road cha
 def loop_findings(tree: ast.Module) -> list[Finding]:
     """Findings about the loops of a program."""
     findings: list[Finding] = []
-    for node in ast.walk(tree):
+    for node in all_nodes(tree):
         if isinstance(node, ast.While):
             findings += _while_findings(node)
         elif isinstance(node, ast.For):

@@ -12,6 +12,8 @@ import ast
 from dataclasses import dataclass
 from typing import Final
 
+from chauffeur.programs.nodes import all_nodes
+
 SEARCHES: Final = frozenset({"any", "all", "next"})
 """Built-ins that may stop before the end of what they are given."""
 
@@ -100,7 +102,7 @@ def can_lower(search: Search) -> bool:
 
 def needs_prelude(tree: ast.Module) -> bool:
     """Whether a program uses a function that `PRELUDE` gives a body."""
-    for node in ast.walk(tree):
+    for node in all_nodes(tree):
         if isinstance(node, ast.Name) and node.id in _NEEDS_PRELUDE:
             return True
         if isinstance(node, ast.Call) and any(keyword.arg in {"key", None} for keyword in node.keywords):
@@ -131,9 +133,9 @@ class Lowering:
     def edits(self) -> list[Edit]:
         """Replacements that do not overlap. Line breaks are kept, so that later lines keep their numbers."""
         in_text = {
-            id(inner) for node in ast.walk(self._tree) if isinstance(node, ast.JoinedStr) for inner in ast.walk(node)
+            id(inner) for node in all_nodes(self._tree) if isinstance(node, ast.JoinedStr) for inner in ast.walk(node)
         }
-        nodes = [node for node in ast.walk(self._tree) if id(node) not in in_text]  # there, positions are not exact
+        nodes = [node for node in all_nodes(self._tree) if id(node) not in in_text]  # there, positions are not exact
         searches = [search for node in nodes if (search := search_of(node)) is not None and can_lower(search)]
         searches.sort(key=lambda search: self.span(search.call)[1] - self.span(search.call)[0])
         for search in searches:  # inner ones first: an outer one takes them over

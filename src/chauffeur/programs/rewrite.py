@@ -19,6 +19,7 @@ from typing import Final
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.foresight import DRIVE, TICK, apis_named, closing, stand_ins
 from chauffeur.programs.lower import PRELUDE, Lowering, apply_edits, needs_prelude
+from chauffeur.programs.nodes import all_nodes
 
 MAX_SOURCE_CHARS: Final = 20_000
 MAX_NODES: Final = 5_000
@@ -143,12 +144,12 @@ def binds(node: ast.AST) -> list[str]:
 
 def bound_names(tree: ast.Module) -> frozenset[str]:
     """Names that a text binds, at any depth."""
-    return frozenset(name for node in ast.walk(tree) for name in binds(node))
+    return frozenset(name for node in all_nodes(tree) for name in binds(node))
 
 
 def generator_names(tree: ast.Module) -> frozenset[str]:
     """Names of all generator functions a text defines, at any depth."""
-    return frozenset(n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef) and is_generator(n))
+    return frozenset(n.name for n in all_nodes(tree) if isinstance(n, ast.FunctionDef) and is_generator(n))
 
 
 def top_level_names(tree: ast.Module) -> frozenset[str]:
@@ -163,7 +164,6 @@ def top_level_generators(tree: ast.Module) -> frozenset[str]:
     return frozenset(node.name for node in tree.body if isinstance(node, ast.FunctionDef) and is_generator(node))
 
 
-@lru_cache(maxsize=512)
 def prepare(source: str, library: str = "") -> Prepared:
     """Rewrite a program, and the library it may call, for the sandbox; a text rewritten before is remembered.
 
@@ -174,6 +174,11 @@ def prepare(source: str, library: str = "") -> Prepared:
     Raises:
         ProgramSyntaxError: The text is no program, or has no main function.
     """
+    return _prepared(source, library)
+
+
+@lru_cache(maxsize=512)
+def _prepared(source: str, library: str) -> Prepared:
     source, library = unix_lines(source), unix_lines(library)
     tree = parse(source)
     main = main_function(tree)
@@ -201,7 +206,7 @@ def _rewrite(source: str, tree: ast.Module, library_generators: frozenset[str], 
     lowering = Lowering(text, tree)
     edits = lowering.edits()
     redefined = "autopilot" in bound_names(tree)
-    for node in ast.walk(tree):
+    for node in all_nodes(tree):
         if isinstance(node, ast.JoinedStr) and any(isinstance(n, ast.Yield | ast.YieldFrom) for n in ast.walk(node)):
             raise ProgramSyntaxError("A yield cannot stand inside an f-string.", line=node.lineno)
         if isinstance(node, ast.Yield):

@@ -65,8 +65,9 @@ def choose_wordings(rows: Sequence[Row], seed: int, avoid: Set[str]) -> list[Cho
         best = min(held, key=partial(_cost, forms=forms, length=length))
         forms[best.form] += 1
         chosen.append(best)
-    main = [i for i, row in enumerate(rows) if row["split"] != "extras"]
-    _balance(rows, options, chosen, uses, main, seed)
+    for split in ("train", "val", "test"):
+        held_in = [i for i, row in enumerate(rows) if row["split"] == split]
+        _balance(options, chosen, uses[split], held_in, seed)
     return chosen
 
 
@@ -91,22 +92,17 @@ def _group(row: Row) -> str:
 
 
 def _balance(
-    rows: Sequence[Row],
-    options: Sequence[Sequence[Choice]],
-    chosen: list[Choice],
-    uses: Mapping[str, Counter[str]],
-    main: Sequence[int],
-    seed: int,
+    options: Sequence[Sequence[Choice]], chosen: list[Choice], forms: Counter[str], held_in: Sequence[int], seed: int
 ) -> None:
-    """Exchange wordings, item by item in a random order, until the main suite's mean length is Tab. III's."""
-    wanted = PAPER_WORDS[1] * len(main)
-    total = sum(words_of(chosen[i].text) for i in main)
-    order = np.random.default_rng(np.random.SeedSequence([seed, 2**32 + 1])).permutation(len(main))
-    for i in (main[j] for j in order):
+    """Exchange wordings of a split, item by item in a random order, until their mean length is Tab. III's."""
+    wanted = PAPER_WORDS[1] * len(held_in)
+    total = sum(words_of(chosen[i].text) for i in held_in)
+    order = np.random.default_rng(np.random.SeedSequence([seed, 2**32 + 1])).permutation(len(held_in))
+    for i in (held_in[j] for j in order):
         missing = wanted - total
-        if abs(missing) <= _CLOSE_WORDS * len(main):
+        if abs(missing) <= _CLOSE_WORDS * len(held_in):
             return
-        forms, now = uses[_group(rows[i])], chosen[i]
+        now = chosen[i]
         fitting = [
             one
             for one in options[i]

@@ -27,11 +27,13 @@ class Verdict:
         feasible: The expert solves it without a collision, and it asks for something.
         why: Why not, in a few words for counting; empty when it is.
         ticks: Control periods the expert took, 0 when it was not driven.
+        by: Which of `scripted.SOLVERS` solved it.
     """
 
     feasible: bool
     why: str = ""
     ticks: int = 0
+    by: str = ""
 
 
 class GoalReferee:
@@ -108,11 +110,11 @@ def feasible(scenario: Scenario) -> Verdict:
     if _fulfilled_by_itself(world, scenario, goal):
         return Verdict(False, "fulfilled without doing anything")
     why = ""
-    for source in programs:
+    for attempt in programs:
         world.reset(scenario)
-        solved, why, ticks = _drive(world, scenario, source)
+        solved, why, ticks = _drive(world, scenario, attempt.source)
         if solved:
-            return Verdict(True, ticks=ticks)
+            return Verdict(True, ticks=ticks, by=attempt.by)
     return Verdict(False, why)
 
 

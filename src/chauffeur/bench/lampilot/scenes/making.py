@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from chauffeur.bench.lampilot.scenes import beyond, fitting
-from chauffeur.bench.lampilot.scenes.feasible import feasible, impossible, start_of
+from chauffeur.bench.lampilot.scenes.feasible import Verdict, feasible, impossible, start_of
 from chauffeur.bench.lampilot.scenes.fitting import Unfit
 from chauffeur.bench.lampilot.scenes.kinds import KINDS, Slot
 from chauffeur.bench.lampilot.scenes.sampling import draw_road
@@ -68,12 +68,12 @@ def make_item(job: Job) -> dict[str, Any]:
         if isinstance(wish, Unfit):
             rejected[wish.why] += 1
             continue
-        why, ticks = _judge(scenario, wish)
-        if why:
-            rejected[why] += 1
+        verdict = _judge(scenario, wish)
+        if verdict.why:
+            rejected[verdict.why] += 1
             continue
         candidates = word(wish, KINDS[slot.kind], slot, _stream(job, _WORDS_KEY))
-        return _row(slot, scenario, wish, candidates, ticks, rejected)
+        return _row(slot, scenario, wish, candidates, verdict, rejected)
     most = ", ".join(f"{why} ({times})" for why, times in rejected.most_common(3))
     raise ScenarioError(
         f"No feasible scene of kind {slot.kind!r} in {MAX_DRAWS} draws (item {slot.index}): {most}.",
@@ -85,14 +85,13 @@ def _stream(job: Job, key: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence([job.seed, job.slot.index], spawn_key=(key,)))
 
 
-def _judge(scenario: Scenario, wish: Wish) -> tuple[str, int]:
-    """Why a scene does not do for a wish (empty when it does), and the expert's control periods."""
+def _judge(scenario: Scenario, wish: Wish) -> Verdict:
+    """Whether a scene does for a wish."""
     if wish.right == "drive":
-        verdict = feasible(Scenario(scenario.id, scenario.world, scenario.config, scenario.seed, goal=wish.goal))
-        return verdict.why, verdict.ticks
-    if wish.why and "_no_" in scenario.id and not impossible(scenario, wish.origin):
-        return "the wish is possible here", 0
-    return "", 0
+        return feasible(replace(scenario, goal=wish.goal))
+    if "_no_" in scenario.id and not impossible(scenario, wish.origin):
+        return Verdict(False, "the wish is possible here")
+    return Verdict(True)
 
 
 def _row(
@@ -100,7 +99,7 @@ def _row(
     scenario: Scenario,
     wish: Wish,
     candidates: Candidates,
-    ticks: int,
+    verdict: Verdict,
     rejected: Counter[str],
 ) -> dict[str, Any]:
     row = asdict(slot) | {
@@ -112,7 +111,8 @@ def _row(
         "slots": [[name, value if isinstance(value, str) else asdict(value)] for name, value in wish.slots],
         "right": wish.right,
         "why": wish.why,
-        "expert_ticks": ticks,
+        "solved_by": verdict.by,
+        "expert_ticks": verdict.ticks,
         "rejected": dict(rejected),
         "wordings": [[one.text, one.template] for one in candidates.wordings],
         "length": candidates.length,

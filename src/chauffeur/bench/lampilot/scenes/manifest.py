@@ -64,6 +64,7 @@ def _scenes(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             "kept": sum(kept[kind] for kind in main),
             "drawn": sum(kept[kind] for kind in main) + total.total(),
             "rejected": dict(total.most_common()),
+            "solved_by": dict(Counter(row["solved_by"] for row in rows if row["kind"] in main).most_common()),
         },
         "by_kind": {
             kind: {"kept": kept[kind], "drawn": kept[kind] + why.total(), "rejected": dict(why.most_common())}

@@ -1,27 +1,47 @@
-"""Programs that ought to solve a goal: the scripted expert that proves a scene feasible."""
+"""Programs that ought to solve a goal: who proves a scene feasible."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Any
 
+from chauffeur.bench.lampilot.expert import EXPERT, expert_program
 from chauffeur.bench.lampilot.scenes.unambiguous import meaning_of
-from chauffeur.concept import LAMPILOT_LIMITS, Situation
+from chauffeur.concept import LAMPILOT_LIMITS, ScenarioError, Situation
 from chauffeur.planners.onboard.choose import Choice, choose
 from chauffeur.planners.onboard.exemplars import program_of
 from chauffeur.planners.onboard.meaning import Meaning, Reading
 from chauffeur.planners.onboard.personal import Leaning
 
-EXPERT = "onboard-exemplars-v1"
-"""Who proves scenes feasible; stands in the manifest."""
+EXEMPLARS = "onboard-exemplars-v1"
+SOLVERS = (EXPERT, EXEMPLARS)
+"""Who proves scenes feasible, in the order in which they try."""
 
 
-def programs_for(goal: dict[str, Any], situation: Situation) -> tuple[str, ...]:
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """A program that ought to solve a goal, and whose it is."""
+
+    by: str
+    source: str
+
+
+def programs_for(goal: dict[str, Any], situation: Situation) -> tuple[Attempt, ...]:
     """Programs that may solve the goal, best first; a scene is feasible when one of them does.
 
-    They are `planners.onboard`'s exemplar programs, given the goal as a meaning and the situation at the start.
+    The scripted expert knows the goal alone, and LaMPilot's goals only. After it come the exemplar programs of
+    `planners.onboard`, given the goal as a meaning and the situation at the start: they do the other goals, and keep
+    scenes that only the expert happens to fail in.
     """
+    out: list[Attempt] = []
+    with suppress(ScenarioError):  # none of LaMPilot's goals
+        out.append(Attempt(EXPERT, expert_program(goal)))
+    return (*out, *(Attempt(EXEMPLARS, source) for source in _exemplars(goal, situation)))
+
+
+def _exemplars(goal: dict[str, Any], situation: Situation) -> tuple[str, ...]:
     if goal["type"] == "SequenceEval" and "distance" in goal["steps"][0] and len(goal["steps"]) > 1:
         return _gap_first(goal, situation)
     out: list[str] = []
@@ -63,7 +83,7 @@ def _gap_first(goal: dict[str, Any], situation: Situation) -> tuple[str, ...]:
     after = rest[0] if len(rest) == 1 else goal | {"steps": rest}
     return tuple(
         _REACH_GAP.format(gap=round(gap, 1), rest=program, function=_FUNCTION.findall(program)[-1])
-        for program in programs_for(after, situation)
+        for program in _exemplars(after, situation)
     )
 
 

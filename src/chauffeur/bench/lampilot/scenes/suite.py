@@ -18,7 +18,7 @@ from chauffeur.bench.lampilot.scenes.choosing import choose_wordings, normal
 from chauffeur.bench.lampilot.scenes.kinds import plan_suite
 from chauffeur.bench.lampilot.scenes.making import Job, make_item
 from chauffeur.bench.lampilot.scenes.manifest import manifest_of
-from chauffeur.bench.lampilot.scenes.scripted import EXPERT
+from chauffeur.bench.lampilot.scenes.scripted import SOLVERS
 from chauffeur.bench.lampilot.scenes.spreading import Progress, spread
 from chauffeur.bench.lampilot.scenes.writer import Item, folder_of, items_of, write_folder
 from chauffeur.bench.store import Row, RowStore
@@ -76,7 +76,7 @@ class Suite:
     def _freeze_plan(self) -> None:
         plan = {
             "generator": GENERATOR,
-            "expert": EXPERT,
+            "solvers": list(SOLVERS),
             "config": asdict(self.config),
             "versions": {name: version(name) for name in ("chauffeur", "highway-env", "numpy")},
         }
@@ -140,7 +140,7 @@ class Suite:
         for name in sorted(folders, key=_place):
             write_folder(self.folder / name, folders[name])
             datasets[name] = load_dataset(self.folder / name)
-        about = {"generator": GENERATOR, "expert": EXPERT, "config": asdict(self.config)}
+        about = {"generator": GENERATOR, "solvers": list(SOLVERS), "config": asdict(self.config)}
         text = json.dumps(about | manifest_of(rows, items, datasets), indent=1)
         publish(self.folder / MANIFEST, f"{text}\n".encode(), "manifest")
         manifest: Row = json.loads(text)

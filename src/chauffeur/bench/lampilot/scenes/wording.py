@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from chauffeur.bench.lampilot.scenes.choosing import normal
 from chauffeur.bench.lampilot.scenes.kinds import Kind, Slot
 from chauffeur.bench.lampilot.scenes.phrasing import Wording, say, templates
 from chauffeur.bench.lampilot.scenes.unambiguous import MAX_WORDS, MIN_WORDS, fault_of, words_of
@@ -88,14 +89,14 @@ def word(wish: Wish, kind: Kind, slot: Slot, rng: np.random.Generator) -> Candid
         length = words_of(wording.text)
         # First those of about the wished length, later any: reading back is what costs time.
         near = abs(length - wanted) <= 1 + 4 * turn // MAX_SAID or turn > MAX_SAID // 2
-        if not near or not MIN_WORDS <= length <= longest or wording.text in kept:
+        if not near or not MIN_WORDS <= length <= longest or normal(wording.text) in kept:
             continue
         said += 1
         fault = fault_of(wording.text, wish, longest)
         if fault:
             misread[fault] += 1
         else:
-            kept[wording.text] = wording
+            kept[normal(wording.text)] = wording
     if not kept:
         raise InstructionError(f"No wording says the wish of item {slot.index} ({kind.name}): {dict(misread)}.")
     return Candidates(tuple(kept.values()), wanted, said, misread)
