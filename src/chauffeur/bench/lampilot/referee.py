@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from chauffeur.bench.lampilot.goals import Ruling, make_goal
+from chauffeur.bench.lampilot.goals import Ruling
+from chauffeur.bench.lampilot.goals_more import make_any_goal
 from chauffeur.bench.lampilot.metrics import metrics_of
 from chauffeur.bench.lampilot.signals import SignalLog, Signals
 from chauffeur.concept import Metric, Outcome, Scenario
@@ -22,7 +23,7 @@ class LampilotReferee:
 
     def __init__(self, world: HasRoad, scenario: Scenario) -> None:
         self._road = world.perception()
-        self._goal = make_goal(self._road, scenario)
+        self._goal = make_any_goal(self._road, scenario)
         self._log = SignalLog(self._road)
         self._ruling: Ruling = "open"
 
