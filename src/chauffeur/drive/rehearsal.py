@@ -7,11 +7,9 @@ going to do. Whatever comes of it says so (`label`). Programs run in the sandbox
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from threading import Lock
-from typing import Protocol, Self
+from typing import Final, Protocol, Self, TypeVar
 
 from chauffeur.concept import Metric, Outcome, SandboxError
 from chauffeur.drive.episode import Referee, run_episode
@@ -30,6 +28,9 @@ class CopyableWorld(World, Protocol):
     def copy(self) -> Self:
         """The same instant in a world of its own; stepping one leaves the other alone."""
         ...
+
+
+SomeWorld = TypeVar("SomeWorld", bound=CopyableWorld)
 
 
 class Judge(Referee, Protocol):
@@ -69,6 +70,11 @@ class Rollout:
     ticks: int
     cut: bool
 
+    @property
+    def failed(self) -> bool:
+        """Whether the program failed."""
+        return self.worth == -math.inf
+
 
 @dataclass(frozen=True, slots=True)
 class Choice:
@@ -77,29 +83,30 @@ class Choice:
     Attributes:
         index: Its place among the candidates.
         source: Its text.
-        rollouts: How each candidate did.
+        rollouts: How the candidates did, by their places.
     """
 
     index: int
     source: str
-    rollouts: tuple[Rollout, ...]
+    rollouts: Mapping[int, Rollout]
 
 
 def rehearse(
-    world: CopyableWorld,
+    world: SomeWorld,
     candidates: Sequence[str],
-    judge: Callable[[CopyableWorld], Judge],
+    judge: Callable[[SomeWorld], Judge],
     *,
     sandbox: Sandbox,
     max_s: float,
     library: str = "",
-    threads: int = 1,
+    which: Iterable[int] | None = None,
+    known: Mapping[int, Rollout] | None = None,
 ) -> Choice:
-    """Try all candidates on copies of the world and choose the one whose trip was worth most.
+    """Try candidates on copies of the world and choose the one whose trip was worth most.
 
     One that collides is only chosen when all collide, one whose program fails only when all fail; of equals the first
-    is taken. A try is broken off as soon as it cannot become the best any more, which changes no choice. So the choice
-    depends on the world, the candidates and the judge alone, not on the number of threads.
+    is taken. A try is broken off as soon as it cannot become the best any more, which changes no choice: it depends on
+    the world, the candidates and the judge alone.
 
     Args:
         world: Where the trip is to begin; it stays as it is.
@@ -108,54 +115,39 @@ def rehearse(
         sandbox: Where the programs run.
         max_s: Bound of each try in simulated time.
         library: Helper functions the programs may call.
-        threads: Tries at a time. A try waits for its sandbox about half of the time, so two keep two cores busy.
+        which: Places of the candidates to try; all if None.
+        known: How some candidates did, as another call found out.
 
     Raises:
         ValueError: There are no candidates.
         SandboxError: No worker can be had.
     """
-    if not candidates:
+    rollouts = dict(known or {})
+    for index in range(len(candidates)) if which is None else which:
+        if index not in rollouts:
+            best = best_of(rollouts)
+            rank = _NOTHING if best is None else _rank(rollouts[best], best)
+            rollouts[index] = _attempt(world, index, candidates[index], judge, rank, sandbox, max_s, library)
+    best = best_of(rollouts)
+    if best is None:
         raise ValueError("There is nothing to rehearse: no candidates.")
-    best = _Best()
-
-    def attempt(index: int) -> Rollout:
-        return _attempt(world.copy(), index, candidates[index], judge, best, sandbox, max_s, library)
-
-    if threads <= 1:
-        rollouts = tuple(map(attempt, range(len(candidates))))
-    else:
-        with ThreadPoolExecutor(threads) as pool:
-            rollouts = tuple(pool.map(attempt, range(len(candidates))))
-    return Choice(best.index, candidates[best.index], rollouts)
+    return Choice(best, candidates[best], rollouts)
 
 
-class _Best:
-    """The best try so far, shared by those under way."""
+def best_of(rollouts: Mapping[int, Rollout]) -> int | None:
+    """Place of the best try; None where there is none."""
+    whole = [index for index, rollout in rollouts.items() if not rollout.cut]
+    return max(whole, key=lambda index: _rank(rollouts[index], index), default=None)
 
-    def __init__(self) -> None:
-        self._lock = Lock()
-        self._rank: tuple[bool, bool, float, int] = (False, False, -math.inf, 0)
 
-    @property
-    def index(self) -> int:
-        """Place of the best candidate."""
-        return -self._rank[3]
-
-    def offer(self, rollout: Rollout, index: int, *, failed: bool) -> None:
-        """A try that has come to its end."""
-        rank = (not rollout.collided, not failed, rollout.worth, -index)
-        with self._lock:
-            self._rank = max(self._rank, rank)
-
-    def beats(self, ceiling: float, index: int) -> bool:
-        """Whether a try under way cannot become the best any more, even without a collision."""
-        return self._rank > (True, True, ceiling, -index)
+def _rank(rollout: Rollout, index: int) -> tuple[bool, bool, float, int]:
+    return not rollout.collided, not rollout.failed, rollout.worth, -index
 
 
 class _Impatient:
-    """A judge that ends a try which is lost."""
+    """A judge that ends a try which is lost, even if it came to no collision."""
 
-    def __init__(self, judge: Judge, best: _Best, index: int) -> None:
+    def __init__(self, judge: Judge, best: tuple[bool, bool, float, int], index: int) -> None:
         self._judge = judge
         self._best = best
         self._index = index
@@ -163,7 +155,7 @@ class _Impatient:
 
     def observe(self) -> None:
         self._judge.observe()
-        self.cut = not self._judge.over and self._best.beats(self._judge.ceiling, self._index)
+        self.cut = not self._judge.over and self._best > (True, True, self._judge.ceiling, -self._index)
 
     @property
     def over(self) -> bool:
@@ -180,29 +172,30 @@ class _Impatient:
         return ()
 
 
+_NOTHING: Final = (False, False, -math.inf, 0)
+"""Rank that any try beats."""
+
+
 def _attempt(
-    world: CopyableWorld,
+    world: SomeWorld,
     index: int,
     source: str,
-    make_judge: Callable[[CopyableWorld], Judge],
-    best: _Best,
+    make_judge: Callable[[SomeWorld], Judge],
+    best: tuple[bool, bool, float, int],
     sandbox: Sandbox,
     max_s: float,
     library: str,
 ) -> Rollout:
-    judge = make_judge(world)
+    twin = world.copy()
+    judge = make_judge(twin)
     referee = _Impatient(judge, best, index)
     executor = ProgramExecutor(sandbox=sandbox, library=library)
     try:
-        executor.start(source, world)
-        episode = run_episode(world, executor, referee, max_s=max_s, record=False)
+        executor.start(source, twin)
+        episode = run_episode(twin, executor, referee, max_s=max_s, record=False)
     finally:
         executor.close()
     if episode.causes.infra_failed:
         raise SandboxError(f"The sandbox failed in a rehearsal: {episode.causes.detail}", retryable=True)
-    failed = episode.causes.policy_failed
-    worth = -math.inf if failed else judge.worth
-    rollout = Rollout(worth, judge.collided, episode.outcome, episode.ticks, referee.cut)
-    if not referee.cut:
-        best.offer(rollout, index, failed=failed)
-    return rollout
+    worth = -math.inf if episode.causes.policy_failed else judge.worth
+    return Rollout(worth, judge.collided, episode.outcome, episode.ticks, referee.cut)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import atexit
 import math
-from collections.abc import Mapping, Sequence
+import multiprocessing
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from functools import cache
-from typing import Any
+from typing import Any, Self
 
 from chauffeur.bench.lampilot.expert import variants
 from chauffeur.bench.lampilot.goals import DistanceGoal, Ruling, SpeedGoal, make_goal
@@ -19,10 +21,10 @@ from chauffeur.bench.lampilot.metrics import (
     points,
 )
 from chauffeur.concept import Metric, Outcome, Scenario
-from chauffeur.drive.rehearsal import Choice, CopyableWorld, rehearse
+from chauffeur.drive.rehearsal import Choice, Rollout, best_of, rehearse
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.variants import perturbed
-from chauffeur.worlds.highway import RoadPerception
+from chauffeur.worlds.highway import HighwayWorld, RoadPerception
 
 MAX_TRY_S = 70.0
 """Longest try: goals with a limit of their own have 60 s."""
@@ -124,19 +126,34 @@ def candidates(goal: Mapping[str, Any], count: int, seed: int, source: str = "")
 
 
 def rehearsed(
-    world: CopyableWorld, scenario: Scenario, sources: Sequence[str], *, library: str = "", threads: int = 1
+    world: HighwayWorld,
+    scenario: Scenario,
+    sources: Sequence[str],
+    *,
+    library: str = "",
+    which: Iterable[int] | None = None,
+    known: Mapping[int, Rollout] | None = None,
 ) -> Choice:
     """The program to drive from the world's present instant, chosen by LaMPilot's own ruler.
+
+    Args:
+        world: Where the trip is to begin; it stays as it is.
+        scenario: The sample, whose goal is judged.
+        sources: Checked program texts, likely ones first.
+        library: Helper functions they may call.
+        which, known: As `rehearse`.
 
     Raises:
         ScenarioError: The scenario's goal cannot be judged here.
         SandboxError: No worker can be had.
     """
 
-    def judge(copy: CopyableWorld) -> OriginJudge:
+    def judge(copy: HighwayWorld) -> OriginJudge:
         return OriginJudge(copy.perception(), scenario)
 
-    return rehearse(world, sources, judge, sandbox=_sandbox(), max_s=MAX_TRY_S, library=library, threads=threads)
+    return rehearse(
+        world, sources, judge, sandbox=_sandbox(), max_s=MAX_TRY_S, library=library, which=which, known=known
+    )
 
 
 @cache
@@ -145,3 +162,47 @@ def _sandbox() -> Sandbox:
     sandbox = Sandbox(UNHURRIED)
     atexit.register(sandbox.close)
     return sandbox
+
+
+class Crew:
+    """Processes that rehearse one trip together, so that one wish has all cores. Use it as a context manager.
+
+    A benchmark run does not need it: its workers have a sample each.
+    """
+
+    def __init__(self, helpers: int) -> None:
+        """Start helper processes beside this one. Raises OSError when none can be started."""
+        context = multiprocessing.get_context("spawn")
+        self._pools = [ProcessPoolExecutor(1, mp_context=context) for _ in range(helpers)]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        for pool in self._pools:
+            pool.shutdown(cancel_futures=True)
+
+    def rehearsed(self, scenario: Scenario, sources: Sequence[str], *, library: str = "") -> Choice:
+        """As `rehearsed`, for a trip that begins where the scenario does; the choice is the same."""
+        world = HighwayWorld()
+        world.reset(scenario)
+        known = rehearsed(world, scenario, sources, library=library, which=(0,)).rollouts
+        shares = [range(1 + i, len(sources), 1 + len(self._pools)) for i in range(1 + len(self._pools))]
+        others = [
+            pool.submit(_share, scenario, sources, library, share, known)
+            for pool, share in zip(self._pools, shares[1:], strict=True)
+        ]
+        rollouts = dict(rehearsed(world, scenario, sources, library=library, which=shares[0], known=known).rollouts)
+        for other in others:
+            rollouts |= other.result()
+        best = best_of(rollouts)
+        assert best is not None
+        return Choice(best, sources[best], dict(sorted(rollouts.items())))
+
+
+def _share(
+    scenario: Scenario, sources: Sequence[str], library: str, which: Iterable[int], known: Mapping[int, Rollout]
+) -> Mapping[int, Rollout]:
+    world = HighwayWorld()
+    world.reset(scenario)
+    return rehearsed(world, scenario, sources, library=library, which=which, known=known).rollouts

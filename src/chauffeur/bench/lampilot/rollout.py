@@ -135,7 +135,8 @@ def _sandbox() -> Sandbox:
     """
     if multiprocessing.parent_process() is not None and hasattr(os, "sched_setaffinity"):
         cores = sorted(os.sched_getaffinity(0))
-        os.sched_setaffinity(0, {cores[os.getpid() % len(cores)]})
+        number = multiprocessing.current_process().name.rpartition("-")[2]  # workers are numbered as they start
+        os.sched_setaffinity(0, {cores[(int(number) if number.isdigit() else os.getpid()) % len(cores)]})
     sandbox = Sandbox(UNHURRIED)
     atexit.register(sandbox.close)
     return sandbox

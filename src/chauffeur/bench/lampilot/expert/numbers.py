@@ -17,7 +17,6 @@ TUNED: Final[dict[str, dict[str, float]]] = {
         "PHASE": 0.87,
         "DRIFT": 0.9,
         "FOLLOW": 37.0,
-        "REST": 3.0,
         "CLOSE_MOST": 4.5,
         "CLOSE_BRAKE": 1.5,
         "KEEP_LEAST": 1.6,
@@ -29,6 +28,7 @@ TUNED: Final[dict[str, dict[str, float]]] = {
         "MARGIN": 0.4,
         "BRAKE": 5.0,
         "ACCELERATE": 5.0,
+        "TELL": 0.001,
     },
     "wider": {
         "FRONT": 9.0,
@@ -39,7 +39,6 @@ TUNED: Final[dict[str, dict[str, float]]] = {
         "PHASE": 0.87,
         "DRIFT": 0.8,
         "FOLLOW": 20.0,
-        "REST": 3.0,
         "CLOSE_MOST": 6.0,
         "CLOSE_BRAKE": 1.0,
         "KEEP_LEAST": 0.5,
@@ -51,12 +50,12 @@ TUNED: Final[dict[str, dict[str, float]]] = {
         "MARGIN": 0.5,
         "BRAKE": 5.0,
         "ACCELERATE": 5.0,
+        "TELL": 0.001,
     },
     "slow": {
         "PERIODS": 12.0,
         "PHASE": 0.87,
         "PAUSE_AT": 0.5,
-        "REST": 3.0,
         "EDGE": 0.93,
         "SLACK": 0.5,
         "CLOSE_MOST": 6.0,
@@ -66,12 +65,12 @@ TUNED: Final[dict[str, dict[str, float]]] = {
         "PAUSE": 0.0,
         "BRAKE": 5.0,
         "ACCELERATE": 5.0,
+        "TELL": 0.001,
     },
     "speed": {
         "PERIODS": 12.0,
         "PHASE": 0.87,
         "PAUSE_AT": 0.5,
-        "REST": 3.0,
         "EDGE": 0.93,
         "SLACK": 0.5,
         "CLOSE_MOST": 6.0,
@@ -81,6 +80,7 @@ TUNED: Final[dict[str, dict[str, float]]] = {
         "PAUSE": 0.0,
         "BRAKE": 5.0,
         "ACCELERATE": 5.0,
+        "TELL": 0.001,
     },
     "lane": {
         "FRONT": 9.0,
@@ -90,6 +90,7 @@ TUNED: Final[dict[str, dict[str, float]]] = {
         "PERIODS": 12.0,
         "PHASE": 0.87,
         "BRAKE_S": 2.0,
+        "TELL": 0.001,
     },
     "overtake": {
         "FRONT": 9.0,
@@ -113,6 +114,7 @@ TUNED: Final[dict[str, dict[str, float]]] = {
         "ROOM": 12.0,
         "BRAKE": 5.0,
         "ACCELERATE": 5.0,
+        "TELL": 0.001,
     },
     "pull_over": {
         "FRONT": 9.0,
@@ -125,6 +127,7 @@ TUNED: Final[dict[str, dict[str, float]]] = {
         "BRAKE": 5.0,
         "PAUSE": 14.0,
         "SHIFT_BRAKE": 5.0,
+        "TELL": 0.001,
     },
     "straight": {
         "DIP": 8.0,
@@ -149,6 +152,7 @@ TUNED: Final[dict[str, dict[str, float]]] = {
         "CROSS": 9.0,
         "CREEP": 0.606,
         "HOLD": 14.8,
+        "TELL": 0.001,
     },
     "left": {
         "DIP": 8.0,
@@ -181,6 +185,7 @@ TUNED: Final[dict[str, dict[str, float]]] = {
         "CROSS": 10.667,
         "CREEP": 0.692,
         "HOLD": 15.029,
+        "TELL": 0.001,
     },
     "right": {
         "DIP": 8.0,
@@ -213,6 +218,7 @@ TUNED: Final[dict[str, dict[str, float]]] = {
         "CROSS": 10.667,
         "CREEP": 0.692,
         "HOLD": 14.8,
+        "TELL": 0.001,
     },
 }
 """By style: `closer` and `wider` keep a distance, `slow` and `speed` a speed; then the manoeuvres and the turns."""
