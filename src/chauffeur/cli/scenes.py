@@ -31,7 +31,7 @@ Examples:
     chauffeur scenes generate --out suite --avoid DbLv1
 
 Every scene is driven by a scripted expert before it is kept, and every instruction is read back. The same seed gives
-the same suite, whatever the machine. Ctrl-C keeps what is made; the same command goes on.
+the same suite, however many processes make it. Ctrl-C keeps what is made; the same command goes on.
 """
 
 CHECK_EXAMPLES = """

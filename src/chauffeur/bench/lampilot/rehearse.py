@@ -11,7 +11,8 @@ from functools import cache
 from typing import Any, Self
 
 from chauffeur.bench.lampilot.expert import variants
-from chauffeur.bench.lampilot.goals import DistanceGoal, Ruling, SpeedGoal, make_goal
+from chauffeur.bench.lampilot.goals import DistanceGoal, OvertakeGoal, Ruling, SpeedGoal
+from chauffeur.bench.lampilot.goals_more import make_any_goal
 from chauffeur.bench.lampilot.metrics import (
     COLLISION_WEIGHT,
     ORIGIN,
@@ -29,7 +30,9 @@ from chauffeur.worlds.highway import HighwayWorld, RoadPerception
 MAX_TRY_S = 70.0
 """Longest try: goals with a limit of their own have 60 s."""
 
-_WAIT_TICKS = 5
+_PASS_S = 0.11
+"""A car that is passed is at most a control period away just before, and to overtake is to pass."""
+_EVERY_TICKS = 5
 """How often a try's ceiling is computed."""
 
 
@@ -38,11 +41,12 @@ class OriginJudge:
 
     def __init__(self, road: RoadPerception, scenario: Scenario) -> None:
         self._road = road
-        self._goal = make_goal(road, scenario)
+        self._goal = make_any_goal(road, scenario)
         self._ruling: Ruling = "open"
         self._steps = 0
         self._mean = self._squares = 0.0
         self._least_s = math.inf
+        self._inevitable_s = _PASS_S if isinstance(self._goal, OvertakeGoal) else math.inf
         self._ceiling = math.inf
 
     def observe(self) -> None:
@@ -55,7 +59,7 @@ class OriginJudge:
         if 0 < now.ttc_along_s < self._least_s:
             self._least_s = now.ttc_along_s
         self._ruling = self._goal.rule(self._steps / 10, now)
-        if self._steps % _WAIT_TICKS == 0:
+        if self._steps % _EVERY_TICKS == 0:
             self._ceiling = self._highest()
 
     @property
@@ -77,7 +81,7 @@ class OriginJudge:
     @property
     def worth(self) -> float:
         """What the trip adds to 100 times the driving score of a run, per item."""
-        return self._score_after(self._steps) * self.success - COLLISION_WEIGHT * self.collided
+        return self._score_after(self._steps, self._least_s) * self.success - COLLISION_WEIGHT * self.collided
 
     @property
     def ceiling(self) -> float:
@@ -99,13 +103,14 @@ class OriginJudge:
         best = (per_mps * math.sqrt(self._squares) / (2.0 * per_step)) ** (2.0 / 3.0)
         left_s = self._goal.left_s(self._steps / 10) if isinstance(self._goal, SpeedGoal | DistanceGoal) else 0.0
         least = self._steps + math.floor(10.0 * left_s)
-        return max(self._score_after(max(least, math.floor(best))), self._score_after(max(least, math.ceil(best))))
+        ttc_s = min(self._least_s, self._inevitable_s)
+        return max(self._score_after(max(least, round_(best)), ttc_s) for round_ in (math.floor, math.ceil))
 
-    def _score_after(self, steps: int) -> float:
+    def _score_after(self, steps: int, least_ttc_s: float) -> float:
         """Score of a success after so many steps, the speeds so far and from now on their mean driven."""
         signals = {
             "steps": steps,
-            "ttc_along_s": self._least_s if math.isfinite(self._least_s) else None,
+            "ttc_along_s": least_ttc_s if math.isfinite(least_ttc_s) else None,
             "speed_std_mps": math.sqrt(self._squares / max(1, steps)),
             "crashed": False,
             "off_road": False,
@@ -133,6 +138,7 @@ def rehearsed(
     library: str = "",
     which: Iterable[int] | None = None,
     known: Mapping[int, Rollout] | None = None,
+    sandbox: Sandbox | None = None,
 ) -> Choice:
     """The program to drive from the world's present instant, chosen by LaMPilot's own ruler.
 
@@ -142,6 +148,7 @@ def rehearsed(
         sources: Checked program texts, likely ones first.
         library: Helper functions they may call.
         which, known: As `rehearse`.
+        sandbox: Where they run; None for one that this module keeps for the process.
 
     Raises:
         ScenarioError: The scenario's goal cannot be judged here.
@@ -152,7 +159,14 @@ def rehearsed(
         return OriginJudge(copy.perception(), scenario)
 
     return rehearse(
-        world, sources, judge, sandbox=_sandbox(), max_s=MAX_TRY_S, library=library, which=which, known=known
+        world,
+        sources,
+        judge,
+        sandbox=_sandbox() if sandbox is None else sandbox,
+        max_s=MAX_TRY_S,
+        library=library,
+        which=which,
+        known=known,
     )
 
 

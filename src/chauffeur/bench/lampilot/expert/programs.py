@@ -35,23 +35,24 @@ _TURNS: Final = {"o1": "left", "o2": "straight", "o3": "right"}
 """Exits of the intersection, seen by the ego that comes from the south."""
 
 
-def expert_program(goal: Mapping[str, Any]) -> str:
+def expert_program(goal: Mapping[str, Any], changed: Mapping[str, float] | None = None) -> str:
     """Text of the program for a goal.
 
     Args:
         goal: A DbLv1 `eval` mapping.
+        changed: Numbers in the place of the tuned ones (`numbers.TUNED`); those the program does not have are ignored.
 
     Raises:
         ScenarioError: There is no program for such a goal, or it is malformed.
     """
     style, text, words = _what(goal)
-    return filled(text, words | _written(TUNED[style]))
+    return filled(text, words | _written(TUNED[style] | dict(changed or {})))
 
 
 def variants(goal: Mapping[str, Any], count: int, seed: int) -> list[str]:
     """The program for a goal and others like it with other numbers (speeds, margins, phases), the program itself first.
 
-    The same goal, count and seed give the same texts; a smaller count gives the first of them.
+    They all differ. The same goal, count and seed give the same texts; a smaller count gives the first of them.
 
     Raises:
         ScenarioError: As `expert_program`.
@@ -59,9 +60,11 @@ def variants(goal: Mapping[str, Any], count: int, seed: int) -> list[str]:
     style, text, words = _what(goal)
     rng = np.random.default_rng([seed, sum(style.encode())])
     out = [filled(text, words | _written(TUNED[style]))]
-    for _ in range(count - 1):
-        out.append(filled(text, words | _written(_drawn(style, rng))))
-    return out[:count]
+    while len(out) < count:
+        variant = filled(text, words | _written(_drawn(style, rng)))
+        if variant not in out:
+            out.append(variant)
+    return out
 
 
 def _drawn(style: str, rng: np.random.Generator) -> dict[str, float]:
