@@ -13,6 +13,7 @@ import os
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from chauffeur.bench.lampilot.metrics import points
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
 from chauffeur.concept import LAMPILOT_LIMITS
 from chauffeur.worlds.highway.dblv1 import load_dataset
@@ -37,7 +38,8 @@ def main() -> None:
         for baseline in ("idm", "mobil"):
             jobs = [RolloutJob(key, s, baseline, None, LAMPILOT_LIMITS) for key, s in samples.items()]
             agree = 0
-            for row in pool.map(roll_out, jobs, chunksize=4):
+            for rolled in pool.map(roll_out, jobs, chunksize=4):
+                row = rolled | points(rolled, "origin")
                 peer = golden[row["key"]][baseline]
                 same = all(row[k] == peer[k] for k in ("success", "collision", "steps"))
                 same = same and all(abs(row[ours] - peer[theirs]) <= 1e-6 for theirs, ours in COLUMNS.items())

@@ -123,7 +123,7 @@ def test_it_completes_every_task_without_a_collision_and_stops_at_signs(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("place", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize("place", [2, 3, 5])
 def test_it_does_so_on_more_of_the_data(lampilot_data: Path, sandbox: Sandbox, place: int) -> None:
     rows = [(s, drive(s, expert_program(s.goal), sandbox)) for s in samples(lampilot_data, place)]
     assert [s.id for s, row in rows if row["collision"]] == []

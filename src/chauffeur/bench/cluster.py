@@ -8,6 +8,7 @@ import os
 import secrets
 import shutil
 import tempfile
+from importlib import import_module
 from importlib.metadata import version
 from typing import Any, Final
 from urllib.parse import urlsplit
@@ -109,13 +110,13 @@ class RayEngine:
 
     async def _check_nodes(self) -> None:
         """Every node must do what this process would do."""
-        from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+        strategies: Any = import_module("ray.util.scheduling_strategies")
 
         here = version("chauffeur")
         nodes = [node for node in self._ray.nodes() if node["Alive"] and node["Resources"].get("CPU", 0) >= 1]
         asked: list[tuple[str, Any]] = []
         for node in nodes:
-            place = NodeAffinitySchedulingStrategy(node["NodeID"], soft=False)
+            place = strategies.NodeAffinitySchedulingStrategy(node["NodeID"], soft=False)
             task = self._ray.remote(num_cpus=0, max_retries=2)(installed).options(scheduling_strategy=place)
             asked.append((node["NodeManagerAddress"], task.remote()))
         for name, reference in asked:
@@ -219,7 +220,7 @@ def _import_ray(*, own_cluster: bool) -> Any:
         # keeps it to the cluster's processes; else it would write one to the home folder.
         os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(32)
     try:
-        import ray
+        ray: Any = import_module("ray")
     except ImportError as error:
         raise MissingExtraError(
             "Ray is not installed.", hint="Install it with: pip install 'chauffeur[cluster]'"

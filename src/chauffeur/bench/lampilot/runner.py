@@ -37,6 +37,10 @@ from chauffeur.worlds.highway.dblv1 import Dataset
 __all__ = ["BENCH_VERSION", "Effort", "LampilotBenchmark", "LampilotRun", "RunConfig", "choose_items"]
 
 
+EXPERT_LABEL = "scripted expert: told the goal, reads no words"
+"""What must be said wherever a row of the expert is shown."""
+
+
 @dataclass(frozen=True, slots=True)
 class Effort:
     """How hard a run works; none of it changes a result.
@@ -96,6 +100,8 @@ class LampilotRun:
         self._planner = planner
         self._requests = requests or _plain(config)
         labels: tuple[str, ...] = (*getattr(planner, "labels", ()), *getattr(requests, "labels", ()))
+        if config.planner == "expert":
+            labels = (*labels, EXPERT_LABEL)
         if config.rehearse:
             if config.planner in ("idm", "mobil"):
                 raise ConfigError(f"{config.planner} has no program to rehearse.", hint="Leave --rehearse out.")

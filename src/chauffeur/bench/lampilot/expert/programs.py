@@ -2,6 +2,7 @@
 
 A program is closed-loop and the same for all samples of a family: what it knows of a sample is the goal (LaMPilot's
 `eval` mapping: what kind, and its number or side); everything else it learns from the driving APIs while it drives.
+What all samples of a family share it knows, too: the layout of LaMPilot's crossing, the vehicle model, the ruler.
 
 Three things make the programs better drivers than plain use of the APIs:
 

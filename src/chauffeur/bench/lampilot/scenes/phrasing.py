@@ -57,11 +57,6 @@ class Wording:
     text: str
     template: str
 
-    @property
-    def words(self) -> int:
-        """Length as LaMPilot counts it: pieces between spaces."""
-        return len(self.text.split())
-
 
 @cache
 def _tables() -> tuple[Mapping[str, tuple[Template, ...]], Mapping[str, Node]]:
