@@ -20,8 +20,8 @@ from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
 from chauffeur.concept import Command, Scenario, Snapshot
 from chauffeur.drive.episode import run_episode
-from chauffeur.programs.gate import check_source
-from chauffeur.programs.rewrite import prepare
+from chauffeur.programs.gate import _judged
+from chauffeur.programs.rewrite import _prepared
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway import world as compiled
 from chauffeur.worlds.highway.reference import ReferenceWorld
@@ -187,8 +187,8 @@ def drive_job(job: RolloutJob) -> Drive:
 def forget() -> None:
     """Drive as if for the first time: no start situation, no judged program is remembered."""
     compiled._starts.clear()
-    check_source.cache_clear()
-    prepare.cache_clear()
+    _judged.cache_clear()
+    _prepared.cache_clear()
 
 
 def on_one_core(work: Callable[[], None]) -> None:
