@@ -243,13 +243,14 @@ def test_a_kind_without_feasible_scenes_says_so(monkeypatch: pytest.MonkeyPatch)
 
 @pytest.fixture
 def faulty(tmp_path: Path) -> Path:
-    """Three items: one sound, one whose words say another side, one that nobody can do."""
+    """Four items: one sound, two whose words say another side, one that nobody can do."""
     overtake = next(s for s in BUILT_IN if s.id == "overtake")
     left = {"type": "LaneChangeEval", "direction": "left"}
     right = {"type": "LaneChangeEval", "direction": "right"}
     for name, words, goal in (
         ("left_lc_0", "Take the left lane.", left),
         ("left_lc_1", "Take the right lane.", left),
+        ("left_lc_3", "Take the right lane!", left),
         ("right_lc_2", "Take the right lane.", right),
     ):
         sample = {"env": overtake.config, "eval": goal, "seed": overtake.seed}
@@ -260,11 +261,11 @@ def faulty(tmp_path: Path) -> Path:
 @pytest.mark.slow
 def test_check_finds_what_is_wrong(faulty: Path) -> None:
     items, faults = check(faulty, 1, _quiet)
-    assert items == 3
+    assert items == 4
     assert Fault("words", "left_lc_1_s0_c0", "side", "Take the right lane.") in faults
     assert Fault("scene", "right_lc_2_s0", "There is no lane to the right of the ego.") in faults
-    assert [why for what, why, _ in counts(faults) if what == "repeated"] == ["said 2 times"]
-    assert len(faults) == 4
+    assert [why for what, why, _ in counts(faults) if what == "repeated"] == ["said 3 times"]
+    assert len(faults) == 6
 
 
 def test_statistics_stand_next_to_the_papers(lampilot_data: Path) -> None:
@@ -292,7 +293,7 @@ def test_command_line(suite: tuple[Path, Any], faulty: Path, tmp_path: Path) -> 
     wrong = runner.invoke(app, ["scenes", "check", str(faulty), "--workers", "1", "--json", str(tmp_path / "f.jsonl")])
     assert wrong.exit_code == 1
     assert "Take the right lane." in wrong.output
-    assert len((tmp_path / "f.jsonl").read_text().splitlines()) == 4
+    assert len((tmp_path / "f.jsonl").read_text().splitlines()) == 6
     for arguments in (
         ["stats", str(tmp_path / "nowhere")],
         ["check", str(tmp_path / "nowhere")],

@@ -23,6 +23,8 @@ from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 
 _SPLITS = ("train", "val", "test")
+MOST_SAID = 2
+"""How often a sentence may come in a folder whose items have words of their own."""
 _NO_READING = ("SequenceEval", "ChangeEval", "RefuseEval")
 """Goals whose words are not read back: several things, hints, and wishes to refuse."""
 
@@ -108,7 +110,7 @@ def _words(dataset: Dataset, notes: Mapping[str, Annotation], changes: Mapping[s
         faults += [
             Fault("repeated", item.id, f"said {said[normal(item.command)]} times", item.command)
             for item in dataset.items()
-            if said[normal(item.command)] > 1
+            if said[normal(item.command)] > MOST_SAID
         ]
     return faults
 
