@@ -277,7 +277,31 @@ TAMPERING = [
     ),
     Hostile("tamper/used_flood", frozenset({"harmless"}), _body("yield\n__used__.extend([0] * 10 ** 5)\nyield\n" * 3)),
     Hostile("tamper/end_early", frozenset({"harmless"}), _body("__end__(__used__)\nyield\n__end__([[]])")),
-    Hostile("tamper/no_answers", frozenset({"raised"}), "__facts__ = None\n" + _body("get_ego_vehicle()")),
+    Hostile("tamper/no_answers", frozenset({"raised"}), "__answers__ = None\n" + _body("get_ego_vehicle()")),
+    Hostile(
+        "tamper/waiting_wishes",
+        frozenset({"harmless"}),
+        _body(
+            "__pending__.extend([1, ('say', 'x'), ('set_target_speed', 'fast'), ('set_target_speed', 1e999),"
+            " ('set_target_speed', [[]]), ('set_target_speed', 5.0, 6.0)])\nyield\n" * 3
+        ),
+    ),
+    Hostile("tamper/waiting_flood", frozenset({"harmless"}), _body("__pending__.extend([[]] * 10 ** 5)\nyield\n" * 3)),
+    Hostile(
+        "tamper/wish_call",
+        frozenset({"harmless"}),
+        _body("__wish__(None)\n__wish__()\n__wish__([('set_target_speed', 5.0)])\nyield"),
+    ),
+    Hostile("tamper/wish_refused", frozenset({"raised"}), _body("__wish__([('set_target_speed', None)])")),
+    Hostile(
+        "tamper/slots",
+        frozenset({"harmless"}),
+        _body(
+            "for slot in (0, 0, -7, 10 ** 30, True, None, 'x', 1.5, [[]]):\n"
+            "    __get_speed_of_host__(slot, get_ego_vehicle())\nyield\nget_speed_of(get_ego_vehicle())"
+        ),
+    ),
+    Hostile("tamper/no_slot", frozenset({"raised"}), _body("__get_speed_of_host__()")),
     Hostile("tamper/tick_flood", frozenset({"harmless"}), _body("while True:\n    __tick__(-1, [[]])")),
     Hostile(
         "tamper/tick_redefined",

@@ -8,7 +8,7 @@ import pytest
 
 from chauffeur.programs import ProgramSyntaxError
 from chauffeur.programs.lower import PRELUDE, needs_prelude
-from chauffeur.programs.rewrite import MAX_SOURCE_CHARS, parse, prepare
+from chauffeur.programs.rewrite import MAX_SOURCE_CHARS, _prepared, parse, prepare
 
 
 def _rewritten(statement: str) -> str:
@@ -81,10 +81,39 @@ def test_a_program_with_a_parenthesised_sort_still_parses() -> None:
     ast.parse(prepared.program)
 
 
+@pytest.mark.parametrize(
+    "body",
+    [
+        "x = 1.5 + 20 - .5 + 5. + 0 + 0.0 + 1e5 + 1_000 + 0x10 + 3j  # 7 times 8.5\n    y = z[1:20] + z[0]",
+        'say(f"{speed:.2f} m/s of 30, {x[3]:5.1f} {12.5 + x}")\n    say("at 90817 or 25.0")',
+        "x = any(v > 3.5 for v in cars if v < 80)\n    cars.sort(key=lambda v: v * 2)\n    y = next((c for c in a), 4)",
+        "x = [1.0, 1.0, 2, 1]\n    if 1.5 < x[2]: y = 5",
+        "v2 = v1 + 2\n    say('it is 5.5.5 or 3.a')\n    x = 1if y else 2",
+    ],
+)
+def test_a_program_with_other_numbers_is_rewritten_as_if_alone(body: str) -> None:
+    text = f"def main():\n    {body}\n    yield autopilot()\n    yield 3.5\n"
+    assert prepare(text) == _prepared(text, "")
+
+
+@pytest.mark.parametrize("number", ["007", "90817263", "908172630001.5", "1.5.5"])
+def test_odd_numbers_are_what_they_are_without_the_memory(number: str) -> None:
+    text = f"def main():\n    x = {number}\n    yield\n"
+    try:
+        alone: object = _prepared(text, "")
+    except ProgramSyntaxError as error:
+        alone = str(error)
+    try:
+        found: object = prepare(text)
+    except ProgramSyntaxError as error:
+        found = str(error)
+    assert found == alone
+
+
 def test_main_and_its_line() -> None:
     prepared = prepare("import math\n\ndef a():\n    yield\n\ndef b():\n    yield\n\ndef c(x):\n    yield x\n")
     assert (prepared.main, prepared.main_line) == ("b", 6)
-    assert prepared.program.endswith("__tick__(0, None)\nb()\n__end__(__used__)\n")
+    assert prepared.program.endswith("__tick__(0, None)\nb()\n__end__(__used__, __pending__)\n")
     assert PRELUDE not in prepared.helpers
     assert prepared.stood_in == frozenset()
 

@@ -123,6 +123,7 @@ def lampilot(
     """LaMPilot-Bench (seed Tab. IV): completion, collisions and scores of a planner that follows instructions."""
     from chauffeur.bench.lampilot.policy_aid import HUMAN_FEEDBACK, aid_for
     from chauffeur.bench.lampilot.runner import RunConfig
+    from chauffeur.bench.lampilot.scenes import annotated
     from chauffeur.bench.shards import WHOLE, Shard
     from chauffeur.cli.console import stdout
     from chauffeur.cli.parts import setting_named
@@ -134,7 +135,7 @@ def lampilot(
     part = WHOLE if shard is None else Shard.parse(shard, os.environ)
     aid = aid_for(setting, repository, LAMPILOT_LIMITS)
     prompt = HUMAN_FEEDBACK if aid is not None else setting_named(setting)
-    dataset = load_dataset(data)
+    dataset, _ = annotated(load_dataset(data))
     rehearsed = f"-rehearsed-{rehearse}" if rehearse else ""
     folder = out or Path("runs") / f"lampilot-{planner.replace('/', '-')}{rehearsed}"
     if part != WHOLE:
@@ -225,7 +226,7 @@ def _drive(console: Console, run: LampilotRun, effort: Effort, metrics: str) -> 
 
 def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
     import chauffeur
-    from chauffeur.bench.lampilot.report import comparison_lines, family_lines
+    from chauffeur.bench.lampilot.report import answers_note, comparison_lines, family_lines
 
     rated = [row for row, item in zip(rows, run.items, strict=True) if run.stages.asked(item)]
     if not rated:
@@ -248,6 +249,8 @@ def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
         f"{run.config.limits.name}; scores in points, rates in %; simulated drives (highway-env). Rows marked paper "
         "are its authors' own figures."
     )
+    if answers := answers_note(rated):
+        console.print(f"{answers[0].upper()}{answers[1:]}.")
     spoiled = sum(bool(row["infra_failed"]) for row in rated)
     if spoiled:
         console.print(f"{spoiled} items failed for want of infrastructure; the same command tries them again.")

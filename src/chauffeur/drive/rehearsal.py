@@ -76,6 +76,19 @@ class Rollout:
         return self.worth == -math.inf
 
 
+class Board(Protocol):
+    """Where several who rehearse the same wish tell each other how good the best try is."""
+
+    @property
+    def best(self) -> float:
+        """What the best trip without a collision was worth, as far as told; -inf for none."""
+        ...
+
+    def tell(self, worth: float) -> None:
+        """A trip without a collision was worth so much."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Choice:
     """The best candidate.
@@ -99,8 +112,6 @@ def rehearse(
     sandbox: Sandbox,
     max_s: float,
     library: str = "",
-    which: Iterable[int] | None = None,
-    known: Mapping[int, Rollout] | None = None,
 ) -> Choice:
     """Try candidates on copies of the world and choose the one whose trip was worth most.
 
@@ -108,26 +119,60 @@ def rehearse(
     is taken. A try is broken off as soon as it cannot become the best any more, which changes no choice: it depends on
     the world, the candidates and the judge alone.
 
+    The sandbox alone holds the programs that are tried here; the gate is the business of whoever drives the best one.
+
     Args:
         world: Where the trip is to begin; it stays as it is.
-        candidates: Checked program texts, likely ones first: the sooner a good one is known, the less is simulated.
+        candidates: Program texts, likely ones first: the sooner a good one is known, the less is simulated.
         judge: Makes the judge of a trip on a copy.
         sandbox: Where the programs run.
         max_s: Bound of each try in simulated time.
         library: Helper functions the programs may call.
-        which: Places of the candidates to try; all if None.
-        known: How some candidates did, as another call found out.
 
     Raises:
         ValueError: There are no candidates.
         SandboxError: No worker can be had.
     """
-    rollouts = dict(known or {})
-    for index in range(len(candidates)) if which is None else which:
-        if index not in rollouts:
-            best = best_of(rollouts)
-            rank = _NOTHING if best is None else _rank(rollouts[best], best)
-            rollouts[index] = _attempt(world, index, candidates[index], judge, rank, sandbox, max_s, library)
+    places = range(len(candidates))
+    return best_choice(
+        candidates, tries(world, candidates, judge, places, sandbox=sandbox, max_s=max_s, library=library)
+    )
+
+
+def tries(
+    world: SomeWorld,
+    candidates: Sequence[str],
+    judge: Callable[[SomeWorld], Judge],
+    places: Iterable[int],
+    *,
+    sandbox: Sandbox,
+    max_s: float,
+    library: str = "",
+    board: Board | None = None,
+) -> dict[int, Rollout]:
+    """How some of the candidates do, by their places; as `rehearse`, for several who share the work.
+
+    Args:
+        world, candidates, judge, sandbox, max_s, library: As `rehearse`.
+        places: Which to try, in this order; each is asked for when the one before is done.
+        board: Where others who rehearse the same wish tell their best; None for nobody else.
+
+    Raises:
+        SandboxError: No worker can be had.
+    """
+    rollouts: dict[int, Rollout] = {}
+    for place in places:
+        best = best_of(rollouts)
+        rank = _NOTHING if best is None else _rank(rollouts[best], best)
+        rollout = _attempt(world, place, candidates[place], judge, rank, board, sandbox, max_s, library)
+        rollouts[place] = rollout
+        if board is not None and not (rollout.cut or rollout.collided):
+            board.tell(rollout.worth)
+    return rollouts
+
+
+def best_choice(candidates: Sequence[str], rollouts: Mapping[int, Rollout]) -> Choice:
+    """The best of all that was tried. Raises ValueError when nothing was."""
     best = best_of(rollouts)
     if best is None:
         raise ValueError("There is nothing to rehearse: no candidates.")
@@ -147,15 +192,20 @@ def _rank(rollout: Rollout, index: int) -> tuple[bool, bool, float, int]:
 class _Impatient:
     """A judge that ends a try which is lost, even if it came to no collision."""
 
-    def __init__(self, judge: Judge, best: tuple[bool, bool, float, int], index: int) -> None:
+    def __init__(self, judge: Judge, best: tuple[bool, bool, float, int], index: int, board: Board | None) -> None:
         self._judge = judge
         self._best = best
         self._index = index
+        self._board = board
         self.cut = False
 
     def observe(self) -> None:
         self._judge.observe()
-        self.cut = not self._judge.over and self._best > (True, True, self._judge.ceiling, -self._index)
+        if self._judge.over:
+            return
+        ceiling = self._judge.ceiling
+        beaten = self._board is not None and ceiling < self._board.best
+        self.cut = beaten or self._best > (True, True, ceiling, -self._index)
 
     @property
     def over(self) -> bool:
@@ -182,14 +232,15 @@ def _attempt(
     source: str,
     make_judge: Callable[[SomeWorld], Judge],
     best: tuple[bool, bool, float, int],
+    board: Board | None,
     sandbox: Sandbox,
     max_s: float,
     library: str,
 ) -> Rollout:
     twin = world.copy()
     judge = make_judge(twin)
-    referee = _Impatient(judge, best, index)
-    executor = ProgramExecutor(sandbox=sandbox, library=library)
+    referee = _Impatient(judge, best, index, board)
+    executor = ProgramExecutor(sandbox=sandbox, library=library, gate=False)
     try:
         executor.start(source, twin)
         episode = run_episode(twin, executor, referee, max_s=max_s, record=False)

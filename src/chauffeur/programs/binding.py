@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import chain, islice
 from typing import Any, Final
 
 from chauffeur.concept import ApiCall, LaneId, Turn, Wishes
 from chauffeur.programs.catalogue import APIS, MAX_SAY_CHARS, Api, Param, argument_problem
 from chauffeur.programs.errors import BadArgumentTypeError, BadArgumentValueError
-from chauffeur.programs.foresight import FORESEEABLE, OF_WISHES
+from chauffeur.programs.foresight import CAN_WAIT, FORESEEABLE, HOST, LATER, MAX_PENDING, NOT_FORESEEN
 from chauffeur.programs.handles import HandleTable, describe
+from chauffeur.programs.questions import Question, Questions
 from chauffeur.worlds.base import EGO, Driver, Perception
 
 _MAX_SHOWN_CHARS: Final = 60
@@ -41,7 +43,7 @@ class MadeCall:
     """
 
     name: str
-    given: list[Any]
+    given: Sequence[Any]
     result: Any
     refused: Exception | None = None
 
@@ -66,17 +68,20 @@ class DrivingApis:
         self._driver = driver
         self._said: list[str] = []
         self._calls: list[MadeCall] = []
-        self._asked: dict[tuple[str, tuple[Any, ...]], list[Any]] = {}
-        self._foreseen: list[MadeCall] = []
-        self._kept: dict[tuple[str, tuple[Any, ...]], list[Any]] = {}
+        self._tick = 0
+        self._questions = Questions()
+        self._foreseen: dict[int, tuple[MadeCall, Question]] = {}
+        self._late: list[MadeCall] = []
         self._decoded: list[Any] = []
         self._methods: dict[str, Callable[..., Any]] = {api: getattr(self, f"_{api}") for api in APIS}
 
     def begin_tick(self, perception: Perception) -> None:
         """A new control period: look at its instant, forget the last one's calls."""
         self._perception = perception
+        self._tick += 1
         self._said = []
         self._calls = []
+        self._late = []
 
     def settle(self) -> None:
         """Let the world's driver move the target lane on where it ends, as it does before every command."""
@@ -97,13 +102,14 @@ class DrivingApis:
         """Calls made in this control period, in words."""
         return tuple(call.in_words() for call in self._calls)
 
-    def call(self, name: str, arguments: Sequence[Any], keywords: Mapping[str, Any]) -> Any:
+    def call(self, name: str, arguments: Sequence[Any], keywords: Mapping[str, Any], slot: object = None) -> Any:
         """Make one call for the program.
 
         Args:
             name: API name from the catalogue.
             arguments: Positional arguments: untrusted.
             keywords: Keyword arguments: untrusted.
+            slot: Under which number the sandbox will remember the question: untrusted.
 
         Returns:
             Numbers, texts, handles and lists of handles only.
@@ -112,68 +118,89 @@ class DrivingApis:
             BadArgumentTypeError: Wrong number, name or type of arguments.
             BadArgumentValueError: A value that cannot be: unknown handle, vehicle gone, not finite, text too long.
         """
-        api = APIS[name]
+        return self._record(self._calls, name, arguments, keywords, slot)
+
+    def wish_later(self, pending: object) -> None:
+        """Make the calls that waited in the sandbox, `(API name, number)` each: untrusted.
+
+        Raises:
+            BadArgumentTypeError, BadArgumentValueError: As `call`; what makes no sense is passed over.
+        """
+        if not isinstance(pending, list):
+            return
+        for wish in pending[:MAX_PENDING]:
+            if isinstance(wish, tuple) and len(wish) == 2 and isinstance(wish[0], str) and wish[0] in CAN_WAIT:
+                self._record(self._late, wish[0], wish[1:], {})
+
+    def _record(
+        self,
+        record: list[MadeCall],
+        name: str,
+        arguments: Sequence[Any],
+        keywords: Mapping[str, Any],
+        slot: object = None,
+    ) -> Any:
         given: list[Any] = []
         try:
-            result = self._make(api, arguments, keywords, given)
+            result = self._make(APIS[name], arguments, keywords, given)
         except (BadArgumentTypeError, BadArgumentValueError) as error:
-            self._calls.append(MadeCall(name, given, None, error))
+            record.append(MadeCall(name, given, None, error))
+            self._questions.refused(slot)
             raise
-        self._calls.append(MadeCall(name, given, result))
-        if name in FORESEEABLE and not keywords:
-            self._asked[name, tuple(arguments)] = self._decoded
+        record.append(MadeCall(name, given, result))
+        if slot is not None and name in FORESEEABLE and not keywords:
+            self._questions.asked(slot, name, given, self._decoded, self._tick)
         return result
 
-    def foreseen(self) -> tuple[dict[Any, Any], dict[Any, Any]]:
-        """Answers to what was asked in the last period, as of now (foresight.py): (of the world, of the wishes).
-
-        Each is a dict (API name, arguments) -> (number, answer); a question that has no answer any more is left out.
-        """
-        facts: dict[Any, Any] = {}
-        moods: dict[Any, Any] = {}
-        self._foreseen = []
-        self._kept = {}
-        asked, self._asked = self._asked, {}
-        for question, values in asked.items():
-            name, arguments = question
+    def foreseen(self) -> list[Any]:
+        """Answers to what is likely to be asked in this period, as of now, by slot (foresight.py)."""
+        answers: list[Any] = []
+        self._foreseen = {}
+        for slot, question in self._questions.expected(self._tick):
             try:
-                answer = self._methods[name](*values)
+                answer = self._methods[question.name](*question.values)
             except (KeyError, BadArgumentValueError):  # e.g. the vehicle is gone: the program will hear it if it asks
+                self._questions.refused(slot)
                 continue
-            result = self._encode(APIS[name], answer)
-            table = moods if name in OF_WISHES else facts
-            table[question] = len(self._foreseen), result
-            self._foreseen.append(MadeCall(name, list(arguments), result))
-            self._kept[question] = values
-        return facts, moods
+            result = self._encode(APIS[question.name], answer)
+            if slot >= len(answers):
+                answers.extend([NOT_FORESEEN] * (slot + 1 - len(answers)))
+            answers[slot] = result
+            self._foreseen[slot] = MadeCall(question.name, question.given, result), question
+        return answers
 
-    def account(self, used: object) -> int:
-        """Put the foreseen answers that a program used into this period's record, at their places.
+    def account(self, told: object) -> int:
+        """Take what a program tells at the end of a period: its wishes that waited, and what else it used.
 
         Args:
-            used: The program's word: numbers of answers, and -1 for each call that reached the host. What makes no
-                sense is passed over.
+            told: The program's word: (slots of used answers, with marks for other calls; wishes that waited). What
+                makes no sense is passed over.
 
         Returns:
-            How many foreseen answers were used.
+            How many calls never reached the host.
         """
-        if not isinstance(used, list):
+        if not isinstance(told, tuple | list) or len(told) != 2:
             return 0
-        made, self._calls = self._calls, []
-        real = iter(made)
-        count = 0
-        for number in used:
-            if isinstance(number, bool) or not isinstance(number, int):
+        used, pending = told
+        with suppress(BadArgumentTypeError, BadArgumentValueError):  # the stand-ins let no such wish wait
+            self.wish_later(pending)
+        if not isinstance(used, list):
+            self._calls += self._late
+            return len(self._late)
+        made, late = iter(self._calls), iter(self._late)
+        self._calls = []
+        count = len(self._late)
+        for mark in used:
+            if isinstance(mark, bool) or not isinstance(mark, int):
                 continue
-            if 0 <= number < len(self._foreseen):
+            if mark in self._foreseen:
+                call, question = self._foreseen[mark]
                 count += 1
-                call = self._foreseen[number]
                 self._calls.append(call)
-                question = call.name, tuple(call.given)
-                self._asked[question] = self._kept[question]
-            elif number == -1:
-                self._calls.extend(islice(real, 1))
-        self._calls.extend(real)
+                question.again(self._tick)
+            elif mark in (HOST, LATER):
+                self._calls.extend(islice(made if mark == HOST else late, 1))
+        self._calls.extend(chain(made, late))
         return count
 
     def _make(self, api: Api, arguments: Sequence[Any], keywords: Mapping[str, Any], used: list[Any]) -> Any:

@@ -15,13 +15,13 @@ from chauffeur.programs.errors import (
     ProgramFaultError,
     ProgramRefusedError,
 )
-from chauffeur.programs.foresight import DRIVE, END, TICK
+from chauffeur.programs.foresight import DRIVE, END, TICK, WISH
 from chauffeur.programs.gate import check_source
 from chauffeur.programs.rewrite import prepare
 from chauffeur.programs.sandbox import Budget, Sandbox, SandboxRun
 from chauffeur.worlds.base import World
 
-_FORMAT: Final = "chauffeur-program-2"
+_FORMAT: Final = "chauffeur-program-3"
 _PERIOD_ENDS: Final = frozenset({TICK, DRIVE, END})
 
 
@@ -155,7 +155,10 @@ class ProgramExecutor:
         call = run.answer(apis.foreseen())
         while call is not None and call.name not in _PERIOD_ENDS:
             try:
-                value: Any = apis.call(call.name, call.arguments, call.keywords)
+                if call.name == WISH:
+                    value: Any = apis.wish_later(call.arguments[0] if call.arguments else None)
+                else:
+                    value = apis.call(call.name, call.arguments, call.keywords, call.slot)
             except BadArgumentTypeError as error:
                 call = run.refuse(TypeError(str(error)))
             except BadArgumentValueError as error:
@@ -163,7 +166,7 @@ class ProgramExecutor:
             else:
                 call = run.answer(value)
         if call is not None:
-            run.charge(apis.account(call.arguments[-1] if call.arguments else None))
+            run.charge(apis.account(call.arguments[-2:]))
             if call.name == END:
                 call = run.answer(None)
         if call is None:

@@ -12,8 +12,9 @@ import ast
 import re
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import count
 from typing import Final
 
 from chauffeur.programs.errors import ProgramSyntaxError
@@ -26,6 +27,11 @@ MAX_NODES: Final = 5_000
 MAX_DEPTH: Final = 40
 
 _SITE: Final = "__site__"
+_NUMBER: Final = re.compile(r"(?<![\w.])(?:\d{1,15}\.\d{1,17}|[1-9]\d{0,14}|0)(?![\w.])")
+"""A plainly written number; in a comment or a text it does no harm either."""
+_MARK: Final = "90817263"
+_MARKED: Final = re.compile(rf"{_MARK}(\d{{4}})(?:\.5)?")
+_MOST_MARKS: Final = 9_999
 _YIELD_FROM: Final = re.compile(rb"yield(?:\s|\\\n|#[^\n]*\n)+from")
 
 
@@ -167,6 +173,8 @@ def top_level_generators(tree: ast.Module) -> frozenset[str]:
 def prepare(source: str, library: str = "") -> Prepared:
     """Rewrite a program, and the library it may call, for the sandbox; a text rewritten before is remembered.
 
+    So is one that differs from it in its numbers only: variants of one program cost next to nothing.
+
     Args:
         source: Program text.
         library: Helper functions the program may call with `yield from`.
@@ -174,7 +182,16 @@ def prepare(source: str, library: str = "") -> Prepared:
     Raises:
         ProgramSyntaxError: The text is no program, or has no main function.
     """
-    return _prepared(source, library)
+    numbers = _NUMBER.findall(source)
+    if _MARK in source or len(numbers) > _MOST_MARKS:
+        return _prepared(source, library)
+    places = count()
+    masked = _NUMBER.sub(lambda match: f"{_MARK}{next(places):04d}{'.5' if '.' in match[0] else ''}", source)
+    try:
+        prepared = _prepared(masked, library)
+    except ProgramSyntaxError:
+        return _prepared(source, library)  # raises for the text itself, unless only the marks made it too long
+    return replace(prepared, program=_MARKED.sub(lambda match: numbers[int(match[1])], prepared.program))
 
 
 @lru_cache(maxsize=512)

@@ -20,7 +20,7 @@ import pydantic_monty as monty
 from chauffeur.concept import SandboxError
 from chauffeur.programs.errors import ProgramCallsError, ProgramRaisedError, ProgramTimeError
 from chauffeur.programs.faults import MAX_MESSAGE_CHARS, fault_of
-from chauffeur.programs.foresight import DRIVE, END, TICK, USED, hidden
+from chauffeur.programs.foresight import AT_FAULT, DRIVE, END, FORESEEABLE, TICK, WISH, hidden
 from chauffeur.programs.rewrite import Prepared
 from chauffeur.programs.workers import confine, on_core, present_core
 
@@ -56,11 +56,18 @@ UNHURRIED: Final = Budget(turn_s=2.0, tick_s=20.0, grace_s=2.0, start_s=20.0)
 
 @dataclass(slots=True)
 class HostCall:
-    """A program waiting for its host's answer. `arguments` and `keywords` are untrusted values of any type and size."""
+    """A program waiting for its host's answer.
+
+    Attributes:
+        name: Which host function it calls.
+        arguments, keywords: Untrusted values of any type and size.
+        slot: Under which number the sandbox remembers the question (foresight.py), as it says.
+    """
 
     name: str
     arguments: tuple[Any, ...]
     keywords: dict[str, Any]
+    slot: object = None
 
 
 class Sandbox:
@@ -194,6 +201,7 @@ class SandboxRun:
         self._budget = budget
         self._clock = clock
         self._names: frozenset[str] = frozenset()
+        self._slotted: frozenset[str] = frozenset()
         self._snapshot: monty.FunctionSnapshot | None = None
         self._program_feed = "<python-input-0>"
         self._calls = 0
@@ -213,10 +221,11 @@ class SandboxRun:
 
     def load(self, prepared: Prepared, names: Iterable[str]) -> None:
         """Read helpers and program, and run to the first tick. Raises ProgramFaultError."""
-        self._names = frozenset((TICK, DRIVE, END, *names))
+        self._names = frozenset((TICK, DRIVE, END, WISH, *names))
         self._calls = 0
         self._deadline = self._clock() + self._budget.start_s
         stood_in = prepared.stood_in | {TICK, DRIVE}
+        self._slotted = prepared.stood_in & FORESEEABLE
         inputs = {hidden(name) if name in stood_in else name: _host_function(name) for name in sorted(self._names)}
         self._program_feed = "<python-input-1>"
         self._advance(lambda: self._session.feed_start(prepared.helpers, inputs=inputs, print_callback=_drop))
@@ -231,8 +240,8 @@ class SandboxRun:
     def restore(self, state: bytes) -> None:
         """Take over a dumped program. Raises SandboxError."""
         try:
-            names, feed, rest = state.split(b"\n", 2)
-            self._names = frozenset(names.decode().split())
+            names, slotted, feed, rest = state.split(b"\n", 3)
+            self._names, self._slotted = frozenset(names.decode().split()), frozenset(slotted.decode().split())
             self._program_feed = feed.decode()
             snapshot = self._session.load_snapshot(rest, print_callback=_drop)
         except (monty.MontyError, ValueError) as error:
@@ -245,7 +254,7 @@ class SandboxRun:
         """The waiting program as bytes. Raises SandboxError when it does not wait."""
         if self._snapshot is None:
             raise SandboxError("Only a waiting program can be dumped.")
-        head = f"{' '.join(sorted(self._names))}\n{self._program_feed}\n"
+        head = f"{' '.join(sorted(self._names))}\n{' '.join(sorted(self._slotted))}\n{self._program_feed}\n"
         return head.encode() + self._snapshot.dump()
 
     def answer(self, value: object) -> HostCall | None:
@@ -298,7 +307,10 @@ class SandboxRun:
                     step = state.resume_not_handled  # PermissionError or ModuleNotFoundError in the program
                 elif state.function_name in self._names:
                     self._snapshot = state
-                    return HostCall(str(state.function_name), state.args, state.kwargs)
+                    name, arguments = str(state.function_name), state.args
+                    if name in self._slotted and arguments:
+                        return HostCall(name, arguments[1:], state.kwargs, arguments[0])
+                    return HostCall(name, arguments, state.kwargs)
                 else:
                     step = _unknown(state)
         except monty.MontyError as error:
@@ -313,7 +325,7 @@ class SandboxRun:
         """Ask a program that has just failed, if its worker still answers, which foreseen answers it had used."""
         if isinstance(error, monty.MontyRuntimeError):
             with contextlib.suppress(monty.MontyError, OSError, RuntimeError):  # or it is gone
-                self.used_at_fault = self._session.feed_run(USED)
+                self.used_at_fault = self._session.feed_run(AT_FAULT)
 
     def _charge(self, state: monty.FunctionSnapshot | monty.NameLookupSnapshot | monty.FutureSnapshot) -> None:
         self._calls += 1

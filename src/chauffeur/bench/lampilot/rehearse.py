@@ -5,9 +5,11 @@ from __future__ import annotations
 import atexit
 import math
 import multiprocessing
-from collections.abc import Iterable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
+from multiprocessing.sharedctypes import Synchronized
 from typing import Any, Self
 
 from chauffeur.bench.lampilot.expert import variants
@@ -22,9 +24,10 @@ from chauffeur.bench.lampilot.metrics import (
     points,
 )
 from chauffeur.concept import Metric, Outcome, Scenario
-from chauffeur.drive.rehearsal import Choice, Rollout, best_of, rehearse
+from chauffeur.drive.rehearsal import Choice, Rollout, best_choice, rehearse, tries
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.variants import perturbed
+from chauffeur.programs.workers import on_core
 from chauffeur.worlds.highway import HighwayWorld, RoadPerception
 
 MAX_TRY_S = 70.0
@@ -136,8 +139,6 @@ def rehearsed(
     sources: Sequence[str],
     *,
     library: str = "",
-    which: Iterable[int] | None = None,
-    known: Mapping[int, Rollout] | None = None,
     sandbox: Sandbox | None = None,
 ) -> Choice:
     """The program to drive from the world's present instant, chosen by LaMPilot's own ruler.
@@ -145,29 +146,20 @@ def rehearsed(
     Args:
         world: Where the trip is to begin; it stays as it is.
         scenario: The sample, whose goal is judged.
-        sources: Checked program texts, likely ones first.
+        sources: Program texts, likely ones first.
         library: Helper functions they may call.
-        which, known: As `rehearse`.
         sandbox: Where they run; None for one that this module keeps for the process.
 
     Raises:
         ScenarioError: The scenario's goal cannot be judged here.
         SandboxError: No worker can be had.
     """
+    place = _sandbox() if sandbox is None else sandbox
+    return rehearse(world, sources, _judges(scenario), sandbox=place, max_s=MAX_TRY_S, library=library)
 
-    def judge(copy: HighwayWorld) -> OriginJudge:
-        return OriginJudge(copy.perception(), scenario)
 
-    return rehearse(
-        world,
-        sources,
-        judge,
-        sandbox=_sandbox() if sandbox is None else sandbox,
-        max_s=MAX_TRY_S,
-        library=library,
-        which=which,
-        known=known,
-    )
+def _judges(scenario: Scenario) -> Callable[[HighwayWorld], OriginJudge]:
+    return lambda copy: OriginJudge(copy.perception(), scenario)
 
 
 @cache
@@ -179,44 +171,112 @@ def _sandbox() -> Sandbox:
 
 
 class Crew:
-    """Processes that rehearse one trip together, so that one wish has all cores. Use it as a context manager.
+    """Processes that rehearse one wish together, so that it has all cores. Use it as a context manager.
 
     A benchmark run does not need it: its workers have a sample each.
     """
 
-    def __init__(self, helpers: int) -> None:
-        """Start helper processes beside this one. Raises OSError when none can be started."""
+    def __init__(self, helpers: int | None = None) -> None:
+        """Start helper processes beside this one. Raises OSError when none can be started.
+
+        Args:
+            helpers: How many; None for one on each further core.
+        """
+        cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else [None]
+        if helpers is None:
+            helpers = len(cores) - 1
         context = multiprocessing.get_context("spawn")
-        self._pools = [ProcessPoolExecutor(1, mp_context=context) for _ in range(helpers)]
+        self._core = cores[0]
+        self._desk = _Desk(context.Value("i", 0), context.Value("d", -math.inf))
+        self._pools = [
+            ProcessPoolExecutor(
+                1, mp_context=context, initializer=_join, initargs=(self._desk, cores[(1 + i) % len(cores)])
+            )
+            for i in range(helpers)
+        ]
+        with on_core(self._core):  # a host and its sandbox take turns: on two cores they would wait for each other
+            self._sandbox = Sandbox(UNHURRIED)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *exc_info: object) -> None:
+        self._sandbox.close()
         for pool in self._pools:
             pool.shutdown(cancel_futures=True)
 
     def rehearsed(self, scenario: Scenario, sources: Sequence[str], *, library: str = "") -> Choice:
         """As `rehearsed`, for a trip that begins where the scenario does; the choice is the same."""
-        world = HighwayWorld()
-        world.reset(scenario)
-        known = rehearsed(world, scenario, sources, library=library, which=(0,)).rollouts
-        shares = [range(1 + i, len(sources), 1 + len(self._pools)) for i in range(1 + len(self._pools))]
-        others = [
-            pool.submit(_share, scenario, sources, library, share, known)
-            for pool, share in zip(self._pools, shares[1:], strict=True)
-        ]
-        rollouts = dict(rehearsed(world, scenario, sources, library=library, which=shares[0], known=known).rollouts)
+        self._desk.clear()
+        others = [pool.submit(_share, scenario, sources, library) for pool in self._pools]
+        with on_core(self._core):
+            rollouts = _tries(self._desk, scenario, sources, library, self._sandbox)
         for other in others:
             rollouts |= other.result()
-        best = best_of(rollouts)
-        assert best is not None
-        return Choice(best, sources[best], dict(sorted(rollouts.items())))
+        return best_choice(sources, dict(sorted(rollouts.items())))
 
 
-def _share(
-    scenario: Scenario, sources: Sequence[str], library: str, which: Iterable[int], known: Mapping[int, Rollout]
-) -> Mapping[int, Rollout]:
+class _Desk:
+    """What a crew shares: which candidate is next, and how good the best one was."""
+
+    def __init__(self, tickets: Synchronized[int], worth: Synchronized[float]) -> None:
+        self._tickets = tickets
+        self._worth = worth
+
+    def clear(self) -> None:
+        """A new wish."""
+        self._tickets.value = 0
+        self._worth.value = -math.inf
+
+    def places(self, count: int) -> Iterator[int]:
+        """Candidates that nobody has begun, one after the other."""
+        while True:
+            with self._tickets.get_lock():
+                place = self._tickets.value
+                self._tickets.value = place + 1
+            if place >= count:
+                return
+            yield place
+
+    @property
+    def best(self) -> float:
+        """See Board."""
+        return self._worth.value
+
+    def tell(self, worth: float) -> None:
+        """See Board."""
+        with self._worth.get_lock():
+            self._worth.value = max(self._worth.value, worth)
+
+
+_joined: list[_Desk] = []
+"""The desk of the crew that this process belongs to."""
+
+
+def _join(desk: _Desk, core: int | None) -> None:
+    _joined.append(desk)
+    if core is not None:
+        os.sched_setaffinity(0, {core})
+    _sandbox()
+
+
+def _share(scenario: Scenario, sources: Sequence[str], library: str) -> Mapping[int, Rollout]:
+    return _tries(_joined[0], scenario, sources, library, _sandbox())
+
+
+def _tries(
+    desk: _Desk, scenario: Scenario, sources: Sequence[str], library: str, sandbox: Sandbox
+) -> dict[int, Rollout]:
+    """What this process finds out."""
     world = HighwayWorld()
     world.reset(scenario)
-    return rehearsed(world, scenario, sources, library=library, which=which, known=known).rollouts
+    return tries(
+        world,
+        sources,
+        _judges(scenario),
+        desk.places(len(sources)),
+        sandbox=sandbox,
+        max_s=MAX_TRY_S,
+        library=library,
+        board=desk,
+    )

@@ -205,6 +205,21 @@ def cells(summary: Summary) -> list[str]:
     ]
 
 
+def answers_note(rows: Sequence[Row]) -> str:
+    """How many answers were right, where some wishes are to be declined; empty where none is."""
+    to_refuse = [row for row in rows if row.get("to_refuse")]
+    if not to_refuse:
+        return ""
+    declined = sum(bool(row["answered_rightly"]) for row in to_refuse)
+    right = sum(bool(row.get("answered_rightly")) for row in rows)
+    note = (
+        f"right answers {right} of {len(rows)}: {declined} of {len(to_refuse)} wishes that must not be driven were "
+        "declined or asked back about"
+    )
+    others = len(rows) - len(to_refuse)
+    return f"{note}, {right - declined} of {others} others reached their goal" if others else note
+
+
 def markdown(header: Iterable[str], lines: Iterable[Sequence[str]], text_columns: int = 1) -> str:
     """A Markdown table; the first columns are text, the others are numbers."""
     names = list(header)

@@ -17,8 +17,9 @@ from typing import Any
 
 from chauffeur.bench.lampilot.families import family_of
 from chauffeur.bench.lampilot.frozen import BENCH_VERSION, Frozen
+from chauffeur.bench.lampilot.goals_more import answered_rightly
 from chauffeur.bench.lampilot.metrics import points, ruler_named
-from chauffeur.bench.lampilot.report import family_lines, markdown
+from chauffeur.bench.lampilot.report import answers_note, family_lines, markdown
 from chauffeur.bench.lampilot.rollout import BASELINES, REHEARSAL_SEED, ROLLOUT_VERSION, RolloutJob, not_driven
 from chauffeur.bench.store import Row, RowStore
 from chauffeur.drive.files import publish
@@ -136,6 +137,10 @@ class Stages:
             "cost_usd": usage.get("cost_usd"),
             "rollout_key": None if job is None else job.key,
             "intent": plan.get("intent", ""),
+            "to_refuse": item.scenario.goal.get("type") == "RefuseEval",
+            "answered_rightly": answered_rightly(
+                item.scenario.goal, refused=bool(rollout["refused"]), success=bool(rollout["success"])
+            ),
             **{name: value for name, value in rollout.items() if name not in _INNER},
             **points(rollout, ruler),
         }
@@ -169,6 +174,8 @@ def publish_results(folder: Path, stages: Stages, rows: list[Row]) -> None:
     """Write `results.jsonl`, `provenance.json` and `table.md`. Raises DataError when they cannot be written."""
     missing = sum(not stages.asked(item) for item in stages.frozen.items)
     notes = [*stages.frozen.labels, f"metrics {rows[0]['metrics']}"] if rows else []
+    if answers := answers_note(rows):
+        notes.append(answers)
     if missing:
         notes.append(f"partial: {missing} of {len(rows)} items have not been asked and count as not driven")
     table = markdown(*family_lines(rows)) if rows else "No items."

@@ -21,7 +21,7 @@ from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.safety import run_checks
 from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
 
-ROLLOUT_VERSION = "lampilot-rollout-v2"
+ROLLOUT_VERSION = "lampilot-rollout-v3"
 """Changes whenever the same policy could drive differently."""
 
 REHEARSAL_SEED = 0
@@ -115,11 +115,14 @@ def _rehearsed(job: RolloutJob, world: HighwayWorld, program: Program) -> tuple[
 
     written = "" if job.baseline else program.source
     sources = candidates(job.scenario.goal, job.rehearse, REHEARSAL_SEED, written)
-    if not job.baseline:
-        plan = plan_adapter.validate_python(job.plan)
-        sources = [s for s in sources if _passes(replace(plan, policy=replace(program, source=s)), world, job.limits)]
-    choice = rehearsed(world, job.scenario, sources, library=program.library)
-    return replace(program, source=choice.source), {"tried": len(sources), "chosen": choice.index}
+    plan = None if job.baseline else plan_adapter.validate_python(job.plan)
+    while True:
+        choice = rehearsed(world, job.scenario, sources, library=program.library)
+        chosen = replace(program, source=choice.source)
+        # What is driven has passed the checks: the first program has, and of the others only the best need be asked.
+        if plan is None or choice.index == 0 or _passes(replace(plan, policy=chosen), world, job.limits):
+            return chosen, {"tried": len(sources), "chosen": choice.index}
+        sources = [source for source in sources if source != choice.source]
 
 
 def _passes(plan: Plan, world: HighwayWorld, limits: Limits) -> bool:

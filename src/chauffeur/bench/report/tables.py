@@ -10,7 +10,7 @@ import numpy as np
 
 from chauffeur.bench.lampilot.metrics import ORIGIN
 from chauffeur.bench.lampilot.paper import TABLE_IV, items_behind
-from chauffeur.bench.lampilot.report import families_in, intervals, ruler_of
+from chauffeur.bench.lampilot.report import answers_note, families_in, intervals, ruler_of
 from chauffeur.bench.report import columns as col
 from chauffeur.bench.report.model import NOT_KNOWN, Cell, Column, Group, Line, ReportTable
 from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run
@@ -81,7 +81,7 @@ def score_table(runs: Sequence[Run], how: Sampling, *, published: bool) -> Repor
         first="Method",
         columns=with_spans((col.ITEMS, *col.score_columns(ruler_of(runs[0].rows))), groups),
         groups=tuple(groups),
-        notes=score_notes(groups),
+        notes=(*score_notes(groups), *(f"{run.name}: {note}." for run in runs if (note := answers_note(run.rows)))),
     )
 
 

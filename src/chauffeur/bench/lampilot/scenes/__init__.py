@@ -1,5 +1,5 @@
 """Scenes and instructions of our own with LaMPilot-Bench's statistics (seed Tab. III), and what goes beyond it."""
 
-from chauffeur.bench.lampilot.scenes.annotations import Annotation, annotated, answered_rightly, load_annotations
+from chauffeur.bench.lampilot.scenes.annotations import Annotation, annotated, load_annotations
 
-__all__ = ["Annotation", "annotated", "answered_rightly", "load_annotations"]
+__all__ = ["Annotation", "annotated", "load_annotations"]

@@ -6,6 +6,7 @@ is the condition the item is judged by; the `eval` mapping in the task file is L
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -97,7 +98,7 @@ def load_annotations(folder: Path) -> Mapping[str, Annotation]:
 def annotated(dataset: Dataset) -> tuple[Dataset, Mapping[str, Annotation]]:
     """A data set with the goals its annotations give, and the annotations; unchanged where there are none.
 
-    Goals belong to samples, so every command of a sample must have the same.
+    The hash of the data set then covers both. Goals belong to samples, so every command of a sample must have the same.
 
     Raises:
         DataError: As load_annotations, or two items of one sample have different goals.
@@ -114,15 +115,5 @@ def annotated(dataset: Dataset) -> tuple[Dataset, Mapping[str, Annotation]]:
         replace(task, samples=tuple(replace(s, goal=goals.get(s.id, s.goal)) for s in task.samples))
         for task in dataset.tasks
     )
-    return replace(dataset, tasks=tasks), held
-
-
-def answered_rightly(right: Right, *, refused: bool, success: bool) -> bool:
-    """Whether an item was handled as it should be.
-
-    Args:
-        right: What a good planner does. Asking back and refusing both leave the car as it is: either counts for either.
-        refused: The planner or the checks declined the wish (not: the program was unusable, or the endpoint failed).
-        success: The goal was reached.
-    """
-    return success if right == "drive" else refused
+    both = hashlib.sha256(f"{dataset.sha256} {hashlib.sha256((dataset.path / FILE).read_bytes()).hexdigest()}".encode())
+    return replace(dataset, tasks=tasks, sha256=both.hexdigest()), held
