@@ -91,7 +91,7 @@ PROGRAMS: dict[str, tuple[str, str, int | None, str]] = {
     "syntax": ("def main(:\n    yield\n", "syntax", 1, "not valid Python"),
     "prose": ("Sure! Here is the program.", "syntax", 1, "not valid Python"),
     "too long": ("#" * 30_000, "syntax", None, "20000 are allowed"),
-    "too deep": (f"x = {'[' * 60}{']' * 60}", "syntax", None, "nested too deeply"),
+    "too deep": (f"x = {'[' * 60}{']' * 60}", "syntax", 1, "nested too deeply"),
     "for over a generator": (
         "def helper():\n    yield 1\ndef main():\n    for x in helper():\n        yield x\n",
         "generator-use",

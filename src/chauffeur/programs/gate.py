@@ -20,6 +20,7 @@ from chauffeur.programs.loops import loop_findings
 from chauffeur.programs.lower import SEARCHES
 from chauffeur.programs.nodes import all_nodes
 from chauffeur.programs.rewrite import (
+    bindings,
     binds,
     bound_names,
     called_name,
@@ -106,6 +107,13 @@ def _judged(source: str, library: str) -> GateReport:
     unique = {(f.line, f.code, f.reason): f for f in findings}
     ordered = sorted(unique.values(), key=lambda finding: (finding.line or 0, finding.code))
     return GateReport(tuple(ordered[:_MAX_FINDINGS]), None if main is None else main.name)
+
+
+@lru_cache(maxsize=64)
+def _judged_library(library: str) -> tuple[ast.Module, tuple[Finding, ...]]:
+    """A library's tree and what refuses it. Raises ProgramSyntaxError."""
+    helpers = parse(unix_lines(library), "library")
+    return helpers, tuple(_library_findings(helpers))
 
 
 def _library_findings(helpers: ast.Module) -> list[Finding]:
@@ -286,18 +294,17 @@ class _Gate:
         )
 
     def _check_bindings(self) -> None:
-        for node in all_nodes(self._tree):
-            for name in binds(node):
-                if name.startswith("__"):
-                    self._add(node, "reserved", f"the name {name[:40]} is reserved", "use another name")
-                elif name in APIS:
-                    self._add(node, "shadow", f"{name} is a driving API and cannot be redefined", "use another name")
-                elif name in SEARCHES:
-                    self._add(node, "shadow", f"{name} is a built-in function and cannot be redefined", "rename it")
-                elif name in self._generators and not (isinstance(node, ast.FunctionDef) and is_generator(node)):
-                    self._add(
-                        node, "shadow", f"{name} is also the name of a generator function", "use another name for one"
-                    )
+        for node, name in bindings(self._tree):
+            if name.startswith("__"):
+                self._add(node, "reserved", f"the name {name[:40]} is reserved", "use another name")
+            elif name in APIS:
+                self._add(node, "shadow", f"{name} is a driving API and cannot be redefined", "use another name")
+            elif name in SEARCHES:
+                self._add(node, "shadow", f"{name} is a built-in function and cannot be redefined", "rename it")
+            elif name in self._generators and not (isinstance(node, ast.FunctionDef) and is_generator(node)):
+                self._add(
+                    node, "shadow", f"{name} is also the name of a generator function", "use another name for one"
+                )
 
     def _check_hidden_helpers(self) -> None:
         """A function named like a helper hides it; one that then delegates to that name only calls itself."""

@@ -7,7 +7,7 @@ from typing import Final
 
 from chauffeur.programs.findings import Finding
 from chauffeur.programs.lower import SEARCHES, can_lower, search_of
-from chauffeur.programs.nodes import all_nodes
+from chauffeur.programs.nodes import all_nodes, children
 from chauffeur.programs.words import BUILTINS
 
 _CONSUMERS: Final = frozenset({"list", "tuple", "set", "frozenset", "dict", "sum", "min", "max", "sorted", "len"})
@@ -18,10 +18,11 @@ _LAZY_VIEWS: Final = frozenset({"zip", "enumerate", "reversed"})
 
 def lazy_findings(tree: ast.Module) -> list[Finding]:
     """Findings about generator expressions and lazy built-ins."""
-    parents = {id(child): node for node in all_nodes(tree) for child in ast.iter_child_nodes(node)}
-    in_text = {id(inner) for node in all_nodes(tree) if isinstance(node, ast.JoinedStr) for inner in ast.walk(node)}
+    nodes = all_nodes(tree)
+    parents = {id(child): node for node in nodes for child in children(node)}
+    in_text = {id(inner) for node in nodes if isinstance(node, ast.JoinedStr) for inner in ast.walk(node)}
     findings: list[Finding] = []
-    for node in all_nodes(tree):
+    for node in nodes:
         parent = parents.get(id(node))
         if isinstance(node, ast.GeneratorExp):
             findings += _generator_findings(node, parent, in_text)

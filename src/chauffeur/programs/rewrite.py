@@ -20,13 +20,26 @@ from typing import Final
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.foresight import DRIVE, TICK, apis_named, closing, stand_ins
 from chauffeur.programs.lower import PRELUDE, Lowering, apply_edits, needs_prelude
-from chauffeur.programs.nodes import all_nodes
+from chauffeur.programs.nodes import all_nodes, children, levels
 
 MAX_SOURCE_CHARS: Final = 20_000
 MAX_NODES: Final = 5_000
 MAX_DEPTH: Final = 40
 
 _SITE: Final = "__site__"
+_BINDINGS: Final = "_chauffeur_bindings"
+_GENERATOR: Final = "_chauffeur_generator"
+_BINDING: Final = (
+    ast.Name,
+    ast.FunctionDef,
+    ast.AsyncFunctionDef,
+    ast.ClassDef,
+    ast.arg,
+    ast.ExceptHandler,
+    ast.alias,
+    ast.Global,
+    ast.Nonlocal,
+)
 _NUMBER: Final = re.compile(r"(?<![\w.])(?:\d{1,15}\.\d{1,17}|[1-9]\d{0,14}|0)(?![\w.])")
 """A plainly written number; in a comment or a text it does no harm either."""
 _MARK: Final = "90817263"
@@ -89,16 +102,13 @@ def unix_lines(text: str) -> str:
 
 
 def _measure(tree: ast.Module, what: str) -> None:
-    stack: list[tuple[ast.AST, int]] = [(tree, 0)]
     nodes = 0
-    while stack:
-        node, depth = stack.pop()
-        nodes += 1
+    for depth, level in enumerate(levels(tree)):
+        nodes += len(level)
         if depth > MAX_DEPTH or nodes > MAX_NODES:
             too = "nested too deeply" if depth > MAX_DEPTH else "too long"
-            line = getattr(node, "lineno", None)
+            line = next((line for node in level if (line := getattr(node, "lineno", None)) is not None), None)
             raise ProgramSyntaxError(f"The {what} is {too}.", line=line, hint="Write a simpler one.")
-        stack.extend((child, depth + 1) for child in ast.iter_child_nodes(node))
 
 
 def own_nodes(function: ast.FunctionDef | ast.Lambda | ast.Module) -> Iterator[ast.AST]:
@@ -108,12 +118,16 @@ def own_nodes(function: ast.FunctionDef | ast.Lambda | ast.Module) -> Iterator[a
         node = stack.pop()
         yield node
         if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef):
-            stack.extend(ast.iter_child_nodes(node))
+            stack += children(node)
 
 
 def is_generator(function: ast.FunctionDef) -> bool:
-    """Whether a function has a yield of its own."""
-    return any(isinstance(node, ast.Yield | ast.YieldFrom) for node in own_nodes(function))
+    """Whether a function has a yield of its own; found out once."""
+    kept: bool | None = getattr(function, _GENERATOR, None)
+    if kept is None:
+        kept = any(isinstance(node, ast.Yield | ast.YieldFrom) for node in own_nodes(function))
+        setattr(function, _GENERATOR, kept)
+    return kept
 
 
 def takes_nothing(function: ast.FunctionDef) -> bool:
@@ -148,9 +162,18 @@ def binds(node: ast.AST) -> list[str]:
     return []
 
 
+def bindings(tree: ast.Module) -> tuple[tuple[ast.AST, str], ...]:
+    """Every name that a text binds, at any depth, with the node that does; listed once, as `all_nodes`."""
+    kept: tuple[tuple[ast.AST, str], ...] | None = getattr(tree, _BINDINGS, None)
+    if kept is None:
+        kept = tuple((node, name) for node in all_nodes(tree) if isinstance(node, _BINDING) for name in binds(node))
+        setattr(tree, _BINDINGS, kept)
+    return kept
+
+
 def bound_names(tree: ast.Module) -> frozenset[str]:
     """Names that a text binds, at any depth."""
-    return frozenset(name for node in all_nodes(tree) for name in binds(node))
+    return frozenset(name for _, name in bindings(tree))
 
 
 def generator_names(tree: ast.Module) -> frozenset[str]:
