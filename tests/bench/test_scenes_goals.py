@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from chauffeur.bench.lampilot.goals_more import CHANGE_HOLD_S, answered_rightly, make_any_goal
+from chauffeur.bench.lampilot.report import answers_note
 from chauffeur.bench.lampilot.scenes import Annotation, annotated, load_annotations
 from chauffeur.bench.lampilot.scenes.feasible import feasible, impossible, start_of
 from chauffeur.concept import DataError, Scenario, ScenarioError, Wishes
@@ -259,3 +260,11 @@ def test_one_sample_has_one_goal(folder: Path) -> None:
 )
 def test_right_answers(goal: str, refused: bool, success: bool, rightly: bool) -> None:
     assert answered_rightly({"type": goal}, refused=refused, success=success) == rightly
+
+
+def test_right_answers_are_said_only_where_something_is_to_be_declined() -> None:
+    drives = [{"to_refuse": False, "answered_rightly": True}, {"to_refuse": False, "answered_rightly": False}]
+    refusals = [{"to_refuse": True, "answered_rightly": True}, {"to_refuse": True, "answered_rightly": False}]
+    assert answers_note(drives) == ""
+    assert answers_note(refusals).startswith("right answers 1 of 2: 1 of 2 wishes")
+    assert answers_note(refusals + drives).endswith("1 of 2 others reached their goal")

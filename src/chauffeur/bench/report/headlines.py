@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from chauffeur.bench.lampilot.metrics import ORIGIN, ruler_named
 from chauffeur.bench.lampilot.paper import TABLE_IV, PaperRow, items_behind
+from chauffeur.bench.lampilot.report import answers_note
 from chauffeur.bench.report.model import SIMULATED, Cell, Headline, Line, ReportTable
 from chauffeur.bench.report.runs import Run
 from chauffeur.bench.report.tables import name_with_labels, number, said
@@ -44,6 +45,8 @@ def result_words(run: Run, line: Line, families: Sequence[Line]) -> Headline:
         f"did as asked in {done:,} of {items.text} items ({completion.text} %{_range(completion)}), {crashed}. "
         f"Driving score {score.text} points{_range(score)}."
     )
+    if answers := answers_note(run.rows):
+        text += f" {answers[0].upper()}{answers[1:]}; the scores above know completed drives only."
     weakest = min(families, key=lambda f: _value(f.cells[2]), default=None)
     if weakest is not None and len(families) > 1 and _value(weakest.cells[2]) < 100.0:
         text += f" Weakest task: {weakest.name}, done in {weakest.cells[2].text} %."
