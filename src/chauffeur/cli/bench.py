@@ -45,6 +45,16 @@ Exit codes: 0 done, 1 the endpoint or this machine gave up, 2 bad input, 3 the b
 the code, what was asked and driven is kept.
 """
 
+PASSENGER_EXAMPLES = """
+Examples:
+
+    chauffeur bench passengers --planner onboard
+
+    chauffeur bench passengers --planner openai/gpt-4o --setting few-shot --concurrency 16
+
+Wishes written by hand, in the words of passengers, each with its right outcome: do this, ask back, or refuse.
+"""
+
 MERGE_EXAMPLES = """
 Examples:
 
@@ -150,6 +160,37 @@ def lampilot(
     _show(console, run, rows)
     if run.halt is not None:
         _stop(console, run)
+
+
+@bench_app.command(epilog=PASSENGER_EXAMPLES)
+def passengers(
+    planner: Annotated[str, typer.Option(help="As for `bench lampilot`.")] = "onboard",
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/passengers-PLANNER.")] = None,
+    setting: Annotated[str, typer.Option(help="Prompt for language models: `few-shot` or `zero-shot`.")] = "few-shot",
+    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    concurrency: Annotated[int, typer.Option(min=1, help="Planner calls in flight at most.")] = 16,
+    workers: Annotated[int | None, typer.Option(min=1, help="Simulation processes; default one per core.")] = None,
+) -> None:
+    """Hand-written wishes with the right outcome each: driven, asked back about, or refused."""
+    from chauffeur.bench.lampilot.asking import PlainRequests
+    from chauffeur.bench.lampilot.runner import RunConfig
+    from chauffeur.bench.passengers import PassengerRequests, as_dataset, load_wishes
+    from chauffeur.cli.console import stdout
+    from chauffeur.cli.parts import setting_named
+    from chauffeur.concept.registry import load_plugin
+
+    console = stdout()
+    prompt = setting_named(setting)
+    dataset = as_dataset()
+    config = RunConfig(planner, prompt, dataset.sha256, 0, 0, LAMPILOT_LIMITS, asked="passengers")
+    requests = PassengerRequests(PlainRequests.of(prompt, LAMPILOT_LIMITS), load_wishes())
+    folder = out or Path("runs") / f"passengers-{planner.replace('/', '-')}"
+    run: LampilotRun = load_plugin("chauffeur.benchmarks", "lampilot").open_run(
+        folder, dataset, config, _planner(planner, base_url), requests=requests
+    )
+    _announce(console, run)
+    rows = _drive(console, run, _effort(workers, concurrency, None, None, None, None), "origin")
+    _show(console, run, rows)
 
 
 def _planner(spec: str, base_url: str | None) -> Planner | None:

@@ -64,7 +64,7 @@ def choose(
     while waiting:
         meaning = waiting.pop(0)
         options = options.with_leaning(leaning(meaning.family))
-        chosen = _CHOOSERS[meaning.manoeuvre](meaning, options)
+        chosen = choose_step(meaning, options)
         if isinstance(chosen, Chosen) and waiting and _comes_back(chosen, waiting[0]):
             # "overtake it, then move back right": one manoeuvre with its return
             del waiting[0]
@@ -74,6 +74,11 @@ def choose(
         steps.append(chosen)
         options = options.after(chosen)
     return Choice(tuple(steps), "+".join(step.intent for step in steps))
+
+
+def choose_step(meaning: Meaning, options: Options) -> Chosen | Declined:
+    """Exemplar and numbers for one thing to do, or the reason why not."""
+    return _CHOOSERS[meaning.manoeuvre](meaning, options)
 
 
 def _comes_back(overtaking: Chosen, following: Meaning) -> bool:

@@ -78,12 +78,14 @@ def _named(meaning: Meaning, amount: Amount, options: Options) -> Chosen | Decli
     return _chosen(meaning, options, "speed.set_down", value, f"slow down to {speed_words(value)} and hold it", assumed)
 
 
-def _limit(meaning: Meaning, options: Options) -> Chosen:
+def _limit(meaning: Meaning, options: Options) -> Chosen | Declined:
     if meaning.amount is None:
         does = f"drive at the speed limit, {speed_words(options.sign_mps)} here"
         return _chosen(meaning, options, "speed.limit", options.sign_mps, does)
     value, assumed = speed_of(meaning.amount, options)
     target = options.sign_mps + value
+    if target < 0.0:
+        return Declined(f"The limit here is {speed_words(options.sign_mps)}; we cannot go {meaning.amount.said} below it.")
     side = "above" if value > 0 else "below"
     does = f"drive {number(abs(value))} m/s {side} the limit, at {speed_words(target)}"
     return _chosen(meaning, options, "speed.over_limit", target, does, assumed)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from chauffeur.concept import ConfigError, Feedback, Plan, PlanRequest, Program, Thoughts
 from chauffeur.planners.onboard.choose import choose
@@ -14,6 +16,9 @@ from chauffeur.planners.onboard.personal import leaning_of
 from chauffeur.planners.onboard.thoughts import thoughts_of
 from chauffeur.planners.onboard.understand import understand
 
+if TYPE_CHECKING:
+    from chauffeur.planners.onboard.language_model import LanguageModelPlanner
+
 VERSION = "meaning-v1"
 """Changes whenever the same request could be planned differently."""
 
@@ -22,11 +27,24 @@ class OnboardPlanner:
     """Plans by structured meaning and exemplar programs, in this process, in a few milliseconds."""
 
     @classmethod
-    def from_spec(cls, argument: str) -> OnboardPlanner:
-        """The planner named `onboard`. Raises ConfigError for an argument: it has no variants."""
-        if argument:
-            raise ConfigError(f"The onboard planner has no variant {argument!r}.", hint="Write just: onboard")
-        return cls()
+    def from_spec(cls, argument: str) -> OnboardPlanner | LanguageModelPlanner:
+        """The planner named `onboard`; `onboard/FOLDER` is the language model of that folder.
+
+        Raises:
+            ConfigError: The argument is no folder.
+            DataError: The folder holds no model.
+        """
+        if not argument:
+            return cls()
+        folder = Path(argument)
+        if not folder.is_dir():
+            raise ConfigError(
+                f"The onboard planner has no variant {argument!r}.",
+                hint="Write just: onboard; or onboard/FOLDER for the language model of a folder.",
+            )
+        from chauffeur.planners.onboard.language_model import LanguageModelPlanner
+
+        return LanguageModelPlanner(folder)
 
     @property
     def id(self) -> str:

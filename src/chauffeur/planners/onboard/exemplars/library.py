@@ -71,6 +71,11 @@ def program_of(steps: Sequence[Filled]) -> str:
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
 
 
+def function_of(step: Filled, *, whole: bool) -> str:
+    """The function of one step; without `whole`, only what brings the manoeuvre about."""
+    return _filled(step, whole=whole)
+
+
 def number(value: float) -> str:
     """A number as the programs and the thoughts write it: two digits at most, one at least, whole counts plain."""
     if isinstance(value, int):

@@ -1,0 +1,6 @@
+"""Wishes in the words of passengers: an evaluation set written by hand, that no generator and no word list produced."""
+
+from chauffeur.bench.passengers.asking import PassengerRequests
+from chauffeur.bench.passengers.loading import PassengerWish, PastWish, as_dataset, load_wishes
+
+__all__ = ["PassengerRequests", "PassengerWish", "PastWish", "as_dataset", "load_wishes"]

@@ -1,0 +1,70 @@
+"""A second look at what the model wrote, by rules that know words: what contradicts the wish is asked about.
+
+A small network may copy a number wrongly or mix up two sides. So every number of a program must be one that the person
+named or history holds, and where the rule-based reading of the same words is sure of a side or a direction, the program
+must not say the opposite.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Final
+
+from chauffeur.language.quantities import read_quantities
+from chauffeur.planners.onboard.dialect import SKILLS, Number, Step
+from chauffeur.planners.onboard.meaning import NotUnderstood, Reading
+from chauffeur.planners.onboard.understand import understand
+
+_DIGITS: Final = re.compile(r"\d+(?:\.\d+)?")
+_CLOSE: Final = 0.011
+_SIDES: Final = ("left", "right")
+
+
+def doubt(wish: str, history: Sequence[str], steps: Sequence[Step]) -> str:
+    """What to ask back about a program before it is driven; empty when nothing speaks against it.
+
+    Args:
+        wish: The passenger's words.
+        history: Remembered trips as the model read them.
+        steps: What the program does.
+    """
+    digits = {float(number) for text in (wish, *history) for number in _DIGITS.findall(text)}
+    quantities = [quantity.value for quantity in read_quantities(wish)]
+    for number in _numbers_of(steps):
+        measured = number.si / number.factor
+        if not any(_close(number.value, one) for one in digits) and not any(_close(measured, q) for q in quantities):
+            return f"I am not sure about the number: did you mean {number.value:g}?"
+    reading = understand(wish)
+    if isinstance(reading, NotUnderstood):
+        return ""
+    return _contradiction(reading, steps)
+
+
+def _close(value: float, other: float) -> bool:
+    return abs(value - other) <= _CLOSE * max(1.0, abs(other))
+
+
+def _numbers_of(steps: Sequence[Step]) -> list[Number]:
+    """Numbers that are measures; factors and counts are said in too many ways."""
+    found: list[Number] = []
+    for step in steps:
+        own = step.number if SKILLS[step.skill].takes in ("speed", "distance", "time") else None
+        condition = step.condition.number if step.condition is not None else None
+        found += [number for number in (own, step.wait_s, condition) if number is not None]
+    return found
+
+
+def _contradiction(reading: Reading, steps: Sequence[Step]) -> str:
+    """Where both read the same manoeuvres, whether one of them says left for right or more for less."""
+    if len(reading.steps) != len(steps):
+        return ""
+    for ruled, step in zip(reading.steps, steps, strict=True):
+        written = step.meaning
+        if ruled.manoeuvre != written.manoeuvre:
+            continue
+        if {ruled.direction, written.direction} == set(_SIDES):
+            return "Do you mean left or right?"
+        if ruled.change * written.change < 0:
+            return "Do you want more or less of it?"
+    return ""

@@ -1,0 +1,148 @@
+"""The planner that asks the on-board language model: words to a program of the dialect, then linked to this road.
+
+What the model writes is read by the dialect's reader, looked at by the guard and linked; it is never run as it comes.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from chauffeur.concept import Plan, PlanRequest, Program, ProgramError, Thoughts, Usage
+from chauffeur.planners.onboard.dialect import Step
+from chauffeur.planners.onboard.engine import Engine, Written
+from chauffeur.planners.onboard.guard import doubt
+from chauffeur.planners.onboard.link import Linked, link
+from chauffeur.planners.onboard.options import Declined
+from chauffeur.planners.onboard.personal import leaning_of
+from chauffeur.planners.onboard.prompt import history_words, prompt
+from chauffeur.planners.onboard.reply import Reply, read_reply
+from chauffeur.planners.onboard.thoughts import thoughts_of
+
+UNSURE = 0.35
+"""Below this probability of its least sure choice the model's program is asked about instead of driven."""
+
+
+class LanguageModelPlanner:
+    """Plans with the on-board language model, in this process."""
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        constrained: bool = True,
+        history: bool = True,
+        guarded: bool = True,
+        told: Callable[[str], None] | None = None,
+    ) -> None:
+        """Load a model.
+
+        Args:
+            folder: The exported model.
+            constrained, history, guarded: Whether decoding holds to the grammar, H is shown, and the guard looks on;
+                turned off for ablations only.
+            told: Called with each piece of text as the model writes it.
+
+        Raises:
+            DataError: The folder holds no model.
+            MissingExtraError: A library is missing.
+        """
+        self._engine = Engine(folder)
+        self._constrained = constrained
+        self._history = history
+        self._guarded = guarded
+        self._told = told
+        self._read: dict[str, tuple[Step, ...]] = {}
+
+    @property
+    def id(self) -> str:
+        """Registry name."""
+        return "onboard"
+
+    @property
+    def model(self) -> str:
+        """Version of the model."""
+        return str(self._engine.about.get("version", "unnamed"))
+
+    async def plan(self, request: PlanRequest) -> Plan:
+        """One plan; what is not understood, not possible or not to be done is declined in words."""
+        begun = time.perf_counter()
+        wish = request.instruction.text
+        situation = request.context.situation
+        history = history_words(request.history, self._steps_of) if self._history else ()
+        text = prompt(situation, history, wish)
+        written = self._engine.write(text, constrained=self._constrained, told=self._told)
+        try:
+            reply = read_reply(written.text)
+        except ProgramError as error:
+            return self._declined("I did not understand that.", "ask", begun, written, str(error))
+        if reply.question:
+            return self._declined(reply.question, "ask", begun, written)
+        if reply.refusal:
+            return self._declined(self._why(reply, text, request), "refuse", begun, written)
+        if self._guarded:
+            question = doubt(wish, history, reply.steps)
+            if not question and written.sure < UNSURE:
+                question = "I am not sure what you want. Please say it in other words."
+            if question:
+                return self._declined(question, "ask", begun, written)
+        linked = self._linked(reply, request)
+        if isinstance(linked, Declined):
+            intent = "+".join(step.meaning.family for step in reply.steps)
+            return self._declined(linked.words, intent, begun, written)
+        used = [leaning_of(request.history, step.meaning.family) for step in reply.steps]
+        settings = {name: value for step in linked.choice.steps for name, value in step.settings}
+        settings |= {name: value for one in used for name, value in one.settings}
+        return Plan(
+            thoughts=thoughts_of(linked.reading, linked.choice, situation, [one.because for one in used]),
+            policy=Program(reply.source, library=linked.library),
+            intent=linked.choice.intent,
+            settings=tuple(settings.items()),
+            planner=self.id,
+            model=self.model,
+            latency_s=time.perf_counter() - begun,
+            usage=_usage(written),
+            raw=written.text,
+        )
+
+    def _steps_of(self, wish: str) -> tuple[Step, ...]:
+        """What an earlier wish asked for, for trips that were driven by another planner; empty when that is unclear."""
+        if wish not in self._read:
+            try:
+                self._read[wish] = read_reply(self._engine.write(prompt(None, (), wish), only_program=True).text).steps
+            except ProgramError:
+                self._read[wish] = ()
+        return self._read[wish]
+
+    def _linked(self, reply: Reply, request: PlanRequest) -> Linked | Declined:
+        return link(reply.steps, request.context.situation, request.limits, partial(leaning_of, request.history))
+
+    def _why(self, reply: Reply, text: str, request: PlanRequest) -> str:
+        """The reason for a refusal: what the road says of the program the model would have written, if it does."""
+        if not reply.refusal.startswith(("There is no", "That is not possible")):
+            return reply.refusal
+        try:
+            wanted = read_reply(self._engine.write(text, only_program=True).text)
+        except ProgramError:
+            return reply.refusal
+        linked = self._linked(wanted, request)
+        return linked.words if isinstance(linked, Declined) else reply.refusal
+
+    def _declined(self, words: str, intent: str, begun: float, written: Written, raw: str = "") -> Plan:
+        return Plan(
+            thoughts=Thoughts(words),
+            policy=None,
+            refusal=words,
+            intent=intent,
+            planner=self.id,
+            model=self.model,
+            latency_s=time.perf_counter() - begun,
+            usage=_usage(written),
+            raw=raw or written.text,
+        )
+
+
+def _usage(written: Written) -> Usage:
+    return Usage(prompt_tokens=written.prompt_tokens, completion_tokens=written.tokens)
