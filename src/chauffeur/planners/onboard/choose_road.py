@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
+from chauffeur.planners.onboard.exemplars import Filled
+from chauffeur.planners.onboard.exemplars.crossing import CROSSING
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.meaning import Meaning
 from chauffeur.planners.onboard.options import USUAL_HEADWAY_S, Chosen, Declined, Options, speed_words
@@ -153,6 +155,8 @@ def choose_turn(meaning: Meaning, options: Options) -> Chosen | Declined:
     if side not in situation.turns:
         return Declined(f"At this junction one cannot {_WORDS[side]}. Possible: {_listed(situation.turns)}.")
     manner = meaning.manner if meaning.manner in ("gentle", "swift") else ""
+    if not manner:
+        return _cross(side, options)
     target, go, after = _CROSSING[side][manner]
     near, far, stop = _ROOM[side]
     numbers = {
@@ -172,6 +176,18 @@ def choose_turn(meaning: Meaning, options: Options) -> Chosen | Declined:
     seen = "from the left" if side == "right" else "from the left and from the right"
     does = f"halt at the stop sign, wait until nobody comes {seen}, and {_WORDS[side]} at {speed_words(target)}"
     return Chosen(filled, f"turn.{side}", does, (), (("target_speed_mps", target),))
+
+
+def _cross(side: str, options: Options) -> Chosen:
+    """The plain way over the junction."""
+    numbers = CROSSING[side]
+    fastest = min(numbers["MOST"], max(options.cap_mps, numbers["FLOOR"]))
+    cruise = min(numbers["CROSS"], fastest)
+    changed = {"HEADWAY": options.headway(0.01), "MOST": fastest, "CROSS": cruise}
+    seen = "from the left" if side == "right" else "from the left and from the right"
+    does = f"halt at the stop sign, wait until nobody comes {seen}, and {_WORDS[side]} at {speed_words(cruise)}"
+    settings = (("target_speed_mps", round(cruise, 2)),)
+    return Chosen(Filled(f"crossing.{side}", changed), f"turn.{side}", does, (), settings)
 
 
 _HALTING = {"gentle": (1.8, 0.8), "smooth": (2.5, 0.85), "swift": (4.0, 1.0)}

@@ -85,7 +85,9 @@ def _limit(meaning: Meaning, options: Options) -> Chosen | Declined:
     value, assumed = speed_of(meaning.amount, options)
     target = options.sign_mps + value
     if target < 0.0:
-        return Declined(f"The limit here is {speed_words(options.sign_mps)}; we cannot go {meaning.amount.said} below it.")
+        return Declined(
+            f"The limit here is {speed_words(options.sign_mps)}; we cannot go {meaning.amount.said} below it."
+        )
     side = "above" if value > 0 else "below"
     does = f"drive {number(abs(value))} m/s {side} the limit, at {speed_words(target)}"
     return _chosen(meaning, options, "speed.over_limit", target, does, assumed)

@@ -19,7 +19,7 @@ from chauffeur.planners.onboard.understand import understand
 if TYPE_CHECKING:
     from chauffeur.planners.onboard.language_model import LanguageModelPlanner
 
-VERSION = "meaning-v1"
+VERSION = "meaning-v2"
 """Changes whenever the same request could be planned differently."""
 
 

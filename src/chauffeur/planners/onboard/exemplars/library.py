@@ -14,6 +14,8 @@ from functools import cache
 from importlib import resources
 from string import Template
 
+from chauffeur.planners.onboard.exemplars.crossing import DONE_M, ON_THE_WAY_M, crossing_program
+
 FILES = ("speed", "gap", "road", "turn", "stop", "style")
 _HOLD = "#: hold"
 _NAME = re.compile(r"^def (\w+)\(\):$", re.MULTILINE)
@@ -62,13 +64,19 @@ def program_of(steps: Sequence[Filled]) -> str:
     names: list[str] = []
     for index, step in enumerate(steps):
         text = _filled(step, whole=index == len(steps) - 1)
-        name = exemplars()[step.id].function
+        name = _function(step)
         unique = name if name not in names else f"{name}_{index + 1}"
         parts.append(text.replace(f"def {name}():", f"def {unique}():", 1))
         names.append(unique)
     calls = "".join(f"    yield from {name}()\n" for name in names)
     parts.append(f"def in_this_order():\n    # One after the other.\n{calls}")
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+
+
+def _function(step: Filled) -> str:
+    if step.id.startswith("crossing."):
+        return "go_straight" if step.id == "crossing.straight" else "turn"
+    return exemplars()[step.id].function
 
 
 def function_of(step: Filled, *, whole: bool) -> str:
@@ -85,6 +93,9 @@ def number(value: float) -> str:
 
 
 def _filled(step: Filled, *, whole: bool) -> str:
+    kind, _, side = step.id.partition(".")
+    if kind == "crossing":
+        return crossing_program(side, {**step.numbers, "END": DONE_M if whole else ON_THE_WAY_M})
     text = exemplars()[step.id].text
     if not whole and _HOLD in text:
         text = text[: text.index(_HOLD)].rstrip() + "\n"
