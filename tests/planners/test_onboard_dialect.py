@@ -1,4 +1,4 @@
-"""The dialect: what is written is read back, every text of it is a program of the language, and nothing else is read."""
+"""The dialect: what is written is read back, every text of it is a program of the language; nothing else is read."""
 
 from __future__ import annotations
 
@@ -46,7 +46,9 @@ def steps(draw: st.DrawFn) -> Step:
     if draw(st.booleans()):
         name = draw(st.sampled_from(sorted(CONDITIONS)))
         kind = CONDITIONS[name][0]
-        condition = Condition(draw(st.sampled_from(["if", "once"])), name, None if kind is None else draw(numbers(kind)))
+        condition = Condition(
+            draw(st.sampled_from(["if", "once"])), name, None if kind is None else draw(numbers(kind))
+        )
     wait = draw(st.none() | numbers("time"))
     return Step(skill.name, number, draw(st.sampled_from(["", *MANNERS])), wait, condition)
 
@@ -119,9 +121,7 @@ def linked(*some: Step) -> Linked:
 
 
 def test_conditions_waits_and_units_are_in_the_library() -> None:
-    step = Step(
-        "overtake_left", None, "", Number(10.0), Condition("once", "lead_closer_than", Number(100.0, "feet"))
-    )
+    step = Step("overtake_left", None, "", Number(10.0), Condition("once", "lead_closer_than", Number(100.0, "feet")))
     library = linked(step).library
     for name in ("def overtake_left(", "def wait(", "def lead_closer_than(", "def feet("):
         assert name in library

@@ -13,6 +13,8 @@ from chauffeur.cli.bench import bench_app
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
 from chauffeur.cli.policies import policies_app
 from chauffeur.cli.scenes import scenes_app
+from chauffeur.cli.serve import serve_app
+from chauffeur.cli.train import train_app
 
 EXAMPLES = """
 Examples:
@@ -67,6 +69,8 @@ bench_app.command(epilog=coach.EXAMPLES)(coach.coach)
 app.add_typer(bench_app, name="bench")
 app.add_typer(policies_app, name="policies")
 app.add_typer(scenes_app, name="scenes")
+app.add_typer(train_app, name="train")
+app.add_typer(serve_app, name="serve")
 
 
 def run() -> None:

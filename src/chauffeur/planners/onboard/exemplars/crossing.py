@@ -1,9 +1,9 @@
 """Over LaMPilot's crossing: one program for going straight on and one for turning, with their numbers.
 
 They stop at the sign (below 1 m/s, lawfully), go once the braking that `is_safe_enter` foresees of the next car says
-that there is time, and keep above 6 m/s in a turn, below which LaMPilot's vehicle model is numerically unstable. Their speed
-changes a little so that others are level with the ego at the end of a control period, not just before: LaMPilot's time
-to collision is read ten times a second, in every lane, and is least in the sample before a pass.
+that there is time, and keep above 6 m/s in a turn, below which LaMPilot's vehicle model is numerically unstable.
+Their speed changes a little so that others are level with the ego at the end of a control period, not just before:
+LaMPilot's time to collision is read ten times a second, in every lane, and is least in the sample before a pass.
 """
 
 from __future__ import annotations

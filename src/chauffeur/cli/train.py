@@ -1,0 +1,83 @@
+"""`chauffeur train`: models of our own, from a seed."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+train_app = typer.Typer(no_args_is_help=True, rich_markup_mode="markdown", help="Train models of our own.")
+
+ONBOARD_EXAMPLES = """
+Examples:
+
+    chauffeur train onboard --out runs/onboard
+
+    chauffeur train onboard --out runs/large --size large --steps 20000 --draws 60000
+
+    chauffeur train onboard --out runs/onboard --data-only
+
+    chauffeur bench passengers --planner onboard/runs/onboard/model
+
+Makes its own data first: scenes, programs that were driven in them, and words. The same seed gives the same data.
+Ctrl-C keeps what is done; the same command goes on. It needs PyTorch and tokenizers: pip install 'chauffeur[models]'.
+"""
+
+_LINE_EVERY_S: Final = 10.0
+
+
+@train_app.callback()
+def train() -> None:
+    """Models of our own."""
+
+
+@train_app.command(epilog=ONBOARD_EXAMPLES)
+def onboard(
+    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    draws: Annotated[int, typer.Option(min=100, help="Scenes drawn; about six in ten become cases.")] = 22_000,
+    per_case: Annotated[int, typer.Option(min=1, help="Wordings tried for each case.")] = 26,
+    size: Annotated[str, typer.Option(help="`small` (an hour on two cores), `medium`, or `large` (GPU).")] = "small",
+    steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 4,096 tokens.")] = 6_000,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes that make data; default one per core.")] = None,
+    threads: Annotated[int, typer.Option(min=0, help="Threads that train; 0 leaves it to PyTorch.")] = 0,
+    device: Annotated[str, typer.Option(help="`cpu` or `cuda`; default the best at hand.")] = "",
+    data_only: Annotated[bool, typer.Option("--data-only", help="Make the data and stop.")] = False,
+) -> None:
+    """The on-board language model: words to driving programs, offline."""
+    from chauffeur.cli.console import stdout
+    from chauffeur.concept import ConfigError, MissingExtraError
+    from chauffeur.models.onboard.pipeline import Plan, build_data, train_model
+
+    console = stdout()
+    plan = Plan(seed, draws, per_case, size, steps)
+    shown: dict[str, float] = {}
+
+    def told(stage: str, done: int, of: int) -> None:
+        name = stage.partition(",")[0]
+        now = time.monotonic()
+        if done == of or now - shown.get(name, 0.0) >= _LINE_EVERY_S:
+            shown[name] = now
+            console.print(f"{stage}: {done:,} of {of:,}", soft_wrap=True)
+
+    try:
+        build_data(out, plan, workers or os.cpu_count() or 1, told)
+        if data_only:
+            console.print(f"Data: {out / 'data'}; its card: {out / 'data' / 'DATA_CARD.md'}", soft_wrap=True)
+            return
+        try:
+            from chauffeur.models.onboard.training import SIZES
+        except ImportError as error:
+            raise MissingExtraError(
+                f"Training needs {error.name}.", hint="Run: pip install 'chauffeur[models]'"
+            ) from error
+        if size not in SIZES:
+            raise ConfigError(f"There is no size {size!r}.", hint=f"Sizes: {', '.join(SIZES)}.")
+        model = train_model(out, plan, told, threads=threads, device=device)
+    except KeyboardInterrupt:
+        console.print(f"Stopped. What is done is kept in {out}; run the same command to go on.", soft_wrap=True)
+        raise typer.Exit(130) from None
+    console.print(f"Model: {model}. Try it: chauffeur bench passengers --planner onboard/{model}", soft_wrap=True)

@@ -1,0 +1,225 @@
+# pyright: reportMissingImports=false
+"""From a seed to a model: cases, examples, tokenizer, network, export; every stage is kept, and a stopped run goes on.
+
+folder/cases.jsonl      scenes and programs, each driven
+folder/data/            packed examples of each split, the splits' texts, `data.json`, `DATA_CARD.md`
+folder/training/        the network's state and log
+folder/model/           what ships: `model.onnx`, `tokenizer.json`, `model.json`
+folder/transformers/    the same as a checkpoint for `transformers`
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from chauffeur.concept import DataError
+from chauffeur.drive.files import publish
+from chauffeur.models.onboard.cases import Case
+from chauffeur.models.onboard.engine import (
+    PER_CASE,
+    VERSION,
+    Splits,
+    gathered,
+    left_out,
+    make_cases,
+    processes,
+    worded,
+)
+from chauffeur.models.onboard.examples import Example, questions, reasons
+from chauffeur.models.onboard.packed import Packed
+from chauffeur.planners.onboard.prompt import END
+
+MODEL_VERSION: Final = "onboard-lm-v1"
+_SPLITS: Final = ("train", "seen", "unseen")
+_TOKENIZER_EXAMPLES: Final = 60_000
+
+Told = Callable[[str, int, int], None]
+"""Is told (stage, done, of how many)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What decides a model.
+
+    Attributes:
+        seed: Of everything.
+        draws: Draws of cases; about six in ten become one.
+        per_case: Wordings tried for each.
+        size: Network's size, see `training.SIZES`.
+        steps: Optimiser steps.
+    """
+
+    seed: int = 0
+    draws: int = 22_000
+    per_case: int = PER_CASE
+    size: str = "small"
+    steps: int = 6_000
+
+
+def build_data(folder: Path, plan: Plan, workers: int, told: Told) -> None:
+    """Cases, examples and tokenizer. Raises DataError when a file cannot be written."""
+    data = folder / "data"
+    if (data / "data.json").exists() and json.loads((data / "data.json").read_text(encoding="utf-8"))["plan"] == {
+        "seed": plan.seed,
+        "draws": plan.draws,
+        "per_case": plan.per_case,
+    }:
+        return
+    data.mkdir(parents=True, exist_ok=True)
+    cases_file = folder / "cases.jsonl"
+    cases = make_cases(plan.seed, plan.draws, cases_file, workers, lambda done, _: told("cases", done, plan.draws))
+    splits = _examples(cases, plan, workers, told)
+    _pack(splits, data, plan.seed, told)
+    facts = _facts(cases, splits, left_out(cases_file), plan)
+    publish(data / "DATA_CARD.md", data_card(facts).encode(), "data card")
+    publish(data / "data.json", (json.dumps(facts, indent=1, ensure_ascii=False) + "\n").encode(), "data set's facts")
+
+
+def _examples(cases: Sequence[Case], plan: Plan, workers: int, told: Told) -> Splits:
+    parts = [cases[i : i + 100] for i in range(0, len(cases), 100)]
+    found: list[Splits] = []
+    with processes(workers) as pool:
+        for part in pool.map(partial(worded, seed=plan.seed, per_case=plan.per_case), parts):
+            found.append(part)
+            told("examples", len(found), len(parts))
+    return gathered(found)
+
+
+def _pack(splits: Splits, data: Path, seed: int, told: Told) -> None:
+    from chauffeur.models.onboard.tokens import train_tokenizer
+
+    rng = np.random.default_rng([seed, 31])
+    count = min(_TOKENIZER_EXAMPLES, len(splits.train))
+    some = [splits.train[i] for i in sorted(rng.choice(len(splits.train), count, replace=False))]
+    tokenizer: Any = train_tokenizer(text for example in some for text in (example.prompt, example.reply))
+    tokenizer.save(str(data / "tokenizer.json"))
+    end = tokenizer.token_to_id(END)
+    for place, (name, examples) in enumerate(zip(_SPLITS, (splits.train, splits.seen, splits.unseen), strict=True)):
+        told("tokens", place, len(_SPLITS))
+        tokens: list[int] = []
+        starts, replies = [0], list[int]()
+        prompts = tokenizer.encode_batch([example.prompt for example in examples])
+        answers = tokenizer.encode_batch([example.reply for example in examples])
+        for asked, answered in zip(prompts, answers, strict=True):
+            tokens += [*asked.ids, *answered.ids, end]
+            starts.append(len(tokens))
+            replies.append(len(asked.ids))
+        packed = Packed(np.array(tokens, np.uint16), np.array(starts, np.int64), np.array(replies, np.int32))
+        packed.save(data / f"{name}.npz")
+        lines = "".join(json.dumps(asdict(example), ensure_ascii=False) + "\n" for example in examples)
+        publish(data / f"{name}.jsonl", lines.encode(), "examples")
+
+
+def _facts(cases: Sequence[Case], splits: Splits, why: Counter[str], plan: Plan) -> dict[str, Any]:
+    train = splits.train
+    skills = Counter(skill for case in cases if not case.refusal for skill in (step.skill for step in case.steps))
+    return {
+        "version": VERSION,
+        "chauffeur": version("chauffeur"),
+        "plan": {"seed": plan.seed, "draws": plan.draws, "per_case": plan.per_case},
+        "cases": len(cases),
+        "cases_refused": sum(bool(case.refusal) for case in cases),
+        "left_out": dict(why.most_common()),
+        "examples": {name: len(part) for name, part in zip(_SPLITS, (train, splits.seen, splits.unseen), strict=True)},
+        "kinds": dict(Counter(example.kind for example in train).most_common()),
+        "directness": dict(sorted(Counter(example.directness for example in train).items())),
+        "noise": dict(sorted(Counter(example.noise for example in train).items())),
+        "steps": dict(sorted(Counter(example.skills.count("+") + 1 for example in train).items())),
+        "wordings": len({example.wish for example in train}),
+        "templates": len({part for example in train for part in example.template.split("+")}),
+        "driven_skills": dict(skills.most_common()),
+        "sha256": hashlib.sha256("".join(example.prompt + example.reply for example in train).encode()).hexdigest(),
+    }
+
+
+def data_card(facts: dict[str, Any]) -> str:
+    """The data card of a data set."""
+
+    def table(head: str, counts: dict[Any, int]) -> str:
+        return f"| {head} | count |\n|---|---:|\n" + "".join(f"| {k} | {n:,} |\n" for k, n in counts.items())
+
+    return f"""# Data card: {facts["version"]}
+
+Training data of the on-board language model: {facts["examples"]["train"]:,} examples of (wish, situation, remembered
+trips) -> (program, what it does), made by this repository alone. All scenes are simulated (highway-env physics), all
+words come from a grammar; no person's data is in it, and no sentence of LaMPilot's or of the hand-written test set.
+
+- **Cases**: {facts["cases"]:,} scenes with a program each ({facts["cases_refused"]:,} of them not possible there, whose
+  answer is a refusal). Every other program was linked, driven in its scene and did what its words say; what did not was
+  left out (table below).
+- **Words**: {facts["wordings"]:,} different wishes from {facts["templates"]:,} templates; about a fifth of those
+  of each skill is held out for tests. Typing and speech-recognition errors in three levels.
+- **Near-duplicates**: no prompt comes twice, and no wording (numbers and politeness masked) more than 24 times for the
+  same program; test wishes whose masked wording occurs in training are left out.
+- **Seed** {facts["plan"]["seed"]}; sha256 of the training examples `{facts["sha256"][:16]}`.
+
+{table("kind", facts["kinds"])}
+{table("directness (0: not varied)", facts["directness"])}
+{table("noise level", facts["noise"])}
+{table("things to do in a wish", facts["steps"])}
+{table("skill, in driven cases", facts["driven_skills"])}
+{table("draws left out because", dict(list(facts["left_out"].items())[:30]))}
+## Limits
+
+English only, one grammar's idea of how people speak, LaMPilot's three roads, one weather. Moods ("I am late") stand for
+the one skill that a reasonable driver would choose.
+"""
+
+
+def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, device: str = "") -> Path:
+    """Train on built data, and export; gives the folder of what ships.
+
+    Raises:
+        ConfigError: The folder holds a training run of another plan.
+        DataError: There is no built data.
+    """
+    import torch
+
+    from chauffeur.models.onboard.export import export, export_transformers
+    from chauffeur.models.onboard.tokens import load_tokenizer
+    from chauffeur.models.onboard.training import Recipe, train
+
+    data = folder / "data"
+    if not (data / "data.json").exists():
+        raise DataError(f"{folder} holds no data to train on.", hint="Build it first: chauffeur train onboard --data")
+    if threads:
+        torch.set_num_threads(threads)
+    tokenizer: Any = load_tokenizer(data)
+    state = folder / "training"
+    state.mkdir(exist_ok=True)
+    recipe = Recipe(size=plan.size, steps=plan.steps, seed=plan.seed)
+    model = train(
+        Packed.load(data / "train.npz"),
+        state,
+        recipe,
+        vocabulary=tokenizer.get_vocab_size(),
+        end=tokenizer.token_to_id(END),
+        held_back=Packed.load(data / "unseen.npz"),
+        watch=lambda step, loss, rate: told(f"training, loss {loss:.3f}, {rate:,.0f} tokens/s", step + 1, plan.steps),
+        device=device,
+    )
+    about = {
+        "version": MODEL_VERSION,
+        "recipe": asdict(recipe),
+        "data": json.loads((data / "data.json").read_text(encoding="utf-8"))["sha256"],
+        "questions": list(questions()),
+        "reasons": list(reasons()),
+    }
+    export(model, tokenizer, folder / "model", about)
+    export_transformers(model, tokenizer, folder / "transformers")
+    return folder / "model"
+
+
+def examples_of(path: Path) -> list[Example]:
+    """The stored examples of a split."""
+    return [Example(**json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]

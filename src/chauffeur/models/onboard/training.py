@@ -1,0 +1,245 @@
+# pyright: reportMissingImports=false, reportUntypedBaseClass=false, reportUntypedFunctionDecorator=false
+"""Training the on-board model: next-token loss on the replies, resumable, the same from the same seed.
+
+The architecture is `transformers`' Llama, small; the loop is plain PyTorch, on CPU cores (bfloat16) or one GPU.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+from torch.nn import functional
+from transformers import LlamaConfig, LlamaForCausalLM
+
+from chauffeur.concept import ConfigError
+from chauffeur.models.onboard.packed import Array, Packed
+
+Network = Any
+"""A `LlamaForCausalLM`: untyped, because `transformers` need not be installed where this is checked."""
+
+LENGTHS: Final = (32, 40, 48, 56, 64, 80, 96, 128, 192, 320, 512)
+"""Tokens an example is padded to."""
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """Shape of the network."""
+
+    hidden: int
+    layers: int
+    heads: int
+    kv_heads: int
+    inner: int
+
+
+SIZES: Final = {
+    "tiny": Size(64, 2, 2, 1, 128),
+    "small": Size(192, 6, 3, 1, 512),
+    "medium": Size(256, 6, 4, 2, 640),
+    "large": Size(384, 10, 6, 2, 1024),
+}
+"""`small` trains in an hour on two cores: 2.9 M parameters; `medium` has 4.6 M, `large`, for a GPU, 15 M."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """What decides a training run.
+
+    Attributes:
+        size: One of SIZES.
+        steps: Optimiser steps.
+        batch_tokens: Tokens a step, padding included.
+        rate: Highest learning rate.
+        warmup: Steps until it is reached; then it falls along a cosine.
+        decay: Weight decay.
+        seed: Of weights and order.
+    """
+
+    size: str = "small"
+    steps: int = 6000
+    batch_tokens: int = 4096
+    rate: float = 2e-3
+    warmup: int = 200
+    decay: float = 0.05
+    seed: int = 0
+
+
+def network(size: Size, vocabulary: int, end: int) -> Network:
+    """An untrained network. Weights come from torch's global generator."""
+    config = LlamaConfig(
+        vocab_size=vocabulary,
+        hidden_size=size.hidden,
+        intermediate_size=size.inner,
+        num_hidden_layers=size.layers,
+        num_attention_heads=size.heads,
+        num_key_value_heads=size.kv_heads,
+        max_position_embeddings=512,
+        tie_word_embeddings=True,
+        bos_token_id=None,
+        eos_token_id=end,
+        pad_token_id=end,
+        rms_norm_eps=1e-5,
+    )
+    return LlamaForCausalLM(config)
+
+
+def batches(data: Packed, tokens: int, rng: np.random.Generator) -> Iterator[Array]:
+    """Endless batches of example numbers in random order, each of one of a few shapes.
+
+    Matrix kernels are made for a shape, and making one costs more than a step: so lengths are rounded up to a few, and
+    every batch of a length has the same number of rows. The few examples that fill no batch wait for the next round.
+    """
+    lengths = np.diff(data.starts)
+    rounded = np.array([next(size for size in LENGTHS if size >= length) for length in lengths])
+    while True:
+        order = rng.permutation(len(data))
+        pool: list[Array] = []
+        for length in LENGTHS:
+            same = order[rounded[order] == length]
+            rows = max(1, tokens // length)
+            pool += [same[i : i + rows] for i in range(0, len(same) - rows + 1, rows)]
+            if 0 < len(same) < rows:
+                pool.append(np.resize(same, rows))
+        for place in rng.permutation(len(pool)):
+            yield pool[place]
+
+
+def collate(data: Packed, which: Array, pad: int) -> tuple[torch.Tensor, torch.Tensor]:
+    """(tokens, targets), both (batch, one of LENGTHS); targets are -100 outside the replies."""
+    rows = [data.tokens[data.starts[i] : data.starts[i + 1]].astype(np.int64) for i in which]
+    longest = next(size for size in LENGTHS if size >= max(len(row) for row in rows))
+    ids = np.full((len(rows), longest + 1), pad, np.int64)
+    targets = np.full((len(rows), longest + 1), -100, np.int64)
+    for line, (row, i) in enumerate(zip(rows, which, strict=True)):
+        ids[line, : len(row)] = row
+        begin = int(data.replies[i])
+        targets[line, begin : len(row)] = row[begin:]
+    return torch.from_numpy(ids[:, :-1]), torch.from_numpy(targets[:, 1:])
+
+
+def loss_of(model: Network, ids: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
+    """Mean loss over the replies' tokens."""
+    logits = model(input_ids=ids, use_cache=False).logits
+    return functional.cross_entropy(logits.float().flatten(0, 1), targets.flatten(), ignore_index=-100)
+
+
+def rate_at(step: int, recipe: Recipe) -> float:
+    """Learning rate of a step."""
+    if step < recipe.warmup:
+        return recipe.rate * (step + 1) / recipe.warmup
+    share = (step - recipe.warmup) / max(1, recipe.steps - recipe.warmup)
+    return recipe.rate * (0.02 + 0.98 * 0.5 * (1.0 + math.cos(math.pi * min(1.0, share))))
+
+
+def train(
+    data: Packed,
+    folder: Path,
+    recipe: Recipe,
+    *,
+    vocabulary: int,
+    end: int,
+    held_back: Packed | None = None,
+    watch: Callable[[int, float, float], None] | None = None,
+    device: str = "",
+    save_s: float = 120.0,
+) -> Network:
+    """Train, or go on where a run in this folder stopped.
+
+    Args:
+        data: Training examples.
+        folder: Where the run keeps its state (`state.pt`) and log (`log.jsonl`).
+        recipe: What decides the run.
+        vocabulary, end: Size of the vocabulary, token that ends a reply.
+        held_back: Validation examples, looked at from time to time.
+        watch: Called after each step with (step, loss, tokens per second).
+        device: `cpu`, `cuda`; empty for the best at hand.
+        save_s: Seconds between two saves.
+
+    Raises:
+        ConfigError: The folder holds a run of another recipe.
+    """
+    where = torch.device(device or ("cuda" if torch.cuda.is_available() else "cpu"))
+    torch.manual_seed(recipe.seed)
+    model: Any = network(SIZES[recipe.size], vocabulary, end).to(where)
+    matrices = [p for p in model.parameters() if p.dim() >= 2]
+    vectors = [p for p in model.parameters() if p.dim() < 2]
+    optimiser = torch.optim.AdamW(
+        [{"params": matrices, "weight_decay": recipe.decay}, {"params": vectors, "weight_decay": 0.0}],
+        lr=recipe.rate,
+        betas=(0.9, 0.98),
+        fused=True,
+    )
+    state_path = folder / "state.pt"
+    first = 0
+    if state_path.exists():
+        state: dict[str, Any] = torch.load(state_path, map_location=where, weights_only=True)
+        if state["recipe"] != asdict(recipe):
+            raise ConfigError(f"{folder} holds a run of another recipe.", hint="Choose another folder, or delete it.")
+        model.load_state_dict(state["model"])
+        optimiser.load_state_dict(state["optimiser"])
+        first = int(state["step"])
+    feed = batches(data, recipe.batch_tokens, np.random.default_rng([recipe.seed, 1]))
+    for _ in range(first):  # the order is the seed's; what was seen is passed over
+        next(feed)
+    model.train()
+    saved = time.monotonic()
+    log = (folder / "log.jsonl").open("a", encoding="utf-8")
+    with log:
+        for step in range(first, recipe.steps):
+            begun = time.perf_counter()
+            for group in optimiser.param_groups:
+                group["lr"] = rate_at(step, recipe)
+            ids, targets = collate(data, next(feed), end)
+            with torch.autocast(where.type, torch.bfloat16):
+                loss = loss_of(model, ids.to(where), targets.to(where))
+            optimiser.zero_grad(set_to_none=True)
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
+            optimiser.step()
+            if watch is not None:
+                watch(step, float(loss.detach()), ids.numel() / (time.perf_counter() - begun))
+            last = step + 1 == recipe.steps
+            if last or (step + 1) % 250 == 0:
+                row = {"step": step + 1, "loss": float(loss.detach())}
+                if held_back is not None:
+                    row["held_back"] = evaluate_loss(model, held_back, recipe.batch_tokens, end)
+                log.write(json.dumps(row) + "\n")
+                log.flush()
+            if last or time.monotonic() - saved > save_s:
+                _save(state_path, recipe, model, optimiser, step + 1)
+                saved = time.monotonic()
+    return model
+
+
+def _save(path: Path, recipe: Recipe, model: Network, optimiser: torch.optim.Optimizer, step: int) -> None:
+    part = path.with_suffix(".part")
+    torch.save(
+        {"recipe": asdict(recipe), "model": model.state_dict(), "optimiser": optimiser.state_dict(), "step": step}, part
+    )
+    part.replace(path)
+
+
+@torch.no_grad()
+def evaluate_loss(model: Network, data: Packed, tokens: int, pad: int, most: int = 2048) -> float:
+    """Mean loss a reply token over (the first `most` of) some examples."""
+    model.eval()
+    where = next(model.parameters()).device
+    total = count = 0.0
+    feed = batches(data, tokens, np.random.default_rng(0))
+    for _ in range(max(1, most * 60 // tokens)):
+        ids, targets = collate(data, next(feed), pad)
+        with torch.autocast(where.type, torch.bfloat16):
+            loss = loss_of(model, ids.to(where), targets.to(where))
+        number = float((targets != -100).sum())
+        total += float(loss) * number
+        count += number
+    model.train()
+    return total / max(1.0, count)

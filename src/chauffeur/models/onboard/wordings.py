@@ -1,0 +1,286 @@
+"""Sentences of passengers for the skills of the dialect, drawn from the tables in `words/`.
+
+Sections have the names of the dialect's functions. A bare name is a wish said directly ("go faster"); `/2` is a
+complaint ("this is slow") and `/3` a mere reason ("my flight leaves in forty minutes") that a reasonable driver
+answers with that skill. `ask.*` are wishes to ask back about, `refuse.*` wishes to refuse, `if.*`, `once.*` and `wait`
+clauses to be put around others, `correction.*` wishes that refer to what was driven before.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+import numpy as np
+
+from chauffeur.language.grammar import Frame, Grammar, Manner, Template, Wording
+
+FILES = (
+    "pieces",
+    "speed",
+    "gap",
+    "lanes",
+    "passing",
+    "road",
+    "others",
+    "styles",
+    "conditions",
+    "asks",
+    "refusals",
+    "corrections",
+    "wide",
+    "more",
+)
+
+_NOT = r"^(?:don't|do not|never|neither|no|patiently|really|not|either)\b"
+"""Imperatives that no "could you" goes in front of."""
+_MANY = re.compile(_NOT + r"|\band\b|\bthen\b|\bbut\b|,")
+"""Imperatives of several verbs, of which a gerund would change only the first."""
+_NOT_ONLY = re.compile(_NOT)
+_OF_US = re.compile(_NOT + r"|\b(?:us|your|yourself|you|me|my)\b")
+"""Imperatives that do not go with "let's" and "we"."""
+_TIMED = re.compile(
+    r"\b(?:now|when|once|whenever|here|there|until|at the|if|moment|from|again|after|while|for|as soon|please)\b|,"
+)
+"""Imperatives that end badly with "now" or "for me"."""
+_PATIENT = re.compile(
+    r"\b(?:lanes?|left|right|over|merge|pass|past|overtak\w*|stop|halt|now|here|when|once|until|moment|turn|shoulder|"
+    r"straight|at the|if|whenever|as soon)\b|" + _NOT
+)
+"""Imperatives whose meaning "when you get a chance" would change: a lane change that waits is another skill."""
+_POLITE = re.compile(r"\b(?:please|thanks|thank you)\b|" + _NOT)
+_ENDED = re.compile(r"[.?!]$")
+_CALLED = re.compile(r"^(?:hey|sorry|ok|okay|oh|look|listen|well|um|hmm|hi|hello|please|whoa|come on|er|wow|man|god)\b")
+
+_CLASH = re.compile(
+    r"\b(?:you|to|we|let's|just|can|could|should|may) (?:first |please )?(?:don't|do not|neither|no)\b|please,? please"
+)
+"""Joints that nobody makes: "could you don't"."""
+_TRIES = 12
+MAX_CHARS = 200
+"""A sentence of several wishes that comes out longer is said another way, if there is one."""
+
+_NAME = "(driver|car|chauffeur|buddy|mate|pal|man|my friend|boss|sir|dude|love|dear|robot|James)"
+_HEY = "(hey|okay|ok|alright|so|well|um|uh|look|listen|sorry|oh|yo|hi|excuse me|now then|hello|hm)"
+
+_FRAMES: Sequence[Frame] = (
+    *[Frame("{body}")] * 12,
+    *[Frame("please {body}", unless=re.compile(r"\bplease\b"))] * 2,
+    *[Frame("{body}, please", unless=re.compile(r"\bplease\b"))] * 2,
+    Frame("{body} please", unless=re.compile(r"\bplease\b")),
+    *[Frame("(could|can|would|will) you {body}?", unless=_POLITE)] * 3,
+    *[Frame("(could|can|would) you please {body}?", unless=_POLITE)] * 2,
+    Frame("(could|can) you (maybe|possibly|perhaps|kindly|quickly) {body}?", unless=_POLITE),
+    *[Frame("I('d like| want| need| would like|'d want|'d love) you to {body}", unless=_POLITE)] * 2,
+    Frame(f"{_HEY}, {{body}}"),
+    Frame(f"{_NAME}, {{body}}"),
+    Frame(f"{{body}}, {_NAME}"),
+    Frame(f"{_HEY} {_NAME}, (could you |can you |please |would you |){{body}}", unless=_POLITE),
+    Frame("{body} now", unless=_TIMED),
+    Frame("{body} for me", unless=re.compile(_TIMED.pattern + r"|\b(?:us|me|car)\b")),
+    *[Frame("let's {body}", unless=_OF_US)] * 2,
+    Frame("(we should|we could|could we|can we|we can|we'd better|we need to|why don't we) {body}", unless=_OF_US),
+    Frame("(maybe|perhaps) {body}", unless=_NOT_ONLY),
+    Frame("maybe (you could|you can|you should|we could) {body}", unless=_OF_US),
+    Frame("(if you don't mind|if it's okay with you|if that's alright|if I may ask), {body}", unless=_PATIENT),
+    Frame("{body}, if you (don't mind|would|would be so kind|please)", unless=re.compile(r"\bplease\b")),
+    Frame("{body} when you (get a chance|can|get a moment|get the chance)", unless=_PATIENT),
+    Frame("if you could {body}, (that would be|that'd be) (great|nice|lovely|good|wonderful)", unless=_POLITE),
+    Frame("I was (wondering if|hoping) you could {body}", unless=_POLITE),
+    Frame("(would it be|is it) (possible|okay|alright) to {body}?", unless=_POLITE),
+    Frame("(any chance|do you think|is there any chance) you could {body}?", unless=_POLITE),
+    Frame("(be a dear|do me a favor|do me a favour|be so kind|be a sport|be nice) and {body}", unless=_POLITE),
+    Frame("go ahead and {body}", unless=_POLITE),
+    Frame("you (can|could|should|may|might want to|ought to|had better) {body}", unless=_POLITE),
+    Frame("I think you (should|could|can) {body}", unless=_POLITE),
+    Frame("(why don't you|how about you|what if you) {body}?", unless=_POLITE),
+    Frame("(just|simply) {body}", unless=re.compile(_NOT + r"|^just\b")),
+    Frame("(sorry to bother you|pardon me|excuse me), but could you {body}?", unless=_POLITE),
+    Frame("I'd (appreciate it|be grateful|be happy|be glad) if you could {body}", unless=_POLITE),
+    Frame("kindly {body}", unless=_POLITE),
+    Frame("{body}, (thanks|thank you|cheers|ta|thx|thank you very much|many thanks)", unless=_POLITE),
+    Frame("{body}, (would you|will you|could you|okay|yeah|alright|ok)?", unless=re.compile(_NOT + r"|\bplease\b")),
+    Frame("(gonna need you|gotta ask you|I have to ask you|I must ask you|may I ask you) to {body}", unless=_POLITE),
+    Frame("(for heaven's sake|for god's sake|come on|dude|oi|man), {body}"),
+    Frame("{body} already", unless=re.compile(_TIMED.pattern + "|" + _NOT)),
+    Frame("(ok so|so yeah|alright so|so basically) {body}"),
+    Frame("I (want|wish|need|expect) the car to {body}", unless=re.compile(_POLITE.pattern + r"|\b(?:car|us|your)\b")),
+    Frame("(time to|it's time to|I'd say it's time to|we have to) {body}", unless=_OF_US),
+    Frame("you (must|have to|need to|gotta) {body}", unless=_POLITE),
+    Frame("(quick request|one more thing|a small wish|new wish|here's what I'd like|request), {body}"),
+    Frame("(I've been thinking|as I said|like I said|if you ask me|you know what|tell you what), {body}"),
+    Frame("{body}, (that's all|that's it|if possible|if that works|if you get me|you know)"),
+    Frame(
+        "(what I want is that you|my wish is that you|I'd be thankful if you|it'd be nice if you) {body}",
+        unless=_POLITE,
+    ),
+    Frame(
+        "(my wife|my mum|my husband|the lady next to me|my boss|everyone back here) wants you to {body}", unless=_POLITE
+    ),
+    Frame("(is it allowed to|are you able to|would you be able to|may I get you to) {body}?", unless=_POLITE),
+    Frame("(please to|you please|be so good to|can be you|must please) {body}", unless=_POLITE),
+    Frame("(make|have) the car {body}", unless=re.compile(_POLITE.pattern + r"|\b(?:car|us|our|your)\b")),
+    Frame("(wanna|could ya|can ya|wouldya|would ya|mind if I ask you to) {body}?", unless=_POLITE),
+    Frame("I (really need|really want|just want|simply want|would really like) you to {body}", unless=_POLITE),
+    Frame("(whenever you're ready|in your own time|when convenient), {body}", unless=_PATIENT),
+    *[Frame("would you mind {ing}?", unless=_MANY)] * 2,
+    Frame("(how about|what about) {ing}?", unless=_MANY),
+    Frame("(do you mind|mind) {ing}?", unless=_MANY),
+    Frame("I'd (appreciate|like) you {ing}", unless=_MANY),
+    Frame("I wouldn't mind you {ing}", unless=_MANY),
+    Frame("(consider|try) {ing}", unless=_MANY),
+)
+
+_OPENINGS: Sequence[Frame] = (
+    *[Frame("{body}")] * 13,
+    *[Frame(f"{_HEY}, {{body}}", unless=_CALLED)] * 2,
+    Frame(f"{_NAME}, {{body}}", unless=_CALLED),
+    Frame(f"{_HEY} {_NAME}, {{body}}", unless=_CALLED),
+    Frame(f"{{body}}, {_NAME}", unless=re.compile(_ENDED.pattern + r"|\b(?:driver|mate|buddy|man|dude|please)$")),
+    Frame(
+        "(one more thing|quick one|another thing|I was just thinking|something else|as I said|like I said), {body}",
+        unless=_CALLED,
+    ),
+    Frame("(I don't want to be rude but|no offence but|forgive me but|don't get me wrong, but) {body}", unless=_CALLED),
+    Frame(
+        "{body}, (if you ask me|if I may say so|that's all|okay|just so you know|is all I'm saying)",
+        unless=re.compile(_ENDED.pattern + r"|\bplease\b|^(?:can|could|let's|how about|what about)\b"),
+    ),
+    Frame("(you know|honestly|to be honest|frankly|just saying|sorry but|I must say), {body}", unless=_CALLED),
+    Frame(
+        "{body}, (you know|to be honest|I must say|honestly)",
+        unless=re.compile(_ENDED.pattern + r"|\bplease\b|^(?:can|could|let's|how about|what about)\b"),
+    ),
+)
+
+_QUESTIONS = (
+    "could you",
+    "can you",
+    "would you",
+    "will you",
+    "can we",
+    "could we",
+    "can't we",
+    "may i have",
+    "could i have",
+    "can i",
+    "how about",
+    "what about",
+    "why don't",
+    "would it be",
+    "is it possible",
+    "any chance",
+    "do you think",
+    "may i ask",
+    "is there any",
+)
+
+_FIRST_VERBS = (
+    "accelerate:accelerating add:adding adjust:adjusting aim:aiming allow:allowing avoid:avoiding back:backing "
+    "be:being bear:bearing blend:blending boost:boosting brake:braking bring:bringing build:building "
+    "bump:bumping call:calling calm:calming cancel:canceling cap:capping carry:carrying catch:catching "
+    "change:changing choose:choosing close:closing come:coming compress:compressing conserve:conserving "
+    "continue:continuing cool:cooling copy:copying crank:cranking creep:creeping cross:crossing cruise:cruising "
+    "cut:cutting decelerate:decelerating decrease:decreasing dial:dialing distance:distancing do:doing "
+    "double:doubling draw:drawing drift:drifting drive:driving drop:dropping ease:easing edge:edging "
+    "enjoy:enjoying enter:entering exceed:exceeding exercise:exercising expand:expanding extend:extending "
+    "fall:falling find:finding fit:fitting fix:fixing float:floating floor:flooring follow:following "
+    "freeze:freezing gain:gaining get:getting give:giving go:going grow:growing guide:guiding halt:halting "
+    "halve:halving hang:hanging have:having head:heading help:helping hit:hitting hold:holding honk:honking "
+    "hop:hopping hug:hugging hurry:hurrying ignore:ignoring inch:inching increase:increasing jump:jumping "
+    "keep:keeping knock:knocking leapfrog:leapfrogging leave:leaving lengthen:lengthening let:letting "
+    "lift:lifting limit:limiting lock:locking loosen:loosening lose:losing lower:lowering maintain:maintaining "
+    "make:making match:matching merge:merging mirror:mirroring move:moving narrow:narrowing navigate:navigating "
+    "nip:nipping nudge:nudging open:opening overtake:overtaking park:parking pass:passing perform:performing "
+    "pick:picking place:placing play:playing pop:popping position:positioning preserve:preserving press:pressing "
+    "proceed:proceeding pull:pulling push:pushing put:putting quicken:quickening raise:raising reduce:reducing "
+    "rein:reining rejoin:rejoining relax:relaxing remain:remaining repeat:repeating reset:resetting "
+    "restrict:restricting resume:resuming return:returning reverse:reversing roll:rolling round:rounding "
+    "run:running save:saving scale:scaling scooch:scooching scoot:scooting set:setting settle:settling "
+    "shadow:shadowing shave:shaving shed:shedding shift:shifting shorten:shortening show:showing "
+    "shrink:shrinking signal:signaling sing:singing sit:sitting skip:skipping slide:sliding slip:slipping "
+    "slow:slowing smooth:smoothing sneak:sneaking snug:snugging space:spacing speed:speeding squeeze:squeezing "
+    "stand:standing stay:staying steer:steering step:stepping stick:sticking stop:stopping stretch:stretching "
+    "subtract:subtracting swap:swapping sweep:sweeping swing:swinging switch:switching sync:syncing tag:tagging "
+    "take:taking tell:telling throttle:throttling tighten:tightening trail:trailing travel:traveling "
+    "treat:treating trim:trimming tuck:tucking turn:turning undo:undoing unwind:unwinding use:using "
+    "watch:watching wave:waving widen:widening wind:winding work:working yield:yielding zip:zipping zoom:zooming"
+)
+_GERUNDS: Mapping[str, str] = {
+    verb: gerund for verb, _, gerund in (pair.partition(":") for pair in _FIRST_VERBS.split())
+}
+
+_MANNER = Manner(
+    frames=_FRAMES,
+    openings=_OPENINGS,
+    questions=_QUESTIONS,
+    gerunds=_GERUNDS,
+    unfinished=0.25,
+    loud=0.04,
+)
+
+
+@cache
+def wordings() -> Grammar:
+    """The tables of what passengers say."""
+    return Grammar("chauffeur.models.onboard.words", FILES, _MANNER)
+
+
+def levels(skill: str) -> tuple[str, ...]:
+    """Sections of a skill, most direct first: `faster`, `faster/2`, ...; empty if it has none."""
+    known = wordings().sections()
+    return tuple(name for name in (skill, f"{skill}/2", f"{skill}/3") if name in known)
+
+
+def utter(section: str, slots: Mapping[str, str], rng: np.random.Generator, held: bool | None = False) -> Wording:
+    """A sentence of a section, all its templates equally likely.
+
+    Args:
+        section: Name, with its level: `faster`, `faster/2`, `ask.side`.
+        slots: Texts for the slots of the section.
+        rng: Random draws.
+        held: False for templates of training, True for those held out, None for all.
+
+    Raises:
+        KeyError: The section is unknown, or a slot has no text.
+    """
+    grammar = wordings()
+    return grammar.say(_drawn(grammar.templates(section, held=held), rng), slots, rng)
+
+
+def clause(section: str, slots: Mapping[str, str], rng: np.random.Generator, held: bool | None = False) -> Wording:
+    """The same without frames and endings: an imperative, or a condition, to be put into a longer sentence.
+
+    Raises:
+        KeyError: The section is unknown, or a slot has no text.
+    """
+    grammar = wordings()
+    found = [t for t in grammar.templates(section, held=held) if not t.sentence]
+    return grammar.clause(_drawn(found, rng), slots, rng)
+
+
+def conditioned(condition: str, wish: str, rng: np.random.Generator, held: bool | None = False) -> Wording:
+    """A sentence of a condition or a wait and an imperative, both from `clause`."""
+    section = "conditioned.then" if condition.endswith(" then") else "conditioned"
+    return _joined(section, {"if": condition, "a": wish}, rng, held)
+
+
+def in_order(wishes: Sequence[str], rng: np.random.Generator, held: bool | None = False) -> Wording:
+    """A sentence of two or three imperatives from `clause`, in their order."""
+    section = "steps" if len(wishes) == 2 else "steps3"
+    return _joined(section, dict(zip("abc", wishes, strict=False)), rng, held)
+
+
+def _joined(section: str, slots: Mapping[str, str], rng: np.random.Generator, held: bool | None) -> Wording:
+    """A sentence of parts. Nobody says "could you don't": another template is drawn for those."""
+    found = utter(section, slots, rng, held)
+    for _ in range(_TRIES):
+        if not _CLASH.search(found.text) and len(found.text) <= MAX_CHARS:
+            break
+        found = utter(section, slots, rng, held)
+    return found
+
+
+def _drawn(found: Sequence[Template], rng: np.random.Generator) -> Template:
+    return found[int(rng.integers(len(found)))]

@@ -1,0 +1,89 @@
+"""Noise changes spellings and never what is meant."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from chauffeur.language import read_quantities
+from chauffeur.models.onboard.noise import SAFE_SLIPS, noisy, protected
+from chauffeur.models.onboard.words import utter, wordings
+
+SLOTS = {
+    "v": "sixty-five mph",
+    "d": "2.5 car lengths",
+    "t": "3 seconds",
+    "k": "two",
+    "n": "40",
+    "a": "slow down to 30 km/h",
+    "b": "turn left",
+    "c": "pull over",
+    "if": "if there's room on the right",
+}
+BACK = {slip.replace("´", "'"): word for word, slips in SAFE_SLIPS.items() for slip in slips}
+SHORTENINGS = {"don't", "do", "not", "to", "of", "you", "is", "are", "a", "have", "in", "an", "so", "well", "it", "lot"}
+
+
+def meant(text: str) -> list[str]:
+    """Protected words in order, with safe slips undone."""
+    words = [re.sub(r"^\W+|\W+$", "", w) for w in text.lower().replace("´", "'").split()]
+    words = [BACK.get(w, w) for w in words]
+    return [w for w in words if w and protected(w) and w not in SHORTENINGS]
+
+
+def test_level_nought_changes_nothing() -> None:
+    rng = np.random.default_rng(0)
+    for section in ("faster", "gap_of"):
+        text = utter(section, SLOTS, rng).text
+        assert noisy(text, rng, 0) == text
+
+
+@pytest.mark.parametrize("level", [1, 2])
+def test_words_that_carry_the_meaning_stay(level: int) -> None:
+    rng = np.random.default_rng(level)
+    for section in wordings().sections():
+        for _ in range(40):
+            text = utter(section, SLOTS, rng, None).text
+            noise = noisy(text, rng, level)
+            assert noise.strip()
+            assert meant(noise) == meant(text), (text, noise)
+
+
+@pytest.mark.parametrize("level", [1, 2])
+def test_numbers_stay(level: int) -> None:
+    rng = np.random.default_rng(3)
+    for section in ("drive_at", "faster_by", "gap_of", "further_by", "gap_of_seconds", "at_most"):
+        for _ in range(150):
+            text = utter(section, SLOTS, rng).text
+            noise = noisy(text, rng, level)
+            before = [q.value for q in read_quantities(text) if q.dimension in ("speed", "distance", "time")]
+            after = [q.value for q in read_quantities(noise) if q.dimension in ("speed", "distance", "time")]
+            assert before == after, (text, noise)
+
+
+def test_noise_is_noisy_and_more_so_at_the_higher_level() -> None:
+    rng = np.random.default_rng(4)
+    text = "Would you please change to the left lane behind that truck, driver?"
+    light = [noisy(text, rng, 1) for _ in range(400)]
+    heavy = [noisy(text, rng, 2) for _ in range(400)]
+    assert len(set(light)) > 100
+    assert len(set(heavy)) > 300
+    assert sum(t == text for t in heavy) <= sum(t == text for t in light)
+
+
+@pytest.mark.parametrize("word", ["left", "Right,", "don't", "65mph", "twenty-five", "slower.", "further", "not", "if"])
+def test_protected(word: str) -> None:
+    assert protected(word)
+
+
+@pytest.mark.parametrize("word", ["lane", "please", "brake", "gap", "overtake", "truck"])
+def test_open(word: str) -> None:
+    assert not protected(word)
+
+
+def test_noise_repeats_with_the_seed() -> None:
+    text = "Could you slow down a bit, please?"
+    first = [noisy(text, np.random.default_rng(k), 2) for k in range(20)]
+    assert first == [noisy(text, np.random.default_rng(k), 2) for k in range(20)]

@@ -1,0 +1,105 @@
+"""Data of the on-board model: every program was driven and did it, words and replies agree, splits are apart."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from chauffeur.models.onboard.cases import Case, case_of, make_case
+from chauffeur.models.onboard.engine import distinct, gathered, make_cases, masked, worded
+from chauffeur.models.onboard.examples import questions, reasons
+from chauffeur.models.onboard.pipeline import Plan, build_data
+from chauffeur.planners.onboard.dialect import SKILLS
+from chauffeur.planners.onboard.prompt import ASK, REFUSE, REPLY, WISH
+from chauffeur.planners.onboard.reply import read_reply
+
+
+@pytest.fixture(scope="module")
+def cases() -> list[Case]:
+    rows = [make_case((7, index)) for index in range(70)]
+    return [case_of(row | {"index": place}) for place, row in enumerate(rows) if "left_out" not in row]
+
+
+def test_a_draw_gives_the_same_case_again() -> None:
+    assert make_case((7, 3)) == make_case((7, 3))
+
+
+def test_draws_become_cases_of_many_kinds(cases: list[Case]) -> None:
+    assert len(cases) > 30
+    driven = {step.skill for case in cases if not case.refusal for step in case.steps}
+    assert len(driven) > 12
+    assert driven <= SKILLS.keys()
+
+
+def test_replies_say_what_the_case_is_and_prompts_hold_the_words(cases: list[Case]) -> None:
+    splits = gathered([worded(cases, 0, per_case=6)])
+    by_index = {case.index: case for case in cases}
+    for example in splits.train + splits.seen + splits.unseen:
+        assert example.prompt.split(WISH)[1].removesuffix(REPLY).strip()
+        reply = read_reply(example.reply)
+        if example.kind == "wish" and not by_index[example.case].refusal:
+            assert reply.steps == by_index[example.case].steps
+        elif example.kind == "ask":
+            assert example.reply.removeprefix(ASK) in questions()
+        elif example.kind == "refuse":
+            assert example.reply.removeprefix(REFUSE) in reasons()
+
+
+def test_tests_share_neither_scenes_nor_held_out_words_with_training(cases: list[Case]) -> None:
+    splits = gathered([worded(cases, 0, per_case=6)])
+    assert not {e.case for e in splits.train if e.case >= 0} & {e.case for e in splits.unseen if e.case >= 0}
+    assert not any(example.held for example in splits.train)
+    known = {masked(example.wish) for example in splits.train}
+    assert not any(masked(example.wish) in known for example in splits.unseen)
+
+
+def test_near_duplicates_are_left_out(cases: list[Case]) -> None:
+    some = worded(cases[:3], 0, per_case=3).train
+    assert len(distinct(some + some)) == len(distinct(some))
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("Please slow down to 45 mph.", "could you slow down to 60 mph?"),
+        ("keep thirty-five meters", "Keep 20 meters, please!"),
+    ],
+)
+def test_masked_wishes_forget_numbers_and_politeness(one: str, other: str) -> None:
+    assert masked(one) == masked(other)
+
+
+def test_masked_wishes_keep_sides_and_directions() -> None:
+    assert len({masked(text) for text in ("left lane", "right lane", "go faster", "go slower")}) == 4
+
+
+def test_a_stopped_run_goes_on(tmp_path: Path) -> None:
+    path = tmp_path / "cases.jsonl"
+    whole = make_cases(5, 24, path, 1, lambda done, kept: None)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join(lines[:9]) + "\n" + lines[9][:20])
+    assert make_cases(5, 24, path, 1, lambda done, kept: None) == whole
+
+
+def test_the_data_set_is_built_packed_and_described(tmp_path: Path) -> None:
+    pytest.importorskip("tokenizers", reason="tokenizers is not installed (extra: models)")
+    from chauffeur.models.onboard.packed import Packed
+    from chauffeur.models.onboard.tokens import load_tokenizer
+
+    build_data(tmp_path, Plan(seed=3, draws=110, per_case=3), 1, lambda stage, done, of: None)
+    data = tmp_path / "data"
+    facts: dict[str, Any] = json.loads((data / "data.json").read_text())
+    packed = Packed.load(data / "train.npz")
+    assert len(packed) == facts["examples"]["train"] > 50
+    tokenizer = load_tokenizer(data)
+    first = json.loads((data / "train.jsonl").read_text().split("\n")[0])
+    tokens = packed.tokens[packed.starts[0] : packed.starts[1]]
+    text = tokenizer.decode(tokens.tolist(), skip_special_tokens=False)
+    assert text == f"{first['prompt']}{first['reply']}<|end|>"
+    assert np.all(packed.replies < np.diff(packed.starts))
+    card = (data / "DATA_CARD.md").read_text()
+    assert f"{facts['examples']['train']:,} examples" in card

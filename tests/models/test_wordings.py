@@ -1,0 +1,288 @@
+"""The grammar of passengers: every section is rich, has its slots, and never says the opposite of its skill."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from chauffeur.concept import units
+from chauffeur.language import read_quantities
+from chauffeur.models.onboard.speech import Unit, spoken
+from chauffeur.models.onboard.words import clause, conditioned, in_order, levels, utter, wordings
+
+SKILLS = {
+    "v": "drive_at faster_by slower_by at_most at_least over_limit_by under_limit_by",
+    "": (
+        "faster a_bit_faster much_faster slower a_bit_slower much_slower drive_at_limit as_fast_as_allowed "
+        "match_traffic hold_speed closer a_bit_closer much_closer further a_bit_further much_further hold_gap "
+        "lane_left lane_right leftmost_lane rightmost_lane keep_lane lane_left_patiently lane_right_patiently "
+        "overtake overtake_left overtake_right overtake_and_return overtake_left_and_return "
+        "overtake_right_and_return turn_left turn_right go_straight pull_over stop_here follow let_in carry_on hurry "
+        "change_lane middle_lane back_on_the_road no_overtaking drive_normally "
+        "relax gently carefully sportily economically"
+    ),
+    "d": "gap_of closer_by further_by gap_at_least gap_at_most",
+    "t": "gap_of_seconds",
+    "k": "lanes_left lanes_right speed_times gap_times",
+}
+SLOT_OF = {skill: slot for slot, skills in SKILLS.items() for skill in skills.split()}
+COMMON = (
+    "drive_at", "faster_by", "slower_by", "faster", "slower", "gap_of", "closer_by", "further_by", "closer", "further",
+    "lane_left", "lane_right", "overtake", "turn_left", "turn_right", "pull_over", "hurry", "relax", "gently",
+    "carefully",
+)  # fmt: skip
+SLOTS = {
+    "v": "45 mph",
+    "d": "30 meters",
+    "t": "3 seconds",
+    "k": "two",
+    "n": "40",
+    "a": "slow down",
+    "b": "go left",
+    "c": "pull over",
+    "if": "if it is free",
+}
+SECTIONS = wordings().sections()
+NUMBERED = {
+    "if.lead_slower_than": "v",
+    "once.lead_slower_than": "v",
+    **{f"{when}.lead_{how}_than": "d" for when in ("if", "once") for how in ("closer", "further")},
+    "wait": "t",
+    "ask.number": "n",
+    "ask.more_number": "n",
+    "ask.unit": "n",
+    "ask.unit_gap": "n",
+    "refuse.unsafe_speed": "v",
+    "refuse.unsafe_gap": "d",
+}
+JOINING = {"conditioned", "conditioned.then", "steps", "steps3"}
+
+
+def said(section: str, count: int, seed: int = 0, held: bool | None = None) -> Iterator[str]:
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        yield utter(section, SLOTS, rng, held).text
+
+
+def test_every_skill_has_a_section() -> None:
+    assert set(SLOT_OF) <= set(SECTIONS)
+    for when in ("if", "once"):
+        for what in ("lead_slower_than", "lead_closer_than", "lead_further_than", "clear_left", "clear_right"):
+            assert f"{when}.{what}" in SECTIONS
+    assert levels("faster") == ("faster", "faster/2")
+    assert levels("hurry") == ("hurry", "hurry/2", "hurry/3")
+
+
+@pytest.mark.parametrize("skill", SLOT_OF)
+def test_skills_have_enough_templates(skill: str) -> None:
+    found = wordings().templates(skill)
+    assert len(found) >= (40 if skill in COMMON else 20)
+
+
+@pytest.mark.parametrize("skill", SLOT_OF)
+def test_skills_have_imperatives_for_longer_sentences(skill: str) -> None:
+    for held in (False, True):
+        assert any(not t.sentence and not t.part for t in wordings().templates(skill, held=held))
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_about_a_fifth_is_held_out(section: str) -> None:
+    found = wordings().templates(section)
+    held = wordings().templates(section, held=True)
+    assert len(found) >= 6
+    assert 0.12 <= len(held) / len(found) <= 0.45
+    assert held
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_sections_have_exactly_their_slots(section: str) -> None:
+    skill = section.partition("/")[0]
+    if section in JOINING:
+        return
+    expected = set(NUMBERED.get(section, SLOT_OF.get(skill, "") if "/" not in section else ""))
+    for template in wordings().templates(section):
+        assert wordings().slots(template) == expected, template.id
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_sentences_are_proper(section: str) -> None:
+    grammar = wordings()
+    rng = np.random.default_rng(1)
+    for template in grammar.templates(section):
+        for _ in range(30):
+            text = grammar.say(template, SLOTS, rng).text
+            assert text.isascii(), text
+            assert 0 < len(text) <= 200, text
+            assert not any(mark in text for mark in "<>{}|()[]_"), text
+            assert "  " not in text, text
+            assert not re.search(r"[,;]$|,,|, ,|[,.;:?!][,.;:!]|\s[,.;?!]|,\S", text), (template.id, text)
+            twice = re.search(r"\bplease\b.*\bplease\b|\bjust just\b|\bnow now\b", text.lower())
+            assert section.startswith("steps") or not twice, (template.id, text)
+            if not template.part:
+                assert not text[0].islower(), text
+
+
+@pytest.mark.parametrize("skill", COMMON)
+def test_common_skills_have_many_sentences(skill: str) -> None:
+    texts = [text.lower() for text in said(skill, 6000, held=False)]
+    # n draws with repetitions from a population: 6000 draws of 20,000 equally likely sentences give 5183 distinct
+    # ones; sentences are not equally likely, so that fewer are enough
+    assert len(set(texts)) > 3000
+
+
+def test_nothing_held_out_is_said_in_training() -> None:
+    rng = np.random.default_rng(2)
+    for section in SECTIONS:
+        train = {utter(section, SLOTS, rng, False).template for _ in range(60)}
+        test = {utter(section, SLOTS, rng, True).template for _ in range(20)}
+        assert not train & test
+
+
+def test_asks_have_a_question_and_refusals_a_reason() -> None:
+    for section in SECTIONS:
+        assert bool(wordings().question(section)) == section.startswith("ask."), section
+        assert bool(wordings().reason(section)) == section.startswith("refuse."), section
+        assert not wordings().question(section) or wordings().question(section).endswith("?")
+
+
+SIDED = [s for s in SECTIONS if re.search(r"left|right", s) and not s.endswith("most_lane/2")]
+"""A complaint about the slow lane is a wish for the other one."""
+
+
+@pytest.mark.parametrize("section", SIDED)
+def test_sides_are_never_mixed_up(section: str) -> None:
+    side, other = ("left", "right") if "left" in section else ("right", "left")
+    fast = r"fast lane|passing lane|overtaking lane" if side == "left" else r"slow lane|slowest lane|crawler lane"
+    for text in said(section, 1500):
+        low = text.lower()
+        assert not re.search(rf"\b{other}(?:most)?\b", low), text
+        assert re.search(rf"{side}|{fast}", low), text
+
+
+SIDELESS = [
+    s for s in SECTIONS
+    if not s.startswith(("ask", "refuse", "step", "cond", "go_straight", "correction")) and s not in SIDED
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("section", SIDELESS)
+def test_other_sections_name_no_side(section: str) -> None:
+    for text in said(section, 300):
+        low = text.lower()
+        assert not re.search(r"\bleft\b(?! a gap)", low), text
+        assert not re.search(r"\bright (?:lane|turn|side)\b|\b(?:to|on) the right\b", low), text
+
+
+OPPOSITES = {
+    "faster": r"slow down|\bslower\b|decelerat|less speed|ease off|reduce",
+    "slower": r"speed up|\bfaster\b|accelerate\b|more speed|(?<!set the )increase",
+    "closer": r"\bfurther\b|farther|drop back|fall back|more (?:room|space|distance)|widen|increase|back off",
+    "further": r"\bcloser\b(?! than)|close up|less (?:room|space|distance)|narrow|shorten|reduce|decrease|tighten",
+}
+
+
+@pytest.mark.parametrize("kind", OPPOSITES)
+def test_sections_never_say_the_opposite(kind: str) -> None:
+    for section in SECTIONS:
+        skill = section.partition("/")[0]
+        if skill not in (kind, f"a_bit_{kind}", f"much_{kind}", f"{kind}_by") or "/" in section:
+            continue
+        for text in said(section, 2500):
+            assert not re.search(OPPOSITES[kind], text.lower()), (section, text)
+
+
+@pytest.mark.parametrize("kind", ["faster", "slower", "closer", "further"])
+def test_amounts_are_said(kind: str) -> None:
+    """What is a bit does not say much, and the plain wish says no amount."""
+    much = r"\b(?:way|a lot|lots|loads|considerably|massive\w*|huge|a great deal|far (?:more|less|faster|slower))\b"
+    little = r"\b(?:a bit|a little|slightly|a touch|a tad|a smidge|a notch|a hair|a wee bit)\b"
+    both = r"not just a (?:bit|little)|not a bit, not a little|loads of room|a long way to go"
+    for section, never in ((f"a_bit_{kind}", much), (f"much_{kind}", little), (kind, f"{much}|{little}")):
+        for text in said(section, 1500):
+            low = re.sub(both, "", text.lower())
+            low = re.sub(r"(?:if|when|once) .{0,20}(?:way|lot)", "", low)
+            assert not re.search(never, low), (section, text)
+
+
+def test_no_words_mean_two_things() -> None:
+    """Words of two sections would have two answers. (Whether a speed or a gap is safe, its value decides.)"""
+    rng = np.random.default_rng(9)
+    meaning: dict[str, str] = {}
+    for section in SECTIONS:
+        if section.startswith(("cond", "step", "manner", "refuse.unsafe")):
+            continue
+        skill = section.partition("/")[0]
+        for template in wordings().templates(section):
+            for _ in range(min(60, 2 * wordings().forms(template))):
+                words = re.sub(r"[^a-z0-9' ]", "", wordings().clause(template, SLOTS, rng).text.lower())
+                words = " ".join(re.sub(r"\b(?:please|thanks|mate|driver|buddy)\b", "", words).split())
+                if words:
+                    assert meaning.setdefault(words, skill) == skill, (words, section)
+
+
+def test_patience_is_said_where_it_is_meant_and_nowhere_else() -> None:
+    waits = r"\bwhen\b|\bonce\b|\bas soon as\b|\bwait\b|\bwhenever\b|no rush|no hurry|patient|the moment|until|gap|room"
+    for side in ("left", "right"):
+        for text in said(f"lane_{side}", 3000):
+            assert not re.search(waits, text.lower().replace("until i say", "")), text
+
+
+def test_a_clause_is_bare() -> None:
+    rng = np.random.default_rng(4)
+    for skill in SLOT_OF:
+        for _ in range(50):
+            text = clause(skill, SLOTS, rng).text
+            assert text[0].islower() and text[-1] not in ".?!,", text
+
+
+def test_conditions_and_steps_keep_their_order() -> None:
+    rng = np.random.default_rng(5)
+    for section in ("if.clear_left", "once.clear_left", "wait"):
+        for _ in range(300):
+            condition = clause(section, SLOTS, rng).text
+            text = conditioned(condition, "take it", rng).text
+            assert "take it" in text.lower(), text
+            if condition.endswith("then"):
+                assert text.lower().index("then") < text.lower().index("take it"), text
+    for _ in range(300):
+        text = in_order(["brake", "swerve", "honk"], rng).text.lower()
+        assert text.index("brake") < text.index("swerve") < text.index("honk"), text
+        text = in_order(["brake", "swerve"], rng).text.lower()
+        assert text.index("brake") < text.index("swerve"), text
+
+
+@pytest.mark.parametrize(
+    ("unit", "si", "dimension"),
+    [
+        ("mps", 1.0, "speed"),
+        ("mph", units.MPS_PER_MPH, "speed"),
+        ("kmh", units.MPS_PER_KMH, "speed"),
+        ("m", 1.0, "distance"),
+        ("ft", units.M_PER_FOOT, "distance"),
+        ("yd", units.M_PER_YARD, "distance"),
+        ("car lengths", units.M_PER_CAR_LENGTH, "distance"),
+        ("s", 1.0, "time"),
+    ],
+)
+def test_quantities_are_read_as_they_were_meant(unit: Unit, si: float, dimension: str) -> None:
+    rng = np.random.default_rng(6)
+    for value in (0.5, 1, 1.5, 2, 2.5, 3, 7, 12, 13.4, 20, 21, 35, 45, 65, 99, 100, 101, 110, 115, 120, 250, 12.25):
+        for _ in range(60):
+            text = spoken(value, unit, rng)
+            found = read_quantities(text)
+            assert [(q.dimension, q.value) for q in found] == [(dimension, pytest.approx(value * si))], text
+
+
+def test_factors_and_counts() -> None:
+    rng = np.random.default_rng(7)
+    assert {spoken(2, "times", rng) for _ in range(300)} >= {"twice", "two times", "2 times"}
+    assert {spoken(0.5, "times", rng) for _ in range(300)} >= {"half"}
+    assert {spoken(2, "lanes", rng) for _ in range(100)} == {"two", "2"}
+    assert {spoken(65, "", rng) for _ in range(100)} == {"65", "sixty-five", "sixty five"}
+
+
+def test_the_same_draws_give_the_same_sentences() -> None:
+    assert list(said("overtake", 50, seed=8)) == list(said("overtake", 50, seed=8))
