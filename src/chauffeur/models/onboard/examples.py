@@ -102,6 +102,13 @@ def reasons() -> tuple[str, ...]:
     return tuple(dict.fromkeys([*impossible, NOT_HERE, *(r for s in grammar.sections() if (r := grammar.reason(s)))]))
 
 
+def checked_reasons() -> tuple[str, ...]:
+    """Reasons that the road and the limits decide: the model may give them, and is not believed."""
+    grammar = wordings()
+    numbers = (grammar.reason(section) for section in ("refuse.unsafe_speed", "refuse.unsafe_gap"))
+    return tuple(dict.fromkeys([*(reason for _, reason in IMPOSSIBLE), NOT_HERE, *numbers]))
+
+
 def wish_example(case: Case, rng: Generator, *, held: bool) -> Example:
     """An example of a case."""
     words, template, level = _wish(case.steps, rng, held=held)

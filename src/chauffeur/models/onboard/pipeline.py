@@ -35,7 +35,7 @@ from chauffeur.models.onboard.engine import (
     processes,
     worded,
 )
-from chauffeur.models.onboard.examples import Example, questions, reasons
+from chauffeur.models.onboard.examples import Example, checked_reasons, questions, reasons
 from chauffeur.models.onboard.packed import Packed
 from chauffeur.planners.onboard.prompt import END
 
@@ -214,6 +214,7 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
         "data": json.loads((data / "data.json").read_text(encoding="utf-8"))["sha256"],
         "questions": list(questions()),
         "reasons": list(reasons()),
+        "checked": list(checked_reasons()),
     }
     export(model, tokenizer, folder / "model", about)
     export_transformers(model, tokenizer, folder / "transformers")

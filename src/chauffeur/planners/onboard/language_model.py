@@ -55,6 +55,7 @@ class LanguageModelPlanner:
         self._guarded = guarded
         self._told = told
         self._read: dict[str, tuple[Step, ...]] = {}
+        self._checked = frozenset(self._engine.about.get("checked", ()))
 
     @property
     def id(self) -> str:
@@ -80,8 +81,12 @@ class LanguageModelPlanner:
             return self._declined("I did not understand that.", "ask", begun, written, str(error))
         if reply.question:
             return self._declined(reply.question, "ask", begun, written)
+        if reply.refusal in self._checked:
+            # Whether the road and the limits allow it is for linking and the checks to say, not for the model.
+            written = self._engine.write(text, only_program=True)
+            reply = read_reply(written.text)
         if reply.refusal:
-            return self._declined(self._why(reply, text, request), "refuse", begun, written)
+            return self._declined(reply.refusal, "refuse", begun, written)
         if self._guarded:
             question = doubt(wish, history, reply.steps)
             if not question and written.sure < UNSURE:
@@ -118,17 +123,6 @@ class LanguageModelPlanner:
 
     def _linked(self, reply: Reply, request: PlanRequest) -> Linked | Declined:
         return link(reply.steps, request.context.situation, request.limits, partial(leaning_of, request.history))
-
-    def _why(self, reply: Reply, text: str, request: PlanRequest) -> str:
-        """The reason for a refusal: what the road says of the program the model would have written, if it does."""
-        if not reply.refusal.startswith(("There is no", "That is not possible")):
-            return reply.refusal
-        try:
-            wanted = read_reply(self._engine.write(text, only_program=True).text)
-        except ProgramError:
-            return reply.refusal
-        linked = self._linked(wanted, request)
-        return linked.words if isinstance(linked, Declined) else reply.refusal
 
     def _declined(self, words: str, intent: str, begun: float, written: Written, raw: str = "") -> Plan:
         return Plan(
