@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from chauffeur.bench.lampilot.families import family_of
+from chauffeur.bench.lampilot.metrics import ORIGIN, points
 from chauffeur.bench.lampilot.report import COLUMNS, cells, markdown, summaries
 from chauffeur.bench.lampilot.rollout import RolloutJob, context_adapter, describe_sample, roll_out
 from chauffeur.concept import LAMPILOT_LIMITS, Instruction, PlanRequest, Scenario, SystemMessage
@@ -48,7 +49,7 @@ def main() -> None:
     ][:: arguments.step]
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         rows = list(pool.map(drive, jobs, chunksize=2))
-    judged = [row for row in rows if row["outcome"] != "not_driven"]
+    judged = [row | points(row, ORIGIN.id) for row in rows if row["outcome"] != "not_driven"]
     crashed = [row for row in judged if row["collision"] and row["steps"] <= 2]
     valid = [row | {"family": family_of(row["sample"])} for row in judged if row not in crashed]
     lines = [[s.label, str(s.items), *cells(s), str(s.refused)] for s in summaries(valid)]
