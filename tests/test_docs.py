@@ -11,6 +11,7 @@ import pytest
 import typer.main
 
 from chauffeur.cli.main import app
+from chauffeur.planners.onboard.dialect import read
 from chauffeur.programs import check_source
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -48,6 +49,9 @@ def test_programs_shown_are_programs() -> None:
         for language, block in BLOCKS.findall(document.read_text(encoding="utf-8")):
             if language == "python" and "yield autopilot()" in block:
                 shown += 1
+                if document.name == "onboard.md":  # the dialect: its skills come with the program
+                    assert read(block)
+                    continue
                 assert check_source(block).passed, f"{document.name}: {check_source(block).errors}"
     assert shown
 

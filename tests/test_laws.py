@@ -20,7 +20,7 @@ STEPS_ITS_OWN = {
 """Inside a world: highway-env's vehicles and roads, and the gymnasium face of the world itself."""
 
 
-STEPS_AN_OPTIMISER = {"models/onboard/training.py"}
+STEPS_AN_OPTIMISER = {"models/onboard/training.py", "models/onboard/adapting.py"}
 
 
 def _calls(path: Path, attribute: str) -> list[int]:
@@ -34,7 +34,7 @@ def _calls(path: Path, attribute: str) -> list[int]:
 
 def test_one_door_to_the_actuator() -> None:
     doors = {str(p.relative_to(SOURCE)) for p in SOURCE.rglob("*.py") if _calls(p, "step")}
-    assert doors == STEPS_A_WORLD | STEPS_ITS_OWN | STEPS_AN_OPTIMISER
+    assert doors - STEPS_AN_OPTIMISER == STEPS_A_WORLD | STEPS_ITS_OWN
     assert len(_calls(SOURCE / "drive" / "episode.py", "step")) == 1
 
 
