@@ -1,4 +1,4 @@
-# pyright: reportMissingImports=false, reportUntypedBaseClass=false, reportUntypedFunctionDecorator=false
+# pyright: reportMissingImports=false, reportUntypedBaseClass=false, reportUntypedFunctionDecorator=false, reportUnknownParameterType=false
 """From a trained network to what ships: an ONNX graph with int8 weights and its tokenizer; and for `transformers`."""
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-# pyright: reportMissingImports=false, reportUntypedBaseClass=false, reportUntypedFunctionDecorator=false
+# pyright: reportMissingImports=false, reportUntypedBaseClass=false, reportUntypedFunctionDecorator=false, reportUnknownParameterType=false
 """The tokenizer of the on-board model: byte-level BPE, one token a digit, whole pieces of programs as one token."""
 
 from __future__ import annotations

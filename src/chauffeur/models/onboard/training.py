@@ -1,4 +1,4 @@
-# pyright: reportMissingImports=false, reportUntypedBaseClass=false, reportUntypedFunctionDecorator=false
+# pyright: reportMissingImports=false, reportUntypedBaseClass=false, reportUntypedFunctionDecorator=false, reportUnknownParameterType=false
 """Training the on-board model: next-token loss on the replies, resumable, the same from the same seed.
 
 The architecture is `transformers`' Llama, small; the loop is plain PyTorch, on CPU cores (bfloat16) or one GPU.
