@@ -87,6 +87,17 @@ class Terminal:
         # What is waited for next comes after this.
         self.seen, self.text = self.text, ""
 
+    def interrupt(self, words: str) -> None:
+        """Ctrl-C, again where nothing comes of it: on a crowded machine a key may come before anybody listens."""
+        for _ in range(3):
+            self.type("\x03")
+            try:
+                self.until(words, 25.0)
+            except AssertionError:
+                continue
+            return
+        raise AssertionError(f"Ctrl-C is not heard: {self.text}")
+
     def type(self, keys: str) -> None:
         os.write(self._terminal, keys.encode())
 
@@ -108,8 +119,7 @@ def test_a_person_at_the_terminal(server: Any, options: list[str], tmp_path: Pat
     terminal.type("You never changed lane.\n")
     terminal.until("round 2")
     terminal.until("How was it?")
-    terminal.type("\x03")  # Ctrl-C while it waits for an answer
-    terminal.until("run the same command to go on")
+    terminal.interrupt("run the same command to go on")  # Ctrl-C while it waits for an answer
     assert terminal.end() == 130
     assert "The passenger says: You never changed lane." in server.requests[1].body["messages"][-1]["content"]
 

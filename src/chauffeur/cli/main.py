@@ -9,6 +9,7 @@ import typer
 
 from chauffeur import __version__
 from chauffeur.cli import apis, coach, doctor, drive, feedback, page, replay, report, scenarios, wheel
+from chauffeur.cli.adapt import adapt_app
 from chauffeur.cli.bench import bench_app
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
 from chauffeur.cli.policies import policies_app
@@ -71,6 +72,7 @@ app.add_typer(policies_app, name="policies")
 app.add_typer(scenes_app, name="scenes")
 app.add_typer(train_app, name="train")
 app.add_typer(serve_app, name="serve")
+app.add_typer(adapt_app, name="adapt")
 
 
 def run() -> None:

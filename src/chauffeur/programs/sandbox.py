@@ -22,7 +22,7 @@ from chauffeur.programs.errors import ProgramCallsError, ProgramRaisedError, Pro
 from chauffeur.programs.faults import MAX_MESSAGE_CHARS, fault_of
 from chauffeur.programs.foresight import AT_FAULT, DRIVE, END, FORESEEABLE, TICK, WISH, hidden
 from chauffeur.programs.rewrite import Prepared
-from chauffeur.programs.workers import confine, on_core, present_core
+from chauffeur.programs.workers import confine, on_core, present_core, uninterrupted
 
 _EPOCH: Final = datetime.datetime(2000, 1, 1, tzinfo=datetime.UTC)
 
@@ -110,7 +110,7 @@ class Sandbox:
             turn_duration_limit_grace=self.budget.grace_s,
         )
         try:
-            with on_core(self._core):  # the pool's threads and workers inherit it
+            with on_core(self._core), uninterrupted():  # the pool's threads and workers inherit both
                 self._pool.__enter__()
         except (OSError, monty.MontyError) as error:
             raise SandboxError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 from collections.abc import Generator
 from pathlib import Path
 from typing import Final
@@ -33,6 +34,19 @@ def on_core(core: int | None) -> Generator[None]:
         yield
     finally:
         os.sched_setaffinity(0, before)
+
+
+@contextlib.contextmanager
+def uninterrupted() -> Generator[None]:
+    """Threads started meanwhile never take Ctrl-C: it is the main thread's, which may be waiting for an answer."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def confine(pid: int, core: int | None) -> None:

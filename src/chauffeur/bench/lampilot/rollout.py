@@ -18,6 +18,7 @@ from chauffeur.describe import describe
 from chauffeur.drive.episode import Episode
 from chauffeur.drive.session import declined, drive_program, drive_without_program, unusable
 from chauffeur.programs import UNHURRIED, Sandbox
+from chauffeur.programs.library import standalone
 from chauffeur.safety import run_checks
 from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
 
@@ -113,6 +114,9 @@ def _rehearsed(job: RolloutJob, world: HighwayWorld, program: Program) -> tuple[
     """The variant to drive, and which of how many it was. Raises ScenarioError, SandboxError."""
     from chauffeur.bench.lampilot.rehearse import candidates, rehearsed
 
+    if not job.baseline and program.library:
+        # The numbers that drive are the library's: what is varied has to hold them.
+        program = replace(program, source=standalone(program.source, "drive", program.library), library="")
     written = "" if job.baseline else program.source
     sources = candidates(job.scenario.goal, job.rehearse, REHEARSAL_SEED, written)
     plan = None if job.baseline else plan_adapter.validate_python(job.plan)

@@ -1,0 +1,118 @@
+"""`chauffeur adapt`: models of our own, made to fit a person or a fleet."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+adapt_app = typer.Typer(no_args_is_help=True, rich_markup_mode="markdown", help="Adapt models of our own.")
+
+ONBOARD_EXAMPLES = """
+Examples:
+
+    chauffeur adapt onboard --base runs/onboard/transformers --out runs/ana --as ana
+
+    chauffeur adapt onboard --base runs/onboard/transformers --out runs/fleet --interactions a.jsonl --interactions b.jsonl
+
+    chauffeur drive "Step on it, love." --as ana --planner onboard/runs/ana/current
+
+Learns from trips that were accepted: they ended well, and nobody asked for a change. The adapted model is taken into
+use only if it forgot nothing and does no worse on interactions that were held back; otherwise, and after Ctrl-C, the
+old one stays. It needs PyTorch and peft: pip install 'chauffeur[models]'.
+"""  # noqa: E501 - a command stands on one line, to be copied
+
+_LINE_EVERY_S: Final = 10.0
+
+_HOW: Final = "How it learns"
+
+
+@adapt_app.callback()
+def adapt() -> None:
+    """Models of our own, made to fit."""
+
+
+@adapt_app.command(epilog=ONBOARD_EXAMPLES)
+def onboard(
+    base: Annotated[Path, typer.Option(help="`transformers` folder of a trained model.")],
+    out: Annotated[Path, typer.Option(help="Folder of the adapted models; `current` in it names the one in use.")],
+    interactions: Annotated[
+        list[Path] | None, typer.Option(help="JSON lines: wish, situation, history, program, accepted. Repeatable.")
+    ] = None,
+    person: Annotated[str | None, typer.Option("--as", help="Learn from this person's remembered trips.")] = None,
+    validation: Annotated[
+        Path | None, typer.Option(help="Examples that guard against forgetting; default data/seen.jsonl of the base.")
+    ] = None,
+    replay: Annotated[
+        Path | None, typer.Option(help="Training examples mixed in; default data/train.jsonl of the base, if there.")
+    ] = None,
+    rank: Annotated[int, typer.Option(min=1, help="Rank of the additions to each matrix.", rich_help_panel=_HOW)] = 8,
+    passes: Annotated[int, typer.Option(min=1, help="How often each interaction is seen.", rich_help_panel=_HOW)] = 20,
+    rate: Annotated[float, typer.Option(help="Highest learning rate.", rich_help_panel=_HOW)] = 1e-3,
+    tolerance: Annotated[float, typer.Option(min=0.0, help="Points of validation that may be lost.")] = 0.5,
+    judged: Annotated[int, typer.Option(min=1, help="Most validation examples judged.", rich_help_panel=_HOW)] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    threads: Annotated[
+        int, typer.Option(min=0, help="Threads that train; 0 leaves it to PyTorch.", rich_help_panel=_HOW)
+    ] = 0,
+) -> None:
+    """The on-board language model, on interactions that people accepted. Exit code 1: the old model stays."""
+    from rich.text import Text
+
+    from chauffeur.cli.console import stdout
+    from chauffeur.cli.parts import memory_named
+    from chauffeur.concept import ConfigError, PersonId
+    from chauffeur.models.onboard.adapting import AdaptRecipe
+    from chauffeur.models.onboard.adapting import adapt as adapt_model
+    from chauffeur.models.onboard.interactions import (
+        Interaction,
+        exported_items,
+        interactions_of,
+        load_interactions,
+    )
+
+    if not interactions and not person:
+        raise ConfigError("There is nothing to learn from.", hint="Give --as NAME, --interactions FILE, or both.")
+    console = stdout()
+    data = base.parent / "data"
+    if replay is None and (data / "train.jsonl").exists():
+        replay = data / "train.jsonl"
+    if replay is None:
+        console.print("Nothing to replay: without examples of its training the model forgets more easily.")
+    found: list[Interaction] = []
+    for path in interactions or ():
+        found += load_interactions(path)
+    if person:
+        found += interactions_of(exported_items(memory_named().export(PersonId(person))))
+    recipe = AdaptRecipe(
+        validation=validation or data / "seen.jsonl",
+        replay=replay,
+        rank=rank,
+        passes=passes,
+        rate=rate,
+        tolerance=tolerance,
+        judged=judged,
+        seed=seed,
+        threads=threads,
+    )
+    shown: dict[str, float] = {}
+
+    def told(stage: str, done: int, of: int) -> None:
+        now = time.monotonic()
+        if done == of or now - shown.get(stage, 0.0) >= _LINE_EVERY_S:
+            shown[stage] = now
+            console.print(f"{stage}: {done:,} of {of:,}", soft_wrap=True)
+
+    try:
+        verdict = adapt_model(base, found, out, recipe, told)
+    except KeyboardInterrupt:
+        console.print("Stopped. The old model stays in use.")
+        raise typer.Exit(130) from None
+    console.print(Text(verdict.why), soft_wrap=True)
+    if not verdict.taken:
+        console.print("Not taken into use: the old model stays.")
+        raise typer.Exit(1)
+    current = out / "current"
+    console.print(Text(f"In use: {current}. Try it: --planner onboard/{current}"), soft_wrap=True)
