@@ -32,12 +32,14 @@ from chauffeur.planners.onboard.reply import read_reply
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
+torch.set_num_threads(1)  # two threads that wait for each other on a crowded machine take ten times as long
+
 WISHES = [
     ("take the left lane", Step("lane_left")),
     ("take the right lane", Step("lane_right")),
     ("go faster", Step("faster")),
     ("go slower", Step("slower")),
-    *((f"drive at {n} mph", Step("drive_at", Number(float(n), "mph"))) for n in range(30, 70, 5)),
+    *((f"drive at {n} mph", Step("drive_at", Number(float(n), "mph"))) for n in (30, 45, 60)),
 ]
 
 
@@ -65,7 +67,7 @@ def data(tokenizer: Any) -> Packed:
 
 
 def trained(data: Packed, tokenizer: Any, folder: Path, steps: int, **more: Any) -> Any:
-    recipe = Recipe(size="tiny", steps=steps, batch_tokens=1024, rate=5e-3, warmup=10)
+    recipe = Recipe(size="tiny", steps=steps, batch_tokens=1024, rate=3e-3, warmup=20)
     end = tokenizer.token_to_id(END)
     folder.mkdir(exist_ok=True)
     return train(data, folder, recipe, vocabulary=tokenizer.get_vocab_size(), end=end, device="cpu", **more)
@@ -73,7 +75,7 @@ def trained(data: Packed, tokenizer: Any, folder: Path, steps: int, **more: Any)
 
 @pytest.fixture(scope="module")
 def model(data: Packed, tokenizer: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    return trained(data, tokenizer, tmp_path_factory.mktemp("run"), 260)
+    return trained(data, tokenizer, tmp_path_factory.mktemp("run"), 400)
 
 
 @pytest.fixture(scope="module")
