@@ -327,12 +327,7 @@ def merge(
 
 
 def _table(console: Console, title: str, header: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
-    from rich.table import Table
+    from chauffeur.cli.tables import show_table
 
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 0, 0, 1))
-    for i, name in enumerate(header):
-        table.add_column(name.replace(" ", "\n"), justify="right" if i else "left", vertical="bottom", no_wrap=True)
-    for line in lines:
-        table.add_row(*line)
-    console.print(table)
+    show_table(console, title, header, lines)
     console.print()

@@ -100,19 +100,11 @@ async def _drive(run: HumanRun, port: int, browser: bool, console: Console) -> N
 
 
 def _report(run: HumanRun, rows: list[dict[str, object]], console: Console) -> None:
-    from rich.table import Table
-
     from chauffeur.bench.lampilot.report import family_lines
     from chauffeur.cli.console import plain
+    from chauffeur.cli.tables import show_table
 
-    header, lines = family_lines(rows)
-    title = plain(", ".join(run.config.labels))
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 0, 0, 1))
-    for i, name in enumerate(header):
-        table.add_column(name.replace(" ", "\n"), justify="right" if i else "left", vertical="bottom", no_wrap=True)
-    for line in lines:
-        table.add_row(*line)
-    console.print(table)
+    show_table(console, plain(", ".join(run.config.labels)), *family_lines(rows))
     rows_at = run.folder / "results.jsonl"
     console.print(f"Simulated drives (highway-env); ruler {run.ruler_id}. Rows: {rows_at}", markup=False)
 

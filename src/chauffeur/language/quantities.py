@@ -7,7 +7,7 @@ without seeing its words.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 from chauffeur.concept import units
 from chauffeur.language.tokens import tokens_of
@@ -15,37 +15,16 @@ from chauffeur.language.tokens import tokens_of
 Dimension = Literal["speed", "distance", "time", "share", "lanes", "bare", "other"]
 """`share` is a factor (half is 0.5), `bare` a number without unit, `other` a unit no manoeuvre takes (minutes)."""
 
-_ONES = {
-    word: float(value)
-    for value, word in enumerate(
-        [
-            "zero",
-            "one",
-            "two",
-            "three",
-            "four",
-            "five",
-            "six",
-            "seven",
-            "eight",
-            "nine",
-            "ten",
-            "eleven",
-            "twelve",
-            "thirteen",
-            "fourteen",
-            "fifteen",
-            "sixteen",
-            "seventeen",
-            "eighteen",
-            "nineteen",
-        ]
-    )
-}
-_TENS = {
-    word: 10.0 * (2 + k)
-    for k, word in enumerate(["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"])
-}
+ONES: Final = (
+    "zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve",
+    "thirteen", "fourteen", "fifteen", "sixteen", "seventeen", "eighteen", "nineteen",
+)  # fmt: skip
+"""Words of the numbers from 0 to 19."""
+TENS: Final = ("twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety")
+"""Words of the tens from 20."""
+
+_ONES = {word: float(value) for value, word in enumerate(ONES)}
+_TENS = {word: 10.0 * (2 + k) for k, word in enumerate(TENS)}
 _TENS["fourty"] = 40.0
 _VAGUE = {"couple": 2.0, "few": 3.0, "several": 4.0, "dozen": 12.0}
 """Counts people use loosely; the plan says which number it took."""

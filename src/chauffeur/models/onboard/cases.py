@@ -14,6 +14,7 @@ from functools import cache
 from typing import Any, Final
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from chauffeur.bench.lampilot.scenes.feasible import start_of
 from chauffeur.bench.lampilot.scenes.sampling import draw_road
@@ -123,9 +124,12 @@ def make_case(job: tuple[int, int]) -> dict[str, Any]:
 
 def case_of(row: dict[str, Any]) -> Case:
     """A stored row as a case."""
-    from pydantic import TypeAdapter
+    return _stored_cases().validate_python(row)
 
-    return TypeAdapter(Case).validate_python(row)
+
+@cache
+def _stored_cases() -> TypeAdapter[Case]:
+    return TypeAdapter(Case)
 
 
 @cache

@@ -18,6 +18,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from chauffeur.language.quantities import ONES, TENS
 from chauffeur.models.onboard.cases import Case, case_of, make_case
 from chauffeur.models.onboard.examples import (
     CORRECTION_SHARE,
@@ -41,10 +42,7 @@ TEST_EVERY: Final = 25
 Told = Callable[[int, int], None]
 
 _MASK = re.compile(r"\d+(?:\.\d+)?")
-_NUMBER_WORDS = re.compile(
-    r"\b(?:zero|one|two|three|four|five|six|seven|eight|nine|ten|eleven|twelve|thirteen|fourteen|fifteen|sixteen|"
-    r"seventeen|eighteen|nineteen|twenty|thirty|forty|fifty|sixty|seventy|eighty|ninety|hundred|half|point|and a)\b"
-)
+_NUMBER_WORDS = re.compile(rf"\b(?:{'|'.join((*ONES, *TENS))}|hundred|half|point|and a)\b")
 _FILLERS = re.compile(
     r"\b(?:please|could|can|would|will|you|i|d|like|want|need|to|the|a|an|now|okay|ok|alright|hey|let|s|us|for|me|um|uh|"
     r"just|kindly|maybe|driver|car|buddy|chauffeur|thanks|thank)\b|[^a-z# ]"

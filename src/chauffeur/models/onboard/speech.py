@@ -6,15 +6,12 @@ from typing import Literal
 
 import numpy as np
 
+from chauffeur.language.quantities import ONES, TENS
+
 Unit = Literal["mps", "mph", "kmh", "m", "ft", "yd", "car lengths", "s", "times", "lanes", ""]
 """`times` is a factor that fits before "our speed" and before "as fast", `lanes` a count before "lanes", the empty
 unit a number alone."""
 
-_ONES = (
-    "zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve",
-    "thirteen", "fourteen", "fifteen", "sixteen", "seventeen", "eighteen", "nineteen",
-)  # fmt: skip
-_TENS = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"]
 
 _FULL: dict[str, tuple[tuple[str, str], ...]] = {
     "mps": (
@@ -133,7 +130,7 @@ def _in_words(value: float, rng: np.random.Generator) -> str:
         return f"{_whole(whole, rng)} and a half"
     tenth = round(rest * 10, 1)
     if tenth.is_integer():
-        return f"{_whole(whole, rng)} point {_ONES[int(tenth)]}"
+        return f"{_whole(whole, rng)} point {ONES[int(tenth)]}"
     return _digits(value)
 
 
@@ -145,7 +142,7 @@ def _whole(number: int, rng: np.random.Generator) -> str:
     draw = rng.random()
     if hundreds == 1 and below >= 20 and draw < 0.2:
         return f"one {small}"
-    head = "a hundred" if hundreds == 1 and draw < 0.6 else f"{_ONES[hundreds]} hundred"
+    head = "a hundred" if hundreds == 1 and draw < 0.6 else f"{ONES[hundreds]} hundred"
     if not below:
         return head
     return f"{head} and {small}" if rng.random() < 0.6 else f"{head} {small}"
@@ -153,11 +150,11 @@ def _whole(number: int, rng: np.random.Generator) -> str:
 
 def _below_hundred(number: int, rng: np.random.Generator) -> str:
     if number < 20:
-        return _ONES[number]
+        return ONES[number]
     tens, ones = divmod(number, 10)
     if not ones:
-        return _TENS[tens - 2]
-    return f"{_TENS[tens - 2]}{'-' if rng.random() < 0.7 else ' '}{_ONES[ones]}"
+        return TENS[tens - 2]
+    return f"{TENS[tens - 2]}{'-' if rng.random() < 0.7 else ' '}{ONES[ones]}"
 
 
 def _of(choices: tuple[str, ...], rng: np.random.Generator) -> str:

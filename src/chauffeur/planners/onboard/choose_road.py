@@ -154,8 +154,8 @@ def choose_turn(meaning: Meaning, options: Options) -> Chosen | Declined:
         return Declined(f"There is no junction ahead where I could {_WORDS[side]}.{tip}")
     if side not in situation.turns:
         return Declined(f"At this junction one cannot {_WORDS[side]}. Possible: {_listed(situation.turns)}.")
-    manner = meaning.manner if meaning.manner in ("gentle", "swift") else ""
-    if not manner:
+    manner = meaning.manner
+    if manner not in ("gentle", "swift"):
         return _cross(side, options)
     target, go, after = _CROSSING[side][manner]
     near, far, stop = _ROOM[side]
@@ -172,7 +172,7 @@ def choose_turn(meaning: Meaning, options: Options) -> Chosen | Declined:
         "turn_cap_mps": options.cap_mps,
         "cross_ticks": 120,
     }
-    filled = options.filled(f"turn.{side}" + (f"_{manner}" if manner else ""), meaning.manner, **numbers)
+    filled = options.filled(f"turn.{side}_{manner}", manner, **numbers)
     seen = "from the left" if side == "right" else "from the left and from the right"
     does = f"halt at the stop sign, wait until nobody comes {seen}, and {_WORDS[side]} at {speed_words(target)}"
     return Chosen(filled, f"turn.{side}", does, (), (("target_speed_mps", target),))
@@ -194,9 +194,9 @@ _HALTING = {"gentle": (1.8, 0.8), "smooth": (2.5, 0.85), "swift": (4.0, 1.0)}
 """Even braking to the halt, m/s2, and share of the present speed while changing lanes."""
 
 _CROSSING: dict[str, dict[str, tuple[float, float, float]]] = {
-    "straight": {"": (8.2, 5.0, 8.2), "gentle": (7.0, 3.0, 7.0), "swift": (9.0, 5.0, 9.0)},
-    "left": {"": (9.7, 4.0, 7.0), "gentle": (7.0, 3.0, 7.0), "swift": (9.7, 5.0, 8.0)},
-    "right": {"": (8.2, 5.0, 7.0), "gentle": (7.0, 3.0, 7.0), "swift": (8.2, 5.0, 7.5)},
+    "straight": {"gentle": (7.0, 3.0, 7.0), "swift": (9.0, 5.0, 9.0)},
+    "left": {"gentle": (7.0, 3.0, 7.0), "swift": (9.7, 5.0, 8.0)},
+    "right": {"gentle": (7.0, 3.0, 7.0), "swift": (8.2, 5.0, 7.5)},
 }
 """Speed over the junction, m/s, how briskly it is reached, m/s2, and speed behind it, m/s."""
 

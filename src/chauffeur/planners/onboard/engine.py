@@ -8,7 +8,7 @@ is left out, and what the grammar leaves no choice about is not asked of the net
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -85,16 +85,18 @@ class Engine:
         self._empty = np.zeros((layers, 1, heads, 0, width), np.float32)
 
     @cached_property
-    def _replies(self) -> str:
-        return self._grammar(only_program=False)
+    def _replies(self) -> Any:
+        return self._matcher(only_program=False)
 
     @cached_property
-    def _programs(self) -> str:
-        return self._grammar(only_program=True)
+    def _programs(self) -> Any:
+        return self._matcher(only_program=True)
 
-    def _grammar(self, *, only_program: bool) -> str:
+    def _matcher(self, *, only_program: bool) -> Any:
+        """At the beginning of a reply: copied for each, because reading the grammar takes longer than most replies."""
         text = grammar(tuple(self.about["questions"]), tuple(self.about["reasons"]), only_program=only_program)
-        return self._llguidance.LLMatcher.grammar_from_lark(text)
+        matchers = self._llguidance.LLMatcher
+        return matchers(self._tokenizer, matchers.grammar_from_lark(text))
 
     def write(
         self,
@@ -113,7 +115,7 @@ class Engine:
             told: Called with each piece of text as it comes.
         """
         ids: list[int] = self._tokenizer.tokenize_str(prompt)[-MAX_PROMPT_TOKENS:]
-        matcher = self._llguidance.LLMatcher(self._tokenizer, self._programs if only_program else self._replies)
+        matcher = (self._programs if only_program else self._replies).deep_copy()
         keys = values = self._empty
         feed = ids
         out: list[int] = []
@@ -147,23 +149,3 @@ class Engine:
             if constrained and matcher.is_stopped():
                 break
         return Written(self._tokenizer.decode_str(out), sure, len(out), len(ids), asked)
-
-    def score(self, prompt: str, reply: str) -> float:
-        """Mean log probability of a reply's tokens, grammar or not."""
-        head, tail = self._tokenizer.tokenize_str(prompt), self._tokenizer.tokenize_str(reply)
-        total = 0.0
-        keys = values = self._empty
-        feed = head
-        for token in tail:
-            logits, keys, values = self._session.run(
-                None, {"ids": np.array([feed], np.int64), "keys": keys, "values": values}
-            )
-            row = logits[0].astype(np.float64)
-            total += float(row[token] - row.max() - np.log(np.exp(row - row.max()).sum()))
-            feed = [token]
-        return total / max(1, len(tail))
-
-    def pieces(self, text: str) -> Iterator[str]:
-        """The tokens of a text, as texts."""
-        for token in self._tokenizer.tokenize_str(text):
-            yield self._tokenizer.decode_str([token])

@@ -124,5 +124,4 @@ class HotPlanner:
 
 
 def _tried_planner(folder: Path) -> LanguageModelPlanner:
-    opened(folder)
-    return LanguageModelPlanner(folder)
+    return LanguageModelPlanner(opened(folder))

@@ -30,7 +30,7 @@ class LanguageModelPlanner:
 
     def __init__(
         self,
-        folder: Path,
+        model: Path | Engine,
         *,
         constrained: bool = True,
         history: bool = True,
@@ -40,7 +40,7 @@ class LanguageModelPlanner:
         """Load a model.
 
         Args:
-            folder: The exported model.
+            model: Folder of the exported model, or the model itself, loaded already.
             constrained, history, guarded: Whether decoding holds to the grammar, H is shown, and the guard looks on;
                 turned off for ablations only.
             told: Called with each piece of text as the model writes it.
@@ -49,7 +49,7 @@ class LanguageModelPlanner:
             DataError: The folder holds no model.
             MissingExtraError: A library is missing.
         """
-        self._engine = Engine(folder)
+        self._engine = model if isinstance(model, Engine) else Engine(model)
         self._constrained = constrained
         self._history = history
         self._guarded = guarded

@@ -13,6 +13,7 @@ from chauffeur.bench.lampilot.scenes.phrasing import Wording, say, templates
 from chauffeur.bench.lampilot.scenes.unambiguous import MAX_WORDS, MIN_WORDS, fault_of, words_of
 from chauffeur.bench.lampilot.scenes.wishes import UNITS, Named, Wish
 from chauffeur.concept import InstructionError
+from chauffeur.language.quantities import ONES, TENS
 
 KEPT = 12
 """Wordings kept for an item; the suite then picks one, so that lengths and repetition come out right."""
@@ -24,30 +25,6 @@ _SPREAD_WORDS = 1.9
 """Spread of instruction lengths within a kind."""
 _SPELLED = 0.12
 """Share of whole numbers that are said in words."""
-
-_ONES = [
-    "zero",
-    "one",
-    "two",
-    "three",
-    "four",
-    "five",
-    "six",
-    "seven",
-    "eight",
-    "nine",
-    "ten",
-    "eleven",
-    "twelve",
-    "thirteen",
-    "fourteen",
-    "fifteen",
-    "sixteen",
-    "seventeen",
-    "eighteen",
-    "nineteen",
-]
-_TENS = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,9 +99,9 @@ def spoken(named: Named, rng: np.random.Generator) -> str:
 def in_words(count: int) -> str:
     """A whole number below 100 in words."""
     if count < 20:
-        return _ONES[count]
+        return ONES[count]
     tens, ones = divmod(count, 10)
-    return _TENS[tens - 2] + (f"-{_ONES[ones]}" if ones else "")
+    return TENS[tens - 2] + (f"-{ONES[ones]}" if ones else "")
 
 
 def _singular(unit: str) -> str:
