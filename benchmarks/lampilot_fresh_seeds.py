@@ -21,7 +21,7 @@ from chauffeur.bench.lampilot.metrics import ORIGIN, points
 from chauffeur.bench.lampilot.report import COLUMNS, cells, markdown, summaries
 from chauffeur.bench.lampilot.rollout import RolloutJob, context_adapter, describe_sample, roll_out
 from chauffeur.concept import LAMPILOT_LIMITS, Instruction, PlanRequest, Scenario, SystemMessage
-from chauffeur.planners.onboard import OnboardPlanner
+from chauffeur.planners.onboard import RetrievalPlanner
 from chauffeur.worlds.highway.dblv1 import load_dataset
 
 
@@ -32,7 +32,7 @@ def drive(job: tuple[Scenario, str]) -> dict[str, Any]:
         return {"sample": scenario.id, "outcome": "not_driven"}
     context = context_adapter.validate_python(described["context"])
     request = PlanRequest(Instruction(command), context, SystemMessage(""), limits=LAMPILOT_LIMITS)
-    plan = asyncio.run(OnboardPlanner().plan(request))
+    plan = asyncio.run(RetrievalPlanner().plan(request))
     return roll_out(RolloutJob("", scenario, "", asdict(plan), LAMPILOT_LIMITS))
 
 

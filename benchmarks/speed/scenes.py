@@ -10,7 +10,7 @@ from typing import Any
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rollout import RolloutJob, context_adapter, describe_sample
 from chauffeur.concept import LAMPILOT_LIMITS, ChauffeurError, Instruction, PlanRequest, Program, Scenario
-from chauffeur.planners.onboard import OnboardPlanner
+from chauffeur.planners.onboard import RetrievalPlanner
 from chauffeur.planners.prompts import build_system_message
 from chauffeur.programs.gate import check_source
 from chauffeur.worlds.highway import HighwayWorld
@@ -70,7 +70,7 @@ def load_samples(data: Path | None) -> list[Sample]:
 
 def plan(samples: list[tuple[Sample, int]]) -> list[Planned]:
     """Programs of the on-board planner for (sample, number of the command); what it declines is left out."""
-    planner, system = OnboardPlanner(), build_system_message("few-shot", limits=LAMPILOT_LIMITS)
+    planner, system = RetrievalPlanner(), build_system_message("few-shot", limits=LAMPILOT_LIMITS)
     contexts: dict[str, Any] = {}
     found: list[Planned] = []
     for sample, number in samples:

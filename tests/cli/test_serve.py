@@ -13,7 +13,7 @@ import pytest
 from chauffeur.cli.serve import Endpoint
 from chauffeur.concept import Instruction, Limits, PlanRequest, Program, SystemMessage
 from chauffeur.describe import describe
-from chauffeur.planners.onboard import OnboardPlanner
+from chauffeur.planners.onboard import RetrievalPlanner
 from chauffeur.planners.onboard.served import situation_of
 from chauffeur.planners.registry import make_planner
 from chauffeur.programs.gate import check_source
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.server
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    server = Endpoint("127.0.0.1", 0, OnboardPlanner(), Limits())
+    server = Endpoint("127.0.0.1", 0, RetrievalPlanner(), Limits())
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()
     yield f"http://127.0.0.1:{server.server_port}/v1"
@@ -69,7 +69,7 @@ def test_our_llm_planner_plans_with_it_as_the_planner_does_itself(address: str, 
     context = describe(snapshot)
     request = PlanRequest(Instruction("Drive 3 m/s slower."), context, SystemMessage(""))
     there = asyncio.run(make_planner("openai/onboard", base_url=address).plan(request))
-    here = asyncio.run(OnboardPlanner().plan(request))
+    here = asyncio.run(RetrievalPlanner().plan(request))
     assert (there.policy is None) == (here.policy is None)
     if isinstance(there.policy, Program):
         assert check_source(there.policy.source).passed

@@ -28,7 +28,7 @@ from chauffeur.concept import (
     SystemMessage,
 )
 from chauffeur.planners.base import Planner
-from chauffeur.planners.onboard import OnboardPlanner
+from chauffeur.planners.onboard import RetrievalPlanner
 from chauffeur.planners.onboard.exemplars import Filled, exemplars, program_of
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.programs import check_source
@@ -41,7 +41,7 @@ CROSSING = Situation("intersection", 10.0, 10.0, 1, 0, False, None, 85.0, ("left
 
 def plan(words: str, situation: Situation = HIGHWAY, **fields: Any) -> Plan:
     request = PlanRequest(Instruction(words), Context("", situation), SystemMessage(""), **fields)
-    return asyncio.run(OnboardPlanner().plan(request))
+    return asyncio.run(RetrievalPlanner().plan(request))
 
 
 def source(made: Plan) -> str:
@@ -54,11 +54,11 @@ def setting(made: Plan, name: str) -> float:
 
 
 def test_is_a_planner_with_versioned_rules() -> None:
-    planner = OnboardPlanner.from_spec("")
+    planner = RetrievalPlanner.from_spec("")
     assert isinstance(planner, Planner)
     assert (planner.id, planner.model) == ("onboard", "meaning-v2")
     with pytest.raises(ConfigError):
-        OnboardPlanner.from_spec("large")
+        RetrievalPlanner.from_spec("large")
 
 
 # Exemplars --------------------------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import resources
 from math import prod
 
@@ -145,8 +146,13 @@ class Grammar:
 
     def templates(self, section: str, *, held: bool | None = None) -> tuple[Template, ...]:
         """Templates of a section; `held` chooses those held out (True) or the others (False). KeyError if unknown."""
+        return self._sections[section] if held is None else self._apart(section)[held]
+
+    @cache  # noqa: B019 - a grammar lives as long as the process
+    def _apart(self, section: str) -> tuple[tuple[Template, ...], tuple[Template, ...]]:
+        """(Templates of training, templates held out) of a section."""
         found = self._sections[section]
-        return found if held is None else tuple(t for t in found if t.held == held)
+        return tuple(t for t in found if not t.held), tuple(t for t in found if t.held)
 
     def question(self, section: str) -> str:
         """What to ask back about the wishes of a section; empty where they need no question."""

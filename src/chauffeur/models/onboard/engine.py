@@ -28,11 +28,12 @@ from chauffeur.models.onboard.examples import (
     correction_example,
     wish_example,
 )
+from chauffeur.models.onboard.wordings import wordings
 
 VERSION: Final = "onboard-data-v1"
 PER_CASE: Final = 26
 """Wordings tried for each case."""
-ANSWER_SHARE: Final = 0.14
+ANSWER_SHARE: Final = 0.2
 """Share of examples that are asked back about or refused wherever we are."""
 MOST_ALIKE: Final = 24
 """How often a wording may come, numbers and politeness masked, for the same skills."""
@@ -142,7 +143,8 @@ def _one(case: Case, rng: np.random.Generator, *, held: bool) -> Example:
     draw = rng.random()
     if draw < ANSWER_SHARE:
         sections = answer_sections(case.situation)
-        section = sections[int(rng.integers(len(sections)))]
+        sizes = np.array([len(wordings().templates(section, held=held)) for section in sections], float)
+        section = sections[int(rng.choice(len(sections), p=sizes / sizes.sum()))]
         situation = None if rng.random() < 0.1 else case.situation
         return answer_example(section, situation, rng, held=held)
     if draw < ANSWER_SHARE + CORRECTION_SHARE:

@@ -26,8 +26,10 @@ Generator = np.random.Generator
 HISTORY_SHARE: Final = 0.35
 """Share of plain wishes that come with remembered trips which have nothing to do with them."""
 CORRECTION_SHARE: Final = 0.06
+UNDRAFTED_SHARE: Final = 0.1
+"""Share of examples without a draft: servers of the exported model show none."""
 UNKNOWN_CONTEXT_SHARE: Final = 0.08
-LEVELS: Final = (0.68, 0.2, 0.12)
+LEVELS: Final = (0.62, 0.22, 0.16)
 NOISE: Final = (0.55, 0.3, 0.15)
 
 SAID: Final = (
@@ -117,7 +119,7 @@ def wish_example(case: Case, rng: Generator, *, held: bool) -> Example:
     reply = refusal_reply(case.refusal) if case.refusal else program_reply(case.steps)
     known = bool(case.refusal) or _needs_context(case.steps) or rng.random() >= UNKNOWN_CONTEXT_SHARE
     history = _other_history(rng) if rng.random() < HISTORY_SHARE else ()
-    text = prompt(case.situation if known else None, history, words)
+    text = prompt(case.situation if known else None, history, words, drafted=_drafted(rng))
     skills = "+".join(step.skill for step in case.steps)
     return Example(text, reply, words, template, skills, level, noise, held, "wish", case.index)
 
@@ -146,7 +148,7 @@ def correction_example(case: Case, rng: Generator, *, held: bool) -> Example | N
     words = noisy(wording.text, rng, noise)
     history = [remembered([step], str(rng.choice(SAID))), *_other_history(rng)[:1]]
     return Example(
-        prompt(case.situation, history, words),
+        prompt(case.situation, history, words, drafted=_drafted(rng)),
         program_reply([wanted]),
         words,
         wording.template,
@@ -168,7 +170,12 @@ def answer_example(section: str, situation: Situation | None, rng: Generator, *,
     reply = f"{ASK}{question}" if question else f"{REFUSE}{reason}"
     history = _other_history(rng) if rng.random() < HISTORY_SHARE else ()
     kind = "ask" if question else "refuse"
-    return Example(prompt(situation, history, words), reply, words, wording.template, kind, 0, noise, held, kind, -1)
+    text = prompt(situation, history, words, drafted=_drafted(rng))
+    return Example(text, reply, words, wording.template, kind, 0, noise, held, kind, -1)
+
+
+def _drafted(rng: Generator) -> bool:
+    return bool(rng.random() >= UNDRAFTED_SHARE)
 
 
 def answer_sections(situation: Situation) -> tuple[str, ...]:

@@ -14,15 +14,15 @@ import torch
 from torch import nn
 
 from chauffeur.models.onboard.training import Network
-from chauffeur.planners.onboard.prompt import CONTEXT, HISTORY, REPLY, WISH
+from chauffeur.planners.onboard.prompt import CONTEXT, DRAFT, HISTORY, REPLY, WISH
 
 CHAT_TEMPLATE = (
     "{%- for m in messages if m['role'] == 'system' %}{% set ns = m['content'] %}{% endfor -%}"
     f"{CONTEXT}unknown{HISTORY}{WISH}"
     "{{ (messages | selectattr('role', 'equalto', 'user') | list | last)['content'] | lower | trim }}"
-    f"{REPLY}"
+    f"{DRAFT}{REPLY}"
 )
-"""For servers of the exported model: the last user message is the wish."""
+"""For servers of the exported model: the last user message is the wish, and nobody drafts."""
 
 
 class Stepped(nn.Module):

@@ -186,7 +186,7 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
     import torch
 
     from chauffeur.models.onboard.export import export, export_transformers
-    from chauffeur.models.onboard.tokens import load_tokenizer
+    from chauffeur.models.onboard.tokens import blanks_of, load_tokenizer
     from chauffeur.models.onboard.training import Recipe, train
 
     data = folder / "data"
@@ -204,6 +204,7 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
         recipe,
         vocabulary=tokenizer.get_vocab_size(),
         end=tokenizer.token_to_id(END),
+        blanks=blanks_of(tokenizer),
         held_back=Packed.load(data / "unseen.npz"),
         watch=lambda step, loss, rate: told(f"training, loss {loss:.3f}, {rate:,.0f} tokens/s", step + 1, plan.steps),
         device=device,

@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from chauffeur.language.quantities import ONES, TENS
 from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, UNITS
-from chauffeur.planners.onboard.prompt import ASK, CONTEXT, END, FENCE_CLOSE, FENCE_OPEN, HISTORY, REFUSE, REPLY, WISH
+from chauffeur.planners.onboard.prompt import ASK, BLANK, DRAFT, FENCE_CLOSE, FENCE_OPEN, REFUSE, SPECIAL, WISH
 
-VOCABULARY: Final = 2048
+VOCABULARY: Final = 4096
 
 PIECES: Final = (
     f"{FENCE_OPEN}def drive():\n",
@@ -40,10 +42,9 @@ def train_tokenizer(texts: Iterable[str]) -> Any:
         [pre_tokenizers.Digits(individual_digits=True), pre_tokenizers.ByteLevel(add_prefix_space=False)]
     )
     tokenizer.decoder = decoders.ByteLevel()
-    special = [END, CONTEXT, HISTORY, WISH, REPLY]
     trainer = trainers.BpeTrainer(
         vocab_size=VOCABULARY - len(PIECES),
-        special_tokens=special,
+        special_tokens=list(SPECIAL),
         initial_alphabet=pre_tokenizers.ByteLevel.alphabet(),
         show_progress=False,
     )
@@ -57,3 +58,27 @@ def load_tokenizer(folder: Path) -> Any:
     from tokenizers import Tokenizer
 
     return Tokenizer.from_file(str(folder / "tokenizer.json"))
+
+
+@dataclass(frozen=True, slots=True)
+class Blanks:
+    """What it takes to blank words of wishes in training.
+
+    Attributes:
+        wish, draft: Tokens that open a wish and end it.
+        blank: The token that stands for a word not heard.
+        kept: Tokens that are never blanked: digits and number words, which a reply copies.
+    """
+
+    wish: int
+    draft: int
+    blank: int
+    kept: frozenset[int]
+
+
+def blanks_of(tokenizer: Any) -> Blanks:
+    """The tokens of a tokenizer that blanking needs."""
+    numbers = {*"0123456789", *ONES, *TENS, "hundred", "half", "point"}
+    words: dict[str, int] = tokenizer.get_vocab()
+    kept = frozenset(token for word, token in words.items() if word.replace("\u0120", "").lower() in numbers)
+    return Blanks(words[WISH], words[DRAFT], words[BLANK], kept)

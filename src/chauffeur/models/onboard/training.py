@@ -21,6 +21,7 @@ from transformers import LlamaConfig, LlamaForCausalLM
 
 from chauffeur.concept import ConfigError
 from chauffeur.models.onboard.packed import Array, Packed
+from chauffeur.models.onboard.tokens import Blanks
 
 Network = Any
 """A `LlamaForCausalLM`: untyped, because `transformers` need not be installed where this is checked."""
@@ -60,6 +61,8 @@ class Recipe:
         rate: Highest learning rate.
         warmup: Steps until it is reached; then it falls along a cosine.
         decay: Weight decay.
+        blanked: Share of a wish's words that are blanked, in half of the examples: so that no template is learned by
+            one word, and the draft is listened to.
         seed: Of weights and order.
     """
 
@@ -69,6 +72,7 @@ class Recipe:
     rate: float = 2e-3
     warmup: int = 200
     decay: float = 0.05
+    blanked: float = 0.1
     seed: int = 0
 
 
@@ -125,6 +129,15 @@ def collate(data: Packed, which: Array, pad: int) -> tuple[torch.Tensor, torch.T
     return torch.from_numpy(ids[:, :-1]), torch.from_numpy(targets[:, 1:])
 
 
+def blank(ids: torch.Tensor, blanks: Blanks, share: float, rng: np.random.Generator) -> None:
+    """Blank a share of the wishes' words in half of a batch's rows (in place); numbers stay."""
+    rows: Array = ids.numpy()
+    opened = np.cumsum(rows == blanks.wish, axis=1) > np.cumsum(rows == blanks.draft, axis=1)
+    words = opened & (rows != blanks.wish) & ~np.isin(rows, list(blanks.kept))
+    chosen = rng.random(rows.shape) < share * (rng.random((len(rows), 1)) < 0.5)
+    rows[words & chosen] = blanks.blank
+
+
 def loss_of(model: Network, ids: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
     """Mean loss over the replies' tokens."""
     logits = model(input_ids=ids, use_cache=False).logits
@@ -146,6 +159,7 @@ def train(
     *,
     vocabulary: int,
     end: int,
+    blanks: Blanks | None = None,
     held_back: Packed | None = None,
     watch: Callable[[int, float, float], None] | None = None,
     device: str = "",
@@ -158,6 +172,7 @@ def train(
         folder: Where the run keeps its state (`state.pt`) and log (`log.jsonl`).
         recipe: What decides the run.
         vocabulary, end: Size of the vocabulary, token that ends a reply.
+        blanks: Tokens for blanking; None for none.
         held_back: Validation examples, looked at from time to time.
         watch: Called after each step with (step, loss, tokens per second).
         device: `cpu`, `cuda`; empty for the best at hand.
@@ -198,6 +213,8 @@ def train(
             for group in optimiser.param_groups:
                 group["lr"] = rate_at(step, recipe)
             ids, targets = collate(data, next(feed), end)
+            if blanks is not None:
+                blank(ids, blanks, recipe.blanked, np.random.default_rng([recipe.seed, 2, step]))
             with torch.autocast(where.type, torch.bfloat16):
                 loss = loss_of(model, ids.to(where), targets.to(where))
             optimiser.zero_grad(set_to_none=True)

@@ -31,6 +31,14 @@ FILES = (
     "corrections",
     "wide",
     "more",
+    "numbers",
+    "pace",
+    "distance",
+    "lane_talk",
+    "manoeuvres",
+    "moods",
+    "answers",
+    "compound",
 )
 
 _NOT = r"^(?:don't|do not|never|neither|no|patiently|really|not|either)\b"
@@ -71,7 +79,7 @@ _FRAMES: Sequence[Frame] = (
     Frame("{body} please", unless=re.compile(r"\bplease\b")),
     *[Frame("(could|can|would|will) you {body}?", unless=_POLITE)] * 3,
     *[Frame("(could|can|would) you please {body}?", unless=_POLITE)] * 2,
-    Frame("(could|can) you (maybe|possibly|perhaps|kindly|quickly) {body}?", unless=_POLITE),
+    Frame("(could|can) you (maybe|possibly|perhaps|kindly) {body}?", unless=_POLITE),
     *[Frame("I('d like| want| need| would like|'d want|'d love) you to {body}", unless=_POLITE)] * 2,
     Frame(f"{_HEY}, {{body}}"),
     Frame(f"{_NAME}, {{body}}"),
@@ -205,7 +213,34 @@ _FIRST_VERBS = (
     "subtract:subtracting swap:swapping sweep:sweeping swing:swinging switch:switching sync:syncing tag:tagging "
     "take:taking tell:telling throttle:throttling tighten:tightening trail:trailing travel:traveling "
     "treat:treating trim:trimming tuck:tucking turn:turning undo:undoing unwind:unwinding use:using "
-    "watch:watching wave:waving widen:widening wind:winding work:working yield:yielding zip:zipping zoom:zooming"
+    "watch:watching wave:waving widen:widening wind:winding work:working yield:yielding zip:zipping zoom:zooming "
+    "relocate:relocating transfer:transferring transition:transitioning filter:filtering glide:gliding "
+    "select:selecting opt:opting join:joining vacate:vacating abandon:abandoning quit:quitting ditch:ditching "
+    "mind:minding pay:paying think:thinking rush:rushing hustle:hustling soften:softening dawdle:dawdling "
+    "spare:sparing burn:burning waste:wasting minimise:minimising cease:ceasing enlarge:enlarging pad:padding "
+    "broaden:broadening amplify:amplifying augment:augmenting hike:hiking inflate:inflating swell:swelling "
+    "tack:tacking throw:throwing slap:slapping chuck:chucking bung:bunging slice:slicing chop:chopping "
+    "clip:clipping pare:paring prune:pruning lessen:lessening diminish:diminishing contract:contracting "
+    "condense:condensing deduct:deducting remove:removing peg:pegging tail:tailing target:targeting "
+    "ensure:ensuring guarantee:guaranteeing alter:altering multiply:multiplying abstain:abstaining "
+    "attempt:attempting begin:beginning borrow:borrowing branch:branching break:breaking bypass:bypassing "
+    "cede:ceding chase:chasing dash:dashing dodge:dodging duck:ducking exit:exiting fly:flying "
+    "forget:forgetting forgo:forgoing grant:granting hook:hooking indicate:indicating invite:inviting "
+    "manoeuvre:manoeuvring maneuver:maneuvering offer:offering outrun:outruning peel:peeling permit:permitting "
+    "pursue:pursuing queue:queueing refuse:refusing resist:resisting sail:sailing shoot:shooting "
+    "skirt:skirting slot:slotting start:starting surrender:surrendering suspend:suspending track:tracking "
+    "try:trying veer:veering wait:waiting welcome:welcoming whip:whipping up:upping top:topping "
+    "notch:notching tick:ticking trickle:trickling crawl:crawling race:racing sprint:sprinting gun:gunning "
+    "hammer:hammering motor:motoring nail:nailing pump:pumping ramp:ramping rev:revving surge:surging "
+    "whack:whacking amp:amping bank:banking lop:lopping dock:docking mellow:mellowing moderate:moderating "
+    "tame:taming temper:tempering tone:toning drag:dragging dip:dipping plunge:plunging tumble:tumbling "
+    "scrub:scrubbing bleed:bleeding coast:coasting "
+    "abide:abiding adapt:adapting adhere:adhering adopt:adopting align:aligning amend:amending "
+    "comply:complying conform:conforming curb:curbing divide:dividing elevate:elevating enhance:enhancing "
+    "equal:equaling hoist:hoisting jack:jacking level:leveling maximise:maximising mimic:mimicing "
+    "observe:observing prevent:preventing ratchet:ratcheting refrain:refraining respect:respecting "
+    "retain:retaining revert:reverting sink:sinking slacken:slackening slash:slashing split:spliting "
+    "stabilise:stabilising steady:steadying sustain:sustaining tie:tying tune:tuning whittle:whittling"
 )
 _GERUNDS: Mapping[str, str] = {
     verb: gerund for verb, _, gerund in (pair.partition(":") for pair in _FIRST_VERBS.split())

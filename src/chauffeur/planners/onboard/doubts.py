@@ -7,6 +7,7 @@ import unicodedata
 
 from chauffeur.language.tokens import plain
 from chauffeur.planners.onboard.clauses import Clause
+from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.lexicon import rewrite
 from chauffeur.planners.onboard.meaning import Meaning, NotUnderstood
 from chauffeur.planners.onboard.words import words_file
@@ -49,6 +50,9 @@ def doubt_before(text: str, max_chars: int) -> NotUnderstood | None:
         return NotUnderstood("symbols", f"I understand words only. {CAN_DO}")
     if _foreign(text, letters):
         return NotUnderstood("language", f"I understand English only. {CAN_DO}")
+    reason = danger(text)
+    if reason:
+        return NotUnderstood("unsupported", f"{reason} {CAN_DO}")
     words = plain(text)
     line = rewrite(re.sub(r"\s+", " ", re.sub(r"[^a-z/#0-9 .,;!?]", " ", words)))
     for pattern, why in _UNSUPPORTED:

@@ -9,17 +9,23 @@ import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Final
 
-from chauffeur.concept import Plan, PlanRequest, Program, ProgramError, Thoughts, Usage
+from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Thoughts, Usage
+from chauffeur.planners.base import Planner
+from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import Step
 from chauffeur.planners.onboard.engine import Engine, Written
 from chauffeur.planners.onboard.guard import doubt
-from chauffeur.planners.onboard.link import Linked, link
+from chauffeur.planners.onboard.link import link
 from chauffeur.planners.onboard.options import Declined
-from chauffeur.planners.onboard.personal import leaning_of
+from chauffeur.planners.onboard.personal import corrections_of, leaning_of
 from chauffeur.planners.onboard.prompt import history_words, prompt
-from chauffeur.planners.onboard.reply import Reply, read_reply
+from chauffeur.planners.onboard.reply import read_reply
 from chauffeur.planners.onboard.thoughts import thoughts_of
+
+SHIPPED: Final = Path(__file__).parent / "weights"
+"""The model that comes with the package."""
 
 UNSURE = 0.35
 """Below this probability of its least sure choice the model's program is asked about instead of driven."""
@@ -57,6 +63,31 @@ class LanguageModelPlanner:
         self._read: dict[str, tuple[Step, ...]] = {}
         self._checked = frozenset(self._engine.about.get("checked", ()))
 
+    @classmethod
+    def from_spec(cls, argument: str) -> Planner:
+        """The planner named `onboard`: the model of the package; `onboard/FOLDER` is the model of a folder.
+
+        A FOLDER that is a symbolic link is looked at before each request: `chauffeur adapt` exchanges models that way.
+
+        Raises:
+            ConfigError: The argument is no folder.
+            DataError: The folder holds no model.
+            MissingExtraError: A library is missing.
+        """
+        if not argument:
+            return cls(SHIPPED)
+        folder = Path(argument)
+        if not folder.is_dir():
+            raise ConfigError(
+                f"The onboard planner has no variant {argument!r}.",
+                hint="Write just: onboard; or onboard/FOLDER for the language model of a folder.",
+            )
+        if folder.is_symlink():
+            from chauffeur.planners.onboard.hot import HotPlanner
+
+            return HotPlanner(folder)
+        return cls(folder)
+
     @property
     def id(self) -> str:
         """Registry name."""
@@ -72,6 +103,8 @@ class LanguageModelPlanner:
         begun = time.perf_counter()
         wish = request.instruction.text
         situation = request.context.situation
+        if self._guarded and (reason := danger(wish)):
+            return self._declined(reason, "refuse", begun, Written("", 1.0, 0, 0, 0))
         history = history_words(request.history, self._steps_of) if self._history else ()
         text = prompt(situation, history, wish)
         written = self._engine.write(text, constrained=self._constrained, told=self._told)
@@ -93,11 +126,12 @@ class LanguageModelPlanner:
                 question = "I am not sure what you want. Please say it in other words."
             if question:
                 return self._declined(question, "ask", begun, written)
-        linked = self._linked(reply, request)
+        leaning = partial(leaning_of, request.history, corrections=corrections_of(request.rounds))
+        linked = link(reply.steps, situation, request.limits, leaning)
         if isinstance(linked, Declined):
             intent = "+".join(step.meaning.family for step in reply.steps)
             return self._declined(linked.words, intent, begun, written)
-        used = [leaning_of(request.history, step.meaning.family) for step in reply.steps]
+        used = [leaning(step.meaning.family) for step in reply.steps]
         settings = {name: value for step in linked.choice.steps for name, value in step.settings}
         settings |= {name: value for one in used for name, value in one.settings}
         return Plan(
@@ -120,9 +154,6 @@ class LanguageModelPlanner:
             except ProgramError:
                 self._read[wish] = ()
         return self._read[wish]
-
-    def _linked(self, reply: Reply, request: PlanRequest) -> Linked | Declined:
-        return link(reply.steps, request.context.situation, request.limits, partial(leaning_of, request.history))
 
     def _declined(self, words: str, intent: str, begun: float, written: Written, raw: str = "") -> Plan:
         return Plan(

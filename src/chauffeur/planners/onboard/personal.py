@@ -6,9 +6,12 @@ slower. The offset a trip was driven with is kept in its settings, so that feedb
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from chauffeur.concept import Feedback, History, HistoryItem
+from chauffeur.concept import Feedback, History, HistoryItem, Round
+from chauffeur.planners.onboard.meaning import Reading
+from chauffeur.planners.onboard.understand import understand
 
 SPEED_SETTING = "personal_speed_mps"
 HEADWAY_SETTING = "personal_headway_s"
@@ -89,3 +92,20 @@ def _because(item: HistoryItem) -> str:
     day = f" on {item.when[:10]}" if item.when else ""
     words = f', you said "{said[:80]}"' if said else ""
     return f'After "{item.instruction[:80]}"{day}{words}; I keep to that.'
+
+
+def corrections_of(rounds: Sequence[Round]) -> tuple[Feedback, ...]:
+    """What earlier rounds of the same wish were answered with, as feedback on the numbers."""
+    said = (understand(one.feedback) for one in rounds)
+    readings = [reading for reading in said if isinstance(reading, Reading)]
+    out: list[Feedback] = []
+    for reading in readings:
+        for step in reading.steps:
+            if step.manoeuvre == "speed" and step.change:
+                out.append(Feedback("", speed=step.change, strength=step.degree))
+            elif step.manoeuvre == "gap" and step.change:
+                # a wish for more room says that the gap was too small
+                out.append(Feedback("", gap=-1 if step.change > 0 else 1, strength=step.degree))
+            elif step.manoeuvre == "style" and step.variant in ("comfort", "careful"):
+                out.append(Feedback("", comfort=-1, strength=step.degree))
+    return tuple(out)

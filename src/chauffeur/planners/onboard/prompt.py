@@ -1,4 +1,4 @@
-"""What the on-board model reads and writes, as text: C and H in a few words, the wish, and the reply.
+"""What the on-board model reads and writes, as text: C and H in a few words, the wish, its draft, and the reply.
 
 The same text is the training data's, the runtime's and, by way of the chat template, that of any server that runs the
 exported model.
@@ -12,9 +12,11 @@ from typing import Final
 
 from chauffeur.concept import Feedback, History, HistoryItem, ProgramError, Situation
 from chauffeur.planners.onboard.dialect import Step, read, tell, write
+from chauffeur.planners.onboard.draft import UNREAD, draft
 
-CONTEXT, HISTORY, WISH, REPLY, END = "<|context|>", "<|history|>", "<|wish|>", "<|reply|>", "<|end|>"
-SPECIAL: Final = (END, CONTEXT, HISTORY, WISH, REPLY)
+CONTEXT, HISTORY, WISH, DRAFT, REPLY = "<|context|>", "<|history|>", "<|wish|>", "<|draft|>", "<|reply|>"
+END, BLANK = "<|end|>", "<|blank|>"
+SPECIAL: Final = (END, CONTEXT, HISTORY, WISH, DRAFT, REPLY, BLANK)
 
 ASK, REFUSE = "ASK: ", "REFUSE: "
 """How a reply begins that drives nothing: a question back, or a reason."""
@@ -27,17 +29,19 @@ HISTORY_ITEMS: Final = 2
 _SPACE = re.compile(r"\s+")
 
 
-def prompt(situation: Situation | None, history: Sequence[str], wish: str) -> str:
+def prompt(situation: Situation | None, history: Sequence[str], wish: str, *, drafted: bool = True) -> str:
     """The whole prompt.
 
     Args:
         situation: Where we are; None when it is not known.
         history: Remembered trips as `remembered` writes them, the most relevant first.
         wish: The passenger's words.
+        drafted: Whether the rules' reading of the words is shown.
     """
     context = "unknown" if situation is None else context_words(situation)
     past = "; ".join(history[:HISTORY_ITEMS])
-    return f"{CONTEXT}{context}{HISTORY}{past}{WISH}{wish_words(wish)}{REPLY}"
+    ruled = draft(wish) if drafted else UNREAD
+    return f"{CONTEXT}{context}{HISTORY}{past}{WISH}{wish_words(wish)}{DRAFT}{ruled}{REPLY}"
 
 
 def wish_words(wish: str) -> str:
