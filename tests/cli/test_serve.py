@@ -13,7 +13,8 @@ import pytest
 from chauffeur.cli.serve import Endpoint
 from chauffeur.concept import Instruction, Limits, PlanRequest, Program, SystemMessage
 from chauffeur.describe import describe
-from chauffeur.planners.onboard import RetrievalPlanner
+from chauffeur.planners.onboard import LanguageModelPlanner
+from chauffeur.planners.onboard.language_model import SHIPPED
 from chauffeur.planners.onboard.served import situation_of
 from chauffeur.planners.registry import make_planner
 from chauffeur.programs.gate import check_source
@@ -25,7 +26,7 @@ pytestmark = pytest.mark.server
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    server = Endpoint("127.0.0.1", 0, RetrievalPlanner(), Limits())
+    server = Endpoint("127.0.0.1", 0, LanguageModelPlanner(SHIPPED), Limits())
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()
     yield f"http://127.0.0.1:{server.server_port}/v1"
@@ -45,7 +46,7 @@ def test_openais_client_gets_a_program(client: openai.OpenAI) -> None:
     )
     text = answer.choices[0].message.content or ""
     source = text.split("```python\n")[1].split("```")[0]
-    assert "20.0 m/s" in text
+    assert "20 m/s" in text
     assert check_source(source).passed
 
 
@@ -69,7 +70,7 @@ def test_our_llm_planner_plans_with_it_as_the_planner_does_itself(address: str, 
     context = describe(snapshot)
     request = PlanRequest(Instruction("Drive 3 m/s slower."), context, SystemMessage(""))
     there = asyncio.run(make_planner("openai/onboard", base_url=address).plan(request))
-    here = asyncio.run(RetrievalPlanner().plan(request))
+    here = asyncio.run(LanguageModelPlanner(SHIPPED).plan(request))
     assert (there.policy is None) == (here.policy is None)
     if isinstance(there.policy, Program):
         assert check_source(there.policy.source).passed

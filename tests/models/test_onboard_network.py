@@ -22,13 +22,15 @@ from chauffeur.describe import describe
 from chauffeur.models.onboard.examples import questions, reasons
 from chauffeur.models.onboard.export import Stepped, export, export_transformers
 from chauffeur.models.onboard.packed import Packed
-from chauffeur.models.onboard.tokens import train_tokenizer
-from chauffeur.models.onboard.training import SIZES, Recipe, evaluate_loss, network, train
+from chauffeur.models.onboard.tokens import blanks_of, train_tokenizer
+from chauffeur.models.onboard.training import SIZES, Recipe, blank, collate, evaluate_loss, network, train
 from chauffeur.planners.onboard.dialect import Number, Step, read
 from chauffeur.planners.onboard.engine import Engine
+from chauffeur.planners.onboard.hot import HotPlanner
 from chauffeur.planners.onboard.language_model import LanguageModelPlanner
 from chauffeur.planners.onboard.prompt import END, program_reply, prompt
 from chauffeur.planners.onboard.reply import read_reply
+from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
@@ -91,15 +93,16 @@ def test_it_learns(model: Any, data: Packed, tokenizer: Any) -> None:
 
 
 def test_a_run_that_stopped_ends_like_one_that_did_not(data: Packed, tokenizer: Any, tmp_path: Path) -> None:
-    whole = trained(data, tokenizer, tmp_path / "whole", 24)
+    blanks = blanks_of(tokenizer)
+    whole = trained(data, tokenizer, tmp_path / "whole", 24, blanks=blanks)
 
     def stop(step: int, loss: float, rate: float) -> None:
         if step == 11:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        trained(data, tokenizer, tmp_path / "parts", 24, watch=stop, save_s=0.0)
-    parts = trained(data, tokenizer, tmp_path / "parts", 24)
+        trained(data, tokenizer, tmp_path / "parts", 24, blanks=blanks, watch=stop, save_s=0.0)
+    parts = trained(data, tokenizer, tmp_path / "parts", 24, blanks=blanks)
     for a, b in zip(whole.parameters(), parts.parameters(), strict=True):
         assert torch.equal(a, b)
 
@@ -180,3 +183,39 @@ def test_the_planner_plans_with_it(exported: Path) -> None:
 def test_the_model_card_names_what_made_it(exported: Path) -> None:
     about = json.loads((exported / "model.json").read_text())
     assert about["version"] == "test"
+
+
+def test_it_may_be_held_to_the_numbers_that_were_said(exported: Path) -> None:
+    engine = Engine(exported)
+    text = prompt(None, (), "drive at 45 mph")
+    for measures in (("17",), ("17", "2.5")):
+        steps = read_reply(engine.write(text, only_program=True, measures=measures).text).steps
+        assert {f"{number.value:g}" for step in steps for number in step.numbers} <= set(measures)
+    assert read_reply(engine.write(text, only_program=True).text).steps == (Step("drive_at", Number(45.0, "mph")),)
+
+
+def test_only_words_of_wishes_are_blanked_and_never_numbers(tokenizer: Any, data: Packed) -> None:
+    blanks = blanks_of(tokenizer)
+    ids, _ = collate(data, np.arange(len(data)), tokenizer.token_to_id(END))
+    before = ids.clone()
+    blank(ids, blanks, 1.0, np.random.default_rng(0))
+    blanked = ids == blanks.blank
+    assert blanked.any()
+    for row, was, gone in zip(ids.tolist(), before.tolist(), blanked.tolist(), strict=True):
+        first, last = was.index(blanks.wish), was.index(blanks.draft)
+        inside = {i for i, out in enumerate(gone) if out}
+        words = {i for i in range(first + 1, last) if was[i] not in blanks.kept}
+        assert inside in (set(), words)
+        assert [token for i, token in enumerate(row) if i not in inside] == [
+            token for i, token in enumerate(was) if i not in inside
+        ]
+    assert {tokenizer.token_to_id(digit) for digit in "0123456789" if tokenizer.token_to_id(digit)} <= blanks.kept
+
+
+def test_a_link_to_a_model_is_followed_anew(exported: Path, tmp_path: Path) -> None:
+    pointer = tmp_path / "current"
+    pointer.symlink_to(exported, target_is_directory=True)
+    assert isinstance(make_planner(f"onboard/{pointer}"), HotPlanner)
+    assert isinstance(make_planner(f"onboard/{exported}"), LanguageModelPlanner)
+    with pytest.raises(ConfigError, match="no variant"):
+        make_planner("onboard/huge")

@@ -56,7 +56,7 @@ def setting(made: Plan, name: str) -> float:
 def test_is_a_planner_with_versioned_rules() -> None:
     planner = RetrievalPlanner.from_spec("")
     assert isinstance(planner, Planner)
-    assert (planner.id, planner.model) == ("onboard", "meaning-v2")
+    assert (planner.id, planner.model) == ("retrieval", "meaning-v2")
     with pytest.raises(ConfigError):
         RetrievalPlanner.from_spec("large")
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from chauffeur.language.grammar import Frame, Grammar, Manner, Template, Wording
 
+PACKAGE = "chauffeur.models.onboard.words"
 FILES = (
     "pieces",
     "speed",
@@ -246,7 +247,7 @@ _GERUNDS: Mapping[str, str] = {
     verb: gerund for verb, _, gerund in (pair.partition(":") for pair in _FIRST_VERBS.split())
 }
 
-_MANNER = Manner(
+MANNER = Manner(
     frames=_FRAMES,
     openings=_OPENINGS,
     questions=_QUESTIONS,
@@ -259,7 +260,7 @@ _MANNER = Manner(
 @cache
 def wordings() -> Grammar:
     """The tables of what passengers say."""
-    return Grammar("chauffeur.models.onboard.words", FILES, _MANNER)
+    return Grammar(PACKAGE, FILES, MANNER)
 
 
 def levels(skill: str) -> tuple[str, ...]:

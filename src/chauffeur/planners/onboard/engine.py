@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -64,7 +64,8 @@ class Engine:
             import onnxruntime
         except ImportError as error:
             raise MissingExtraError(
-                f"The on-board model needs {error.name}.", hint="Run: pip install onnxruntime llguidance"
+                f"The on-board model needs {error.name}.",
+                hint="Run: pip install onnxruntime llguidance; or drive with --planner retrieval.",
             ) from error
         self._llguidance: Any = llguidance
         try:
@@ -84,17 +85,11 @@ class Engine:
         layers, _, heads, _, width = (d if isinstance(d, int) else 0 for d in self._session.get_inputs()[1].shape)
         self._empty = np.zeros((layers, 1, heads, 0, width), np.float32)
 
-    @cached_property
-    def _replies(self) -> Any:
-        return self._matcher(only_program=False)
-
-    @cached_property
-    def _programs(self) -> Any:
-        return self._matcher(only_program=True)
-
-    def _matcher(self, *, only_program: bool) -> Any:
+    @lru_cache(maxsize=8)  # noqa: B019 - an engine lives as long as the process
+    def _matcher(self, only_program: bool, measures: tuple[str, ...]) -> Any:
         """At the beginning of a reply: copied for each, because reading the grammar takes longer than most replies."""
-        text = grammar(tuple(self.about["questions"]), tuple(self.about["reasons"]), only_program=only_program)
+        questions, reasons = tuple(self.about["questions"]), tuple(self.about["reasons"])
+        text = grammar(questions, reasons, only_program=only_program, measures=measures)
         matchers = self._llguidance.LLMatcher
         return matchers(self._tokenizer, matchers.grammar_from_lark(text))
 
@@ -103,6 +98,7 @@ class Engine:
         prompt: str,
         *,
         only_program: bool = False,
+        measures: tuple[str, ...] = (),
         constrained: bool = True,
         told: Callable[[str], None] | None = None,
     ) -> Written:
@@ -111,11 +107,12 @@ class Engine:
         Args:
             prompt: As `prompt.prompt` makes it.
             only_program: Whether questions and refusals are left out.
+            measures: The only numbers that may stand for a speed, a distance or a time; empty for any.
             constrained: Whether the grammar holds; without it, whatever the network prefers.
             told: Called with each piece of text as it comes.
         """
         ids: list[int] = self._tokenizer.tokenize_str(prompt)[-MAX_PROMPT_TOKENS:]
-        matcher = (self._programs if only_program else self._replies).deep_copy()
+        matcher = self._matcher(only_program, measures).deep_copy()
         keys = values = self._empty
         feed = ids
         out: list[int] = []

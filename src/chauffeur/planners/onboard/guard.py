@@ -12,12 +12,13 @@ from collections.abc import Sequence
 from typing import Final
 
 from chauffeur.language.quantities import read_quantities
-from chauffeur.planners.onboard.dialect import SKILLS, Number, Step
+from chauffeur.planners.onboard.dialect import SKILLS, UNITS, Number, Step, plain
 from chauffeur.planners.onboard.meaning import NotUnderstood, Reading
 from chauffeur.planners.onboard.understand import understand
 
 _DIGITS: Final = re.compile(r"\d+(?:\.\d+)?")
 _CLOSE: Final = 0.011
+_ROUND: Final = 0.01
 _SIDES: Final = ("left", "right")
 
 
@@ -29,16 +30,36 @@ def doubt(wish: str, history: Sequence[str], steps: Sequence[Step]) -> str:
         history: Remembered trips as the model read them.
         steps: What the program does.
     """
+    strange = unnamed(wish, history, steps)
+    if strange is not None:
+        return f"I am not sure about the number: did you mean {strange.value:g}?"
+    reading = understand(wish)
+    if isinstance(reading, NotUnderstood):
+        return ""
+    return _contradiction(reading, steps)
+
+
+def unnamed(wish: str, history: Sequence[str], steps: Sequence[Step]) -> Number | None:
+    """The first number of a program that neither the wish nor history names."""
     digits = {float(number) for text in (wish, *history) for number in _DIGITS.findall(text)}
     quantities = [quantity.value for quantity in read_quantities(wish)]
     for number in _numbers_of(steps):
         measured = number.si / number.factor
         if not any(_close(number.value, one) for one in digits) and not any(_close(measured, q) for q in quantities):
-            return f"I am not sure about the number: did you mean {number.value:g}?"
-    reading = understand(wish)
-    if isinstance(reading, NotUnderstood):
-        return ""
-    return _contradiction(reading, steps)
+            return number
+    return None
+
+
+def named(wish: str, history: Sequence[str]) -> tuple[str, ...]:
+    """Every number that a program may take over from the words, in any unit in which it is a round one."""
+    found = {number for text in (wish, *history) for number in _DIGITS.findall(text)}
+    for quantity in read_quantities(wish):
+        values = [
+            quantity.value,
+            *(quantity.value / si for kind, si, _ in UNITS.values() if kind == quantity.dimension),
+        ]
+        found |= {plain(round(value, 2)) for value in values if abs(2 * value - round(2 * value)) < _ROUND}
+    return tuple(sorted(found))
 
 
 def _close(value: float, other: float) -> bool:

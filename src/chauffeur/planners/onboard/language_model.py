@@ -6,7 +6,7 @@ What the model writes is read by the dialect's reader, looked at by the guard an
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -16,12 +16,12 @@ from chauffeur.planners.base import Planner
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import Step
 from chauffeur.planners.onboard.engine import Engine, Written
-from chauffeur.planners.onboard.guard import doubt
+from chauffeur.planners.onboard.guard import doubt, named, unnamed
 from chauffeur.planners.onboard.link import link
 from chauffeur.planners.onboard.options import Declined
 from chauffeur.planners.onboard.personal import corrections_of, leaning_of
 from chauffeur.planners.onboard.prompt import history_words, prompt
-from chauffeur.planners.onboard.reply import read_reply
+from chauffeur.planners.onboard.reply import Reply, read_reply
 from chauffeur.planners.onboard.thoughts import thoughts_of
 
 SHIPPED: Final = Path(__file__).parent / "weights"
@@ -29,6 +29,54 @@ SHIPPED: Final = Path(__file__).parent / "weights"
 
 UNSURE = 0.35
 """Below this probability of its least sure choice the model's program is asked about instead of driven."""
+
+
+NOTHING: Final = Written("", 1.0, 0, 0, 0)
+"""What the network wrote where it was not asked."""
+
+
+def answer(
+    engine: Engine,
+    text: str,
+    wish: str,
+    history: Sequence[str],
+    *,
+    constrained: bool = True,
+    guarded: bool = True,
+    told: Callable[[str], None] | None = None,
+) -> tuple[Reply, Written]:
+    """What the model says to a wish after the guard has looked at it: steps, a question, or a refusal.
+
+    Args:
+        engine: The model.
+        text: Its prompt.
+        wish: The passenger's words.
+        history: Remembered trips as the prompt has them.
+        constrained: Whether decoding holds to the grammar.
+        guarded: Whether the guard looks on.
+        told: Called with each piece of text as the model writes it.
+
+    Raises:
+        ProgramError: What it wrote is no reply; only without the grammar.
+    """
+    if guarded and (reason := danger(wish)):
+        return Reply(refusal=reason), NOTHING
+    written = engine.write(text, constrained=constrained, told=told)
+    reply = read_reply(written.text)
+    if reply.refusal in engine.about.get("checked", ()):
+        # Whether the road and the limits allow it is for linking and the checks to say, not for the model.
+        written = engine.write(text, only_program=True)
+        reply = read_reply(written.text)
+    if not guarded or not reply.steps:
+        return reply, written
+    if unnamed(wish, history, reply.steps) and (numbers := named(wish, history)):
+        # Once more with the numbers that were said, and no others.
+        written = engine.write(text, only_program=True, measures=numbers)
+        reply = read_reply(written.text)
+    question = doubt(wish, history, reply.steps)
+    if not question and written.sure < UNSURE:
+        question = "I am not sure what you want. Please say it in other words."
+    return (Reply(question=question), written) if question else (reply, written)
 
 
 class LanguageModelPlanner:
@@ -61,7 +109,6 @@ class LanguageModelPlanner:
         self._guarded = guarded
         self._told = told
         self._read: dict[str, tuple[Step, ...]] = {}
-        self._checked = frozenset(self._engine.about.get("checked", ()))
 
     @classmethod
     def from_spec(cls, argument: str) -> Planner:
@@ -103,29 +150,24 @@ class LanguageModelPlanner:
         begun = time.perf_counter()
         wish = request.instruction.text
         situation = request.context.situation
-        if self._guarded and (reason := danger(wish)):
-            return self._declined(reason, "refuse", begun, Written("", 1.0, 0, 0, 0))
         history = history_words(request.history, self._steps_of) if self._history else ()
         text = prompt(situation, history, wish)
-        written = self._engine.write(text, constrained=self._constrained, told=self._told)
         try:
-            reply = read_reply(written.text)
+            reply, written = answer(
+                self._engine,
+                text,
+                wish,
+                history,
+                constrained=self._constrained,
+                guarded=self._guarded,
+                told=self._told,
+            )
         except ProgramError as error:
-            return self._declined("I did not understand that.", "ask", begun, written, str(error))
-        if reply.question:
-            return self._declined(reply.question, "ask", begun, written)
-        if reply.refusal in self._checked:
-            # Whether the road and the limits allow it is for linking and the checks to say, not for the model.
-            written = self._engine.write(text, only_program=True)
-            reply = read_reply(written.text)
-        if reply.refusal:
-            return self._declined(reply.refusal, "refuse", begun, written)
-        if self._guarded:
-            question = doubt(wish, history, reply.steps)
-            if not question and written.sure < UNSURE:
-                question = "I am not sure what you want. Please say it in other words."
-            if question:
-                return self._declined(question, "ask", begun, written)
+            return self._declined("I did not understand that.", "ask", begun, NOTHING, str(error))
+        if not reply.steps:
+            return self._declined(
+                reply.question or reply.refusal, "ask" if reply.question else "refuse", begun, written
+            )
         leaning = partial(leaning_of, request.history, corrections=corrections_of(request.rounds))
         linked = link(reply.steps, situation, request.limits, leaning)
         if isinstance(linked, Declined):

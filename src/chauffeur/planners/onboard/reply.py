@@ -43,13 +43,20 @@ def read_reply(text: str) -> Reply:
     return Reply(steps=read(source), source=source)
 
 
-def grammar(questions: tuple[str, ...], refusals: tuple[str, ...], *, only_program: bool = False) -> str:
+def grammar(
+    questions: tuple[str, ...],
+    refusals: tuple[str, ...],
+    *,
+    only_program: bool = False,
+    measures: tuple[str, ...] = (),
+) -> str:
     """The replies up to the end of the program, as a Lark grammar.
 
     Args:
         questions: Everything the model may ask back.
         refusals: Every reason it may give.
         only_program: Whether neither may come.
+        measures: The only numbers that may stand for a speed, a distance or a time; empty for any.
     """
     return "\n".join(
         (
@@ -67,6 +74,7 @@ def grammar(questions: tuple[str, ...], refusals: tuple[str, ...], *, only_progr
             *(f"{kind}: {_number(kind)}" for kind in _KINDS),
             'factored: NUMBER " * "',
             r"NUMBER: /[0-9]{1,4}(\.[0-9]{1,2})?/",
+            f"measure: {_any(measures) if measures else 'NUMBER'}",
         )
     )
 
@@ -98,5 +106,6 @@ def _test(name: str) -> str:
 
 def _number(kind: Kind) -> str:
     units = [unit for unit, (what, _, _) in UNITS.items() if what == kind]
-    ways = ["NUMBER", *(f'{_literal(unit + "(")} NUMBER ")"' for unit in units)]
+    number = "measure" if kind in ("speed", "distance", "time") else "NUMBER"
+    ways = [number, *(f'{_literal(unit + "(")} {number} ")"' for unit in units)]
     return f"factored? ({' | '.join(ways)})"
