@@ -24,7 +24,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from chauffeur.concept import LAMPILOT_LIMITS, ProgramError
+from chauffeur.concept import LAMPILOT_LIMITS, ProgramError, Scenario
 from chauffeur.models.onboard.cases import Case, case_of
 from chauffeur.models.onboard.examples import Example
 from chauffeur.models.onboard.judging import judge
@@ -90,7 +90,7 @@ def driven(job: tuple[Case, Example, Reply]) -> bool:
     if not wanted.steps:
         return False
     world, sandbox = _tools()
-    return judge(world, case.scenario, wanted.steps, reply.source, linked, sandbox).done
+    return judge(world, Scenario(**case.scenario), wanted.steps, reply.source, linked, sandbox).done
 
 
 def outcomes(

@@ -218,8 +218,44 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
         "checked": list(checked_reasons()),
     }
     export(model, tokenizer, folder / "model", about)
+    facts = json.loads((data / "data.json").read_text(encoding="utf-8"))
+    count = sum(parameter.numel() for parameter in model.parameters())
+    publish(folder / "model" / "MODEL_CARD.md", model_card(about, facts, count).encode(), "model card")
+    publish(folder / "model" / "DATA_CARD.md", data_card(facts).encode(), "data card")
     export_transformers(model, tokenizer, folder / "transformers")
     return folder / "model"
+
+
+def model_card(about: dict[str, Any], facts: dict[str, Any], parameters: int) -> str:
+    """The model card of a trained model.
+
+    Args:
+        about: What `model.json` says.
+        facts: What `data.json` says of the data.
+        parameters: How many the network has.
+    """
+    recipe = about["recipe"]
+    tokens = recipe["steps"] * recipe["batch_tokens"] / 1e6
+    return f"""# Model card: {about["version"]}
+
+Writes driving programs for passengers' wishes, on board, offline. {parameters / 1e6:.1f} million parameters, Llama
+architecture (`{recipe["size"]}`), int8 weights for ONNX Runtime, trained from nothing by this repository.
+
+- **Input**: situation and remembered trips in a few words, the wish (English, one sentence or a few), and what the
+  rule-based reader made of it. **Output**: a program of the dialect and one sentence that says the same, a question
+  back, or a reason to refuse.
+- **Training**: {recipe["steps"]:,} steps of {recipe["batch_tokens"]:,} tokens ({tokens:.0f} M with padding) on
+  {facts["examples"]["train"]:,} examples; AdamW, rate {recipe["rate"]}, decay {recipe["decay"]},
+  {recipe["blanked"]:.0%} of the words blanked in half of the examples; seed {recipe["seed"]}. Data `{about["data"][:16]}`: see `DATA_CARD.md`.
+  The same command makes it again: `chauffeur train onboard --out DIR --size {recipe["size"]} --steps {recipe["steps"]}
+  --seed {recipe["seed"]} --draws {facts["plan"]["draws"]} --per-case {facts["plan"]["per_case"]}`.
+- **Meant for** the `onboard` planner of Chauffeur, behind its grammar, guard, linking and checks, in simulation. Alone
+  it has none of them: it may copy a number wrongly or mistake a wish, more often on phrasings unlike its grammar's.
+- **Not for** a vehicle on a road, other languages, conversations, or any task but this one.
+- **Figures**: `benchmarks/RESULTS.md` of the repository: LaMPilot-Bench, hand-written wishes, phrasings seen and not
+  seen in training, ablations, latency.
+- **Licence** and data: those of the repository; no third-party text, no personal data.
+"""
 
 
 def examples_of(path: Path) -> list[Example]:

@@ -14,7 +14,7 @@ from typing import Final
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Thoughts, Usage
 from chauffeur.planners.base import Planner
 from chauffeur.planners.onboard.dangers import danger
-from chauffeur.planners.onboard.dialect import Step
+from chauffeur.planners.onboard.dialect import Step, tell
 from chauffeur.planners.onboard.engine import Engine, Written
 from chauffeur.planners.onboard.guard import doubt, named, unnamed
 from chauffeur.planners.onboard.link import link
@@ -75,7 +75,8 @@ def answer(
         reply = read_reply(written.text)
     question = doubt(wish, history, reply.steps)
     if not question and written.sure < UNSURE:
-        question = "I am not sure what you want. Please say it in other words."
+        guess = tell(reply.steps).removeprefix("I ").removesuffix(".").replace(", then I ", ", then ")
+        question = f"I am not sure what you want. Shall I {guess}?"
     return (Reply(question=question), written) if question else (reply, written)
 
 
