@@ -246,7 +246,8 @@ architecture (`{recipe["size"]}`), int8 weights for ONNX Runtime, trained from n
   back, or a reason to refuse.
 - **Training**: {recipe["steps"]:,} steps of {recipe["batch_tokens"]:,} tokens ({tokens:.0f} M with padding) on
   {facts["examples"]["train"]:,} examples; AdamW, rate {recipe["rate"]}, decay {recipe["decay"]},
-  {recipe["blanked"]:.0%} of the words blanked in half of the examples; seed {recipe["seed"]}. Data `{about["data"][:16]}`: see `DATA_CARD.md`.
+  {recipe["blanked"]:.0%} of the words blanked in half of the examples; seed {recipe["seed"]}.
+  Data `{about["data"][:16]}`: see `DATA_CARD.md`.
   The same command makes it again: `chauffeur train onboard --out DIR --size {recipe["size"]} --steps {recipe["steps"]}
   --seed {recipe["seed"]} --draws {facts["plan"]["draws"]} --per-case {facts["plan"]["per_case"]}`.
 - **Meant for** the `onboard` planner of Chauffeur, behind its grammar, guard, linking and checks, in simulation. Alone
