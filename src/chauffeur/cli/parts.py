@@ -40,7 +40,7 @@ def planner_named(spec: str, base_url: str | None, on_text: Callable[[str, int],
     from chauffeur.planners.registry import make_planner
 
     options: dict[str, Any] = {} if base_url is None else {"base_url": base_url}
-    if on_text is not None and spec.startswith("openai/"):
+    if on_text is not None and spec.partition("/")[0] in ("openai", "onboard"):
         options["on_text"] = on_text
     return make_planner(spec, **options)
 

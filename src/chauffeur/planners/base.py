@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from chauffeur.concept import Plan, PlanRequest, Usage
 from chauffeur.planners.prompts import Message
+
+OnText = Callable[[str, int], None]
+"""Gets each piece of a reply, and the number of the request it belongs to: a new number means: start over."""
 
 
 @runtime_checkable

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chauffeur.concept import ConfigError, InstructionError, Plan, PlanRequest, Program, Thoughts, Usage
-from chauffeur.planners.base import Prose
+from chauffeur.planners.base import OnText, Prose
 from chauffeur.planners.cache import Completion, ReplyCache, default_cache_dir, endpoint_key
 from chauffeur.planners.llm_address import Address, parse_address
 from chauffeur.planners.llm_endpoint import Endpoint, Sampling
@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     import numpy as np
 
 _log = logging.getLogger(__name__)
-
-OnText = Callable[[str, int], None]
-"""Gets each piece of a reply, and the number of the request it belongs to: a new number means: start over."""
 
 Gate = Callable[[str], list[str]]
 """What the static gate finds in a program, one message (line, reason, remedy) each; empty when it may drive."""

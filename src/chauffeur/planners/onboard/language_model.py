@@ -6,13 +6,14 @@ What the model writes is read by the dialect's reader, looked at by the guard an
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
+from itertools import count
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Thoughts, Usage
-from chauffeur.planners.base import Planner
+from chauffeur.planners.base import OnText, Planner
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import Step, tell
 from chauffeur.planners.onboard.engine import Engine, Written
@@ -43,7 +44,7 @@ def answer(
     *,
     constrained: bool = True,
     guarded: bool = True,
-    told: Callable[[str], None] | None = None,
+    on_text: OnText | None = None,
 ) -> tuple[Reply, Written]:
     """What the model says to a wish after the guard has looked at it: steps, a question, or a refusal.
 
@@ -54,30 +55,39 @@ def answer(
         history: Remembered trips as the prompt has them.
         constrained: Whether decoding holds to the grammar.
         guarded: Whether the guard looks on.
-        told: Called with each piece of text as the model writes it.
+        on_text: Gets each piece of text as the model writes it.
 
     Raises:
         ProgramError: What it wrote is no reply; only without the grammar.
     """
     if guarded and (reason := danger(wish)):
         return Reply(refusal=reason), NOTHING
-    written = engine.write(text, constrained=constrained, told=told)
-    reply = read_reply(written.text)
+    attempts = count(1)
+
+    def write(**how: Any) -> tuple[Reply, Written]:
+        attempt = next(attempts)
+        told = None if on_text is None else partial(_told, on_text, attempt)
+        written = engine.write(text, told=told, **how)
+        return read_reply(written.text), written
+
+    reply, written = write(constrained=constrained)
     if reply.refusal in engine.about.get("checked", ()):
         # Whether the road and the limits allow it is for linking and the checks to say, not for the model.
-        written = engine.write(text, only_program=True)
-        reply = read_reply(written.text)
+        reply, written = write(only_program=True)
     if not guarded or not reply.steps:
         return reply, written
     if unnamed(wish, history, reply.steps) and (numbers := named(wish, history)):
         # Once more with the numbers that were said, and no others.
-        written = engine.write(text, only_program=True, measures=numbers)
-        reply = read_reply(written.text)
+        reply, written = write(only_program=True, measures=numbers)
     question = doubt(wish, history, reply.steps)
     if not question and written.sure < UNSURE:
         guess = tell(reply.steps).removeprefix("I ").removesuffix(".").replace(", then I ", ", then ")
         question = f"I am not sure what you want. Shall I {guess}?"
     return (Reply(question=question), written) if question else (reply, written)
+
+
+def _told(on_text: OnText, attempt: int, piece: str) -> None:
+    on_text(piece, attempt)
 
 
 class LanguageModelPlanner:
@@ -90,7 +100,7 @@ class LanguageModelPlanner:
         constrained: bool = True,
         history: bool = True,
         guarded: bool = True,
-        told: Callable[[str], None] | None = None,
+        on_text: OnText | None = None,
     ) -> None:
         """Load a model.
 
@@ -98,7 +108,7 @@ class LanguageModelPlanner:
             model: Folder of the exported model, or the model itself, loaded already.
             constrained, history, guarded: Whether decoding holds to the grammar, H is shown, and the guard looks on;
                 turned off for ablations only.
-            told: Called with each piece of text as the model writes it.
+            on_text: Gets each piece of text as the model writes it.
 
         Raises:
             DataError: The folder holds no model.
@@ -108,11 +118,11 @@ class LanguageModelPlanner:
         self._constrained = constrained
         self._history = history
         self._guarded = guarded
-        self._told = told
+        self._on_text = on_text
         self._read: dict[str, tuple[Step, ...]] = {}
 
     @classmethod
-    def from_spec(cls, argument: str) -> Planner:
+    def from_spec(cls, argument: str, *, on_text: OnText | None = None) -> Planner:
         """The planner named `onboard`: the model of the package; `onboard/FOLDER` is the model of a folder.
 
         A FOLDER that is a symbolic link is looked at before each request: `chauffeur adapt` exchanges models that way.
@@ -123,7 +133,7 @@ class LanguageModelPlanner:
             MissingExtraError: A library is missing.
         """
         if not argument:
-            return cls(SHIPPED)
+            return cls(SHIPPED, on_text=on_text)
         folder = Path(argument)
         if not folder.is_dir():
             raise ConfigError(
@@ -134,7 +144,7 @@ class LanguageModelPlanner:
             from chauffeur.planners.onboard.hot import HotPlanner
 
             return HotPlanner(folder)
-        return cls(folder)
+        return cls(folder, on_text=on_text)
 
     @property
     def id(self) -> str:
@@ -161,7 +171,7 @@ class LanguageModelPlanner:
                 history,
                 constrained=self._constrained,
                 guarded=self._guarded,
-                told=self._told,
+                on_text=self._on_text,
             )
         except ProgramError as error:
             return self._declined("I did not understand that.", "ask", begun, NOTHING, str(error))
