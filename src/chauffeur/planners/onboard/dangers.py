@@ -8,22 +8,49 @@ from typing import Final
 from chauffeur.language.tokens import plain
 from chauffeur.planners.onboard.words import words_file
 
-_DANGERS: Final = tuple((group[0].strip("[]"), re.compile("|".join(group[1:]))) for group in words_file("dangers.txt"))
-_NEGATED: Final = re.compile(
-    r"\b(?:(?:do not|does not|did not|not allowed to|never|not|no|without|avoid|instead of|rather than|afraid|scared|"
-    r"worried|fear|hate|stop|quit|careful|lest|keep from|in case|before|if (?:you|we)) "
-    r"(?:you |we |to |of |they |him |them |have |want |need |us |going |people |that |about |he |please |ever |wanna |"
-    r"i |actually |really |even )*|(?:nearly|almost|he|she|they|who|(?:we|you) are|might|gonna|could|will|would) )$"
+_ARROW: Final = "->"
+_LINES: Final = tuple((group[0].strip("[]"), re.compile("|".join(group[1:]))) for group in words_file("dangers.txt"))
+_SAME: Final = tuple((name.removeprefix(_ARROW).strip(), lines) for name, lines in _LINES if name.startswith(_ARROW))
+_DANGERS: Final = tuple((reason, lines) for reason, lines in _LINES if not reason.startswith(_ARROW))
+_NOT: Final = (
+    r"(?:(?:(?<!why )do|does|did) not|not allowed to|never|(?<!why )(?<!do )(?<!can )(?<!could )not|no|without|avoid|"
+    r"instead of|rather than|afraid|scared|worried|fear|hate|stop|quit|careful|lest|keep from|in case|before|because|"
+    r"(?:or|if) (?:you|we|he|they)) "
+    r"(?:you |we |i |to |of |he |she |they |it |him |us |me |have |want |need |going |that |about |get |start |be |"
+    r"let |please |ever |even |try |trying |in |with |the |a |this |all |your |will |would |might |could |are |is |"
+    r"keep |do |always |by |any )*"
 )
+_TOLD: Final = (
+    r"(?:nearly|almost|about|he|she|they|who|"
+    r"(?:he|she|they|him|it|kin|wife) (?:might|will|would|could|always|just|keeps?)|"
+    r"(?:^|[.,;!?] )him|let (?:him|ambulance|police)|(?:he|she|him|police|car) (?:is|was)|(?:we|you|they) (?:are|were)|"
+    r"(?:are|were|is|was) (?:you|he|she|they|we|him)|^(?:are|is|were)|(?:why|where|how) (?:are|is)|"
+    r"you (?:will|might|always|keep)|(?<!can )(?<!could )(?<!would )(?<!will )(?<!want )(?<!need )(?<!not )(?<!like )"
+    r"(?<!should )(?<!must )(?<!that )(?<!suggest )you) "
+    r"(?:going to |trying to |about to |always |nearly |almost |in )*"
+)
+_NEGATED: Final = re.compile(rf"\b(?:{_NOT}|{_TOLD})$")
 """What stands right in front of words that only sound dangerous: "do not run the red light", "he nearly hit us"."""
+_URGED: Final = re.compile(
+    r"\b(?:not (?:be )?(?:afraid|scared|shy|hesitate|worried|fear|scruples) (?:to |of )?|"
+    r"(?:love it|like it|nice|great|good|cool|fun|funny|happy|glad|appreciate it|mind|what) if (?:you|we) (?:could )?)$"
+)
+"""What looks like a negation and is none: "do not be afraid to hit him"."""
+_TAKEN_BACK: Final = re.compile(r" ?[.,;?!]* ?(?:no|nope|better not|rather not|or (?:rather )?not)(?: ?[.,;!?]|$)")
+"""What takes the words before it back: "turn around? No, ..."."""
 _GAP: Final = re.compile(r"\s+")
 
 
 def danger(wish: str) -> str:
     """Why a wish is not carried out, in words for the person; empty when nothing in it is dangerous."""
     words = _GAP.sub(" ", re.sub(r"[^a-z0-9 .,;!?]", " ", plain(wish))).strip()
+    for name, same in _SAME:
+        words = _GAP.sub(" ", same.sub(name, words)).strip()
     for reason, pattern in _DANGERS:
         for found in pattern.finditer(words):
-            if _NEGATED.search(words[: found.start()]) is None:
+            before = words[: found.start()]
+            if _NEGATED.search(before) and not _URGED.search(before):
+                continue
+            if not _TAKEN_BACK.match(words, found.end()):
                 return reason
     return ""
