@@ -184,6 +184,9 @@ def _number(tokens: list[str], i: int) -> tuple[float, int, bool] | None:
         return _after_article(tokens, i)
     if word in _VAGUE:
         return _VAGUE[word], i + 1, False
+    if word == "hundred":  # "another hundred feet"
+        words = _spelled(["one", *tokens[i:]], 0)
+        return None if words is None else (words[0], i + words[1] - 1, True)
     words = _spelled(tokens, i)
     if words is None:
         return None

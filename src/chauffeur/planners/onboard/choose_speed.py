@@ -15,6 +15,8 @@ from chauffeur.planners.onboard.options import (
 )
 
 _STEP_MPS = {BIT: 1.5, MUCH: 6.0}
+_FELT_MPS = 1.2
+"""The least change upwards that a passenger notices."""
 _PLAIN_STEP_MPS = 3.0
 """Own steps at highway speed; in proportion below 25 m/s."""
 
@@ -111,7 +113,7 @@ def _step(meaning: Meaning, options: Options) -> Chosen | Declined:
     name = {BIT: "_bit", MUCH: "_much"}.get(meaning.degree, "")
     amount = {BIT: "a little ", MUCH: "a lot "}.get(meaning.degree, "")
     if meaning.change > 0:
-        target = min(options.speed + max(0.5, step + leaning), options.own_cap_mps)
+        target = min(options.speed + max(_FELT_MPS, step + leaning), options.own_cap_mps)
         if target < options.speed + 0.3:
             return Declined(
                 f"We already drive {speed_words(options.speed)}, and {speed_words(options.own_cap_mps)} is what is "

@@ -13,7 +13,7 @@ from typing import Final
 
 from chauffeur.language.quantities import read_quantities
 from chauffeur.planners.onboard.dialect import SKILLS, UNITS, Number, Step, plain
-from chauffeur.planners.onboard.meaning import NotUnderstood, Reading
+from chauffeur.planners.onboard.meaning import Meaning, NotUnderstood, Reading
 from chauffeur.planners.onboard.understand import understand
 
 _DIGITS: Final = re.compile(r"\d+(?:\.\d+)?")
@@ -42,10 +42,13 @@ def doubt(wish: str, history: Sequence[str], steps: Sequence[Step]) -> str:
 def unnamed(wish: str, history: Sequence[str], steps: Sequence[Step]) -> Number | None:
     """The first number of a program that neither the wish nor history names."""
     digits = {float(number) for text in (wish, *history) for number in _DIGITS.findall(text)}
-    quantities = [quantity.value for quantity in read_quantities(wish)]
+    quantities = read_quantities(wish)
+    digits |= {quantity.value for quantity in quantities if quantity.dimension == "bare"}
     for number in _numbers_of(steps):
         measured = number.si / number.factor
-        if not any(_close(number.value, one) for one in digits) and not any(_close(measured, q) for q in quantities):
+        if any(_close(number.value, one) for one in digits):
+            continue
+        if not any(_close(measured, quantity.value) for quantity in quantities):
             return number
     return None
 
@@ -76,12 +79,26 @@ def _numbers_of(steps: Sequence[Step]) -> list[Number]:
     return found
 
 
+_PACES: Final = {"hurry": 1, "sporty": 1, "relax": -1, "careful": -1, "comfort": -1, "eco": -1}
+
+
+def _pace(meaning: Meaning) -> int:
+    """+1 for what makes the drive quicker, -1 for what makes it calmer, 0 for the rest."""
+    if meaning.manoeuvre == "style":
+        return _PACES.get(meaning.variant, 0)
+    return meaning.change if meaning.manoeuvre == "speed" else 0
+
+
 def _contradiction(reading: Reading, steps: Sequence[Step]) -> str:
     """Where both read the same manoeuvres, whether one of them says left for right or more for less."""
     if len(reading.steps) != len(steps):
         return ""
     for ruled, step in zip(reading.steps, steps, strict=True):
         written = step.meaning
+        if step.number is not None and step.number.factor != 1.0:
+            continue  # "a bit slower than last time" may still be faster than now
+        if _pace(ruled) * _pace(written) < 0:
+            return "Shall I drive faster or slower?"
         if ruled.manoeuvre != written.manoeuvre:
             continue
         if {ruled.direction, written.direction} == set(_SIDES):
