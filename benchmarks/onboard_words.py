@@ -129,6 +129,7 @@ def main() -> None:
     arguments = parser.parse_args()
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     engine = Engine(arguments.model)
+    shipped: list[float] = []
     rows = (json.loads(line) for line in (arguments.run / "cases.jsonl").read_text().splitlines())
     cases = {row["index"]: case_of(row) for row in rows if "left_out" not in row}
     print("| asked | split | examples | right | exact | done otherwise | right answer | asked | else | unreadable |")
@@ -144,14 +145,13 @@ def main() -> None:
             cells = " | ".join(share(counts[name]) for name in names)
             print(f"| {way.name} | {split} | {len(examples)} | **{share(right)}** | {cells} |", flush=True)
             if way == WAYS[0]:
-                times.sort()
-                spread = (
-                    f"median {times[len(times) // 2] * 1e3:.1f} ms, 95 % {times[int(0.95 * len(times))] * 1e3:.1f} ms"
-                )
+                shipped += times
+    shipped.sort()
     after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    median, most = shipped[len(shipped) // 2], shipped[int(0.95 * len(shipped))]
     print(
-        f"\nWish to reply: {spread}, longest {times[-1] * 1e3:.1f} ms. Peak memory {after / 1024:.0f} MiB, "
-        f"before loading the model {before / 1024:.0f} MiB."
+        f"\nWish to reply: median {median * 1e3:.1f} ms, 95 % {most * 1e3:.1f} ms, longest {shipped[-1] * 1e3:.1f} ms. "
+        f"Peak memory {after / 1024:.0f} MiB, of which {before / 1024:.0f} MiB before the model was loaded."
     )
 
 

@@ -41,7 +41,7 @@ def onboard(
     draws: Annotated[int, typer.Option(min=100, help="Scenes drawn; about six in ten become cases.")] = 22_000,
     per_case: Annotated[int, typer.Option(min=1, help="Wordings tried for each case.")] = 26,
     size: Annotated[str, typer.Option(help="`small` (an hour on two cores), `medium`, or `large` (GPU).")] = "small",
-    steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 4,096 tokens.")] = 6_000,
+    steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 4,096 tokens.")] = 6_500,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes that make data; default one per core.")] = None,
     threads: Annotated[int, typer.Option(min=0, help="Threads that train; 0 leaves it to PyTorch.")] = 0,
     device: Annotated[str, typer.Option(help="`cpu` or `cuda`; default the best at hand.")] = "",

@@ -63,7 +63,7 @@ class Plan:
     draws: int = 22_000
     per_case: int = PER_CASE
     size: str = "small"
-    steps: int = 6_000
+    steps: int = 6_500
 
 
 def build_data(folder: Path, plan: Plan, workers: int, told: Told) -> None:
