@@ -263,11 +263,10 @@ def test_conditions_and_steps_keep_their_order() -> None:
             if condition.endswith("then"):
                 assert text.lower().index("then") < text.lower().index("take it"), text
     for _ in range(300):
-        text = in_order(["brake", "swerve", "honk"], rng).text.lower()
-        assert text.index("brake") < text.index("swerve") < text.index("honk"), text
-        text = in_order(["brake", "swerve"], rng).text.lower()
-        late = re.search(r"swerve.*\b(?:first|before|after)\b.*brake", text)
-        assert late or text.index("brake") < text.index("swerve"), text
+        for words in (["brake", "swerve", "honk"], ["brake", "swerve"]):
+            text = in_order(words, rng).text.lower()
+            if not re.search(r"\b(?:first|before|after)\b", text):  # "swerve, but first brake"
+                assert sorted(words, key=text.index) == words, text
 
 
 @pytest.mark.parametrize(
@@ -313,7 +312,7 @@ def test_left_and_right_are_mirrors(left: str) -> None:
 
     def mirrored(text: str) -> str:
         swapped = {"left": "right", "right": "left", "fast": "slow", "slow": "fast"}
-        return re.sub(r"left|right|fast|slow", lambda word: swapped[word[0]], text)
+        return re.sub(r"left|right|(?:fast|slow)(?= lane| one)", lambda word: swapped[word[0]], text)
 
     ours = {mirrored(text) for text in forms(left)}
     theirs = forms(left.replace("left", "right"))
