@@ -49,8 +49,8 @@ def onboard(
         Path | None, typer.Option(help="Training examples mixed in; default data/train.jsonl of the base, if there.")
     ] = None,
     rank: Annotated[int, typer.Option(min=1, help="Rank of the additions to each matrix.", rich_help_panel=_HOW)] = 8,
-    passes: Annotated[int, typer.Option(min=1, help="How often each interaction is seen.", rich_help_panel=_HOW)] = 20,
-    rate: Annotated[float, typer.Option(help="Highest learning rate.", rich_help_panel=_HOW)] = 1e-3,
+    passes: Annotated[int, typer.Option(min=1, help="How often each interaction is seen.", rich_help_panel=_HOW)] = 30,
+    rate: Annotated[float, typer.Option(help="Highest learning rate.", rich_help_panel=_HOW)] = 3e-3,
     tolerance: Annotated[float, typer.Option(min=0.0, help="Points of validation that may be lost.")] = 0.5,
     judged: Annotated[int, typer.Option(min=1, help="Most validation examples judged.", rich_help_panel=_HOW)] = 1000,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,

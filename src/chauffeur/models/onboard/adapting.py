@@ -77,8 +77,8 @@ class AdaptRecipe:
     validation: Path
     replay: Path | None = None
     rank: int = 8
-    rate: float = 1e-3
-    passes: int = 20
+    rate: float = 3e-3
+    passes: int = 30
     batch: int = 16
     replay_share: float = 0.5
     keep: float = 5.0
