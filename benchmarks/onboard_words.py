@@ -28,6 +28,7 @@ from chauffeur.concept import LAMPILOT_LIMITS, ProgramError, Scenario
 from chauffeur.models.onboard.cases import Case, case_of
 from chauffeur.models.onboard.examples import Example
 from chauffeur.models.onboard.judging import judge
+from chauffeur.models.onboard.pipeline import examples_of
 from chauffeur.planners.onboard.draft import draft
 from chauffeur.planners.onboard.engine import Engine
 from chauffeur.planners.onboard.language_model import SHIPPED, answer
@@ -136,8 +137,7 @@ def main() -> None:
     print("|---|---|---:|---:|---:|---:|---:|---:|---:|---:|")
     for way in WAYS if arguments.ablations else WAYS[:1]:
         for split in ("seen", "unseen"):
-            lines = (arguments.run / "data" / f"{split}.jsonl").read_text(encoding="utf-8").splitlines()
-            examples = [Example(**json.loads(line)) for line in lines][: arguments.most]
+            examples = examples_of(arguments.run / "data" / f"{split}.jsonl")[: arguments.most]
             counts, times = outcomes(engine, examples, cases, way)
             share = partial(_share, len(examples))
             right = counts["exact"] + counts["done otherwise"] + counts["right answer"]

@@ -104,9 +104,9 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Trained:
         pytest.importorskip(library)
     import torch
 
-    from chauffeur.models.onboard.adapting import _packed
     from chauffeur.models.onboard.examples import questions, reasons
     from chauffeur.models.onboard.export import export, export_transformers
+    from chauffeur.models.onboard.packed import Packed
     from chauffeur.models.onboard.tokens import train_tokenizer
     from chauffeur.models.onboard.training import Recipe, train
 
@@ -127,7 +127,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Trained:
     for name in ("training", "data"):
         (folder / name).mkdir()
     recipe = Recipe(size="tiny", steps=200, batch_tokens=1024, rate=5e-3, warmup=20)
-    packed = _packed(pairs, tokenizer, end)
+    packed = Packed.of([(one.prompt, one.reply) for one in pairs], tokenizer, end)
     model = train(packed, folder / "training", recipe, vocabulary=tokenizer.get_vocab_size(), end=end, device="cpu")
     about = {"version": "tiny", "questions": list(questions()), "reasons": list(reasons())}
     export(model, tokenizer, folder / "model", about)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -24,7 +23,6 @@ use only if it forgot nothing and does no worse on interactions that were held b
 old one stays. It needs PyTorch and peft: pip install 'chauffeur[models]'.
 """  # noqa: E501 - a command stands on one line, to be copied
 
-_LINE_EVERY_S: Final = 10.0
 
 _HOW: Final = "How it learns"
 
@@ -63,6 +61,7 @@ def onboard(
 
     from chauffeur.cli.console import stdout
     from chauffeur.cli.parts import memory_named
+    from chauffeur.cli.stages import stage_lines
     from chauffeur.concept import ConfigError, PersonId
     from chauffeur.models.onboard.adapting import AdaptRecipe
     from chauffeur.models.onboard.adapting import adapt as adapt_model
@@ -97,16 +96,8 @@ def onboard(
         seed=seed,
         threads=threads,
     )
-    shown: dict[str, float] = {}
-
-    def told(stage: str, done: int, of: int) -> None:
-        now = time.monotonic()
-        if done == of or now - shown.get(stage, 0.0) >= _LINE_EVERY_S:
-            shown[stage] = now
-            console.print(f"{stage}: {done:,} of {of:,}", soft_wrap=True)
-
     try:
-        verdict = adapt_model(base, found, out, recipe, told)
+        verdict = adapt_model(base, found, out, recipe, stage_lines(console))
     except KeyboardInterrupt:
         console.print("Stopped. The old model stays in use.")
         raise typer.Exit(130) from None

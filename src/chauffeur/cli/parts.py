@@ -37,10 +37,10 @@ def planner_named(spec: str, base_url: str | None, on_text: Callable[[str, int],
     Raises:
         ConfigError: Unknown, or it takes no endpoint.
     """
-    from chauffeur.planners.registry import make_planner
+    from chauffeur.planners.registry import make_planner, takes_option
 
     options: dict[str, Any] = {} if base_url is None else {"base_url": base_url}
-    if on_text is not None and spec.partition("/")[0] in ("openai", "onboard"):
+    if on_text is not None and takes_option(spec, "on_text"):
         options["on_text"] = on_text
     return make_planner(spec, **options)
 

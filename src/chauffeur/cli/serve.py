@@ -12,7 +12,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from chauffeur.concept import LAMPILOT_LIMITS, ChauffeurError, ConfigError, Limits
+from chauffeur.concept import ChauffeurError, ConfigError, Limits
 from chauffeur.planners.base import Planner
 
 serve_app = typer.Typer(no_args_is_help=True, rich_markup_mode="markdown", help="Serve models of our own.")
@@ -46,12 +46,10 @@ def onboard(
 ) -> None:
     """The on-board planner through the chat-completions protocol."""
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.parts import limits_named
     from chauffeur.planners.registry import make_planner
 
-    known = {"default": Limits(), "lampilot": LAMPILOT_LIMITS}
-    if limits not in known:
-        raise ConfigError(f"There are no limits named {limits!r}.", hint=f"Known: {', '.join(known)}.")
-    server = Endpoint(host, port, make_planner(model), known[limits])
+    server = Endpoint(host, port, make_planner(model), limits_named(limits))
     address = f"http://{host}:{server.server_port}/v1"
     stdout().print(f"Serving {model} at {address} (Ctrl-C ends it)", soft_wrap=True)
     try:

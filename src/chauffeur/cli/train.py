@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-import time
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import typer
 
@@ -25,8 +24,6 @@ Examples:
 Makes its own data first: scenes, programs that were driven in them, and words. The same seed gives the same data.
 Ctrl-C keeps what is done; the same command goes on. It needs PyTorch and tokenizers: pip install 'chauffeur[models]'.
 """
-
-_LINE_EVERY_S: Final = 10.0
 
 
 @train_app.callback()
@@ -49,20 +46,13 @@ def onboard(
 ) -> None:
     """The on-board language model: words to driving programs, offline."""
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.stages import stage_lines
     from chauffeur.concept import ConfigError, MissingExtraError
     from chauffeur.models.onboard.pipeline import Plan, build_data, train_model
 
     console = stdout()
     plan = Plan(seed, draws, per_case, size, steps)
-    shown: dict[str, float] = {}
-
-    def told(stage: str, done: int, of: int) -> None:
-        name = stage.partition(",")[0]
-        now = time.monotonic()
-        if done == of or now - shown.get(name, 0.0) >= _LINE_EVERY_S:
-            shown[name] = now
-            console.print(f"{stage}: {done:,} of {of:,}", soft_wrap=True)
-
+    told = stage_lines(console)
     try:
         build_data(out, plan, workers or os.cpu_count() or 1, told)
         if data_only:

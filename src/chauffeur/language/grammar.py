@@ -16,7 +16,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from importlib import resources
 from math import prod
 
@@ -116,6 +115,11 @@ class Grammar:
         self._openings = tuple((frame, _parse(frame.text)) for frame in manner.openings)
         for file in files:
             self._read(resources.files(package).joinpath(f"{file}.txt").read_text(encoding="utf-8"))
+        # (templates of training, templates held out)
+        self._apart = {
+            name: (tuple(t for t in found if not t.held), tuple(t for t in found if t.held))
+            for name, found in self._sections.items()
+        }
 
     def _read(self, text: str) -> None:
         section = ""
@@ -146,13 +150,7 @@ class Grammar:
 
     def templates(self, section: str, *, held: bool | None = None) -> tuple[Template, ...]:
         """Templates of a section; `held` chooses those held out (True) or the others (False). KeyError if unknown."""
-        return self._sections[section] if held is None else self._apart(section)[held]
-
-    @cache  # noqa: B019 - a grammar lives as long as the process
-    def _apart(self, section: str) -> tuple[tuple[Template, ...], tuple[Template, ...]]:
-        """(Templates of training, templates held out) of a section."""
-        found = self._sections[section]
-        return tuple(t for t in found if not t.held), tuple(t for t in found if t.held)
+        return self._sections[section] if held is None else self._apart[section][held]
 
     def question(self, section: str) -> str:
         """What to ask back about the wishes of a section; empty where they need no question."""

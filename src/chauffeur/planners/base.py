@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from chauffeur.concept import Plan, PlanRequest, Usage
+from chauffeur.concept import Plan, PlanRequest, Thoughts, Usage
 from chauffeur.planners.prompts import Message
 
 OnText = Callable[[str, int], None]
@@ -30,6 +31,32 @@ class Planner(Protocol):
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan. Raises PlannerError when no plan can be had; declining is a Plan with `refusal`."""
         ...
+
+
+def declined(
+    planner: Planner, words: str, begun: float, *, intent: str = "", usage: Usage | None = None, raw: str = ""
+) -> Plan:
+    """A plan that drives nothing and says why.
+
+    Args:
+        planner: Whose plan it is.
+        words: For the person.
+        begun: When planning began, by `time.perf_counter`.
+        intent: Short tag of what was understood.
+        usage: What it cost; None for nothing.
+        raw: What the planner's model wrote.
+    """
+    return Plan(
+        thoughts=Thoughts(words),
+        policy=None,
+        refusal=words,
+        intent=intent,
+        planner=planner.id,
+        model=planner.model,
+        latency_s=time.perf_counter() - begun,
+        usage=usage or Usage(),
+        raw=raw,
+    )
 
 
 @dataclass(frozen=True, slots=True)

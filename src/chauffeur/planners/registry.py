@@ -47,6 +47,15 @@ def make_planner(spec: str, **options: object) -> Planner:
     return planner
 
 
+def takes_option(spec: str, option: str) -> bool:
+    """Whether the planner a specification names has a setting of that name. Raises ConfigError as `make_planner`."""
+    return option in _options_of(inspect.signature(_builder(spec.strip().partition("/")[0])))
+
+
+def _options_of(signature: inspect.Signature) -> list[str]:
+    return [name for name, one in signature.parameters.items() if one.kind is inspect.Parameter.KEYWORD_ONLY]
+
+
 def _builder(name: str) -> Callable[..., object]:
     build = getattr(load_plugin(GROUP, name), "from_spec", None)
     if not callable(build):
@@ -59,11 +68,7 @@ def _check_options(name: str, build: Callable[..., object], argument: str, optio
     try:
         signature.bind(argument, **options)
     except TypeError as error:
-        takes = [
-            parameter.name
-            for parameter in signature.parameters.values()
-            if parameter.kind is inspect.Parameter.KEYWORD_ONLY
-        ]
+        takes = _options_of(signature)
         unknown = next((option for option in options if option not in takes), "")
         close = difflib.get_close_matches(unknown, takes, n=1)
         guess = f"Did you mean {close[0]!r}? " if close else ""

@@ -109,7 +109,8 @@ def fine_tune(
     from chauffeur.models.onboard.training import collate
 
     end: int = tokenizer.token_to_id(END)
-    data = _packed([*own, *replayed], tokenizer, end)
+    pairs = [(one.prompt, one.reply) for one in (*own, *replayed)]
+    data = Packed.of(pairs, tokenizer, end, longest=MAX_PROMPT_TOKENS)  # as the runtime reads them
     config = LoraConfig(r=recipe.rank, lora_alpha=2 * recipe.rank, target_modules=list(ADAPTED), task_type="CAUSAL_LM")
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(recipe.seed)
@@ -163,17 +164,6 @@ def _turns(count: int, size: int, rng: np.random.Generator) -> Iterator[Array]:
             waiting = np.concatenate((waiting, rng.permutation(count)))
         yield waiting[:size]
         waiting = waiting[size:]
-
-
-def _packed(pairs: Sequence[Pair], tokenizer: Any, end: int) -> Packed:
-    tokens: list[int] = []
-    starts, replies = [0], list[int]()
-    for one in pairs:
-        asked = tokenizer.encode(one.prompt).ids[-MAX_PROMPT_TOKENS:]  # as the runtime reads it
-        tokens += [*asked, *tokenizer.encode(one.reply).ids, end]
-        starts.append(len(tokens))
-        replies.append(len(asked))
-    return Packed(np.array(tokens, np.uint16), np.array(starts, np.int64), np.array(replies, np.int32))
 
 
 # Judging --------------------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,27 @@ class Packed:
     tokens: Array
     starts: Array
     replies: Array
+
+    @classmethod
+    def of(cls, pairs: Sequence[tuple[str, str]], tokenizer: Any, end: int, longest: int | None = None) -> Packed:
+        """Tokenise (prompt, reply) pairs.
+
+        Args:
+            pairs: Texts.
+            tokenizer: A `tokenizers.Tokenizer`.
+            end: Token that ends a reply.
+            longest: Tokens of a prompt that are kept, counted from its end; None for all.
+        """
+        tokens: list[int] = []
+        starts, replies = [0], list[int]()
+        prompts = tokenizer.encode_batch([prompt for prompt, _ in pairs])
+        answers = tokenizer.encode_batch([reply for _, reply in pairs])
+        for asked, answered in zip(prompts, answers, strict=True):
+            ids = asked.ids if longest is None else asked.ids[-longest:]
+            tokens += [*ids, *answered.ids, end]
+            starts.append(len(tokens))
+            replies.append(len(ids))
+        return cls(np.array(tokens, np.uint16), np.array(starts, np.int64), np.array(replies, np.int32))
 
     def __len__(self) -> int:
         return len(self.replies)

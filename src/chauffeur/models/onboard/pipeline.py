@@ -106,16 +106,7 @@ def _pack(splits: Splits, data: Path, seed: int, told: Told) -> None:
     end = tokenizer.token_to_id(END)
     for place, (name, examples) in enumerate(zip(_SPLITS, (splits.train, splits.seen, splits.unseen), strict=True)):
         told("tokens", place, len(_SPLITS))
-        tokens: list[int] = []
-        starts, replies = [0], list[int]()
-        prompts = tokenizer.encode_batch([example.prompt for example in examples])
-        answers = tokenizer.encode_batch([example.reply for example in examples])
-        for asked, answered in zip(prompts, answers, strict=True):
-            tokens += [*asked.ids, *answered.ids, end]
-            starts.append(len(tokens))
-            replies.append(len(asked.ids))
-        packed = Packed(np.array(tokens, np.uint16), np.array(starts, np.int64), np.array(replies, np.int32))
-        packed.save(data / f"{name}.npz")
+        Packed.of([(example.prompt, example.reply) for example in examples], tokenizer, end).save(data / f"{name}.npz")
         lines = "".join(json.dumps(asdict(example), ensure_ascii=False) + "\n" for example in examples)
         publish(data / f"{name}.jsonl", lines.encode(), "examples")
 
@@ -191,7 +182,9 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
 
     data = folder / "data"
     if not (data / "data.json").exists():
-        raise DataError(f"{folder} holds no data to train on.", hint="Build it first: chauffeur train onboard --data")
+        raise DataError(
+            f"{folder} holds no data to train on.", hint="Build it first: chauffeur train onboard --data-only"
+        )
     if threads:
         torch.set_num_threads(threads)
     tokenizer: Any = load_tokenizer(data)
@@ -209,16 +202,16 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
         watch=lambda step, loss, rate: told(f"training, loss {loss:.3f}, {rate:,.0f} tokens/s", step + 1, plan.steps),
         device=device,
     )
+    facts = json.loads((data / "data.json").read_text(encoding="utf-8"))
     about = {
         "version": MODEL_VERSION,
         "recipe": asdict(recipe),
-        "data": json.loads((data / "data.json").read_text(encoding="utf-8"))["sha256"],
+        "data": facts["sha256"],
         "questions": list(questions()),
         "reasons": list(reasons()),
         "checked": list(checked_reasons()),
     }
     export(model, tokenizer, folder / "model", about)
-    facts = json.loads((data / "data.json").read_text(encoding="utf-8"))
     count = sum(parameter.numel() for parameter in model.parameters())
     publish(folder / "model" / "MODEL_CARD.md", model_card(about, facts, count).encode(), "model card")
     publish(folder / "model" / "DATA_CARD.md", data_card(facts).encode(), "data card")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
@@ -17,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 import torch
 from torch.nn import functional
+from torch.nn.attention import SDPBackend, sdpa_kernel
 from transformers import LlamaConfig, LlamaForCausalLM
 
 from chauffeur.concept import ConfigError
@@ -28,6 +30,10 @@ Network = Any
 
 LENGTHS: Final = (32, 40, 48, 56, 64, 80, 96, 128, 192, 320, 512)
 """Tokens an example is padded to."""
+ROWS: Final = 256
+"""The loss is taken of a multiple of so many tokens."""
+COMPILED_FROM: Final = 2_000
+"""Steps of a run from which fused kernels pay."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,10 +144,29 @@ def blank(ids: torch.Tensor, blanks: Blanks, share: float, rng: np.random.Genera
     rows[words & chosen] = blanks.blank
 
 
-def loss_of(model: Network, ids: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
-    """Mean loss over the replies' tokens."""
-    logits = model(input_ids=ids, use_cache=False).logits
-    return functional.cross_entropy(logits.float().flatten(0, 1), targets.flatten(), ignore_index=-100)
+def loss_of(model: Network, ids: torch.Tensor, targets: torch.Tensor, body: Network | None = None) -> torch.Tensor:
+    """Mean loss over the replies' tokens; only for them are words weighed, two thirds of a row being prompt.
+
+    Args:
+        model: A `LlamaForCausalLM`.
+        ids, targets: As `collate` gives them.
+        body: Its compiled body, where there is one.
+    """
+    hidden = (model.model if body is None else body)(input_ids=ids, use_cache=False).last_hidden_state.flatten(0, 1)
+    wanted = targets.flatten()
+    kept = (wanted != -100).nonzero().squeeze(1)
+    spare = -len(kept) % ROWS  # row 0, without a target: kernels are made for a few shapes
+    rows = functional.pad(kept, (0, spare))
+    labels = functional.pad(wanted[kept], (0, spare), value=-100)
+    return functional.cross_entropy(model.lm_head(hidden[rows]).float(), labels, ignore_index=-100)
+
+
+def compiled_body(model: Network) -> Network | None:
+    """The network's body as fused kernels, where there is a compiler; they round differently in the last bits."""
+    if shutil.which("g++") is None:
+        return None
+    torch._dynamo.config.recompile_limit = 2 * len(LENGTHS)  # pyright: ignore[reportPrivateUsage]
+    return torch.compile(model.model, dynamic=False)
 
 
 def rate_at(step: int, recipe: Recipe) -> float:
@@ -205,6 +230,10 @@ def train(
     for _ in range(first):  # the order is the seed's; what was seen is passed over
         next(feed)
     model.train()
+    # Making kernels for all lengths takes some minutes, a step then three quarters of its time.
+    body = compiled_body(model) if recipe.steps >= COMPILED_FROM else None
+    # The flash kernels are for long rows; of these, plain products are the faster.
+    attention = [SDPBackend.MATH] if where.type == "cpu" else [SDPBackend.FLASH_ATTENTION, SDPBackend.MATH]
     saved = time.monotonic()
     log = (folder / "log.jsonl").open("a", encoding="utf-8")
     with log:
@@ -215,10 +244,11 @@ def train(
             ids, targets = collate(data, next(feed), end)
             if blanks is not None:
                 blank(ids, blanks, recipe.blanked, np.random.default_rng([recipe.seed, 2, step]))
-            with torch.autocast(where.type, torch.bfloat16):
-                loss = loss_of(model, ids.to(where), targets.to(where))
             optimiser.zero_grad(set_to_none=True)
-            loss.backward()
+            with sdpa_kernel(attention):
+                with torch.autocast(where.type, torch.bfloat16):
+                    loss = loss_of(model, ids.to(where), targets.to(where), body)
+                loss.backward()
             torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
             optimiser.step()
             if watch is not None:

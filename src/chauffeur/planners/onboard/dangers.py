@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import Final
 
 from chauffeur.language.tokens import plain
@@ -41,6 +42,7 @@ _TAKEN_BACK: Final = re.compile(r" ?[.,;?!]* ?(?:no|nope|better not|rather not|o
 _GAP: Final = re.compile(r"\s+")
 
 
+@lru_cache(maxsize=32)  # the planner asks, and then the rules that draft for it
 def danger(wish: str) -> str:
     """Why a wish is not carried out, in words for the person; empty when nothing in it is dangerous."""
     words = _GAP.sub(" ", re.sub(r"[^a-z0-9 .,;!?]", " ", plain(wish))).strip()

@@ -6,7 +6,7 @@ is right on phrasings that only one of them understands.
 
 from __future__ import annotations
 
-from functools import cache, lru_cache
+from functools import cache
 from typing import Final
 
 from chauffeur.planners.onboard.dialect import SKILLS, Number, Step
@@ -17,7 +17,6 @@ UNREAD: Final = ""
 """The draft where nobody read the words: the network alone decides."""
 
 
-@lru_cache(maxsize=4096)
 def draft(wish: str) -> str:
     """What the rules read: `lane_left(), faster_by()`, or why they read nothing: `ambiguous`."""
     reading = understand(wish)

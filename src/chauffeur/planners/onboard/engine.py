@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -85,9 +85,16 @@ class Engine:
         layers, _, heads, _, width = (d if isinstance(d, int) else 0 for d in self._session.get_inputs()[1].shape)
         self._empty = np.zeros((layers, 1, heads, 0, width), np.float32)
 
-    @lru_cache(maxsize=8)  # noqa: B019 - an engine lives as long as the process
-    def _matcher(self, only_program: bool, measures: tuple[str, ...]) -> Any:
-        """At the beginning of a reply: copied for each, because reading the grammar takes longer than most replies."""
+    @cached_property
+    def _replies(self) -> Any:
+        return self._matcher(only_program=False)
+
+    @cached_property
+    def _programs(self) -> Any:
+        return self._matcher(only_program=True)
+
+    def _matcher(self, *, only_program: bool, measures: tuple[str, ...] = ()) -> Any:
+        """At the beginning of a reply: kept and copied, because reading the grammar takes longer than most replies."""
         questions, reasons = tuple(self.about["questions"]), tuple(self.about["reasons"])
         text = grammar(questions, reasons, only_program=only_program, measures=measures)
         matchers = self._llguidance.LLMatcher
@@ -112,7 +119,10 @@ class Engine:
             told: Called with each piece of text as it comes.
         """
         ids: list[int] = self._tokenizer.tokenize_str(prompt)[-MAX_PROMPT_TOKENS:]
-        matcher = self._matcher(only_program, measures).deep_copy()
+        if measures:
+            matcher = self._matcher(only_program=only_program, measures=measures)
+        else:
+            matcher = (self._programs if only_program else self._replies).deep_copy()
         keys = values = self._empty
         feed = ids
         out: list[int] = []

@@ -41,7 +41,7 @@ def doubt(wish: str, history: Sequence[str], steps: Sequence[Step]) -> str:
 
 def unnamed(wish: str, history: Sequence[str], steps: Sequence[Step]) -> Number | None:
     """The first number of a program that neither the wish nor history names."""
-    digits = {float(number) for text in (wish, *history) for number in _DIGITS.findall(text)}
+    digits = {float(number) for number in _digits(wish, history)}
     quantities = read_quantities(wish)
     digits |= {quantity.value for quantity in quantities if quantity.dimension == "bare"}
     for number in _numbers_of(steps):
@@ -55,7 +55,7 @@ def unnamed(wish: str, history: Sequence[str], steps: Sequence[Step]) -> Number 
 
 def named(wish: str, history: Sequence[str]) -> tuple[str, ...]:
     """Every number that a program may take over from the words, in any unit in which it is a round one."""
-    found = {number for text in (wish, *history) for number in _DIGITS.findall(text)}
+    found = _digits(wish, history)
     for quantity in read_quantities(wish):
         values = [
             quantity.value,
@@ -63,6 +63,10 @@ def named(wish: str, history: Sequence[str]) -> tuple[str, ...]:
         ]
         found |= {plain(round(value, 2)) for value in values if abs(2 * value - round(2 * value)) < _ROUND}
     return tuple(sorted(found))
+
+
+def _digits(wish: str, history: Sequence[str]) -> set[str]:
+    return {number for text in (wish, *history) for number in _DIGITS.findall(text)}
 
 
 def _close(value: float, other: float) -> bool:

@@ -12,8 +12,8 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Final
 
-from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Thoughts, Usage
-from chauffeur.planners.base import OnText, Planner
+from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Usage
+from chauffeur.planners.base import OnText, Planner, declined
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import Step, tell
 from chauffeur.planners.onboard.engine import Engine, Written
@@ -174,16 +174,16 @@ class LanguageModelPlanner:
                 on_text=self._on_text,
             )
         except ProgramError as error:
-            return self._declined("I did not understand that.", "ask", begun, NOTHING, str(error))
+            return declined(self, "I did not understand that.", begun, intent="ask", raw=str(error))
         if not reply.steps:
-            return self._declined(
-                reply.question or reply.refusal, "ask" if reply.question else "refuse", begun, written
-            )
+            words = reply.question or reply.refusal
+            intent = "ask" if reply.question else "refuse"
+            return declined(self, words, begun, intent=intent, usage=_usage(written), raw=written.text)
         leaning = partial(leaning_of, request.history, corrections=corrections_of(request.rounds))
         linked = link(reply.steps, situation, request.limits, leaning)
         if isinstance(linked, Declined):
             intent = "+".join(step.meaning.family for step in reply.steps)
-            return self._declined(linked.words, intent, begun, written)
+            return declined(self, linked.words, begun, intent=intent, usage=_usage(written), raw=written.text)
         used = [leaning(step.meaning.family) for step in reply.steps]
         settings = {name: value for step in linked.choice.steps for name, value in step.settings}
         settings |= {name: value for one in used for name, value in one.settings}
@@ -207,19 +207,6 @@ class LanguageModelPlanner:
             except ProgramError:
                 self._read[wish] = ()
         return self._read[wish]
-
-    def _declined(self, words: str, intent: str, begun: float, written: Written, raw: str = "") -> Plan:
-        return Plan(
-            thoughts=Thoughts(words),
-            policy=None,
-            refusal=words,
-            intent=intent,
-            planner=self.id,
-            model=self.model,
-            latency_s=time.perf_counter() - begun,
-            usage=_usage(written),
-            raw=raw or written.text,
-        )
 
 
 def _usage(written: Written) -> Usage:

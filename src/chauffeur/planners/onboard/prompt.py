@@ -46,9 +46,10 @@ def prompt(situation: Situation | None, history: Sequence[str], wish: str, *, dr
 
 def wish_words(wish: str) -> str:
     """A wish as the model reads it: one line of lower case, no longer than it can be."""
+    words = wish.lower()  # first, or a mark in capitals would pass
     for mark in SPECIAL:
-        wish = wish.replace(mark, " ")
-    return _SPACE.sub(" ", wish).strip().lower()[:MAX_WISH_CHARS]
+        words = words.replace(mark, " ")
+    return _SPACE.sub(" ", words).strip()[:MAX_WISH_CHARS]
 
 
 def context_words(situation: Situation) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from functools import partial
 
-from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
+from chauffeur.concept import ConfigError, Plan, PlanRequest, Program
+from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.choose import choose
 from chauffeur.planners.onboard.exemplars import program_of
 from chauffeur.planners.onboard.meaning import NotUnderstood
@@ -43,13 +44,13 @@ class RetrievalPlanner:
         begun = time.perf_counter()
         reading = understand(request.instruction.text)
         if isinstance(reading, NotUnderstood):
-            return self._declined(reading.words, begun, raw=reading.why)
+            return declined(self, reading.words, begun, raw=reading.why)
         corrections = corrections_of(request.rounds)
         leaning = partial(leaning_of, request.history, corrections=corrections)
         choice = choose(reading, request.context.situation, request.limits, leaning)
         if isinstance(choice, Declined):
             intent = "+".join(step.family for step in reading.steps)
-            return self._declined(choice.words, begun, intent=intent)
+            return declined(self, choice.words, begun, intent=intent)
         used = [leaning(step.family) for step in reading.steps]
         settings = {name: value for step in choice.steps for name, value in step.settings}
         settings |= {name: value for one in used for name, value in one.settings}
@@ -62,16 +63,4 @@ class RetrievalPlanner:
             planner=self.id,
             model=self.model,
             latency_s=time.perf_counter() - begun,
-        )
-
-    def _declined(self, words: str, begun: float, *, intent: str = "", raw: str = "") -> Plan:
-        return Plan(
-            thoughts=Thoughts(words),
-            policy=None,
-            refusal=words,
-            intent=intent,
-            planner=self.id,
-            model=self.model,
-            latency_s=time.perf_counter() - begun,
-            raw=raw,
         )

@@ -7,6 +7,7 @@ means and end, reason and wish, or part and whole are fused. What stays contradi
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 from chauffeur.planners.onboard.clauses import Clause, clauses_of
 from chauffeur.planners.onboard.doubts import doubt_before, doubt_without_meaning, is_question
@@ -20,6 +21,7 @@ MAX_CHARS = 1000
 MAX_STEPS = 3
 
 
+@lru_cache(maxsize=32)  # the draft and the guard of one plan ask about the same words
 def understand(text: str) -> Reading | NotUnderstood:
     """Meaning of a wish, or why it has none for us. Never raises."""
     doubt = doubt_before(text, MAX_CHARS)
