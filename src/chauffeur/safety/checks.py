@@ -9,9 +9,13 @@ from chauffeur.concept import Limits, Plan, Snapshot, Verdict
 from chauffeur.safety.base import Check
 from chauffeur.safety.envelope import check_parameters
 from chauffeur.safety.format import check_format
+from chauffeur.safety.reach import check_reach
 
 DEFAULT_CHECKS: tuple[Check, ...] = (check_format, check_parameters)
 """The two checks of the seeds: format, then parameters in context."""
+
+DRIVE_CHECKS: tuple[Check, ...] = (*DEFAULT_CHECKS, check_reach)
+"""What stands before a drive for a person: also what no reading of constants finds, at some milliseconds a program."""
 
 _log = logging.getLogger(__name__)
 
