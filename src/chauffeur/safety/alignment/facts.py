@@ -1,0 +1,134 @@
+"""What a program does, as values: what reading finds in its text, and what running it on copies of a scene showed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from chauffeur.concept import Snapshot
+from chauffeur.safety.alignment.values import Base, Term
+
+Deed = Literal["speed", "headway", "gap", "lane", "turn", "go", "wait", "say"]
+"""What an event is: a wish for a speed, a headway, a lane or a route; a gap that is steered towards; leaving the stop
+sign; time that passes; words."""
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something a program does.
+
+    Attributes:
+        deed: What.
+        line: Program line, 1-based; None inside a helper of a library.
+        terms: Alternatives of its number: m/s of a speed, s of a headway or a wait.
+        sides: Of a lane: where it may lead, -1 left, 0 no change, +1 right. Of a turn: -1, 0 straight, +1.
+        checked: Of a lane: the program asks whether it may enter before it does. Of leaving the stop sign: whether
+            traffic that crosses was asked about.
+        depends: What else it depends on: `other speed`, `gap`, `behind`, `stopped`, `sign`, ...
+        times: How often it is repeated at most; 0 for as often as it goes.
+        back: Of a lane: whether it leads back to one the ego has been in.
+        reference: Of a speed: found as what a controller steers towards, not as a wish itself.
+        open: Whether its number may be another one than those known.
+    """
+
+    deed: Deed
+    line: int | None
+    terms: frozenset[Term] = frozenset()
+    sides: frozenset[int] = frozenset()
+    checked: bool = False
+    depends: frozenset[str] = frozenset()
+    times: int = 1
+    back: bool = False
+    reference: bool = False
+    open: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A number that something measured is compared with, or subtracted from it: `gap < 30`, `gap - 25`."""
+
+    base: Base
+    value: float
+    line: int | None
+    compared: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What reading finds.
+
+    Attributes:
+        events: What the program does, in the order of its text with its functions put in where they are called.
+        marks: Numbers that measured things are held against.
+        spans_s: Times its loops may last, s.
+        literals: Plain numbers written in the program.
+        readable: Whether it was read at all; False for text that is no program, or too long.
+    """
+
+    events: tuple[Event, ...] = ()
+    marks: tuple[Mark, ...] = ()
+    spans_s: tuple[float, ...] = ()
+    literals: frozenset[float] = frozenset()
+    readable: bool = True
+
+    def of(self, *deeds: Deed) -> Iterator[tuple[int, Event]]:
+        """Events of some kinds with their places."""
+        return ((place, event) for place, event in enumerate(self.events) if event.deed in deeds)
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """What happened when a program ran on a copy of the scene. Simulated.
+
+    Attributes:
+        lanes_moved: Lanes to the right (negative: left) between start and end.
+        leftmost, rightmost: The farthest it was on either side of the start, in lanes.
+        speeds_mps: Speed at the start, and the mean of the last second.
+        gaps_m: Gap to the vehicle ahead at the start and at the end; None where there is none.
+        stood: Whether it stood still at some time.
+        failed: Whether the program failed.
+    """
+
+    lanes_moved: int
+    leftmost: int
+    rightmost: int
+    speeds_mps: tuple[float, float]
+    gaps_m: tuple[float | None, float | None]
+    stood: bool
+    failed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """Where the ego is when the program begins.
+
+    Attributes:
+        speed_mps: Its speed.
+        limit_mps: The limit of its lane.
+        gap_m: Distance to the vehicle ahead, centre to centre.
+        other_mps: Speed of that vehicle.
+        sign_m: Distance to the stop sign ahead.
+        crossing: Whether this is an intersection.
+    """
+
+    speed_mps: float | None = None
+    limit_mps: float | None = None
+    gap_m: float | None = None
+    other_mps: float | None = None
+    sign_m: float | None = None
+    crossing: bool = False
+
+    @classmethod
+    def of(cls, snapshot: Snapshot) -> Surroundings:
+        """Those of a snapshot."""
+        front = snapshot.front
+        limits = [lane.speed_limit_mps for lane in snapshot.lanes if lane.id == snapshot.ego.lane]
+        return cls(
+            speed_mps=snapshot.ego.speed_mps,
+            limit_mps=limits[0] if limits else None,
+            gap_m=None if front is None else front.distance_m,
+            other_mps=None if front is None else front.speed_mps,
+            sign_m=snapshot.stop_sign_m,
+            crossing=snapshot.kind == "intersection",
+        )
