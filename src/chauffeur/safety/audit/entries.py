@@ -1,0 +1,186 @@
+"""One line of an audit log: what it holds, its one written form, and the hash that ties it to the line before.
+
+A line is a JSON object in canonical form: keys sorted, no spaces, ASCII only, numbers as Python writes them. Its `hash`
+is the SHA-256 of the same object without `hash` and `texts`; `prev` is the hash of the line before. What a
+person said, or what could quote them, stands in `texts`, outside the hash: the chained body holds a salted digest of
+it only, so that it can be erased and the chain still holds (`texts.py`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal, cast, get_args
+
+FORMAT: Final = 1
+"""Version of the line layout; a reader refuses newer ones."""
+
+Kind = Literal[
+    "opened",
+    "wish",
+    "context",
+    "plan",
+    "verdict",
+    "intervention",
+    "actuation",
+    "outcome",
+    "gap",
+    "redaction",
+    "closed",
+]
+"""What a record tells of. `gap`: records were lost here; `redaction`: personal texts of earlier records were erased."""
+
+KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
+
+BATCHED: Final[frozenset[Kind]] = frozenset({"actuation"})
+"""Kinds that reach the disk within a second; all others at once."""
+
+NO_RECORD: Final = "0" * 64
+"""`prev` of the first record."""
+
+LINE_START: Final = b'{"body":{'
+"""How every line begins."""
+
+MAX_LINE_BYTES: Final = 16 << 20
+"""Nothing Chauffeur writes is nearly as long."""
+
+_MOST_RECORDS = 1 << 63
+_KEYS = {"body", "hash", "kind", "prev", "seq", "time"}
+_OPTIONAL_KEYS = {"mac", "texts"}
+_MAC_PURPOSE = b"chauffeur-audit-record-1\0"
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A record as it stands in a log.
+
+    Attributes:
+        seq: Its number; the first is 0.
+        time: When it was handed over, ISO 8601 UTC.
+        kind: What it tells of.
+        body: Its content, without anything a person said.
+        prev: Hash of the record before.
+        hash: Its own.
+        texts: Personal texts beside the body, by name, as `texts.py` writes them.
+        mac: HMAC-SHA256 of body, kind, prev, seq and time; empty in a log without a key.
+    """
+
+    seq: int
+    time: str
+    kind: Kind
+    body: Mapping[str, Any]
+    prev: str
+    hash: str
+    texts: Mapping[str, Mapping[str, Any]]
+    mac: str = ""
+
+
+class NotARecordError(ValueError):
+    """A line that Chauffeur did not write; the text says why."""
+
+
+def canonical(value: Any) -> bytes:
+    """The one written form of a JSON value. Raises TypeError or ValueError for what is none."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False).encode("ascii")
+
+
+def storable(value: Any) -> Any:
+    """A value with every key as text, and NaN and infinity, which JSON lacks, as text too."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return "NaN" if math.isnan(value) else ("Infinity" if value > 0 else "-Infinity")
+    if isinstance(value, Mapping):
+        return {str(key): storable(item) for key, item in cast("Mapping[Any, Any]", value).items()}
+    if isinstance(value, list | tuple):
+        return [storable(item) for item in cast("list[Any]", value)]
+    return value
+
+
+def seal(
+    seq: int,
+    prev: str,
+    kind: Kind,
+    time: str,
+    body: Mapping[str, Any],
+    texts: Mapping[str, Mapping[str, Any]],
+    key: bytes | None,
+) -> tuple[bytes, str]:
+    """A record's line, with its line end, and its hash.
+
+    Raises:
+        TypeError, ValueError: The body holds something that is not a JSON value.
+    """
+    line: dict[str, Any] = {"body": storable(body), "kind": kind, "prev": prev, "seq": seq, "time": time}
+    if key is not None:
+        line["mac"] = _mac(key, line)
+    digest = line["hash"] = hashlib.sha256(canonical(line)).hexdigest()
+    if texts:
+        line["texts"] = texts
+    return canonical(line) + b"\n", digest
+
+
+def parse(line: bytes) -> Record:
+    """The record of a line without its line end; whether its hash is right is not looked at.
+
+    Raises:
+        NotARecordError: It is not one, or not in canonical form.
+    """
+    try:
+        value = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        raise NotARecordError("it is not a record in JSON") from error
+    if not isinstance(value, dict):
+        raise NotARecordError("it is not a record in JSON")
+    fields = cast("dict[str, Any]", value)
+    keys = set(fields)
+    if not _KEYS <= keys <= _KEYS | _OPTIONAL_KEYS:
+        raise NotARecordError("it has not the fields of a record")
+    try:
+        same = canonical(fields) == line
+    except (ValueError, RecursionError):
+        same = False
+    if not same:
+        raise NotARecordError("it is not written the way Chauffeur writes a record")
+    texts = fields.setdefault("texts", {})
+    fields.setdefault("mac", "")
+    if not (
+        type(fields["seq"]) is int
+        and 0 <= fields["seq"] < _MOST_RECORDS
+        and fields["kind"] in KINDS
+        and isinstance(fields["body"], dict)
+        and isinstance(texts, dict)
+        and all(isinstance(text, dict) for text in cast("dict[str, Any]", texts).values())
+        and all(isinstance(fields[name], str) for name in ("time", "prev", "hash", "mac"))
+    ):
+        raise NotARecordError("its fields are not of the kinds a record has")
+    return Record(**fields)
+
+
+def content_hash(record: Record) -> str:
+    """The hash that a record's content gives."""
+    fields = _core(record)
+    if record.mac:
+        fields["mac"] = record.mac
+    return hashlib.sha256(canonical(fields)).hexdigest()
+
+
+def is_sealed_with(record: Record, key: bytes) -> bool:
+    """Whether a record was written under this key."""
+    return hmac.compare_digest(record.mac.encode(), _mac(key, _core(record)).encode())
+
+
+def _core(record: Record) -> dict[str, Any]:
+    return {
+        "body": record.body,
+        "kind": record.kind,
+        "prev": record.prev,
+        "seq": record.seq,
+        "time": record.time,
+    }
+
+
+def _mac(key: bytes, core: Mapping[str, Any]) -> str:
+    return hmac.new(key, _MAC_PURPOSE + canonical(core), hashlib.sha256).hexdigest()

@@ -1,0 +1,129 @@
+"""Erasing what a person said from a log: the words and their salts go, the chain and every earlier head still hold."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from chauffeur.concept import ConfigError, DataError, PersonId
+from chauffeur.safety.audit.entries import NotARecordError, Record, canonical, parse, seal
+from chauffeur.safety.audit.reading import lines, opened
+from chauffeur.safety.audit.storage import LogFile, replace_whole
+from chauffeur.safety.audit.texts import erased, says
+from chauffeur.safety.audit.verification import head_path, verify
+from chauffeur.safety.audit.writer import utc_now
+
+PERSON = "person"
+"""Name of the text that says whose texts a record holds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Redaction:
+    """What was erased.
+
+    Attributes:
+        records: Records that held the person's texts.
+        texts: Texts erased.
+        head: Hash of the log's last record afterwards.
+    """
+
+    records: int
+    texts: int
+    head: str
+
+
+def redact(
+    path: Path, person: PersonId, *, key: bytes | None = None, clock: Callable[[], datetime] = utc_now
+) -> Redaction:
+    """Erase every text of a person from a log: their name, wishes, situations, plans and what quotes them.
+
+    The file is replaced in one step, and a last record says how many texts of which records are gone, not whose. What
+    remains are numbers: times, verdicts, commands. Copies, exports and old disk blocks are out of reach.
+
+    Args:
+        path: The log; nobody may be writing it.
+        person: Whose texts; `NOBODY` for wishes without a name.
+        key: The log's key, if it has one.
+        clock: Present time, with a time zone.
+
+    Raises:
+        DataError: The log cannot be read or written, is being written, or was changed since it was written.
+        ConfigError: The log has a key, and it was not given.
+    """
+    path = path.resolve()  # a link must not be replaced in the place of what it points to
+    with opened(path):
+        pass  # opening for writing would make it
+    file = LogFile(path)
+    try:
+        return _redact(path, person, key, clock)
+    except OSError as error:
+        raise DataError(
+            f"The audit log {path} cannot be written: {error.strerror or error}. Nothing was erased."
+        ) from error
+    finally:
+        file.close()
+
+
+def _redact(path: Path, person: PersonId, key: bytes | None, clock: Callable[[], datetime]) -> Redaction:
+    found = verify(path, key=key)
+    if not found.ok:
+        raise DataError(
+            f"The audit log {path} is not as it was written ({found.findings[0]}); nothing was erased.",
+            hint=f"Look at it with: chauffeur audit verify {path}",
+        )
+    if found.key == "unchecked":
+        raise ConfigError(f"The audit log {path} has a key, which erasing needs.", hint="Give it with --key FILE.")
+    kept: list[bytes] = []
+    numbers: list[int] = []
+    texts = 0
+    torn = b""
+    with opened(path) as file:
+        for line in lines(file):
+            if not line.whole:
+                torn += line.content
+                continue
+            record = _parse(path, line.content)
+            if says(record, PERSON, person, key):
+                numbers.append(record.seq)
+                texts += len(record.texts)
+                kept.append(_line(record, erased(record)))
+            else:
+                kept.append(line.content + b"\n")
+    if not numbers:
+        return Redaction(0, 0, found.head)
+    body: dict[str, Any] = {"records": numbers, "redacted_texts": texts}
+    if torn:
+        # The rest of a cut-off write may hold words too, and nothing in the chain stands for it.
+        body |= {"torn_bytes": len(torn), "torn_sha256": hashlib.sha256(torn).hexdigest()}
+    stamp = clock().astimezone(UTC).isoformat(timespec="milliseconds")
+    last, head = seal(found.records, found.head, "redaction", stamp, body, {}, key)
+    kept.append(last)
+    replace_whole(path, b"".join(kept))
+    replace_whole(head_path(path), f"{head}\n".encode())
+    return Redaction(len(numbers), texts, head)
+
+
+def _parse(path: Path, content: bytes) -> Record:
+    try:
+        return parse(content)
+    except NotARecordError as error:  # verified a moment ago: somebody writes past the lock
+        raise DataError(f"The audit log {path} changed while it was read; nothing was erased.") from error
+
+
+def _line(record: Record, texts: dict[str, dict[str, Any]]) -> bytes:
+    fields: dict[str, Any] = {
+        "body": record.body,
+        "hash": record.hash,
+        "kind": record.kind,
+        "prev": record.prev,
+        "seq": record.seq,
+        "texts": texts,
+        "time": record.time,
+    }
+    if record.mac:
+        fields["mac"] = record.mac
+    return canonical(fields) + b"\n"

@@ -1,0 +1,143 @@
+"""Personal texts of a record: stored beside the chained body, digested in it, and erasable without breaking the chain.
+
+The body refers to a text as `{"digest": SHA-256(salt + form + value)}`; the value and its random salt stand in the
+record's `texts`. Erasing a text erases its salt as well, so that not even a guess of the words can be tried on what is
+left. In privacy mode the value is the text's HMAC under the log's key instead of the text; without a key there is
+neither text nor digest: a digest of a short wish that anybody can compute would give the wish away.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal, cast
+
+from chauffeur.safety.audit.entries import Record
+
+SALT_BYTES: Final = 16
+
+REFERENCES: Final = "texts"
+"""Name in the body under which the digests stand."""
+
+Form = Literal["text", "hmac"]
+
+_HMAC_PURPOSE = b"chauffeur-audit-text-1\0"
+_ERASED: dict[str, Any] = {"redacted": True}
+_WITHHELD: dict[str, Any] = {"withheld": True}
+
+
+@dataclass(frozen=True, slots=True)
+class TextState:
+    """How one personal text of a record stands.
+
+    Attributes:
+        name: Its name.
+        state: `stored`, `digest` (privacy mode with a key), `withheld` (without one), `redacted`, or `wrong`.
+        words: The text where it is stored, what is wrong where it is wrong; else empty.
+    """
+
+    name: str
+    state: Literal["stored", "digest", "withheld", "redacted", "wrong"]
+    words: str = ""
+
+
+def hide(
+    texts: Mapping[str, str], *, private: bool, key: bytes | None, make_salt: Callable[[int], bytes]
+) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """Texts as (references for the body, values to stand beside it).
+
+    Args:
+        texts: The texts by name.
+        private: Whether nothing of the words may be kept.
+        key: The log's key, if it has one.
+        make_salt: Gives that many random bytes, fit for cryptography.
+    """
+    references: dict[str, Any] = {}
+    values: dict[str, dict[str, Any]] = {}
+    for name, text in texts.items():
+        if private and key is None:
+            references[name] = _WITHHELD
+            continue
+        salt = make_salt(SALT_BYTES)
+        form: Form = "hmac" if private else "text"
+        value = _text_mac(key, salt, text) if private and key is not None else text
+        references[name] = {"digest": _digest(salt, form, value)}
+        values[name] = {"salt": salt.hex(), form: value}
+    return references, values
+
+
+def states(record: Record) -> Iterator[TextState]:
+    """How each personal text of a record stands, and what is wrong with it, if anything."""
+    listed: Any = record.body.get(REFERENCES, {})
+    references = cast("dict[str, Any]", listed) if isinstance(listed, dict) else {}
+    for name in record.texts:
+        if name not in references:
+            yield TextState(name, "wrong", f"its text {name!r} was added")
+    for name, reference in references.items():
+        yield _state(name, reference, record.texts.get(name))
+
+
+def words_of(record: Record) -> dict[str, str]:
+    """The personal texts of a record as they can be shown: the words, or in brackets why there are none."""
+    marks = {
+        "digest": "[digest only]",
+        "withheld": "[withheld]",
+        "redacted": "[redacted]",
+        "wrong": "[does not fit its digest]",
+    }
+    return {state.name: marks.get(state.state, state.words) for state in states(record)}
+
+
+def says(record: Record, name: str, text: str, key: bytes | None = None) -> bool | None:
+    """Whether a record's text was this one; None where that cannot be known (redacted, withheld, no key given)."""
+    value = record.texts.get(name)
+    if value is None or _is_erased(value) or _state(name, _reference(record, name), value).state == "wrong":
+        return None
+    if "text" in value:
+        return value["text"] == text
+    if key is None:
+        return None
+    return hmac.compare_digest(str(value["hmac"]), _text_mac(key, bytes.fromhex(str(value["salt"])), text))
+
+
+def erased(record: Record) -> dict[str, dict[str, Any]]:
+    """What stands beside the body once every text of a record is erased."""
+    return {name: dict(_ERASED) for name in record.texts}
+
+
+def _state(name: str, reference: Any, value: Mapping[str, Any] | None) -> TextState:
+    if reference == _WITHHELD:
+        return TextState(name, "wrong", f"its text {name!r} was added") if value else TextState(name, "withheld")
+    if value is None:
+        return TextState(name, "wrong", f"its text {name!r} was removed")
+    if _is_erased(value):
+        return TextState(name, "redacted")
+    form: Form = "hmac" if "hmac" in value else "text"
+    if set(value) == {"salt", form} and all(isinstance(part, str) for part in value.values()):
+        words = str(value[form])
+        try:
+            salt = bytes.fromhex(str(value["salt"]))
+        except ValueError:
+            salt = b""
+        if salt.hex() == value["salt"] and reference == {"digest": _digest(salt, form, words)}:
+            return TextState(name, "stored", words) if form == "text" else TextState(name, "digest")
+    return TextState(name, "wrong", f"its text {name!r} was changed")
+
+
+def _is_erased(value: Mapping[str, Any]) -> bool:
+    return len(value) == 1 and value.get("redacted") is True  # by identity: to Python, 1 equals true
+
+
+def _reference(record: Record, name: str) -> Any:
+    listed: Any = record.body.get(REFERENCES, {})
+    return cast("dict[str, Any]", listed).get(name) if isinstance(listed, dict) else None
+
+
+def _digest(salt: bytes, form: Form, value: str) -> str:
+    return hashlib.sha256(salt + form.encode() + b"\0" + value.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _text_mac(key: bytes, salt: bytes, text: str) -> str:
+    return hmac.new(key, _HMAC_PURPOSE + salt + text.encode("utf-8", "surrogatepass"), hashlib.sha256).hexdigest()

@@ -1,0 +1,303 @@
+"""Whether an audit log is as it was written: every line looked at, everything that is wrong said in words.
+
+The chain shows any change, removal, insertion or swap of lines that were written before the last one. It cannot show
+that lines are missing at the end, nor that the whole log was written anew: for the first, keep the hash of the last
+record elsewhere (`head`); for the second, write the log under a key, or keep the head where the rewriter cannot reach.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, BinaryIO, Final, Literal, cast
+
+from chauffeur.concept import ConfigError, DataError
+from chauffeur.safety.audit.entries import (
+    FORMAT,
+    NO_RECORD,
+    NotARecordError,
+    Record,
+    content_hash,
+    is_sealed_with,
+    parse,
+)
+from chauffeur.safety.audit.keys import key_name
+from chauffeur.safety.audit.reading import Line, lines, opened
+from chauffeur.safety.audit.texts import states
+
+MAX_FINDINGS: Final = 100
+"""Findings kept in words; the others are counted."""
+
+HASH_CHARACTERS: Final = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something that is not as it was written.
+
+    Attributes:
+        line: Line of the file, 1-based; None where it is about the log as a whole.
+        what: In words.
+    """
+
+    line: int | None
+    what: str
+
+    def __str__(self) -> str:
+        return self.what if self.line is None else f"line {self.line}: {self.what}"
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """What was found in a log.
+
+    Attributes:
+        findings: What is wrong, in the order of the file; at most `MAX_FINDINGS`.
+        more_findings: How many more there are.
+        records: Records read.
+        kinds: How many of each kind.
+        head: Hash of the last record.
+        torn_bytes: Bytes after the last whole line: a write that was cut off, e.g. by a crash, or is going on now.
+        redacted: Personal texts erased since.
+        withheld: Personal texts of which at most a digest was ever written (privacy mode).
+        lost: Records that could not be written in time; the log itself says so.
+        closed: Whether the log was closed, and not cut off.
+        key: `none` (the log has no key), `unchecked` (it has, none was given) or `checked`.
+        after_head: Records behind the one that the given head names; None when no head was given.
+    """
+
+    findings: tuple[Finding, ...]
+    more_findings: int
+    records: int
+    kinds: Mapping[str, int]
+    head: str
+    torn_bytes: int
+    redacted: int
+    withheld: int
+    lost: int
+    closed: bool
+    key: Literal["none", "unchecked", "checked"]
+    after_head: int | None
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing is wrong. A torn tail is not: what was never whole was never acknowledged."""
+        return not self.findings
+
+
+def head_path(path: Path) -> Path:
+    """Where the head of a log is kept beside it."""
+    return path.with_name(f"{path.name}.head")
+
+
+def read_head(path: Path) -> str | None:
+    """The hash in the head file beside a log, or None where there is no such file.
+
+    Raises:
+        DataError: It is there and cannot be used.
+    """
+    beside = head_path(path)
+    try:
+        text = beside.read_text(encoding="ascii").strip()
+    except FileNotFoundError:
+        return None
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"The head file {beside} cannot be read: {error}.", hint="Remove it, or restore it.") from error
+    return _hash(text, f"The head in {beside}")
+
+
+def verify(path: Path, *, head: str | None = None, key: bytes | None = None) -> Verification:
+    """Look at every record of a log.
+
+    Args:
+        path: The log.
+        head: Hash of a record that must be in it, as printed when the log was closed; by default the one in the head
+            file beside the log, if there is one.
+        key: The log's key.
+
+    Raises:
+        DataError: The file cannot be read, is not an audit log, or is of a newer format.
+        ConfigError: The head is not a hash.
+    """
+    anchor = read_head(path) if head is None else _hash(head, "The head given")
+    with opened(path) as file:
+        return verify_stream(file, str(path), head=anchor, key=key)
+
+
+def verify_stream(file: BinaryIO, name: str, *, head: str | None = None, key: bytes | None = None) -> Verification:
+    """As `verify`, of an open file; `name` is what errors call it."""
+    examination = _Examination(name, head, key)
+    for line in lines(file):
+        examination.look_at(line)
+    return examination.result()
+
+
+@dataclass(slots=True)
+class _Examination:
+    name: str
+    anchor: str | None
+    key: bytes | None
+    findings: list[Finding] = field(default_factory=list[Finding])
+    found: int = 0
+    kinds: Counter[str] = field(default_factory=Counter[str])
+    last: Record | None = None
+    keyed: bool = False
+    foreign_key: bool = False
+    """Whether the log names another key than the one given; its seals are then not looked at one by one."""
+    closed: bool = False
+    torn_bytes: int = 0
+    lost: int = 0
+    withheld: int = 0
+    anchor_at: int | None = None
+    erased: dict[int, tuple[int, int]] = field(default_factory=dict[int, tuple[int, int]])
+    """Sequence number -> (line, erased texts) of records with erased texts."""
+    announced: set[int] = field(default_factory=set[int])
+    """Sequence numbers of the records that a redaction record names."""
+    follows_a_gap: bool = False
+    """Whether the line before could not be read, so that the next one cannot be tied to it."""
+
+    def look_at(self, line: Line) -> None:
+        if not line.whole:
+            self.torn_bytes += len(line.content)
+            return
+        try:
+            record = parse(line.content)
+        except NotARecordError as error:
+            self._say(line.number, f"{error}.")
+            self.follows_a_gap = True
+            return
+        before = self.found
+        if self.last is None:
+            self._begin(line.number, record)
+        self._check_place(line.number, record)
+        if content_hash(record) != record.hash:
+            self._say(
+                line.number, f"record {record.seq} ({record.kind}) was changed: its content does not give its hash."
+            )
+        self._check_texts(line.number, record)
+        self._check_key(line.number, record)
+        self._take_note(record, sound=self.found == before)
+        self.last, self.follows_a_gap = record, False
+
+    def result(self) -> Verification:
+        total = sum(self.kinds.values())
+        if not total:
+            if self.findings:
+                raise DataError(
+                    f"{self.name} is not an audit log: none of its lines is a record.",
+                    hint="Write one with `chauffeur drive ... --audit FILE`.",
+                )
+            self._say(None, "the log holds no record.")
+        for seq, (line, _) in self.erased.items():
+            if seq not in self.announced:
+                self._say(line, f"a personal text of record {seq} was erased, and no redaction record says so.")
+        if self.anchor is not None and self.anchor_at is None:
+            self._say(
+                None,
+                f"no record with the head {self.anchor} is in the log: its end was cut off, or it was written anew.",
+            )
+        return Verification(
+            findings=tuple(self.findings),
+            more_findings=self.found - len(self.findings),
+            records=total,
+            kinds=dict(self.kinds),
+            head=NO_RECORD if self.last is None else self.last.hash,
+            torn_bytes=self.torn_bytes,
+            redacted=sum(texts for _, texts in self.erased.values()),
+            withheld=self.withheld,
+            lost=self.lost,
+            closed=self.closed and not self.torn_bytes,
+            key="none" if not self.keyed else "unchecked" if self.key is None else "checked",
+            after_head=None if self.anchor_at is None else total - self.anchor_at,
+        )
+
+    def _begin(self, line: int, record: Record) -> None:
+        version = record.body.get("format")
+        sound = content_hash(record) == record.hash
+        if sound and record.kind == "opened" and isinstance(version, int) and version > FORMAT:
+            raise DataError(
+                f"{self.name} has audit format {version}; this Chauffeur reads up to {FORMAT}.",
+                hint="Upgrade: pip install -U chauffeur",
+            )
+        name = record.body.get("key", "") if record.kind == "opened" else record.mac
+        self.keyed = bool(name)
+        if self.key is None:
+            return
+        if not self.keyed:
+            self._say(line, "the log was written without a key, and a key was given.")
+        elif record.kind == "opened" and name != key_name(self.key):
+            self.foreign_key = True
+            self._say(line, f"the log was written under the key {name}, and the key given is {key_name(self.key)}.")
+
+    def _check_place(self, line: int, record: Record) -> None:
+        if self.last is None:
+            if not self.follows_a_gap and (record.seq != 0 or record.prev != NO_RECORD or record.kind != "opened"):
+                self._say(line, f"the log begins with record {record.seq} ({record.kind}): its beginning was removed.")
+            return
+        if self.follows_a_gap:
+            return
+        expected = self.last.seq + 1
+        if record.seq > expected:
+            missing = (
+                f"record {expected} is" if record.seq == expected + 1 else f"records {expected} to {record.seq - 1} are"
+            )
+            self._say(line, f"record {record.seq} ({record.kind}) stands here; {missing} not where it belongs.")
+        elif record.seq < expected:
+            self._say(line, f"record {record.seq} ({record.kind}) stands here, where record {expected} belongs.")
+        elif record.prev != self.last.hash:
+            self._say(
+                line,
+                f"record {record.seq} ({record.kind}) was not written after the record before it: one of them was "
+                "exchanged or changed.",
+            )
+
+    def _check_texts(self, line: int, record: Record) -> None:
+        gone = 0
+        for state in states(record):
+            if state.state == "wrong":
+                self._say(line, f"record {record.seq} ({record.kind}): {state.words}.")
+            gone += state.state == "redacted"
+            self.withheld += state.state in ("withheld", "digest")
+        if gone:
+            self.erased[record.seq] = (line, gone)
+
+    def _check_key(self, line: int, record: Record) -> None:
+        if bool(record.mac) != self.keyed:
+            self._say(
+                line, f"record {record.seq} ({record.kind}) {'lacks' if self.keyed else 'has'} a seal of the key."
+            )
+            return
+        if not self.keyed or self.key is None or self.foreign_key:
+            return
+        if not is_sealed_with(record, self.key):
+            self._say(line, f"record {record.seq} ({record.kind}) was not written with this key.")
+
+    def _take_note(self, record: Record, *, sound: bool) -> None:
+        self.kinds[record.kind] += 1
+        if record.kind != "redaction":
+            self.closed = record.kind == "closed"
+        if sound and self.anchor is not None and record.hash == self.anchor:
+            self.anchor_at = sum(self.kinds.values())
+        if record.kind == "gap":
+            lost: Any = record.body.get("lost", {})
+            counts = cast("dict[str, Any]", lost).values() if isinstance(lost, dict) else ()
+            self.lost += sum(count for count in counts if isinstance(count, int))
+        if record.kind == "redaction":
+            named: Any = record.body.get("records", [])
+            self.announced.update(seq for seq in cast("list[Any]", named) if isinstance(seq, int))
+
+    def _say(self, line: int | None, what: str) -> None:
+        self.found += 1
+        if self.found <= MAX_FINDINGS:
+            self.findings.append(Finding(line, what))
+
+
+def _hash(text: str, where: str) -> str:
+    if len(text) != HASH_CHARACTERS or set(text) - set("0123456789abcdef"):
+        raise ConfigError(
+            f"{where} is not a hash of {HASH_CHARACTERS} hexadecimal digits.",
+            hint="Give the hash that was printed when the log was closed.",
+        )
+    return text

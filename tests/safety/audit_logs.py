@@ -1,0 +1,67 @@
+"""Small audit logs to look at and to tamper with."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from chauffeur.safety.audit import AuditLog, Closing, Verification, verify_stream
+
+KEY = b"a key of thirty-two bytes, quite"
+OTHER_KEY = b"another key of thirty-two bytes!"
+ABOUT = {"scenario": "cruise", "seed": 7, "simulated": True}
+WISH = "Überhol ihn, 快点 – \ud800"
+
+
+def ticking(start: datetime = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)) -> Callable[[], datetime]:
+    """A clock that goes on by a tenth of a second whenever it is looked at."""
+    count = 0
+
+    def now() -> datetime:
+        nonlocal count
+        count += 1
+        return start + timedelta(seconds=0.1 * count)
+
+    return now
+
+
+def write(path: Path, *, key: bytes | None = None, private: bool = False) -> Closing:
+    """A short drive of Ana's, then one of Ben's, in one log."""
+    log = AuditLog(path, about=ABOUT, clock=ticking(), key=key, private=private, make_salt=counting_salt())
+    for person in ("ana", "ben"):
+        log.append("wish", {"source": "text"}, {"person": person, "wish": f"{WISH} ({person})"})
+        log.append("context", {"letter": "C"}, {"person": person, "context": "Three lanes."})
+        log.append("verdict", {"check": "format-v1", "passed": True, "line": None}, {"person": person, "reason": "ok"})
+        log.append(
+            "intervention", {"rule": "gap-v1", "interventions": [[3, 0.3, "too close", [1.5, 0.0], [-2.0, 0.0]]]}
+        )
+        log.append("actuation", {"ticks": [0, 1], "requested": [[0.1, -0.0], [1e-9, 0.3]], "applied_otherwise": []})
+        log.append("outcome", {"outcome": "ended", "metrics": [{"value": float("nan")}]}, {"person": person})
+    return log.close()
+
+
+def counting_salt() -> Callable[[int], bytes]:
+    """Salts that are never the same twice, and the same in every run of a test."""
+    count = 0
+
+    def salt(length: int) -> bytes:
+        nonlocal count
+        count += 1
+        return count.to_bytes(length, "big")
+
+    return salt
+
+
+def look(content: bytes, *, head: str | None = None, key: bytes | None = None) -> Verification:
+    """Verify a log's bytes."""
+    return verify_stream(BytesIO(content), "the log", head=head, key=key)
+
+
+def fields(line: bytes) -> dict[str, Any]:
+    """A line as plain JSON."""
+    value: dict[str, Any] = json.loads(line)
+    return value
