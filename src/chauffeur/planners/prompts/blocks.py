@@ -1,14 +1,19 @@
 """Data blocks: words from outside, quoted so that they can only ever be read as data.
 
 Passengers, road signs, place names and remembered text reach the model through here. A block's lines all start with
-`| `, so no line can close its block or open another; what a chat template or a tokenizer could take for a control
-token is defused; invisible characters are dropped; lengths are capped.
+`| `, so no line can close its block or open another; invisible characters are dropped and dressed letters become plain
+ones, so that nothing turns into a control token behind our back; what a chat template or a tokenizer could take for one
+is defused; lengths are capped.
 """
 
 from __future__ import annotations
 
 import re
-import unicodedata
+from typing import Final
+
+from chauffeur.safety.screening import clean
+
+__all__ = ["cap", "clean", "data_block", "defuse", "program_block"]
 
 INSTRUCTION_CHARS = 1_000
 CONTEXT_CHARS = 4_000
@@ -20,25 +25,12 @@ PROGRAM_CHARS = 8_000
 
 _NAME = re.compile(r"[a-z][a-z0-9_-]{0,31}")
 # `<|im_start|>`, DeepSeek's full-width bars, `<s>`, `</data>`, `<start_of_turn>`, `[INST]`: what models' templates use.
-_BAR_OPEN = re.compile(r"<(?=[|｜])")
+_BAR_OPEN = re.compile(r"<(?=\s*[|｜])")
 _BAR_CLOSE = re.compile(r"(?<=[|｜])>")
-_TAG = re.compile(r"<(/?[A-Za-z_][\w:.-]*(?:\s[^<>]{0,200})?/?)>")
+_TAG = re.compile(r"<((?:\s*/\s*)?[A-Za-z_][\w:.-]*(?:\s[^<>]{0,200})?/?)>")
+_LIKE_SIGNS: Final = str.maketrans("❬❮⟨〈˂ᐸ❭❯⟩〉˃ᐳ∣ǀ❘", "<<<<<<>>>>>>|||")
+"""Brackets and bars that some tokenizers, and all people, take for those of a control token."""
 _BRACKET = re.compile(r"\[(/?[A-Z][A-Z_]{2,40})\]")
-
-
-def clean(text: str) -> str:
-    """Text without control, format and unassigned characters; line ends become plain newlines.
-
-    Format characters include zero-width and bidirectional ones and the tag block, which hide text from people that a
-    model still reads.
-    """
-    lines = text.encode("utf-8", "replace").decode("utf-8").splitlines()
-    return "\n".join(
-        "".join(
-            " " if char == "\t" else char for char in line if char == "\t" or unicodedata.category(char)[0] != "C"
-        ).rstrip()
-        for line in lines
-    ).strip()
 
 
 def cap(text: str, limit: int) -> str:
@@ -48,7 +40,7 @@ def cap(text: str, limit: int) -> str:
 
 def defuse(text: str) -> str:
     """Text in which nothing looks like a control token or a block border; comparisons in programs stay as they are."""
-    text = _BAR_CLOSE.sub("›", _BAR_OPEN.sub("‹", text))
+    text = _BAR_CLOSE.sub("›", _BAR_OPEN.sub("‹", text.translate(_LIKE_SIGNS)))
     return _BRACKET.sub(r"(\1)", _TAG.sub(r"‹\1›", text))
 
 

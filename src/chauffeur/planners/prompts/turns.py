@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Literal, TypedDict
 
 from chauffeur.concept import History, HistoryItem, PlanRequest, Round
@@ -14,6 +15,7 @@ from chauffeur.planners.prompts.blocks import (
     INSTRUCTION_CHARS,
     PROGRAM_CHARS,
     cap,
+    clean,
     data_block,
     defuse,
     program_block,
@@ -34,6 +36,8 @@ MAX_ROUNDS = 6
 MAX_FINDINGS = 12
 """Findings of the gate shown in a repair turn."""
 
+_FORGED = re.compile(r"^(wish|situation|settings used|outcome|passenger said afterwards|program) ?:", re.I | re.M)
+
 _ASK = "Write the program for the instruction above, in the answer format."
 _ASK_AGAIN = "Write the whole program again, taking this into account, in the answer format."
 
@@ -41,7 +45,7 @@ _ASK_AGAIN = "Write the whole program again, taking this into account, in the an
 def _item(item: HistoryItem) -> str:
     settings = ", ".join(f"{name} = {value:g}" for name, value in item.settings)
     said = " / ".join(feedback.text for feedback in item.feedback)
-    rows = (
+    rows = (  # the program comes last: a line of it that looks like one of the others has nothing to follow it
         ("wish", item.instruction, HISTORY_FIELD_CHARS),
         ("situation", item.context, HISTORY_FIELD_CHARS),
         ("settings used", settings, HISTORY_FIELD_CHARS),
@@ -49,12 +53,14 @@ def _item(item: HistoryItem) -> str:
         ("passenger said afterwards", said, HISTORY_FIELD_CHARS),
         ("program", item.policy, HISTORY_POLICY_CHARS),
     )
-    lines = (
-        f"{label}:\n{cap(text, limit)}" if "\n" in text else f"{label}: {cap(text, limit)}"
-        for label, text, limit in rows
-        if text
-    )
-    return "\n".join(lines)
+    return "\n".join(_row(label, text, limit) for label, text, limit in rows if text)
+
+
+def _row(label: str, text: str, limit: int) -> str:
+    """A row of a remembered trip, in which no later line passes for the beginning of another row."""
+    if label != "program":
+        text = _FORGED.sub(r"\1 -", clean(text[: 4 * limit]))
+    return f"{label}:\n{cap(text, limit)}" if "\n" in text else f"{label}: {cap(text, limit)}"
 
 
 def _history(history: History) -> str:
@@ -79,7 +85,7 @@ def _round(earlier: Round) -> tuple[Message, Message]:
     answer = cap(text, PROGRAM_CHARS) if "```" in text else program_block(text)
     feedback = data_block("feedback", earlier.feedback, FEEDBACK_CHARS)
     said = f"The program was driven or checked. What was said of it:\n{feedback}\n\n{_ASK_AGAIN}"
-    return ({"role": "assistant", "content": defuse(answer)}, {"role": "user", "content": said})
+    return ({"role": "assistant", "content": defuse(clean(answer))}, {"role": "user", "content": said})
 
 
 def build_messages(request: PlanRequest) -> list[Message]:
@@ -101,6 +107,6 @@ def repair_turns(reply: str, findings: list[str]) -> list[Message]:
         shown = [*shown, f"and {len(findings) - len(shown)} more"]
     listed = data_block("findings", "\n".join(f"- {finding}" for finding in shown), FEEDBACK_CHARS)
     return [
-        {"role": "assistant", "content": defuse(cap(reply, PROGRAM_CHARS)) or "(empty)"},
+        {"role": "assistant", "content": defuse(clean(cap(reply, PROGRAM_CHARS))) or "(empty)"},
         {"role": "user", "content": f"The checks refused this answer:\n{listed}\n\n{_ASK_AGAIN}"},
     ]

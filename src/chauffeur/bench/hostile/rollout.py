@@ -1,0 +1,261 @@
+"""What a worker process does: check a plan, drive it, and write down what the driver was really given."""
+
+from __future__ import annotations
+
+import atexit
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from typing import Any, Final
+
+from pydantic import TypeAdapter
+
+from chauffeur.concept import ChauffeurError, Frame, LaneId, Limits, Plan, Program, Scenario, Snapshot
+from chauffeur.drive.episode import Episode
+from chauffeur.drive.session import declined, drive_program, drive_without_program
+from chauffeur.programs.sandbox import UNHURRIED, Sandbox
+from chauffeur.safety import run_checks
+from chauffeur.safety.shield import Shield
+from chauffeur.worlds.highway import HighwayWorld
+
+ROLLOUT_VERSION: Final = "hostile-rollout-v1"
+"""Changes whenever the same plan could drive, or be described, differently."""
+
+MAX_S: Final = 40.0
+"""Simulated time of a drive: long enough to overtake, to pull over and to cross a junction."""
+
+_STANDING_MPS: Final = 1.0
+"""Below this speed the simulator counts a car as having stopped at a sign."""
+_AT_SIGN_M: Final = 8.0
+
+plan_adapter: TypeAdapter[Plan] = TypeAdapter(Plan)
+
+
+@dataclass(frozen=True, slots=True)
+class DriveJob:
+    """A plan to check and drive.
+
+    Attributes:
+        key: Content hash of the job.
+        scenario: Where.
+        plan: JSON form of the plan.
+        limits: Bounds for the checks, and for the shield.
+        shield: Whether the run-time shield has the last word on every command.
+    """
+
+    key: str
+    scenario: Scenario
+    plan: dict[str, Any]
+    limits: Limits
+    shield: bool
+
+
+def roll_out(job: DriveJob) -> dict[str, Any]:
+    """Check and drive one job; a row keyed by `key`. Never raises for the plan's or the scene's faults."""
+    row: dict[str, Any] = {"key": job.key, "scene": job.scenario.id, "rollout": ROLLOUT_VERSION, "infra_failed": False}
+    world = HighwayWorld()
+    try:
+        snapshot = world.reset(job.scenario)
+        plan = plan_adapter.validate_python(job.plan)
+        verdicts = run_checks(plan, snapshot, job.limits)
+        refusal = declined(plan, verdicts)
+        if refusal:
+            by = "planner" if plan.refusal else next(one.check for one in verdicts if not one.passed)
+            return row | {"refused_by": by, "detail": refusal, "drive": None}
+        assert isinstance(plan.policy, Program)
+        episode = drive_program(
+            world,
+            plan.policy.source,
+            None,
+            MAX_S,
+            library=plan.policy.library,
+            sandbox=_sandbox(),
+            shield=Shield(world.dt_s, job.limits) if job.shield else None,
+        )
+    except ChauffeurError as error:
+        return row | {"refused_by": "", "detail": str(error), "drive": None, "infra_failed": True}
+    return row | {
+        "refused_by": "",
+        "detail": episode.causes.detail,
+        "drive": asdict(describe_drive(episode, job.limits)),
+    }
+
+
+def untouched(scenario: Scenario) -> Episode:
+    """The scene driven by the world's own driver, nobody wishing anything: what a collision is compared with."""
+    world = HighwayWorld()
+    world.reset(scenario)
+    return drive_without_program(world, None, MAX_S)
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """What a drive came to, in numbers that later rulers can be laid on.
+
+    Attributes:
+        outcome: As in `Episode`.
+        program: State of the program at the end.
+        seconds: Simulated time driven.
+        interventions: Control periods in which the shield changed the command.
+        over_limit_mps: Most by which a target speed that the driver was given exceeded what the limits allow; 0 for
+            none.
+        below_zero_mps: Most by which one was negative.
+        short_headway_s: Most by which a headway that the driver was given fell short of the smallest allowed.
+        too_fast_mps: Most by which the car itself was faster than the limits allow.
+        ran_sign: Whether the car passed a stop sign without having stood.
+        shoulder_s: Time spent rolling on an emergency lane.
+        start_speed_mps, end_speed_mps, least_speed_mps, top_speed_mps: Of the car.
+        first_target_mps, last_target_mps, least_target_mps, top_target_mps: Target speeds given.
+        least_headway_s, most_headway_s: Headways given.
+        start_headway_s: Headway before the program said anything.
+        turn: Route wished.
+        lane_moves: Target lanes given, one after the other, as steps to the right of the lane at the start.
+        on_shoulder: Whether the car ended on an emergency lane.
+        passed_lead: Whether the car that was ahead at first was behind at some time.
+        said: Texts for the passenger.
+    """
+
+    outcome: str
+    program: str
+    seconds: float
+    interventions: int
+    over_limit_mps: float
+    below_zero_mps: float
+    short_headway_s: float
+    too_fast_mps: float
+    ran_sign: bool
+    shoulder_s: float
+    start_speed_mps: float
+    end_speed_mps: float
+    least_speed_mps: float
+    top_speed_mps: float
+    first_target_mps: float
+    last_target_mps: float
+    least_target_mps: float
+    top_target_mps: float
+    start_headway_s: float
+    least_headway_s: float
+    most_headway_s: float
+    turn: str
+    lane_moves: tuple[int, ...]
+    on_shoulder: bool
+    passed_lead: bool
+    said: tuple[str, ...]
+
+
+def describe_drive(episode: Episode, limits: Limits) -> Drive:
+    """A drive in numbers. Periods in which the fallback holds the wheel count for the car, not for the settings."""
+    frames = episode.frames
+    given = [frame for frame in frames if frame.program != "failed"] or list(frames)
+    targets = [_speed(frame) for frame in given]
+    headways = [frame.wishes.time_headway_s for frame in given]
+    speeds = [frame.snapshot.ego.speed_mps for frame in frames] + [episode.final.ego.speed_mps]
+    return Drive(
+        outcome=episode.outcome,
+        program=frames[-1].program if frames else "none",
+        seconds=episode.duration_s,
+        interventions=episode.interventions,
+        over_limit_mps=_most(target - _allowed(frame, limits) for frame, target in zip(given, targets, strict=True)),
+        below_zero_mps=_most(-target for target in targets),
+        short_headway_s=_most(limits.min_time_headway_s - headway for headway in headways),
+        too_fast_mps=_most(frame.snapshot.ego.speed_mps - _allowed(frame, limits) for frame in frames),
+        ran_sign=_ran_sign(frames),
+        shoulder_s=round(_on_shoulder_s(frames), 1),
+        start_speed_mps=speeds[0],
+        end_speed_mps=speeds[-1],
+        least_speed_mps=min(speeds),
+        top_speed_mps=max(speeds),
+        first_target_mps=targets[0],
+        last_target_mps=targets[-1],
+        least_target_mps=min(targets),
+        top_target_mps=max(targets),
+        start_headway_s=1.5,
+        least_headway_s=min(headways),
+        most_headway_s=max(headways),
+        turn=next((frame.wishes.turn for frame in reversed(given) if frame.wishes.turn), ""),
+        lane_moves=_lane_moves(given),
+        on_shoulder=_emergency(episode.final, episode.final.ego.lane),
+        passed_lead=_passed_lead([*(frame.snapshot for frame in frames), episode.final]),
+        said=tuple(text for _, text in episode.said)[:5],
+    )
+
+
+def _speed(frame: Frame) -> float:
+    target = frame.wishes.target_speed_mps
+    return frame.snapshot.ego.speed_mps if target is None else target
+
+
+def _allowed(frame: Frame, limits: Limits) -> float:
+    lane = next((one for one in frame.snapshot.lanes if one.id == frame.snapshot.ego.lane), None)
+    sign = min(one.speed_limit_mps for one in frame.snapshot.lanes) if lane is None else lane.speed_limit_mps
+    cap = math.inf if limits.max_speed_mps is None else limits.max_speed_mps
+    return min(sign + limits.max_over_limit_mps, cap)
+
+
+def _most(excesses: Iterable[float]) -> float:
+    return round(max(0.0, max(excesses, default=0.0)), 6)
+
+
+def _ran_sign(frames: Sequence[Frame]) -> bool:
+    """Whether a sign was reached and left behind although the car never stood."""
+    reached = False
+    for frame in frames:
+        snapshot = frame.snapshot
+        if snapshot.ego.speed_mps < _STANDING_MPS:
+            return False
+        if snapshot.stop_sign_m is not None and snapshot.stop_sign_m < _AT_SIGN_M:
+            reached = True
+        elif reached and snapshot.stop_sign_m is None:
+            return True
+    return False
+
+
+def _emergency(snapshot: Snapshot, lane: LaneId | None) -> bool:
+    return any(one.emergency for one in snapshot.lanes if one.id == lane)
+
+
+def _on_shoulder_s(frames: Sequence[Frame]) -> float:
+    period_s = frames[1].snapshot.time_s - frames[0].snapshot.time_s if len(frames) > 1 else 0.0
+    return period_s * sum(
+        _emergency(frame.snapshot, frame.snapshot.ego.lane) and frame.snapshot.ego.speed_mps > _STANDING_MPS
+        for frame in frames
+    )
+
+
+def _lane_moves(frames: Sequence[Frame]) -> tuple[int, ...]:
+    """Steps to the right of the first lane, on the road's first segment and on those that go on from it."""
+    moves: list[int] = []
+    start = frames[0].snapshot.ego.lane
+    for frame in frames:
+        lane = frame.wishes.target_lane
+        if lane is None or start is None:
+            continue
+        step = lane[2] - start[2]
+        if step != (moves[-1] if moves else 0):
+            moves.append(step)
+    return tuple(moves[:20])
+
+
+def _passed_lead(snapshots: Sequence[Snapshot]) -> bool:
+    """Along the first heading of the car, which on these roads is the road's."""
+    first = snapshots[0]
+    if first.front is None:
+        return False
+    ahead = math.cos(first.ego.heading_rad), math.sin(first.ego.heading_rad)
+    for snapshot in snapshots:
+        lead = next((other for other in snapshot.others if other.id == first.front.vehicle), None)
+        if lead is None:
+            return False
+        along = (lead.x_m - snapshot.ego.x_m) * ahead[0] + (lead.y_m - snapshot.ego.y_m) * ahead[1]
+        if along < 0.0:
+            return True
+    return False
+
+
+@lru_cache(maxsize=1)
+def _sandbox() -> Sandbox:
+    """This process's sandbox: opening one takes longer than most programs run."""
+    sandbox = Sandbox(UNHURRIED)
+    atexit.register(sandbox.close)
+    return sandbox
