@@ -16,6 +16,7 @@ STEPS_ITS_OWN = {
     "worlds/highway/reference/world.py",
     "worlds/highway/traffic.py",
     "worlds/highway/gym.py",
+    "worlds/highway/provoked.py",
 }
 """Inside a world: highway-env's vehicles and roads, and the gymnasium face of the world itself."""
 

@@ -99,6 +99,9 @@ def lampilot(
     rehearse: Annotated[
         int, typer.Option(min=0, help="Try this many variants of each program on copies of the scene first.")
     ] = 0,
+    shield: Annotated[
+        bool, typer.Option("--shield", help="Let the run-time shield have the last word; LaMPilot has none.")
+    ] = False,
     metrics: MetricsOption = "origin",
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
     concurrency: Annotated[
@@ -146,12 +149,12 @@ def lampilot(
     aid = aid_for(setting, repository, LAMPILOT_LIMITS)
     prompt = HUMAN_FEEDBACK if aid is not None else setting_named(setting)
     dataset, _ = annotated(load_dataset(data))
-    rehearsed = f"-rehearsed-{rehearse}" if rehearse else ""
-    folder = out or Path("runs") / f"lampilot-{planner.replace('/', '-')}{rehearsed}"
+    variant = (f"-rehearsed-{rehearse}" if rehearse else "") + ("-shielded" if shield else "")
+    folder = out or Path("runs") / f"lampilot-{planner.replace('/', '-')}{variant}"
     if part != WHOLE:
         folder = folder / part.folder
     asked = "" if aid is None else aid.id
-    config = RunConfig(planner, prompt, dataset.sha256, items, seed, LAMPILOT_LIMITS, rehearse, asked)
+    config = RunConfig(planner, prompt, dataset.sha256, items, seed, LAMPILOT_LIMITS, rehearse, asked, shield)
     run: LampilotRun = load_plugin("chauffeur.benchmarks", "lampilot").open_run(
         folder, dataset, config, _planner(planner, base_url), shard=part, requests=aid
     )

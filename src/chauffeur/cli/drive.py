@@ -44,6 +44,9 @@ def drive(
     setting: Annotated[str, typer.Option(help="Prompt: `few-shot` or `zero-shot`.")] = "few-shot",
     limits: Annotated[str, typer.Option(help="Bounds no plan may cross: `default` or `lampilot`.")] = "default",
     data: Annotated[Path | None, typer.Option(help="LaMPilot's DbLv1 folder, for its own samples.")] = None,
+    audit: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the outcome only.")] = False,
     browser: Annotated[
         bool, typer.Option("--open/--no-open", help="Open the page of the drive; without --save in ./trips.")
@@ -51,12 +54,15 @@ def drive(
 ) -> None:
     """Drive a wish: plan it, check it, drive it, score it."""
     import asyncio
+    from contextlib import ExitStack
 
+    from chauffeur.cli.audit import auditor_for, tell_closing
     from chauffeur.cli.console import stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.parts import limits_named, memory_named, planner_named, referee_for, setting_named
     from chauffeur.cli.show import Quiet, Teller
     from chauffeur.concept import PersonId
+    from chauffeur.drive.auditing import told_to, with_head
     from chauffeur.drive.scenarios import find, suiting
     from chauffeur.drive.session import Forgetful, Session, parse_wish
 
@@ -72,17 +78,28 @@ def drive(
         tell=teller.tell,
         setting=setting_named(setting),
     )
-    teller.begin(place, place.seed if seed is None else seed)
-    with teller:
-        recorded = asyncio.run(session.drive(instruction, place, place.seed if seed is None else seed, bounds))
+    start_seed = place.seed if seed is None else seed
+    with ExitStack() as stack:
+        auditor = None
+        if audit is not None:  # before anything moves: a log that cannot be had is refused here
+            auditor = stack.enter_context(auditor_for(audit, place, start_seed))
+            session.tell = told_to(auditor.tell, teller.tell)
+        teller.begin(place, start_seed)
+        stack.enter_context(teller)
+        recorded = asyncio.run(session.drive(instruction, place, start_seed, bounds))
+    closing = None if auditor is None else auditor.close()
+    if closing is not None:
+        recorded = with_head(recorded, closing)
     teller.end(recorded)
+    if audit is not None and closing is not None:
+        tell_closing(console, audit, closing)
     if browser and save is None:
         save = Path("trips") / recorded.trip.id
     if save is not None:
         teller.wrote(save_trip(save, recorded))
         if browser:
             typer.launch((save / "trip.html").resolve().as_uri())
-    if recorded.trip.outcome not in _DONE:
+    if recorded.trip.outcome not in _DONE or (closing is not None and not closing.complete):
         raise typer.Exit(FAILED)
 
 

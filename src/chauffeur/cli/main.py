@@ -8,8 +8,22 @@ from typing import Annotated
 import typer
 
 from chauffeur import __version__
-from chauffeur.cli import apis, coach, doctor, drive, feedback, page, replay, report, scenarios, wheel
+from chauffeur.cli import (
+    apis,
+    bench_alignment,
+    bench_hostile,
+    coach,
+    doctor,
+    drive,
+    feedback,
+    page,
+    replay,
+    report,
+    scenarios,
+    wheel,
+)
 from chauffeur.cli.adapt import adapt_app
+from chauffeur.cli.audit import audit_app
 from chauffeur.cli.bench import bench_app
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
 from chauffeur.cli.policies import policies_app
@@ -67,12 +81,15 @@ app.command(epilog=report.EXAMPLES)(report.report)
 app.command(epilog=doctor.EXAMPLES)(doctor.doctor)
 bench_app.command(epilog=wheel.EXAMPLES)(wheel.human)
 bench_app.command(epilog=coach.EXAMPLES)(coach.coach)
+bench_app.command(epilog=bench_alignment.EXAMPLES)(bench_alignment.alignment)
+bench_app.command(epilog=bench_hostile.EXAMPLES)(bench_hostile.hostile)
 app.add_typer(bench_app, name="bench")
 app.add_typer(policies_app, name="policies")
 app.add_typer(scenes_app, name="scenes")
 app.add_typer(train_app, name="train")
 app.add_typer(serve_app, name="serve")
 app.add_typer(adapt_app, name="adapt")
+app.add_typer(audit_app, name="audit")
 
 
 def run() -> None:

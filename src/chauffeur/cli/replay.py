@@ -52,8 +52,9 @@ def drive_again(recorded: RecordedTrip) -> RecordedTrip:
     from dataclasses import replace
 
     from chauffeur.cli.parts import referee_for
-    from chauffeur.concept import DataError, Program
+    from chauffeur.concept import DataError, Limits, Program
     from chauffeur.drive.session import MAX_TRIP_S, drive_program, make_world
+    from chauffeur.safety.shield import Shield
 
     trip, scenario = recorded.trip, recorded.scenario
     policy = trip.plan.policy
@@ -62,7 +63,9 @@ def drive_again(recorded: RecordedTrip) -> RecordedTrip:
     world = make_world(scenario)
     world.reset(scenario, trip.seed)
     referee = referee_for(world, scenario, trip.plan)
-    episode = drive_program(world, policy.source, referee, MAX_TRIP_S, library=policy.library)
+    record = dict(trip.record)
+    shield = Shield(world.dt_s, Limits(**record["limits"])) if "shield" in record else None
+    episode = drive_program(world, policy.source, referee, MAX_TRIP_S, library=policy.library, shield=shield)
     driven = replace(
         trip,
         outcome=episode.outcome,

@@ -115,6 +115,9 @@ class Teller(Quiet):
         super().end(recorded)
         for cause in words.cause_words(trip.causes):
             self.console.print(Padding(plain(cause), (0, 0, 0, 2)))
+        shielded = words.shield_words([change for frame in recorded.frames for change in frame.interventions])
+        if shielded:
+            self.console.print(Padding(plain(shielded), (0, 0, 0, 2)))
         if trip.metrics:
             self.console.print(columns((words.metric_name(m.id), words.metric_value(m)) for m in trip.metrics))
         facts = [f"planner {trip.plan.planner}"]

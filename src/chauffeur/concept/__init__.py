@@ -51,7 +51,7 @@ from chauffeur.concept.scene import (
     VehicleState,
     Wishes,
 )
-from chauffeur.concept.trace import ApiCall, Frame, ProgramState
+from chauffeur.concept.trace import ApiCall, Frame, Intervention, ProgramState
 
 __all__ = [
     "LAMPILOT_LIMITS",
@@ -70,6 +70,7 @@ __all__ = [
     "HistoryItem",
     "Instruction",
     "InstructionError",
+    "Intervention",
     "LaneId",
     "LaneView",
     "Lead",

@@ -27,6 +27,23 @@ class ApiCall:
 
 
 @dataclass(frozen=True, slots=True)
+class Intervention:
+    """One change the run-time shield made to a command.
+
+    Attributes:
+        rule: Short stable name of the rule.
+        reason: Why, in words.
+        before: The command as it came.
+        after: As it went on.
+    """
+
+    rule: str
+    reason: str
+    before: Command
+    after: Command
+
+
+@dataclass(frozen=True, slots=True)
 class Frame:
     """One control period: what was seen, wished, asked of the actuator and really applied.
 
@@ -39,6 +56,7 @@ class Frame:
         line: Program line it waits at (1-based), if it runs.
         said: Texts told to the passenger in this period.
         calls: Driving-API calls made in this period.
+        interventions: What the run-time shield changed in what the driver asked for.
     """
 
     snapshot: Snapshot
@@ -49,3 +67,4 @@ class Frame:
     line: int | None = None
     said: tuple[str, ...] = ()
     calls: tuple[ApiCall, ...] = ()
+    interventions: tuple[Intervention, ...] = ()

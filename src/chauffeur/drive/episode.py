@@ -24,6 +24,7 @@ from chauffeur.concept import (
     Snapshot,
     Wishes,
 )
+from chauffeur.safety.shield import Guarded, Shield
 from chauffeur.worlds.base import EGO, World
 
 FALLBACK_S = 10.0
@@ -93,6 +94,7 @@ class Episode:
         outcome, causes, metrics: What happened, why, and the scores.
         said: What the passenger was told, as (time s, text).
         success: The referee's success flag.
+        interventions: Control periods in which the shield changed the command.
     """
 
     frames: tuple[Frame, ...]
@@ -104,6 +106,7 @@ class Episode:
     metrics: tuple[Metric, ...]
     said: tuple[tuple[float, str], ...]
     success: bool
+    interventions: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +131,7 @@ def run_episode(
     adjust: Callable[[Wishes], Wishes] | None = None,
     watch: Callable[[Frame], None] | None = None,
     hands: Hands | None = None,
+    shield: Shield | None = None,
 ) -> Episode:
     """Drive until the goal is decided, the world ends, the program has ended, or `max_s` simulated seconds passed.
 
@@ -140,6 +144,7 @@ def run_episode(
         adjust: Baseline that rewrites settled wishes each period, e.g. MOBIL's lane choice.
         watch: Called with each recorded frame, for live display.
         hands: A person who acts in the driver's place; `policy` is then None, and nobody's wishes are followed.
+        shield: Has the last word on every command; None where a benchmark's own rules allow none.
     """
     driver = world.driver()
     frames: list[Frame] = []
@@ -147,7 +152,7 @@ def run_episode(
     failure: ChauffeurError | None = None
     held = driver.initial_wishes()
     idle = 0
-    ticks = 0
+    ticks = changed = 0
     end = round(max_s / world.dt_s)
     while ticks < end:
         at_s = ticks * world.dt_s
@@ -168,11 +173,15 @@ def run_episode(
         if requested is None:
             failure = ChauffeurError(f"Given up by the driver after {at_s:.1f} s.")
             break
-        before = world.snapshot() if record else None
-        applied = world.step(requested)
+        before = world.snapshot() if record or shield is not None else None
+        guarded = Guarded(requested) if shield is None or before is None else shield.guard(before, requested)
+        changed += bool(guarded.interventions)
+        applied = world.step(guarded.command)
         ticks += 1
-        if before is not None:
-            frame = Frame(before, wishes, requested, applied, tick.state, tick.line, tick.said, tick.calls)
+        if record and before is not None:
+            frame = Frame(
+                before, wishes, requested, applied, tick.state, tick.line, tick.said, tick.calls, guarded.interventions
+            )
             frames.append(frame)
             if watch is not None:
                 watch(frame)
@@ -198,6 +207,7 @@ def run_episode(
         metrics=() if referee is None else referee.metrics() if failure is None else _void(referee.metrics()),
         said=tuple(said),
         success=success,
+        interventions=changed,
     )
 
 

@@ -31,6 +31,7 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.planners.base import Planner
+from chauffeur.safety.screening import screen_request
 from chauffeur.worlds.base import World
 
 
@@ -65,7 +66,8 @@ async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, s
     for letter, value in (("I", I), ("C", C), ("H", H), ("S", S)):
         stages.tell(letter, value)
 
-    request = PlanRequest(I, C, S, H, limits=limits)
+    request, screened = screen_request(PlanRequest(I, C, S, H, limits=limits))  # words are data
+    stages.tell("screened", screened)
     plan = await stages.planner.plan(request)  # R, P
     stages.tell("RP", plan)
 

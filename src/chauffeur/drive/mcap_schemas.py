@@ -223,7 +223,15 @@ WISHES = Channel(
         served_stops=_array(_INTEGER),
     ),
 )
-COMMAND = Channel("/command", "chauffeur.Command", _object(requested=_COMMAND, applied=_COMMAND))
+COMMAND = Channel(
+    "/command",
+    "chauffeur.Command",
+    _object(
+        requested=_COMMAND,
+        applied=_COMMAND,
+        interventions=_array(_object(rule=_text(), reason=_text(), before=_COMMAND, after=_COMMAND)),
+    ),
+)
 PROGRAM = Channel(
     "/program",
     "chauffeur.ProgramState",

@@ -225,7 +225,7 @@ def _write(
         parts = _storable(_frame.dump_python(frame, mode="json", exclude={"snapshot"}))
         parts["wishes"]["served_stops"].sort()
         put(channels.WISHES, parts["wishes"], time, index)
-        put(channels.COMMAND, {"requested": parts["requested"], "applied": parts["applied"]}, time, index)
+        put(channels.COMMAND, {name: parts[name] for name in ("requested", "applied", "interventions")}, time, index)
         program = {"state": parts["program"], "line": parts["line"], "calls": parts["calls"]}
         put(channels.PROGRAM, program, time, index)
         for text in frame.said:

@@ -37,7 +37,8 @@ from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.programs import ProgramExecutor
 from chauffeur.programs.sandbox import UNHURRIED, Sandbox
-from chauffeur.safety import run_checks
+from chauffeur.safety import DRIVE_CHECKS, run_checks
+from chauffeur.safety.shield import SHIELD_VERSION, Shield
 from chauffeur.worlds.base import World
 
 MAX_WISH_CHARACTERS = 2000
@@ -98,6 +99,7 @@ class Session:
         tell: Called with the loop's letters as they come, and with `frame` for each control period.
         setting: Whether S carries examples.
         max_s: Bound of the trip in simulated time.
+        shielded: Whether the run-time shield has the last word on every command.
     """
 
     planner: Planner
@@ -106,6 +108,7 @@ class Session:
     tell: Callable[[str, object], None] = _silent
     setting: Setting = "few-shot"
     max_s: float = MAX_TRIP_S
+    shielded: bool = True
     _episode: Episode | None = None
     _system: SystemMessage | None = None
 
@@ -123,7 +126,7 @@ class Session:
             memory=self.memory,
             system=self._build_system,
             planner=self.planner,
-            check=run_checks,
+            check=partial(run_checks, checks=DRIVE_CHECKS),
             execute=partial(self._execute, world),
             tell=self.tell,
         )
@@ -152,13 +155,19 @@ class Session:
     ) -> Trip:
         refused = declined(plan, verdicts)
         if refused:
-            return make_trip(request, plan, verdicts, scenario, seed, None, refused)
+            return make_trip(request, plan, verdicts, scenario, seed, None, refused, shielded=self.shielded)
         assert isinstance(plan.policy, Program)
         referee = self.referee(world, scenario, plan)
         self._episode = drive_program(
-            world, plan.policy.source, referee, self.max_s, partial(self.tell, "frame"), library=plan.policy.library
+            world,
+            plan.policy.source,
+            referee,
+            self.max_s,
+            partial(self.tell, "frame"),
+            library=plan.policy.library,
+            shield=Shield(world.dt_s, request.limits) if self.shielded else None,
         )
-        return make_trip(request, plan, verdicts, scenario, seed, self._episode, "")
+        return make_trip(request, plan, verdicts, scenario, seed, self._episode, "", shielded=self.shielded)
 
 
 def drive_program(
@@ -171,15 +180,17 @@ def drive_program(
     record: bool = True,
     library: str = "",
     sandbox: Sandbox | None = None,
+    shield: Shield | None = None,
 ) -> Episode:
     """Run a checked program, with the helper functions it may call, on a world just reset.
 
     Simulated time waits for the program, so its budgets are wide: how busy the machine is must not change a trip.
-    `sandbox` lends one that is open already; otherwise one is opened for this drive.
+    `sandbox` lends one that is open already; otherwise one is opened for this drive. `shield` has the last word on
+    every command; LaMPilot's own rules know none.
     """
     with ProgramExecutor(budget=UNHURRIED, library=library, sandbox=sandbox) as executor:
         executor.start(source, world)
-        return run_episode(world, executor, referee, max_s=max_s, record=record, watch=watch)
+        return run_episode(world, executor, referee, max_s=max_s, record=record, watch=watch, shield=shield)
 
 
 def drive_without_program(world: World, referee: Referee | None, max_s: float, **options: Any) -> Episode:
@@ -210,9 +221,13 @@ def make_trip(
     seed: int,
     episode: Episode | None,
     refusal: str,
+    *,
+    shielded: bool = False,
 ) -> Trip:
     """File what happened, with its provenance."""
     record = provenance(plan, scenario, seed, request.limits)
+    if shielded:
+        record = (*record, ("shield", SHIELD_VERSION))
     if episode is None:
         failed = unusable(plan, verdicts)
         causes = Causes(refused=not failed, policy_failed=failed, detail=refusal)

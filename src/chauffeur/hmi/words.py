@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
-from typing import Literal
+from collections import Counter
+from collections.abc import Sequence
+from typing import Final, Literal
 
-from chauffeur.concept import Causes, Feedback, Metric, Outcome
+from chauffeur.concept import Causes, Feedback, Intervention, Metric, Outcome
 from chauffeur.concept.units import kmh
 
 Tone = Literal["good", "bad", "neutral"]
@@ -46,6 +48,19 @@ def outcome_words(outcome: Outcome) -> tuple[str, Tone]:
     return _OUTCOMES[outcome]
 
 
+_RULES: Final = {
+    "gap": "distance ahead",
+    "lane": "lane not free",
+    "speed": "speed limit",
+    "yield": "right of way",
+    "clear": "clearing the crossing",
+    "brake": "braking too hard",
+    "reverse": "standing, not reversing",
+    "finite": "no number",
+}
+"""The shield's rules in a few words."""
+
+
 def cause_words(causes: Causes) -> tuple[str, ...]:
     """Every cause that holds, in words; empty when nothing went wrong."""
     words = [
@@ -61,6 +76,16 @@ def cause_words(causes: Causes) -> tuple[str, ...]:
     if causes.detail:
         words.append(causes.detail)
     return tuple(words)
+
+
+def shield_words(interventions: Sequence[Intervention]) -> str:
+    """How often the run-time shield changed a command, and why; empty when it never did."""
+    if not interventions:
+        return ""
+    counts = Counter(change.rule for change in interventions)
+    why = ", ".join(f"{_RULES.get(rule, rule)} {count}" for rule, count in counts.most_common())
+    times = "once" if len(interventions) == 1 else f"{len(interventions)} times"
+    return f"The shield changed a command {times}: {why}."
 
 
 def metric_name(metric_id: str) -> str:

@@ -37,6 +37,7 @@ class RunConfig:
         seed: Seed of the draw.
         limits: Bounds for the checks.
         rehearse: Variants tried before one is driven; 0 for none.
+        shield: Whether the run-time shield has the last word; LaMPilot has none.
         asked: What else decides the requests: the frozen policy repository of the human-feedback setting.
     """
 
@@ -48,6 +49,7 @@ class RunConfig:
     limits: Limits = LAMPILOT_LIMITS
     rehearse: int = 0
     asked: str = ""
+    shield: bool = False
 
 
 def choose_items(dataset: Dataset, count: int, seed: int) -> Sequence[Item]:
@@ -89,6 +91,8 @@ class Frozen:
         drawn = choose_items(dataset, config.items, config.seed)
         places = tuple(place for place, item in enumerate(drawn) if shard.owns(item.id))
         stored: dict[str, Any] = json.loads(json.dumps(asdict(config)))
+        if not config.shield:
+            del stored["shield"]  # as it was before there was one: such runs can be continued
         return cls(stored, model, tuple(labels), shard, tuple(drawn[i] for i in places), places, len(drawn))
 
     @cached_property

@@ -23,6 +23,7 @@ from chauffeur.bench.lampilot.report import answers_note, family_lines, markdown
 from chauffeur.bench.lampilot.rollout import BASELINES, REHEARSAL_SEED, ROLLOUT_VERSION, RolloutJob, not_driven
 from chauffeur.bench.store import Row, RowStore
 from chauffeur.drive.files import publish
+from chauffeur.safety.shield import SHIELD_VERSION
 from chauffeur.worlds.highway.dblv1 import Item
 
 SCHEMA = "lampilot-results-v2"
@@ -77,6 +78,10 @@ class Stages:
     def _rehearse(self) -> int:
         return int(self.frozen.config.get("rehearse", 0))
 
+    @property
+    def _shield(self) -> bool:
+        return bool(self.frozen.config.get("shield", False))
+
     def plan(self, item: Item) -> dict[str, Any] | None:
         """The item's plan; None when there is none (yet)."""
         return self.plans.rows.get(item.id, {}).get("plan")
@@ -89,7 +94,7 @@ class Stages:
         job = self._jobs.get(item.id)
         if job is None or job.plan is not plan:
             key = self._key(item.scenario.id, plan)
-            job = RolloutJob(key, item.scenario, self.baseline, plan, self.frozen.limits, self._rehearse)
+            job = RolloutJob(key, item.scenario, self.baseline, plan, self.frozen.limits, self._rehearse, self._shield)
             self._jobs[item.id] = job
         return job
 
@@ -101,6 +106,8 @@ class Stages:
         parts = [ROLLOUT_VERSION, self.frozen.hashes[sample], decisive, self._limits]
         if self._rehearse:
             parts += [self._rehearse, REHEARSAL_SEED]
+        if self._shield:
+            parts.append(SHIELD_VERSION)
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:24]
 
     def asked(self, item: Item) -> bool:

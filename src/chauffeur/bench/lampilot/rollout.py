@@ -20,6 +20,7 @@ from chauffeur.drive.session import declined, drive_program, drive_without_progr
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.library import standalone
 from chauffeur.safety import run_checks
+from chauffeur.safety.shield import SHIELD_VERSION, Shield
 from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
 
 ROLLOUT_VERSION = "lampilot-rollout-v3"
@@ -49,6 +50,7 @@ class RolloutJob:
         plan: JSON form of the plan.
         limits: Bounds for the checks.
         rehearse: Variants of the program to try on copies of the scene first; 0 drives the program itself.
+        shield: Whether the run-time shield has the last word on every command.
     """
 
     key: str
@@ -57,6 +59,7 @@ class RolloutJob:
     plan: dict[str, Any] | None
     limits: Limits
     rehearse: int = 0
+    shield: bool = False
 
 
 def describe_sample(scenario: Scenario) -> dict[str, Any]:
@@ -77,9 +80,12 @@ def roll_out(job: RolloutJob) -> dict[str, Any]:
         referee = LampilotReferee(world, job.scenario)
     except ChauffeurError as error:
         return row | not_driven("not_driven", str(error), infra_failed=True)
+    shield = Shield(world.dt_s, job.limits) if job.shield else None
+    if shield is not None:
+        row["shield"] = SHIELD_VERSION
     if job.baseline in ("idm", "mobil"):
         adjust = None if job.baseline == "idm" else _mobil(world)
-        episode = drive_without_program(world, referee, MAX_EPISODE_S, record=False, adjust=adjust)
+        episode = drive_without_program(world, referee, MAX_EPISODE_S, record=False, adjust=adjust, shield=shield)
         return row | _driven(episode, referee)
     try:
         if job.baseline:
@@ -104,6 +110,7 @@ def roll_out(job: RolloutJob) -> dict[str, Any]:
             record=False,
             library=program.library,
             sandbox=_sandbox(),
+            shield=shield,
         )
     except ChauffeurError as error:
         return row | not_driven("not_driven", str(error), infra_failed=True)
@@ -164,6 +171,7 @@ def _driven(episode: Episode, referee: LampilotReferee) -> dict[str, Any]:
         "success": episode.success,
         "steps": episode.ticks,
         "signals": referee.signals().as_row(),
+        **({"interventions": episode.interventions} if episode.interventions else {}),
         **_causes(asdict(episode.causes)),
     }
 

@@ -32,12 +32,14 @@ from chauffeur.bench.store import Row, Scribe, sole_writer
 from chauffeur.concept import ChauffeurError, ConfigError
 from chauffeur.drive.rehearsal import label
 from chauffeur.planners.base import Planner
+from chauffeur.safety.shield import SHIELD_VERSION
 from chauffeur.worlds.highway.dblv1 import Dataset
 
 __all__ = ["BENCH_VERSION", "Effort", "LampilotBenchmark", "LampilotRun", "RunConfig", "choose_items"]
 
 
 EXPERT_LABEL = "scripted expert: told the goal, reads no words"
+SHIELD_LABEL = f"{SHIELD_VERSION} has the last word"
 """What must be said wherever a row of the expert is shown."""
 
 
@@ -106,6 +108,8 @@ class LampilotRun:
             if config.planner in ("idm", "mobil"):
                 raise ConfigError(f"{config.planner} has no program to rehearse.", hint="Leave --rehearse out.")
             labels = (*labels, label(config.rehearse))
+        if config.shield:
+            labels = (*labels, SHIELD_LABEL)
         frozen = Frozen.make(dataset, config, "" if planner is None else planner.model, labels, shard)
         with sole_writer(folder):
             frozen.freeze(folder)

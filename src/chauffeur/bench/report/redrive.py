@@ -13,6 +13,7 @@ from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run
 from chauffeur.bench.report.wording import ending_words
 from chauffeur.bench.store import Row
 from chauffeur.concept import (
+    LAMPILOT_LIMITS,
     ChauffeurError,
     Context,
     Instruction,
@@ -28,6 +29,7 @@ from chauffeur.describe import describe
 from chauffeur.drive.episode import Episode, run_episode
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.session import drive_program, drive_without_program, make_trip
+from chauffeur.safety.shield import Shield
 from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
 
 
@@ -57,6 +59,10 @@ class Kept:
     def plan(self, row: Row) -> Plan | None:
         """(R, P) of the item; None for baselines and calls that failed."""
         return _valid(plan_adapter, (self._plans.get(str(row["item"])) or {}).get("plan"))
+
+    def shielded(self, row: Row) -> bool:
+        """Whether the item was driven under the run-time shield."""
+        return "shield" in (self._rollouts.get(str(row.get("rollout_key", ""))) or {})
 
     def verdicts(self, row: Row) -> tuple[Verdict, ...]:
         """What the checks said of the item's plan."""
@@ -113,13 +119,15 @@ def drive_again(row: Row, scenario: Scenario, kept: Kept) -> tuple[RecordedTrip 
 
 
 def _drive(row: Row, plan: Plan | None, world: HighwayWorld, referee: LampilotReferee, kept: Kept) -> Episode | None:
+    shield = Shield(world.dt_s, LAMPILOT_LIMITS) if kept.shielded(row) else None
     if kept.baseline == "mobil":
-        return drive_without_program(world, referee, MAX_EPISODE_S, adjust=MobilBaseline(world.perception()).choose)
+        adjust = MobilBaseline(world.perception()).choose
+        return drive_without_program(world, referee, MAX_EPISODE_S, adjust=adjust, shield=shield)
     if kept.baseline:
-        return drive_without_program(world, referee, MAX_EPISODE_S)
+        return drive_without_program(world, referee, MAX_EPISODE_S, shield=shield)
     hands = kept.hands(row)
     if hands is not None:
         return run_episode(world, None, referee, max_s=MAX_EPISODE_S, hands=hands)
     if plan is None or not isinstance(plan.policy, Program):
         return None
-    return drive_program(world, plan.policy.source, referee, MAX_EPISODE_S, library=plan.policy.library)
+    return drive_program(world, plan.policy.source, referee, MAX_EPISODE_S, library=plan.policy.library, shield=shield)

@@ -1,0 +1,154 @@
+"""Who is to blame for a collision: the last instant the pair was safe, who left that state, who answered properly.
+
+Source: Shalev-Shwartz, Shammah, Shashua 2017, Def. 5 to 7 (blame time, proper response), for straight roads. A pair is
+safe while there is clear room to the side, or the rear one keeps a responsibility-sensitive gap. Whoever ended that is
+to blame: the one that came over to the other's side, or the rear one in a lane; and an ego that was wronged is to blame
+all the same if it did not brake with all it has. What was unsafe from the beginning is nobody's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from chauffeur.concept import Frame, Snapshot
+from chauffeur.safety.shield.frame import Body, Lens, Scene
+from chauffeur.safety.shield.gaps import braking_gap_m, rss_gap_m
+from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
+
+_FULL: Final = 0.9
+"""Share of full braking that counts as braking with all one has."""
+_STILL_MPS: Final = 0.5
+_TOWARDS_MPS: Final = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Blame:
+    """Who caused a collision.
+
+    Attributes:
+        who: `nobody`: there was none, or the pair was never safe.
+        other: Id of the other vehicle; None without a collision.
+        since_s: Blame time: when the pair was safe last; None if it never was.
+        reason: In words.
+    """
+
+    who: Literal["ego", "other", "nobody"]
+    other: int | None
+    since_s: float | None
+    reason: str
+
+
+def blame(
+    frames: Sequence[Frame], final: Snapshot, dt_s: float, parameters: ShieldParameters = LAMPILOT_SHIELD
+) -> Blame:
+    """Judge the end of a trip.
+
+    Args:
+        frames: Its control periods, at least the last seconds.
+        final: The instant it ended with.
+        dt_s: Control period.
+        parameters: What each side may be trusted to do.
+    """
+    if not final.ego.crashed:
+        return Blame("nobody", None, None, "There was no collision.")
+    lens = Lens()
+    last = frames[-1].snapshot if frames else final
+    other = _struck(final) or _struck(last)
+    if other is None:
+        return Blame("nobody", None, None, "The ego crashed, but into nobody that is seen.")
+    pairs = [_pair(lens.look(frame.snapshot), other) for frame in frames]
+    unsafe_from = len(pairs)
+    while unsafe_from > 0 and not _safe(pairs[unsafe_from - 1], dt_s, parameters):
+        unsafe_from -= 1
+    if unsafe_from == 0:
+        return Blame("nobody", other, None, "They were too close from the beginning.")
+    since = frames[unsafe_from - 1].snapshot.time_s
+    before = pairs[unsafe_from - 1]
+    assert before is not None
+    if _apart(before, parameters):
+        came_over = _ego_came_over(pairs[unsafe_from - 1 :])
+        if came_over:
+            return Blame("ego", other, since, "The ego came over to the other's side.")
+        if not _answered(frames[unsafe_from:], pairs[unsafe_from:], parameters):
+            return Blame("ego", other, since, "The other came over, but the ego did not brake with all it has.")
+        return Blame("other", other, since, "The other came over to the ego's side.")
+    if before[1].s_m < 0.0:
+        return Blame("other", other, since, "The other followed too closely.")
+    if _answered(frames[unsafe_from:], pairs[unsafe_from:], parameters):
+        return Blame("other", other, since, "The other ahead braked harder than anyone may be expected to.")
+    return Blame("ego", other, since, "The ego followed too closely.")
+
+
+Pair = tuple[Body, Body]
+
+
+def _struck(snapshot: Snapshot) -> int | None:
+    """The crashed vehicle, or else the obstacle, that is nearest to the ego."""
+    ego = snapshot.ego
+    crashed = [other for other in (*snapshot.others, *snapshot.objects) if other.crashed]
+    near = min(crashed, key=lambda other: (other.x_m - ego.x_m) ** 2 + (other.y_m - ego.y_m) ** 2, default=None)
+    return None if near is None else near.id
+
+
+def _pair(scene: Scene | None, other: int) -> Pair | None:
+    if scene is None:
+        return None
+    found = next((body for body in scene.others if body.id == other), None)
+    return None if found is None else (scene.ego, found)
+
+
+def _clear_m(pair: Pair) -> float:
+    """Clear distance to the side; negative where they overlap across the road."""
+    ego, other = pair
+    return abs(other.d_m - ego.d_m) - ego.half_width_m - other.half_width_m
+
+
+def _apart(pair: Pair, parameters: ShieldParameters) -> bool:
+    return _clear_m(pair) >= parameters.side_m
+
+
+def _safe(pair: Pair | None, dt_s: float, parameters: ShieldParameters) -> bool:
+    if pair is None or _apart(pair, parameters):
+        return True
+    ego, other = pair
+    gap = abs(other.s_m) - ego.half_length_m - other.half_length_m
+    if other.s_m >= 0.0:
+        return gap >= braking_gap_m(
+            max(ego.along_mps, 0.0), other.along_mps, parameters.braking_mps2, parameters.others_braking_mps2, dt_s
+        )
+    needed = rss_gap_m(
+        other.along_mps,
+        ego.along_mps,
+        0.0,
+        parameters.others_acceleration_mps2,
+        parameters.others_sure_braking_mps2,
+        parameters.braking_mps2,
+    )
+    return gap >= needed
+
+
+def _ego_came_over(pairs: Sequence[Pair | None]) -> bool:
+    """Whether, until their sides met, it was the ego that moved over rather than the other."""
+    ego_way = other_way = 0.0
+    for pair in pairs:
+        if pair is None:
+            continue
+        ego, other = pair
+        side = 1.0 if other.d_m >= ego.d_m else -1.0
+        ego_way += max(0.0, side * ego.across_mps - _TOWARDS_MPS)
+        other_way += max(0.0, -side * other.across_mps - _TOWARDS_MPS)
+        if _clear_m(pair) < 0.0:
+            break
+    return ego_way > other_way
+
+
+def _answered(frames: Sequence[Frame], pairs: Sequence[Pair | None], parameters: ShieldParameters) -> bool:
+    """Whether the ego braked with all it has whenever the other was ahead, one period for noticing aside."""
+    for frame, pair in list(zip(frames, pairs, strict=True))[1:]:
+        if pair is None or pair[1].s_m <= 0.0 or frame.snapshot.ego.speed_mps < _STILL_MPS:
+            continue
+        if frame.applied.acceleration_mps2 > -_FULL * parameters.braking_mps2:
+            return False
+    return True

@@ -1,0 +1,175 @@
+"""What the shield sees: the others in the frame of the lane the ego is in, and the lanes beside it.
+
+s runs along the ego's lane, d across it, towards where headings grow: on highway roads, whose y grows to the right of
+travel, the side with the higher lane index. A lane that bends is taken to go on as the circle it is where the ego is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+from chauffeur.concept import LaneId, LaneView, Snapshot, VehicleState
+from chauffeur.geometry import wrap_to_pi
+
+
+@dataclass(frozen=True, slots=True)
+class Strip:
+    """A lane where the ego is: its centre and edges across, m from the ego's own lane centre."""
+
+    lane: LaneId
+    centre_m: float
+    low_m: float
+    high_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A vehicle or obstacle in the frame.
+
+    Attributes:
+        id: As in the snapshot.
+        s_m, d_m: Centre, from the ego along and from its lane centre across.
+        heading_rad: Against the lane.
+        along_mps, across_mps: Speeds.
+        half_length_m, half_width_m: Half its extent along and across, turned as it is.
+    """
+
+    id: int
+    s_m: float
+    d_m: float
+    heading_rad: float
+    along_mps: float
+    across_mps: float
+    half_length_m: float
+    half_width_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """The ego, the others and the lanes, in the ego lane's frame; its curvature in 1/m grows with headings."""
+
+    ego: Body
+    others: tuple[Body, ...]
+    strips: tuple[Strip, ...]
+    speed_limit_mps: float
+    curvature: float = 0.0
+
+
+_EVERY_M: Final = 2.0
+"""The lane's frame is found anew every so many metres."""
+_PREVIEW_M: Final = 3.0
+"""Way over which a lane's bend is measured."""
+_STRAIGHT: Final = 1e-3
+"""Curvature, 1/m, below which a lane is straight."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    """Origin on the ego's lane, its direction, and the strips of the same road there."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    cos: float
+    sin: float
+    strips: tuple[Strip, ...]
+    limit_mps: float
+    curvature: float
+
+
+class Lens:
+    """Looks at one trip's snapshots: it keeps the frame from one to the next while the ego has not got far."""
+
+    def __init__(self) -> None:
+        self._lanes: tuple[LaneView, ...] = ()
+        self._place: tuple[LaneId, int, int] | None = None
+        self._frame: _Frame | None = None
+
+    def look(self, snapshot: Snapshot) -> Scene | None:
+        """The scene in the frame of the ego's lane; None where the ego is on no lane of the road."""
+        ego = snapshot.ego
+        if ego.lane is None:
+            return None
+        place = ego.lane, round(ego.x_m / _EVERY_M), round(ego.y_m / _EVERY_M)
+        if place != self._place or snapshot.lanes is not self._lanes:
+            self._lanes, self._place = snapshot.lanes, place
+            self._frame = _frame_at(snapshot.lanes, *place)
+        frame = self._frame
+        if frame is None:
+            return None
+        solid = (other for other in (*snapshot.others, *snapshot.objects) if other.kind != "stop_sign")
+        from_m = _place(ego, frame)[0]
+        others = tuple(_body(other, from_m, frame) for other in solid)
+        return Scene(_body(ego, from_m, frame), others, frame.strips, frame.limit_mps, frame.curvature)
+
+
+def _frame_at(lanes: tuple[LaneView, ...], own: LaneId, cell_x: int, cell_y: int) -> _Frame | None:
+    beside = {lane.id: lane for lane in lanes if lane.id[:2] == own[:2]}
+    if own not in beside:
+        return None
+    x, y, heading = _nearest(beside[own], cell_x * _EVERY_M, cell_y * _EVERY_M)
+    c, s = math.cos(heading), math.sin(heading)
+    strips: list[Strip] = []
+    for lane in beside.values():
+        lane_x, lane_y, _ = _nearest(lane, x, y)
+        centre = -s * (lane_x - x) + c * (lane_y - y)
+        strips.append(Strip(lane.id, centre, centre - lane.width_m / 2.0, centre + lane.width_m / 2.0))
+    strips.sort(key=lambda strip: strip.centre_m)
+    ahead = _nearest(beside[own], x + _PREVIEW_M * c, y + _PREVIEW_M * s)[2]
+    curvature = wrap_to_pi(ahead - heading) / _PREVIEW_M
+    if abs(curvature) < _STRAIGHT:
+        curvature = 0.0
+    return _Frame(x, y, heading, c, s, tuple(strips), beside[own].speed_limit_mps, curvature)
+
+
+def _nearest(lane: LaneView, x: float, y: float) -> tuple[float, float, float]:
+    """(x, y, heading) of the point of a lane's centre line that is closest; its ends go on straight."""
+    best = (math.inf, 0.0, 0.0, 0.0)
+    points = lane.centre_m
+    for i, ((ax, ay), (bx, by)) in enumerate(pairwise(points)):
+        length = math.hypot(bx - ax, by - ay)
+        if length == 0.0:
+            continue
+        ux, uy = (bx - ax) / length, (by - ay) / length
+        along = (x - ax) * ux + (y - ay) * uy
+        low = -math.inf if i == 0 else 0.0
+        high = math.inf if i == len(points) - 2 else length
+        along = max(low, min(high, along))
+        px, py = ax + along * ux, ay + along * uy
+        distance = math.hypot(x - px, y - py)
+        if distance < best[0]:
+            best = (distance, px, py, math.atan2(uy, ux))
+    return best[1], best[2], best[3]
+
+
+def _place(vehicle: VehicleState, frame: _Frame) -> tuple[float, float, float]:
+    """(along, across, heading of the lane there) from the frame's origin; the heading is against the frame's."""
+    dx, dy = vehicle.x_m - frame.x_m, vehicle.y_m - frame.y_m
+    along, across = frame.cos * dx + frame.sin * dy, -frame.sin * dx + frame.cos * dy
+    if frame.curvature == 0.0:
+        return along, across, 0.0
+    # The lane is a circle about (0, radius), on the side where headings grow if the radius is positive.
+    radius = 1.0 / frame.curvature
+    side = math.copysign(1.0, radius)
+    turned = side * math.atan2(along, side * (radius - across))
+    return turned * radius, radius - side * math.hypot(along, radius - across), turned
+
+
+def _body(vehicle: VehicleState, from_m: float, frame: _Frame) -> Body:
+    along, across, lane_heading = _place(vehicle, frame)
+    heading = wrap_to_pi(vehicle.heading_rad - frame.heading_rad - lane_heading)
+    c, s = math.cos(heading), math.sin(heading)
+    half_length, half_width = vehicle.length_m / 2.0, vehicle.width_m / 2.0
+    return Body(
+        vehicle.id,
+        along - from_m,
+        across,
+        heading,
+        vehicle.speed_mps * c,
+        vehicle.speed_mps * s,
+        abs(c) * half_length + abs(s) * half_width,
+        abs(s) * half_length + abs(c) * half_width,
+    )

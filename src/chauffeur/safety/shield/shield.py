@@ -1,0 +1,317 @@
+"""The shield: the last word between the controllers and the world.
+
+It changes a command as little as is needed so that full braking and steering back to the lane still end well, whatever
+the others do within what `ShieldParameters` assume of them; it says what it changed and why. It knows no program, no
+wish and no model, and remembers nothing from one period to the next but the lane it could steer back to.
+
+Across the road: a command that would carry the body over a line is let through only if that lane is free, ahead and
+behind, by responsibility-sensitive distances; otherwise the car is steered back. Along it: no faster than still stops
+behind every car in the lanes the body touches or is on its way to; no harder braking than needed while somebody follows
+too closely; no reversing; not above the speed limit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from chauffeur.concept import Command, Intervention, LaneId, Limits, Snapshot, VehicleState
+from chauffeur.safety.shield.crossing import CLEARING_MPS, CLEARING_MPS2, INSIDE_M, NOTHING_CROSSES, Crossing, Junction
+from chauffeur.safety.shield.frame import Body, Lens, Scene, Strip
+from chauffeur.safety.shield.gaps import greatest_acceleration, rss_gap_m, stopping_m
+from chauffeur.safety.shield.sweep import recovery_steering, swept, yaw_rate
+from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
+from chauffeur.safety.words import speed_words
+
+Span = tuple[float, float]
+"""(lowest, highest) place across the road, m from the centre of the ego's lane."""
+
+_LANE_M = 4.0
+_CORNER_M = 1.0
+_LANES_AT_ONCE = 2
+_HOLD_M = 1.0
+"""How far before a crossing way the ego stops."""
+_CROSSING_SINE = math.sin(math.radians(40.0))
+"""A car turned further than this against the lane crosses it: it does not drift along."""
+_TOUCH_M = 0.05
+"""How far a body must reach over a line to be in the lane beyond it."""
+_LEVEL_MPS2 = 1e-6
+_LEVEL_RAD = 1e-9
+_SLOWING_MPS2 = 1.0
+"""Braking towards the speed limit when a car is above it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Guarded:
+    """What may go to the actuator, and what was changed on the way."""
+
+    command: Command
+    interventions: tuple[Intervention, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Cap:
+    """A bound of the acceleration, and whom it is owed to."""
+
+    acceleration_mps2: float
+    rule: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Steered:
+    """A command that may be steered, and what the body touches on it."""
+
+    command: Command
+    span: Span
+
+
+class Shield:
+    """Judges and mends commands of one trip, one a control period."""
+
+    def __init__(
+        self, dt_s: float, limits: Limits | None = None, parameters: ShieldParameters = LAMPILOT_SHIELD
+    ) -> None:
+        self._dt_s = dt_s
+        self._limits = Limits() if limits is None else limits
+        self._table = parameters
+        self._lens = Lens()
+        self._back: LaneId | None = None
+        self._junction: Junction | None = None
+
+    def guard(self, snapshot: Snapshot, command: Command) -> Guarded:
+        """The command, changed as little as needed.
+
+        Args:
+            snapshot: The instant the command is for.
+            command: What the controllers ask; numbers that are none stop the car.
+        """
+        scene = self._lens.look(snapshot)
+        if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
+            safe = self._standing_still(snapshot, scene)
+            return Guarded(safe, (Intervention("finite", "A command that is no number was replaced.", command, safe),))
+        if scene is None:
+            return Guarded(command)
+        interventions: list[Intervention] = []
+        steered = self._across(scene, snapshot.ego, command, interventions)
+        crossing = self._crossing(snapshot)
+        mended = self._along(scene, snapshot.ego, crossing, steered, interventions)
+        return Guarded(mended, tuple(interventions))
+
+    def _standing_still(self, snapshot: Snapshot, scene: Scene | None) -> Command:
+        speed = snapshot.ego.speed_mps
+        steering = 0.0
+        if scene is not None:
+            own = _own(scene)
+            steering = recovery_steering(scene.ego, own.centre_m, speed, self._table.steering_rad, scene.curvature)
+        return Command(max(-self._table.braking_mps2, -max(speed, 0.0) / self._dt_s), steering)
+
+    def _crossing(self, snapshot: Snapshot) -> Crossing:
+        if snapshot.kind != "intersection":
+            return NOTHING_CROSSES
+        if self._junction is None or self._junction.lanes is not snapshot.lanes:
+            self._junction = Junction(snapshot.lanes)
+        return self._junction.look(snapshot, self._table.others_acceleration_mps2)
+
+    # Across -----------------------------------------------------------------------------------------------------------
+
+    def _across(self, scene: Scene, ego: VehicleState, command: Command, said: list[Intervention]) -> _Steered:
+        """The command with its steering mended, and what it touches across the road.
+
+        A command is let through if after one period of it the car can still be steered back into a lane without
+        touching anything on the way. That lane is kept: whatever the next command is, the way back to it is open.
+        """
+        own = _own(scene)
+        back = next((strip for strip in scene.strips if strip.lane == self._back), own)
+        why = ""
+        for lane in (own, back) if back is not own else (own,):
+            span = self._swept(scene, ego, command.steering_rad, lane)
+            reason = self._why_not(scene, own, span)
+            if not reason and self._too_sharp(scene, ego.speed_mps, command.steering_rad):
+                reason = "That is too sharp at this speed."
+            if not reason:
+                self._back = lane.lane
+                return _Steered(command, _lanes_wide(scene, span))
+            why = why or reason
+        self._back = back.lane
+        steering = recovery_steering(scene.ego, back.centre_m, ego.speed_mps, self._table.steering_rad, scene.curvature)
+        mended = Command(command.acceleration_mps2, steering)
+        if abs(steering - command.steering_rad) > _LEVEL_RAD:
+            said.append(Intervention("lane", why, command, mended))
+        return _Steered(mended, _lanes_wide(scene, self._swept(scene, ego, steering, back)))
+
+    def _swept(self, scene: Scene, ego: VehicleState, steering_rad: float, lane: Strip) -> Span:
+        return swept(
+            scene.ego,
+            ego.speed_mps,
+            (ego.length_m, ego.width_m),
+            steering_rad,
+            lane.centre_m,
+            self._table.steering_rad,
+            self._dt_s,
+            scene.curvature,
+        )
+
+    def _too_sharp(self, scene: Scene, speed: float, steering_rad: float) -> bool:
+        """Whether a command turns the car further away from its lane than any lane change needs."""
+        before = scene.ego.heading_rad
+        after = before + (yaw_rate(speed, steering_rad) - scene.curvature * speed) * self._dt_s
+        return abs(after) > abs(before) and abs(speed * math.sin(after)) > self._table.sideways_mps
+
+    def _why_not(self, scene: Scene, own: Strip, span: Span) -> str:
+        """Why the body must not sweep a span; empty when it may."""
+        ego = scene.ego
+        low, high = ego.d_m - ego.half_width_m, ego.d_m + ego.half_width_m
+        # Where lanes bend and cross there is road beside them, and cars cut corners.
+        verge = _CORNER_M if scene.curvature else 0.0
+        left, right = scene.strips[0].low_m - verge, scene.strips[-1].high_m + verge
+        if span[0] < min(left, low) - _TOUCH_M or span[1] > max(right, high) + _TOUCH_M:
+            return "That would leave the road."
+        entered = [strip for strip in scene.strips if _in(strip, span)]
+        if len(entered) > _LANES_AT_ONCE and span[1] - span[0] > high - low + _TOUCH_M:
+            return "That would cross more than one line at once."
+        for strip in entered:
+            further = span[0] < low - _TOUCH_M if strip.centre_m < own.centre_m else span[1] > high + _TOUCH_M
+            if strip is own or not further:
+                continue
+            touched = _in(strip, (low, high))
+            for other in scene.others:
+                if _overlaps(other, (strip.low_m, strip.high_m), 0.0, self._table.drift_mps):
+                    reason = self._too_close(ego, other, touched)
+                    if reason:
+                        return reason
+        return ""
+
+    def _too_close(self, ego: Body, other: Body, touched: bool) -> str:
+        """Why the ego must not come, or come further, into the lane of another; empty when it may.
+
+        A car behind has seen it (`touched`) once it is over the line, and needs no time to respond any more.
+        """
+        table = self._table
+        is_m = max(abs(other.s_m) - ego.half_length_m - other.half_length_m, 0.0)
+        if is_m < table.margin_m:
+            return "The lane is not free: a car is beside."
+        if other.s_m >= 0.0:
+            cap = self._greatest(max(ego.along_mps, 0.0), is_m - table.margin_m, other.along_mps)
+            return (
+                f"The lane is not free: a car {is_m:.0f} m ahead in it is too close."
+                if cap < -table.gentle_mps2
+                else ""
+            )
+        needed = table.margin_m + rss_gap_m(
+            other.along_mps,
+            ego.along_mps,
+            0.0 if touched else table.others_response_s,
+            table.others_acceleration_mps2,
+            table.others_sure_braking_mps2,
+            table.gentle_mps2,
+        )
+        if is_m < needed:
+            return f"The lane is not free: a car {is_m:.0f} m behind in it needs {needed:.0f} m."
+        return ""
+
+    # Along ------------------------------------------------------------------------------------------------------------
+
+    def _along(
+        self, scene: Scene, ego: VehicleState, crossing: Crossing, steered: _Steered, said: list[Intervention]
+    ) -> Command:
+        """The command with its acceleration mended."""
+        command, span, speed = steered.command, steered.span, ego.speed_mps
+        asked = command.acceleration_mps2
+        bound = self._bound(scene, span)
+        if not crossing.inside and math.isfinite(crossing.hold_m):
+            bound = self._yielding(crossing, ego, bound)
+        wanted = min(asked, bound.acceleration_mps2)
+        rule, reason = bound.rule, bound.reason
+        if crossing.inside and speed < CLEARING_MPS and wanted < min(CLEARING_MPS2, bound.acceleration_mps2):
+            wanted = min(CLEARING_MPS2, bound.acceleration_mps2)
+            rule, reason = "clear", "Somebody is coming: the crossing has to be cleared."
+        elif wanted >= asked - _LEVEL_MPS2 and wanted < -self._table.gentle_mps2:
+            spared = min(self._spared(scene, span, wanted), bound.acceleration_mps2)
+            if spared > wanted:
+                wanted, rule = spared, "brake"
+                reason = "A car close behind could not stop for braking that hard, and nothing ahead asks for it."
+        standing = -max(speed, 0.0) / self._dt_s
+        if wanted < standing:
+            wanted, rule, reason = standing, "reverse", "The car stands; it does not reverse."
+        if abs(wanted - asked) <= _LEVEL_MPS2:
+            return command
+        mended = Command(wanted, command.steering_rad)
+        if speed > 0.0 or wanted < asked:
+            said.append(Intervention(rule, reason, command, mended))
+        return mended
+
+    def _yielding(self, crossing: Crossing, ego: VehicleState, bound: _Cap) -> _Cap:
+        """The bound with which the car still stops before a way that somebody else needs; as it was past that point."""
+        speed = max(ego.speed_mps, 0.0)
+        front = crossing.hold_m - ego.length_m / 2.0
+        if front + INSIDE_M < stopping_m(speed, self._table.braking_mps2, self._dt_s):
+            return bound
+        cap = self._greatest(speed, front - _HOLD_M, 0.0)
+        if cap >= bound.acceleration_mps2:
+            return bound
+        return _Cap(cap, "yield", "Somebody crosses ahead, and goes first.")
+
+    def _bound(self, scene: Scene, span: Span) -> _Cap:
+        """The strictest bound of the acceleration."""
+        table, ego = self._table, scene.ego
+        speed = max(math.hypot(ego.along_mps, ego.across_mps), 0.0)
+        most = scene.speed_limit_mps + self._limits.max_over_limit_mps
+        if self._limits.max_speed_mps is not None:
+            most = min(most, self._limits.max_speed_mps)
+        towards = (most - speed) / self._dt_s
+        allowed = towards if towards >= 0.0 else max(towards, -_SLOWING_MPS2)
+        strictest = _Cap(min(allowed, table.acceleration_mps2), "speed", f"No faster than {speed_words(most)} here.")
+        for other in scene.others:
+            if other.s_m <= 0.0 or not _overlaps(other, span, table.side_m, table.drift_mps):
+                continue
+            gap = other.s_m - ego.half_length_m - other.half_length_m
+            cap = self._greatest(speed, gap - table.margin_m, other.along_mps)
+            if cap < strictest.acceleration_mps2:
+                strictest = _Cap(cap, "gap", f"Too close to the car {max(gap, 0.0):.0f} m ahead to ask for more.")
+        return strictest
+
+    def _greatest(self, speed: float, gap_m: float, lead_mps: float) -> float:
+        table = self._table
+        return greatest_acceleration(speed, gap_m, lead_mps, table.braking_mps2, table.others_braking_mps2, self._dt_s)
+
+    def _spared(self, scene: Scene, span: Span, wanted: float) -> float:
+        """Braking that a car following too closely can still answer; `wanted` where nobody does."""
+        table, ego = self._table, scene.ego
+        for other in scene.others:
+            if other.s_m >= 0.0 or not _overlaps(other, span, 0.0, table.drift_mps):
+                continue
+            gap = -other.s_m - ego.half_length_m - other.half_length_m - table.margin_m
+            needed = rss_gap_m(
+                other.along_mps, ego.along_mps, table.others_response_s, 0.0, table.others_sure_braking_mps2, -wanted
+            )
+            if gap < needed:
+                return -table.gentle_mps2
+        return wanted
+
+
+def _own(scene: Scene) -> Strip:
+    """The lane whose centre is nearest to the ego's."""
+    return min(scene.strips, key=lambda strip: abs(strip.centre_m - scene.ego.d_m))
+
+
+def _in(strip: Strip, span: Span) -> bool:
+    return span[0] < strip.high_m - _TOUCH_M and span[1] > strip.low_m + _TOUCH_M
+
+
+def _lanes_wide(scene: Scene, span: Span) -> Span:
+    """A span widened to the edges of every lane it is in."""
+    lanes = [strip for strip in scene.strips if _in(strip, span)]
+    return min([span[0], *(s.low_m for s in lanes)]), max([span[1], *(s.high_m for s in lanes)])
+
+
+def _overlaps(other: Body, span: Span, side_m: float, drift_mps: float) -> bool:
+    """Whether a body is, or is on its way, within a span; one that drifts claims the width of a lane more."""
+    left = other.d_m - other.half_width_m - side_m
+    right = other.d_m + other.half_width_m + side_m
+    drifts = abs(other.across_mps) > drift_mps and abs(math.sin(other.heading_rad)) < _CROSSING_SINE
+    if drifts and other.across_mps > 0.0:
+        right += _LANE_M
+    elif drifts:
+        left -= _LANE_M
+    return left < span[1] and right > span[0]
