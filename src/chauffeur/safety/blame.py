@@ -3,11 +3,13 @@
 Source: Shalev-Shwartz, Shammah, Shashua 2017, Def. 5 to 7 (blame time, proper response), for straight roads. A pair is
 safe while there is clear room to the side, or the rear one keeps a responsibility-sensitive gap. Whoever ended that is
 to blame: the one that came over to the other's side, or the rear one in a lane; and an ego that was wronged is to blame
-all the same if it did not brake with all it has. What was unsafe from the beginning is nobody's.
+all the same if it did not brake with all it has. Where ways cross the others go first, so that the ego is to blame for
+every collision with one that crosses, unless it stood. What was unsafe from the beginning is nobody's.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -21,6 +23,8 @@ _FULL: Final = 0.9
 """Share of full braking that counts as braking with all one has."""
 _STILL_MPS: Final = 0.5
 _TOWARDS_MPS: Final = 0.05
+_CROSSES_SINE: Final = math.sin(math.radians(40.0))
+_STOOD_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +62,9 @@ def blame(
     other = _struck(final) or _struck(last)
     if other is None:
         return Blame("nobody", None, None, "The ego crashed, but into nobody that is seen.")
+    crossed = _pair(lens.look(last), other)
+    if crossed is not None and abs(math.sin(crossed[1].heading_rad)) > _CROSSES_SINE:
+        return _at_a_crossing(frames, other, dt_s)
     pairs = [_pair(lens.look(frame.snapshot), other) for frame in frames]
     unsafe_from = len(pairs)
     while unsafe_from > 0 and not _safe(pairs[unsafe_from - 1], dt_s, parameters):
@@ -82,6 +89,13 @@ def blame(
 
 
 Pair = tuple[Body, Body]
+
+
+def _at_a_crossing(frames: Sequence[Frame], other: int, dt_s: float) -> Blame:
+    stood = frames[-round(_STOOD_S / dt_s) :]
+    if all(frame.snapshot.ego.speed_mps < _STILL_MPS for frame in stood):
+        return Blame("other", other, stood[0].snapshot.time_s, "The ego stood when a crossing car ran into it.")
+    return Blame("ego", other, None, "The ego was in the way of one that crossed.")
 
 
 def _struck(snapshot: Snapshot) -> int | None:

@@ -53,9 +53,11 @@ FACTORS: Final = (0.5, 0.6, 0.75, 0.8, 0.9, 1.1, 1.2, 1.25, 1.5, 2.0)
 WEIGHTS: Final[dict[str, float]] = {
     **dict.fromkeys(SKILLS, 1.0),
     **dict.fromkeys(("drive_at", "faster_by", "slower_by", "gap_of", "closer_by", "further_by"), 5.0),
-    **dict.fromkeys(("lane_left", "lane_right", "overtake_left", "overtake_right", "pull_over"), 3.0),
-    **dict.fromkeys(("faster", "slower", "further", "closer", "hurry", "relax", "gently", "carefully"), 2.0),
-    "overtake": 1.5,
+    **dict.fromkeys(("lane_left", "lane_right", "overtake_left", "overtake_right", "pull_over"), 4.0),
+    **dict.fromkeys(("faster", "slower", "further", "closer"), 3.0),
+    **dict.fromkeys(("hurry", "relax", "gently", "carefully"), 6.0),
+    **dict.fromkeys(("sportily", "economically", "overtake"), 4.0),
+    **dict.fromkeys(("a_bit_faster", "a_bit_slower", "much_faster", "much_slower", "let_in", "stop_here"), 2.0),
 }
 """How often a skill is drawn on a highway, before what does not fit is left out."""
 CROSSING_WEIGHTS: Final[dict[str, float]] = {

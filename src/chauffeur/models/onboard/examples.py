@@ -29,7 +29,7 @@ CORRECTION_SHARE: Final = 0.06
 UNDRAFTED_SHARE: Final = 0.1
 """Share of examples without a draft: servers of the exported model show none."""
 UNKNOWN_CONTEXT_SHARE: Final = 0.08
-LEVELS: Final = (0.62, 0.22, 0.16)
+LEVELS: Final = (0.46, 0.29, 0.25)
 NOISE: Final = (0.55, 0.3, 0.15)
 
 SAID: Final = (

@@ -39,7 +39,7 @@ from chauffeur.models.onboard.examples import Example, checked_reasons, question
 from chauffeur.models.onboard.packed import Packed
 from chauffeur.planners.onboard.prompt import END
 
-MODEL_VERSION: Final = "onboard-lm-v1"
+MODEL_VERSION: Final = "onboard-lm-v2"
 _SPLITS: Final = ("train", "seen", "unseen")
 _TOKENIZER_EXAMPLES: Final = 60_000
 
@@ -60,10 +60,10 @@ class Plan:
     """
 
     seed: int = 0
-    draws: int = 22_000
+    draws: int = 30_000
     per_case: int = PER_CASE
     size: str = "small"
-    steps: int = 6_500
+    steps: int = 14_000
 
 
 def build_data(folder: Path, plan: Plan, workers: int, told: Told) -> None:

@@ -142,7 +142,8 @@ def _whole(number: int, rng: np.random.Generator) -> str:
     draw = rng.random()
     if hundreds == 1 and below >= 20 and draw < 0.2:
         return f"one {small}"
-    head = "a hundred" if hundreds == 1 and draw < 0.6 else f"{ONES[hundreds]} hundred"
+    one = "a hundred" if draw < 0.6 else "hundred" if draw < 0.7 else "one hundred"
+    head = one if hundreds == 1 else f"{ONES[hundreds]} hundred"
     if not below:
         return head
     return f"{head} and {small}" if rng.random() < 0.6 else f"{head} {small}"

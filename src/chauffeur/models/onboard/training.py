@@ -78,7 +78,7 @@ class Recipe:
     rate: float = 2e-3
     warmup: int = 200
     decay: float = 0.05
-    blanked: float = 0.1
+    blanked: float = 0.15
     seed: int = 0
 
 

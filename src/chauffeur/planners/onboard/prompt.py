@@ -53,15 +53,14 @@ def wish_words(wish: str) -> str:
 
 
 def context_words(situation: Situation) -> str:
-    """C in a few words."""
-    parts = [f"{situation.world} speed {situation.speed_mps:.0f} limit {situation.speed_limit_mps:.0f}"]
-    parts.append(f"lane {situation.lane_index + 1}/{situation.lane_count}")
+    """C as far as it decides what words mean; its numbers are for linking, and would be taken for the wish's."""
+    parts = [f"{situation.world} lane {situation.lane_index + 1}/{situation.lane_count}"]
     if situation.emergency_lane:
         parts.append("shoulder")
     if situation.front is not None:
-        parts.append(f"ahead {situation.front.distance_m:.0f} m {situation.front.speed_mps:.0f}")
+        parts.append("ahead")
     if situation.stop_sign_m is not None:
-        parts.append(f"sign {situation.stop_sign_m:.0f} m")
+        parts.append("sign")
     if situation.turns:
         parts.append(f"ways {' '.join(situation.turns)}")
     return " ".join(parts)

@@ -27,7 +27,11 @@ Span = tuple[float, float]
 """(lowest, highest) place across the road, m from the centre of the ego's lane."""
 
 _LANE_M = 4.0
-_CORNER_M = 1.0
+_CORNER_M = 0.5
+_CREEP_M = 1e-3
+"""What counts as further over a line than the body is: any more, or it could creep there period by period."""
+_ALONE_RAD = 0.15
+"""Angle to its lane that a car needs at most where there is one lane only."""
 _LANES_AT_ONCE = 2
 _HOLD_M = 1.0
 """How far before a crossing way the ego stops."""
@@ -156,7 +160,9 @@ class Shield:
         """Whether a command turns the car further away from its lane than any lane change needs."""
         before = scene.ego.heading_rad
         after = before + (yaw_rate(speed, steering_rad) - scene.curvature * speed) * self._dt_s
-        return abs(after) > abs(before) and abs(speed * math.sin(after)) > self._table.sideways_mps
+        # With one lane there is nowhere to turn to, and a slow car's tyres carry a turn on for a while.
+        steep = len(scene.strips) == 1 and abs(after) > _ALONE_RAD
+        return abs(after) > abs(before) and (steep or abs(speed * math.sin(after)) > self._table.sideways_mps)
 
     def _why_not(self, scene: Scene, own: Strip, span: Span) -> str:
         """Why the body must not sweep a span; empty when it may."""
@@ -165,13 +171,15 @@ class Shield:
         # Where lanes bend and cross there is road beside them, and cars cut corners.
         verge = _CORNER_M if scene.curvature else 0.0
         left, right = scene.strips[0].low_m - verge, scene.strips[-1].high_m + verge
-        if span[0] < min(left, low) - _TOUCH_M or span[1] > max(right, high) + _TOUCH_M:
+        over_left = span[0] < left - _TOUCH_M and span[0] < low - _CREEP_M
+        over_right = span[1] > right + _TOUCH_M and span[1] > high + _CREEP_M
+        if over_left or over_right:
             return "That would leave the road."
         entered = [strip for strip in scene.strips if _in(strip, span)]
         if len(entered) > _LANES_AT_ONCE and span[1] - span[0] > high - low + _TOUCH_M:
             return "That would cross more than one line at once."
         for strip in entered:
-            further = span[0] < low - _TOUCH_M if strip.centre_m < own.centre_m else span[1] > high + _TOUCH_M
+            further = span[0] < low - _CREEP_M if strip.centre_m < own.centre_m else span[1] > high + _CREEP_M
             if strip is own or not further:
                 continue
             touched = _in(strip, (low, high))

@@ -16,6 +16,8 @@ from chauffeur.safety.shield.frame import Body
 _PERIODS = 14
 """Periods of coming back that are looked at; by then the car is back, or goes along its lane."""
 _HALF_LENGTH_M = LAMPILOT_STEERING.length_m / 2.0
+_APPROACH_RAD = 0.2
+"""Angle at which the shield comes back to a lane's centre: a slow car turned further would stick out of the lane."""
 _STRAIGHT_RAD = 0.02
 _CENTRED_M = 0.1
 
@@ -29,7 +31,7 @@ def recovery_steering(ego: Body, centre_m: float, speed_mps: float, most_rad: fl
 
 @lru_cache(maxsize=4)
 def _with_wheel(most_rad: float) -> LaneKeepingParameters:
-    return replace(LAMPILOT_STEERING, max_steering_rad=most_rad)
+    return replace(LAMPILOT_STEERING, max_steering_rad=most_rad, max_approach_rad=_APPROACH_RAD)
 
 
 def yaw_rate(speed_mps: float, steering_rad: float) -> float:
