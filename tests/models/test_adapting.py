@@ -61,12 +61,11 @@ WORDINGS = 48
 HURRY, RELAX = write([Step("hurry")]), write([Step("relax")])
 
 
-def phrase(words: str, program: str, speeds: range) -> list[Interaction]:
-    """One phrase of a person's in several situations."""
-    return [Interaction(words, replace(HIGHWAY, speed_mps=float(speed)), (), program, True) for speed in speeds]
-
-
-BOOGIE = phrase("Let us boogie", HURRY, range(18, 30))
+BOOGIE = [
+    Interaction(f"{begin}{end}", HIGHWAY, (), HURRY, True)
+    for begin in ("Let us boogie", "Boogie", "Time to boogie", "Now boogie")
+    for end in ("", " please", " again")
+]
 
 
 def told(stage: str, done: int, of: int) -> None:
@@ -229,9 +228,9 @@ def test_parts_are_apart_and_stay_so() -> None:
     assert parted(reversed(BOOGIE), 0.25, seed=0) == (learned, held)
     newer = replace(BOOGIE[0], program=RELAX)
     both = parted([*BOOGIE, newer, replace(BOOGIE[1], accepted=False, program=RELAX)], 0.25, seed=0)
-    programs = {one.situation: one.program for part in both for one in part}
-    assert programs[BOOGIE[0].situation] == RELAX
-    assert programs[BOOGIE[1].situation] == HURRY
+    programs = {one.wish: one.program for part in both for one in part}
+    assert programs[BOOGIE[0].wish] == RELAX
+    assert programs[BOOGIE[1].wish] == HURRY
     with pytest.raises(DataError, match="3 different"):
         parted(BOOGIE[:3], 0.25, seed=0)
 
@@ -258,7 +257,7 @@ def test_the_model_folder_holds_counts_only(boogied: tuple[Path, Verdict]) -> No
     assert about["version"] == "tiny+adapted.1"
     counts = about["adapted"]["interactions"]
     assert (counts["learned"], counts["held_back"]) == (10, 2)
-    assert counts["replayed"] > 100
+    assert counts["replayed"] > 50
     assert sorted(path.name for path in (out / "models").iterdir()) == ["0001"]
     for path in out.rglob("*"):
         if path.is_file():

@@ -170,8 +170,10 @@ class Teller(Quiet):
 
     def _verdict(self, verdict: Verdict) -> None:
         mark = Text("✓ ", "green") if verdict.passed else Text("✕ ", "bold red")
+        # Of what passed, the doubts are on the page and in the recording.
+        reason = verdict.reason.split(". ", 1)[0].rstrip(".") + "." if verdict.passed else verdict.reason
         where = f"{verdict.check}, line {verdict.line}" if verdict.line else verdict.check
-        body = Text.assemble(mark, plain(verdict.reason or "passed"), (f"  {where}", "dim"))
+        body = Text.assemble(mark, plain(reason if verdict.reason else "passed"), (f"  {where}", "dim"))
         if verdict.remedy and not verdict.passed:
             body.append_text(Text("\n  ") + plain(verdict.remedy))
         self._letter("V", body)

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from typing import Final, Literal
 from urllib.parse import unquote
 
-from chauffeur.safety.skeleton import dressed, folded, ignorable, skeleton, words_that_mix
+from chauffeur.language.letters import dressed, folded, ignorable, skeleton, words_that_mix
 
 Kind = Literal["override", "role", "code", "control", "lookalike", "encoded", "long"]
 """What was found: words that claim to change the rules; a forged speaker or chat-template token; program text, markup

@@ -12,14 +12,13 @@ Everything here is a pure function of text that never raises.
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from chauffeur.concept import Context, Feedback, History, HistoryItem, Instruction, PlanRequest
+from chauffeur.language.letters import clean
 from chauffeur.safety.hiding import MAX_READ_CHARS, Found, Kind, hidden_in
-from chauffeur.safety.skeleton import fold_char, ignorable
 
 Source = Literal["wish", "history", "service", "reply"]
 """Who wrote it: the passenger now; the passenger, or whoever used the name, earlier; a map, a weather or traffic
@@ -98,18 +97,6 @@ def screen(text: str, source: Source) -> Screened:
         return Screened(clean(text), findings)
     kinds = ", ".join(dict.fromkeys(finding.kind for finding in findings))
     return Screened(f"withheld ({kinds}): {quote(text, QUOTED_CHARS)}", findings, withheld=True)
-
-
-def clean(text: str) -> str:
-    """A text without invisible characters and in plain letters; line ends become newlines, tabs become blanks.
-
-    What goes: control, format, private and unassigned characters, and everything that Unicode lets a display ignore
-    (zero-width, bidirectional and tag characters, variation selectors, fillers), which hides text from people that a
-    model still reads. Full-width, mathematical and circled letters become the letters they stand for. Superscripts and
-    fractions stay: `10²` must not become `102`. Cleaning a clean text changes nothing.
-    """
-    lines = text.encode("utf-8", "replace").decode("utf-8").splitlines()
-    return "\n".join(map(_clean_line, lines)).strip()
 
 
 def quote(text: str, limit: int) -> str:
@@ -193,11 +180,6 @@ def _found(text: str) -> Iterable[Found]:
 def _too_long(text: str) -> Iterable[Found]:
     if len(text) > MAX_CHARS:
         yield "long", (MAX_CHARS, len(text)), f"{len(text)} characters"
-
-
-def _clean_line(line: str) -> str:
-    kept = "".join(" " if char == "\t" else fold_char(char) for char in line if char == "\t" or not ignorable(char))
-    return unicodedata.normalize("NFC", kept).rstrip()
 
 
 _NEUTRAL: Final = str.maketrans({'"': "'", "`": "'", "<": "‹", ">": "›", "|": "¦", "{": "(", "}": ")", "\\": "/"})

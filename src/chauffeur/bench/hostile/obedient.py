@@ -15,8 +15,8 @@ from typing import Final
 
 from chauffeur.bench.hostile.loading import Input
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
+from chauffeur.language.letters import clean
 from chauffeur.language.quantities import read_quantities
-from chauffeur.safety.screening import clean
 
 VERSION: Final = "obedient-v1"
 

@@ -20,6 +20,7 @@ _DIGITS: Final = re.compile(r"\d+(?:\.\d+)?")
 _CLOSE: Final = 0.011
 _ROUND: Final = 0.01
 _SIDES: Final = ("left", "right")
+_WHICH_SIDE: Final = "Do you mean left or right?"
 
 
 def doubt(wish: str, history: Sequence[str], steps: Sequence[Step]) -> str:
@@ -35,7 +36,9 @@ def doubt(wish: str, history: Sequence[str], steps: Sequence[Step]) -> str:
         return f"I am not sure about the number: did you mean {strange.value:g}?"
     reading = understand(wish)
     if isinstance(reading, NotUnderstood):
-        return ""
+        both = set(_SIDES) <= set(re.findall(r"[a-z]+", wish.lower()))
+        sided = any(step.meaning.direction in _SIDES for step in steps)
+        return _WHICH_SIDE if reading.why == "ambiguous" and both and sided else ""
     return _contradiction(reading, steps)
 
 
@@ -106,7 +109,7 @@ def _contradiction(reading: Reading, steps: Sequence[Step]) -> str:
         if ruled.manoeuvre != written.manoeuvre:
             continue
         if {ruled.direction, written.direction} == set(_SIDES):
-            return "Do you mean left or right?"
+            return _WHICH_SIDE
         if ruled.change * written.change < 0:
             return "Do you want more or less of it?"
     return ""

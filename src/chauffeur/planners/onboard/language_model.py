@@ -64,21 +64,23 @@ def answer(
         return Reply(refusal=reason), NOTHING
     attempts = count(1)
 
-    def write(**how: Any) -> tuple[Reply, Written]:
+    def write(asked: str = text, **how: Any) -> tuple[Reply, Written]:
         attempt = next(attempts)
         told = None if on_text is None else partial(_told, on_text, attempt)
-        written = engine.write(text, told=told, **how)
+        written = engine.write(asked, told=told, **how)
         return read_reply(written.text), written
 
     reply, written = write(constrained=constrained)
     if reply.refusal in engine.about.get("checked", ()):
-        # Whether the road and the limits allow it is for linking and the checks to say, not for the model.
-        reply, written = write(only_program=True)
+        # Whether the road and the limits allow it is for linking and the checks to say, not for the model. It is asked
+        # as if nothing were known of the road: where it knows of no lane on the right, it would rather go left.
+        text = prompt(None, history, wish)
+        reply, written = write(text, only_program=True)
     if not guarded or not reply.steps:
         return reply, written
     if unnamed(wish, history, reply.steps) and (numbers := named(wish, history)):
         # Once more with the numbers that were said, and no others.
-        reply, written = write(only_program=True, measures=numbers)
+        reply, written = write(text, only_program=True, measures=numbers)
     question = doubt(wish, history, reply.steps)
     if not question and written.sure < UNSURE:
         guess = tell(reply.steps).removeprefix("I ").removesuffix(".").replace(", then I ", ", then ")

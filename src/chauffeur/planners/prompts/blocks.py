@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from chauffeur.safety.screening import clean
+from chauffeur.language.letters import clean
 
 __all__ = ["cap", "clean", "data_block", "defuse", "program_block"]
 

@@ -31,7 +31,8 @@ _CORNER_M = 0.5
 _CREEP_M = 1e-3
 """What counts as further over a line than the body is: any more, or it could creep there period by period."""
 _ALONE_RAD = 0.15
-"""Angle to its lane that a car needs at most where there is one lane only."""
+"""Angle to its lane that a slow car needs at most where there is one lane only."""
+_SLOW_MPS = 3.0
 _LANES_AT_ONCE = 2
 _HOLD_M = 1.0
 """How far before a crossing way the ego stops."""
@@ -161,7 +162,7 @@ class Shield:
         before = scene.ego.heading_rad
         after = before + (yaw_rate(speed, steering_rad) - scene.curvature * speed) * self._dt_s
         # With one lane there is nowhere to turn to, and a slow car's tyres carry a turn on for a while.
-        steep = len(scene.strips) == 1 and abs(after) > _ALONE_RAD
+        steep = len(scene.strips) == 1 and speed < _SLOW_MPS and abs(after) > _ALONE_RAD
         return abs(after) > abs(before) and (steep or abs(speed * math.sin(after)) > self._table.sideways_mps)
 
     def _why_not(self, scene: Scene, own: Strip, span: Span) -> str:

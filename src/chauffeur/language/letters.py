@@ -49,6 +49,23 @@ def fold_char(char: str) -> str:
     return folded if clean and unicodedata.normalize("NFKC", folded) == folded else char
 
 
+def clean(text: str) -> str:
+    """A text without invisible characters and in plain letters; line ends become newlines, tabs become blanks.
+
+    What goes: control, format, private and unassigned characters, and everything that Unicode lets a display ignore
+    (zero-width, bidirectional and tag characters, variation selectors, fillers), which hides text from people that a
+    model still reads. Full-width, mathematical and circled letters become the letters they stand for. Superscripts and
+    fractions stay: `10²` must not become `102`. Cleaning a clean text changes nothing.
+    """
+    lines = text.encode("utf-8", "replace").decode("utf-8").splitlines()
+    return "\n".join(map(_clean_line, lines)).strip()
+
+
+def _clean_line(line: str) -> str:
+    kept = "".join(" " if char == "\t" else fold_char(char) for char in line if char == "\t" or not ignorable(char))
+    return unicodedata.normalize("NFC", kept).rstrip()
+
+
 def dressed(char: str) -> bool:
     """Whether a character stands for an ASCII letter, digit or sign, as full-width and mathematical letters do."""
     return not char.isascii() and not char.isspace() and fold_char(char).isascii()

@@ -28,9 +28,9 @@ from chauffeur.cli.bench_hostile import hostile
 from chauffeur.concept import ConfigError, DataError, Limits, Plan, PlanRequest, SystemMessage
 from chauffeur.describe import describe
 from chauffeur.drive.episode import Episode
+from chauffeur.language.letters import clean
 from chauffeur.planners.keyword import KeywordPlanner
 from chauffeur.programs.gate import check_source
-from chauffeur.safety.screening import clean
 from chauffeur.worlds.highway import HighwayWorld
 
 ATTACKS, HARMLESS = hostile_inputs(), lookalikes()
