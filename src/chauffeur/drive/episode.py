@@ -174,7 +174,11 @@ def run_episode(
             failure = ChauffeurError(f"Given up by the driver after {at_s:.1f} s.")
             break
         before = world.snapshot() if record or shield is not None else None
-        guarded = Guarded(requested) if shield is None or before is None else shield.guard(before, requested)
+        guarded = (
+            Guarded(requested)
+            if shield is None or before is None
+            else shield.guard(before, requested, wishes.target_lane)
+        )
         changed += bool(guarded.interventions)
         applied = world.step(guarded.command)
         ticks += 1

@@ -62,10 +62,10 @@ def blame(
     other = _struck(final) or _struck(last)
     if other is None:
         return Blame("nobody", None, None, "The ego crashed, but into nobody that is seen.")
-    crossed = _pair(lens.look(last), other)
+    crossed = _pair(lens.look(last, last.ego.lane), other)
     if crossed is not None and abs(math.sin(crossed[1].heading_rad)) > _CROSSES_SINE:
         return _at_a_crossing(frames, other, dt_s)
-    pairs = [_pair(lens.look(frame.snapshot), other) for frame in frames]
+    pairs = [_pair(lens.look(frame.snapshot, frame.snapshot.ego.lane), other) for frame in frames]
     unsafe_from = len(pairs)
     while unsafe_from > 0 and not _safe(pairs[unsafe_from - 1], dt_s, parameters):
         unsafe_from -= 1

@@ -8,6 +8,7 @@ has to clear the crossing, and may not wait in it.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -20,17 +21,19 @@ Points = NDArray[np.float64]
 
 _STEP_M: Final = 1.0
 """Distance between two looked-at points of a way."""
-_BEYOND_M: Final = 12.0
-"""How far beyond the crossing a way is looked at: by then the ego drives along with those it met."""
-_SIDE_M: Final = 0.8
+_AHEAD_M: Final = 45.0
+"""How far ahead a way is looked at: beyond it the car could still stop, and ways come back on themselves."""
+_SIDE_M: Final = 1.0
 """Clear distance to the side between two ways that do not meet."""
 _ALONG_RAD: Final = math.radians(40.0)
 """Ways that differ by less run along together: a lead or a follower, not a crossing."""
+_SAME_RAD: Final = math.radians(15.0)
+"""Cars turned by less against each other are in one stream already."""
 _AFTER_S: Final = 1.0
 """Time between the ego's leaving and another's arriving."""
 _MERGE_S: Final = 2.0
 """The same where the other's way becomes the ego's own: it has to be up to speed."""
-INSIDE_M: Final = 1.0
+INSIDE_M: Final = 0.6
 """How far the ego's front is where ways meet before it counts as inside: that far it may have slid."""
 CLEARING_MPS2: Final = 2.0
 """Acceleration with which the ego leaves a crossing."""
@@ -69,13 +72,17 @@ class Junction:
             self._onward.setdefault(lane.id[0], []).append(lane)
         self._ways: dict[LaneId, list[Points]] = {}
 
-    def look(self, snapshot: Snapshot, acceleration_mps2: float) -> Crossing:
-        """What the ego has to wait for, others gaining speed with up to `acceleration_mps2`."""
+    def look(self, snapshot: Snapshot, acceleration_mps2: float, lanes: Sequence[LaneId | None]) -> Crossing:
+        """What the ego has to wait for.
+
+        Args:
+            snapshot: The instant.
+            acceleration_mps2: With how much others may gain speed.
+            lanes: Where the ego is: every way on from one of them counts.
+        """
         ego = snapshot.ego
         hold, clear, inside = math.inf, 0.0, False
-        if ego.lane is None or not snapshot.others:
-            return NOTHING_CROSSES
-        for way in self._ways_from(ego.lane):
+        for way in (way for lane in lanes if lane is not None for way in self._ways_from(lane)):
             path, at = _ahead(way, ego)
             for other in snapshot.others:
                 met = _meet(path, at, ego, other)
@@ -123,7 +130,8 @@ def _ahead(way: Points, ego: VehicleState) -> tuple[Points, Points]:
     x, y, heading = way[nearest].tolist()
     passed = nearest * _STEP_M + (ego.x_m - x) * math.cos(heading) + (ego.y_m - y) * math.sin(heading)
     behind = max(0, nearest - math.ceil(ego.length_m / 2.0 / _STEP_M))
-    return way[behind:], np.arange(behind, len(way)) * _STEP_M - passed
+    beyond = min(len(way), nearest + round(_AHEAD_M / _STEP_M))
+    return way[behind:beyond], np.arange(behind, beyond) * _STEP_M - passed
 
 
 def _meet(path: Points, at: Points, ego: VehicleState, other: VehicleState) -> tuple[float, float, float, bool] | None:
@@ -135,15 +143,15 @@ def _meet(path: Points, at: Points, ego: VehicleState, other: VehicleState) -> t
     dx, dy = path[:, 0] - other.x_m, path[:, 1] - other.y_m
     along, across = c * dx + s * dy, np.abs(-s * dx + c * dy)
     turn = np.abs((path[:, 2] - other.heading_rad + math.pi) % (2.0 * math.pi) - math.pi)
-    wide = (ego.width_m + other.width_m) / 2.0 + _SIDE_M
-    # Where the ego is turned, its length reaches over to the side as well.
-    near = across < wide + np.abs(np.sin(turn)) * (ego.length_m - ego.width_m) / 2.0
+    # The ego's length counts along its way, before `first` and behind `last`; its width where the ways are oblique.
+    near = across < other.width_m / 2.0 + _SIDE_M + np.abs(np.cos(turn)) * ego.width_m / 2.0
     ahead = near & (along > -(other.length_m + ego.width_m) / 2.0)
     crossing = ahead & (turn > _ALONG_RAD)
-    if not crossing.any():
+    if not ahead.any() or turn[0] <= _SAME_RAD:
         return None
-    begin = int(np.argmax(crossing))
-    stop = begin + int(np.argmin(np.r_[crossing[begin:], False]))
+    begin = int(np.argmax(ahead))
+    # Where a way bends into the other's at a flat angle they meet all the same, where it does.
+    stop = begin + max(1, int(np.argmin(np.r_[crossing[begin:], False])))
     merging = bool(stop < len(near) and ahead[stop])
     arrival = float(along[begin:stop].min()) - (other.length_m + ego.width_m) / 2.0
     return float(at[begin]), float(at[stop - 1]) + ego.length_m / 2.0, max(arrival, 0.0), merging

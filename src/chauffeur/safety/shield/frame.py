@@ -88,12 +88,12 @@ class Lens:
         self._place: tuple[LaneId, int, int] | None = None
         self._frame: _Frame | None = None
 
-    def look(self, snapshot: Snapshot) -> Scene | None:
-        """The scene in the frame of the ego's lane; None where the ego is on no lane of the road."""
+    def look(self, snapshot: Snapshot, lane: LaneId | None) -> Scene | None:
+        """The scene in the frame of a lane, mostly the ego's own; None where there is no such lane."""
         ego = snapshot.ego
-        if ego.lane is None:
+        if lane is None:
             return None
-        place = ego.lane, round(ego.x_m / _EVERY_M), round(ego.y_m / _EVERY_M)
+        place = lane, round(ego.x_m / _EVERY_M), round(ego.y_m / _EVERY_M)
         if place != self._place or snapshot.lanes is not self._lanes:
             self._lanes, self._place = snapshot.lanes, place
             self._frame = _frame_at(snapshot.lanes, *place)

@@ -13,6 +13,7 @@ too closely; no reversing; not above the speed limit.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from chauffeur.concept import Command, Intervention, LaneId, Limits, Snapshot, VehicleState
@@ -65,10 +66,12 @@ class _Cap:
 
 @dataclass(frozen=True, slots=True)
 class _Steered:
-    """A command that may be steered, and what the body touches on it."""
+    """A command that may be steered, what the body touches on it, the lane it could come back to, what was changed."""
 
     command: Command
     span: Span
+    back: LaneId
+    said: tuple[Intervention, ...] = ()
 
 
 class Shield:
@@ -80,28 +83,36 @@ class Shield:
         self._dt_s = dt_s
         self._limits = Limits() if limits is None else limits
         self._table = parameters
-        self._lens = Lens()
+        self._lens, self._aim_lens = Lens(), Lens()
         self._back: LaneId | None = None
         self._junction: Junction | None = None
 
-    def guard(self, snapshot: Snapshot, command: Command) -> Guarded:
+    def guard(self, snapshot: Snapshot, command: Command, aim: LaneId | None = None) -> Guarded:
         """The command, changed as little as needed.
 
         Args:
             snapshot: The instant the command is for.
             command: What the controllers ask; numbers that are none stop the car.
+            aim: Lane the controllers steer for. Where ways part, the nearest lane need not be the car's own.
         """
-        scene = self._lens.look(snapshot)
+        scene = self._lens.look(snapshot, snapshot.ego.lane)
         if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
             safe = self._standing_still(snapshot, scene)
             return Guarded(safe, (Intervention("finite", "A command that is no number was replaced.", command, safe),))
         if scene is None:
             return Guarded(command)
-        interventions: list[Intervention] = []
-        steered = self._across(scene, snapshot.ego, command, interventions)
-        crossing = self._crossing(snapshot)
-        mended = self._along(scene, snapshot.ego, crossing, steered, interventions)
-        return Guarded(mended, tuple(interventions))
+        lanes = [snapshot.ego.lane]
+        steered = self._across(scene, snapshot.ego, command)
+        if aim is not None and snapshot.ego.lane is not None and _parts_from(snapshot.ego.lane, aim):
+            lanes.append(aim)
+            aimed = self._aim_lens.look(snapshot, aim)
+            other = None if aimed is None else self._across(aimed, snapshot.ego, command)
+            if aimed is not None and other is not None:
+                scene, steered = aimed, other
+        self._back = steered.back
+        said = list(steered.said)
+        mended = self._along(scene, snapshot.ego, self._crossing(snapshot, lanes), steered, said)
+        return Guarded(mended, tuple(said))
 
     def _standing_still(self, snapshot: Snapshot, scene: Scene | None) -> Command:
         speed = snapshot.ego.speed_mps
@@ -111,16 +122,16 @@ class Shield:
             steering = recovery_steering(scene.ego, own.centre_m, speed, self._table.steering_rad, scene.curvature)
         return Command(max(-self._table.braking_mps2, -max(speed, 0.0) / self._dt_s), steering)
 
-    def _crossing(self, snapshot: Snapshot) -> Crossing:
+    def _crossing(self, snapshot: Snapshot, lanes: Sequence[LaneId | None]) -> Crossing:
         if snapshot.kind != "intersection":
             return NOTHING_CROSSES
         if self._junction is None or self._junction.lanes is not snapshot.lanes:
             self._junction = Junction(snapshot.lanes)
-        return self._junction.look(snapshot, self._table.others_acceleration_mps2)
+        return self._junction.look(snapshot, self._table.others_acceleration_mps2, lanes)
 
     # Across -----------------------------------------------------------------------------------------------------------
 
-    def _across(self, scene: Scene, ego: VehicleState, command: Command, said: list[Intervention]) -> _Steered:
+    def _across(self, scene: Scene, ego: VehicleState, command: Command) -> _Steered:
         """The command with its steering mended, and what it touches across the road.
 
         A command is let through if after one period of it the car can still be steered back into a lane without
@@ -135,15 +146,13 @@ class Shield:
             if not reason and self._too_sharp(scene, ego.speed_mps, command.steering_rad):
                 reason = "That is too sharp at this speed."
             if not reason:
-                self._back = lane.lane
-                return _Steered(command, _lanes_wide(scene, span))
+                return _Steered(command, _lanes_wide(scene, span), lane.lane)
             why = why or reason
-        self._back = back.lane
         steering = recovery_steering(scene.ego, back.centre_m, ego.speed_mps, self._table.steering_rad, scene.curvature)
         mended = Command(command.acceleration_mps2, steering)
-        if abs(steering - command.steering_rad) > _LEVEL_RAD:
-            said.append(Intervention("lane", why, command, mended))
-        return _Steered(mended, _lanes_wide(scene, self._swept(scene, ego, steering, back)))
+        changed = abs(steering - command.steering_rad) > _LEVEL_RAD
+        said = (Intervention("lane", why, command, mended),) if changed else ()
+        return _Steered(mended, _lanes_wide(scene, self._swept(scene, ego, steering, back)), back.lane, said)
 
     def _swept(self, scene: Scene, ego: VehicleState, steering_rad: float, lane: Strip) -> Span:
         return swept(
@@ -297,6 +306,11 @@ class Shield:
             if gap < needed:
                 return -table.gentle_mps2
         return wanted
+
+
+def _parts_from(lane: LaneId, other: LaneId) -> bool:
+    """Whether two lanes begin at one place and lead to different ones."""
+    return lane[0] == other[0] and lane[1] != other[1]
 
 
 def _own(scene: Scene) -> Strip:
