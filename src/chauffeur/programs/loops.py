@@ -13,7 +13,7 @@ from chauffeur.programs.nodes import all_nodes
 from chauffeur.programs.rewrite import own_nodes
 from chauffeur.programs.words import BUILTINS, MUTATING
 
-_MAX_BARE_RANGE: Final = 100_000
+MAX_BARE_RANGE: Final = 100_000
 """Passes of a counted loop without a yield that surely fit into one control period."""
 
 _REMEDY: Final = "put `yield autopilot()` into the loop; nothing on the road changes until a yield"
@@ -58,7 +58,7 @@ def _for_findings(loop: ast.For) -> list[Finding]:
         return []
     numbers = [constant_number(arg) for arg in call.args]
     last = numbers[0] if len(numbers) == 1 else numbers[1]
-    if last is None or abs(last) <= _MAX_BARE_RANGE or _reaches_yield(loop.body):
+    if last is None or abs(last) <= MAX_BARE_RANGE or _reaches_yield(loop.body):
         return []
     return [Finding(loop.lineno, "no-yield", f"this loop makes {abs(last):.0f} passes without a yield", _REMEDY)]
 

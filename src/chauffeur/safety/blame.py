@@ -9,7 +9,6 @@ every collision with one that crosses, unless it stood. What was unsafe from the
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -23,7 +22,6 @@ _FULL: Final = 0.9
 """Share of full braking that counts as braking with all one has."""
 _STILL_MPS: Final = 0.5
 _TOWARDS_MPS: Final = 0.05
-_CROSSES_SINE: Final = math.sin(math.radians(40.0))
 _STOOD_S: Final = 1.0
 
 
@@ -63,7 +61,7 @@ def blame(
     if other is None:
         return Blame("nobody", None, None, "The ego crashed, but into nobody that is seen.")
     crossed = _pair(lens.look(last, last.ego.lane), other)
-    if crossed is not None and abs(math.sin(crossed[1].heading_rad)) > _CROSSES_SINE:
+    if crossed is not None and crossed[1].crosses:
         return _at_a_crossing(frames, other, dt_s)
     pairs = [_pair(lens.look(frame.snapshot, frame.snapshot.ego.lane), other) for frame in frames]
     unsafe_from = len(pairs)
@@ -127,7 +125,7 @@ def _safe(pair: Pair | None, dt_s: float, parameters: ShieldParameters) -> bool:
     if pair is None or _apart(pair, parameters):
         return True
     ego, other = pair
-    gap = abs(other.s_m) - ego.half_length_m - other.half_length_m
+    gap = ego.gap_m(other)
     if other.s_m >= 0.0:
         return gap >= braking_gap_m(
             max(ego.along_mps, 0.0), other.along_mps, parameters.braking_mps2, parameters.others_braking_mps2, dt_s

@@ -22,6 +22,7 @@ from typing import Final, Literal
 from chauffeur.concept import Limits, Plan, Program, Snapshot, Verdict
 from chauffeur.programs.catalogue import APIS, Param
 from chauffeur.programs.errors import ProgramSyntaxError
+from chauffeur.programs.loops import MAX_BARE_RANGE
 from chauffeur.programs.verify import CallSite, Circumstances, LoopReport, Note, Value, Verification, verify
 from chauffeur.safety.words import speed_words
 
@@ -29,8 +30,6 @@ REACH_CHECK: Final = "reach-v1"
 
 _ROUNDING: Final = 1e-6
 """Slack at every bound, as in `parameters-v1`."""
-_MAX_QUIET_PASSES: Final = 100_000
-"""Passes without a yield that surely fit into one control period, as the static gate counts."""
 _MAX_SHOWN: Final = 3
 """More doubts do not help anybody."""
 _ORDERED: Final = {"set_target_speed": "target speed", "set_desired_time_headway": "time headway"}
@@ -197,7 +196,7 @@ def _loop_findings(report: Verification) -> Iterator[_Finding]:
             )
         elif loop.verdict == "unknown":
             yield _Finding("doubt", f"of this loop {loop.reason}.{_helper(loop)}", line)
-        elif loop.verdict == "bounded" and loop.passes is not None and loop.passes > _MAX_QUIET_PASSES:
+        elif loop.verdict == "bounded" and loop.passes is not None and loop.passes > MAX_BARE_RANGE:
             yield _Finding("doubt", f"this loop may make {loop.passes} passes without a yield.{_helper(loop)}", line)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chauffeur.concept import LaneId, LaneView, Snapshot, VehicleState
+from chauffeur.safety.shield.frame import CROSSING_RAD
 
 Points = NDArray[np.float64]
 
@@ -25,8 +26,6 @@ _AHEAD_M: Final = 45.0
 """How far ahead a way is looked at: beyond it the car could still stop, and ways come back on themselves."""
 _SIDE_M: Final = 1.0
 """Clear distance to the side between two ways that do not meet."""
-_ALONG_RAD: Final = math.radians(40.0)
-"""Ways that differ by less run along together: a lead or a follower, not a crossing."""
 _SAME_RAD: Final = math.radians(15.0)
 """Cars turned by less against each other are in one stream already."""
 _AFTER_S: Final = 1.0
@@ -49,12 +48,10 @@ class Crossing:
 
     Attributes:
         hold_m: The ego's front has to stop before this, from its centre; infinite where nothing has to be awaited.
-        clear_m: Its centre has left the last crossing way by then.
         inside: It is where ways cross already.
     """
 
     hold_m: float = math.inf
-    clear_m: float = 0.0
     inside: bool = False
 
 
@@ -81,7 +78,7 @@ class Junction:
             lanes: Where the ego is: every way on from one of them counts.
         """
         ego = snapshot.ego
-        hold, clear, inside = math.inf, 0.0, False
+        hold, inside = math.inf, False
         for way in (way for lane in lanes if lane is not None for way in self._ways_from(lane)):
             path, at = _ahead(way, ego)
             for other in snapshot.others:
@@ -89,15 +86,15 @@ class Junction:
                 if met is None:
                     continue
                 first, last, arrival_m, merging = met
-                leaving = _time_to(last, max(ego.speed_mps, 0.0))
-                arriving = _earliest(arrival_m, max(other.speed_mps, 0.0), acceleration_mps2)
+                leaving = _time_to(last, max(ego.speed_mps, 0.0), CLEARING_MPS, CLEARING_MPS2)
+                arriving = _time_to(arrival_m, max(other.speed_mps, 0.0), _FASTEST_MPS, acceleration_mps2)
                 if arriving > leaving + (_MERGE_S if merging else _AFTER_S):
                     continue
                 if first < ego.length_m / 2.0 - INSIDE_M:
-                    inside, clear = True, max(clear, last)
+                    inside = True
                 else:
                     hold = min(hold, first)
-        return Crossing(hold, clear, inside)
+        return Crossing(hold, inside)
 
     def _ways_from(self, lane: LaneId) -> list[Points]:
         """Every way on from a lane through what follows it: rows of (x, y, heading)."""
@@ -146,7 +143,7 @@ def _meet(path: Points, at: Points, ego: VehicleState, other: VehicleState) -> t
     # The ego's length counts along its way, before `first` and behind `last`; its width where the ways are oblique.
     near = across < other.width_m / 2.0 + _SIDE_M + np.abs(np.cos(turn)) * ego.width_m / 2.0
     ahead = near & (along > -(other.length_m + ego.width_m) / 2.0)
-    crossing = ahead & (turn > _ALONG_RAD)
+    crossing = ahead & (turn > CROSSING_RAD)
     if not ahead.any() or turn[0] <= _SAME_RAD:
         return None
     begin = int(np.argmax(ahead))
@@ -157,21 +154,11 @@ def _meet(path: Points, at: Points, ego: VehicleState, other: VehicleState) -> t
     return float(at[begin]), float(at[stop - 1]) + ego.length_m / 2.0, max(arrival, 0.0), merging
 
 
-def _time_to(distance_m: float, speed_mps: float) -> float:
-    """Time for the ego to get so far, gaining speed as it does to clear a crossing."""
+def _time_to(distance_m: float, speed_mps: float, top_mps: float, acceleration_mps2: float) -> float:
+    """Time to get so far while gaining speed up to a top, which a faster car keeps."""
     if distance_m <= 0.0:
         return 0.0
-    top = max(CLEARING_MPS, speed_mps)
-    gaining_s = (top - speed_mps) / CLEARING_MPS2
-    gained_m = (speed_mps + top) / 2.0 * gaining_s
-    if gained_m < distance_m:
-        return gaining_s + (distance_m - gained_m) / top
-    return (-speed_mps + math.sqrt(speed_mps**2 + 2.0 * CLEARING_MPS2 * distance_m)) / CLEARING_MPS2
-
-
-def _earliest(distance_m: float, speed_mps: float, acceleration_mps2: float) -> float:
-    """Earliest time at which another can be there."""
-    top = max(_FASTEST_MPS, speed_mps)
+    top = max(top_mps, speed_mps)
     gaining_s = (top - speed_mps) / acceleration_mps2
     gained_m = (speed_mps + top) / 2.0 * gaining_s
     if gained_m < distance_m:

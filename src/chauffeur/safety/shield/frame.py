@@ -14,6 +14,10 @@ from typing import Final
 from chauffeur.concept import LaneId, LaneView, Snapshot, VehicleState
 from chauffeur.geometry import wrap_to_pi
 
+CROSSING_RAD: Final = math.radians(40.0)
+"""What is turned by less runs along: a lead, a follower, a car that changes lanes. What is turned further crosses."""
+_CROSSING_SINE: Final = math.sin(CROSSING_RAD)
+
 
 @dataclass(frozen=True, slots=True)
 class Strip:
@@ -45,6 +49,15 @@ class Body:
     across_mps: float
     half_length_m: float
     half_width_m: float
+
+    @property
+    def crosses(self) -> bool:
+        """Whether it crosses the lane rather than drive along it."""
+        return abs(math.sin(self.heading_rad)) > _CROSSING_SINE
+
+    def gap_m(self, other: Body) -> float:
+        """Clear distance along the lane between the ego and another; negative beside each other."""
+        return abs(other.s_m) - self.half_length_m - other.half_length_m
 
 
 @dataclass(frozen=True, slots=True)

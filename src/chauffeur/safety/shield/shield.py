@@ -37,8 +37,6 @@ _SLOW_MPS = 3.0
 _LANES_AT_ONCE = 2
 _HOLD_M = 1.0
 """How far before a crossing way the ego stops."""
-_CROSSING_SINE = math.sin(math.radians(40.0))
-"""A car turned further than this against the lane crosses it: it does not drift along."""
 _TOUCH_M = 0.05
 """How far a body must reach over a line to be in the lane beyond it."""
 _LEVEL_MPS2 = 1e-6
@@ -102,13 +100,10 @@ class Shield:
         if scene is None:
             return Guarded(command)
         lanes = [snapshot.ego.lane]
-        steered = self._across(scene, snapshot.ego, command)
         if aim is not None and snapshot.ego.lane is not None and _parts_from(snapshot.ego.lane, aim):
             lanes.append(aim)
-            aimed = self._aim_lens.look(snapshot, aim)
-            other = None if aimed is None else self._across(aimed, snapshot.ego, command)
-            if aimed is not None and other is not None:
-                scene, steered = aimed, other
+            scene = self._aim_lens.look(snapshot, aim) or scene
+        steered = self._across(scene, snapshot.ego, command)
         self._back = steered.back
         said = list(steered.said)
         mended = self._along(scene, snapshot.ego, self._crossing(snapshot, lanes), steered, said)
@@ -206,7 +201,7 @@ class Shield:
         A car behind has seen it (`touched`) once it is over the line, and needs no time to respond any more.
         """
         table = self._table
-        is_m = max(abs(other.s_m) - ego.half_length_m - other.half_length_m, 0.0)
+        is_m = max(ego.gap_m(other), 0.0)
         if is_m < table.margin_m:
             return "The lane is not free: a car is beside."
         if other.s_m >= 0.0:
@@ -283,7 +278,7 @@ class Shield:
         for other in scene.others:
             if other.s_m <= 0.0 or not _overlaps(other, span, table.side_m, table.drift_mps):
                 continue
-            gap = other.s_m - ego.half_length_m - other.half_length_m
+            gap = ego.gap_m(other)
             cap = self._greatest(speed, gap - table.margin_m, other.along_mps)
             if cap < strictest.acceleration_mps2:
                 strictest = _Cap(cap, "gap", f"Too close to the car {max(gap, 0.0):.0f} m ahead to ask for more.")
@@ -299,7 +294,7 @@ class Shield:
         for other in scene.others:
             if other.s_m >= 0.0 or not _overlaps(other, span, 0.0, table.drift_mps):
                 continue
-            gap = -other.s_m - ego.half_length_m - other.half_length_m - table.margin_m
+            gap = ego.gap_m(other) - table.margin_m
             needed = rss_gap_m(
                 other.along_mps, ego.along_mps, table.others_response_s, 0.0, table.others_sure_braking_mps2, -wanted
             )
@@ -332,7 +327,7 @@ def _overlaps(other: Body, span: Span, side_m: float, drift_mps: float) -> bool:
     """Whether a body is, or is on its way, within a span; one that drifts claims the width of a lane more."""
     left = other.d_m - other.half_width_m - side_m
     right = other.d_m + other.half_width_m + side_m
-    drifts = abs(other.across_mps) > drift_mps and abs(math.sin(other.heading_rad)) < _CROSSING_SINE
+    drifts = abs(other.across_mps) > drift_mps and not other.crosses
     if drifts and other.across_mps > 0.0:
         right += _LANE_M
     elif drifts:
