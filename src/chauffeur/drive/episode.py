@@ -1,4 +1,4 @@
-"""The control loop: the one place where a command reaches a world.
+"""The control loop of a trip in simulated time.
 
 Each control period: the policy states its wishes, the driver turns them into a command, the world applies it, the
 referee looks. A policy that fails loses the wheel at once: the driver goes on with safe wishes for a moment, and the
@@ -24,7 +24,8 @@ from chauffeur.concept import (
     Snapshot,
     Wishes,
 )
-from chauffeur.safety.shield import Guarded, Shield
+from chauffeur.drive.actuate import actuate
+from chauffeur.safety.shield import Shield
 from chauffeur.worlds.base import EGO, World
 
 FALLBACK_S = 10.0
@@ -174,17 +175,20 @@ def run_episode(
             failure = ChauffeurError(f"Given up by the driver after {at_s:.1f} s.")
             break
         before = world.snapshot() if record or shield is not None else None
-        guarded = (
-            Guarded(requested)
-            if shield is None or before is None
-            else shield.guard(before, requested, wishes.target_lane)
-        )
-        changed += bool(guarded.interventions)
-        applied = world.step(guarded.command)
+        done = actuate(world, before, requested, wishes.target_lane, shield)
+        changed += bool(done.interventions)
         ticks += 1
         if record and before is not None:
             frame = Frame(
-                before, wishes, requested, applied, tick.state, tick.line, tick.said, tick.calls, guarded.interventions
+                before,
+                wishes,
+                requested,
+                done.applied,
+                tick.state,
+                tick.line,
+                tick.said,
+                tick.calls,
+                done.interventions,
             )
             frames.append(frame)
             if watch is not None:

@@ -95,7 +95,7 @@ class World(Protocol):
         ...
 
     def step(self, command: Command) -> Command:
-        """Advance one control period; returns the command really applied. Only the control loop of `drive` calls it."""
+        """Advance one control period; returns the command really applied. Only `drive.actuate` calls it."""
         ...
 
     def snapshot(self) -> Snapshot:
@@ -113,4 +113,17 @@ class World(Protocol):
 
     def driver(self) -> Driver:
         """The low-level driver of the present trip; the same object until the next reset."""
+        ...
+
+
+@runtime_checkable
+class MirroredWorld(World, Protocol):
+    """A world whose present instant can be shown to another process, which keeps a copy of the same scenario."""
+
+    def observation(self) -> bytes:
+        """The present instant, without what is the same throughout a trip."""
+        ...
+
+    def adopt(self, observation: bytes) -> None:
+        """Be at that instant. Raises DataError if it is none of this scenario; the world then stays as it was."""
         ...

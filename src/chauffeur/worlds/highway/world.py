@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import json
 import math
+import struct
 from collections import OrderedDict
 from dataclasses import dataclass
 
 import numpy as np
 
-from chauffeur.concept import Command, LaneView, Lead, Scenario, ScenarioError, Snapshot
+from chauffeur.concept import Command, DataError, LaneView, Lead, Scenario, ScenarioError, Snapshot
 from chauffeur.control import Actuation
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.core import CoreRoad
@@ -26,6 +27,8 @@ FOLLOW_WITHIN_M = 50.0
 """LaMPilot starts the ego at the speed of a vehicle closer than this ahead, at the speed limit otherwise."""
 
 _KEPT_STARTS = 64
+_INSTANT = struct.Struct("<Qd")
+"""Control periods since the trip began, and the simulator's own clock, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +101,18 @@ class HighwayWorld:
         if self._driver is not None:
             twin._driver = self._driver.copy(core, twin._perception)
         return twin
+
+    def observation(self) -> bytes:
+        """The present instant, for a copy of this world in another process."""
+        return _INSTANT.pack(self._tick, self._clock_s) + self._road().state()
+
+    def adopt(self, observation: bytes) -> None:
+        """Be at an instant of the same scenario and seed, stepped elsewhere. Raises DataError if it is none."""
+        if len(observation) < _INSTANT.size:
+            raise DataError("An observation ends too early.")
+        tick, clock_s = _INSTANT.unpack_from(observation)
+        self._road().adopt(observation[_INSTANT.size :])
+        self._tick, self._clock_s = tick, clock_s
 
     def step(self, command: Command) -> Command:
         """Advance 0.1 s under `command`; returns what the vehicle really applied."""

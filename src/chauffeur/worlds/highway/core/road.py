@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chauffeur.concept import LaneId
+from chauffeur.concept import DataError, LaneId
 from chauffeur.worlds.highway.core import lanes as geometry
 from chauffeur.worlds.highway.core import layout as at
 from chauffeur.worlds.highway.core import signals, traffic
@@ -65,6 +65,23 @@ class CoreRoad:
         twin.floats, twin.ints, twin.scene = self.floats.copy(), self.ints.copy(), self.scene.copy()
         twin.order, twin.out = self.order.copy(), self.out.copy()
         return twin
+
+    def state(self) -> bytes:
+        """All that changes from step to step, as bytes: arrays one after the other, of sizes that stay in a trip."""
+        return b"".join(array.tobytes() for array in self._arrays())
+
+    def adopt(self, state: bytes) -> None:
+        """Take over a state of the same scene. Raises DataError if sizes differ; nothing is changed then."""
+        arrays = self._arrays()
+        if len(state) != sum(array.nbytes for array in arrays):
+            raise DataError("A state of another scene.")
+        at_byte = 0
+        for array in arrays:
+            array[...] = np.frombuffer(state, array.dtype, array.size, at_byte).reshape(array.shape)
+            at_byte += array.nbytes
+
+    def _arrays(self) -> tuple[NDArray[Any], ...]:
+        return self.floats, self.ints, self.scene, self.order, self.out
 
     def _list_solid(self) -> None:
         solid = np.flatnonzero(self.ints[:, at.KIND] != at.SIGN)

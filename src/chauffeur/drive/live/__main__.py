@@ -1,0 +1,121 @@
+"""Entry of the processes: `python -m chauffeur.drive.live ROLE FOLDER`; the supervisor starts them."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+from chauffeur.concept.registry import load_plugin
+from chauffeur.drive.live.settings import Settings, ring
+
+FIGURES_FILE = "punctuality.json"
+READY_SUFFIX = ".ready"
+
+
+def _told_to_end() -> Callable[[], bool]:
+    """Whether SIGTERM came, or the process that started this one is gone. Ctrl-C is the supervisor's to hear."""
+    asked = False
+    parent = os.getppid()
+
+    def ask(number: int, frame: object) -> None:
+        nonlocal asked
+        del number, frame
+        asked = True
+
+    signal.signal(signal.SIGTERM, ask)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return lambda: asked or os.getppid() != parent
+
+
+def _ready(folder: Path, role: str) -> None:
+    (folder / f"{role}{READY_SUFFIX}").touch()
+
+
+def _control(folder: Path, settings: Settings, over: Callable[[], bool]) -> None:
+    from chauffeur.drive.live.control import Control, Rings, run
+    from chauffeur.drive.live.realtime import Ticker, become_realtime, punctuality
+
+    world = load_plugin("chauffeur.worlds", settings.starts[0].scenario.world)()
+    rings = Rings(ring(folder, "wishes"), ring(folder, "observations"), ring(folder, "reports"))
+    for start in settings.starts:  # what is slow about a start is done before anything moves
+        world.reset(start.scenario, start.seed)
+    control = Control(world, settings.starts, rings, speed=settings.speed)
+    control.warm_up()
+    allowed = become_realtime(settings.realtime)
+    for each in (rings.wishes, rings.observations, rings.reports):
+        each.touch_pages()
+    _ready(folder, "control")
+    ticker = Ticker(control.dt_s / settings.speed)
+    lateness = run(control, ticker, over)
+    figures = (
+        asdict(punctuality(lateness, ticker.missed)) | asdict(allowed) | {"period_s": control.dt_s / settings.speed}
+    )
+    (folder / FIGURES_FILE).write_text(json.dumps(figures))
+
+
+def _policy(folder: Path, settings: Settings, over: Callable[[], bool]) -> None:
+    import time
+
+    from chauffeur.drive.live.mirror import Mirror
+    from chauffeur.drive.live.policy import LIVE_BUDGET, Policy, PolicyRings
+    from chauffeur.programs import Sandbox
+
+    world = load_plugin("chauffeur.worlds", settings.starts[0].scenario.world)()
+    mirror = Mirror(world, settings.starts, ring(folder, "observations"))
+    rings = PolicyRings(
+        ring(folder, "orders"), ring(folder, "wishes"), ring(folder, "policy_events"), ring(folder, "checkpoints")
+    )
+    for start in settings.starts:
+        world.reset(start.scenario, start.seed)
+    pause_s = world.dt_s / settings.speed / 20.0
+    with Sandbox(LIVE_BUDGET) as sandbox:
+        policy = Policy(mirror, rings, sandbox)
+        _ready(folder, "policy")
+        while not over():
+            if not policy.tick():
+                time.sleep(pause_s)
+        policy.close()
+
+
+def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None:
+    import asyncio
+
+    from chauffeur.drive.live.mirror import Mirror
+    from chauffeur.drive.live.planning import Planning, PlanningRings
+    from chauffeur.drive.loop import Memory
+    from chauffeur.drive.session import Forgetful
+    from chauffeur.planners.registry import make_planner
+
+    world = load_plugin("chauffeur.worlds", settings.starts[0].scenario.world)()
+    mirror = Mirror(world, settings.starts, ring(folder, "observations"))
+    rings = PlanningRings(ring(folder, "requests"), ring(folder, "orders"), ring(folder, "planner_events"))
+    options = {} if settings.base_url is None else {"base_url": settings.base_url}
+    planner = make_planner(settings.planner, **options)
+    memory: Memory = load_plugin("chauffeur.memories", settings.memory)() if settings.memory else Forgetful()
+    planning = Planning(
+        mirror,
+        rings,
+        planner,
+        memory,
+        setting="zero-shot" if settings.setting == "zero-shot" else "few-shot",
+        speed=settings.speed,
+    )
+    _ready(folder, "planner")
+    asyncio.run(planning.run(over))
+
+
+def main(role: str, folder: Path) -> None:
+    """Be one of the processes of the drive in a folder."""
+    logging.basicConfig(level=logging.WARNING)
+    over = _told_to_end()
+    {"control": _control, "policy": _policy, "planner": _planner}[role](folder, Settings.read(folder), over)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], Path(sys.argv[2]))

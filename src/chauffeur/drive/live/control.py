@@ -1,0 +1,262 @@
+"""The control process: one period after the other, it alone commands the vehicle.
+
+It knows the world, the driver, the shield and the ladder of fallbacks. It reads the policy's newest wish without ever
+waiting for it, believes nothing of it that it cannot check, and goes on whatever has become of every other process.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from array import array
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from chauffeur.concept import Command, Snapshot, Wishes
+from chauffeur.drive.actuate import Actuated, actuate
+from chauffeur.drive.live.ladder import Ladder
+from chauffeur.drive.live.messages import MessageError, Observation, Report, Rung, Wish
+from chauffeur.drive.live.realtime import Ticker
+from chauffeur.drive.live.ring import Ring
+from chauffeur.drive.live.starts import Start
+from chauffeur.safety.bounds import bounded
+from chauffeur.safety.shield import Shield
+from chauffeur.worlds.base import Driver, MirroredWorld
+
+AHEAD_NS: Final = 50_000_000
+"""How far in the future a wish may claim to be issued: clocks of one machine agree far better."""
+FAULT_BRAKING_MPS2: Final = 3.0
+"""What answers an error inside the control period itself."""
+WARM_UP_PERIODS: Final = 30
+STANDING_MPS: Final = 0.1
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Rings:
+    """What control reads and writes."""
+
+    wishes: Ring
+    observations: Ring
+    reports: Ring
+
+
+class Control:
+    """Drives trips one after the other, a period at each `tick`."""
+
+    def __init__(
+        self,
+        world: MirroredWorld,
+        starts: Sequence[Start],
+        rings: Rings,
+        *,
+        speed: float = 1.0,
+        clock_ns: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        """Set up.
+
+        Args:
+            world: Where to drive.
+            starts: The trips; the last one is the last.
+            rings: Shared memory.
+            speed: Vehicle time per time of the clock: 2 drives 0.1 s in every 50 ms.
+            clock_ns: The clock all processes share.
+        """
+        self._world, self._starts, self._rings = world, starts, rings
+        self._speed, self._clock_ns = speed, clock_ns
+        self._trip = 0
+        self._tick = 0
+        self._heard = 0
+        self._wish: Wish | None = None
+        self._ladder = Ladder()
+        self._shield: Shield | None = None
+        self._driver: Driver | None = None
+        self._held = Wishes()
+        self._refused: Counter[str] = Counter()
+        self._faults = 0
+        self._stopping = False
+
+    @property
+    def dt_s(self) -> float:
+        """Control period in vehicle time."""
+        return self._world.dt_s
+
+    @property
+    def over(self) -> bool:
+        """Whether every trip is over."""
+        return self._trip > len(self._starts)
+
+    def stop(self) -> None:
+        """Come to a stand, then let the trip end; no further one begins."""
+        self._stopping = True
+
+    def warm_up(self) -> None:
+        """Drive the first start for a moment in a world of its own kind, so that no code is met for the first time
+        while driving; then forget it."""
+        start = self._starts[0]
+        self._world.reset(start.scenario, start.seed)
+        driver, shield = self._world.driver(), Shield(self._world.dt_s, start.limits)
+        for rung in range(WARM_UP_PERIODS):
+            if self._world.ended:
+                break
+            snapshot = self._world.snapshot()
+            ladder_wishes = self._ladder.choose(float(rung), None, math.inf, snapshot)[1]
+            wishes, _ = bounded(ladder_wishes, start.limits, self._limit_mps(ladder_wishes, snapshot))
+            settled = driver.settle(wishes)
+            actuate(self._world, snapshot, driver.command(settled), settled.target_lane, shield)
+            self._world.observation()
+
+    def begin_trip(self) -> bool:
+        """Set up the next trip and show its first instant; False if there is none."""
+        self._trip += 1
+        if self.over or self._stopping:
+            self._trip = len(self._starts) + 1
+            return False
+        start = self._starts[self._trip - 1]
+        self._world.reset(start.scenario, start.seed)
+        self._driver = self._world.driver()
+        self._held = self._driver.initial_wishes()
+        self._shield = Shield(self._world.dt_s, start.limits)
+        self._ladder = Ladder()
+        self._wish = None
+        self._tick = 0
+        self._show()
+        return True
+
+    def tick(self, late_ns: int = 0, missed: int = 0) -> Report:
+        """One control period: hear, choose, command, show. Nothing another process does makes it raise."""
+        at_s = self._tick * self.dt_s
+        start = self._starts[self._trip - 1]
+        rung: Rung = "keep"
+        clipped: tuple[str, ...] = ()
+        age_s = 0.0
+        snapshot = self._world.snapshot()
+        wishes = self._held
+        try:
+            age_s = self._hear()
+            rung, wishes = self._choose(at_s, age_s, snapshot)
+            wishes, clipped = bounded(wishes, start.limits, self._limit_mps(wishes, snapshot))
+            done = self._act(snapshot, wishes)
+            self._held = wishes
+        except Exception:  # noqa: BLE001 - whatever it is, the car is braked in this period and control goes on
+            _log.exception("a control period failed")
+            self._faults += 1
+            done = self._brake(snapshot)
+        self._tick += 1
+        outcome = self._outcome(snapshot, start)
+        wish = self._wish
+        report = Report(
+            trip=self._trip,
+            tick=self._tick - 1,
+            late_ns=late_ns,
+            rung=rung,
+            plan="" if wish is None else wish.plan,
+            state="none" if wish is None else wish.state,
+            line=None if wish is None else wish.line,
+            age_s=round(age_s, 4),
+            wishes=wishes,
+            requested=done.requested,
+            applied=done.applied,
+            interventions=done.interventions,
+            clipped=clipped,
+            refused=dict(self._refused),
+            missed=missed,
+            faults=self._faults,
+            speed_mps=snapshot.ego.speed_mps,
+            lane=snapshot.ego.lane,
+            ended=bool(outcome),
+            outcome=outcome,
+        )
+        self._show()
+        self._rings.reports.write(report.encode())
+        return report
+
+    def _hear(self) -> float:
+        """Take in the policy's newest wish, if it is one; returns the age of what is followed, in vehicle time."""
+        message = self._rings.wishes.latest()
+        if message is not None and message.number != self._heard:
+            self._heard = message.number
+            try:
+                self._wish = self._believed(Wish.decode(message.payload))
+            except MessageError as error:
+                self._refused[str(error)] += 1
+        if self._wish is None:
+            return self._tick * self.dt_s
+        # What was wished for an old instant is old, however lately it was written: the policy may see a frozen picture.
+        since_issue_s = (self._clock_ns() - self._wish.issued_ns) * 1e-9 * self._speed
+        return max(0.0, since_issue_s, (self._tick - self._wish.tick) * self.dt_s)
+
+    def _believed(self, wish: Wish) -> Wish:
+        """The wish, if it can be meant for now. Raises MessageError."""
+        if wish.trip != self._trip:
+            raise MessageError("another trip")
+        if wish.tick > self._tick:
+            raise MessageError("an instant to come")
+        if wish.issued_ns > self._clock_ns() + AHEAD_NS:
+            raise MessageError("issued in the future")
+        if self._wish is not None and wish.issued_ns < self._wish.issued_ns:
+            raise MessageError("older than the one before")
+        lane = wish.wishes.target_lane
+        if lane is not None and not self._world.perception().has_lane(lane):
+            raise MessageError("no such lane")
+        return wish
+
+    def _choose(self, at_s: float, age_s: float, snapshot: Snapshot) -> tuple[Rung, Wishes]:
+        if self._stopping:
+            return "stop", replace(self._held, target_speed_mps=0.0, target_lane=snapshot.ego.lane)
+        wish = self._wish
+        if wish is None and age_s <= self._ladder.patience_s:
+            return "hold", self._held  # nobody has wished anything yet
+        expired = wish is not None and self._clock_ns() > wish.expires_ns
+        return self._ladder.choose(at_s, wish, age_s, snapshot, expired=expired)
+
+    def _limit_mps(self, wishes: Wishes, snapshot: Snapshot) -> float:
+        """The speed limit where the car is; in a lane change, the higher one of both."""
+        lanes = [lane for lane in (snapshot.ego.lane, wishes.target_lane) if lane is not None]
+        limits = [self._world.perception().speed_limit(lane) for lane in lanes]
+        return max(limits, default=math.inf)
+
+    def _act(self, snapshot: Snapshot, wishes: Wishes) -> Actuated:
+        assert self._driver is not None
+        settled = self._driver.settle(wishes)
+        return actuate(self._world, snapshot, self._driver.command(settled), settled.target_lane, self._shield)
+
+    def _brake(self, snapshot: Snapshot) -> Actuated:
+        """Brake straight on, past driver and shield, which may be what failed."""
+        braking = min(FAULT_BRAKING_MPS2, max(0.0, snapshot.ego.speed_mps) / self.dt_s)
+        return actuate(self._world, snapshot, Command(-braking, 0.0), None, None)
+
+    def _outcome(self, before: Snapshot, start: Start) -> str:
+        now = self._world.snapshot()
+        if now.ego.crashed:
+            return "collision"
+        if now.off_road:
+            return "off_road"
+        if self._world.ended:
+            return "ended"
+        if self._stopping and before.ego.speed_mps <= STANDING_MPS:
+            return "stopped"
+        return "ended" if self._tick * self.dt_s >= start.most_s else ""
+
+    def _show(self) -> None:
+        payload = Observation(self._trip, self._tick, self._world.observation()).encode()
+        self._rings.observations.write(payload)
+
+
+def run(control: Control, ticker: Ticker, asked_to_end: Callable[[], bool]) -> array[int]:
+    """Drive all trips at the ticker's rate; returns how late the periods began, ns."""
+    told = False
+    while control.begin_trip():
+        ticker.restart()
+        ended = False
+        while not ended:
+            late = ticker.wait()
+            if not told and asked_to_end():
+                control.stop()
+                told = True
+            ended = control.tick(late, ticker.missed).ended
+    return ticker.lateness_ns

@@ -1,0 +1,106 @@
+"""What is driven when nobody says what to drive: a ladder of fallbacks, one rung down at a time.
+
+follow  the policy's wishes are fresh
+hold    they are not, but the plan they come from was checked and has not expired: they go on for a moment
+keep    stay in the lane, no faster than now, with a generous gap
+slow    slow down, and make for the shoulder where the road has one
+stop    stand
+
+Ages are counted in the vehicle's own time. A fresh wish leads back to the top at once; a plan that failed or expired
+skips the rung that would hold its wishes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+from chauffeur.concept import LaneId, Snapshot, Wishes
+from chauffeur.drive.live.messages import Rung, Wish
+
+RUNGS: Final[tuple[Rung, ...]] = ("follow", "hold", "keep", "slow", "stop")
+
+
+@dataclass(frozen=True, slots=True)
+class LadderTable:
+    """When the ladder is stepped down.
+
+    Attributes:
+        fresh_s: Oldest wish that is followed as it is: three control periods at 10 Hz.
+        hold_s: How long a wish is held: what a policy process needs to be started anew.
+        keep_s: How long lane and gap are kept after that.
+        slow_s: How long the car is slow at most before it stops.
+        slow_mps: Speed of the rung `slow`, 30 km/h.
+        headway_s: Time headway from `keep` downwards.
+    """
+
+    fresh_s: float = 0.3
+    hold_s: float = 2.0
+    keep_s: float = 6.0
+    slow_s: float = 10.0
+    slow_mps: float = 30.0 / 3.6
+    headway_s: float = 2.0
+
+
+class Ladder:
+    """Chooses the rung, period by period."""
+
+    def __init__(self, table: LadderTable | None = None) -> None:
+        self._table = LadderTable() if table is None else table
+        self._entered_s: float | None = None
+        """When the wishes were let go of, in vehicle time."""
+        self._kept_mps = 0.0
+
+    @property
+    def patience_s(self) -> float:
+        """How long a wish is held, and how long a first one is waited for."""
+        return self._table.hold_s
+
+    def choose(
+        self, at_s: float, wish: Wish | None, age_s: float, snapshot: Snapshot, *, expired: bool = False
+    ) -> tuple[Rung, Wishes]:
+        """The rung and its wishes.
+
+        Args:
+            at_s: Vehicle time.
+            wish: The newest one heard in this trip.
+            age_s: Its age.
+            snapshot: The instant.
+            expired: Whether its plan may not be followed any more.
+        """
+        table = self._table
+        usable = wish is not None and not expired and wish.state != "failed"
+        if wish is not None and usable and age_s <= table.hold_s:
+            self._entered_s = None
+            return ("follow" if age_s <= table.fresh_s else "hold"), wish.wishes
+        if self._entered_s is None:
+            self._entered_s, self._kept_mps = at_s, max(0.0, snapshot.ego.speed_mps)
+        base = Wishes() if wish is None else wish.wishes
+        gone_s = at_s - self._entered_s
+        wished = base.target_speed_mps
+        speed = self._kept_mps if wished is None else min(wished, self._kept_mps)
+        safe = replace(
+            base,
+            target_speed_mps=speed,
+            time_headway_s=max(table.headway_s, base.time_headway_s),
+            target_lane=snapshot.ego.lane,
+        )
+        if gone_s < table.keep_s:
+            return "keep", safe
+        lane = _towards_shoulder(snapshot)
+        slow = snapshot.ego.speed_mps <= table.slow_mps + 0.5
+        if gone_s < table.keep_s + table.slow_s and not (slow and lane == snapshot.ego.lane):
+            return "slow", replace(safe, target_speed_mps=min(speed, table.slow_mps), target_lane=lane)
+        return "stop", replace(safe, target_speed_mps=0.0, target_lane=lane)
+
+
+def _towards_shoulder(snapshot: Snapshot) -> LaneId | None:
+    """The next lane on the way to an emergency lane beside; the ego's own where there is none."""
+    own = snapshot.ego.lane
+    if own is None:
+        return None
+    shoulders = [lane.id for lane in snapshot.lanes if lane.emergency and lane.id[:2] == own[:2]]
+    if not shoulders:
+        return own
+    index = min(shoulders, key=lambda lane: abs(lane[2] - own[2]))[2]
+    return own[0], own[1], own[2] + (index > own[2]) - (index < own[2])

@@ -1,0 +1,46 @@
+"""Another process's own copy of the world, kept at the newest instant that control has shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from chauffeur.concept import DataError, Limits
+from chauffeur.drive.live.messages import MessageError, Observation
+from chauffeur.drive.live.ring import Ring
+from chauffeur.drive.live.starts import Start
+from chauffeur.worlds.base import MirroredWorld
+
+
+class Mirror:
+    """A world that nobody steps: it follows what control shows."""
+
+    def __init__(self, world: MirroredWorld, starts: Sequence[Start], observations: Ring) -> None:
+        self.world = world
+        self._starts, self._observations = starts, observations
+        self._seen = 0
+        self.trip = 0
+        self.tick = 0
+
+    @property
+    def limits(self) -> Limits:
+        """Of the present trip."""
+        return self._starts[self.trip - 1].limits
+
+    def follow(self) -> bool:
+        """Be at the newest instant; False where there is no newer one, or what is there is none."""
+        message = self._observations.latest()
+        if message is None or message.number == self._seen:
+            return False
+        self._seen = message.number
+        try:
+            shown = Observation.decode(message.payload)
+            if not 1 <= shown.trip <= len(self._starts):
+                return False
+            if shown.trip != self.trip:
+                start = self._starts[shown.trip - 1]
+                self.world.reset(start.scenario, start.seed)
+            self.world.adopt(shown.world)
+        except (MessageError, DataError):
+            return False
+        self.trip, self.tick = shown.trip, shown.tick
+        return True

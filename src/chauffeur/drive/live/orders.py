@@ -1,0 +1,137 @@
+"""What goes between planner, policy and supervisor: wishes, plans, events. Control reads none of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from chauffeur.concept import NOBODY, LaneId, Plan, Snapshot
+from chauffeur.drive.live.messages import MessageError
+
+EventKind = Literal[
+    "planning", "planned", "declined", "unplanned", "superseded", "started", "refused", "stale", "finished", "failed",
+    "interrupted", "resumed", "said", "garbage",
+]  # fmt: skip
+"""What becomes of a wish, in about this order. `declined`: the planner says no, in words; `unplanned`: it could not;
+`refused`: a check says no; `stale`: the plan came too late; `interrupted`: the process that ran it is gone."""
+
+FINAL: Final[frozenset[EventKind]] = frozenset(
+    {"declined", "unplanned", "superseded", "refused", "stale", "finished", "failed", "interrupted"}
+)
+"""Events after which nothing more becomes of a wish."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A wish, to the planner.
+
+    Attributes:
+        wish: Id.
+        text: The person's words.
+        person: Who says it.
+        turn: Counts how often it was asked for; more than once where a plan was stale or the planner died.
+    """
+
+    wish: str
+    text: str
+    person: str = NOBODY
+    turn: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """The instant a plan was made for.
+
+    Attributes:
+        trip, tick: Of the observation.
+        lane: The ego's.
+        lead: Id of the vehicle ahead, None for none.
+    """
+
+    trip: int
+    tick: int
+    lane: LaneId | None
+    lead: int | None
+
+    @classmethod
+    def of(cls, trip: int, snapshot: Snapshot) -> Scene:
+        """What of an instant a plan relies on."""
+        return cls(trip, snapshot.tick, snapshot.ego.lane, None if snapshot.front is None else snapshot.front.vehicle)
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """A plan, to the policy.
+
+    Attributes:
+        wish: Id of the wish.
+        plan: R and P, unchecked.
+        scene: The instant it was made for.
+        issued_ns: When the planner saw that instant.
+        start_by_ns: Not started after this.
+        expires_ns: Not followed after this.
+    """
+
+    wish: str
+    plan: Plan
+    scene: Scene
+    issued_ns: int
+    start_by_ns: int
+    expires_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that became of a wish.
+
+    Attributes:
+        kind: What.
+        wish: Id, empty where it is about none.
+        text: In words, for the person.
+        trip, tick: When.
+    """
+
+    kind: EventKind
+    wish: str
+    text: str = ""
+    trip: int = 0
+    tick: int = 0
+
+
+_T = TypeVar("_T")
+_request, _order, _event = TypeAdapter(Request), TypeAdapter(Order), TypeAdapter(Event)
+
+
+def encode(message: Request | Order | Event) -> bytes:
+    """As bytes."""
+    match message:
+        case Request():
+            return _request.dump_json(message)
+        case Order():
+            return _order.dump_json(message)
+        case Event():
+            return _event.dump_json(message)
+
+
+def read_request(payload: bytes) -> Request:
+    """From bytes. Raises MessageError."""
+    return _read(_request, payload)
+
+
+def read_order(payload: bytes) -> Order:
+    """From bytes. Raises MessageError."""
+    return _read(_order, payload)
+
+
+def read_event(payload: bytes) -> Event:
+    """From bytes. Raises MessageError."""
+    return _read(_event, payload)
+
+
+def _read(adapter: TypeAdapter[_T], payload: bytes) -> _T:
+    try:
+        return adapter.validate_json(payload)
+    except (ValidationError, ValueError, RecursionError) as error:
+        raise MessageError(f"not as it should be: {type(error).__name__}") from error

@@ -1,0 +1,150 @@
+"""The planner process: from words to plans, however long that takes and whatever comes of it.
+
+Models, network, memory and prompts live here. Nothing waits for this process: if it hangs, floods or dies, a wish goes
+unanswered until the supervisor has started another one, and the car drives on with the plan it has.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from chauffeur.concept import ChauffeurError, PersonId, Plan, PlanRequest
+from chauffeur.describe import describe
+from chauffeur.drive.live.messages import MessageError
+from chauffeur.drive.live.mirror import Mirror
+from chauffeur.drive.live.orders import Event, EventKind, Order, Request, Scene, encode, read_request
+from chauffeur.drive.live.ring import Ring
+from chauffeur.drive.loop import Memory
+from chauffeur.drive.session import parse_wish
+from chauffeur.planners.base import Planner
+from chauffeur.planners.prompts import Setting, build_system_message
+from chauffeur.safety.screening import screen_request
+
+START_WITHIN_S: Final = 10.0
+"""Vehicle time from the instant a plan was made for to its start."""
+FOLLOW_FOR_S: Final = 600.0
+"""Vehicle time for which a plan may be followed."""
+PLAN_WITHIN_S: Final = 60.0
+"""Time of the clock after which a planner is given up on."""
+LOOK_EVERY_S: Final = 0.02
+_RECALLED: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class PlanningRings:
+    """What the planner process reads and writes, apart from observations."""
+
+    requests: Ring
+    orders: Ring
+    events: Ring
+
+
+class Planning:
+    """Answers wishes, one at a time; a newer one ends the work on an older one."""
+
+    def __init__(
+        self,
+        mirror: Mirror,
+        rings: PlanningRings,
+        planner: Planner,
+        memory: Memory,
+        *,
+        setting: Setting = "few-shot",
+        speed: float = 1.0,
+        clock_ns: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        self._mirror, self._rings, self._planner, self._memory = mirror, rings, planner, memory
+        self._setting: Setting = setting
+        self._speed, self._clock_ns = speed, clock_ns
+        self._asked = rings.requests.head
+        self._at_work: asyncio.Task[None] | None = None
+        self._request: Request | None = None
+
+    async def run(self, over: Callable[[], bool]) -> None:
+        """Answer wishes until it is over."""
+        while not over():
+            await self.look()
+            await asyncio.sleep(LOOK_EVERY_S)
+        await self._give_up("The drive is over.")
+
+    async def look(self) -> None:
+        """Take up the newest wish, if there is a new one; whatever was worked on is given up."""
+        messages, _ = self._rings.requests.since(self._asked)
+        self._asked = max(self._asked, self._rings.requests.head)
+        requests: list[Request] = []
+        for message in messages:
+            try:
+                requests.append(read_request(message.payload))
+            except MessageError as error:
+                self._tell("garbage", "", f"A wish that is none: {error}.")
+        if not requests:
+            return
+        await self._give_up("A newer wish came.")
+        for passed_over in requests[:-1]:
+            self._tell("superseded", passed_over.wish, "A newer wish came.")
+        self._request = requests[-1]
+        self._at_work = asyncio.create_task(self._answer(requests[-1]))
+
+    async def finish(self) -> None:
+        """Wait for the work at hand."""
+        if self._at_work is not None:
+            await self._at_work
+
+    async def _give_up(self, why: str) -> None:
+        task, request = self._at_work, self._request
+        self._at_work = self._request = None
+        if task is None or request is None or task.done():
+            return
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        self._tell("superseded", request.wish, why)
+
+    async def _answer(self, request: Request) -> None:
+        self._tell("planning", request.wish, "")
+        try:
+            order = await asyncio.wait_for(self._plan(request), PLAN_WITHIN_S)
+        except TimeoutError:
+            self._tell("unplanned", request.wish, f"No plan within {PLAN_WITHIN_S:.0f} s.")
+            return
+        except ChauffeurError as error:
+            self._tell("unplanned", request.wish, str(error))
+            return
+        except Exception as error:  # noqa: BLE001 - a planner may be anybody's code; the wish is answered all the same
+            self._tell("unplanned", request.wish, f"The planner failed: {type(error).__name__}: {error}")
+            return
+        if order.plan.refusal or order.plan.policy is None:
+            self._tell("declined", request.wish, order.plan.refusal or "The planner gave no program.")
+            return
+        try:
+            self._rings.orders.write(encode(order))
+        except ValueError as error:
+            self._tell("unplanned", request.wish, str(error))
+            return
+        self._tell("planned", request.wish, order.plan.thoughts.text)
+
+    async def _plan(self, request: Request) -> Order:
+        self._mirror.follow()
+        issued_ns = self._clock_ns()
+        snapshot, limits = self._mirror.world.snapshot(), self._mirror.limits
+        scene = Scene.of(self._mirror.trip, snapshot)
+        instruction = parse_wish(request.text, PersonId(request.person))
+        context = describe(snapshot)
+        history = self._memory.recall(instruction.person, instruction, context, _RECALLED)
+        system = build_system_message(self._setting, limits=limits)
+        asked, _ = screen_request(PlanRequest(instruction, context, system, history, limits=limits))
+        plan: Plan = await self._planner.plan(asked)
+        return Order(
+            wish=request.wish,
+            plan=plan,
+            scene=scene,
+            issued_ns=issued_ns,
+            start_by_ns=issued_ns + round(START_WITHIN_S / self._speed * 1e9),
+            expires_ns=issued_ns + round(FOLLOW_FOR_S / self._speed * 1e9),
+        )
+
+    def _tell(self, kind: EventKind, wish: str, text: str) -> None:
+        self._rings.events.write(encode(Event(kind, wish, text[:2000], self._mirror.trip, self._mirror.tick)))
