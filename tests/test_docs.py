@@ -73,3 +73,17 @@ def test_documents_speak_of_the_product_alone() -> None:
     for document in [*DOCUMENTS, ROOT / "ARCHITECTURE.md", ROOT / "CHANGELOG.md"]:
         text = document.read_text(encoding="utf-8")
         assert not re.search(r"issue #?\d|TODO|FIXME", text), document.name
+
+
+def test_the_evidence_of_the_safety_case_is_there() -> None:
+    text = (ROOT / "docs" / "safety-case.md").read_text(encoding="utf-8")
+    named = re.findall(r"`((?:tests|safety|drive)/[\w/]+(?:\.py)?)(?:::(\w+))?`", text)
+    assert len(named) > 25
+    for path, function in named:
+        file = ROOT / path if path.startswith("tests") else ROOT / "src" / "chauffeur" / path
+        assert file.exists(), path
+        assert not function or f"def {function}(" in file.read_text(encoding="utf-8"), f"{path}::{function}"
+    results = (ROOT / "benchmarks" / "RESULTS.md").read_text(encoding="utf-8")
+    for cell in re.findall(r"RESULTS, ((?:\"[^\"]+\"(?:, | and )?)+)", text):
+        for title in re.findall(r"\"([^\"]+)\"", cell):
+            assert re.search(rf"^##+ {re.escape(title)}$", results, re.MULTILINE), title

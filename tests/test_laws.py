@@ -9,7 +9,7 @@ import chauffeur
 
 SOURCE = Path(chauffeur.__file__).parent
 
-STEPS_A_WORLD = {"drive/episode.py"}
+STEPS_A_WORLD = {"drive/actuate.py"}
 """Law 1: the only module that hands a command to a world."""
 
 STEPS_ITS_OWN = {
@@ -36,7 +36,9 @@ def _calls(path: Path, attribute: str) -> list[int]:
 def test_one_door_to_the_actuator() -> None:
     doors = {str(p.relative_to(SOURCE)) for p in SOURCE.rglob("*.py") if _calls(p, "step")}
     assert doors - STEPS_AN_OPTIMISER == STEPS_A_WORLD | STEPS_ITS_OWN
-    assert len(_calls(SOURCE / "drive" / "episode.py", "step")) == 1
+    assert len(_calls(SOURCE / "drive" / "actuate.py", "step")) == 1
+    hands = {str(p.relative_to(SOURCE)) for p in SOURCE.rglob("*.py") if "drive.actuate import" in p.read_text("utf-8")}
+    assert hands == {"drive/episode.py", "drive/live/control.py"}  # trips in simulated time, and in real time
 
 
 def test_the_compiled_core_is_the_highway_worlds_own() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from chauffeur.language import read_quantities
-from chauffeur.models.onboard.noise import SAFE_SLIPS, noisy, protected
+from chauffeur.models.onboard.noise import SAFE_SLIPS, noisy, protected, said_in_full
 from chauffeur.models.onboard.words import utter, wordings
 
 SLOTS = {
@@ -87,3 +87,18 @@ def test_noise_repeats_with_the_seed() -> None:
     text = "Could you slow down a bit, please?"
     first = [noisy(text, np.random.default_rng(k), 2) for k in range(20)]
     assert first == [noisy(text, np.random.default_rng(k), 2) for k in range(20)]
+
+
+@pytest.mark.parametrize(
+    ("said", "full"),
+    [
+        ("I'm late, don't dawdle", "I am late, do not dawdle"),
+        ("that's got to be faster", "that's got to be faster"),
+        ("that's too fast, let's slow down", "that is too fast, let us slow down"),
+        ("I'd like you to stop", "I would like you to stop"),
+        ("can't you go faster", "can't you go faster"),
+        ("we can't see past the truck", "we cannot see past the truck"),
+    ],
+)
+def test_contractions_are_said_in_full_where_the_sentence_stays_english(said: str, full: str) -> None:
+    assert said_in_full(said) == full

@@ -7,6 +7,7 @@ import os
 import platform
 import re
 import shutil
+import subprocess
 import sys
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, distribution, requires, version
@@ -74,6 +75,9 @@ def doctor() -> None:
             lines.append(("", Text(install_command(extra), "cyan")))
     console.print(columns(lines))
 
+    console.print("\nReal time", style="bold")
+    console.print(columns([("scheduling", Text(_realtime()))]))
+
     console.print("\nSettings", style="bold")
     console.print(columns(_settings()))
     if missing:
@@ -85,6 +89,17 @@ def doctor() -> None:
         console.print(Text("\nEverything needed to drive is here.", "green"))
     if missing or sandbox:
         raise typer.Exit(FAILED)
+
+
+_TRY_REALTIME = "import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))"
+
+
+def _realtime() -> str:
+    """Whether `chauffeur live` may have a core to itself when it needs one; tried in a process of its own."""
+    tried = subprocess.run([sys.executable, "-I", "-c", _TRY_REALTIME], capture_output=True, check=False)  # noqa: S603
+    if tried.returncode == 0:
+        return "allowed: control keeps its rate whatever else runs"
+    return "not allowed: control may be late on a busy machine. Allow it with rtprio in /etc/security/limits.conf."
 
 
 def installed_parts() -> tuple[tuple[Part, ...], dict[str, tuple[Part, ...]]]:

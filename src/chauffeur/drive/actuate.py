@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from chauffeur.concept import Command, Intervention, LaneId, Snapshot
-from chauffeur.safety.shield import Shield
+from chauffeur.safety.shield import Guarded, Shield
 from chauffeur.worlds.base import World
 
 
@@ -30,7 +30,5 @@ def actuate(
         aim: Lane that is steered for.
         shield: Has the last word; None where a benchmark's own rules allow none.
     """
-    if shield is None or snapshot is None:
-        return Actuated(requested, world.step(requested))
-    guarded = shield.guard(snapshot, requested, aim)
+    guarded = Guarded(requested) if shield is None or snapshot is None else shield.guard(snapshot, requested, aim)
     return Actuated(requested, world.step(guarded.command), guarded.interventions)

@@ -1,4 +1,7 @@
-"""Entry of the processes: `python -m chauffeur.drive.live ROLE FOLDER`; the supervisor starts them."""
+"""Entry of the processes: `python -m chauffeur.drive.live ROLE FOLDER`; the supervisor starts them.
+
+A `spare` is a policy process that has loaded everything and waits: on SIGUSR1 it takes the place of one that died.
+"""
 
 from __future__ import annotations
 
@@ -59,11 +62,30 @@ def _control(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     (folder / FIGURES_FILE).write_text(json.dumps(figures))
 
 
-def _policy(folder: Path, settings: Settings, over: Callable[[], bool]) -> None:
+def _spare(folder: Path, settings: Settings, over: Callable[[], bool]) -> None:
+    called = False
+
+    def call(number: int, frame: object) -> None:
+        nonlocal called
+        del number, frame
+        called = True
+
+    signal.signal(signal.SIGUSR1, call)
+    _policy(folder, settings, over, role="spare", called=lambda: called)
+
+
+def _policy(
+    folder: Path,
+    settings: Settings,
+    over: Callable[[], bool],
+    role: str = "policy",
+    called: Callable[[], bool] = lambda: True,
+) -> None:
     import time
 
     from chauffeur.drive.live.mirror import Mirror
     from chauffeur.drive.live.policy import LIVE_BUDGET, Policy, PolicyRings
+    from chauffeur.drive.live.realtime import become_favoured
     from chauffeur.programs import Sandbox
 
     world = load_plugin("chauffeur.worlds", settings.starts[0].scenario.world)()
@@ -74,9 +96,13 @@ def _policy(folder: Path, settings: Settings, over: Callable[[], bool]) -> None:
     for start in settings.starts:
         world.reset(start.scenario, start.seed)
     pause_s = world.dt_s / settings.speed / 20.0
+    if settings.realtime:
+        become_favoured()
     with Sandbox(LIVE_BUDGET) as sandbox:
+        _ready(folder, role)
+        while not called() and not over():
+            time.sleep(pause_s)
         policy = Policy(mirror, rings, sandbox)
-        _ready(folder, "policy")
         while not over():
             if not policy.tick():
                 time.sleep(pause_s)
@@ -85,6 +111,7 @@ def _policy(folder: Path, settings: Settings, over: Callable[[], bool]) -> None:
 
 def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None:
     import asyncio
+    import importlib
 
     from chauffeur.drive.live.mirror import Mirror
     from chauffeur.drive.live.planning import Planning, PlanningRings
@@ -106,6 +133,8 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
         setting="zero-shot" if settings.setting == "zero-shot" else "few-shot",
         speed=settings.speed,
     )
+    if settings.planner.startswith("openai/"):
+        importlib.import_module("openai")  # seconds on a busy machine: not at the first wish
     _ready(folder, "planner")
     asyncio.run(planning.run(over))
 
@@ -114,7 +143,9 @@ def main(role: str, folder: Path) -> None:
     """Be one of the processes of the drive in a folder."""
     logging.basicConfig(level=logging.WARNING)
     over = _told_to_end()
-    {"control": _control, "policy": _policy, "planner": _planner}[role](folder, Settings.read(folder), over)
+    {"control": _control, "policy": _policy, "spare": _spare, "planner": _planner}[role](
+        folder, Settings.read(folder), over
+    )
 
 
 if __name__ == "__main__":

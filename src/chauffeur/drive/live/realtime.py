@@ -16,6 +16,8 @@ import numpy as np
 FIFO_PRIORITY: Final = 10
 """Above all ordinary processes, below the kernel's own (50)."""
 NICENESS: Final = -15
+POLICY_NICENESS: Final = -10
+"""Of the policy, which control does not wait for: before ordinary work, after control."""
 _LOCK_NOW_AND_LATER: Final = 3
 """MCL_CURRENT | MCL_FUTURE of mlockall(2)."""
 _KEPT: Final = 1 << 20
@@ -51,12 +53,18 @@ def become_realtime(wanted: bool = True) -> Realtime:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(FIFO_PRIORITY))
         scheduling = "fifo"
     except (OSError, AttributeError):
-        try:
-            os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
+        if become_favoured(NICENESS):
             scheduling = "nice"
-        except OSError:
-            pass
     return Realtime(scheduling, memory_locked=_lock_memory())
+
+
+def become_favoured(niceness: int = POLICY_NICENESS) -> bool:
+    """Ask for a larger share of the core; whether it was given."""
+    try:
+        os.setpriority(os.PRIO_PROCESS, 0, niceness)
+    except OSError:
+        return False
+    return True
 
 
 def _lock_memory() -> bool:

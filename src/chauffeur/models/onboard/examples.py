@@ -15,7 +15,7 @@ import numpy as np
 
 from chauffeur.concept import Situation
 from chauffeur.models.onboard.cases import Case
-from chauffeur.models.onboard.noise import noisy
+from chauffeur.models.onboard.noise import noisy, said_in_full
 from chauffeur.models.onboard.speech import Unit, spoken
 from chauffeur.models.onboard.wordings import clause, conditioned, in_order, levels, utter, wordings
 from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, Kind, Number, Step
@@ -25,7 +25,9 @@ Generator = np.random.Generator
 
 HISTORY_SHARE: Final = 0.35
 """Share of plain wishes that come with remembered trips which have nothing to do with them."""
-CORRECTION_SHARE: Final = 0.06
+CORRECTION_SHARE: Final = 0.12
+IN_FULL_SHARE: Final = 0.15
+"""Share of sentences without contractions: "I am late"."""
 UNDRAFTED_SHARE: Final = 0.1
 """Share of examples without a draft: servers of the exported model show none."""
 UNKNOWN_CONTEXT_SHARE: Final = 0.08
@@ -50,6 +52,10 @@ LESS: Final = {
     "much_faster": "faster", "faster": "a_bit_faster", "much_slower": "slower", "slower": "a_bit_slower",
     "much_closer": "closer", "closer": "a_bit_closer", "much_further": "further", "further": "a_bit_further",
 }  # fmt: skip
+HOLDS: Final = ("hold_speed", "hold_gap", "carry_on")
+"""What keeps the present: "the same speed as last time" is not that."""
+BELOW: Final = ("under_limit_by",)
+"""Skills whose larger number is a lower speed."""
 MORE: Final = {weak: strong for strong, weak in LESS.items()}
 LESS_FACTOR, MORE_FACTOR = 0.85, 1.15
 
@@ -114,8 +120,7 @@ def checked_reasons() -> tuple[str, ...]:
 def wish_example(case: Case, rng: Generator, *, held: bool) -> Example:
     """An example of a case."""
     words, template, level = _wish(case.steps, rng, held=held)
-    noise = int(rng.choice(3, p=NOISE))
-    words = noisy(words, rng, noise)
+    words, noise = _arriving(words, rng)
     reply = refusal_reply(case.refusal) if case.refusal else program_reply(case.steps)
     known = bool(case.refusal) or _needs_context(case.steps) or rng.random() >= UNKNOWN_CONTEXT_SHARE
     history = _other_history(rng) if rng.random() < HISTORY_SHARE else ()
@@ -136,16 +141,20 @@ def correction_example(case: Case, rng: Generator, *, held: bool) -> Example | N
         ways.append("more")
     way = ways[int(rng.integers(len(ways)))]
     about = SKILLS[step.skill].meaning.manoeuvre
-    section = f"correction.{about}_{way}" if about in ("speed", "gap") and rng.random() < 0.5 else f"correction.{way}"
-    wording = utter(section, {}, rng, held)
+    named = about in ("speed", "gap") and step.skill not in HOLDS and rng.random() < 0.5
+    wording = utter(f"correction.{about}_{way}" if named else f"correction.{way}", {}, rng, held)
+    if named and (step.meaning.change < 0 or step.skill in BELOW) and way != "same":
+        # Of what slows down or closes up, "slower than last time" is more, not less.
+        way = "more" if way == "less" else "less"
+        if step.number is None and step.skill not in (LESS if way == "less" else MORE):
+            return None
     wanted = step
     if way != "same":
         if step.number is not None:
             wanted = replace(step, number=replace(step.number, factor=LESS_FACTOR if way == "less" else MORE_FACTOR))
         else:
             wanted = replace(step, skill=(LESS if way == "less" else MORE)[step.skill])
-    noise = int(rng.choice(3, p=NOISE))
-    words = noisy(wording.text, rng, noise)
+    words, noise = _arriving(wording.text, rng)
     history = [remembered([step], str(rng.choice(SAID))), *_other_history(rng)[:1]]
     return Example(
         prompt(case.situation, history, words, drafted=_drafted(rng)),
@@ -164,14 +173,19 @@ def correction_example(case: Case, rng: Generator, *, held: bool) -> Example | N
 def answer_example(section: str, situation: Situation | None, rng: Generator, *, held: bool) -> Example:
     """A wish to ask back about, or to refuse, wherever we are."""
     wording = utter(section, _free_slots(section, rng), rng, held)
-    noise = int(rng.choice(3, p=NOISE))
-    words = noisy(wording.text, rng, noise)
+    words, noise = _arriving(wording.text, rng)
     question, reason = wordings().question(section), wordings().reason(section)
     reply = f"{ASK}{question}" if question else f"{REFUSE}{reason}"
     history = _other_history(rng) if rng.random() < HISTORY_SHARE else ()
     kind = "ask" if question else "refuse"
     text = prompt(situation, history, words, drafted=_drafted(rng))
     return Example(text, reply, words, wording.template, kind, 0, noise, held, kind, -1)
+
+
+def _arriving(words: str, rng: Generator) -> tuple[str, int]:
+    """A sentence as it may arrive, and how noisy that is."""
+    noise = int(rng.choice(3, p=NOISE))
+    return noisy(said_in_full(words) if rng.random() < IN_FULL_SHARE else words, rng, noise), noise
 
 
 def _drafted(rng: Generator) -> bool:

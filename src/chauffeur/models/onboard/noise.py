@@ -131,6 +131,23 @@ _SHORT: tuple[tuple[str, str], ...] = (
     (r"\bthe\b", "da"),
     (r"\bsomething\b", "sth"),
 )
+_FULL: tuple[tuple[str, str], ...] = (
+    (r"\b(I)'m\b", r"\1 am"),
+    (r"\b(you|we|they)'re\b", r"\1 are"),
+    (r"\b(it|that|there|he|she|what|where|who)'s (?!got\b|been\b|had\b|gone\b|\w+ed\b)", r"\1 is "),
+    (r"\b(I|you|we|they)'ve\b", r"\1 have"),
+    (r"\b(I|you|we|they|he|she|it|that)'ll\b", r"\1 will"),
+    (r"\b(I|you|we)'d (?=like|love|rather|prefer|want|be)", r"\1 would "),
+    (r"\bcan't\b(?! (?:you|we)\b)", "cannot"),
+    (r"\bwon't\b(?! (?:you|it)\b)", "will not"),
+    (
+        r"\b(do|does|did|is|are|was|were|have|has|had|should|would|could|need)n't\b"
+        r"(?! (?:you|we|it|they|there|he|she)\b)",
+        r"\1 not",
+    ),
+    (r"\b(L|l)et's\b", r"\1et us"),
+)
+"""Contractions said in full: recognizers and careful people write so."""
 _FILLERS = ("um", "uh", "er", "like", "you know", "uhm", "well", "ehm", "hmm", "let's see")
 _KEYS = ("qwertyuiop", "asdfghjkl", "zxcvbnm")
 _NEAR: dict[str, str] = {
@@ -144,6 +161,13 @@ _NEAR: dict[str, str] = {
     for column, key in enumerate(keys)
 }
 _TOKEN = re.compile(r"^(\W*)(.*?)(\W*)$")
+
+
+def said_in_full(text: str) -> str:
+    """The sentence without contractions: "I'm late" becomes "I am late"; the wish is the same."""
+    for pattern, by in _FULL:
+        text = re.sub(pattern, by, text)
+    return text
 
 
 def noisy(text: str, rng: np.random.Generator, level: int) -> str:

@@ -39,7 +39,7 @@ from chauffeur.models.onboard.examples import Example, checked_reasons, question
 from chauffeur.models.onboard.packed import Packed
 from chauffeur.planners.onboard.prompt import END
 
-MODEL_VERSION: Final = "onboard-lm-v2"
+MODEL_VERSION: Final = "onboard-lm-v3"
 _SPLITS: Final = ("train", "seen", "unseen")
 _TOKENIZER_EXAMPLES: Final = 60_000
 

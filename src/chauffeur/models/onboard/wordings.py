@@ -40,6 +40,12 @@ FILES = (
     "moods",
     "answers",
     "compound",
+    "again",
+    "pace_felt",
+    "room_felt",
+    "not_driven",
+    "plain_rare",
+    "steps_more",
 )
 
 _NOT = r"^(?:don't|do not|never|neither|no|patiently|really|not|either)\b"
@@ -146,7 +152,13 @@ _OPENINGS: Sequence[Frame] = (
     *[Frame(f"{_HEY}, {{body}}", unless=_CALLED)] * 2,
     Frame(f"{_NAME}, {{body}}", unless=_CALLED),
     Frame(f"{_HEY} {_NAME}, {{body}}", unless=_CALLED),
-    Frame(f"{{body}}, {_NAME}", unless=re.compile(_ENDED.pattern + r"|\b(?:driver|mate|buddy|man|dude|please)$")),
+    Frame(
+        f"{{body}}, {_NAME}",
+        unless=re.compile(
+            _ENDED.pattern
+            + r"|\b(?:driver|mate|buddy|man|dude|please|sir|dear|love|pal|boss|friend|robot|James|chauffeur)$"
+        ),
+    ),
     Frame(
         "(one more thing|quick one|another thing|I was just thinking|something else|as I said|like I said), {body}",
         unless=_CALLED,
@@ -227,7 +239,7 @@ _FIRST_VERBS = (
     "attempt:attempting begin:beginning borrow:borrowing branch:branching break:breaking bypass:bypassing "
     "cede:ceding chase:chasing dash:dashing dodge:dodging duck:ducking exit:exiting fly:flying "
     "forget:forgetting forgo:forgoing grant:granting hook:hooking indicate:indicating invite:inviting "
-    "manoeuvre:manoeuvring maneuver:maneuvering offer:offering outrun:outruning peel:peeling permit:permitting "
+    "manoeuvre:manoeuvring maneuver:maneuvering offer:offering outrun:outrunning peel:peeling permit:permitting "
     "pursue:pursuing queue:queueing refuse:refusing resist:resisting sail:sailing shoot:shooting "
     "skirt:skirting slot:slotting start:starting surrender:surrendering suspend:suspending track:tracking "
     "try:trying veer:veering wait:waiting welcome:welcoming whip:whipping up:upping top:topping "
@@ -238,9 +250,9 @@ _FIRST_VERBS = (
     "scrub:scrubbing bleed:bleeding coast:coasting "
     "abide:abiding adapt:adapting adhere:adhering adopt:adopting align:aligning amend:amending "
     "comply:complying conform:conforming curb:curbing divide:dividing elevate:elevating enhance:enhancing "
-    "equal:equaling hoist:hoisting jack:jacking level:leveling maximise:maximising mimic:mimicing "
+    "equal:equaling hoist:hoisting jack:jacking level:leveling maximise:maximising mimic:mimicking "
     "observe:observing prevent:preventing ratchet:ratcheting refrain:refraining respect:respecting "
-    "retain:retaining revert:reverting sink:sinking slacken:slackening slash:slashing split:spliting "
+    "retain:retaining revert:reverting sink:sinking slacken:slackening slash:slashing split:splitting "
     "stabilise:stabilising steady:steadying sustain:sustaining tie:tying tune:tuning whittle:whittling"
 )
 _GERUNDS: Mapping[str, str] = {

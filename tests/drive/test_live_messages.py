@@ -1,0 +1,112 @@
+"""What control believes of what it reads: a wish that is one, and nothing else."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chauffeur.concept import Command, Intervention, Wishes
+from chauffeur.drive.live.messages import MessageError, Observation, Report, Wish
+
+WISH = Wish(
+    trip=1,
+    tick=7,
+    plan="w1",
+    issued_ns=10,
+    expires_ns=20,
+    state="running",
+    line=3,
+    wishes=Wishes(25.0, 1.5, ("a", "b", 1), "left", frozenset({4, 2})),
+)
+
+
+def fields() -> dict[str, Any]:
+    return json.loads(WISH.encode())
+
+
+def test_a_wish_comes_back_as_it_was() -> None:
+    assert Wish.decode(WISH.encode()) == WISH
+    bare = Wish(1, 0, "", 0, 0, "none", None, Wishes())
+    assert Wish.decode(bare.encode()) == bare
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "why"),
+    [
+        ("speed", math.nan, "bad speed"),
+        ("speed", math.inf, "bad speed"),
+        ("speed", "25", "bad speed"),
+        ("speed", True, "bad speed"),
+        ("speed", -1.0, "speed out of range"),
+        ("speed", 100.1, "speed out of range"),
+        ("headway", None, "bad headway"),
+        ("headway", -0.1, "headway out of range"),
+        ("headway", 61, "headway out of range"),
+        ("trip", -1, "bad trip"),
+        ("tick", 1.0, "bad tick"),
+        ("tick", True, "bad tick"),
+        ("issued_ns", 1 << 63, "bad issued_ns"),
+        ("expires_ns", None, "bad expires_ns"),
+        ("state", "driving", "bad state"),
+        ("line", "3", "bad line"),
+        ("plan", None, "bad plan"),
+        ("plan", "x" * 65, "bad plan"),
+        ("lane", ["a", "b"], "bad lane"),
+        ("lane", ["a", "b", True], "bad lane"),
+        ("lane", [1, "b", 0], "bad lane"),
+        ("lane", "ab0", "bad lane"),
+        ("turn", "back", "bad turn"),
+        ("turn", ["left"], "bad turn"),
+        ("served", None, "bad stops"),
+        ("served", ["1"], "bad stops"),
+        ("served", [True], "bad stops"),
+        ("served", list(range(65)), "bad stops"),
+    ],
+)
+def test_each_field_must_be_of_its_kind(name: str, value: Any, why: str) -> None:
+    with pytest.raises(MessageError, match=f"^{why}$"):
+        Wish.decode(json.dumps(fields() | {name: value}).encode())
+
+
+@pytest.mark.parametrize("name", sorted(set(fields()) - {"speed", "lane", "turn", "line"}))
+def test_a_missing_field_is_none(name: str) -> None:
+    with pytest.raises(MessageError):
+        Wish.decode(json.dumps({k: v for k, v in fields().items() if k != name}).encode())
+
+
+@given(st.binary(max_size=400))
+def test_no_bytes_do_more_than_be_refused(payload: bytes) -> None:
+    for kind in (Wish, Observation):
+        try:
+            kind.decode(payload)
+        except MessageError:
+            continue
+
+
+@pytest.mark.parametrize("payload", [b"", b"[]", b"null", b"{", b"\xff\xfe", b"[" * 5000, b'"' + b"x" * 100 + b'"'])
+def test_what_is_no_object_is_no_wish(payload: bytes) -> None:
+    with pytest.raises(MessageError, match=r"^(not JSON|no object)$"):
+        Wish.decode(payload)
+
+
+def test_an_observation_comes_back_and_a_short_one_is_none() -> None:
+    shown = Observation(3, 99, b"world")
+    assert Observation.decode(shown.encode()) == shown
+    with pytest.raises(MessageError, match="too short"):
+        Observation.decode(b"0123456789")
+
+
+def test_a_report_comes_back_as_it_was() -> None:
+    before, after = Command(1.0, 0.1), Command(-2.0, 0.0)
+    report = Report(
+        trip=1, tick=2, late_ns=3, rung="hold", plan="w1", state="running", line=None, age_s=0.5,
+        wishes=WISH.wishes, requested=before, applied=after,
+        interventions=(Intervention("gap", "Too close.", before, after),), clipped=("target_speed",),
+        refused={"not JSON": 2}, missed=1, faults=0, speed_mps=20.0, lane=("a", "b", 0),
+    )  # fmt: skip
+    assert Report.decode(report.encode()) == report

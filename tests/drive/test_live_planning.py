@@ -1,0 +1,165 @@
+"""The planner process in one piece: every wish gets an answer, whatever the planner does."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from live_bench import OVERTAKE, Bench
+
+from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
+from chauffeur.drive.live import planning as module
+from chauffeur.drive.live.mirror import Mirror
+from chauffeur.drive.live.orders import Event, Order, Request, encode, read_event, read_order
+from chauffeur.drive.live.planning import Planning, PlanningRings
+from chauffeur.drive.live.ring import Ring
+from chauffeur.drive.live.settings import SIZES, RingName
+from chauffeur.drive.session import Forgetful
+from chauffeur.planners.base import Planner
+from chauffeur.planners.registry import make_planner
+from chauffeur.worlds.highway import HighwayWorld
+
+PLAN = Plan(Thoughts("I hold it."), Program("def drive():\n    yield autopilot()\n"), planner="written")
+
+
+class Written:
+    """A planner that does what its wish names."""
+
+    name = "written"
+
+    async def plan(self, request: PlanRequest) -> Plan:
+        match request.instruction.text.split()[0]:
+            case "wait":
+                await asyncio.sleep(30.0)
+            case "raise":
+                raise ConfigError("No such model.")
+            case "break":
+                raise ZeroDivisionError("oops")
+            case "decline":
+                return Plan(Thoughts(""), None, refusal="Cars cannot fly.")
+            case "nothing":
+                return Plan(Thoughts(""), None)
+            case "long":
+                return Plan(Thoughts(""), Program("#" * 400_000))
+            case _:
+                pass
+        return PLAN
+
+
+class Rig:
+    def __init__(self, folder: Path, planner: Planner) -> None:
+        self.bench = Bench(folder, (OVERTAKE,))
+        self.bench.control.begin_trip()
+        names: tuple[RingName, ...] = ("requests", "orders", "planner_events")
+        self.requests, self.orders, self.events = (Ring(folder / name, *SIZES[name], create=True) for name in names)
+        self.planning = Planning(
+            Mirror(HighwayWorld(), (OVERTAKE,), self.bench.observations),
+            PlanningRings(self.requests, self.orders, self.events),
+            planner,
+            Forgetful(),
+            clock_ns=lambda: self.bench.now_ns,
+        )
+
+    def ask(self, *texts: str) -> None:
+        for k, text in enumerate(texts, 1):
+            self.requests.write(encode(Request(f"w{k}", text)))
+
+    async def answered(self) -> list[tuple[str, str]]:
+        await self.planning.look()
+        await self.planning.finish()
+        return self.kinds()
+
+    def told(self) -> list[Event]:
+        return [read_event(message.payload) for message in self.events.since(0)[0]]
+
+    def kinds(self) -> list[tuple[str, str]]:
+        return [(event.kind, event.wish) for event in self.told()]
+
+    def ordered(self) -> Order:
+        message = self.orders.latest()
+        assert message is not None
+        return read_order(message.payload)
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[Rig]:
+    yield Rig(tmp_path, Written())
+
+
+def test_a_wish_becomes_an_order_that_says_what_it_was_made_for(rig: Rig) -> None:
+    rig.bench.tick()
+    rig.ask("go")
+    assert asyncio.run(rig.answered()) == [("planning", "w1"), ("planned", "w1")]
+    order = rig.ordered()
+    assert (order.wish, order.plan, order.scene.trip, order.scene.tick) == ("w1", PLAN, 1, 1)
+    assert order.scene.lane == rig.bench.world.snapshot().ego.lane
+    assert order.issued_ns < order.start_by_ns < order.expires_ns
+
+
+@pytest.mark.parametrize(
+    ("wish", "kind", "words"),
+    [
+        ("decline", "declined", "cannot fly"),
+        ("nothing", "declined", "no program"),
+        ("raise", "unplanned", "No such model"),
+        ("break", "unplanned", "ZeroDivisionError"),
+        ("long", "unplanned", "does not fit"),
+        ("x" * 3000, "unplanned", "3000 characters"),
+    ],
+)
+def test_what_goes_wrong_is_an_answer(rig: Rig, wish: str, kind: str, words: str) -> None:
+    rig.ask(wish)
+    assert asyncio.run(rig.answered()) == [("planning", "w1"), (kind, "w1")]
+    assert words in rig.told()[-1].text
+    assert rig.orders.latest() is None
+
+
+def test_a_planner_without_end_is_given_up_on(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "PLAN_WITHIN_S", 0.05)
+    rig.ask("wait")
+    assert asyncio.run(rig.answered()) == [("planning", "w1"), ("unplanned", "w1")]
+
+
+def test_a_newer_wish_ends_the_work_on_an_older_one_and_all_are_answered(rig: Rig) -> None:
+    async def drive() -> None:
+        rig.ask("wait", "go there", "wait")
+        await rig.planning.look()
+        await asyncio.sleep(0.02)
+        rig.requests.write(encode(Request("w4", "go")))
+        await rig.planning.look()
+        await rig.planning.finish()
+
+    asyncio.run(drive())
+    assert rig.kinds() == [
+        ("superseded", "w1"),
+        ("superseded", "w2"),
+        ("planning", "w3"),
+        ("superseded", "w3"),
+        ("planning", "w4"),
+        ("planned", "w4"),
+    ]
+
+
+def test_garbage_among_the_wishes_is_told_of(rig: Rig) -> None:
+    rig.requests.write(b"\xff")
+    rig.ask("go")
+    assert asyncio.run(rig.answered()) == [("garbage", ""), ("planning", "w1"), ("planned", "w1")]
+
+
+def test_at_the_end_of_the_drive_the_wish_at_hand_is_answered(rig: Rig) -> None:
+    rig.ask("wait")
+    looks = iter([False, False, True])
+    asyncio.run(rig.planning.run(lambda: next(looks)))
+    assert rig.kinds() == [("planning", "w1"), ("superseded", "w1")]
+
+
+def test_the_onboard_planner_plans_for_what_control_shows(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, make_planner("retrieval"))
+    for _ in range(10):
+        rig.bench.tick()
+    rig.ask("Slow down to 20 m/s")
+    assert asyncio.run(rig.answered()) == [("planning", "w1"), ("planned", "w1")]
+    assert isinstance(rig.ordered().plan.policy, Program)
+    assert rig.ordered().scene.tick == 10

@@ -1,0 +1,277 @@
+"""The policy process in one piece beside a control process: what it starts, runs, puts down and picks up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from live_bench import OVERTAKE, Bench
+
+from chauffeur.concept import Plan, Program, Thoughts
+from chauffeur.drive.live.messages import Observation, Wish
+from chauffeur.drive.live.mirror import Mirror
+from chauffeur.drive.live.orders import Event, Order, Scene, encode, read_event
+from chauffeur.drive.live.policy import MOST_RESUMPTIONS, Policy, PolicyRings
+from chauffeur.drive.live.ring import Ring
+from chauffeur.drive.live.settings import SIZES, RingName
+from chauffeur.drive.live.starts import Start
+from chauffeur.drive.scenarios import find
+from chauffeur.programs import UNHURRIED, Sandbox
+from chauffeur.worlds.highway import HighwayWorld
+
+HOLD_20 = """
+def drive():
+    set_target_speed(20.0)
+    for _ in range(40):
+        yield autopilot()
+    say("Done.")
+    yield autopilot()
+"""
+COUNT = """
+def drive():
+    speed = 30.0
+    while speed > 20.0:
+        speed = speed - 0.1
+        set_target_speed(speed)
+        yield autopilot()
+"""
+FASTER = """
+def drive():
+    set_target_speed(31.0)
+    while True:
+        yield autopilot()
+"""
+TOO_FAST = """
+def drive():
+    set_target_speed(60.0)
+    while True:
+        yield autopilot()
+"""
+FAILS = """
+def drive():
+    yield autopilot()
+    x = [1]
+    y = x[3]
+    yield autopilot()
+"""
+
+
+class Rig:
+    """Control and policy side by side, period by period."""
+
+    def __init__(self, folder: Path, sandbox: Sandbox, starts: tuple[Start, ...] = (OVERTAKE,)) -> None:
+        self.bench = Bench(folder, starts)
+        names: tuple[RingName, ...] = ("orders", "policy_events", "checkpoints")
+        orders, events, checkpoints = (Ring(folder / name, *SIZES[name], create=True) for name in names)
+        self.orders, self.events = orders, events
+        self.rings = PolicyRings(orders, self.bench.wishes, events, checkpoints)
+        self.starts, self.sandbox = starts, sandbox
+        self.policy = self.new_policy()
+        self.bench.control.begin_trip()
+        self._heard = 0
+
+    def new_policy(self) -> Policy:
+        mirror = Mirror(HighwayWorld(), self.starts, self.bench.observations)
+        return Policy(mirror, self.rings, self.sandbox, clock_ns=lambda: self.bench.now_ns)
+
+    def period(self, count: int = 1) -> Wish:
+        """Let both run; the policy's last wish."""
+        for _ in range(count):
+            self.policy.tick()
+            self.bench.tick()
+        message = self.bench.wishes.latest()
+        assert message is not None
+        return Wish.decode(message.payload)
+
+    def order(self, source: str, wish: str = "w1", **changes: object) -> None:
+        snapshot = self.bench.world.snapshot()
+        message = self.bench.observations.latest()
+        assert message is not None
+        seen = Observation.decode(message.payload)
+        made = Order(
+            wish,
+            Plan(Thoughts("As you wish."), Program(source)),
+            Scene.of(seen.trip, snapshot),
+            self.bench.now_ns,
+            self.bench.now_ns + 10**10,
+            self.bench.now_ns + 10**12,
+        )
+        self.orders.write(encode(replace(made, **changes)))  # pyright: ignore[reportArgumentType]
+
+    def told(self) -> list[Event]:
+        messages, _ = self.events.since(self._heard)
+        self._heard = self.events.head
+        return [read_event(message.payload) for message in messages]
+
+    def kinds(self) -> list[tuple[str, str]]:
+        return [(event.kind, event.wish) for event in self.told()]
+
+
+@pytest.fixture(scope="module")
+def sandbox() -> Iterator[Sandbox]:
+    with Sandbox(UNHURRIED) as opened:
+        yield opened
+
+
+@pytest.fixture
+def rig(tmp_path: Path, sandbox: Sandbox) -> Iterator[Rig]:
+    made = Rig(tmp_path, sandbox)
+    yield made
+    made.policy.close()
+
+
+def test_without_a_plan_it_wishes_what_is_and_shows_that_it_lives(rig: Rig) -> None:
+    wish = rig.period(3)
+    assert (wish.plan, wish.state, wish.tick) == ("", "none", 2)
+    assert rig.bench.tick().rung == "follow"
+    assert rig.kinds() == []
+
+
+def test_a_plan_is_checked_started_run_and_told_of(rig: Rig) -> None:
+    rig.period(2)
+    rig.order(HOLD_20)
+    wish = rig.period()
+    assert (wish.plan, wish.state, wish.wishes.target_speed_mps) == ("w1", "running", 20.0)
+    assert wish.line is not None
+    assert rig.kinds() == [("started", "w1")]
+    assert rig.period(45).state == "finished"
+    assert rig.kinds() == [("said", "w1"), ("finished", "w1")]
+    assert rig.period().wishes.target_speed_mps == 20.0  # what was wished holds on
+
+
+def test_a_plan_that_crosses_the_limits_is_refused_and_what_is_driven_goes_on(rig: Rig) -> None:
+    rig.period()
+    rig.order(HOLD_20)
+    rig.period(3)
+    rig.order(TOO_FAST, "w2")
+    wish = rig.period()
+    assert (wish.plan, wish.wishes.target_speed_mps) == ("w1", 20.0)
+    kinds = rig.kinds()
+    assert kinds == [("started", "w1"), ("refused", "w2")]
+
+
+def test_a_new_plan_takes_over_at_the_beginning_of_a_period_with_the_wishes_of_the_old(rig: Rig) -> None:
+    rig.period()
+    rig.order("def drive():\n    set_desired_time_headway(2.0)\n    while True:\n        yield autopilot()\n")
+    assert rig.period().wishes.time_headway_s == 2.0
+    rig.order(FASTER, "w2")
+    wish = rig.period()
+    assert (wish.plan, wish.wishes.target_speed_mps, wish.wishes.time_headway_s) == ("w2", 31.0, 2.0)
+    assert rig.kinds() == [("started", "w1"), ("superseded", "w1"), ("started", "w2")]
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"start_by_ns": 1}, "too late"),
+        ({"expires_ns": 1}, "too late"),
+        ({"scene": Scene(2, 0, None, None)}, "another trip"),
+        ({"scene": Scene(1, 0, ("x", "y", 0), None)}, "another lane"),
+    ],
+)
+def test_a_stale_plan_is_not_started(rig: Rig, changes: dict[str, object], why: str) -> None:
+    rig.period()
+    rig.order(HOLD_20, **changes)
+    assert rig.period().plan == ""
+    (event,) = rig.told()
+    assert event.kind == "stale"
+    assert why in event.text
+
+
+def test_a_plan_for_another_car_ahead_is_stale(rig: Rig) -> None:
+    rig.period()
+    scene = Scene.of(1, rig.bench.world.snapshot())
+    assert scene.lead is not None
+    rig.order(HOLD_20, scene=replace(scene, lead=scene.lead + 1))
+    rig.period()
+    assert [(e.kind, "Another car" in e.text) for e in rig.told()] == [("stale", True)]
+
+
+def test_garbage_among_the_plans_is_told_of_and_only_the_last_of_several_is_looked_at(rig: Rig) -> None:
+    rig.period()
+    rig.orders.write(b"{garbage")
+    rig.order(HOLD_20, "w1")
+    rig.order(FASTER, "w2")
+    assert rig.period().plan == "w2"
+    assert rig.kinds() == [("garbage", ""), ("superseded", "w1"), ("started", "w2")]
+
+
+def test_a_program_that_fails_says_so_once_and_control_lets_go_of_its_wishes(rig: Rig) -> None:
+    rig.period()
+    rig.order(FAILS)
+    assert rig.period(4).state == "failed"
+    assert rig.kinds() == [("started", "w1"), ("failed", "w1")]
+    assert rig.bench.tick().rung == "keep"
+
+
+def test_a_program_goes_on_where_it_stood_when_its_process_dies(rig: Rig) -> None:
+    rig.period()
+    rig.order(COUNT)
+    before = rig.period(30)
+    rig.policy.close()  # as the end of the process would
+    rig.policy = rig.new_policy()
+    after = rig.period()
+    assert rig.kinds() == [("started", "w1"), ("resumed", "w1")]
+    assert (after.plan, after.state) == ("w1", "running")
+    assert before.wishes.target_speed_mps is not None
+    assert after.wishes.target_speed_mps == pytest.approx(before.wishes.target_speed_mps - 0.1)
+
+
+def test_a_program_that_was_running_whenever_its_process_died_is_given_up(rig: Rig) -> None:
+    rig.period()
+    rig.order(FASTER)
+    rig.period(2)
+    for _ in range(MOST_RESUMPTIONS):
+        rig.policy.close()
+        rig.policy = rig.new_policy()
+        assert rig.period(2).plan == "w1"
+    rig.policy.close()
+    rig.policy = rig.new_policy()
+    assert rig.period().plan == ""
+    assert rig.kinds() == [("started", "w1"), *[("resumed", "w1")] * MOST_RESUMPTIONS, ("interrupted", "w1")]
+
+
+def test_a_program_that_had_ended_is_not_picked_up_again(rig: Rig) -> None:
+    rig.period()
+    rig.order(HOLD_20)
+    assert rig.period(50).state == "finished"
+    rig.policy.close()
+    rig.policy = rig.new_policy()
+    assert rig.period().plan == ""
+    assert ("resumed", "w1") not in rig.kinds()
+
+
+def test_a_torn_checkpoint_is_no_program(rig: Rig) -> None:
+    rig.period()
+    rig.order(COUNT)
+    rig.period(3)
+    rig.policy.close()
+    message = rig.rings.checkpoints.latest()
+    assert message is not None
+    rig.rings.checkpoints.write(message.payload[:-200] + bytes(200))
+    rig.policy = rig.new_policy()
+    assert rig.period(2).plan == ""
+    assert rig.kinds() == [("started", "w1"), ("interrupted", "w1")]
+
+
+def test_a_new_trip_ends_what_was_driven(tmp_path: Path, sandbox: Sandbox) -> None:
+    starts = (replace(OVERTAKE, most_s=1.0), Start(find("following"), 2))
+    rig = Rig(tmp_path, sandbox, starts)
+    rig.period()
+    rig.order(FASTER)
+    rig.period(9)
+    rig.bench.control.begin_trip()
+    wish = rig.period()
+    assert (wish.trip, wish.plan, wish.state) == (2, "", "none")
+    assert rig.kinds() == [("started", "w1"), ("interrupted", "w1")]
+    rig.policy.close()
+
+
+def test_a_plan_without_a_program_is_refused(rig: Rig) -> None:
+    rig.period()
+    rig.order("", plan=Plan(Thoughts(""), None, refusal="I cannot fly."))
+    rig.period()
+    (event,) = rig.told()
+    assert (event.kind, event.text) == ("refused", "I cannot fly.")

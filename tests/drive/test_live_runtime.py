@@ -1,0 +1,176 @@
+"""The processes themselves: started, driven, killed and replaced."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from chauffeur.concept import SandboxError
+from chauffeur.drive.live.messages import Report
+from chauffeur.drive.live.orders import Event
+from chauffeur.drive.live.settings import Settings
+from chauffeur.drive.live.starts import Start
+from chauffeur.drive.live.supervisor import Replaced, Runtime
+from chauffeur.drive.scenarios import find
+
+STARTS = (Start(find("overtake"), 3),)
+SETTINGS = Settings(STARTS, planner="retrieval", realtime=False)
+
+
+class Heard:
+    def __init__(self) -> None:
+        self.reports: list[Report] = []
+        self.events: list[Event] = []
+        self.replaced: list[Replaced] = []
+
+    def __call__(self, heard: Event | Report | Replaced) -> None:
+        match heard:
+            case Report():
+                self.reports.append(heard)
+            case Event():
+                self.events.append(heard)
+            case Replaced():
+                self.replaced.append(heard)
+
+
+def until(runtime: Runtime, holds: Callable[[], bool], within_s: float = 60.0) -> None:
+    end = time.monotonic() + within_s
+    while not holds():
+        assert time.monotonic() < end, "it did not come to pass in time"
+        assert runtime.driving, "control has ended"
+        runtime.poll()
+        time.sleep(0.005)
+
+
+def following(heard: Heard, wish: str) -> bool:
+    return bool(heard.reports) and (heard.reports[-1].plan, heard.reports[-1].rung) == (wish, "follow")
+
+
+def test_a_wish_is_driven_while_every_other_process_is_killed(tmp_path: Path) -> None:
+    heard = Heard()
+    with Runtime(SETTINGS, heard) as runtime:
+        folder = runtime.folder
+        wish = runtime.ask("Slow down to 20 m/s and keep going.")
+        until(runtime, lambda: following(heard, wish))
+        speed = heard.reports[-1].wishes.target_speed_mps
+
+        before = runtime.pid("policy")
+        os.kill(before, signal.SIGKILL)
+        until(runtime, lambda: bool(runtime.replaced) and runtime.pid("policy") != before)
+        until(
+            runtime,
+            lambda: any(event.kind == "resumed" for event in heard.events) or bool(runtime.interactions[wish].answer),
+        )
+        until(runtime, lambda: heard.reports[-1].rung == "follow")
+
+        planner = runtime.pid("planner")
+        os.kill(planner, signal.SIGKILL)
+        second = runtime.ask("Go back up to 25 m/s.")
+        until(runtime, lambda: following(heard, second))
+        assert runtime.pid("planner") != planner
+        assert heard.reports[-1].wishes.target_speed_mps != speed
+        runtime.stop()
+        pids = [runtime.pid("control"), runtime.pid("policy"), runtime.pid("planner")]
+        figures = runtime.figures()
+    assert all(interaction.stage == "closed" for interaction in runtime.interactions.values())
+    assert figures is not None
+    assert figures["scheduling"] == "default"
+    assert figures["ticks"] >= len(heard.reports) > 20
+    assert heard.reports[-1].outcome == "stopped"
+    assert not any(report.faults for report in heard.reports)
+    assert {replaced.role for replaced in heard.replaced} == {"policy", "planner"}
+    assert not folder.exists()
+    assert not any(Path(f"/proc/{pid}/cmdline").exists() for pid in pids)
+
+
+def test_a_policy_that_hangs_is_replaced_and_control_does_not_wait_for_it() -> None:
+    heard = Heard()
+    with Runtime(SETTINGS, heard) as runtime:
+        until(runtime, lambda: bool(heard.reports) and heard.reports[-1].rung == "follow")
+        os.kill(runtime.pid("policy"), signal.SIGSTOP)
+        until(runtime, lambda: heard.reports[-1].rung in ("keep", "slow"))
+        until(runtime, lambda: bool(heard.replaced))
+        assert heard.replaced[0].why == "It hung."
+        until(runtime, lambda: heard.reports[-1].rung == "follow")
+
+
+def test_a_killed_control_process_ends_the_drive_and_wishes_are_answered() -> None:
+    heard = Heard()
+    with Runtime(SETTINGS, heard) as runtime:
+        wish = runtime.ask("Slow down.")
+        until(runtime, lambda: bool(heard.reports))
+        os.kill(runtime.pid("control"), signal.SIGKILL)
+        end = time.monotonic() + 5.0
+        while runtime.driving and time.monotonic() < end:
+            time.sleep(0.01)
+        runtime.poll()
+        assert not runtime.driving
+        answer = runtime.interactions[wish].answer
+        assert answer is not None
+        assert runtime.figures() is None
+
+
+def test_a_planner_that_cannot_be_had_is_said_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    with pytest.raises(SandboxError, match="planner process could not be started") as caught:
+        Runtime(Settings(STARTS, planner="nobody"), folder=tmp_path).__enter__()
+    assert "nobody" in str(caught.value.hint)
+
+
+_SUPERVISOR = """
+import sys, time
+from pathlib import Path
+from chauffeur.drive.live.settings import Settings
+from chauffeur.drive.live.starts import Start
+from chauffeur.drive.live.supervisor import Runtime
+from chauffeur.drive.scenarios import find
+
+settings = Settings((Start(find("overtake"), 3),), planner="retrieval", speed=8.0, realtime=False)
+with Runtime(settings, folder=Path(sys.argv[1])) as runtime:
+    print(runtime.pid("control"), runtime.pid("policy"), runtime.pid("planner"), flush=True)
+    while True:
+        runtime.poll()
+        time.sleep(0.01)
+"""
+
+
+def test_without_its_supervisor_the_car_comes_to_a_stand_and_no_process_is_left(tmp_path: Path) -> None:
+    supervisor = subprocess.Popen([sys.executable, "-c", _SUPERVISOR, str(tmp_path)], stdout=subprocess.PIPE, text=True)
+    assert supervisor.stdout is not None
+    pids = [int(pid) for pid in supervisor.stdout.readline().split()]
+    supervisor.kill()
+    supervisor.wait()
+    end = time.monotonic() + 60.0
+    while any(_lives(pid) for pid in pids) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not any(_lives(pid) for pid in pids)
+    figures = json.loads((tmp_path / "punctuality.json").read_text())  # control ended in its own time, not killed
+    assert figures["ticks"] > 10
+
+
+def _lives(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+def test_control_loads_nothing_that_plans_remembers_or_talks() -> None:
+    code = (
+        "import sys; import chauffeur.drive.live.control, chauffeur.drive.live.realtime, chauffeur.worlds.highway, "
+        "chauffeur.drive.live.settings;"
+        "print(sorted(n for n in sys.modules if n.split('.')[0] in "
+        "('httpx', 'openai', 'onnxruntime', 'tokenizers', 'pydantic_monty', 'torch', 'transformers')"
+        " or n.startswith(('chauffeur.planners', 'chauffeur.memory', 'chauffeur.language', 'chauffeur.models', "
+        "'chauffeur.describe', 'chauffeur.programs'))))"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.strip() == "[]"
