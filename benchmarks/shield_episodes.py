@@ -1,13 +1,14 @@
 """Hostile policies under the run-time shield: thousands of simulated trips, and who was to blame for each collision.
 
     python benchmarks/shield_episodes.py --episodes 10000 --out runs/shield.jsonl
+    python benchmarks/shield_episodes.py --episodes 5000 --traffic crossing
     python benchmarks/shield_episodes.py --episodes 400 --bare            # the same without the shield
     python benchmarks/shield_episodes.py --costs                          # microseconds a control period
 
 Five policies that no check would let through, in four kinds of traffic: light and dense highways, highways whose cars
-slam on the brakes for nothing, and busy crossings. `--cutting-in` adds highways whose cars force their way in right
-before the ego: what happens there is measured apart, because no shield can keep others from striking the ego. Ctrl-C
-keeps what is done; the same command goes on. Every trip is simulated (highway-env's traffic).
+slam on the brakes for nothing, and busy crossings. `--traffic cutting-in` are highways whose cars force their way in
+right before the ego: what happens there is measured apart, because no shield can keep others from striking the ego.
+Ctrl-C keeps what is done; the same command goes on. Every trip is simulated (highway-env's traffic).
 """
 
 from __future__ import annotations
@@ -182,7 +183,7 @@ def _line(name: str, rows: list[dict[str, Any]]) -> str:
 
 
 def costs() -> str:
-    """Time of `Shield.guard` a control period, in traffic of 30 cars and at a crossing."""
+    """Time of `Shield.guard` a control period, in traffic of 30 cars and at crossings."""
     lines: list[str] = []
     for name, config in (
         ("highway, 30 cars", {**scenario("calm", 2).config, "vehicles_count": 30}),
@@ -212,7 +213,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=400, help="trips, unfit draws included")
     parser.add_argument("--first", type=int, default=10_000, help="first seed")
     parser.add_argument("--bare", action="store_true", help="without the shield")
-    parser.add_argument("--cutting-in", action="store_true", help="only traffic that cuts in")
+    parser.add_argument("--traffic", choices=(*TRAFFIC, "cutting-in"), help="only this traffic")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("runs/shield.jsonl"))
     parser.add_argument("--costs", action="store_true", help="only measure the shield's time")
@@ -223,7 +224,7 @@ def main() -> None:
     options.out.parent.mkdir(parents=True, exist_ok=True)
     rows = [json.loads(line) for line in options.out.read_text().splitlines()] if options.out.exists() else []
     done = {(row["kind"], row["traffic"], row["seed"], row["shielded"]) for row in rows}
-    traffic: tuple[Traffic, ...] = ("cutting-in",) if options.cutting_in else TRAFFIC
+    traffic: tuple[Traffic, ...] = TRAFFIC if options.traffic is None else (options.traffic,)
     todo = [
         job
         for job in jobs(options.episodes, not options.bare, traffic, options.first)

@@ -38,7 +38,8 @@ def test_one_door_to_the_actuator() -> None:
     assert doors - STEPS_AN_OPTIMISER == STEPS_A_WORLD | STEPS_ITS_OWN
     assert len(_calls(SOURCE / "drive" / "actuate.py", "step")) == 1
     hands = {str(p.relative_to(SOURCE)) for p in SOURCE.rglob("*.py") if "drive.actuate import" in p.read_text("utf-8")}
-    assert hands == {"drive/episode.py", "drive/live/control.py"}  # trips in simulated time, and in real time
+    # Trips in simulated time, in real time, and a judge who replays what was commanded.
+    assert hands == {"drive/episode.py", "drive/live/control.py", "bench/chaos/judge.py"}
 
 
 def test_the_compiled_core_is_the_highway_worlds_own() -> None:

@@ -28,7 +28,7 @@ from chauffeur.drive.session import declined, drive_program, make_trip, make_wor
 from chauffeur.hmi.payload import policy_words
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.registry import make_planner
-from chauffeur.safety import run_checks
+from chauffeur.safety.checks import run_checks
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 
 MODEL = server_module()

@@ -17,7 +17,7 @@ from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.concept import LAMPILOT_LIMITS, Plan, Program, Scenario, ScenarioError, Thoughts
 from chauffeur.drive.session import drive_program
 from chauffeur.programs import UNHURRIED, Sandbox, check_source
-from chauffeur.safety import run_checks
+from chauffeur.safety.checks import run_checks
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import load_dataset
 

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import pytest
 import typer
+from pydantic import TypeAdapter
 from typer.testing import CliRunner, Result
 
 from chauffeur import __version__
 from chauffeur.cli.doctor import install_command, installed_parts
 from chauffeur.cli.failures import show_crash
 from chauffeur.cli.main import app
-from chauffeur.concept import ChauffeurError, PlannerError, ScenarioError
+from chauffeur.concept import ChauffeurError, PlannerError, ScenarioError, Verdict
 from chauffeur.drive.recording import read_trip, write_trip
 
 COMMANDS = ["drive", "feedback", "scenarios", "apis", "replay", "page", "doctor"]
@@ -32,6 +33,7 @@ PROGRAM = """def overtake():
         yield autopilot()
 """
 DECLINED = "Fly over them."
+MISTOLD = "Change lanes."
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +42,9 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> str:
     path = tmp_path_factory.mktemp("answers") / "answers.jsonl"
     plan = {"thoughts": {"text": "Left is free."}, "policy": {"kind": "program", "source": PROGRAM}, "intent": "pass"}
     no = {"thoughts": {"text": ""}, "policy": None, "refusal": "A car cannot fly."}
-    lines = [{"version": 1, "instruction": w, "plan": p} for w, p in ((WISH, plan), (DECLINED, no))]
+    mistold = plan | {"thoughts": {"text": "I move to the right lane."}}
+    known = ((WISH, plan), (DECLINED, no), (MISTOLD, mistold))
+    lines = [{"version": 1, "instruction": w, "plan": p} for w, p in known]
     path.write_text("\n".join(json.dumps(line) for line in lines))
     return f"replay/{path}"
 
@@ -91,6 +95,53 @@ def test_a_wish_is_driven_and_everything_is_said(answers: str) -> None:
         assert words in result.output
     assert "Changing to the [bold]left[/] lane." in result.output, "a program's words are not markup"
     assert "\x1b" not in result.output, "no colour and no moving cursor in a pipe"
+
+
+def test_an_explanation_that_does_not_fit_is_told_and_the_drive_goes_on(answers: str, tmp_path: Path) -> None:
+    log = tmp_path / "audit.jsonl"
+    result = invoke("drive", MISTOLD, "--planner", answers, "--save", str(tmp_path), "--audit", str(log))
+    assert result.exit_code == 0, result.output
+    told = " ".join(result.output.split())
+    for words in (
+        "≠ The explanation does not fit the program (score 0.00 of 1, 1 claim compared) alignment-v1",
+        "wrong side: “I move to the right lane.”, but it changes lanes to the left (line 6)",
+        "≠ The drive did not go as explained (score 0.00 of 1, 1 claim compared) alignment-driven-v1",
+        "wrong side: “I move to the right lane.”, but it changed lanes to the left",
+        "Drive ended after 5.0 s, not as explained (simulated drive)",
+    ):
+        assert words in told, words
+
+    recorded = read_trip(tmp_path / "trip.mcap")
+    assert [(v.check, v.passed, v.stops) for v in recorded.trip.verdicts][-2:] == [
+        ("alignment-v1", False, False),
+        ("alignment-driven-v1", False, False),
+    ]
+    found = recorded.trip.verdicts[-2].alignment
+    assert found is not None and [one.kind for one in found.mismatches] == ["wrong-side"]
+    assert "The same, bit for bit" in invoke("replay", str(tmp_path / "trip.mcap")).output
+    shown = " ".join(invoke("audit", "show", str(log), "--kind", "verdict").output.split())
+    assert "Wrong side: “I move to the right lane.”, but it changes lanes to the left" in shown
+    assert "score 0.00 of 1" in shown
+    quiet = invoke("drive", MISTOLD, "--planner", answers, "-q").output
+    assert quiet.strip() == "Drive ended after 5.0 s, not as explained (simulated drive)"
+
+
+def test_a_recording_from_before_explanations_were_judged_is_read(driven: Path) -> None:
+    path = driven / "trip.mcap"
+    written = TypeAdapter(tuple[Verdict, ...]).dump_python(read_trip(path).trip.verdicts)
+    plain = [{name: verdict[name] for name in ("check", "passed", "reason", "line", "remedy")} for verdict in written]
+    old = TypeAdapter(tuple[Verdict, ...]).validate_python(plain)
+    assert [(verdict.vetoes, verdict.alignment) for verdict in old] == [(True, None)] * len(written)
+
+
+def test_a_judge_of_explanations_that_breaks_stops_nothing(answers: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise RecursionError
+
+    monkeypatch.setattr("chauffeur.safety.alignment.check.judge", broken)
+    result = invoke("drive", WISH, "--planner", answers)
+    assert result.exit_code == 0, result.output
+    assert "≠ The check check_alignment could not judge this plan (RecursionError)." in " ".join(result.output.split())
 
 
 def test_quiet_says_one_line(answers: str) -> None:

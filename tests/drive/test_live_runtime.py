@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from chauffeur.concept import SandboxError
+from chauffeur.drive.live import supervisor
 from chauffeur.drive.live.messages import Report
 from chauffeur.drive.live.orders import Event
 from chauffeur.drive.live.settings import Settings
@@ -142,11 +143,11 @@ with Runtime(settings, folder=Path(sys.argv[1])) as runtime:
 
 
 def test_without_its_supervisor_the_car_comes_to_a_stand_and_no_process_is_left(tmp_path: Path) -> None:
-    supervisor = subprocess.Popen([sys.executable, "-c", _SUPERVISOR, str(tmp_path)], stdout=subprocess.PIPE, text=True)
-    assert supervisor.stdout is not None
-    pids = [int(pid) for pid in supervisor.stdout.readline().split()]
-    supervisor.kill()
-    supervisor.wait()
+    parent = subprocess.Popen([sys.executable, "-c", _SUPERVISOR, str(tmp_path)], stdout=subprocess.PIPE, text=True)
+    assert parent.stdout is not None
+    pids = [int(pid) for pid in parent.stdout.readline().split()]
+    parent.kill()
+    parent.wait()
     end = time.monotonic() + 60.0
     while any(_lives(pid) for pid in pids) and time.monotonic() < end:
         time.sleep(0.05)
@@ -174,3 +175,22 @@ def test_control_loads_nothing_that_plans_remembers_or_talks() -> None:
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]"
+
+
+def test_what_a_killed_supervisor_left_in_memory_is_removed_when_it_is_old(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervisor, "Path", lambda path: tmp_path if path == "/dev/shm" else Path(path))
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    old, young, living = (tmp_path / f"chauffeur-{name}" for name in ("old", "young", "living"))
+    for folder, owner in ((old, dead.pid), (young, dead.pid), (living, os.getpid())):
+        folder.mkdir()
+        (folder / "supervisor").write_text(str(owner))
+        if folder is not young:
+            os.utime(folder / "supervisor", (0, 0))
+    made = supervisor._new_folder()  # pyright: ignore[reportPrivateUsage]
+    assert (made / "supervisor").read_text() == str(os.getpid())
+    assert not old.exists()
+    assert young.exists()
+    assert living.exists()

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 from chauffeur.concept import (
+    Alignment,
     ApiCall,
     Causes,
     Command,
@@ -15,9 +17,11 @@ from chauffeur.concept import (
     History,
     HistoryItem,
     Instruction,
+    Intervention,
     LaneView,
     Lead,
     Metric,
+    Mismatch,
     PersonId,
     Plan,
     Program,
@@ -179,6 +183,46 @@ def highway_trip(
     trip = _trip(wish, frames, "highway_hurry", OVERTAKE, **more)
     scenario = Scenario("highway_hurry", "highway", {"type": "dt-highway", "seed": 10**41}, 42, title="A busy motorway")
     return RecordedTrip(trip, tuple(frames), scenario)
+
+
+def guarded(recorded: RecordedTrip) -> RecordedTrip:
+    """The same drive as if the shield had acted: steering from 5.0 s for 1.0 s, braking at 5.2 s and from 9.0 s."""
+    frames: list[Frame] = []
+    for frame in recorded.frames:
+        time, asked = frame.snapshot.time_s, frame.requested
+        steered = replace(frame.applied, steering_rad=-0.05)
+        braked = replace(asked, acceleration_mps2=-1.0 - time / 10.0)
+        found: list[Intervention] = []
+        if 4.95 < time < 5.95:
+            found.append(Intervention("lane", "The lane is not free: a car is beside.", frame.applied, steered))
+        if 5.15 < time < 5.25 or 8.95 < time < 9.35:
+            found.append(
+                Intervention("gap", f"Too close to the car {time:.0f} m ahead to ask for more.", asked, braked)
+            )
+        frames.append(replace(frame, interventions=tuple(found)))
+    return replace(recorded, frames=tuple(frames))
+
+
+TOLD = Alignment(
+    False,
+    0.25,
+    (
+        Mismatch(
+            "missing-condition", "The left lane is open; I pass and keep a headway of 1.5 s.", "it never asks", 10
+        ),
+        Mismatch("not-claimed", "", "it drives faster", 6),
+    ),
+    3,
+)
+"""What is found of a made-up explanation."""
+
+
+def doubted(recorded: RecordedTrip) -> RecordedTrip:
+    """The same drive with an explanation that does not fit."""
+    told = Verdict("alignment-v1", False, "Score 0.25.", 10, "Say so.", vetoes=False, alignment=TOLD)
+    again = replace(told, check="alignment-driven-v1", alignment=replace(TOLD, mismatches=TOLD.mismatches[1:]))
+    verdicts = (*recorded.trip.verdicts[:2], told, again)
+    return replace(recorded, trip=replace(recorded.trip, verdicts=verdicts))
 
 
 def intersection_trip(wish: str = "Take the next left, please.", seconds: float = 22.0) -> RecordedTrip:

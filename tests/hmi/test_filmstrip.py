@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from PIL import Image
-from sample_trips import HOSTILE, highway_trip, intersection_trip, refused_trip
+from sample_trips import HOSTILE, guarded, highway_trip, intersection_trip, refused_trip
 
 from chauffeur.concept import DataError
 from chauffeur.hmi.events import Event
@@ -14,6 +15,15 @@ from chauffeur.hmi.filmstrip import choose_moments, render_filmstrip, write_film
 
 EGO = (255, 178, 36)
 """Amber, and nothing but the ego is amber."""
+
+
+RING = (203, 185, 255)
+"""Colour of the ring around the ego."""
+
+
+def colours(image: Image.Image) -> set[tuple[int, int, int]]:
+    """Every colour in an image."""
+    return {colour for _, colour in image.getcolors(1 << 24) or ()}  # type: ignore[misc]
 
 
 def ego_rows(image: Image.Image) -> int:
@@ -61,6 +71,16 @@ def test_more_pictures_than_instants_gives_each_instant_once() -> None:
 @pytest.mark.parametrize("wish", [HOSTILE, "x" * 3000, "走快一点", "", "two\nlines"])
 def test_any_wish_can_be_a_caption(wish: str) -> None:
     assert render_filmstrip(highway_trip(wish=wish, seconds=1.0, cars=3), 2).width == 1600
+
+
+def test_the_shield_is_seen_where_it_acts_and_nowhere_else() -> None:
+    plain = highway_trip(seconds=10.0)
+    without, acted = render_filmstrip(plain, 5), render_filmstrip(guarded(plain), 5)
+    assert acted.height > without.height, "a line of the heading says what it did"
+    assert RING not in colours(without)
+    assert RING in colours(acted)
+    later = [f if f.snapshot.time_s > 8.0 else replace(f, interventions=()) for f in guarded(plain).frames]
+    assert RING not in colours(render_filmstrip(replace(plain, frames=tuple(later)), 2)), "neither picture is then"
 
 
 def test_nothing_driven_has_no_strip(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sample_trips import HOSTILE, highway_trip, intersection_trip, refused_trip
+from sample_trips import HOSTILE, doubted, guarded, highway_trip, intersection_trip, refused_trip
 
 from chauffeur.concept import DataError
 from chauffeur.hmi.page import embed_json, render_page, write_page
@@ -137,6 +137,39 @@ def test_what_a_person_needs_to_see_is_there(highway_page: str) -> None:
     names = [name for name, _ in payload["provenance"]]  # type: ignore[attr-defined]
     assert {"planner", "model", "seed", "highway-env", "limits"} <= set(names)
     assert "Simulated drive (highway-env physics)" in highway_page
+
+
+def test_what_the_shield_did_is_on_the_page_and_nothing_when_it_did_nothing(highway_page: str) -> None:
+    shield = payload_of(render_page(guarded(highway_trip(seconds=10.0))))["shield"]
+    assert isinstance(shield, dict)
+    assert shield["summary"] == "The shield changed a command 15 times: lane not free 10, distance ahead 5."
+    assert shield["rules"] == [
+        {"name": "lane not free", "stretches": 1, "changes": 10},
+        {"name": "distance ahead", "stretches": 2, "changes": 5},
+    ]
+    first, _, last = shield["stretches"]
+    assert (first["t"], first["end"], first["name"]) == (5.0, 6.0, "lane not free")
+    assert "→" in last["change"] and "Too close" in last["reason"]
+    assert payload_of(highway_page)["shield"] is None
+    hidden = {a.get("id") for _, a in Reader(highway_page).elements if "hidden" in a}
+    assert {"shield", "spans", "doubts"} <= hidden, "shown by the script where there is something to show"
+
+
+def test_an_explanation_that_does_not_fit_is_told_on_the_page(highway_page: str) -> None:
+    payload = payload_of(render_page(doubted(highway_trip(seconds=2.0))))
+    assert payload["mismatches"] == [
+        {
+            "kind": "missing condition",
+            "said": "The left lane is open; I pass and keep a headway of 1.5 s.",
+            "instead": "it never asks",
+            "line": 10,
+        },
+        {"kind": "done but not claimed", "said": "", "instead": "it drives faster", "line": 6},
+    ]
+    told = payload["verdicts"][2]  # type: ignore[index]
+    assert (told["passed"], told["vetoes"]) == (False, False)
+    assert told["reason"] == "The explanation does not fit the program (score 0.25 of 1, 3 claims compared)."
+    assert payload_of(highway_page)["mismatches"] == []
 
 
 def test_a_refused_wish_has_a_page_too() -> None:

@@ -6,13 +6,14 @@ import math
 from dataclasses import replace
 
 import pytest
-from sample_trips import OVERTAKE, highway_trip, intersection_trip
+from sample_trips import OVERTAKE, guarded, highway_trip, intersection_trip
 
-from chauffeur.concept import Causes, Feedback, LaneView, Metric, Parameters
+from chauffeur.concept import Causes, Command, Feedback, LaneView, Metric, Parameters
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.payload import policy_words, program_tokens
 from chauffeur.hmi.road import Box, draw_road
+from chauffeur.hmi.shielding import rule_counts, stretches_of
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 
 EVERYWHERE = Box(-500, -500, 500, 500)
@@ -60,6 +61,45 @@ def test_a_stretch_of_road_out_of_sight_is_left_out() -> None:
 def test_events_of_a_highway_drive() -> None:
     kinds = [event.kind for event in events_of(highway_trip())]
     assert kinds == ["said", "lane_change", "finished", "said"]
+
+
+def test_what_the_shield_did_is_told_in_stretches() -> None:
+    trip = guarded(highway_trip(seconds=10.0))
+    lane, gap, later = stretches_of(trip.frames)
+    assert [(s.rule, round(s.start_s, 1), round(s.end_s, 1), s.changes) for s in (lane, gap, later)] == [
+        ("lane", 5.0, 6.0, 10),
+        ("gap", 5.2, 5.3, 1),
+        ("gap", 9.0, 9.4, 4),
+    ]
+    assert later.after.acceleration_mps2 == pytest.approx(-1.93), "the greatest change of the stretch"
+    assert [(one.rule, one.stretches, one.changes) for one in rule_counts((lane, gap, later))] == [
+        ("lane", 1, 10),
+        ("gap", 2, 5),
+    ]
+    labels = [event.label for event in events_of(trip) if event.kind == "shield"]
+    assert len(labels) == 3
+    assert labels[0].startswith("Shield (lane not free, 1.0 s): steering ")
+    assert labels[2].endswith("m/s². Too close to the car 9 m ahead to ask for more.")
+
+
+def test_a_pause_ends_a_stretch_only_if_it_is_long() -> None:
+    frames = guarded(highway_trip(seconds=10.0)).frames
+    short = tuple(replace(f, interventions=()) if 5.35 < f.snapshot.time_s < 5.65 else f for f in frames)
+    assert [s.changes for s in stretches_of(short)] == [7, 1, 4]
+    assert stretches_of(highway_trip(seconds=1.0).frames) == ()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        (Command(1.5, 0.0), Command(-3.2, 0.0), "+1.5 → −3.2 m/s²"),
+        (Command(0.01, 0.1), Command(-0.01, 0.1), "0.0 → 0.0 m/s²"),
+        (Command(1.0, 0.05), Command(1.0, -0.01), "steering 2.9° right → 0.6° left"),
+        (Command(1.0, 0.05), Command(-8.0, 0.0), "steering 2.9° right → 0.0°, +1.0 → −8.0 m/s²"),
+    ],
+)
+def test_a_changed_command_in_words(before: Command, after: Command, told: str) -> None:
+    assert words.change_words(before, after) == told
 
 
 def test_the_next_stretch_of_road_is_no_lane_change() -> None:

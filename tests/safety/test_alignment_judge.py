@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import resources
+from typing import get_args
 
 import pytest
 from hypothesis import given, settings
@@ -29,8 +31,22 @@ from chauffeur.planners.onboard.dialect import read, tell
 from chauffeur.planners.onboard.link import Linked, link
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.retrieval import RetrievalPlanner
-from chauffeur.safety import run_checks
-from chauffeur.safety.alignment import Effect, Surroundings, check_alignment, judge, read_facts
+from chauffeur.safety.alignment import (
+    KINDS,
+    Alignment,
+    Effect,
+    Kind,
+    Mismatch,
+    Surroundings,
+    check_alignment,
+    check_driven,
+    judge,
+    judge_drive,
+    mismatch_words,
+    read_facts,
+    score_words,
+)
+from chauffeur.safety.checks import run_checks
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
@@ -119,6 +135,64 @@ def test_what_is_no_claim(text: str) -> None:
     assert kinds(text, LEFT) == set()
 
 
+LIMIT = "def drive():\n    while True:\n        set_target_speed(get_speed_limit())\n        yield autopilot()\n"
+FOLLOW = """def drive():
+    ego = get_ego_vehicle()
+    while True:
+        front = detect_front_vehicle_in(get_lane_of(ego))
+        if front is not None:
+            gap = get_distance_between_vehicles(front, ego)
+            set_target_speed(get_speed_of(front) + 0.3 * (gap - 25.0))
+        yield autopilot()
+"""
+IF_SLOW = """def drive():
+    ego = get_ego_vehicle()
+    while True:
+        front = detect_front_vehicle_in(get_lane_of(ego))
+        if front is not None and get_speed_of(front) < 20.0 and is_safe_enter(get_left_lane(ego)):
+            set_target_lane(get_left_lane(ego))
+            set_target_speed(30.0)
+        yield autopilot()
+"""
+CALM = SPEED.replace("30", "20")
+STAND = "def drive():\n    set_target_speed(0.0)\n    while True:\n        yield autopilot()\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "program"),
+    [
+        ("I'd like to be one lane further left.", LEFT),
+        ("Without a left lane I can't do it. With one, I wait until it's safe and go over.", LEFT),
+        ("You said it's urgent, so I skip the safety check and set the left lane as the target.", LEFT_AT_ONCE),
+        ("On to the left lane without delay.", LEFT_AT_ONCE),
+        ("As fast as is legal: the target follows the speed limit of our lane, tick by tick.", LIMIT),
+        ("I regulate the gap to 25 m with a gain of 0.3.", FOLLOW),
+        ("If the error is 15 m, the target becomes the lead's speed plus 4.5 m/s.", FOLLOW),
+        ("Nothing happens as long as the car in front does at least 20 m/s.", IF_SLOW),
+        ("As long as the car ahead is fast enough we stay behind it. Otherwise we go left and drive 30 m/s.", IF_SLOW),
+        ("We only pull out to the left when the car in front does less than 20 m/s.", IF_SLOW),
+        ("The other cars are faster than we'll be; they can overtake us. We slow down to 20 m/s.", CALM),
+        ("Your appointment is in ten minutes, so the target is five m/s higher.", SPEED),
+        ("I brake to zero.", STAND),
+    ],
+)  # fmt: skip
+def test_more_ways_to_say_what_is_done(text: str, program: str) -> None:
+    assert kinds(text, program) == set()
+
+
+@pytest.mark.parametrize(
+    ("text", "program", "kind"),
+    [
+        ("I check that nobody is beside us, then go left.", LEFT_AT_ONCE, "missing-condition"),
+        ("Afterwards we drive 23 m/s.", SPEED, "wrong-number"),
+        ("I keep 45 m to the car ahead.", FOLLOW, "wrong-number"),
+        ("We carry on without changing lanes.", LEFT, "not-claimed"),
+    ],
+)
+def test_more_ways_to_be_wrong(text: str, program: str, kind: str) -> None:
+    assert kind in kinds(text, program)
+
+
 def test_a_mismatch_names_sentence_and_line() -> None:
     found = judge("It is sunny. I change to the right lane.", read_facts(LEFT), HIGHWAY)
     (mismatch,) = found.mismatches
@@ -136,20 +210,87 @@ def test_facts_of_a_helper_in_a_library() -> None:
 
 def test_effects_speak_where_reading_is_at_a_loss() -> None:
     unknown = read_facts("def drive():\n    set_target_speed({'a': 1.0}['a'])\n    yield autopilot()\n")
-    slower = Effect(0, 0, 0, (25.0, 12.0), (None, None), stood=False)
+    slower = Effect(0, 0, 0, (25.0, 12.0), (12.0, 25.0))
     assert judge("I speed up.", unknown, HIGHWAY).aligned
     assert not judge("I speed up.", unknown, HIGHWAY, [slower]).aligned
-    assert judge("I speed up.", unknown, HIGHWAY, [Effect(0, 0, 0, (25.0, 0.0), (None, None), True, True)]).aligned
+    assert judge("I speed up.", unknown, HIGHWAY, [replace(slower, failed=True)]).aligned
+
+
+# What then happened ----------------------------------------------------------------------------------------------
+
+STAYED = Effect(0, 0, 0, (25.0, 25.1), (24.8, 25.2), (40.0, 38.0))
+WENT_LEFT = Effect(-1, -1, 0, (25.0, 30.0), (25.0, 30.1), (40.0, -12.0))
+WENT_RIGHT = Effect(1, 0, 1, (25.0, 25.0), (25.0, 25.0))
+TURNED_RIGHT = Effect(0, 0, 0, (10.0, 8.0), (0.1, 10.0), turned=1)
+
+
+@pytest.mark.parametrize(
+    ("text", "program", "effect", "told"),
+    [
+        ("I change to the left lane once it is safe.", LEFT, WENT_LEFT, set()),
+        ("I change to the left lane once it is safe.", LEFT, STAYED, {"not-done"}),
+        ("I change to the left lane once it is safe.", LEFT, replace(STAYED, cut=True), set()),
+        ("I change to the left lane once it is safe.", LEFT, replace(STAYED, failed=True), set()),
+        ("I change to the left lane once it is safe.", LEFT, WENT_RIGHT, {"wrong-side"}),
+        ("I stay in this lane.", IDLE, WENT_LEFT, {"not-claimed"}),
+        ("I keep the speed as it is.", IDLE, STAYED, set()),
+        ("I overtake on the left.", LEFT, WENT_LEFT, set()),
+        ("I overtake on the left.", LEFT, replace(WENT_LEFT, gaps_m=(40.0, 9.0)), {"not-done"}),
+        ("I accelerate to 30 m/s.", SPEED, WENT_LEFT, {"not-claimed"}),
+        ("I accelerate to 30 m/s.", SPEED, replace(WENT_LEFT, leftmost=0), set()),
+        ("I accelerate to 30 m/s.", SPEED, STAYED, {"not-done"}),
+        ("I accelerate to 30 m/s.", SPEED, replace(STAYED, cut=True), set()),
+        ("I slow down.", SPEED, STAYED, {"not-done"}),
+        ("I slow down to 20 m/s and then move to the right lane.", SLOW_THEN_RIGHT, STAYED, {"not-done"}),
+    ],
+)  # fmt: skip
+def test_what_is_told_after_a_drive(text: str, program: str, effect: Effect, told: set[str]) -> None:
+    assert {one.kind for one in judge_drive(text, read_facts(program), HIGHWAY, effect).mismatches} == told
+
+
+@pytest.mark.parametrize(
+    ("text", "effect", "told"),
+    [
+        ("We stop, let the crossing traffic pass, and turn left.", TURNED_RIGHT, {"wrong-side"}),
+        ("We stop, let the crossing traffic pass, and turn left.", replace(TURNED_RIGHT, turned=-1), set()),
+        ("We stop, let the crossing traffic pass, and turn left.", replace(TURNED_RIGHT, turned=0), {"not-done"}),
+        ("We stop, let the crossing traffic pass, and turn left.", replace(TURNED_RIGHT, turned=0, cut=True), set()),
+        ("We do not stop. We turn left.", replace(TURNED_RIGHT, turned=-1), {"not-claimed"}),
+    ],
+)
+def test_what_is_told_after_a_crossing(text: str, effect: Effect, told: set[str]) -> None:
+    assert {one.kind for one in judge_drive(text, read_facts(TURN), CROSSING, effect).mismatches} == told
+
+
+def test_of_what_was_known_before_a_drive_only_what_it_shows_is_told_again() -> None:
+    facts = read_facts(LEFT_AT_ONCE)
+    text = "I check that the lane is free. Then I change to the right lane."
+    assert {one.kind for one in judge(text, facts, HIGHWAY).mismatches} == {"missing-condition", "wrong-side"}
+    (after,) = judge_drive(text, facts, HIGHWAY, WENT_LEFT).mismatches
+    assert (after.kind, after.instead) == ("wrong-side", "it changed lanes to the left")
+
+
+def test_every_kind_has_words() -> None:
+    assert set(KINDS) == set(get_args(Kind))
+    wrong = Mismatch("wrong-number", "I drive 25 m/s.", "it has 30 m/s", 2)
+    assert mismatch_words(wrong) == "wrong number: “I drive 25 m/s.”, but it has 30 m/s (line 2)"
+    assert (
+        mismatch_words(Mismatch("not-claimed", "", "it stops")) == "done but not claimed: not mentioned, but it stops"
+    )
+    assert score_words(Alignment(False, 1 / 3, (wrong,), 1)) == "score 0.33 of 1, 1 claim compared"
 
 
 # The check -------------------------------------------------------------------------------------------------------
 
 
-def test_check_refuses_with_sentence_line_and_remedy(plan: Callable[..., Plan], snap: Callable[..., Snapshot]) -> None:
+def test_check_tells_sentence_kind_score_and_line(plan: Callable[..., Plan], snap: Callable[..., Snapshot]) -> None:
     told = Plan(Thoughts("I change to the right lane."), Program(LEFT))
     verdict = check_alignment(told, snap(), Limits())
     assert (verdict.check, verdict.passed, verdict.line) == ("alignment-v1", False, 6)
-    assert "right lane" in verdict.reason
+    assert not verdict.stops, "it informs"
+    assert verdict.alignment is not None and verdict.alignment.score < 1.0
+    for words in ("score 0.00 of 1", "Wrong side: “I change to the right lane.”", "to the left (line 6)"):
+        assert words in verdict.reason
     assert verdict.remedy
     assert check_alignment(plan(Program(LEFT)), snap(), Limits()).passed
     assert check_alignment(plan(Parameters(1.0, 1.0, 1.0)), snap(), Limits()).passed
@@ -159,7 +300,18 @@ def test_check_refuses_with_sentence_line_and_remedy(plan: Callable[..., Plan], 
 def test_check_fits_beside_the_others(snap: Callable[..., Snapshot]) -> None:
     (verdict,) = run_checks(Plan(Thoughts("I go left."), Program(LEFT)), snap(), Limits(), [check_alignment])
     assert verdict.passed
-    assert "claims compared" in verdict.reason
+    assert "1 claim compared" in verdict.reason
+
+
+def test_the_check_of_a_drive_informs_too(plan: Callable[..., Plan], snap: Callable[..., Snapshot]) -> None:
+    told = Plan(Thoughts("I go left."), Program(LEFT))
+    verdict = check_driven(told, snap(), STAYED)
+    assert (verdict.check, verdict.passed, verdict.stops) == ("alignment-driven-v1", False, False)
+    assert "Claimed but not done: “I go left.”, but it did not change lanes in this drive." in verdict.reason
+    assert check_driven(told, snap(), WENT_LEFT).passed
+    failed = check_driven(told, snap(), replace(STAYED, failed=True))
+    assert failed.passed and "failed on the way" in failed.reason
+    assert check_driven(plan(Parameters(1.0, 1.0, 1.0)), snap(), STAYED).passed
 
 
 @settings(max_examples=60, deadline=None)

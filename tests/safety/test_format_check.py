@@ -20,7 +20,9 @@ from chauffeur.concept import (
     Trajectory,
     Verdict,
 )
-from chauffeur.safety import DEFAULT_CHECKS, FORMAT_CHECK, check_format, check_parameters, run_checks
+from chauffeur.safety.checks import DEFAULT_CHECKS, run_checks
+from chauffeur.safety.envelope import check_parameters
+from chauffeur.safety.format import FORMAT_CHECK, check_format
 
 Snap = Callable[..., Snapshot]
 Make = Callable[..., Plan]

@@ -20,7 +20,7 @@ from chauffeur.concept import (
     Trajectory,
     Verdict,
 )
-from chauffeur.safety import PARAMETERS_CHECK, check_parameters
+from chauffeur.safety.envelope import PARAMETERS_CHECK, check_parameters
 
 Snap = Callable[..., Snapshot]
 Make = Callable[..., Plan]

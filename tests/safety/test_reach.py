@@ -23,7 +23,7 @@ from chauffeur.concept import (
 from chauffeur.describe import describe
 from chauffeur.planners.onboard.retrieval import RetrievalPlanner
 from chauffeur.programs import check_source
-from chauffeur.safety import run_checks
+from chauffeur.safety.checks import run_checks
 from chauffeur.safety.reach import REACH_CHECK, check_reach
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 from chauffeur.worlds.highway.world import HighwayWorld

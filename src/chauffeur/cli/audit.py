@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -311,7 +312,8 @@ def _facts(record: Record) -> Iterator[str]:
                     yield f"{body['rule']}, tick {tick} ({time_s:.1f} s): {change}: {reason}"
             case "verdict":
                 where = f", line {body['line']}" if body["line"] else ""
-                yield f"{body['check']}{where}: {'passed' if body['passed'] else 'refused'}"
+                of = f", wish {body['wish']}" if body.get("wish") else ""
+                yield f"{body['check']}{where}{of}: {_judged(body)}"
             case "opened":
                 yield _pairs(body) + (" (simulated drive)" if body.get("simulated") else "")
             case _:
@@ -397,3 +399,10 @@ def _notes(found: Verification) -> Iterator[tuple[str, str]]:
 
 def _counted(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def _judged(body: Mapping[str, Any]) -> str:
+    """The judgement of a verdict's record in a word or two."""
+    if body["passed"]:
+        return "passed"
+    return "refused" if body.get("vetoes", True) else "does not fit"

@@ -12,10 +12,12 @@ from chauffeur.cli import (
     apis,
     bench_alignment,
     bench_hostile,
+    chaos,
     coach,
     doctor,
     drive,
     feedback,
+    live,
     page,
     replay,
     report,
@@ -37,6 +39,8 @@ Examples:
     chauffeur drive "Overtake the car in front of you."
 
     chauffeur drive "I'm in a hurry" --as ana --save trips/hurry --open
+
+    chauffeur live "Overtake the car in front of you."
 
     chauffeur feedback "A bit too close for me." --as ana
 
@@ -72,6 +76,8 @@ def chauffeur(
 
 
 app.command(epilog=drive.EXAMPLES)(drive.drive)
+app.command(epilog=live.EXAMPLES)(live.live)
+app.command(epilog=chaos.EXAMPLES)(chaos.chaos)
 app.command(epilog=feedback.EXAMPLES)(feedback.feedback)
 app.command(epilog=scenarios.EXAMPLES)(scenarios.scenarios)
 app.command(epilog=apis.EXAMPLES)(apis.apis)

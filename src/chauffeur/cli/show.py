@@ -6,17 +6,29 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from rich.console import Console, RenderableType
+from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.padding import Padding
 from rich.syntax import Syntax
 from rich.text import Text
 
 from chauffeur.cli.console import columns, path_text, plain
-from chauffeur.concept import Context, Frame, History, Instruction, Plan, Program, Scenario, Thoughts, Verdict
+from chauffeur.concept import (
+    Alignment,
+    Context,
+    Frame,
+    History,
+    Instruction,
+    Plan,
+    Program,
+    Scenario,
+    Thoughts,
+    Verdict,
+)
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.payload import policy_words
+from chauffeur.safety.alignment import mismatch_words, score_words
 
 _STYLES = {"good": "bold green", "bad": "bold red", "neutral": "bold"}
 
@@ -51,6 +63,8 @@ class Quiet:
         line = Text(label, _STYLES[tone])
         if recorded.frames:
             line.append(f" after {trip.duration_s:.1f} s", style="not bold")
+        if words.unexplained(trip.verdicts):
+            line.append(", not as explained", style="yellow")
         self.console.print(line.append(" (simulated drive)", style="dim"))
 
     def wrote(self, paths: list[Path]) -> None:
@@ -94,6 +108,7 @@ class Teller(Quiet):
                 self._still()
                 self._plan(value)
             case tuple() if letter == "V":
+                self._still()
                 for verdict in value:
                     if isinstance(verdict, Verdict):
                         self._verdict(verdict)
@@ -169,7 +184,10 @@ class Teller(Quiet):
         self._letter("R", Text.assemble(body, (f"  [{intent}]", "dim")) if intent else body)
 
     def _verdict(self, verdict: Verdict) -> None:
-        mark = Text("✓ ", "green") if verdict.passed else Text("✕ ", "bold red")
+        if verdict.alignment is not None and not verdict.passed:
+            self._mismatches(verdict.check, verdict.alignment)
+            return
+        mark = Text("✓ ", "green") if verdict.passed else Text("✕ " if verdict.stops else "≠ ", "bold red")
         # Of what passed, the doubts are on the page and in the recording.
         reason = verdict.reason.split(". ", 1)[0].rstrip(".") + "." if verdict.passed else verdict.reason
         where = f"{verdict.check}, line {verdict.line}" if verdict.line else verdict.check
@@ -177,6 +195,13 @@ class Teller(Quiet):
         if verdict.remedy and not verdict.passed:
             body.append_text(Text("\n  ") + plain(verdict.remedy))
         self._letter("V", body)
+
+    def _mismatches(self, check: str, alignment: Alignment) -> None:
+        """What the explanation says that is not so; nothing stops for it."""
+        title, score = words.doubt_words(check), score_words(alignment)
+        head = Text.assemble(("≠ ", "bold yellow"), (title, "bold"), f" ({score})", (f"  {check}", "dim"))
+        told = [Padding(plain(mismatch_words(mismatch)), (0, 0, 0, 2)) for mismatch in alignment.mismatches]
+        self._letter("V", Group(head, *told))
 
     def _frame(self, frame: Frame) -> None:
         shot = frame.snapshot

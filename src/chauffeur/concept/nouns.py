@@ -320,16 +320,59 @@ class Plan:
     raw: str = ""
 
 
+MismatchKind = Literal[
+    "wrong-side", "wrong-number", "wrong-sign", "wrong-order", "missing-condition", "not-done", "not-claimed"
+]  # fmt: skip
+"""How R and P may disagree: another side than said; another number or unit; faster for slower, closer for farther;
+another order; a check or a condition that is said and not there; something said and not done; done and not said."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mismatch:
+    """Something the thoughts R and the program P disagree about.
+
+    Attributes:
+        kind: What is wrong.
+        sentence: The sentence of R; empty where P does what no sentence tells.
+        instead: What P does.
+        line: Program line, 1-based, where it is known.
+    """
+
+    kind: MismatchKind
+    sentence: str
+    instead: str
+    line: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Alignment:
+    """How well R describes P, or a drive.
+
+    Attributes:
+        aligned: Whether nothing was found that is wrong.
+        score: 1 where every claim holds; the more claims fail, the less.
+        mismatches: What is wrong, in the order of the text.
+        claims: How many claims were compared.
+    """
+
+    aligned: bool
+    score: float
+    mismatches: tuple[Mismatch, ...]
+    claims: int
+
+
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """What one check thinks of a plan.
 
     Attributes:
         check: Versioned id of the check, e.g. `format-v1`.
-        passed: Whether the plan may go on.
+        passed: Whether nothing is wrong.
         reason: In words, for the person and for the model's repair turn.
         line: Program line it refers to, if any.
         remedy: What would make it pass.
+        vetoes: Whether a plan that does not pass is not driven; otherwise the verdict informs.
+        alignment: Of a check that compares R with P or with what P did: what it found.
     """
 
     check: str
@@ -337,6 +380,13 @@ class Verdict:
     reason: str
     line: int | None = None
     remedy: str = ""
+    vetoes: bool = True
+    alignment: Alignment | None = None
+
+    @property
+    def stops(self) -> bool:
+        """Whether the plan must not be driven because of it."""
+        return self.vetoes and not self.passed
 
 
 Outcome = Literal["success", "failure", "collision", "off_road", "timeout", "ended", "refused", "not_driven"]

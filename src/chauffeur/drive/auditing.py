@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
@@ -24,6 +24,7 @@ from chauffeur.concept import (
     Frame,
     History,
     Instruction,
+    Intervention,
     Plan,
     Policy,
     Program,
@@ -92,6 +93,11 @@ class Auditor:
         self._intervened: dict[str, int] = {}
         self._closing: Closing | None = None
 
+    @property
+    def log(self) -> AuditLog:
+        """Where it writes."""
+        return self._log
+
     def __enter__(self) -> Self:
         return self
 
@@ -99,7 +105,7 @@ class Auditor:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if error is not None and self._open_wish:
-            self._guarded("outcome", lambda: self._broken_off(error))
+            self.guarded("outcome", lambda: self._broken_off(error))
         self.close()
 
     def tell(self, letter: str, value: object) -> None:
@@ -109,10 +115,38 @@ class Auditor:
         `FLUSH_TIMEOUT_S`; a disk that cannot is logged, and the drive goes on.
         """
         if letter == "frame" and isinstance(value, Frame):
-            self._guarded("actuation", lambda: self._frame(value))
+            self.guarded("actuation", lambda: self._frame(value))
             return
         kind = {"I": "wish", "C": "context", "H": "context", "S": "context", "RP": "plan", "V": "verdict"}
-        self._guarded(kind.get(letter, "outcome"), lambda: self._letter(letter, value))
+        self.guarded(kind.get(letter, "outcome"), lambda: self._letter(letter, value))
+
+    def period(
+        self,
+        tick: int,
+        time_s: float,
+        speed_mps: float,
+        wishes: Wishes,
+        requested: Command,
+        applied: Command,
+        program: str,
+        interventions: Sequence[Intervention],
+    ) -> None:
+        """One control period of a drive that leaves no frames: in real time, control says what it did.
+
+        Args:
+            tick: Control period.
+            time_s: Since the trip began.
+            speed_mps: Of the ego, before the command.
+            wishes: What was handed to the driver.
+            requested: What the driver asked for.
+            applied: What the vehicle did.
+            program: State of the program.
+            interventions: Of the shield.
+        """
+        self.guarded(
+            "actuation",
+            lambda: self._period(tick, time_s, speed_mps, wishes, requested, applied, program, (), interventions),
+        )
 
     def intervene(self, tick: int, time_s: float, rule: str, reason: str, before: Command, after: Command) -> None:
         """The shield changed a command, told apart from frames, which bring their interventions with them.
@@ -127,17 +161,41 @@ class Auditor:
             before: What was asked for.
             after: What the shield let through.
         """
-        self._guarded("intervention", lambda: self._intervention(tick, time_s, rule, reason, before, after))
+        self.guarded("intervention", lambda: self._intervention(tick, time_s, rule, reason, before, after))
+
+    def hand_over(self) -> None:
+        """Hand over the commands and interventions collected so far."""
+        for rule in list(self._interventions):
+            self._hand_over_interventions(rule)
+        batch, self._batch = self._batch, None
+        if batch is None:
+            return
+        body: dict[str, Any] = {
+            "ticks": (batch.first_tick, batch.first_tick + len(batch.requested) - 1),
+            "time_s": (batch.first_s, batch.last_s),
+            "requested": batch.requested,
+            "applied_otherwise": batch.applied,
+            "speed_mps": batch.speed_mps,
+            "wishes": batch.wishes,
+            "program": batch.program,
+        }
+        if batch.said:
+            self._personal("actuation", body, {"said": "\n".join(batch.said)})
+        else:
+            self._log.append("actuation", body)
 
     def close(self) -> Closing:
         """Write what is left, close the log, and say how it ended; a second call says the same."""
         if self._closing is None:
-            self._guarded("actuation", self._hand_over)
+            self.guarded("actuation", self.hand_over)
             self._closing = self._log.close()
         return self._closing
 
-    def _guarded(self, kind: str, write: Callable[[], None]) -> None:
-        """A value of an unexpected kind (planners are third-party code) leaves a gap, and the drive alone."""
+    def guarded(self, kind: str, write: Callable[[], None]) -> None:
+        """Make a record; nothing that goes wrong with it raises.
+
+        A value of an unexpected kind (planners are third-party code) leaves a gap, and the drive alone.
+        """
         try:
             write()
         except Exception as error:  # noqa: BLE001 - an audit log must not take a drive down
@@ -149,7 +207,7 @@ class Auditor:
     def _letter(self, letter: str, value: object) -> None:
         match value:
             case Instruction():
-                self._hand_over()
+                self.hand_over()
                 self._person, self._open_wish, self._driven = value.person, True, False
                 self._wishes, self._program = None, ""
                 self._intervened.clear()
@@ -178,32 +236,14 @@ class Auditor:
                 return
 
     def _plan(self, plan: Plan) -> None:
-        policy = plan.policy
-        body = {
-            "planner": plan.planner,
-            "model": plan.model,
-            "policy": None if policy is None else policy.kind,
-            "refused": bool(plan.refusal),
-            "latency_s": plan.latency_s,
-            "usage": asdict(plan.usage),
-        }
-        settings = ", ".join(f"{name}={value!r}" for name, value in plan.settings)
-        texts = {
-            "thoughts": plan.thoughts.text,
-            "refusal": plan.refusal,
-            "intent": plan.intent,
-            "settings": settings,
-            "reply": plan.raw,
-            **_policy_texts(policy),
-        }
-        self._personal("plan", body, texts)
+        self._personal("plan", *plan_record(plan))
 
     def _verdict(self, verdict: Verdict) -> None:
-        body = {"check": verdict.check, "passed": verdict.passed, "line": verdict.line}
+        body = {"check": verdict.check, "passed": verdict.passed, "vetoes": verdict.vetoes, "line": verdict.line}
         self._personal("verdict", body, {"reason": verdict.reason, "remedy": verdict.remedy})
 
     def _trip(self, trip: Trip) -> None:
-        self._hand_over()
+        self.hand_over()
         causes = asdict(trip.causes)
         detail = str(causes.pop("detail"))
         body: dict[str, Any] = {
@@ -218,37 +258,60 @@ class Auditor:
         self._personal("outcome", body, {"detail": detail, "trip": trip.id})
 
     def _broken_off(self, error: BaseException) -> None:
-        self._hand_over()
+        self.hand_over()
         self._open_wish = False
         body = {"outcome": "broken_off" if self._driven else "not_driven", "error": type(error).__name__}
         self._personal("outcome", body, {"detail": str(error)})
 
     def _frame(self, frame: Frame) -> None:
         shot = frame.snapshot
-        batch = self._batch
         self._driven = True
+        self._period(
+            shot.tick,
+            shot.time_s,
+            shot.ego.speed_mps,
+            frame.wishes,
+            frame.requested,
+            frame.applied,
+            frame.program,
+            frame.said,
+            frame.interventions,
+        )
+
+    def _period(
+        self,
+        tick: int,
+        time_s: float,
+        speed_mps: float,
+        wishes: Wishes,
+        asked: Command,
+        done: Command,
+        program: str,
+        said: Sequence[str],
+        interventions: Sequence[Intervention],
+    ) -> None:
+        batch = self._batch
         if batch is not None and (
-            shot.tick != batch.first_tick + len(batch.requested) or shot.time_s - batch.first_s >= BATCH_S - _ROUNDING_S
+            tick != batch.first_tick + len(batch.requested) or time_s - batch.first_s >= BATCH_S - _ROUNDING_S
         ):
-            self._hand_over()
+            self.hand_over()
             batch = None
         if batch is None:
-            batch = self._batch = _Batch(shot.tick, shot.time_s, shot.time_s)
-        asked, done = frame.requested, frame.applied
+            batch = self._batch = _Batch(tick, time_s, time_s)
         if done != asked:
             batch.applied.append((len(batch.requested), done.acceleration_mps2, done.steering_rad))
         batch.requested.append((asked.acceleration_mps2, asked.steering_rad))
-        batch.speed_mps.append(round(shot.ego.speed_mps, 3))
-        if frame.wishes is not self._wishes and frame.wishes != self._wishes:
-            self._wishes = frame.wishes
-            batch.wishes.append((shot.tick, _wishes(frame.wishes)))
-        if frame.program != self._program:
-            self._program = frame.program
-            batch.program.append((shot.tick, frame.program))
-        batch.said.extend(frame.said)
-        batch.last_s = shot.time_s
-        for change in frame.interventions:
-            self._intervention(shot.tick, shot.time_s, change.rule, change.reason, change.before, change.after)
+        batch.speed_mps.append(round(speed_mps, 3))
+        if wishes is not self._wishes and wishes != self._wishes:
+            self._wishes = wishes
+            batch.wishes.append((tick, _wishes(wishes)))
+        if program != self._program:
+            self._program = program
+            batch.program.append((tick, program))
+        batch.said.extend(said)
+        batch.last_s = time_s
+        for change in interventions:
+            self._intervention(tick, time_s, change.rule, change.reason, change.before, change.after)
 
     def _intervention(self, tick: int, time_s: float, rule: str, reason: str, before: Command, after: Command) -> None:
         row = (
@@ -264,27 +327,6 @@ class Auditor:
         self._intervened[rule] = tick
         if not goes_on:
             self._hand_over_interventions(rule)
-
-    def _hand_over(self) -> None:
-        """Hand over the commands and interventions collected so far."""
-        for rule in list(self._interventions):
-            self._hand_over_interventions(rule)
-        batch, self._batch = self._batch, None
-        if batch is None:
-            return
-        body: dict[str, Any] = {
-            "ticks": (batch.first_tick, batch.first_tick + len(batch.requested) - 1),
-            "time_s": (batch.first_s, batch.last_s),
-            "requested": batch.requested,
-            "applied_otherwise": batch.applied,
-            "speed_mps": batch.speed_mps,
-            "wishes": batch.wishes,
-            "program": batch.program,
-        }
-        if batch.said:
-            self._personal("actuation", body, {"said": "\n".join(batch.said)})
-        else:
-            self._log.append("actuation", body)
 
     def _hand_over_interventions(self, rule: str) -> None:
         if rows := self._interventions.pop(rule, []):
@@ -334,6 +376,29 @@ def with_head(recorded: RecordedTrip, closing: Closing) -> RecordedTrip:
     """The trip with the head of its audit log among its provenance: the recording then vouches for the log's length."""
     trip = recorded.trip
     return replace(recorded, trip=replace(trip, record=(*trip.record, ("audit_head", closing.head))))
+
+
+def plan_record(plan: Plan) -> tuple[dict[str, Any], dict[str, str]]:
+    """What a log holds of a plan: numbers and names of parts, and the personal texts by name."""
+    policy = plan.policy
+    body = {
+        "planner": plan.planner,
+        "model": plan.model,
+        "policy": None if policy is None else policy.kind,
+        "refused": bool(plan.refusal),
+        "latency_s": plan.latency_s,
+        "usage": asdict(plan.usage),
+    }
+    settings = ", ".join(f"{name}={value!r}" for name, value in plan.settings)
+    texts = {
+        "thoughts": plan.thoughts.text,
+        "refusal": plan.refusal,
+        "intent": plan.intent,
+        "settings": settings,
+        "reply": plan.raw,
+        **_policy_texts(policy),
+    }
+    return body, texts
 
 
 def _policy_texts(policy: Policy | None) -> dict[str, str]:

@@ -1,16 +1,16 @@
-"""What a program does, found by running it: on copies of the scene, in the sandbox, for a few simulated seconds.
+"""What a program did: in a drive, or tried on copies of the scene, in the sandbox, for a few simulated seconds.
 
-It needs a world that can be copied at an instant, and so a simulated one: what is found foresees the simulator's
-traffic, and says nothing of a real road.
+Trying needs a world that can be copied at an instant, and so a simulated one: what is found foresees the simulator's
+traffic, and says nothing of a real road. It takes some tenths of a second; a drive does not wait for it.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Final
 
-from chauffeur.concept import Frame, Program, SandboxError, Snapshot, Thoughts
+from chauffeur.concept import Program, SandboxError, Snapshot, Thoughts
 from chauffeur.drive.episode import Episode, run_episode
 from chauffeur.drive.rehearsal import CopyableWorld
 from chauffeur.programs import ProgramExecutor, Sandbox
@@ -19,7 +19,6 @@ from chauffeur.safety.alignment import Alignment, Effect, Surroundings, judge, r
 MAX_S: Final = 30.0
 """Simulated seconds a program is given to show what it does."""
 
-_STANDING_MPS: Final = 0.5
 _MEAN_TICKS: Final = 10
 """Control periods of the last second."""
 
@@ -57,54 +56,61 @@ def judge_driven(
     return judge(thoughts.text, read_facts(program.source, program.library), where, effects)
 
 
-@dataclass(slots=True)
-class _Log:
-    """What of a run is kept while it goes on."""
-
-    speeds: list[float] = field(default_factory=list[float])
-    places: list[int] = field(default_factory=list[int])
-
-    def see(self, frame: Frame) -> None:
-        self._add(frame.snapshot)
-
-    def _add(self, snapshot: Snapshot) -> None:
-        self.speeds.append(snapshot.ego.speed_mps)
-        lane = snapshot.ego.lane
-        if lane is not None:
-            self.places.append(lane[2])
+def effect_of(episode: Episode) -> Effect | None:
+    """What happened in a recorded drive; None where nothing was driven."""
+    if not episode.frames:
+        return None
+    shots = [*(frame.snapshot for frame in episode.frames), episode.final]
+    first, last = shots[0], shots[-1]
+    speeds = [shot.ego.speed_mps for shot in shots]
+    # Lanes of another stretch of road have numbers of their own; on the roads here they run on side by side.
+    places = [shot.ego.lane[2] for shot in shots if shot.ego.lane is not None] or [0]
+    ending = speeds[-1 - _MEAN_TICKS :]
+    return Effect(
+        lanes_moved=places[-1] - places[0],
+        leftmost=min(places) - places[0],
+        rightmost=max(places) - places[0],
+        speeds_mps=(speeds[0], sum(ending) / len(ending)),
+        extremes_mps=(min(speeds), max(speeds)),
+        gaps_m=_gaps(first, last),
+        turned=round(_turn_rad(first.ego.heading_rad, last.ego.heading_rad) / (math.pi / 2.0)),
+        failed=episode.causes.policy_failed or episode.causes.infra_failed,
+        cut=episode.success or last.ego.crashed or last.off_road,
+    )
 
 
 def _effect(world: CopyableWorld, program: Program, sandbox: Sandbox, max_s: float) -> Effect:
     twin = world.copy()
-    first = twin.snapshot()
-    log = _Log()
     executor = ProgramExecutor(sandbox=sandbox, library=program.library, gate=False)
     try:
         executor.start(program.source, twin)
-        episode = run_episode(twin, executor, None, max_s=max_s, watch=log.see)
+        episode = run_episode(twin, executor, None, max_s=max_s)
     finally:
         executor.close()
     if episode.causes.infra_failed:
         raise SandboxError(f"The sandbox failed while a program was tried: {episode.causes.detail}", retryable=True)
-    return _of(first, episode, log)
+    effect = effect_of(episode)
+    assert effect is not None  # at least one control period is driven
+    return effect
 
 
-def _of(first: Snapshot, episode: Episode, log: _Log) -> Effect:
-    last = episode.final
-    places = log.places or [0]
-    # Lanes of another stretch of road have numbers of their own; on the roads here they run on side by side.
-    home, end = places[0], last.ego.lane[2] if last.ego.lane is not None else places[-1]
-    final = [*log.speeds[-_MEAN_TICKS:], last.ego.speed_mps]
-    return Effect(
-        lanes_moved=end - home,
-        leftmost=min([*places, end]) - home,
-        rightmost=max([*places, end]) - home,
-        speeds_mps=(first.ego.speed_mps, sum(final) / len(final)),
-        gaps_m=(_gap(first), _gap(last)),
-        stood=min([*log.speeds, last.ego.speed_mps]) < _STANDING_MPS,
-        failed=episode.causes.policy_failed,
-    )
+def _gaps(first: Snapshot, last: Snapshot) -> tuple[float | None, float | None]:
+    """Way along the ego to the vehicle that is ahead at first, then and at the end."""
+    if first.front is None:
+        return None, None
+    ahead = first.front.vehicle
+    return _along(first, ahead), _along(last, ahead)
 
 
-def _gap(snapshot: Snapshot) -> float | None:
-    return None if snapshot.front is None else snapshot.front.distance_m
+def _along(shot: Snapshot, vehicle: int) -> float | None:
+    ego = shot.ego
+    for other in shot.others:
+        if other.id == vehicle:
+            dx, dy = other.x_m - ego.x_m, other.y_m - ego.y_m
+            return dx * math.cos(ego.heading_rad) + dy * math.sin(ego.heading_rad)
+    return None
+
+
+def _turn_rad(first: float, last: float) -> float:
+    """Angle turned, -pi to pi; y grows to the right of +x in the worlds, so that right is positive."""
+    return math.remainder(last - first, 2.0 * math.pi)

@@ -74,7 +74,7 @@ async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, s
     V = stages.check(plan, snapshot, limits)  # noqa: N806
     stages.tell("V", V)
 
-    trip = stages.execute(request, plan, V, scenario, seed)  # drives P only if every verdict passed
+    trip = stages.execute(request, plan, V, scenario, seed)  # drives P only if no verdict stops it
     stages.tell("trip", trip)
 
     stages.memory.remember(trip, None)  # H + (I, C, P, R); F joins when the person speaks

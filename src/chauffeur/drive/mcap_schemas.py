@@ -153,7 +153,15 @@ VERDICTS = Channel(
     "chauffeur.Verdicts",
     _object(
         verdicts=_array(
-            _object(check=_text(), passed=_FLAG, reason=_text(), line={"type": ["integer", "null"]}, remedy=_text())
+            _object(
+                check=_text(),
+                passed=_FLAG,
+                reason=_text(),
+                line={"type": ["integer", "null"]},
+                remedy=_text(),
+                vetoes=_FLAG,
+                alignment={"type": ["object", "null"]},
+            )
         )
     ),
 )

@@ -6,7 +6,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from importlib.metadata import version
 from typing import Any
@@ -24,12 +24,14 @@ from chauffeur.concept import (
     PlanRequest,
     Program,
     Scenario,
+    Snapshot,
     SystemMessage,
     Trip,
     Verdict,
 )
 from chauffeur.concept.registry import load_plugin
 from chauffeur.describe import describe
+from chauffeur.drive.effects import effect_of
 from chauffeur.drive.episode import Episode, Referee, run_episode
 from chauffeur.drive.loop import Memory, Stages, drive
 from chauffeur.drive.recording import RecordedTrip
@@ -37,7 +39,9 @@ from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.programs import ProgramExecutor
 from chauffeur.programs.sandbox import UNHURRIED, Sandbox
-from chauffeur.safety import DRIVE_CHECKS, run_checks
+from chauffeur.safety.alignment import check_alignment, check_driven
+from chauffeur.safety.base import Check
+from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
 from chauffeur.safety.shield import SHIELD_VERSION, Shield
 from chauffeur.worlds.base import World
 
@@ -126,7 +130,7 @@ class Session:
             memory=self.memory,
             system=self._build_system,
             planner=self.planner,
-            check=partial(run_checks, checks=DRIVE_CHECKS),
+            check=check_drive,
             execute=partial(self._execute, world),
             tell=self.tell,
         )
@@ -167,7 +171,32 @@ class Session:
             library=plan.policy.library,
             shield=Shield(world.dt_s, request.limits) if self.shielded else None,
         )
-        return make_trip(request, plan, verdicts, scenario, seed, self._episode, "", shielded=self.shielded)
+        told = _check_driven(plan, self._episode, request.limits)
+        self.tell("V", told)
+        return make_trip(request, plan, verdicts + told, scenario, seed, self._episode, "", shielded=self.shielded)
+
+
+def check_drive(plan: Plan, snapshot: Snapshot, limits: Limits) -> tuple[Verdict, ...]:
+    """All verdicts before a drive: of the checks that can stop it, and whether the explanation fits the program."""
+    return run_checks(plan, snapshot, limits, DRIVE_CHECKS) + _told(plan, snapshot, limits, check_alignment)
+
+
+def _check_driven(plan: Plan, episode: Episode, limits: Limits) -> tuple[Verdict, ...]:
+    """Whether the drive went as explained; nothing where nothing was driven."""
+    effect = effect_of(episode)
+    if effect is None:
+        return ()
+
+    def driven(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:
+        del limits
+        return check_driven(plan, snapshot, effect)
+
+    return _told(plan, episode.frames[0].snapshot, limits, driven)
+
+
+def _told(plan: Plan, snapshot: Snapshot, limits: Limits, check: Check) -> tuple[Verdict, ...]:
+    """What a check says that only informs: if it breaks, that is told as well, and stops nothing."""
+    return tuple(replace(verdict, vetoes=False) for verdict in run_checks(plan, snapshot, limits, (check,)))
 
 
 def drive_program(
@@ -202,14 +231,14 @@ def unusable(plan: Plan, verdicts: tuple[Verdict, ...]) -> bool:
     """Whether a plan that is not driven failed as a policy (no program, or not of the language), not as a wish."""
     if plan.refusal:
         return plan.intent == "unusable"
-    return bool(verdicts) and not verdicts[0].passed
+    return bool(verdicts) and verdicts[0].stops
 
 
 def declined(plan: Plan, verdicts: tuple[Verdict, ...]) -> str:
     """Why a plan is not driven, in words; empty when it may be."""
     if plan.refusal:
         return plan.refusal
-    failed = [verdict.reason for verdict in verdicts if not verdict.passed]
+    failed = [verdict.reason for verdict in verdicts if verdict.stops]
     return " ".join(failed)
 
 

@@ -8,9 +8,11 @@ from typing import Literal
 
 from chauffeur.concept import Frame, Snapshot
 from chauffeur.drive.recording import RecordedTrip
+from chauffeur.hmi import words
+from chauffeur.hmi.shielding import Stretch, stretches_of
 from chauffeur.hmi.view import instants_of
 
-EventKind = Literal["said", "lane_change", "stopped", "finished", "failed", "collision", "off_road"]
+EventKind = Literal["said", "lane_change", "stopped", "finished", "failed", "collision", "off_road", "shield"]
 
 _STANDING_MPS = 0.3
 _MOVING_MPS = 1.0
@@ -34,8 +36,16 @@ class Event:
 def events_of(recorded: RecordedTrip) -> tuple[Event, ...]:
     """All marks of a trip, in order of time."""
     events = [*_program_events(recorded.frames), *_drive_events(instants_of(recorded))]
+    events.extend(Event(s.start_s, "shield", shield_label(s)) for s in stretches_of(recorded.frames))
     events.extend(Event(f.snapshot.time_s, "said", text) for f in recorded.frames for text in f.said)
     return tuple(sorted(events, key=lambda event: event.time_s))
+
+
+def shield_label(stretch: Stretch) -> str:
+    """A stretch of the shield in words, with what became of the command."""
+    lasted = stretch.end_s - stretch.start_s
+    change = words.change_words(stretch.before, stretch.after)
+    return f"Shield ({words.rule_words(stretch.rule)}, {lasted:.1f} s): {change}. {stretch.reason}"
 
 
 def _program_events(frames: tuple[Frame, ...]) -> list[Event]:

@@ -18,6 +18,7 @@ from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import Event, EventKind, events_of
 from chauffeur.hmi.road import Box, Road, draw_road, track_box
+from chauffeur.hmi.shielding import stretches_of
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 
 _WIDTH = 1600
@@ -41,15 +42,17 @@ _MARK, _CENTRE, _HATCH = "#f4f2ea", "#f2c14b", "#737a84"
 _CAR, _CAR_EDGE = "#d9dee4", "#2d3239"
 _EGO, _EGO_EDGE, _TRAIL = "#ffb224", "#4a2c00", "#c9963a"
 _OBSTACLE, _STOP, _CRASH = "#c9452f", "#b3201a", "#d6281e"
+_GUARD, _RING = "#5a3ea6", "#cbb9ff"
 
 _RANK: dict[EventKind, int] = {
     "collision": 0,
     "off_road": 1,
     "failed": 2,
     "lane_change": 3,
-    "stopped": 4,
-    "said": 5,
-    "finished": 6,
+    "shield": 4,
+    "stopped": 5,
+    "said": 6,
+    "finished": 7,
 }
 
 _Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
@@ -98,20 +101,25 @@ def render_filmstrip(recorded: RecordedTrip, frames: int = 6) -> Image.Image:
         height = min((camera.box.y1 - camera.box.y0) * scale, width * 1.2)
         scale = min(scale, height / (camera.box.y1 - camera.box.y0))
     rows = math.ceil(len(moments) / columns)
-    top = _MARGIN + _TITLE_PX + 14 + _HEAD_PX + 28
+    shielded = words.shield_words([change for frame in recorded.frames for change in frame.interventions])
+    top = _MARGIN + _TITLE_PX + 14 + _HEAD_PX + 28 + (_HEAD_PX + 10 if shielded else 0)
     total = top + rows * (_HEAD_HEIGHT + height) + (rows - 1) * _GAP + _MARGIN
 
     k = _SUPERSAMPLE
     sheet = Image.new("RGB", (_WIDTH * k, round(total) * k), _PAPER)
-    _title(ImageDraw.Draw(sheet), recorded)
+    _title(ImageDraw.Draw(sheet), recorded, shielded)
+    stretches = stretches_of(recorded.frames)
     for number, moment in enumerate(moments):
         x = _MARGIN + (number % columns) * (width + _GAP)
         y = top + (number // columns) * (_HEAD_HEIGHT + height + _GAP)
         shot = shots[moment.index]
-        _head(ImageDraw.Draw(sheet), shot, moment.event, x, y, width)
+        now = [stretch.rule for stretch in stretches if stretch.start_s <= shot.time_s < stretch.end_s]
+        _head(ImageDraw.Draw(sheet), shot, moment.event, now, x, y, width)
         middle_x = shot.ego.x_m + width / scale * (0.5 - _EGO_PLACE) if camera.along else _middle(camera.box)[0]
         panel = _Panel(round(width * k), round(height * k), scale * k, middle_x, _middle(camera.box)[1])
         panel.paint(road, shots[: moment.index + 1])
+        if now:
+            panel.ring(shot.ego)
         sheet.paste(panel.image, (round(x * k), round((y + _HEAD_HEIGHT) * k)))
     return sheet.resize((_WIDTH, round(total)), Image.Resampling.LANCZOS)
 
@@ -167,7 +175,7 @@ def _fit(draw: ImageDraw.ImageDraw, text: str, font: _Font, width: float) -> str
     return clean[:low].rstrip() + "..."
 
 
-def _title(draw: ImageDraw.ImageDraw, recorded: RecordedTrip) -> None:
+def _title(draw: ImageDraw.ImageDraw, recorded: RecordedTrip, shielded: str) -> None:
     k, trip = _SUPERSAMPLE, recorded.trip
     room = (_WIDTH - 2 * _MARGIN) * k
     font = _font(_TITLE_PX)
@@ -178,15 +186,30 @@ def _title(draw: ImageDraw.ImageDraw, recorded: RecordedTrip) -> None:
     )
     small = _font(_HEAD_PX)
     line = _fit(draw, f"{facts}   |   {words.SIMULATED}", small, room)
-    draw.text((_MARGIN * k, (_MARGIN + _TITLE_PX + 14) * k), line, _MUTED, small)
+    below = _MARGIN + _TITLE_PX + 14
+    draw.text((_MARGIN * k, below * k), line, _MUTED, small)
+    if shielded:
+        draw.text((_MARGIN * k, (below + _HEAD_PX + 10) * k), _fit(draw, shielded, small, room), _GUARD, small)
 
 
-def _head(draw: ImageDraw.ImageDraw, shot: Snapshot, event: Event | None, x: float, y: float, width: float) -> None:
+def _head(
+    draw: ImageDraw.ImageDraw,
+    shot: Snapshot,
+    event: Event | None,
+    rules: Sequence[str],
+    x: float,
+    y: float,
+    width: float,
+) -> None:
+    """Time, speed, which rules of the shield act, and what happened."""
     k = _SUPERSAMPLE
     pen, right = x * k, (x + width) * k
     baseline = (y + _HEAD_HEIGHT - 11) * k
     parts = [(f"{shot.time_s:.1f} s", _INK, _HEAD_PX), (words.speed(shot.ego.speed_mps), _MUTED, _SMALL_PX)]
-    if event is not None:
+    if rules:
+        acting = ", ".join(words.rule_words(rule) for rule in dict.fromkeys(rules))
+        parts.append((f"Shield: {acting}", _GUARD, _SMALL_PX))
+    if event is not None and not (rules and event.kind == "shield"):
         quoted = f'"{event.label}"' if event.kind == "said" else event.label
         parts.append((quoted, _INK, _SMALL_PX))
     for text, ink, size in parts:
@@ -232,6 +255,12 @@ class _Panel:
             self._body(car, _CRASH if car.crashed else _CAR, _CAR_EDGE)
         self._body(shot.ego, _CRASH if shot.ego.crashed else _EGO, _EGO_EDGE, halo=True)
 
+    def ring(self, ego: VehicleState) -> None:
+        """A ring around the ego while the shield acts."""
+        u, v = 0.5 + 1.2 / ego.length_m, 0.5 + 0.8 / ego.width_m
+        corners = [self._on(ego, *place) for place in ((-u, -v), (u, -v), (u, v), (-u, v))]
+        self._draw.line([*corners, corners[0]], fill=_RING, width=max(4, round(0.35 * self._scale)), joint="curve")
+
     def _at(self, x_m: float, y_m: float) -> tuple[float, float]:
         return (
             (x_m - self._middle[0]) * self._scale + self._size[0] / 2.0,
@@ -270,19 +299,20 @@ class _Panel:
         self._rectangle(body, 0.08, 0.25, 0.37, edge)
         self._rectangle(body, -0.36, -0.27, 0.34, edge)
 
+    def _on(self, body: VehicleState, u: float, v: float) -> tuple[float, float]:
+        """Pixel of a place on a body, in shares of its length and width from its centre."""
+        c, s = math.cos(body.heading_rad), math.sin(body.heading_rad)
+        return self._at(
+            body.x_m + c * u * body.length_m - s * v * body.width_m,
+            body.y_m + s * u * body.length_m + c * v * body.width_m,
+        )
+
     def _rectangle(
         self, body: VehicleState, back: float, front: float, half: float, fill: str, edge: str | None = None
     ) -> None:
         """A part of a body, in shares of its length and width."""
-        c, s = math.cos(body.heading_rad), math.sin(body.heading_rad)
         corners = [(back, -half), (front, -half), (front, half), (back, half)]
-        points = [
-            self._at(
-                body.x_m + c * u * body.length_m - s * v * body.width_m,
-                body.y_m + s * u * body.length_m + c * v * body.width_m,
-            )
-            for u, v in corners
-        ]
+        points = [self._on(body, u, v) for u, v in corners]
         self._draw.polygon(points, fill=fill, outline=edge, width=3 if edge else 1)
 
 

@@ -15,18 +15,22 @@ from chauffeur.concept import (
     Frame,
     HistoryItem,
     LaneId,
+    Mismatch,
     Parameters,
     Policy,
     Program,
     Snapshot,
     Trip,
     VehicleState,
+    Verdict,
 )
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.road import Box, Road, draw_road, track_box
+from chauffeur.hmi.shielding import rule_counts, stretches_of
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
+from chauffeur.safety.alignment import KINDS, score_words
 
 _SIGHT_M = 260.0
 """Nothing farther from the ego's path than this is ever on the screen."""
@@ -52,9 +56,15 @@ def page_payload(recorded: RecordedTrip) -> Json:
         "program": _program_lines(trip.plan.policy),
         "policy": policy_words(trip.plan.policy),
         "verdicts": [
-            {"check": v.check, "passed": v.passed, "reason": v.reason, "line": v.line, "remedy": v.remedy}
+            {"check": v.check, "passed": v.passed, "reason": _reason(v), "line": v.line, "remedy": v.remedy}
+            | {"vetoes": v.vetoes}
             for v in trip.verdicts
         ],
+        "mismatches": [
+            {"kind": KINDS[one.kind], "said": one.sentence, "instead": one.instead, "line": one.line}
+            for one in _mismatches(trip)
+        ],
+        "shield": _shield(recorded),
         "outcome": {"label": label, "tone": tone, "causes": words.cause_words(trip.causes)},
         "duration": round(trip.duration_s, 2),
         "metrics": [
@@ -156,6 +166,48 @@ def _program_lines(policy: Policy | None) -> list[list[tuple[str, str]]] | None:
     return program_tokens(policy_words(policy).rstrip("\n")) if isinstance(policy, Program) else None
 
 
+def _reason(verdict: Verdict) -> str:
+    """Why; of an explanation that does not fit the single mismatches are shown beside it."""
+    if verdict.alignment is None or verdict.passed:
+        return verdict.reason
+    return f"{words.doubt_words(verdict.check)} ({score_words(verdict.alignment)})."
+
+
+def _mismatches(trip: Trip) -> tuple[Mismatch, ...]:
+    """What is wrong in the thoughts; what the drive only showed once more is left out."""
+    found: dict[tuple[str, str], Mismatch] = {}
+    for verdict in trip.verdicts:
+        if verdict.alignment is not None:
+            for one in verdict.alignment.mismatches:
+                found.setdefault((one.kind, one.sentence), one)
+    return tuple(found.values())
+
+
+def _shield(recorded: RecordedTrip) -> Json | None:
+    """What the run-time shield did; None where it did nothing."""
+    stretches = stretches_of(recorded.frames)
+    if not stretches:
+        return None
+    rules = [
+        {"name": words.rule_words(one.rule), "stretches": one.stretches, "changes": one.changes}
+        for one in rule_counts(stretches)
+    ]
+    return {
+        "summary": words.shield_words([change for frame in recorded.frames for change in frame.interventions]),
+        "rules": rules,
+        "stretches": [
+            {
+                "t": round(one.start_s, 2),
+                "end": round(one.end_s, 2),
+                "name": words.rule_words(one.rule),
+                "change": words.change_words(one.before, one.after),
+                "reason": one.reason,
+            }
+            for one in stretches
+        ],
+    }
+
+
 def _history_item(item: HistoryItem) -> Json:
     return {
         "when": item.when,
@@ -190,6 +242,7 @@ def _drive(recorded: RecordedTrip) -> Json | None:
         "cars": _cars(shots, sight),
         "speed": [round(s.ego.speed_mps, 2) for s in shots],
         "acceleration": [round(row.applied.acceleration_mps2, 2) if row else 0.0 for row in rows],
+        "asked": [round(row.requested.acceleration_mps2, 2) if row else 0.0 for row in rows],
         "target": [_rounded(row.wishes.target_speed_mps) if row else None for row in rows],
         "limit": [_rounded(limits.get(s.ego.lane) if s.ego.lane else None) for s in shots],
         "gap": [_rounded(s.front.distance_m) if s.front else None for s in shots],

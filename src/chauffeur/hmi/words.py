@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Sequence
 from typing import Final, Literal
 
-from chauffeur.concept import Causes, Feedback, Intervention, Metric, Outcome
+from chauffeur.concept import Causes, Command, Feedback, Intervention, Metric, Outcome, Verdict
 from chauffeur.concept.units import kmh
+from chauffeur.safety.alignment import ALIGNMENT_CHECK, DRIVEN_CHECK
 
 Tone = Literal["good", "bad", "neutral"]
 
@@ -61,6 +63,16 @@ _RULES: Final = {
 """The shield's rules in a few words."""
 
 
+_SAME_MPS2: Final = 0.05
+_SAME_RAD: Final = 0.002
+"""Smaller changes of a command are not told beside a greater one."""
+
+_DOUBTS: Final = {
+    ALIGNMENT_CHECK: "The explanation does not fit the program",
+    DRIVEN_CHECK: "The drive did not go as explained",
+}
+
+
 def cause_words(causes: Causes) -> tuple[str, ...]:
     """Every cause that holds, in words; empty when nothing went wrong."""
     words = [
@@ -82,10 +94,50 @@ def shield_words(interventions: Sequence[Intervention]) -> str:
     """How often the run-time shield changed a command, and why; empty when it never did."""
     if not interventions:
         return ""
+    if len(interventions) == 1:
+        return f"The shield changed a command once: {rule_words(interventions[0].rule)}."
     counts = Counter(change.rule for change in interventions)
-    why = ", ".join(f"{_RULES.get(rule, rule)} {count}" for rule, count in counts.most_common())
-    times = "once" if len(interventions) == 1 else f"{len(interventions)} times"
-    return f"The shield changed a command {times}: {why}."
+    why = ", ".join(f"{rule_words(rule)} {count}" for rule, count in counts.most_common())
+    return f"The shield changed a command {len(interventions)} times: {why}."
+
+
+def rule_words(rule: str) -> str:
+    """A rule of the shield in a few words."""
+    return _RULES.get(rule, rule)
+
+
+def change_words(before: Command, after: Command) -> str:
+    """What became of a command: `+1.5 → −3.2 m/s²`, and the steering where that was changed."""
+    parts: list[str] = []
+    steered = abs(after.steering_rad - before.steering_rad) >= _SAME_RAD
+    if steered:
+        parts.append(f"steering {_steering(before)} → {_steering(after)}")
+    if not steered or abs(after.acceleration_mps2 - before.acceleration_mps2) >= _SAME_MPS2:
+        asked, done = (_signed(one.acceleration_mps2) for one in (before, after))
+        parts.append(f"{asked} → {done} m/s²")
+    return ", ".join(parts)
+
+
+def _signed(value: float) -> str:
+    text = f"{value:+.1f}"
+    return "0.0" if float(text) == 0.0 else text.replace("-", "\N{MINUS SIGN}")
+
+
+def _steering(command: Command) -> str:
+    degrees = f"{abs(math.degrees(command.steering_rad)):.1f}°"
+    if float(degrees[:-1]) == 0.0:
+        return "0.0°"
+    return f"{degrees} {'right' if command.steering_rad > 0.0 else 'left'}"
+
+
+def doubt_words(check: str) -> str:
+    """What it means that a check which only informs did not pass."""
+    return _DOUBTS.get(check, f"{check} did not pass")
+
+
+def unexplained(verdicts: Sequence[Verdict]) -> bool:
+    """Whether the person was told something that is not so."""
+    return any(one.alignment is not None and not one.alignment.aligned for one in verdicts)
 
 
 def metric_name(metric_id: str) -> str:

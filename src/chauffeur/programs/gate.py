@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, Literal
+from typing import Final
 
 from chauffeur.programs.calls import CallChecks
 from chauffeur.programs.catalogue import APIS
@@ -19,6 +19,7 @@ from chauffeur.programs.lazy import lazy_findings
 from chauffeur.programs.loops import loop_findings
 from chauffeur.programs.lower import SEARCHES
 from chauffeur.programs.nodes import all_nodes
+from chauffeur.programs.placing import misplaced
 from chauffeur.programs.rewrite import (
     bindings,
     binds,
@@ -90,16 +91,17 @@ def check_source(source: str, library: str = "") -> GateReport:
 
 @lru_cache(maxsize=512)
 def _judged(source: str, library: str) -> GateReport:
+    text = unix_lines(source)
     try:
-        tree = parse(unix_lines(source))
+        tree = parse(text)
     except ProgramSyntaxError as error:
         return GateReport((Finding(error.line, "syntax", error.message, error.hint),), None)
     try:
-        helpers = parse(unix_lines(library), "library")
+        helpers, refused = _judged_library(library)
     except ProgramSyntaxError as error:
         return GateReport((Finding(None, "library", error.message, error.hint),), None)
     main = main_function(tree)
-    findings = _library_findings(helpers)
+    findings = [*refused, *misplaced(text, tree)]
     findings += _Gate(tree, helpers).run()
     findings += _main_findings(tree, main)
     findings += loop_findings(tree)
@@ -112,11 +114,12 @@ def _judged(source: str, library: str) -> GateReport:
 @lru_cache(maxsize=64)
 def _judged_library(library: str) -> tuple[ast.Module, tuple[Finding, ...]]:
     """A library's tree and what refuses it. Raises ProgramSyntaxError."""
-    helpers = parse(unix_lines(library), "library")
-    return helpers, tuple(_library_findings(helpers))
+    text = unix_lines(library)
+    helpers = parse(text, "library")
+    return helpers, tuple(_library_findings(text, helpers))
 
 
-def _library_findings(helpers: ast.Module) -> list[Finding]:
+def _library_findings(text: str, helpers: ast.Module) -> list[Finding]:
     """What refuses a library: whatever refuses a program, and top-level names that a program could not do without."""
     found: list[Finding] = []
     for node in helpers.body:
@@ -124,6 +127,7 @@ def _library_findings(helpers: ast.Module) -> list[Finding]:
             found.append(Finding(node.lineno, "library", "a library holds functions only", "move it into a function"))
     for name in sorted(top_level_names(helpers) & BUILTINS):
         found.append(Finding(None, "library", f"{name} is a built-in function", "rename it"))
+    found += misplaced(text, helpers)
     found += _Gate(helpers, ast.Module([], [])).run() + loop_findings(helpers) + lazy_findings(helpers)
     return [
         Finding(None, "library", f"line {one.line or 1} of the library: {one.reason}", one.remedy)
@@ -206,11 +210,9 @@ class _Gate:
         self._check_top_level()
         return self._findings
 
-    def _add(
-        self, node: ast.AST, code: str, reason: str, remedy: str, severity: Literal["error", "warning"] = "error"
-    ) -> None:
+    def _add(self, node: ast.AST, code: str, reason: str, remedy: str) -> None:
         if len(self._findings) < _MAX_COLLECTED:
-            self._findings.append(Finding(getattr(node, "lineno", None), code, reason, remedy, severity))
+            self._findings.append(Finding(getattr(node, "lineno", None), code, reason, remedy))
 
     def _check_allowed(self, node: ast.AST) -> None:
         if isinstance(node, ALLOWED_NODES):

@@ -251,11 +251,14 @@ class SandboxRun:
         self._snapshot = snapshot
 
     def dump(self) -> bytes:
-        """The waiting program as bytes. Raises SandboxError when it does not wait."""
+        """The waiting program as bytes. Raises SandboxError when it does not wait, or its worker has died."""
         if self._snapshot is None:
             raise SandboxError("Only a waiting program can be dumped.")
         head = f"{' '.join(sorted(self._names))}\n{' '.join(sorted(self._slotted))}\n{self._program_feed}\n"
-        return head.encode() + self._snapshot.dump()
+        try:
+            return head.encode() + self._snapshot.dump()
+        except monty.MontyError as error:
+            raise SandboxError(f"The program cannot be dumped: {str(error)[:MAX_MESSAGE_CHARS]}.") from error
 
     def answer(self, value: object) -> HostCall | None:
         """Give the result of the waiting call; returns the next call, or None when the program has ended.

@@ -3,17 +3,20 @@
 Source: Shalev-Shwartz, Shammah, Shashua 2017, Def. 5 to 7 (blame time, proper response), for straight roads. A pair is
 safe while there is clear room to the side, or the rear one keeps a responsibility-sensitive gap. Whoever ended that is
 to blame: the one that came over to the other's side, or the rear one in a lane; and an ego that was wronged is to blame
-all the same if it did not brake with all it has. Where ways cross the others go first, so that the ego is to blame for
-every collision with one that crosses, unless it stood. What was unsafe from the beginning is nobody's.
+all the same if it did not brake with all it has. Where ways cross, and where a car comes towards the ego, the others go
+first: the ego is to blame for every such collision, unless it stood, and the other left its straight way to strike it.
+(To stand is not enough: a car that came to a stop across the lane of the oncoming traffic was once absolved.) What was
+unsafe from the beginning is nobody's.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from chauffeur.concept import Frame, Snapshot
+from chauffeur.concept import Frame, Snapshot, VehicleState
 from chauffeur.safety.shield.frame import Body, Lens, Scene
 from chauffeur.safety.shield.gaps import braking_gap_m, rss_gap_m
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
@@ -22,7 +25,6 @@ _FULL: Final = 0.9
 """Share of full braking that counts as braking with all one has."""
 _STILL_MPS: Final = 0.5
 _TOWARDS_MPS: Final = 0.05
-_STOOD_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +63,8 @@ def blame(
     if other is None:
         return Blame("nobody", None, None, "The ego crashed, but into nobody that is seen.")
     crossed = _pair(lens.look(last, last.ego.lane), other)
-    if crossed is not None and crossed[1].crosses:
-        return _at_a_crossing(frames, other, dt_s)
+    if crossed is not None and (crossed[1].crosses or crossed[1].along_mps < -_STILL_MPS):
+        return _at_a_crossing(frames, final, other)
     pairs = [_pair(lens.look(frame.snapshot, frame.snapshot.ego.lane), other) for frame in frames]
     unsafe_from = len(pairs)
     while unsafe_from > 0 and not _safe(pairs[unsafe_from - 1], dt_s, parameters):
@@ -89,11 +91,25 @@ def blame(
 Pair = tuple[Body, Body]
 
 
-def _at_a_crossing(frames: Sequence[Frame], other: int, dt_s: float) -> Blame:
-    stood = frames[-round(_STOOD_S / dt_s) :]
-    if all(frame.snapshot.ego.speed_mps < _STILL_MPS for frame in stood):
-        return Blame("other", other, stood[0].snapshot.time_s, "The ego stood when a crossing car ran into it.")
+def _at_a_crossing(frames: Sequence[Frame], final: Snapshot, other: int) -> Blame:
+    begun = len(frames)
+    while begun > 0 and frames[begun - 1].snapshot.ego.speed_mps < _STILL_MPS:
+        begun -= 1
+    if begun < len(frames):
+        stood = frames[begun].snapshot
+        found = next((car for car in (*stood.others, *stood.objects) if car.id == other), None)
+        if found is not None and not _in_the_way(final.ego, found):
+            return Blame("other", other, stood.time_s, "The ego stood clear of the way of the one that ran into it.")
     return Blame("ego", other, None, "The ego was in the way of one that crossed.")
+
+
+def _in_the_way(ego: VehicleState, other: VehicleState) -> bool:
+    """Whether the ego's body is in the strip that another covers if it goes straight on."""
+    c, s = math.cos(other.heading_rad), math.sin(other.heading_rad)
+    across = -s * (ego.x_m - other.x_m) + c * (ego.y_m - other.y_m)
+    turned = ego.heading_rad - other.heading_rad
+    wide = abs(math.sin(turned)) * ego.length_m / 2.0 + abs(math.cos(turned)) * ego.width_m / 2.0
+    return abs(across) < wide + other.width_m / 2.0
 
 
 def _struck(snapshot: Snapshot) -> int | None:

@@ -201,7 +201,7 @@ def _intent_faults(plan: Plan, road: _Road) -> Iterator[_Fault]:
     if plan.policy is None:
         return
     # Of several steps joined by "+" only the first begins where the car is now.
-    tokens = re.split(r"[^a-z]+", plan.intent.lower().partition("+")[0])
+    tokens = re.findall(r"[a-z]+", plan.intent.lower().partition("+")[0])
     if "turn" in tokens or "straight" in tokens:
         if road.kind != "intersection":
             yield _Fault(

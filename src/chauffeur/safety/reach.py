@@ -120,14 +120,12 @@ def _call_findings(report: Verification, where: Circumstances, limits: Limits) -
             if param is None:
                 continue
             if param.kind == "number":
-                bounds = _bounds(site.name, param, where, limits)
-                if bounds is not None:
-                    yield from _number_findings(site, param, argument.value, bounds)
+                yield from _number_findings(site, param, argument.value, _bounds(site.name, param, where, limits))
             elif param.kind in {"vehicle", "lane"}:
                 yield from _handle_findings(site, param, argument.value)
 
 
-def _bounds(name: str, param: Param, where: Circumstances, limits: Limits) -> _Bounds | None:
+def _bounds(name: str, param: Param, where: Circumstances, limits: Limits) -> _Bounds:
     if name == "set_target_speed":
         here = where.speed_limits_mps[0] if where.speed_limit_mps is None else where.speed_limit_mps
         cap = math.inf if limits.max_speed_mps is None else limits.max_speed_mps
@@ -140,8 +138,8 @@ def _bounds(name: str, param: Param, where: Circumstances, limits: Limits) -> _B
     if name == "set_desired_time_headway":
         low, high = limits.min_time_headway_s, limits.max_time_headway_s
         return _Bounds("time headway", low, high, high, "s", f"outside {low:g} to {high:g} s")
-    if param.low is None or param.high is None:
-        return None
+    assert param.low is not None  # every number of the catalogue has both bounds
+    assert param.high is not None
     what = f"{param.name} of {name}"
     return _Bounds(what, param.low, param.high, param.high, param.unit, f"outside {param.low:g} to {param.high:g}")
 

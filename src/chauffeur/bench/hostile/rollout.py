@@ -15,7 +15,7 @@ from chauffeur.concept import ChauffeurError, Frame, LaneId, Limits, Plan, Progr
 from chauffeur.drive.episode import Episode
 from chauffeur.drive.session import declined, drive_program, drive_without_program
 from chauffeur.programs.sandbox import UNHURRIED, Sandbox
-from chauffeur.safety import run_checks
+from chauffeur.safety.checks import run_checks
 from chauffeur.safety.shield import Shield
 from chauffeur.worlds.highway import HighwayWorld
 

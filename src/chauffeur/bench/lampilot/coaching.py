@@ -49,7 +49,7 @@ from chauffeur.planners.base import Planner, Writer
 from chauffeur.planners.prompts import COACHED_PROMPT_VERSION, description_messages
 from chauffeur.planners.prompts.blocks import FEEDBACK_CHARS
 from chauffeur.programs.library import function_names, main_name, standalone
-from chauffeur.safety import run_checks
+from chauffeur.safety.checks import run_checks
 from chauffeur.worlds.highway.dblv1 import Dataset, Item
 
 COACHING_VERSION = "lampilot-coaching-v1"

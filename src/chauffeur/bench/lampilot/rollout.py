@@ -19,7 +19,7 @@ from chauffeur.drive.episode import Episode
 from chauffeur.drive.session import declined, drive_program, drive_without_program, unusable
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.library import standalone
-from chauffeur.safety import run_checks
+from chauffeur.safety.checks import run_checks
 from chauffeur.safety.shield import SHIELD_VERSION, Shield
 from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
 

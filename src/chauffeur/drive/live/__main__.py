@@ -1,4 +1,4 @@
-"""Entry of the processes: `python -m chauffeur.drive.live ROLE FOLDER`; the supervisor starts them.
+"""Entry of the processes: `python -m chauffeur.drive.live ROLE FOLDER [PARENT]`; the supervisor starts them.
 
 A `spare` is a policy process that has loaded everything and waits: on SIGUSR1 it takes the place of one that died.
 """
@@ -21,10 +21,13 @@ FIGURES_FILE = "punctuality.json"
 READY_SUFFIX = ".ready"
 
 
-def _told_to_end() -> Callable[[], bool]:
-    """Whether SIGTERM came, or the process that started this one is gone. Ctrl-C is the supervisor's to hear."""
+def _told_to_end(parent: int) -> Callable[[], bool]:
+    """Whether SIGTERM came, or the process that started this one is gone. Ctrl-C is the supervisor's to hear.
+
+    Args:
+        parent: Who started it, as that process said: it may be gone before this one can look.
+    """
     asked = False
-    parent = os.getppid()
 
     def ask(number: int, frame: object) -> None:
         nonlocal asked
@@ -135,18 +138,20 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     )
     if settings.planner.startswith("openai/"):
         importlib.import_module("openai")  # seconds on a busy machine: not at the first wish
+    for start in settings.starts:
+        world.reset(start.scenario, start.seed)
     _ready(folder, "planner")
     asyncio.run(planning.run(over))
 
 
-def main(role: str, folder: Path) -> None:
+def main(role: str, folder: Path, parent: int) -> None:
     """Be one of the processes of the drive in a folder."""
     logging.basicConfig(level=logging.WARNING)
-    over = _told_to_end()
+    over = _told_to_end(parent)
     {"control": _control, "policy": _policy, "spare": _spare, "planner": _planner}[role](
         folder, Settings.read(folder), over
     )
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], Path(sys.argv[2]))
+    main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else os.getppid())

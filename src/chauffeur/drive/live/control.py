@@ -172,8 +172,15 @@ class Control:
             outcome=outcome,
         )
         self._show()
-        self._rings.reports.write(report.encode())
+        self._report(report)
         return report
+
+    def _report(self, report: Report) -> None:
+        """Show the report; one that is too long for its place without its details."""
+        try:
+            self._rings.reports.write(report.encode())
+        except ValueError:
+            self._rings.reports.write(replace(report, interventions=(), refused={}).encode())
 
     def _hear(self) -> float:
         """Take in the policy's newest wish, if it is one; returns the age of what is followed, in vehicle time."""

@@ -204,9 +204,14 @@ def _count(fields: dict[str, Any], name: str) -> int:
 
 def _number(fields: dict[str, Any], name: str, least: float, most: float) -> float:
     value = fields.get(name)
-    if type(value) not in (int, float) or not math.isfinite(cast("float", value)):
+    if type(value) not in (int, float):
         raise MessageError(f"bad {name}")
-    number = float(cast("float", value))
+    try:
+        number = float(cast("float", value))
+    except OverflowError as error:  # JSON knows no largest integer
+        raise MessageError(f"{name} out of range") from error
+    if not math.isfinite(number):
+        raise MessageError(f"bad {name}")
     if not least <= number <= most:
         raise MessageError(f"{name} out of range")
     return number

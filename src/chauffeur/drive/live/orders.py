@@ -23,6 +23,12 @@ FINAL: Final[frozenset[EventKind]] = frozenset(
 """Events after which nothing more becomes of a wish."""
 
 
+START_WITHIN_S: Final = 10.0
+"""Vehicle time from the instant a plan was made for to its start."""
+MOST_SAID: Final = 2000
+"""Characters of an event's text: in JSON at most 6 bytes each, so that any event fits into its ring."""
+
+
 @dataclass(frozen=True, slots=True)
 class Request:
     """A wish, to the planner.
@@ -91,6 +97,7 @@ class Event:
         wish: Id, empty where it is about none.
         text: In words, for the person.
         trip, tick: When.
+        again: Whether asking once more may help.
     """
 
     kind: EventKind
@@ -98,6 +105,7 @@ class Event:
     text: str = ""
     trip: int = 0
     tick: int = 0
+    again: bool = True
 
 
 _T = TypeVar("_T")

@@ -16,16 +16,24 @@ from chauffeur.concept import ChauffeurError, PersonId, Plan, PlanRequest
 from chauffeur.describe import describe
 from chauffeur.drive.live.messages import MessageError
 from chauffeur.drive.live.mirror import Mirror
-from chauffeur.drive.live.orders import Event, EventKind, Order, Request, Scene, encode, read_request
-from chauffeur.drive.live.ring import Ring
+from chauffeur.drive.live.orders import (
+    MOST_SAID,
+    START_WITHIN_S,
+    Event,
+    EventKind,
+    Order,
+    Request,
+    Scene,
+    encode,
+    read_request,
+)
+from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.loop import Memory
 from chauffeur.drive.session import parse_wish
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.safety.screening import screen_request
 
-START_WITHIN_S: Final = 10.0
-"""Vehicle time from the instant a plan was made for to its start."""
 FOLLOW_FOR_S: Final = 600.0
 """Vehicle time for which a plan may be followed."""
 PLAN_WITHIN_S: Final = 60.0
@@ -60,7 +68,7 @@ class Planning:
         self._mirror, self._rings, self._planner, self._memory = mirror, rings, planner, memory
         self._setting: Setting = setting
         self._speed, self._clock_ns = speed, clock_ns
-        self._asked = rings.requests.head
+        self._asked = Reader(rings.requests)
         self._at_work: asyncio.Task[None] | None = None
         self._request: Request | None = None
 
@@ -73,8 +81,7 @@ class Planning:
 
     async def look(self) -> None:
         """Take up the newest wish, if there is a new one; whatever was worked on is given up."""
-        messages, _ = self._rings.requests.since(self._asked)
-        self._asked = max(self._asked, self._rings.requests.head)
+        messages, _ = self._asked.news()
         requests: list[Request] = []
         for message in messages:
             try:
@@ -111,7 +118,7 @@ class Planning:
             self._tell("unplanned", request.wish, f"No plan within {PLAN_WITHIN_S:.0f} s.")
             return
         except ChauffeurError as error:
-            self._tell("unplanned", request.wish, str(error))
+            self._tell("unplanned", request.wish, str(error), again=error.retryable)
             return
         except Exception as error:  # noqa: BLE001 - a planner may be anybody's code; the wish is answered all the same
             self._tell("unplanned", request.wish, f"The planner failed: {type(error).__name__}: {error}")
@@ -122,13 +129,13 @@ class Planning:
         try:
             self._rings.orders.write(encode(order))
         except ValueError as error:
-            self._tell("unplanned", request.wish, str(error))
+            self._tell("unplanned", request.wish, str(error), again=False)
             return
         self._tell("planned", request.wish, order.plan.thoughts.text)
 
     async def _plan(self, request: Request) -> Order:
+        issued_ns = self._clock_ns()  # before the look: what is seen may already be old when it has been taken in
         self._mirror.follow()
-        issued_ns = self._clock_ns()
         snapshot, limits = self._mirror.world.snapshot(), self._mirror.limits
         scene = Scene.of(self._mirror.trip, snapshot)
         instruction = parse_wish(request.text, PersonId(request.person))
@@ -146,5 +153,6 @@ class Planning:
             expires_ns=issued_ns + round(FOLLOW_FOR_S / self._speed * 1e9),
         )
 
-    def _tell(self, kind: EventKind, wish: str, text: str) -> None:
-        self._rings.events.write(encode(Event(kind, wish, text[:2000], self._mirror.trip, self._mirror.tick)))
+    def _tell(self, kind: EventKind, wish: str, text: str, *, again: bool = True) -> None:
+        event = Event(kind, wish, text[:MOST_SAID], self._mirror.trip, self._mirror.tick, again)
+        self._rings.events.write(encode(event))

@@ -21,10 +21,11 @@ from typing import Final
 from chauffeur.concept import Program, ProgramState, SandboxError, Wishes
 from chauffeur.drive.live.messages import MessageError, Wish
 from chauffeur.drive.live.mirror import Mirror
-from chauffeur.drive.live.orders import Event, EventKind, Order, Scene, encode, read_order
-from chauffeur.drive.live.ring import Ring
+from chauffeur.drive.live.orders import MOST_SAID, START_WITHIN_S, Event, EventKind, Order, Scene, encode, read_order
+from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.programs import Budget, ProgramExecutor, Sandbox, starting_wishes
-from chauffeur.safety import DRIVE_CHECKS, Check, run_checks
+from chauffeur.safety.base import Check
+from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
 
 LIVE_BUDGET: Final = Budget(turn_s=0.1, tick_s=0.2, grace_s=0.05, start_s=1.0)
 """Wider than a control period: a policy that is late once is what the ladder's first rungs are for."""
@@ -70,7 +71,7 @@ class Policy:
     ) -> None:
         self._mirror, self._rings, self._sandbox = mirror, rings, sandbox
         self._checks, self._clock_ns = checks, clock_ns
-        self._ordered = rings.orders.head
+        self._orders = Reader(rings.orders)
         self._trip = 0
         self._driven: _Driven | None = None
         self._wishes: Wishes | None = None
@@ -127,8 +128,7 @@ class Policy:
     # Orders -----------------------------------------------------------------------------------------------------------
 
     def _take_orders(self) -> None:
-        messages, _ = self._rings.orders.since(self._ordered)
-        self._ordered = max(self._ordered, self._rings.orders.head)
+        messages, _ = self._orders.news()
         orders: list[Order] = []
         for message in messages:
             try:
@@ -152,7 +152,7 @@ class Policy:
             self._tell("refused", order.wish, plan.refusal or "The plan is no program.")
             return
         verdicts = run_checks(plan, snapshot, self._mirror.limits, self._checks)
-        failed = [verdict.reason for verdict in verdicts if not verdict.passed]
+        failed = [verdict.reason for verdict in verdicts if verdict.stops]
         if failed:
             self._tell("refused", order.wish, " ".join(failed))
             return
@@ -175,6 +175,8 @@ class Policy:
             return "The plan was made for another trip."
         if self._clock_ns() > min(order.start_by_ns, order.expires_ns):
             return "The plan came too late."
+        if (now.tick - scene.tick) * self._mirror.world.dt_s > START_WITHIN_S:
+            return "The plan was made for an instant that is long gone."
         if scene.lane != now.lane:
             return "The car is in another lane than the plan was made for."
         if scene.lead != now.lead:
@@ -217,11 +219,14 @@ class Policy:
         message = self._rings.checkpoints.latest()
         if message is None:
             return
-        length = _HEAD.unpack_from(message.payload)[0]
-        head = json.loads(message.payload[_HEAD.size : _HEAD.size + length])
-        if head["trip"] != self._trip or self._clock_ns() > head["expires_ns"] or self._ended_since(head["wish"]):
+        try:
+            length = _HEAD.unpack_from(message.payload)[0]
+            head = json.loads(message.payload[_HEAD.size : _HEAD.size + length])
+            if head["trip"] != self._trip or self._clock_ns() > head["expires_ns"] or self._ended_since(head["wish"]):
+                return
+            resumed = head["resumed"] + 1
+        except (struct.error, ValueError, KeyError, TypeError):  # it must not keep every later process from starting
             return
-        resumed = head["resumed"] + 1
         if resumed > MOST_RESUMPTIONS:
             self._tell("interrupted", head["wish"], "The program was running whenever its process died.")
             return
@@ -247,7 +252,7 @@ class Policy:
         return last.plan != wish or last.state != "running"
 
     def _tell(self, kind: EventKind, wish: str, text: str) -> None:
-        self._rings.events.write(encode(Event(kind, wish, text[:2000], self._trip, self._mirror.tick)))
+        self._rings.events.write(encode(Event(kind, wish, text[:MOST_SAID], self._trip, self._mirror.tick)))
 
 
 _ENDS: Final[dict[ProgramState, EventKind]] = {"finished": "finished", "failed": "failed"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import gc
 import os
@@ -9,6 +10,7 @@ import time
 from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
@@ -59,11 +61,17 @@ def become_realtime(wanted: bool = True) -> Realtime:
 
 
 def become_favoured(niceness: int = POLICY_NICENESS) -> bool:
-    """Ask for a larger share of the core; whether it was given."""
+    """Ask for a larger share of the core; whether it was given.
+
+    Linux shares cores between sessions first (sched(7), autogroups), so a process that leads one asks for both.
+    """
     try:
         os.setpriority(os.PRIO_PROCESS, 0, niceness)
     except OSError:
         return False
+    if os.getsid(0) == os.getpid():
+        with contextlib.suppress(OSError):  # a kernel without autogroups
+            Path("/proc/self/autogroup").write_text(str(niceness))
     return True
 
 

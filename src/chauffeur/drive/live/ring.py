@@ -29,6 +29,8 @@ _SLOT = struct.Struct("<QqII")
 _TRIES: Final = 3
 _MOST: Final = 1 << 62
 """A larger number was never counted up to: somebody scribbled there."""
+_AHEAD_NS: Final = 1_000_000_000
+"""A message from further in the future was not written by anybody who can be believed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +104,15 @@ class Ring:
         for at in range(0, len(self._map), mmap.PAGESIZE):
             self._map[at]  # pyright: ignore[reportUnusedExpression] - the read is the point
 
+    def renew(self) -> None:
+        """Write what marks the file as a ring once more: whoever opens it next may rely on it."""
+        _HEADER.pack_into(self._map, 0, _MAGIC, self._slots, self._size)
+
+    @property
+    def slots(self) -> int:
+        """Messages kept."""
+        return self._slots
+
     @property
     def head(self) -> int:
         """Number of the newest message, 0 for none."""
@@ -146,6 +157,19 @@ class Ring:
         found = tuple(message for k in range(first, head + 1) if (message := self._read(k)) is not None)
         return found, head - number - len(found)
 
+    def newer(self, than_ns: int, until_ns: int) -> tuple[Message, ...]:
+        """Whole messages written in a time, oldest first. It goes back from the newest one until one is older."""
+        head = self.head
+        found: list[Message] = []
+        for number in range(head, max(0, head - self._slots), -1):
+            message = self._read(number)
+            if message is None or message.written_ns >= until_ns:
+                continue
+            if message.written_ns <= than_ns or (found and message.written_ns > found[-1].written_ns):
+                break
+            found.append(message)
+        return tuple(reversed(found))
+
     def _at(self, number: int) -> int:
         return _SLOTS_AT + number % self._slots * self._stride
 
@@ -159,3 +183,32 @@ class Ring:
         if zlib.crc32(payload, zlib.crc32(head)) != checksum:
             return None
         return Message(number, written_ns, payload)
+
+
+class Reader:
+    """Reads what is new in a ring.
+
+    It goes by the times at which messages were written, not by their numbers alone: numbers that were scribbled over,
+    or that a new writer counts anew, neither make it deaf nor have it hear old messages again.
+    """
+
+    def __init__(self, ring: Ring, *, old: bool = False) -> None:
+        """Read from now on.
+
+        Args:
+            ring: What to read.
+            old: Whether to begin with what is there already.
+        """
+        self._ring = ring
+        self._number = 0 if old else ring.head
+        self._written_ns = 0 if old else time.monotonic_ns()
+
+    def news(self) -> tuple[tuple[Message, ...], int]:
+        """Whole messages since the last call, oldest first, and how many are known to be lost."""
+        found = self._ring.newer(self._written_ns, time.monotonic_ns() + _AHEAD_NS)
+        if not found:
+            return (), 0
+        newest = found[-1]
+        lost = max(0, newest.number - self._number - len(found))
+        self._number, self._written_ns = newest.number, newest.written_ns
+        return found, lost

@@ -18,12 +18,12 @@ RingName = Literal[
 ]
 SIZES: Final[dict[RingName, tuple[int, int]]] = {
     "observations": (4, 64 << 10),
-    "reports": (512, 4 << 10),
+    "reports": (512, 16 << 10),
     "wishes": (8, 2 << 10),
     "orders": (8, 256 << 10),
     "requests": (16, 16 << 10),
-    "policy_events": (256, 4 << 10),
-    "planner_events": (256, 4 << 10),
+    "policy_events": (256, 16 << 10),
+    "planner_events": (256, 16 << 10),
     "checkpoints": (2, 1 << 20),
 }
 """Messages kept, and most bytes of one."""

@@ -7,6 +7,7 @@ times and then given up on in words.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -25,22 +26,31 @@ from chauffeur.concept import NOBODY, SandboxError
 from chauffeur.drive.live.__main__ import FIGURES_FILE, READY_SUFFIX
 from chauffeur.drive.live.messages import MessageError, Report, Wish
 from chauffeur.drive.live.orders import FINAL, Event, EventKind, Request, encode, read_event
+from chauffeur.drive.live.ring import Reader
 from chauffeur.drive.live.settings import SIZES, RingName, Settings, ring
 
-Role = Literal["control", "policy", "planner"]
-ROLES: Final[tuple[Role, ...]] = ("control", "policy", "planner")
+Role = Literal["control", "policy", "spare", "planner"]
+"""`spare`: a policy process that waits to take over."""
 
 MOST_TURNS: Final = 3
 SILENT_S: Final = 1.0
 """A policy that has wished nothing for so long hangs, and is replaced."""
 PLANNER_SILENT_S: Final = 70.0
 """So long after a wish was sent, a planner that has said nothing hangs: its own patience ends before."""
+UNHEARD_S: Final = 10.0
+"""A planner that has not taken a wish up so long after it was sent did not hear it, or hangs."""
 UNSTARTED_S: Final = 5.0
 """A plan that was sent and is not heard of again so long after is lost."""
-READY_WITHIN_S: Final = 60.0
+READY_WITHIN_S: Final = 120.0
 FIRST_PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 5.0
+SPARE_PAUSE_S: Final = 1.0
+"""A new spare is started so long after one was called: the one that took over comes first."""
 STOP_WITHIN_S: Final = 30.0
+FOLDER_PREFIX: Final = "chauffeur-"
+OWNER_FILE: Final = "supervisor"
+LEFT_FOR_S: Final = 120.0
+"""A folder whose supervisor is gone, and which nobody has written to for so long, is removed."""
 
 _HEARD: Final[tuple[RingName, ...]] = ("reports", "policy_events", "planner_events")
 
@@ -100,13 +110,10 @@ class Runtime:
         self._settings = settings
         self._tell: Listener = tell or (lambda heard: None)  # noqa: ARG005
         self._own = folder is None
-        memory = Path("/dev/shm")  # noqa: S108 - a new folder in it, of this user alone
-        self.folder = folder or Path(
-            tempfile.mkdtemp(prefix="chauffeur-", dir=memory if os.access(memory, os.W_OK) else None)
-        )
+        self.folder = _new_folder() if folder is None else folder
         settings.write(self.folder)
         self._rings = {name: ring(self.folder, name, create=True) for name in SIZES}
-        self._heard: dict[RingName, int] = dict.fromkeys(_HEARD, 0)
+        self._heard = {name: Reader(self._rings[name], old=True) for name in _HEARD}
         self.interactions: dict[str, Interaction] = {}
         self.report: Report | None = None
         self.lost_reports = 0
@@ -133,13 +140,20 @@ class Runtime:
 
     def ask(self, text: str, person: str = NOBODY) -> str:
         """Hand a wish to the planner; returns its id. What becomes of it is told by events."""
-        wish = f"w{len(self.interactions) + 1}"
+        wish = self.next_wish
         self.interactions[wish] = Interaction(Request(wish, text, person), since_s=time.monotonic())
         self._send(self.interactions[wish])
         return wish
 
+    @property
+    def next_wish(self) -> str:
+        """Id that the next wish will get."""
+        return f"w{len(self.interactions) + 1}"
+
     def poll(self) -> None:
         """Hear what came, see who lives."""
+        for each in self._rings.values():
+            each.renew()
         self._hear_reports()
         self._hear_events("planner_events")
         self._hear_events("policy_events")
@@ -166,6 +180,20 @@ class Runtime:
         path = self.folder / FIGURES_FILE
         return json.loads(path.read_text()) if path.exists() else None
 
+    def halt(self) -> None:
+        """Have the car brought to a stand, without waiting for it: poll until it is no longer `driving`."""
+        control = self._children["control"].process
+        if control.poll() is None:
+            control.terminate()
+
+    def abort(self) -> None:
+        """End every process at once, wherever the car is."""
+        self._stopping = True
+        for child in self._children.values():
+            if child.process.poll() is None:
+                child.process.kill()
+                child.process.wait()
+
     def stop(self) -> None:
         """Bring the car to a stand and end; returns when control has ended."""
         self._stopping = True
@@ -180,9 +208,10 @@ class Runtime:
         for child in self._children.values():
             if child.role != "control":
                 _end(child.process)
-        self._hear_reports()
-        self._hear_events("planner_events")
-        self._hear_events("policy_events")
+        if self._rings:
+            self._hear_reports()
+            self._hear_events("planner_events")
+            self._hear_events("policy_events")
         for interaction in self.open_wishes:
             self._close(interaction, Event("interrupted", interaction.request.wish, "The drive is over."))
 
@@ -211,6 +240,7 @@ class Runtime:
                             f"The {role} process could not be started.", hint=self._last_words(role) or "Try again."
                         )
                 time.sleep(0.01)
+        self._start("spare")
         self._wish_at_s = time.monotonic()
 
     def _ready_file(self, role: Role) -> Path:
@@ -220,10 +250,11 @@ class Runtime:
         self._ready_file(role).unlink(missing_ok=True)
         with (self.folder / f"{role}.log").open("ab") as log:
             process = subprocess.Popen(  # noqa: S603 - this package's own processes
-                [sys.executable, "-m", "chauffeur.drive.live", role, str(self.folder)],
+                [sys.executable, "-m", "chauffeur.drive.live", role, str(self.folder), str(os.getpid())],
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
+                start_new_session=True,  # a share of the cores of its own; and Ctrl-C is this process's to hear
             )
         before = self._children.get(role)
         starts = 1 if before is None else before.starts + 1
@@ -244,22 +275,35 @@ class Runtime:
             policy.process.kill()
             policy.process.wait()
             self._replace(policy, "It hung.", now_s)
-        helpers: tuple[Role, ...] = ("policy", "planner")
+        helpers: tuple[Role, ...] = ("policy", "planner", "spare")
         for role in helpers:
             child = self._children[role]
             if child.restart_at_s is not None:
-                if now_s >= child.restart_at_s:
+                if now_s >= child.restart_at_s and not (role == "policy" and self._spare_takes_over(now_s)):
                     self._start(role)
             elif (code := child.process.poll()) is not None:
                 self._replace(child, f"It ended with code {code}.", now_s)
 
+    def _spare_takes_over(self, now_s: float) -> bool:
+        """Call the policy process that waits; False if none is ready."""
+        spare = self._children["spare"]
+        if spare.restart_at_s is not None or not self._ready_file("spare").exists() or spare.process.poll() is not None:
+            return False
+        spare.process.send_signal(signal.SIGUSR1)
+        starts = self._children["policy"].starts + 1
+        self._children["policy"] = _Child("policy", spare.process, now_s, starts)
+        self._ready_file("policy").touch()
+        self._ready_file("spare").unlink(missing_ok=True)
+        spare.restart_at_s = now_s + SPARE_PAUSE_S
+        return True
+
     def _replace(self, child: _Child, why: str, now_s: float) -> None:
         """Start anew: at once if it lived a while, later and later if it dies again and again."""
-        lived_s = now_s - child.started_s
-        pause_s = (
-            0.0 if lived_s > LONGEST_PAUSE_S else min(LONGEST_PAUSE_S, FIRST_PAUSE_S * 2.0 ** min(child.starts, 8))
-        )
+        again = now_s - child.started_s <= LONGEST_PAUSE_S
+        pause_s = min(LONGEST_PAUSE_S, FIRST_PAUSE_S * 2.0 ** min(child.starts, 8)) if again else 0.0
         child.restart_at_s = now_s + pause_s
+        if child.role == "spare":
+            return
         said = Replaced(child.role, why)
         self.replaced.append(said)
         self._tell(said)
@@ -297,13 +341,25 @@ class Runtime:
             waited_s = now_s - interaction.since_s
             if not self.driving:
                 self._close(interaction, Event("interrupted", interaction.request.wish, "The drive is over."))
-            elif interaction.stage == "asked" and waited_s > PLANNER_SILENT_S:
-                if self._children["planner"].restart_at_s is None and self._ready_file("planner").exists():
-                    self._again(interaction, "unplanned", "The planner does not answer.")
+            elif interaction.stage == "asked" and waited_s > self._patience_s(interaction):
+                planner = self._children["planner"]
+                if planner.restart_at_s is None and self._ready_file("planner").exists():
+                    if interaction.request.turn > 1 and interaction.since_s > planner.started_s:  # asked anew in vain
+                        planner.process.kill()
+                        planner.process.wait()
+                        self._replace(planner, "It hung.", now_s)
+                    else:
+                        self._again(interaction, "unplanned", "The planner does not answer.")
             elif interaction.stage == "planned" and waited_s > UNSTARTED_S:
                 self._again(interaction, "failed", "The plan was lost on its way to the policy.")
             elif interaction.stage == "driven":
                 self._settle_doubt(interaction)
+
+    @staticmethod
+    def _patience_s(interaction: Interaction) -> float:
+        """How long a planner may be silent: it takes a wish up at once, and may then think."""
+        taken_up = sum(event.kind == "planning" for event in interaction.events) >= interaction.request.turn
+        return PLANNER_SILENT_S if taken_up else UNHEARD_S
 
     def _settle_doubt(self, interaction: Interaction) -> None:
         """After the policy was replaced: either it goes on with the wish, or the wish ended with it."""
@@ -331,16 +387,14 @@ class Runtime:
     # Hearing ----------------------------------------------------------------------------------------------------------
 
     def _hear_reports(self) -> None:
-        messages, lost = self._rings["reports"].since(self._heard["reports"])
-        self._heard["reports"] = max(self._heard["reports"], self._rings["reports"].head)
+        messages, lost = self._heard["reports"].news()
         self.lost_reports += lost
         for message in messages:
             self.report = Report.decode(message.payload)
             self._tell(self.report)
 
     def _hear_events(self, name: Literal["policy_events", "planner_events"]) -> None:
-        messages, _ = self._rings[name].since(self._heard[name])
-        self._heard[name] = self._rings[name].head
+        messages, _ = self._heard[name].news()
         for message in messages:
             try:
                 event = read_event(message.payload)
@@ -355,6 +409,9 @@ class Runtime:
                 self._tell(event)
             return
         if event.kind == "stale" or (event.kind == "unplanned" and sent_by == "planner"):
+            if not event.again:
+                self._close(interaction, event)
+                return
             interaction.events.append(event)
             self._tell(event)
             self._again(interaction, event.kind, event.text)
@@ -368,6 +425,21 @@ class Runtime:
             interaction.since_s = time.monotonic()
             interaction.events.append(event)
             self._tell(event)
+
+
+def _new_folder() -> Path:
+    """A folder for shared memory, in memory where there is any; what killed supervisors left there is removed."""
+    memory = Path("/dev/shm")  # noqa: S108 - a new folder in it, of this user alone
+    place = memory if os.access(memory, os.W_OK) else Path(tempfile.gettempdir())
+    for left in place.glob(f"{FOLDER_PREFIX}*"):
+        with contextlib.suppress(OSError, ValueError):  # not of this user, or just being made or removed
+            owner = int((left / OWNER_FILE).read_text())
+            idle_s = time.time() - max(file.stat().st_mtime for file in left.iterdir())
+            if not Path(f"/proc/{owner}").exists() and idle_s > LEFT_FOR_S:
+                shutil.rmtree(left)
+    folder = Path(tempfile.mkdtemp(prefix=FOLDER_PREFIX, dir=place))
+    (folder / OWNER_FILE).write_text(str(os.getpid()))
+    return folder
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

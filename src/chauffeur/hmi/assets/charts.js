@@ -19,11 +19,16 @@ function niceTicks(low, high, wanted) {
 }
 
 /* `series` is [{name, className, values, broken}]: a line breaks where `broken` changes value. `right` labels the same ticks in another unit. */
-function makeChart({ element, legend, series, low, high, unit, right, total, onSeek, timeAxis }) {
+function makeChart({ element, legend, series, low, high, unit, right, total, onSeek, timeAxis, bands = [] }) {
   legend.append(make('span', unit, 'unit'));
   for (const item of series) {
     const part = make('span');
     part.append(make('i', null, item.className), make('span', item.name));
+    legend.append(part);
+  }
+  if (bands.length) {
+    const part = make('span');
+    part.append(make('i', null, 'c-shield'), make('span', 'Shield acts'));
     legend.append(part);
   }
   if (right) legend.append(make('span', right.unit, 'unit right'));
@@ -60,6 +65,10 @@ function makeChart({ element, legend, series, low, high, unit, right, total, onS
     place = { left: gutter, width: width - 2 * gutter, x: (t) => gutter + (t / total) * (width - 2 * gutter), y: (v) => height - bottom - ((v - low) / (high - low)) * (height - bottom - 10) };
     element.setAttribute('viewBox', `0 0 ${width} ${height}`);
     element.replaceChildren();
+    for (const band of bands) {
+      const from = place.x(band.t);
+      element.append(svg('rect', { class: 'c-shield', x: from, y: 4, width: Math.max(place.x(Math.min(band.end, total)) - from, 2), height: height - bottom - 4 }));
+    }
     for (const tick of niceTicks(low, high, height > 110 ? 4 : 3)) {
       const y = place.y(tick);
       element.append(svg('line', { class: 'grid', x1: gutter, x2: width - gutter, y1: y, y2: y }));
@@ -101,6 +110,7 @@ function makeCharts(total, onSeek) {
     element: $('speed-chart'), legend: $('speed-legend'), unit: 'm/s', total, onSeek, timeAxis: !gaps.length,
     right: { unit: 'km/h', of: (v) => (v * 3.6).toFixed(0) },
     low, high: Math.ceil(top + Math.max(1, top * 0.04)),
+    bands: trip.shield ? trip.shield.stretches : [],
     series: [
       { name: 'Speed', className: 'c-speed', values: drive.speed },
       { name: 'Target speed', className: 'c-target', values: drive.target },

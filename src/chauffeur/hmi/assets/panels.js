@@ -43,7 +43,8 @@ function fillProgram() {
     return [];
   }
   const list = make('ol');
-  const flagged = new Map(trip.verdicts.filter((v) => !v.passed && v.line).map((v) => [v.line, v.reason]));
+  const flagged = new Map(trip.verdicts.filter((v) => !v.passed && v.vetoes && v.line).map((v) => [v.line, v.reason]));
+  const doubted = new Map(trip.mismatches.filter((m) => m.line).map((m) => [m.line, mismatchWords(m)]));
   trip.program.forEach((tokens, index) => {
     const line = make('li');
     line.dataset.n = index + 1;
@@ -57,6 +58,9 @@ function fillProgram() {
     if (flagged.has(index + 1)) {
       line.classList.add('flagged');
       line.title = flagged.get(index + 1);
+    } else if (doubted.has(index + 1)) {
+      line.classList.add('doubted');
+      line.title = doubted.get(index + 1);
     }
     list.append(line);
   });
@@ -67,13 +71,15 @@ function fillProgram() {
 function fillVerdicts() {
   if (!trip.verdicts.length) $('verdicts').append(make('li', 'No check was run.', 'none'));
   for (const verdict of trip.verdicts) {
-    const item = make('li', null, verdict.passed ? 'pass' : 'fail');
-    const icon = make('b', verdict.passed ? '✓' : '✕');
-    icon.setAttribute('aria-label', verdict.passed ? 'passed' : 'not passed');
+    const look = verdict.passed ? ['pass', '✓', 'passed'] : verdict.vetoes ? ['fail', '✕', 'not passed'] : ['doubt', '≠', 'does not fit'];
+    const item = make('li', null, look[0]);
+    const icon = make('b', look[1]);
+    icon.setAttribute('aria-label', look[2]);
     icon.setAttribute('role', 'img');
     const where = verdict.line ? `${verdict.check}, line ${verdict.line}` : verdict.check;
     item.append(icon, make('span', verdict.reason || (verdict.passed ? 'Passed.' : 'Not passed.')));
-    if (verdict.remedy && !verdict.passed) item.append(make('span', verdict.remedy));
+    if (verdict.remedy && !verdict.passed && verdict.vetoes) item.append(make('span', verdict.remedy));
+    if (!verdict.passed && !verdict.vetoes) item.append(make('span', 'This informs; it stops nothing. The thoughts show where.'));
     item.append(make('small', where));
     $('verdicts').append(item);
   }
@@ -89,10 +95,64 @@ function fillResults() {
     const dd = pair(scores, metric.name, metric.value, metric.id);
     if (!metric.applies) dd.className = 'na';
   }
-  $('thoughts').textContent = trip.thoughts || 'The planner gave no reasoning.';
+  fillThoughts();
   $('context').textContent = trip.context || 'No context was recorded.';
   for (const [name, value] of trip.provenance) pair($('provenance'), name, value);
 }
+
+const mismatchWords = (m) => `${m.kind}: ${m.instead}${m.line ? ` (line ${m.line})` : ''}`;
+
+/* The thoughts with every sentence marked that is not so, and below them what is so instead. */
+function fillThoughts() {
+  const box = $('thoughts');
+  const text = trip.thoughts || 'The planner gave no reasoning.';
+  const wrong = new Map();
+  for (const m of trip.mismatches) {
+    const from = m.said ? text.indexOf(m.said) : -1;
+    if (from >= 0) wrong.set(from, m.said.length);
+  }
+  let end = 0;
+  for (const [from, length] of [...wrong].sort((a, b) => a[0] - b[0])) {
+    if (from < end) continue;
+    box.append(text.slice(end, from), make('mark', text.slice(from, from + length)));
+    end = from + length;
+  }
+  box.append(text.slice(end));
+  for (const m of trip.mismatches) {
+    const item = make('li');
+    item.append(make('b', m.kind));
+    if (m.said) item.append(make('q', m.said));
+    const but = m.said ? 'but ' : 'not mentioned: ';
+    item.append(make('span', `${but}${m.instead}${m.line ? ` (line ${m.line})` : ''}.`));
+    $('doubts').append(item);
+  }
+  $('doubts').hidden = !trip.mismatches.length;
+}
+
+/* What the run-time shield changed; each stretch leads to its instant. */
+function fillShield(seek) {
+  if (!trip.shield) return;
+  $('shield').hidden = false;
+  $('shield-summary').textContent = trip.shield.summary;
+  for (const rule of trip.shield.rules) {
+    const many = (count, one, more) => (count === 1 ? `1 ${one}` : `${count} ${more}`);
+    const commands = many(rule.changes, 'command', 'commands');
+    pair($('shield-rules'), rule.name, `${commands} in ${many(rule.stretches, 'stretch', 'stretches')}`);
+  }
+  for (const stretch of trip.shield.stretches) {
+    const item = make('li');
+    const at = make('button', `${stretch.t.toFixed(1)} s`);
+    at.type = 'button';
+    at.setAttribute('aria-label', `Show ${stretch.t.toFixed(1)} seconds: ${stretch.name}`);
+    at.addEventListener('click', () => seek(stretch.t));
+    const what = make('span');
+    what.append(make('b', stretch.name), ` ${stretch.change} `, make('small', `for ${(stretch.end - stretch.t).toFixed(1)} s. ${stretch.reason}`));
+    item.append(at, what);
+    $('stretches').append(item);
+  }
+}
+
+const shieldAt = (time) => (trip.shield ? trip.shield.stretches.filter((s) => s.t <= time + 1e-6 && time < s.end - 1e-6) : []);
 
 function fillHistory() {
   if (!trip.history.length) $('history').append(make('li', 'Nothing was recalled for this wish.', 'none'));
@@ -130,7 +190,10 @@ function makeInstruments() {
   return (index, mps) => {
     put(speed, mps);
     const a = drive.acceleration[index];
-    speed.sub.textContent = `${a > 0 ? '+' : a < 0 ? '−' : ''}${Math.abs(a).toFixed(1)} m/s²`;
+    const signed = (value) => `${value > 0 ? '+' : value < 0 ? '−' : ''}${Math.abs(value).toFixed(1)}`;
+    const asked = drive.asked[index];
+    const held = shieldAt(drive.time[index]).length && Math.abs(asked - a) >= 0.05;
+    speed.sub.textContent = held ? `${signed(a)} m/s², asked ${signed(asked)}` : `${signed(a)} m/s²`;
     const wanted = drive.target[index];
     if (wanted === null) target.value.textContent = 'as it is';
     else put(target, wanted);

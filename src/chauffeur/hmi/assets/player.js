@@ -1,5 +1,5 @@
 /* Time: playing, scrubbing, marks, and bringing every part to the same instant. */
-const GLYPHS = { said: '“', lane_change: '⇄', stopped: '■', finished: '✓', failed: '✕', collision: '✸', off_road: '⚠' };
+const GLYPHS = { said: '“', lane_change: '⇄', stopped: '■', finished: '✓', failed: '✕', collision: '✸', off_road: '⚠', shield: 'S' };
 const RATES = [0.5, 1, 2, 4, 8];
 const STATES = { none: '', running: 'running', finished: 'finished', failed: 'failed' };
 const CAPTION_S = 3;
@@ -117,22 +117,34 @@ function makePlayer() {
     const box = $('marks');
     box.replaceChildren();
     const width = box.clientWidth;
-    const ends = [-Infinity, -Infinity];
-    let high = false;
-    for (const event of trip.events) {
+    const taken = [[], []];
+    const placed = [];
+    const fits = (row, x) => taken[row].every((other) => Math.abs(other - x) >= 26);
+    // The shield's marks come last: where others crowd, the spans and the list still hold all that it changed.
+    const ofShield = (event) => event.kind === 'shield';
+    for (const event of [...trip.events.filter((e) => !ofShield(e)), ...trip.events.filter(ofShield)]) {
       const x = (event.t / total) * width;
-      const row = x - ends[0] >= 26 ? 0 : 1;
-      ends[row] = x;
-      high ||= row === 1;
+      const row = fits(0, x) ? 0 : 1;
+      if (row && ofShield(event) && !fits(1, x)) continue;
+      taken[row].push(x);
       const mark = make('button', GLYPHS[event.kind], `mark ${event.kind}${row ? ' high' : ''}`);
       mark.type = 'button';
       mark.style.left = `${x}px`;
       mark.title = `${event.t.toFixed(1)} s: ${event.label}`;
       mark.setAttribute('aria-label', mark.title);
       mark.addEventListener('click', () => { pause(); seek(event.t); });
-      box.append(mark);
+      placed.push([event.t, mark]);
     }
+    box.append(...placed.sort((a, b) => a[0] - b[0]).map(([, mark]) => mark));
+    const high = taken[1].length > 0;
     box.classList.toggle('two', high);
+    $('spans').hidden = !trip.shield;
+    $('spans').replaceChildren(...(trip.shield ? trip.shield.stretches : []).map((stretch) => {
+      const span = make('i');
+      span.style.left = `${(stretch.t / total) * width}px`;
+      span.style.width = `${Math.max(((stretch.end - stretch.t) / total) * width, 3)}px`;
+      return span;
+    }));
   }
 
   function resize() {
@@ -166,6 +178,7 @@ function makePlayer() {
     action();
   });
 
+  fillShield((at) => { pause(); seek(at); });
   new ResizeObserver(resize).observe(document.querySelector('.frame'));
   window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', resize);
   resize();

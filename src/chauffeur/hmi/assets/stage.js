@@ -18,7 +18,7 @@ function makeStage() {
 
   function resize() {
     const names = ['ground', 'ground-ink', 'verge', 'asphalt', 'asphalt-edge', 'mark', 'centre', 'hatch', 'car', 'car-edge',
-      'ego-fill', 'ego-edge', 'label-back', 'label-ink', 'bad', 'sans'];
+      'ego-fill', 'ego-edge', 'label-back', 'label-ink', 'bad', 'ring', 'sans'];
     colour = Object.fromEntries(names.map((name) => [name, css(`--${name}`)]));
     view.width = canvas.parentElement.clientWidth;
     if (camera.along) {
@@ -246,6 +246,24 @@ function makeStage() {
     };
   }
 
+  /* While the shield acts: a ring around the ego, and which rule, in words. */
+  function drawShield(now, ego) {
+    if (!now.length) return;
+    const l = (drive.ego.l + 2.4) * view.scale;
+    const w = (drive.ego.w + 1.6) * view.scale;
+    ctx.save();
+    ctx.translate(sx(ego.x), sy(ego.y));
+    ctx.rotate(ego.h);
+    ctx.beginPath();
+    ctx.roundRect(-l / 2, -w / 2, l, w, w * 0.35);
+    ctx.strokeStyle = colour.ring;
+    ctx.lineWidth = Math.max(2.5, 0.3 * view.scale);
+    ctx.stroke();
+    ctx.restore();
+    const names = [...new Set(now.map((s) => s.name))].join(', ');
+    label(`Shield: ${names}`, view.width, camera.along ? 22 : view.height - 18);
+  }
+
   function drawScale() {
     const metres = view.scale > 4 ? 10 : 20;
     const y = camera.along ? 28 : view.height - 16;
@@ -276,10 +294,13 @@ function makeStage() {
     drawBody(drive.ego, ego, colour['ego-fill'], colour['ego-edge'], false);
     ctx.shadowBlur = 0;
     drawBody(drive.ego, ego, colour['ego-fill'], colour['ego-edge'], drive.acceleration[index] < -0.5);
+    const shielded = shieldAt(drive.time[index]);
+    drawShield(shielded, ego);
     if (labelLead) labelLead();
     drawScale();
     const state = ego.crashed ? 'crashed' : `at ${drive.speed[index].toFixed(1)} metres per second`;
-    canvas.setAttribute('aria-label', `The road from above at ${drive.time[index].toFixed(1)} seconds: the car is ${state}.`);
+    const guarded = shielded.length ? `, and the shield acts: ${shielded.map((s) => s.name).join(', ')}` : '';
+    canvas.setAttribute('aria-label', `The road from above at ${drive.time[index].toFixed(1)} seconds: the car is ${state}${guarded}.`);
   }
 
   return { resize, draw };

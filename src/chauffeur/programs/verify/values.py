@@ -120,6 +120,8 @@ class Value(NamedTuple):
             return True
         if value.startswith("lane:") and self.bits & LANE:
             return True
+        if self.bits & (OBJECT | FUNCTION):  # ranges, views, functions and modules leave the sandbox as descriptions
+            return True
         return bool(self.bits & TEXT) and (self.texts is None or value in self.texts)
 
 
@@ -154,8 +156,17 @@ def constant(value: object) -> Value:
     if isinstance(value, float):
         return Value(NAN) if math.isnan(value) else Value(FLOAT, value, value)
     if isinstance(value, str):
-        return Value(TEXT, texts=frozenset({value}))
+        # The sandbox puts other characters in the place of lone surrogates, so that such a text is not known there.
+        return Value(TEXT, texts=frozenset({value}) if _is_utf8(value) else None)
     return Value(OBJECT)
+
+
+def _is_utf8(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def outward(lo: float, hi: float) -> tuple[float, float]:

@@ -26,11 +26,16 @@ def speeds(clause: Clause, base: Claim) -> Iterator[Claim]:
         way = 1 if said & {"above", "over"} else -1
         yield replace(base, matter="speed", at_limit=True, sign=way, quantities=numbers)
         return
+    if not numbers and not sign and "plus" in said and any(q.dimension == "bare" for q in clause_quantities(clause)):
+        yield replace(base, matter="speed", aside=True)
+        return
+    if "divided" in said:
+        return
     if not numbers and not sign:
         if said & words.SPEEDS and not said & (words.KEEPS | words.UNCHANGED | {"limit", "nothing"}):
             yield replace(base, matter="speed", quantities=shares)
         return
-    exact = bool(numbers) and _led_to(clause.words) and not _relative(clause)
+    exact = bool(numbers) and _led_to(clause.words) and not _relative(clause) and all(q.value >= 0.0 for q in numbers)
     if "limit" in said and _relative(clause):
         sign = 0
     if numbers and clause.negated and clause.says("faster than", "above", "exceed", "over", "more than"):
@@ -41,11 +46,17 @@ def speeds(clause: Clause, base: Claim) -> Iterator[Claim]:
 _LEADS: Final = frozenset({"to", "at", "exactly", "becomes", "speed", "target", "be", "is"})
 
 
+_STEPS: Final = tuple((word,) for word in ("higher", "lower", "more", "less", "faster", "slower", "above", "below"))
+"""What after a number makes it a step: `the target is 5 m/s higher`."""
+
+
 def _led_to(said: tuple[str, ...]) -> bool:
     """Whether a number is where a speed is to get (`to 20`, `at 20`, `a speed of 20`), and no step on the way."""
     for index, word in enumerate(said):
         if word.startswith("#"):
             before = [one for one in said[:index] if one not in ("about", "around", "roughly", "only", "some")][-2:]
+            if said[index + 1 : index + 2] in _STEPS:
+                continue
             if before and (before[-1] in _LEADS or (before[-1] == "of" and before[0] in words.SPEEDS | {"target"})):
                 return True
     return False
@@ -72,6 +83,8 @@ def _relative(clause: Clause) -> bool:
             "off",
             "faster",
             "slower",
+            "relative",
+            "difference",
         }
     ) and not clause.says("down to", "up to")
 
@@ -88,7 +101,9 @@ def _speed_sign(clause: Clause) -> int:
         if word not in words.UP | words.DOWN or after in _NOT_OURS - {"down", "driver"}:
             continue
         rest = said[index + 1 : index + 4]
-        if "than" in rest and set(said[index + 1 : index + 8]) & (words.VEHICLES | {"it", "him", "them"}):
+        if word in ("braking", "acceleration", "deceleration") and after == "of":
+            continue  # how hard others or we would brake
+        if "than" in rest and set(said[index + 1 : index + 8]) & (words.VEHICLES | {"it", "him", "them", "others"}):
             continue
         votes += 1 if word in words.UP else -1
     if not votes:
@@ -110,11 +125,19 @@ def gaps(clause: Clause, base: Claim) -> Iterator[Claim]:
     about = bool(said & (words.GAPS - {"following"})) or clause.says(
         "following distance", "behind the car", "behind the vehicle"
     )
+    about = about or (bool(said & words.KEEPS & words.listed("keep keeps keeping hold holds")) and "ahead" in said)
     headway = bool(said & {"headway"}) or clause.says("time gap", "second rule", "s behind")
     sign = _gap_sign(clause)
+    if said & {"minimum", "allowed"}:
+        return
     unit = "time" if headway else "distance"
     bare = unit if about or headway else ""
     numbers = tuple(q for q in clause_quantities(clause, bare) if q.dimension in ("distance", "time"))
+    if not headway and clause.says("in #0", "after #0", "within #0", "for #0"):
+        numbers = tuple(q for q in numbers if q.dimension == "distance")  # when, or how long; not how far apart
+    if clause.says("at a distance of") and said & words.MOVES:
+        yield replace(base, matter="other gap", quantities=numbers)
+        return
     if not about and not headway and not sign:
         numbers = tuple(q for q in numbers if q.dimension == "distance")
         if numbers and not said & {"wait", "waits", "after", "ahead"}:
@@ -148,7 +171,9 @@ def _gap_sign(clause: Clause) -> int:
 def waits(clause: Clause, base: Claim) -> Iterator[Claim]:
     """What it claims of time that passes."""
     said = set(clause.words)
-    if said & {"headway", "gap", "distance", "tick", "ticks", "behind", "every"} or clause.says("time gap"):
+    if said & {"headway", "gap", "distance", "tick", "ticks", "behind", "every", "minimum", "allowed"} or clause.says(
+        "time gap"
+    ):
         return
     numbers = tuple(_time(q) for q in clause_quantities(clause) if q.dimension == "time" or _is_minutes(q))
     if numbers:

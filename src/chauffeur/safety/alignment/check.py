@@ -1,14 +1,22 @@
-"""`alignment-v1`: the thoughts that are shown to the person describe the program that will run."""
+"""`alignment-v1`: the thoughts that are shown to the person describe the program; `alignment-driven-v1`: and the drive.
+
+Both inform: an explanation that does not fit is told, and the drive goes on.
+"""
 
 from __future__ import annotations
 
-from chauffeur.concept import Limits, Plan, Program, Snapshot, Verdict
-from chauffeur.safety.alignment.comparing import Mismatch
-from chauffeur.safety.alignment.facts import Surroundings
-from chauffeur.safety.alignment.judge import judge
+from typing import Final
+
+from chauffeur.concept import Alignment, Limits, Plan, Program, Snapshot, Verdict
+from chauffeur.safety.alignment.facts import Effect, Facts, Surroundings
+from chauffeur.safety.alignment.judge import judge, judge_drive
+from chauffeur.safety.alignment.saying import claims_words, mismatch_words, score_words
 from chauffeur.safety.alignment.tracing import read_facts
 
-ALIGNMENT_CHECK = "alignment-v1"
+ALIGNMENT_CHECK: Final = "alignment-v1"
+DRIVEN_CHECK: Final = "alignment-driven-v1"
+
+_REMEDY: Final = "Let the thoughts say what the program does, or the program do what the thoughts say."
 
 
 def check_alignment(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:  # noqa: ARG001 - one shape for all checks
@@ -16,25 +24,48 @@ def check_alignment(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict: 
 
     A plan without thoughts, or with another policy than a program, claims nothing that could be wrong here.
     """
-    if not isinstance(plan.policy, Program) or not plan.thoughts.text.strip():
-        return Verdict(ALIGNMENT_CHECK, True, "There is no explanation of a program to compare.")
-    facts = read_facts(plan.policy.source, plan.policy.library)
-    if not facts.readable:
-        return Verdict(ALIGNMENT_CHECK, True, "The program cannot be read, so its explanation was not compared.")
+    facts = _facts(plan)
+    if isinstance(facts, str):
+        return Verdict(ALIGNMENT_CHECK, True, facts, vetoes=False)
     found = judge(plan.thoughts.text, facts, Surroundings.of(snapshot))
-    if found.aligned:
-        return Verdict(ALIGNMENT_CHECK, True, f"The explanation fits the program ({found.claims} claims compared).")
-    line = next((one.line for one in found.mismatches if one.line is not None), None)
-    return Verdict(
-        ALIGNMENT_CHECK,
-        False,
-        " ".join(_words(one) for one in found.mismatches),
-        line,
-        "Let the thoughts say what the program does, or the program do what the thoughts say.",
+    return _verdict(
+        ALIGNMENT_CHECK, found, "The explanation fits the program", "The explanation does not fit the program"
     )
 
 
-def _words(mismatch: Mismatch) -> str:
-    if not mismatch.sentence:
-        return f"The program does something that the explanation does not mention: {mismatch.instead}."
-    return f"The explanation says {mismatch.sentence!r}, but of the program: {mismatch.instead}."
+def check_driven(plan: Plan, snapshot: Snapshot, effect: Effect) -> Verdict:
+    """Whether what the plan's thoughts claim is what then happened.
+
+    Args:
+        plan: What was driven.
+        snapshot: The instant it began.
+        effect: What happened.
+    """
+    facts = _facts(plan)
+    if effect.failed:
+        facts = "The program failed on the way, so that the drive was not compared with the explanation."
+    if isinstance(facts, str):
+        return Verdict(DRIVEN_CHECK, True, facts, vetoes=False)
+    found = judge_drive(plan.thoughts.text, facts, Surroundings.of(snapshot), effect)
+    return _verdict(DRIVEN_CHECK, found, "The drive went as explained", "The drive did not go as explained")
+
+
+def _facts(plan: Plan) -> Facts | str:
+    """What reading finds in the plan's program, or why there is nothing to compare."""
+    if not isinstance(plan.policy, Program) or not plan.thoughts.text.strip():
+        return "There is no explanation of a program to compare."
+    facts = read_facts(plan.policy.source, plan.policy.library)
+    return facts if facts.readable else "The program cannot be read, so its explanation was not compared."
+
+
+def _verdict(check: str, found: Alignment, fits: str, differs: str) -> Verdict:
+    if found.aligned:
+        return Verdict(check, True, f"{fits} ({claims_words(found)}).", vetoes=False, alignment=found)
+    line = next((one.line for one in found.mismatches if one.line is not None), None)
+    told = ". ".join(_capital(mismatch_words(one)) for one in found.mismatches)
+    reason = f"{differs} ({score_words(found)}). {told}."
+    return Verdict(check, False, reason, line, _REMEDY, vetoes=False, alignment=found)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -52,6 +52,8 @@ class Claim:
     at_limit: bool = False
 
 
+_FACTORS: Final = frozenset({"gain", "factor", "coefficient", "weight"})
+"""What measures nothing."""
 _VAGUE: Final = frozenset({"few", "couple", "several", "some"})
 
 
@@ -63,6 +65,9 @@ def clause_quantities(clause: Clause, bare: Literal["", "speed", "distance", "ti
             quantity = clause.quantities[int(word[1:])]
             before = clause.words[index - 1] if index else ""
             if (before in ("from", "than") and clause.says("to")) or _VAGUE.intersection(quantity.said.split()):
+                continue
+            measured = _FACTORS.isdisjoint(clause.words[max(0, index - 2) : index])
+            if quantity.dimension == "bare" and (not measured or clause.words[index + 1 : index + 2] == ("divided",)):
                 continue
             if quantity.dimension == "bare" and bare:
                 fits = bare != "speed" or clause.has(words.SPEEDS)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Final
 
 from chauffeur.safety.alignment import wording as words
 from chauffeur.safety.alignment.amounts import gaps, speeds, waits
@@ -30,9 +31,19 @@ def claims_of(text: str, *, crossing: bool = False) -> tuple[Claim, ...]:
         following = clauses[index + 1] if index + 1 < len(clauses) else clause
         if clause.mood == "condition" and following.place == clause.place and "autopilot" in following.words[:2]:
             continue  # what the autopilot does in any case
+        beside = [
+            one for one in clauses[max(0, index - 1) : index + 2] if one is not clause and one.place == clause.place
+        ]
+        conditional = clause.opener in ("otherwise", "else", "or else") or clause.says("in which case")
+        conditional = conditional or any(one.mood == "condition" and one.opener in _LASTING for one in beside)
         for claim in _claims(clause, crossing=crossing):
-            found.append(_ordered(claim, clause, clauses, index))
+            if not (conditional and claim.matter in ("stay", "nothing")):
+                found.append(_ordered(claim, clause, clauses, index))
     return tuple(found)
+
+
+_LASTING: Final = frozenset({"as long as", "so long as", "until", "till", "unless", "if", "while", "when", "only if"})
+"""Openers of what limits how long something is left as it is."""
 
 
 def describes(text: str) -> bool:
@@ -58,6 +69,10 @@ def _ordered(claim: Claim, clause: Clause, clauses: Sequence[Clause], index: int
     told = told or clause.has(words.LATER) or clause.has(words.FIRST)
     previous = clauses[index - 1] if index and clauses[index - 1].place == clause.place else None
     following = clauses[index + 1] if index + 1 < len(clauses) and clauses[index + 1].place == clause.place else None
+    if clause.opener in ("after", "once") and following is not None:
+        told = False  # its place is told for what follows, not for what stands before
+    if previous is not None and previous.opener in ("after", "once"):
+        told = True
     if clause.opener in ("after", "once", "when", "as soon as", "until") and following is None and previous is not None:
         order -= 1.5  # "B after A"
         told = True

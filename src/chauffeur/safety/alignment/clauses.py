@@ -174,6 +174,8 @@ def _opener(tokens: Sequence[str], index: int) -> tuple[str, ...]:
             joins = {before, following} <= {"left", "right", "direction", "both", "lane", "speed", "headway"}
             kept = bool(words.KEEPS & set(tokens[max(0, index - 6) : index]))
             joins = joins or (kept and bool({"lane", *words.SPEEDS} & set(tokens[index + 1 : index + 4])))
+        case ("as", _):
+            joins = before in ("speed", "lane", "fast", "quickly", "slow", "slowly", "far")
         case ("which",):
             joins = before in ("to", "in", "of", "on")
         case ("next",):
@@ -197,11 +199,14 @@ def _mood(opener: str, part: Sequence[str], before: Mood) -> Mood:
         return "condition"
     if opener in _REASON_OPENERS:
         return "reason"
-    if found & words.COULD and not found & {"like"} and "rather" not in found:
+    if part[0] == "without" and part[1:2] and part[1] in ("a", "an", "any"):
+        return "state"  # "without a left lane": what is not there, not what is not done
+    if found & words.COULD and not found & {"like", "better"} and "rather" not in found:
         return "thought"
     if _is_wish(part):
         return "wish"
-    if _is_about_others(part) or _is_state(part):
+    later = opener in words.LATER or opener in ("and then", "after that", "after which") or found & {"faster", "slower"}
+    if _is_about_others(part) or (_is_state(part) and not (later and part[1:2] == ["drive"])):
         return "state"
     if opener in (":", "then") and before == "wish" and not found & words.OURSELVES:
         return "wish"
@@ -248,12 +253,12 @@ def _is_about_others(part: Sequence[str]) -> bool:
             following = part[index + 1 : index + 6]
             if part[max(0, index - 1)] == "the" and _is_done_by_us(following):
                 return False
-            verb = next((w for w in following if w in _STATE_VERBS), None)
+            others = _STATE_VERBS | {"can", "cross", "come"} if word in ("cars", "vehicles") else _STATE_VERBS
+            verb = next((w for w in following if w in others), None)
             if verb is None:
                 return False
-            return (
-                index <= 4 and not {"will", "should", "must", "shall"} & set(following) and part[0] not in words.MOVES
-            )
+            before = following[: following.index(verb)]
+            return index <= 4 and not {"will", "should", "must", "shall"} & set(before) and part[0] not in words.MOVES
     return False
 
 
@@ -308,14 +313,20 @@ _BEING: Final = frozenset(
 """What `we` are said to be doing already."""
 
 
+_DEEDS: Final = words.MOVES | words.OVERTAKES | words.PASSES | words.STOPS | words.UP | words.DOWN | {"lane", "lanes"}
+
+
 def _negated(opener: str, part: Sequence[str]) -> bool:
     if opener in ("rather than", "instead of", "unless"):
         return True
     hit = [index for index, word in enumerate(part) if word in words.NEGATIONS]
-    if hit and part[hit[0]] == "without" and not words.MOVES.isdisjoint(part[: hit[0]]):
-        return False  # what is done is told before, and only how comes after it
+    if hit and part[hit[0]] == "without":
+        # Where something is done before it, only how it is done comes after it: `without delay`.
+        return words.MOVES.isdisjoint(part[: hit[0]]) and not _DEEDS.isdisjoint(part[hit[0] + 1 :])
     if not hit:
         return False
+    if part[hit[0]] in ("nobody", "none", "no") and not words.LOOKS.isdisjoint(part[: hit[0]]):
+        return False  # "check that nobody is beside us"
     rest = part[hit[0] + 1 : hit[0] + 3]
     # "not only", "no faster than", "no longer", "no one is there": nothing of what is done is denied.
     return rest[:1] not in (["only"], ["faster"], ["longer"], ["later"], ["hard"])

@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
+from chauffeur.concept import Mismatch
 from chauffeur.language.quantities import Quantity
 from chauffeur.safety.alignment.claim import Claim
 from chauffeur.safety.alignment.claims import claims_of, describes
 from chauffeur.safety.alignment.facts import Effect, Event, Facts, Surroundings
 from chauffeur.safety.alignment.numbers import Numbers
-
-Kind = Literal[
-    "wrong-side", "wrong-number", "wrong-sign", "wrong-order", "missing-condition", "not-done", "not-claimed"
-]  # fmt: skip
-"""What may be wrong: another side than said; another number or unit; faster for slower, closer for farther; another
-order; a check or a condition that is said and not there; something said and not done; something done and not said."""
 
 _MAX_CHARS: Final = 20_000
 """Of a text; nobody reads more, and what follows is not compared."""
@@ -31,27 +25,12 @@ _ALONE: Final = re.compile(
 _PASSING: Final = re.compile(r"\b(?:over|under)tak\w+|\bpass(?:ing|es|ed)?\b|\bpast\b", re.IGNORECASE)
 """An overtaking has a speed of its own."""
 
+_SPEED: Final = re.compile(r"\b(?:speed|pace|velocity)\b", re.IGNORECASE)
+
 DRIVEN_SPEED_MPS: Final = 1.0
 """How far a driven speed may be off one that is told."""
 
-_SIDE_WORDS: Final = {-1: "left", 0: "straight on", 1: "right"}
-
-
-@dataclass(frozen=True, slots=True)
-class Mismatch:
-    """Something the text and the program disagree about.
-
-    Attributes:
-        kind: What is wrong.
-        sentence: The sentence of the text; empty where the program does what no sentence tells.
-        instead: What the program does.
-        line: Program line, 1-based, where it is known.
-    """
-
-    kind: Kind
-    sentence: str
-    instead: str
-    line: int | None = None
+SIDE_WORDS: Final = {-1: "left", 0: "straight on", 1: "right"}
 
 
 class Comparison:
@@ -67,7 +46,7 @@ class Comparison:
         crossing: Whether its way leads over an intersection.
         alone: Whether the text says that it has told everything.
         describes: Whether it tells deeds at all.
-        says_limit, says_passing: Whether it speaks of the limit, of passing somebody.
+        says_limit, says_speed, says_passing: Whether it speaks of the limit, of speed, of passing somebody.
     """
 
     def __init__(self, text: str, facts: Facts, where: Surroundings, effects: Sequence[Effect]) -> None:
@@ -85,11 +64,18 @@ class Comparison:
         self.alone = _ALONE.search(text) is not None
         self.describes = describes(text)
         self.says_limit = "limit" in text.lower()
+        self.says_speed = _SPEED.search(text) is not None
         self.says_passing = _PASSING.search(text) is not None
 
     def is_stop(self, event: Event) -> bool:
         """Whether a wish is for standing still."""
         return not event.reference and any(not t.factor and abs(t.offset) < 0.05 and not t.bound for t in event.terms)
+
+    def driven_sides(self) -> frozenset[int]:
+        """Sides to which lanes were changed where the program was run."""
+        left = any(effect.leftmost < 0 for effect in self.effects)
+        right = any(effect.rightmost > 0 for effect in self.effects)
+        return frozenset(side for side, gone in ((-1, left), (1, right)) if gone)
 
     def wrong_number(self, claim: Claim, quantity: Quantity, line: int | None) -> Mismatch:
         """A number of the text that is none of the program's."""
@@ -100,13 +86,13 @@ class Comparison:
 
 def moving(sides: frozenset[int]) -> str:
     """A change of lanes in words."""
-    named = [_SIDE_WORDS[side] for side in sorted(sides - {0})]
+    named = [SIDE_WORDS[side] for side in sorted(sides - {0})]
     return f"changes lanes to the {' or '.join(named)}" if named else "changes lanes"
 
 
 def turning(sides: frozenset[int]) -> str:
     """A way over an intersection in words."""
-    named = ["goes straight on" if side == 0 else f"turns {_SIDE_WORDS[side]}" for side in sorted(sides)]
+    named = ["goes straight on" if side == 0 else f"turns {SIDE_WORDS[side]}" for side in sorted(sides)]
     return " or ".join(named)
 
 

@@ -15,6 +15,8 @@ from chauffeur.safety.alignment.motions import motions, sides_of
 def looks(clause: Clause) -> bool:
     """Whether a clause speaks of looking if a way is free."""
     said = set(clause.words)
+    if said & {"skip", "skips", "skipping", "omit"}:
+        return False
     if said & {"wait", "let", "lets", "allow"} and said & {"traffic", "everyone", "everybody", "others"}:
         return True
     if clause.says("is safe enter", "give way", "gives way", "yield to", "yields to", "yielding to"):
@@ -41,6 +43,7 @@ def conditions(clause: Clause, base: Claim, *, crossing: bool) -> Iterator[Claim
     safe = said & {"safe", "clear", "clears", "free", "vacant", "safely"} and (said & ways)
     nobody = clause.says("nobody", "no one", "no traffic", "none comes", "gap is available", "gap opens", "opens up",
                          "room", "gap in", "sufficient gap", "safe gap", "traffic has gone")  # fmt: skip
+    nobody = nobody and not (said & {"front", "ahead"} and not said & {"lane", "side", "left", "right"})
     roomy = "enough" in said and said & {"space", "room"}
     looked = said & words.LOOKS and said & {"safety", "safe", "clear", "free", "traffic", "lane"}
     if (safe or nobody or roomy or looked) and not clause.says("not safe", "is not free", "not clear"):
@@ -48,10 +51,13 @@ def conditions(clause: Clause, base: Claim, *, crossing: bool) -> Iterator[Claim
     numbers = clause_quantities(clause)
     other = bool(said & (words.VEHICLES | {"it", "lead's"}))
     ours = bool(said & {"we", "i", "our", "us"})
-    if other and not ours and (said & {"slower", "faster", "below", "above", "exceeds", "under"}):
-        said_speeds = tuple(q for q in clause_quantities(clause, "speed") if q.dimension == "speed")
+    said_speeds = tuple(q for q in clause_quantities(clause, "speed") if q.dimension == "speed")
+    than = said & {"slower", "faster", "below", "above", "exceeds", "under"} or (
+        said & {"less", "more"} and said_speeds
+    )
+    if other and not ours and than:
         yield replace(base, matter="other speed", quantities=said_speeds, denied=denied)
-    elif said & {"behind", "rear"} and any(q.dimension == "distance" for q in numbers):
+    elif not ours and said & {"behind", "rear"} and any(q.dimension == "distance" for q in numbers):
         yield replace(
             base, matter="behind", quantities=tuple(q for q in numbers if q.dimension == "distance"), denied=denied
         )
@@ -78,6 +84,8 @@ def stays(clause: Clause, base: Claim) -> Iterator[Claim]:
     said = set(clause.words)
     if clause.mood != "plan":
         return
+    if clause.says("same speed as", "same lane as"):
+        return
     keeps = said & (words.KEEPS | words.UNCHANGED)
     if keeps and (
         "lane" in said or clause.says("stay behind", "remain behind", "remains behind", "stays behind", "where we are")
@@ -92,8 +100,6 @@ def stays(clause: Clause, base: Claim) -> Iterator[Claim]:
     )  # fmt: skip
     if said & words.KEEPS and said & words.GAPS and said & {"default", "usual", "same"}:
         yield replace(base, matter="nothing", denied=False, quantities=(), sides=frozenset({3}))
-        return
-    if clause.says("same speed as", "same lane as"):
         return
     if nothing and not any(q.dimension == "time" for q in clause_quantities(clause)):
         yield replace(base, matter="nothing", denied=False, quantities=(), sides=_about(said))

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from chauffeur.concept import Mismatch
 from chauffeur.safety.alignment.claim import Claim
 from chauffeur.safety.alignment.comparing import (
     Comparison,
-    Mismatch,
     faster,
     moving,
     turning,
@@ -109,7 +109,7 @@ class Duties(Comparison):
         also = {"speed", "stop", "pull over"}
         also |= set() if self.alone else {"overtake", "gap", "turn", "other speed"}
         quiet = not told & also and not (self.numbers.by_limit and self.says_limit)
-        quiet = quiet and not (self.moves and self.says_passing)
+        quiet = quiet and not (self.moves and self.says_passing) and not (self.numbers.of_others and self.says_speed)
         if signs and 0 not in signs and quiet and not self.numbers.follows:
             yield Mismatch("not-claimed", "", "it drives " + faster(signs), self.speeds[0][1].line)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 from chauffeur.concept import Snapshot
 from chauffeur.safety.alignment.values import Base, Term
@@ -12,6 +12,10 @@ from chauffeur.safety.alignment.values import Base, Term
 Deed = Literal["speed", "headway", "gap", "lane", "turn", "go", "wait", "say"]
 """What an event is: a wish for a speed, a headway, a lane or a route; a gap that is steered towards; leaving the stop
 sign; time that passes; words."""
+
+
+STANDING_MPS: Final = 0.5
+"""A car this slow stands."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,24 +83,35 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What happened when a program ran on a copy of the scene. Simulated.
+    """What happened when a program ran: in a drive, or on a copy of the scene. Simulated.
 
     Attributes:
         lanes_moved: Lanes to the right (negative: left) between start and end.
         leftmost, rightmost: The farthest it was on either side of the start, in lanes.
         speeds_mps: Speed at the start, and the mean of the last second.
-        gaps_m: Gap to the vehicle ahead at the start and at the end; None where there is none.
-        stood: Whether it stood still at some time.
+        extremes_mps: The lowest and the highest speed.
+        gaps_m: Way along the ego to the vehicle that was ahead at the start, then and at the end, negative once it is
+            behind; None where there was none, or it is out of sight.
+        turned: Quarter turns to the right (negative: left) between start and end.
         failed: Whether the program failed.
+        cut: Whether it was ended before it was through: its goal was reached, or something happened to the car. What
+            it had not done by then, it might still have done.
     """
 
     lanes_moved: int
     leftmost: int
     rightmost: int
     speeds_mps: tuple[float, float]
-    gaps_m: tuple[float | None, float | None]
-    stood: bool
+    extremes_mps: tuple[float, float]
+    gaps_m: tuple[float | None, float | None] = (None, None)
+    turned: int = 0
     failed: bool = False
+    cut: bool = False
+
+    @property
+    def stood(self) -> bool:
+        """Whether it stood still at some time."""
+        return self.extremes_mps[0] < STANDING_MPS
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,32 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 
+from chauffeur.concept import Alignment, Mismatch
 from chauffeur.safety.alignment.claim import Claim
-from chauffeur.safety.alignment.comparing import Mismatch
+from chauffeur.safety.alignment.comparing import Comparison
+from chauffeur.safety.alignment.driven import Driven
 from chauffeur.safety.alignment.duties import Duties
 from chauffeur.safety.alignment.facts import Effect, Facts, Surroundings
 from chauffeur.safety.alignment.rates import Rates
 from chauffeur.safety.alignment.ways import Ways
-
-
-@dataclass(frozen=True, slots=True)
-class Alignment:
-    """How well a text describes a program.
-
-    Attributes:
-        aligned: Whether nothing was found that is wrong.
-        score: 1 where every claim holds; the more claims fail, the less.
-        mismatches: What is wrong, in the order of the text.
-        claims: How many claims were compared.
-    """
-
-    aligned: bool
-    score: float
-    mismatches: tuple[Mismatch, ...]
-    claims: int
 
 
 def judge(
@@ -44,11 +28,34 @@ def judge(
     if not facts.readable:
         return Alignment(True, 1.0, (), 0)
     case = _Case(text, facts, surroundings or Surroundings(), effects)
-    found = list(dict.fromkeys(case.mismatches()))
+    return _weighed(case, case.mismatches())
+
+
+def judge_drive(text: str, facts: Facts, surroundings: Surroundings, effect: Effect) -> Alignment:
+    """Compare a text with what happened when its program drove.
+
+    What reading the program finds by itself counts only where the drive shows it too.
+
+    Args:
+        text: The thoughts R.
+        facts: What reading finds in P.
+        surroundings: Where the ego was when the drive began.
+        effect: What happened.
+    """
+    read = judge(text, facts, surroundings)
+    resolved = judge(text, facts, surroundings, [effect])
+    driven = Driven(text, facts, surroundings, [effect])
+    seen = list(driven.mismatches())
+    about = {(one.kind, one.sentence) for one in (*read.mismatches, *seen)}
+    return _weighed(driven, [*(one for one in resolved.mismatches if (one.kind, one.sentence) not in about), *seen])
+
+
+def _weighed(case: Comparison, mismatches: Iterable[Mismatch]) -> Alignment:
+    found = tuple(dict.fromkeys(mismatches))
     told = sum(claim.firm for claim in case.claims)
     held = max(0, told - len(found))
     score = 1.0 if not found else held / (held + 2.0 * len(found))
-    return Alignment(not found, score, tuple(found), told)
+    return Alignment(not found, score, found, told)
 
 
 class _Case(Ways, Rates, Duties):

@@ -30,11 +30,15 @@ def motions(clause: Clause, base: Claim, sides: frozenset[int], *, crossing: boo
     if _returns(clause):
         yield replace(base, matter="back", sides=sides)
         return
-    if said & words.STOPS and not clause.says("stop sign", "stop line", "stands for") and not said & {"behind"}:
+    speeds = words.DOWN | words.SPEEDS | words.LOWER
+    zero = bool(said & speeds) and any(q.value == 0.0 and q.dimension == "bare" for q in clause_quantities(clause))
+    if (_stops(clause) or zero) and not clause.says("stop sign", "stop line", "stands for") and "behind" not in said:
         yield replace(base, matter="stop", exact=bool(said & words.KEEPS) or clause.says("for good"))
     if junction and "lane" not in said:
         if "straight" in said:
             yield replace(base, matter="turn", sides=frozenset({0}))
+        elif not sides and "cross" in said and not clause.negated:
+            yield replace(base, matter="turn", aside=True)
         elif sides and (said & words.TURNS or len(clause.words) <= 5):
             yield replace(base, matter="turn", sides=sides)
         return
@@ -43,17 +47,36 @@ def motions(clause: Clause, base: Claim, sides: frozenset[int], *, crossing: boo
     ):
         return
     edge = bool(said & {"leftmost", "rightmost"}) or clause.says("all the way")
-    if sides and (said & words.MOVES or said & {"lane", "side"} or len(clause.words) <= 6):
+    if sides and (said & words.MOVES or said & {"lane", "side"} or _count(clause) or len(clause.words) <= 6):
         yield replace(base, matter="lane", sides=sides, count=99 if edge else _count(clause))
     elif not sides and _changes_lanes(clause):
         yield replace(base, matter="lane", count=_count(clause))
+    elif not sides and not clause.negated and _mentions_lane(clause):
+        yield replace(base, matter="lane", aside=True)
+
+
+def _mentions_lane(clause: Clause) -> bool:
+    """Whether a change of lanes may be meant: `take it`, or just `change`."""
+    return (clause.says("take it", "use it", "enter it") and "easy" not in clause.words) or clause.words == ("change",)
+
+
+def _stops(clause: Clause) -> bool:
+    """Whether it speaks of stopping; `stop asking` is another thing."""
+    after = (*clause.words[1:], "")
+    return any(
+        word in words.STOPS and not next_.endswith("ing") for word, next_ in zip(clause.words, after, strict=True)
+    )
 
 
 def _changes_lanes(clause: Clause) -> bool:
     if clause.says("lane change", "lane changes", "another lane", "other lane", "neighbouring lane", "of this lane",
+                   "leave the lane",
                    "change lanes", "switch lanes", "changing lanes",
+                   "move over", "moves over", "moving over", "go over", "goes over", "swap lanes",
                    "pull out", "pulls out", "pulling out", "set the lane", "target lane"):  # fmt: skip
         return True
+    if "limit" in clause.words or clause.says("our lane", "my lane", "this lane"):
+        return False
     moves = words.MOVES - {
         "set",
         "sets",
@@ -102,6 +125,8 @@ def sides_of(clause: Clause) -> frozenset[int]:
 
 
 def _overtakes(clause: Clause) -> bool:
+    if clause.says("overtake us", "overtakes us", "overtaking us", "pass us", "passes us", "passing us"):
+        return False
     if clause.has(words.OVERTAKES):
         return True
     if clause.says("let", "lets", "so that") or clause.has(frozenset({"others", "crossing"})):
@@ -117,8 +142,10 @@ def _returns(clause: Clause) -> bool:
     said = set(clause.words)
     if said & words.SPEEDS or said & {"autopilot", "none", "true", "false"}:
         return False
+    if clause.says("old lane", "original lane", "former lane", "previous lane") and not said & words.KEEPS:
+        return True
     if said & {"return", "returns", "returning"}:
-        return "speed" not in said
+        return not any(quantity.dimension == "speed" for quantity in clause_quantities(clause))
     if "back" not in said:
         return False
     index = clause.words.index("back")
@@ -135,7 +162,8 @@ def _returns(clause: Clause) -> bool:
         "hold",
         "set",
     } and (
-        bool(set(before) & words.MOVES)
+        (index == 0 and clause.words[1:2] != ("off",))
+        or bool(set(before) & words.MOVES)
         or clause.words[index + 1 : index + 2] in (("in",), ("into",), ("to",), ("right",), ("left",))
     )
 

@@ -37,8 +37,8 @@ class Numbers:
         self.gap_line = lines[0] if lines else None
         self.unknown_speed = any(event.open for event in self._speeds)
         # Speed by the speed of the vehicle ahead: a gap is kept.
-        of_others = all(term.base == "other" for event in self._speeds for term in event.terms)
-        self.follows = bool(self._steered) or (bool(gaps) and bool(self._speeds) and of_others)
+        self.of_others = bool(self._speeds) and all(term.base == "other" for e in self._speeds for term in e.terms)
+        self.follows = bool(self._steered) or (bool(gaps) and self.of_others)
 
     # Signs -----------------------------------------------------------------------------------------------------
 
@@ -70,7 +70,7 @@ class Numbers:
         if term.base == "ego" and term.factor == 1.0:
             off = term.offset
         elif term.base == "ego" and now is None:
-            off = term.factor - 1.0
+            return _sign(term.factor - 1.0, 0.01)
         elif speed is None or now is None:
             return None
         else:

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
+from chauffeur.concept import Mismatch
 from chauffeur.language.quantities import Quantity
 from chauffeur.safety.alignment.claim import Claim
 from chauffeur.safety.alignment.comparing import (
     DRIVEN_SPEED_MPS,
     Comparison,
-    Mismatch,
     faster,
     sign_of,
 )
@@ -46,6 +46,8 @@ class Rates(Comparison):
             if not any(self.numbers.supports(q, exact=True) for q in said if q.dimension == "speed"):
                 yield Mismatch("not-done", claim.sentence, "it keeps its speed", line)
             return
+        if self.numbers.follows and not claim.exact:
+            return  # it goes by the gap: a speed told is an example of what comes of that
         for quantity in claim.quantities:
             if not self.numbers.supports(quantity, exact=claim.exact) and not self._driven_at(quantity):
                 yield self.wrong_number(claim, quantity, line)
@@ -56,9 +58,7 @@ class Rates(Comparison):
         if self.crossing:
             return bool(claim.sign) and (claim.exact or not self.turns)
         foreign = any(not self.numbers.supports(one, exact=False) for one in claim.quantities)
-        return (not self.numbers.follows and bool(claim.sign or claim.exact or foreign)) or bool(
-            claim.sign and claim.exact
-        )
+        return (not self.numbers.follows and bool(claim.sign or foreign)) or bool(claim.sign and claim.exact)
 
     def _beside_limit(self, claim: Claim, beside_mps: float, line: int | None) -> Iterator[Mismatch]:
         """Of a speed that is told by the limit, in a program that goes by it."""

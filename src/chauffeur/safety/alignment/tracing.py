@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Final
 
 from chauffeur.programs.rewrite import main_function
@@ -21,8 +22,9 @@ from chauffeur.safety.alignment.values import NOTHING, Term, Value, combined, ei
 _MAX_CHARS: Final = 100_000
 
 
+@lru_cache(maxsize=64)
 def read_facts(source: str, library: str = "") -> Facts:
-    """What a program does, as far as reading tells; never raises on bad programs."""
+    """What a program does, as far as reading tells; never raises on bad programs. One read before is remembered."""
     if len(source) + len(library) > _MAX_CHARS:
         return Facts(readable=False)
     try:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from chauffeur.concept import Mismatch
 from chauffeur.safety.alignment.claim import Claim
 from chauffeur.safety.alignment.comparing import (
     Comparison,
-    Mismatch,
     moving,
     turning,
 )
@@ -29,7 +29,7 @@ class Ways(Comparison):
             return
         sides = frozenset(side for _, event in self.moves for side in event.sides) - {0}
         known = all(event.sides for _, event in self.moves)
-        if not known and (driven := self._driven_sides()):
+        if not known and (driven := self.driven_sides()):
             sides, known = driven, True
         first = self.moves[0][1]
         if claim.matter == "back":
@@ -81,12 +81,6 @@ class Ways(Comparison):
             if wrong:
                 yield Mismatch("not-claimed", claim.sentence, f"it {moving(event.sides)}", event.line)
                 return
-
-    def _driven_sides(self) -> frozenset[int]:
-        """Sides to which lanes were changed where the program was run."""
-        left = any(effect.leftmost < 0 for effect in self.effects)
-        right = any(effect.rightmost > 0 for effect in self.effects)
-        return frozenset(side for side, gone in ((-1, left), (1, right)) if gone)
 
     def _other_side(self, claim: Claim, sides: frozenset[int], event: Event) -> Mismatch:
         return Mismatch("wrong-side", claim.sentence, f"it {moving(sides)}", event.line)

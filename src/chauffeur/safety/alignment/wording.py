@@ -18,7 +18,7 @@ def _phrases(text: str) -> tuple[tuple[str, ...], ...]:
 
 
 PERSONS: Final = listed(
-    "you passenger passengers user users rider riders customer instruction request command driver person guest "
+    "you your passenger passengers user users rider riders customer instruction request command driver person guest "
     "they he she somebody someone passenger's task order human"
 )
 """Who wishes; a clause about them tells a wish, not a plan."""

@@ -286,7 +286,8 @@ class _Examination:
             self.lost += sum(count for count in counts if isinstance(count, int))
         if record.kind == "redaction":
             named: Any = record.body.get("records", [])
-            self.announced.update(seq for seq in cast("list[Any]", named) if isinstance(seq, int))
+            listed = cast("list[Any]", named) if isinstance(named, list) else []
+            self.announced.update(seq for seq in listed if isinstance(seq, int))
 
     def _say(self, line: int | None, what: str) -> None:
         self.found += 1

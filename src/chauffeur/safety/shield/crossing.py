@@ -1,166 +1,390 @@
-"""Right of way where roads cross: the ego goes only if everybody who crosses its way arrives after it has left.
+"""Right of way where roads cross: a command goes through only if a plan is left after it that ends well.
 
-Source: Shalev-Shwartz, Shammah, Shashua 2017, Sec. 3.5 (routes that cross; here the ego never has priority). Others are
-taken to go straight on, as fast as they can. Before the place where ways meet, the ego could still stop; past it, it
-has to clear the crossing, and may not wait in it.
+There are two kinds of plan: to stop, and to clear the crossing. Either is rolled on with the vehicle's own motion, and
+ends well if the body never is where somebody who crosses may be by then, going straight on as fast as they can, and
+does not stand in a lane that is not its own. The ego has no priority here. By induction the car is never where it can
+neither stop nor clear: what was promised in one period is still there in the next.
+
+Source: Shalev-Shwartz, Shammah, Shashua 2017, Sec. 3.5 (routes that cross); the plan that is always kept in hand is
+that of Pek, Althoff, "Fail-safe motion planning for online verification", 2020.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chauffeur.concept import LaneId, LaneView, Snapshot, VehicleState
+from chauffeur.concept import Command, LaneId, LaneView, Snapshot, VehicleState
+from chauffeur.geometry import wrap_to_pi
+from chauffeur.safety.shield import foresight
 from chauffeur.safety.shield.frame import CROSSING_RAD
+from chauffeur.safety.shield.table import ShieldParameters
 
-Points = NDArray[np.float64]
+Array = NDArray[np.float64]
 
-_STEP_M: Final = 1.0
-"""Distance between two looked-at points of a way."""
-_AHEAD_M: Final = 45.0
-"""How far ahead a way is looked at: beyond it the car could still stop, and ways come back on themselves."""
-_SIDE_M: Final = 1.0
-"""Clear distance to the side between two ways that do not meet."""
-_SAME_RAD: Final = math.radians(15.0)
-"""Cars turned by less against each other are in one stream already."""
-_AFTER_S: Final = 1.0
-"""Time between the ego's leaving and another's arriving."""
-_MERGE_S: Final = 2.0
-"""The same where the other's way becomes the ego's own: it has to be up to speed."""
-INSIDE_M: Final = 0.6
-"""How far the ego's front is where ways meet before it counts as inside: that far it may have slid."""
-CLEARING_MPS2: Final = 2.0
-"""Acceleration with which the ego leaves a crossing."""
-CLEARING_MPS: Final = 8.0
+_CLEARING_MPS2: Final = 2.0, 5.0
+"""Acceleration with which the ego leaves a crossing: easily, or with the whole pedal."""
+_CLEARING_MPS: Final = 8.0
 """Speed up to which it does."""
-_FASTEST_MPS: Final = 14.0
-"""No crossing car is expected to go faster than this, or than it does already."""
+_STOP_S: Final = 2.5
+_CLEAR_S: Final = 7.0
+"""How long a plan is looked at: by then a car of the crossing's speeds stands, or is through."""
+_AWAY_RAD: Final = math.radians(60.0)
+"""A lane turned by more against the car is not the one it drives in, close as it may be."""
+_ALONG: Final = math.cos(CROSSING_RAD)
+_FAR_M: Final = 40.0
+"""Where a car that turns will go cannot be told at this distance: it is not minded yet."""
+_BENT_M: Final = 0.1
+_JOINT_M: Final = 0.5
+_HALVINGS: Final = 8
+_SAME_M: Final = 1e-3
+_HELD_MPS2: Final = 0.3
+"""Accelerations closer than this are not told apart."""
 
 
 @dataclass(frozen=True, slots=True)
-class Crossing:
-    """Where the ego's ways meet those of others, m ahead of its centre.
+class _Care:
+    """How much is left: time before another arrives, to the side of its way, and to the side of the ego's own."""
 
-    Attributes:
-        hold_m: The ego's front has to stop before this, from its centre; infinite where nothing has to be awaited.
-        inside: It is where ways cross already.
-    """
+    after_s: float
+    merge_s: float
+    side_m: float
+    room_m: float
+    turn_rad: float
+    followers: bool = False
 
-    hold_m: float = math.inf
-    inside: bool = False
+
+_DUE: Final = _Care(after_s=1.0, merge_s=1.5, side_m=0.6, room_m=2.6, turn_rad=0.7)
+"""What every command has to leave; a body has its lane, and half a metre that corners are cut by."""
+_KIND: Final = replace(_DUE, followers=True)
+"""The same, and who follows in the ego's stream could still stop behind it. That can be the follower's own doing."""
+_LOST: Final = _Care(after_s=1.0, merge_s=1.5, side_m=0.6, room_m=4.5, turn_rad=2.0)
+"""The same for a car that got off its way: it needs room to get back to it."""
+_LAST: Final = _Care(after_s=0.2, merge_s=0.6, side_m=0.2, room_m=math.inf, turn_rad=math.inf)
+"""What is left where that is gone, because others or tyres did what was not foreseen."""
 
 
-NOTHING_CROSSES: Final = Crossing()
+@dataclass(frozen=True, slots=True)
+class Mended:
+    """A command that may go through, and the rule and reason where it is another than was asked."""
+
+    command: Command
+    rule: str = ""
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """A way of the ego: its points, the nearest one, where nobody crosses any more, where a lead may stop."""
+
+    points: Array
+    at: int
+    beyond: int
+    hold_m: float
+
+
+class Motion:
+    """The ego's state with what a snapshot does not show: how fast it slides and turns."""
+
+    def __init__(self, dt_s: float) -> None:
+        self._dt_s = dt_s
+        self._tick = -2
+        self._expected = np.zeros(6)
+        self._before: VehicleState | None = None
+
+    def observe(self, snapshot: Snapshot) -> Array:
+        """The state now: as foreseen under the last command, or else from the way since the last instant."""
+        ego, before = snapshot.ego, self._before
+        state = np.array([ego.x_m, ego.y_m, ego.heading_rad, ego.speed_mps, 0.0, 0.0])
+        if before is not None and snapshot.tick == self._tick + 1:
+            turned = wrap_to_pi(ego.heading_rad - self._expected[2])
+            if math.hypot(*(self._expected[:2] - state[:2])) < _SAME_M and abs(turned) < _SAME_M:
+                state[4:] = self._expected[4:]
+            else:
+                middle = before.heading_rad + wrap_to_pi(ego.heading_rad - before.heading_rad) / 2.0
+                dx, dy = ego.x_m - before.x_m, ego.y_m - before.y_m
+                state[4] = (math.cos(middle) * dy - math.sin(middle) * dx) / self._dt_s
+                state[5] = wrap_to_pi(ego.heading_rad - before.heading_rad) / self._dt_s
+        return state
+
+    def commanded(self, snapshot: Snapshot, state: Array, command: Command) -> None:
+        """Remember what the vehicle was told."""
+        self._tick, self._before = snapshot.tick, snapshot.ego
+        self._expected = state.copy()
+        foresight.move(self._expected, command.acceleration_mps2, command.steering_rad, self._dt_s)
 
 
 class Junction:
-    """Ways of one road network, found when first asked for."""
+    """The guard of one trip over a network whose roads cross."""
 
-    def __init__(self, lanes: tuple[LaneView, ...]) -> None:
+    def __init__(self, lanes: tuple[LaneView, ...], table: ShieldParameters, dt_s: float) -> None:
         self.lanes = lanes
+        self._table = table
+        self._dt_s = dt_s
         self._named = {lane.id: lane for lane in lanes}
         self._onward: dict[str, list[LaneView]] = {}
         for lane in lanes:
             self._onward.setdefault(lane.id[0], []).append(lane)
-        self._ways: dict[LaneId, list[Points]] = {}
+        self._ways: dict[tuple[LaneId, LaneId | None], list[Array]] = {}
+        self._straight = {lane.id: line for lane in lanes if (line := _straight(lane)) is not None}
+        self._keep_clear = np.array(
+            [
+                (x, y, math.cos(heading), math.sin(heading), self._named[lane].length_m)
+                for lane, (x, y, heading) in self._straight.items()
+            ]
+        ).reshape(-1, 5)
+        self._promised: Array | None = None
+        self._motion = Motion(dt_s)
 
-    def look(self, snapshot: Snapshot, acceleration_mps2: float, lanes: Sequence[LaneId | None]) -> Crossing:
-        """What the ego has to wait for.
+    def mend(self, snapshot: Snapshot, lane: LaneId, aim: LaneId | None, command: Command, most_mps2: float) -> Mended:
+        """The command, changed as little as is needed.
 
         Args:
             snapshot: The instant.
-            acceleration_mps2: With how much others may gain speed.
-            lanes: Where the ego is: every way on from one of them counts.
+            lane: Where the ego is, or where ways part the lane it steers for: every way on from it counts.
+            aim: The lane it steers for: where it follows, the only way on that counts.
+            command: As all other rules let it through.
+            most_mps2: Hardest acceleration that they would.
         """
+        outlook = self._outlook(snapshot)
+        ways = [outlook.way(points) for points in self._candidates(lane, aim, outlook.state)]
+        found = _mend(outlook, ways, command, most_mps2, _KIND) or _mend(outlook, ways, command, most_mps2, _DUE)
+        if found is not None:
+            mended, way = found
+            self._promised = way.points
+        else:
+            promised = ways[0] if self._promised is None else outlook.way(self._promised)
+            mended = _rescue(outlook, promised, command, most_mps2)
+        self._motion.commanded(snapshot, outlook.state, mended.command)
+        return mended
+
+    def _outlook(self, snapshot: Snapshot) -> _Outlook:
         ego = snapshot.ego
-        hold, inside = math.inf, False
-        for way in (way for lane in lanes if lane is not None for way in self._ways_from(lane)):
-            path, at = _ahead(way, ego)
-            for other in snapshot.others:
-                met = _meet(path, at, ego, other)
-                if met is None:
-                    continue
-                first, last, arrival_m, merging = met
-                leaving = _time_to(last, max(ego.speed_mps, 0.0), CLEARING_MPS, CLEARING_MPS2)
-                arriving = _time_to(arrival_m, max(other.speed_mps, 0.0), _FASTEST_MPS, acceleration_mps2)
-                if arriving > leaving + (_MERGE_S if merging else _AFTER_S):
-                    continue
-                if first < ego.length_m / 2.0 - INSIDE_M:
-                    inside = True
-                else:
-                    hold = min(hold, first)
-        return Crossing(hold, inside)
+        solid = [other for other in (*snapshot.others, *snapshot.objects) if other.kind != "stop_sign"]
+        rows = [row for other in solid if (row := self._row(other, ego)) is not None]
+        others = np.array(rows, dtype=np.float64).reshape(len(rows), 7)
+        size = ego.length_m / 2.0, ego.width_m / 2.0
+        return _Outlook(self._motion.observe(snapshot), size, others, self._keep_clear, self._table, self._dt_s)
 
-    def _ways_from(self, lane: LaneId) -> list[Points]:
-        """Every way on from a lane through what follows it: rows of (x, y, heading)."""
-        if lane not in self._ways:
-            ways: list[Points] = []
+    def _row(self, other: VehicleState, ego: VehicleState) -> tuple[float, ...] | None:
+        """Another as `foresight` wants it; None if nothing can be said of where it will go, far away as it is.
+
+        Along a straight lane it goes on as the lane does, and keeps the room between the lane's middle and where it is.
+        """
+        x, y, heading = other.x_m, other.y_m, other.heading_rad
+        long, wide = other.length_m / 2.0, other.width_m / 2.0
+        line = None if other.lane is None else self._straight.get(other.lane)
+        if line is not None and math.cos(heading - line[2]) > _ALONG:
+            c, s = math.cos(line[2]), math.sin(line[2])
+            off = -s * (x - line[0]) + c * (y - line[1])
+            wide += abs(off) / 2.0 + abs(math.sin(heading - line[2])) * long
+            x, y, heading = x + s * off / 2.0, y - c * off / 2.0, line[2]
+        elif math.hypot(x - ego.x_m, y - ego.y_m) > _FAR_M:
+            return None
+        return x, y, math.cos(heading), math.sin(heading), max(other.speed_mps, 0.0), long, wide
+
+    def _candidates(self, lane: LaneId, aim: LaneId | None, state: Array) -> list[Array]:
+        """The ways a command has to leave open: those from the ego's lane, unless that is another's, driven across."""
+        ways = self._ways_from(lane, aim if aim in self._named and aim[0] == lane[1] else None)
+        if self._promised is None or any(_along(way, state) for way in ways):
+            return ways
+        return [self._promised]
+
+    def _after(self, lane: LaneView) -> list[tuple[LaneView] | tuple[()]]:
+        """What follows a lane: each lane that begins where it ends, or nothing."""
+        x, y = lane.centre_m[-1]
+        begin = [one for one in self._onward.get(lane.id[1], []) if math.dist(one.centre_m[0], (x, y)) < _JOINT_M]
+        return [(one,) for one in begin] or [()]
+
+    def _ways_from(self, lane: LaneId, onto: LaneId | None) -> list[Array]:
+        """Ways on from a lane, through what follows it or only `onto` one lane: rows of (x, y, heading)."""
+        if (lane, onto) not in self._ways:
             own = self._named[lane]
-            for first in self._onward.get(lane[1], []) or [None]:
-                parts = [own] if first is None else [own, first]
-                after = [] if first is None else self._onward.get(first.id[1], [])
-                for second in after or [None]:
-                    ways.append(_sampled([*parts, *([] if second is None else [second])]))
-            self._ways[lane] = ways
-        return self._ways[lane]
+            ways = [
+                _sampled([own, *first, *second])
+                for first in (self._after(own) if onto is None else [(self._named[onto],)])
+                for second in (self._after(*first) if first else [()])
+            ]
+            ways.sort(key=_turned)  # the straightest first: what stops, stops there
+            self._ways[lane, onto] = ways
+        return self._ways[lane, onto]
 
 
-def _sampled(lanes: list[LaneView]) -> Points:
+def _sampled(lanes: Sequence[LaneView]) -> Array:
     line = np.array([point for lane in lanes for point in lane.centre_m])
     keep = np.r_[True, np.hypot(*np.diff(line, axis=0).T) > 1e-6]
     line = line[keep]
     lengths = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]
-    at = np.arange(0.0, lengths[-1], _STEP_M)
+    at = np.arange(0.0, lengths[-1], foresight.STEP_M)
     x, y = np.interp(at, lengths, line[:, 0]), np.interp(at, lengths, line[:, 1])
     heading = np.arctan2(np.gradient(y), np.gradient(x))
-    return np.stack([x, y, heading], axis=1).astype(np.float64)
+    return np.ascontiguousarray(np.stack([x, y, heading], axis=1), dtype=np.float64)
 
 
-def _ahead(way: Points, ego: VehicleState) -> tuple[Points, Points]:
-    """The part of a way from the ego on, and its distances from the ego, m."""
-    nearest = int(np.argmin((way[:, 0] - ego.x_m) ** 2 + (way[:, 1] - ego.y_m) ** 2))
-    x, y, heading = way[nearest].tolist()
-    passed = nearest * _STEP_M + (ego.x_m - x) * math.cos(heading) + (ego.y_m - y) * math.sin(heading)
-    behind = max(0, nearest - math.ceil(ego.length_m / 2.0 / _STEP_M))
-    beyond = min(len(way), nearest + round(_AHEAD_M / _STEP_M))
-    return way[behind:beyond], np.arange(behind, beyond) * _STEP_M - passed
+def _straight(lane: LaneView) -> tuple[float, float, float] | None:
+    """(x, y) of a straight lane's first point and its heading; None for a bend."""
+    (x, y), *rest = lane.centre_m
+    heading = math.atan2(rest[-1][1] - y, rest[-1][0] - x)
+    off = max(abs(math.cos(heading) * (b - y) - math.sin(heading) * (a - x)) for a, b in rest)
+    return (x, y, heading) if off < _BENT_M else None
 
 
-def _meet(path: Points, at: Points, ego: VehicleState, other: VehicleState) -> tuple[float, float, float, bool] | None:
-    """(first, last) place of a way that another will cross, m from the ego; its way there, m; whether it joins.
-
-    None where they do not meet: it is past, or on its way elsewhere.
-    """
-    c, s = math.cos(other.heading_rad), math.sin(other.heading_rad)
-    dx, dy = path[:, 0] - other.x_m, path[:, 1] - other.y_m
-    along, across = c * dx + s * dy, np.abs(-s * dx + c * dy)
-    turn = np.abs((path[:, 2] - other.heading_rad + math.pi) % (2.0 * math.pi) - math.pi)
-    # The ego's length counts along its way, before `first` and behind `last`; its width where the ways are oblique.
-    near = across < other.width_m / 2.0 + _SIDE_M + np.abs(np.cos(turn)) * ego.width_m / 2.0
-    ahead = near & (along > -(other.length_m + ego.width_m) / 2.0)
-    crossing = ahead & (turn > CROSSING_RAD)
-    if not ahead.any() or turn[0] <= _SAME_RAD:
-        return None
-    begin = int(np.argmax(ahead))
-    # Where a way bends into the other's at a flat angle they meet all the same, where it does.
-    stop = begin + max(1, int(np.argmin(np.r_[crossing[begin:], False])))
-    merging = bool(stop < len(near) and ahead[stop])
-    arrival = float(along[begin:stop].min()) - (other.length_m + ego.width_m) / 2.0
-    return float(at[begin]), float(at[stop - 1]) + ego.length_m / 2.0, max(arrival, 0.0), merging
+def _turned(way: Array) -> float:
+    return float(np.abs(np.diff(np.unwrap(way[:, 2]))).sum())
 
 
-def _time_to(distance_m: float, speed_mps: float, top_mps: float, acceleration_mps2: float) -> float:
-    """Time to get so far while gaining speed up to a top, which a faster car keeps."""
-    if distance_m <= 0.0:
-        return 0.0
-    top = max(top_mps, speed_mps)
-    gaining_s = (top - speed_mps) / acceleration_mps2
-    gained_m = (speed_mps + top) / 2.0 * gaining_s
-    if gained_m < distance_m:
-        return gaining_s + (distance_m - gained_m) / top
-    return (-speed_mps + math.sqrt(speed_mps**2 + 2.0 * acceleration_mps2 * distance_m)) / acceleration_mps2
+def _along(way: Array, state: Array) -> bool:
+    at = foresight.nearest(way, state[0], state[1], -1)
+    return abs(wrap_to_pi(float(way[at, 2] - state[2]))) < _AWAY_RAD
+
+
+@dataclass(frozen=True, slots=True)
+class _Outlook:
+    """An instant, ready to be rolled on."""
+
+    state: Array
+    size: tuple[float, float]
+    others: Array
+    lanes: Array
+    table: ShieldParameters
+    dt_s: float
+
+    def way(self, points: Array) -> _Way:
+        """What is to be known of a way before it is driven."""
+        at = foresight.nearest(points, self.state[0], self.state[1], -1)
+        first, last, hold = foresight.stretch(points, at, self.size, self.others, self.table.others_braking_mps2)
+        del first
+        beyond = last + math.ceil(self.size[0] / foresight.STEP_M)
+        return _Way(points, at, beyond, hold - self.table.margin_m)
+
+    def trouble_s(self, command: Command, way: _Way, plan: _Plan, care: _Care) -> float:
+        """Time until a plan after a command ends badly; infinite if it ends well."""
+        return self.trouble(command, way, plan, care)[0]
+
+    def trouble(self, command: Command, way: _Way, plan: _Plan, care: _Care) -> tuple[float, int]:
+        """The same, and what it is."""
+        table = self.table
+        stops = plan.mps2 < 0.0
+        return foresight.foresee(
+            self.state,
+            (command.acceleration_mps2, command.steering_rad),
+            plan.mps2,
+            _CLEARING_MPS,
+            plan.law,
+            way.points,
+            way.at,
+            way.beyond,
+            way.hold_m,
+            self.size,
+            self.others,
+            self.lanes,
+            care.room_m,
+            care.turn_rad,
+            care.side_m,
+            care.after_s,
+            care.merge_s,
+            care.followers,
+            (
+                table.others_acceleration_mps2,
+                table.others_braking_mps2,
+                table.others_response_s,
+                table.others_sure_braking_mps2,
+            ),
+            table.braking_mps2,
+            self.dt_s,
+            round((_STOP_S if stops else _CLEAR_S) / self.dt_s),
+        )
+
+    def stops(self, command: Command, ways: Sequence[_Way], care: _Care) -> _Way | None:
+        """The first way on which the car can still stop after a command."""
+        return next((way for way in ways if self._ends_well(command, way, _STOPS, care)), None)
+
+    def clears(self, command: Command, ways: Sequence[_Way], care: _Care) -> _Way | None:
+        """The first way, if on each of them the crossing can be cleared after a command: any may be taken."""
+        return ways[0] if all(self._ends_well(command, way, _CLEARS, care) for way in ways) else None
+
+    def _ends_well(self, command: Command, way: _Way, plans: Sequence[_Plan], care: _Care) -> bool:
+        return any(self.trouble_s(command, way, plan, care) == math.inf for plan in plans)
+
+    def wheel_rad(self, law: int, way: _Way, acceleration_mps2: float) -> float:
+        """Steering angle of a law."""
+        return foresight.wheel(law, self.state, way.points, way.at, acceleration_mps2, self.dt_s)
+
+    def clearing_mps2(self, most_mps2: float) -> tuple[float, ...]:
+        """Accelerations that clear the crossing, as far as the other rules let them."""
+        return tuple(max(self.least_mps2, min(mps2, most_mps2)) for mps2 in _CLEARING_MPS2)
+
+    @property
+    def least_mps2(self) -> float:
+        """Hardest braking that does not reverse."""
+        return max(-self.table.braking_mps2, -max(float(self.state[3]), 0.0) / self.dt_s)
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    mps2: float
+    law: int
+
+
+_STOPS: Final = tuple(_Plan(-8.0, law) for law in (0, 1, 2))
+_CLEARS: Final = tuple(_Plan(mps2, law) for law in (3, 2) for mps2 in _CLEARING_MPS2)
+_YIELDS: Final = "Somebody crosses ahead, and goes first."
+_CLEARS_WHY: Final = "Somebody is coming: the crossing has to be cleared."
+_STRAYS: Final = "The car would leave its way, or get into that of somebody who crosses."
+
+
+def _mend(
+    outlook: _Outlook, ways: Sequence[_Way], command: Command, most_mps2: float, care: _Care
+) -> tuple[Mended, _Way] | None:
+    """The command with its acceleration mended, if that is enough, and the way that is then promised."""
+    asked, steering = command.acceleration_mps2, command.steering_rad
+    way = outlook.stops(command, ways, care) or outlook.clears(command, ways, care)
+    if way is not None:
+        return Mended(command), way
+    low, high = outlook.least_mps2, asked
+    way = outlook.stops(Command(low, steering), ways, care) if low < high else None
+    if way is not None:
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2.0
+            if outlook.stops(Command(middle, steering), [way], care):
+                low = middle
+            else:
+                high = middle
+        return Mended(Command(low, steering), "yield", _YIELDS), way
+    for clearing in outlook.clearing_mps2(most_mps2):
+        way = outlook.clears(Command(clearing, steering), ways, care) if asked < clearing else None
+        if way is not None:
+            return Mended(Command(clearing, steering), "clear", _CLEARS_WHY), way
+    return None
+
+
+def _rescue(outlook: _Outlook, way: _Way, command: Command, most_mps2: float) -> Mended:
+    """The command with steering and acceleration of the way that was promised; the least bad one if none ends well."""
+    asked = command.acceleration_mps2
+    least = outlook.least_mps2
+    clearing = outlook.clearing_mps2(most_mps2)
+    for care in (_DUE, _LOST):
+        # To stop comes first: the way that was promised need not be the one that is wanted.
+        for ends_well, accelerations in (
+            (outlook.stops, (asked, least)),
+            (outlook.clears, (asked, *clearing)),
+        ):
+            for acceleration in accelerations:
+                for law in range(foresight.LAWS):
+                    trial = Command(acceleration, outlook.wheel_rad(law, way, acceleration))
+                    if ends_well(trial, [way], care):
+                        return Mended(trial, "lane", _STRAYS)
+    best, latest = Command(least, 0.0), -1.0
+    for acceleration in (least, *clearing):
+        for law in range(foresight.LAWS):
+            trial = Command(acceleration, outlook.wheel_rad(law, way, acceleration))
+            for plan in (*_STOPS, *_CLEARS):
+                trouble = outlook.trouble_s(trial, way, plan, _LAST)
+                if trouble > latest:
+                    best, latest = trial, trouble
+    return Mended(best, "yield" if best.acceleration_mps2 <= asked else "clear", _STRAYS)

@@ -2,24 +2,24 @@
 
 It changes a command as little as is needed so that full braking and steering back to the lane still end well, whatever
 the others do within what `ShieldParameters` assume of them; it says what it changed and why. It knows no program, no
-wish and no model, and remembers nothing from one period to the next but the lane it could steer back to.
+wish and no model, and remembers nothing from one period to the next but the lane it could steer back to, and how the
+vehicle moved under the last command.
 
 Across the road: a command that would carry the body over a line is let through only if that lane is free, ahead and
 behind, by responsibility-sensitive distances; otherwise the car is steered back. Along it: no faster than still stops
 behind every car in the lanes the body touches or is on its way to; no harder braking than needed while somebody follows
-too closely; no reversing; not above the speed limit.
+too closely; no reversing; not above the speed limit. Where roads cross, `crossing.Junction` judges both at once.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from chauffeur.concept import Command, Intervention, LaneId, Limits, Snapshot, VehicleState
-from chauffeur.safety.shield.crossing import CLEARING_MPS, CLEARING_MPS2, INSIDE_M, NOTHING_CROSSES, Crossing, Junction
+from chauffeur.safety.shield.crossing import Junction
 from chauffeur.safety.shield.frame import Body, Lens, Scene, Strip
-from chauffeur.safety.shield.gaps import greatest_acceleration, rss_gap_m, stopping_m
+from chauffeur.safety.shield.gaps import greatest_acceleration, rss_gap_m
 from chauffeur.safety.shield.sweep import recovery_steering, swept, yaw_rate
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
 from chauffeur.safety.words import speed_words
@@ -35,8 +35,6 @@ _ALONE_RAD = 0.15
 """Angle to its lane that a slow car needs at most where there is one lane only."""
 _SLOW_MPS = 3.0
 _LANES_AT_ONCE = 2
-_HOLD_M = 1.0
-"""How far before a crossing way the ego stops."""
 _TOUCH_M = 0.05
 """How far a body must reach over a line to be in the lane beyond it."""
 _LEVEL_MPS2 = 1e-6
@@ -99,14 +97,17 @@ class Shield:
             return Guarded(safe, (Intervention("finite", "A command that is no number was replaced.", command, safe),))
         if scene is None:
             return Guarded(command)
-        lanes = [snapshot.ego.lane]
-        if aim is not None and snapshot.ego.lane is not None and _parts_from(snapshot.ego.lane, aim):
-            lanes.append(aim)
-            scene = self._aim_lens.look(snapshot, aim) or scene
-        steered = self._across(scene, snapshot.ego, command)
+        crossings = snapshot.kind == "intersection"
+        lane = snapshot.ego.lane
+        assert lane is not None
+        if aim is not None and _parts_from(lane, aim):
+            aimed = self._aim_lens.look(snapshot, aim)
+            if aimed is not None:
+                lane, scene = aim, aimed
+        steered = self._across(scene, snapshot.ego, command, crossings)
         self._back = steered.back
         said = list(steered.said)
-        mended = self._along(scene, snapshot.ego, self._crossing(snapshot, lanes), steered, said)
+        mended = self._along(scene, snapshot, lane, aim, steered, said)
         return Guarded(mended, tuple(said))
 
     def _standing_still(self, snapshot: Snapshot, scene: Scene | None) -> Command:
@@ -117,22 +118,25 @@ class Shield:
             steering = recovery_steering(scene.ego, own.centre_m, speed, self._table.steering_rad, scene.curvature)
         return Command(max(-self._table.braking_mps2, -max(speed, 0.0) / self._dt_s), steering)
 
-    def _crossing(self, snapshot: Snapshot, lanes: Sequence[LaneId | None]) -> Crossing:
-        if snapshot.kind != "intersection":
-            return NOTHING_CROSSES
+    def _guard_of(self, snapshot: Snapshot) -> Junction:
         if self._junction is None or self._junction.lanes is not snapshot.lanes:
-            self._junction = Junction(snapshot.lanes)
-        return self._junction.look(snapshot, self._table.others_acceleration_mps2, lanes)
+            self._junction = Junction(snapshot.lanes, self._table, self._dt_s)
+        return self._junction
 
     # Across -----------------------------------------------------------------------------------------------------------
 
-    def _across(self, scene: Scene, ego: VehicleState, command: Command) -> _Steered:
+    def _across(self, scene: Scene, ego: VehicleState, command: Command, crossings: bool) -> _Steered:
         """The command with its steering mended, and what it touches across the road.
 
         A command is let through if after one period of it the car can still be steered back into a lane without
         touching anything on the way. That lane is kept: whatever the next command is, the way back to it is open.
         """
         own = _own(scene)
+        if crossings:  # where roads cross, the way is judged as it bends, and as the tyres take it
+            steering = recovery_steering(
+                scene.ego, own.centre_m, ego.speed_mps, self._table.steering_rad, scene.curvature
+            )
+            return _Steered(command, _lanes_wide(scene, self._swept(scene, ego, steering, own)), own.lane)
         back = next((strip for strip in scene.strips if strip.lane == self._back), own)
         why = ""
         for lane in (own, back) if back is not own else (own,):
@@ -226,20 +230,22 @@ class Shield:
     # Along ------------------------------------------------------------------------------------------------------------
 
     def _along(
-        self, scene: Scene, ego: VehicleState, crossing: Crossing, steered: _Steered, said: list[Intervention]
+        self,
+        scene: Scene,
+        snapshot: Snapshot,
+        lane: LaneId,
+        aim: LaneId | None,
+        steered: _Steered,
+        said: list[Intervention],
     ) -> Command:
         """The command with its acceleration mended."""
-        command, span, speed = steered.command, steered.span, ego.speed_mps
+        command, span, speed = steered.command, steered.span, snapshot.ego.speed_mps
+        crossings = snapshot.kind == "intersection"
         asked = command.acceleration_mps2
-        bound = self._bound(scene, span)
-        if not crossing.inside and math.isfinite(crossing.hold_m):
-            bound = self._yielding(crossing, ego, bound)
+        bound = self._bound(scene, span, crossings)
         wanted = min(asked, bound.acceleration_mps2)
         rule, reason = bound.rule, bound.reason
-        if crossing.inside and speed < CLEARING_MPS and wanted < min(CLEARING_MPS2, bound.acceleration_mps2):
-            wanted = min(CLEARING_MPS2, bound.acceleration_mps2)
-            rule, reason = "clear", "Somebody is coming: the crossing has to be cleared."
-        elif wanted >= asked - _LEVEL_MPS2 and wanted < -self._table.gentle_mps2:
+        if wanted >= asked - _LEVEL_MPS2 and wanted < -self._table.gentle_mps2:
             spared = min(self._spared(scene, span, wanted), bound.acceleration_mps2)
             if spared > wanted:
                 wanted, rule = spared, "brake"
@@ -247,26 +253,21 @@ class Shield:
         standing = -max(speed, 0.0) / self._dt_s
         if wanted < standing:
             wanted, rule, reason = standing, "reverse", "The car stands; it does not reverse."
-        if abs(wanted - asked) <= _LEVEL_MPS2:
-            return command
         mended = Command(wanted, command.steering_rad)
-        if speed > 0.0 or wanted < asked:
+        if crossings:
+            result = self._guard_of(snapshot).mend(snapshot, lane, aim, mended, bound.acceleration_mps2)
+            if result.rule:
+                mended, rule, reason = result.command, result.rule, result.reason
+        faster = mended.acceleration_mps2 - asked
+        turned = abs(mended.steering_rad - command.steering_rad) > _LEVEL_RAD
+        if abs(faster) <= _LEVEL_MPS2 and not turned:
+            return command
+        if turned or speed > 0.0 or faster < 0.0:
             said.append(Intervention(rule, reason, command, mended))
         return mended
 
-    def _yielding(self, crossing: Crossing, ego: VehicleState, bound: _Cap) -> _Cap:
-        """The bound with which the car still stops before a way that somebody else needs; as it was past that point."""
-        speed = max(ego.speed_mps, 0.0)
-        front = crossing.hold_m - ego.length_m / 2.0
-        if front + INSIDE_M < stopping_m(speed, self._table.braking_mps2, self._dt_s):
-            return bound
-        cap = self._greatest(speed, front - _HOLD_M, 0.0)
-        if cap >= bound.acceleration_mps2:
-            return bound
-        return _Cap(cap, "yield", "Somebody crosses ahead, and goes first.")
-
-    def _bound(self, scene: Scene, span: Span) -> _Cap:
-        """The strictest bound of the acceleration."""
+    def _bound(self, scene: Scene, span: Span, crossings: bool) -> _Cap:
+        """The strictest bound of the acceleration; where roads cross, those who do are minded elsewhere."""
         table, ego = self._table, scene.ego
         speed = max(math.hypot(ego.along_mps, ego.across_mps), 0.0)
         most = scene.speed_limit_mps + self._limits.max_over_limit_mps
@@ -276,7 +277,11 @@ class Shield:
         allowed = towards if towards >= 0.0 else max(towards, -_SLOWING_MPS2)
         strictest = _Cap(min(allowed, table.acceleration_mps2), "speed", f"No faster than {speed_words(most)} here.")
         for other in scene.others:
-            if other.s_m <= 0.0 or not _overlaps(other, span, table.side_m, table.drift_mps):
+            if (
+                other.s_m <= 0.0
+                or (crossings and other.crosses)
+                or not _overlaps(other, span, table.side_m, table.drift_mps)
+            ):
                 continue
             gap = ego.gap_m(other)
             cap = self._greatest(speed, gap - table.margin_m, other.along_mps)

@@ -36,8 +36,16 @@ def _with_wheel(most_rad: float) -> LaneKeepingParameters:
 
 def yaw_rate(speed_mps: float, steering_rad: float) -> float:
     """Rate of turn, rad/s, of the kinematic bicycle."""
-    slip = math.atan(0.5 * math.tan(steering_rad))
-    return speed_mps * math.sin(slip) / _HALF_LENGTH_M
+    return _turning(speed_mps, _slip(steering_rad))
+
+
+def _slip(steering_rad: float) -> float:
+    """Angle, rad, between the car's heading and where its centre goes."""
+    return math.atan(0.5 * math.tan(steering_rad))
+
+
+def _turning(speed_mps: float, slip_rad: float) -> float:
+    return speed_mps * math.sin(slip_rad) / _HALF_LENGTH_M
 
 
 def swept(
@@ -77,7 +85,7 @@ def swept(
             angle = lane_keeping_steering(speed_mps, heading, offset, bend * parameters.preview_s, parameters)
         else:
             angle = steering_rad
-        slip = math.atan(0.5 * math.tan(angle))
+        slip = _slip(angle)
         d += speed_mps * math.sin(heading + slip) * dt_s
-        heading += (speed_mps * math.sin(slip) / _HALF_LENGTH_M - bend) * dt_s
+        heading += (_turning(speed_mps, slip) - bend) * dt_s
     return low, high

@@ -1,0 +1,213 @@
+"""Mutation testing of the checks before a drive: small changes are made to them, and some test must notice each.
+
+    python benchmarks/mutation/run.py [--modules envelope,gate] [--out DIR]
+
+Needs mutmut 3 (`pip install mutmut`). It works on a copy in the folder of `--out` and never touches this repository;
+a second run goes on with what the first has left and tries only what has changed. Each module is tried against the few
+test files that are about it. `RESULT.json` there has the figures, `survivors.txt` every mutant that no test noticed, as
+a difference; SURVIVORS.md beside this file says of those that stay why they do not matter.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, Final
+
+ROOT: Final = Path(__file__).resolve().parents[2]
+
+KILLED, SURVIVED, UNTESTED, TIMED_OUT, SUSPICIOUS = "killed", "survived", "untested", "timed out", "suspicious"
+_BY_EXIT_CODE: Final = {1: KILLED, 3: KILLED, 0: SURVIVED, 5: UNTESTED, 33: UNTESTED, 36: TIMED_OUT, 24: TIMED_OUT}
+"""mutmut's own table; -24 and 152 are a CPU limit that was reached."""
+
+
+@dataclass(frozen=True, slots=True)
+class Module:
+    """A module, and the tests that are about it."""
+
+    path: str
+    tests: tuple[str, ...]
+
+
+_WORDS: Final = "tests/safety/test_verdict_words.py"
+_CHECKS: Final = "tests/safety/test_checks_edges.py"
+_GATE_TESTS: Final = ("tests/programs/test_gate_edges.py", "tests/programs/test_placing.py")
+MODULES: Final = {
+    "envelope": Module("safety/envelope.py", ("tests/safety/test_parameters_check.py", _WORDS)),
+    "format": Module("safety/format.py", ("tests/safety/test_format_check.py", _WORDS)),
+    "reach": Module("safety/reach.py", ("tests/safety/test_reach.py", "tests/safety/test_reach_words.py", _CHECKS)),
+    "checks": Module(
+        "safety/checks.py", ("tests/safety/test_format_check.py", "tests/safety/test_parameters_check.py", _WORDS)
+    ),
+    "screening": Module(
+        "safety/screening.py", ("tests/safety/test_screening.py", _CHECKS, "tests/safety/test_screening_edges.py")
+    ),
+    "gate": Module("programs/gate.py", _GATE_TESTS),
+    "placing": Module("programs/placing.py", _GATE_TESTS),
+}
+_SLOW: Final = (
+    "tests/programs/test_placing.py::test_what_the_compiler_takes_runs",
+    "tests/programs/test_placing.py::test_formats_that_can_be_are_not_refused",
+    "tests/programs/test_placing.py::test_benign_programs_have_nothing_misplaced",
+    "tests/safety/test_reach.py::test_no_program_of_the_retrieval_planner_is_refused_that_passed_before",
+    "tests/safety/test_screening.py::test_long_texts_cost_little",
+)
+
+
+_FORGETFUL: Final = """
+import gc
+from functools import _lru_cache_wrapper
+
+_kept = []
+
+
+def pytest_collection_finish(session):
+    _kept[:] = [one for one in gc.get_objects() if isinstance(one, _lru_cache_wrapper)
+                and str(one.__module__).startswith("chauffeur.programs")]
+
+
+def pytest_runtest_setup(item):
+    for one in _kept:
+        one.cache_clear()
+"""
+"""A plugin for pytest: verdicts remembered from before a mutation must not stand for those after it."""
+
+
+def main() -> int:
+    """Try the mutants of the modules named."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--modules", default=",".join(MODULES), help=f"of {', '.join(MODULES)}")
+    parser.add_argument("--out", type=Path, default=Path.home() / ".cache" / "chauffeur-mutation")
+    given = parser.parse_args()
+    names = given.modules.split(",")
+    if unknown := set(names) - MODULES.keys():
+        parser.error(f"no such module: {', '.join(sorted(unknown))}")
+    try:
+        version("mutmut")
+    except PackageNotFoundError:
+        print("mutmut is not installed: pip install mutmut", file=sys.stderr)
+        return 2
+    results = [_tried(name, MODULES[name], given.out / name) for name in names]
+    for result in results:
+        (given.out / result["module"] / "RESULT.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    print(
+        f"\n{'module':<12}{'mutants':>8}{'killed':>8}{'survived':>10}{'untested':>10}{'timed out':>10}{'killed, %':>11}"
+    )
+    for result in results:
+        count = result["mutants"]
+        caught = result[KILLED] + result[TIMED_OUT]
+        share = 100.0 * caught / count if count else 0.0
+        print(
+            f"{result['module']:<12}{count:>8}{result[KILLED]:>8}{result[SURVIVED]:>10}{result[UNTESTED]:>10}"
+            f"{result[TIMED_OUT]:>10}{share:>11.1f}"
+        )
+    return 0
+
+
+def _tried(name: str, module: Module, folder: Path) -> dict[str, Any]:
+    _laid_out(module, folder)
+    begun = time.monotonic()
+    environment = {**os.environ, "PYTHONPATH": ""}
+    with (folder / "log.txt").open("wb") as log:
+        subprocess.run(
+            [sys.executable, "-m", "mutmut", "run", "--max-children", "1"],
+            cwd=folder, stdout=log, stderr=log, env=environment, check=False,
+        )  # fmt: skip
+    verdicts = _verdicts(folder / "mutants" / "src" / "chauffeur" / f"{module.path}.meta")
+    counts = Counter(verdicts.values())
+    left = sorted(key for key, verdict in verdicts.items() if verdict in (SURVIVED, UNTESTED, SUSPICIOUS))
+    (folder / "survivors.txt").write_text(_shown(left, folder), encoding="utf-8")
+    print(
+        f"{name}: {len(verdicts)} mutants in {time.monotonic() - begun:.0f} s, {len(left)} left; {folder / 'log.txt'}"
+    )
+    return {
+        "module": name,
+        "path": module.path,
+        "tests": module.tests,
+        "mutants": len(verdicts),
+        **{verdict: counts[verdict] for verdict in (KILLED, SURVIVED, UNTESTED, TIMED_OUT, SUSPICIOUS)},
+        "left": left,
+        "versions": {
+            "python": platform.python_version(),
+            "mutmut": version("mutmut"),
+            "chauffeur": version("chauffeur"),
+        },
+    }
+
+
+def _laid_out(module: Module, folder: Path) -> None:
+    """A copy of the sources and tests, with mutmut's settings."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for part in ("src", "tests"):
+        _mirrored(ROOT / part, folder / part)
+    present = [test for test in module.tests if (ROOT / test).is_file()]
+    deselected = [f"--deselect={test}" for test in _SLOW if test.partition("::")[0] in present]
+    (folder / "forgetful.py").write_text(_FORGETFUL, encoding="utf-8")
+    arguments = ["-p", "forgetful", "-p", "no:xdist", "-p", "no:cacheprovider", "-p", "no:randomly", *deselected]
+    lines = [
+        "[mutmut]",
+        "source_paths=src",
+        f"only_mutate=src/chauffeur/{module.path}",
+        "use_git_change_detection=False",
+        "also_copy=\n    forgetful.py",
+        "mutate_only_covered_lines=False",
+        "timeout_constant=15.0",  # a busy machine is no infinite loop
+        "pytest_add_cli_args=" + "".join(f"\n    {one}" for one in arguments),
+        "pytest_add_cli_args_test_selection=" + "".join(f"\n    {one}" for one in present),
+    ]
+    (folder / "setup.cfg").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _mirrored(source: Path, copy: Path) -> None:
+    """Copy what has changed, remove what is gone; what has not changed keeps its time, by which mutmut goes."""
+    there = {
+        path.relative_to(source) for path in source.rglob("*") if path.is_file() and "__pycache__" not in path.parts
+    }
+    for path in copy.rglob("*"):
+        if path.is_file() and path.relative_to(copy) not in there:
+            path.unlink()
+    for relative in there:
+        one, other = source / relative, copy / relative
+        if not other.is_file() or other.stat().st_mtime != one.stat().st_mtime:
+            other.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(one, other)
+
+
+def _verdicts(meta: Path) -> dict[str, str]:
+    codes: dict[str, int | None] = json.loads(meta.read_text("utf-8"))["exit_code_by_key"]
+    return {
+        key: TIMED_OUT if code is not None and (code < 0 or code == 152) else _BY_EXIT_CODE.get(code or 0, SUSPICIOUS)
+        for key, code in codes.items()
+        if code is not None
+    }
+
+
+_SHOW: Final = """
+import sys
+from mutmut.mutation.diff_apply import get_diff_for_mutant
+for key in sys.stdin.read().split():
+    print(f"# {key}")
+    print(get_diff_for_mutant(key))
+"""
+
+
+def _shown(keys: list[str], folder: Path) -> str:
+    """Mutants as differences."""
+    done = subprocess.run(
+        [sys.executable, "-c", _SHOW], input="\n".join(keys), cwd=folder, capture_output=True, text=True, check=False
+    )
+    return done.stdout or done.stderr
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,204 @@
+"""What `chauffeur live` does while it drives: asks wishes in their turn, listens, and stops when it is told to."""
+
+from __future__ import annotations
+
+import signal
+import time
+from concurrent.futures import Future
+from types import FrameType
+from typing import Final
+
+from chauffeur.cli.lines import Lines
+from chauffeur.cli.live_screen import QuietScreen, last_words
+from chauffeur.concept import Instruction, InstructionError, PersonId
+from chauffeur.drive.live.books import Books
+from chauffeur.drive.live.messages import Report
+from chauffeur.drive.live.orders import Event
+from chauffeur.drive.live.supervisor import Interaction, Replaced, Runtime
+from chauffeur.drive.session import MAX_WISH_CHARACTERS, parse_wish
+
+STOP: Final = "stop"
+"""The line that ends the drive."""
+
+DRIVEN_FOR_S: Final = 10.0
+"""So long a given wish is driven, in the car's time, before the next one is asked: some have no end of their own."""
+LOOK_EVERY_S: Final = 0.05
+
+_MOST_WAITING: Final = 64
+"""Lines of a file that are read ahead."""
+_OVER: Final = "The drive was over before it came to this."
+_WELL: Final = ("ended", "stopped")
+_UNDRIVEN: Final = ("declined", "unplanned", "refused", "stale", "failed")
+
+
+class LiveDrive:
+    """Asks wishes, listens, and looks at the clock, until the car stands or the trip is over."""
+
+    def __init__(
+        self, screen: QuietScreen, books: Books | None, given: list[str], person: PersonId, every_s: float | None
+    ) -> None:
+        self._screen, self._books, self._person, self._every_s = screen, books, person, every_s
+        self._given = given
+        self._typed: list[str] = []
+        self._keeping: tuple[Instruction, Future[bool]] | None = None
+        self._at_s = self._asked_at_s = self._driven_at_s = 0.0
+        self._stopping = False
+        self._passed_over = 0
+        self.interrupts = 0
+        self.well = False
+
+    def tell(self, heard: Event | Report | Replaced) -> None:
+        """What the runtime tells."""
+        match heard:
+            case Report():
+                self._at_s = heard.tick * self._screen.dt_s
+            case Event(kind="started"):
+                self._driven_at_s = self._at_s
+            case _:
+                pass
+        if self._books is not None:
+            self._books.tell(heard)
+        self._screen.tell(heard)
+
+    def run(self, runtime: Runtime, lines: Lines) -> None:
+        """Drive to the end."""
+        self._screen.runtime = runtime
+        numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        heard = [number for number in numbers if signal.getsignal(number) != signal.SIG_IGN]  # nohup stays nohup
+        before = {number: signal.signal(number, self._interrupt) for number in heard}
+        outcome = "aborted"
+        try:
+            while runtime.driving:
+                self._look(runtime, lines)
+            runtime.poll()
+            ended = runtime.report is not None and runtime.report.ended
+            outcome = runtime.report.outcome if ended and runtime.report is not None else "died"
+        except KeyboardInterrupt:
+            runtime.abort()
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+        runtime.stop()
+        self._end(runtime, outcome)
+
+    def _look(self, runtime: Runtime, lines: Lines) -> None:
+        if lines.terminal or len(self._given) < _MOST_WAITING:
+            for line in lines.read(LOOK_EVERY_S):
+                self._take(runtime, line, typed=lines.terminal)
+        else:
+            time.sleep(LOOK_EVERY_S)
+        runtime.poll()
+        if not self._stopping:
+            self._ask(runtime)
+        if self.interrupts and not self._stopping:
+            self._stop(runtime)
+        typing = lines.terminal and lines.open and not self._stopping
+        self._screen.refresh(lines.typed if typing else None, self._stopping)
+
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        del number, frame
+        self.interrupts += 1
+        if self.interrupts > 1:
+            raise KeyboardInterrupt
+
+    def _stop(self, runtime: Runtime) -> None:
+        self._stopping = True
+        self._screen.note("Stopping. The car comes to a stand; Ctrl-C ends at once.")
+        runtime.halt()
+
+    # Wishes -----------------------------------------------------------------------------------------------------------
+
+    def _take(self, runtime: Runtime, line: str, *, typed: bool) -> None:
+        """A line: what is typed is meant now, what a file holds is meant in its turn."""
+        if self._stopping or not line.strip():
+            return
+        if not typed:
+            self._given.append(line)
+        elif is_stop(line):
+            self._stop(runtime)
+        else:
+            self._typed.append(line)
+
+    def _ask(self, runtime: Runtime) -> None:
+        """Write the next wish down, and hand it on once it is on the disk."""
+        if self._keeping is not None:
+            instruction, kept = self._keeping
+            if not kept.done():
+                return
+            if not kept.result():
+                self._screen.note("The audit log could not be written in time; the wish is asked all the same.")
+            self._keeping = None
+            self._hand_on(runtime, instruction)
+        elif self._typed:
+            self._keep(runtime, self._typed.pop(0))
+        elif self._given and self._in_turn(runtime):
+            line = self._given.pop(0)
+            if is_stop(line):
+                self._stop(runtime)
+            else:
+                self._keep(runtime, line)
+
+    def _in_turn(self, runtime: Runtime) -> bool:
+        if not runtime.interactions:
+            return True
+        if self._every_s is not None:
+            return self._at_s - self._asked_at_s >= self._every_s
+        *_, last = runtime.interactions.values()
+        if last.stage == "driven":
+            return self._at_s - self._driven_at_s >= DRIVEN_FOR_S
+        return last.stage == "closed"
+
+    def _keep(self, runtime: Runtime, line: str) -> None:
+        try:
+            instruction = parse_wish(line, self._person)
+        except InstructionError as error:
+            self._screen.note(str(error))
+            self._pass_over(line, "refused", str(error))
+            return
+        if self._books is None:
+            self._hand_on(runtime, instruction)
+        else:
+            self._books.wish(runtime.next_wish, instruction)
+            self._keeping = instruction, self._books.kept()
+
+    def _hand_on(self, runtime: Runtime, instruction: Instruction) -> None:
+        self._asked_at_s = self._at_s
+        self._screen.asked(runtime.next_wish, instruction.text)
+        runtime.ask(instruction.text, instruction.person)
+
+    def _pass_over(self, line: str, kind: str, why: str) -> None:
+        """A wish that is not handed on stands in the books all the same."""
+        self._passed_over += 1
+        if self._books is not None:
+            self._books.wish("", Instruction(line[:MAX_WISH_CHARACTERS], self._person))
+            self._books.answer("", kind, why)
+
+    def _end(self, runtime: Runtime, outcome: str) -> None:
+        unasked: list[str] = []
+        if self._keeping is not None:
+            unasked.append(self._keeping[0].text)
+            if self._books is not None:
+                self._books.answer(runtime.next_wish, "not_asked", _OVER)
+        for line in (*self._typed, *self._given):
+            if not is_stop(line):
+                unasked.append(line.strip())
+                self._pass_over(line, "not_asked", _OVER)
+        figures = runtime.figures()
+        if self._books is not None:
+            self._books.end(outcome, figures, runtime.lost_reports)
+        self._screen.end(outcome, figures, tuple(unasked), last_words(runtime) if outcome == "died" else "")
+        driven = all(_driven(each) for each in runtime.interactions.values())
+        self.well = outcome in _WELL and driven and not unasked and not self._passed_over
+
+
+def is_stop(line: str) -> bool:
+    """Whether a line ends the drive."""
+    return line.strip().lower() == STOP
+
+
+def _driven(interaction: Interaction) -> bool:
+    """Whether a wish was driven, or gave way to another one."""
+    answer = interaction.answer
+    if answer is None or answer.kind in _UNDRIVEN:
+        return False
+    return answer.kind != "interrupted" or any(event.kind == "started" for event in interaction.events)

@@ -1,0 +1,253 @@
+"""The books of a drive in real time: every wish, what became of it, and what control did, in the audit log.
+
+A wish is on the disk before it goes to the planner (`kept`); all else is handed over as it is heard, and neither waits
+nor raises. A session that was killed leaves its open wishes behind; `unanswered` finds them.
+
+Besides the records of any drive (`drive/auditing.py`), each with the id of its wish: `verdict` of `live`, whether a
+plan was started; `outcome`, what became of a wish, and of the drive; `context`, what happened in between: `event` is
+one of the events of a wish, `replaced`, `rung` or `settings`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+from chauffeur.concept import NOBODY, Instruction
+from chauffeur.drive.auditing import FLUSH_TIMEOUT_S, Auditor, plan_record
+from chauffeur.drive.live.messages import MessageError, Report, Rung
+from chauffeur.drive.live.orders import Event, read_order
+from chauffeur.drive.live.ring import Reader, Ring
+from chauffeur.drive.live.settings import Settings, ring
+from chauffeur.drive.live.supervisor import Replaced, Runtime
+from chauffeur.safety.audit.reading import read_records
+from chauffeur.safety.audit.redaction import PERSON
+from chauffeur.safety.audit.texts import words_of
+from chauffeur.safety.audit.writer import Closing
+
+JUDGED: Final = "live"
+"""Name of the judgement over all checks, made when a plan is about to start: the policy tells no more of it."""
+
+_DRIVEN: Final[frozenset[Rung]] = frozenset({"follow", "hold"})
+"""Between these the ladder goes up and down without anything being let go of."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unanswered:
+    """A wish of a session that ended before it was answered.
+
+    Attributes:
+        wish: Its id there.
+        text: The words, or in brackets why they are not kept.
+        person: Who said it.
+    """
+
+    wish: str
+    text: str
+    person: str
+
+
+def unanswered(path: Path) -> tuple[Unanswered, ...]:
+    """Wishes of the last session in a log to which nothing was answered, oldest first; none where there is no log.
+
+    Raises:
+        DataError: The log cannot be read.
+    """
+    waiting: dict[str, Unanswered] = {}
+    if not path.is_file():
+        return ()
+    for _, record in read_records(path):
+        wish = str(record.body.get("wish", ""))
+        match record.kind:
+            case "opened":
+                waiting.clear()
+            case "wish":
+                words = words_of(record)
+                waiting[wish] = Unanswered(wish, words.get("wish", ""), words.get(PERSON, ""))
+            case "outcome":
+                waiting.pop(wish, None)
+            case _:
+                pass
+    return tuple(waiting.values())
+
+
+class Books:
+    """Writes one drive in real time into a log; used from the thread that polls the drive."""
+
+    def __init__(self, auditor: Auditor, dt_s: float) -> None:
+        """Keep books.
+
+        Args:
+            auditor: Writes the log.
+            dt_s: Control period in vehicle time.
+        """
+        self._auditor, self._log, self._dt_s = auditor, auditor.log, dt_s
+        self._disk = ThreadPoolExecutor(1, "audit flush")
+        self._runtime: Runtime | None = None
+        self._orders: tuple[Ring, Reader] | None = None
+        self._people: dict[str, str] = {}
+        self._rung: Rung = "follow"
+        self._rungs: Counter[Rung] = Counter()
+        self._tick = -1
+        self._outcome_written = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is not None:
+            self._over("broken_off", {"error": type(error).__name__})
+        self.close()
+
+    def follow(self, runtime: Runtime, settings: Settings) -> None:
+        """A drive has begun; what is told from now on is its.
+
+        Args:
+            runtime: Processes of the drive.
+            settings: What they were told.
+        """
+        self._runtime = runtime
+        orders = ring(runtime.folder, "orders")
+        self._orders = orders, Reader(orders, old=True)
+        about = {name: value for name, value in asdict(settings).items() if name not in ("starts", "base_url")}
+        starts = [{"limits": asdict(start.limits), "most_s": start.most_s} for start in settings.starts]
+        self._note("settings", {**about, "starts": starts})
+
+    def wish(self, wish: str, instruction: Instruction) -> None:
+        """Write a wish down; it is handed to the planner when `kept` says so.
+
+        Args:
+            wish: Id it will have; empty for one that will not be asked.
+            instruction: The words, and whose they are.
+        """
+        self._people[wish] = str(instruction.person)
+        self._personal("wish", wish, {"wish": wish, "source": instruction.source}, {"wish": instruction.text})
+
+    def kept(self) -> Future[bool]:
+        """Whether all of this is on the disk, as soon as that is known: at most `FLUSH_TIMEOUT_S` later."""
+        return self._disk.submit(self._log.flush, FLUSH_TIMEOUT_S)
+
+    def answer(self, wish: str, kind: str, why: str) -> None:
+        """What became of a wish that the drive itself never heard of."""
+        self._personal("outcome", wish, {"wish": wish, "outcome": kind}, {"detail": why})
+
+    def tell(self, heard: Event | Report | Replaced) -> None:
+        """Hear what the drive tells."""
+        match heard:
+            case Report():
+                self._auditor.guarded("actuation", lambda: self._report(heard))
+            case Replaced():
+                self._note("replaced", {"process": heard.role, "why": heard.why})
+            case Event():
+                self._auditor.guarded("plan", self._plans)
+                self._auditor.guarded("outcome", lambda: self._event(heard))
+
+    def end(self, outcome: str, figures: Mapping[str, Any] | None, lost_reports: int) -> None:
+        """How the drive ended.
+
+        Args:
+            outcome: Of the trip, as control reported it; or what became of control.
+            figures: Its punctuality, if it could still tell.
+            lost_reports: Control periods nobody heard of.
+        """
+        self._over(outcome, {"control": dict(figures or {}), "lost_reports": lost_reports})
+
+    def close(self) -> Closing:
+        """Write what is left, close the log, and say how it ended; a second call says the same."""
+        self._disk.shutdown()
+        if self._orders is not None:
+            self._orders[0].close()
+            self._orders = None
+        return self._auditor.close()
+
+    def _report(self, report: Report) -> None:
+        if self._tick >= 0 and report.tick > self._tick + 1:
+            self._log.append(
+                "gap", {"lost": {"period": report.tick - self._tick - 1}, "why": "reports of control were not heard"}
+            )
+        self._tick = report.tick
+        self._rungs[report.rung] += 1
+        at_s = report.tick * self._dt_s
+        self._auditor.period(
+            report.tick,
+            at_s,
+            report.speed_mps,
+            report.wishes,
+            report.requested,
+            report.applied,
+            report.state,
+            report.interventions,
+        )
+        before, self._rung = self._rung, report.rung
+        if before != report.rung and not {before, report.rung} <= _DRIVEN:
+            self._note("rung", {"wish": report.plan, "rung": report.rung, "age_s": report.age_s, "tick": report.tick})
+
+    def _event(self, event: Event) -> None:
+        at = {"wish": event.wish, "tick": self._tick}
+        interaction = None if self._runtime is None else self._runtime.interactions.get(event.wish)
+        closed = interaction is not None and interaction.answer is event
+        match event.kind:
+            case "planned":
+                pass  # the plan itself has been written down
+            case "started":
+                self._verdict(event, "")
+            case "refused":
+                self._verdict(event, event.text)
+            case "stale" if not closed:  # told once as it comes, and once more if it is the last word
+                self._verdict(event, event.text)
+            case "declined":
+                self._personal("plan", event.wish, {**at, "policy": None, "refused": True}, {"refusal": event.text})
+            case _ if not closed:
+                self._personal("context", event.wish, {"event": event.kind, **at}, {"text": event.text})
+            case _:
+                pass
+        if closed:
+            self._personal("outcome", event.wish, {**at, "outcome": event.kind}, {"detail": event.text})
+
+    def _verdict(self, event: Event, why: str) -> None:
+        body = {"wish": event.wish, "check": JUDGED, "passed": not why, "line": None, "tick": self._tick}
+        self._personal("verdict", event.wish, body, {"reason": why})
+
+    def _plans(self) -> None:
+        """Write down the plans that came since: the planner sends one before anybody tells of it."""
+        if self._orders is None:
+            return
+        messages, lost = self._orders[1].news()
+        if lost:
+            self._log.append("gap", {"lost": {"plan": lost}, "why": "plans were overwritten before they were read"})
+        for message in messages:
+            try:
+                order = read_order(message.payload)
+            except MessageError as error:
+                self._note("garbage", {"process": "planner", "why": str(error)})
+                continue
+            body, texts = plan_record(order.plan)
+            self._personal("plan", order.wish, {"wish": order.wish, **body, "tick": order.scene.tick}, texts)
+
+    def _over(self, outcome: str, body: Mapping[str, Any]) -> None:
+        if not self._outcome_written:
+            self._outcome_written = True
+            self._auditor.guarded("actuation", self._auditor.hand_over)
+            self._log.append(
+                "outcome",
+                {
+                    "outcome": outcome,
+                    "duration_s": round((self._tick + 1) * self._dt_s, 6),
+                    "periods_by_rung": dict(self._rungs),
+                    **body,
+                },
+            )
+
+    def _note(self, event: str, body: Mapping[str, Any]) -> None:
+        self._log.append("context", {"event": event, **body})
+
+    def _personal(self, kind: Any, wish: str, body: Mapping[str, Any], texts: Mapping[str, str]) -> None:
+        person = self._people.get(wish, NOBODY)
+        self._log.append(kind, body, {PERSON: person} | {name: text for name, text in texts.items() if text})

@@ -1,0 +1,88 @@
+"""What the run-time shield did in a drive: its changes put together to stretches of time, and counted by rule."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from chauffeur.concept import Command, Frame, Intervention
+
+_PAUSE_S = 0.45
+"""Changes by one rule that are no further apart are one stretch."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A time during which a rule changed commands.
+
+    Attributes:
+        rule: The rule.
+        reason: In the shield's words, of the greatest change.
+        start_s, end_s: When; the end is that of the last period changed.
+        changes: Control periods changed.
+        before, after: The command as it came and as it went on, of the greatest change.
+    """
+
+    rule: str
+    reason: str
+    start_s: float
+    end_s: float
+    changes: int
+    before: Command
+    after: Command
+
+
+@dataclass(frozen=True, slots=True)
+class RuleCount:
+    """How much of a drive a rule had a hand in: stretches, and control periods changed."""
+
+    rule: str
+    stretches: int
+    changes: int
+
+
+def stretches_of(frames: Sequence[Frame]) -> tuple[Stretch, ...]:
+    """All stretches of a drive, in order of their beginning."""
+    times = [frame.snapshot.time_s for frame in frames]
+    period_s = min((after - before for before, after in pairwise(times)), default=0.0)
+    done: list[Stretch] = []
+    running: dict[str, Stretch] = {}
+    for frame in frames:
+        now = frame.snapshot.time_s
+        for change in frame.interventions:
+            before = running.get(change.rule)
+            if before is not None and now - before.end_s <= _PAUSE_S:
+                running[change.rule] = _longer(before, change, now + period_s)
+                continue
+            if before is not None:
+                done.append(before)
+            running[change.rule] = Stretch(
+                change.rule, change.reason, now, now + period_s, 1, change.before, change.after
+            )
+    return tuple(sorted((*done, *running.values()), key=lambda stretch: (stretch.start_s, stretch.rule)))
+
+
+def rule_counts(stretches: Sequence[Stretch]) -> tuple[RuleCount, ...]:
+    """By rule, the one that changed most first."""
+    found = [
+        RuleCount(
+            rule,
+            len(own := [stretch for stretch in stretches if stretch.rule == rule]),
+            sum(stretch.changes for stretch in own),
+        )
+        for rule in dict.fromkeys(stretch.rule for stretch in stretches)
+    ]
+    return tuple(sorted(found, key=lambda count: -count.changes))
+
+
+def _longer(stretch: Stretch, change: Intervention, end_s: float) -> Stretch:
+    longer = replace(stretch, end_s=end_s, changes=stretch.changes + 1)
+    if _size(change.before, change.after) <= _size(stretch.before, stretch.after):
+        return longer
+    return replace(longer, reason=change.reason, before=change.before, after=change.after)
+
+
+def _size(before: Command, after: Command) -> tuple[float, float]:
+    """How great a change is; any of the steering counts more than all of the pedals."""
+    return abs(after.steering_rad - before.steering_rad), abs(after.acceleration_mps2 - before.acceleration_mps2)

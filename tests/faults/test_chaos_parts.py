@@ -1,0 +1,108 @@
+"""Who does the damage, tried alone: the vandal on real rings, the language model over real HTTP, the table."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import time
+from urllib.parse import urlsplit
+
+import pytest
+
+from chauffeur.bench.chaos import replies
+from chauffeur.bench.chaos.model import FAULTS, ModelServer, Script
+from chauffeur.bench.chaos.table import failures, figures, headline, table_markdown
+from chauffeur.bench.chaos.vandal import DEEDS, Vandal
+from chauffeur.concept import Wishes
+from chauffeur.drive.live.messages import MessageError, Observation, Wish
+from chauffeur.drive.live.settings import SIZES, ring
+
+FOREVER_NS = (1 << 63) - 1
+
+
+@pytest.fixture
+def rings(tmp_path):
+    made = {name: ring(tmp_path, name, create=True) for name in SIZES}
+    made["observations"].write(Observation(3, 40, b"x").encode())
+    wish = Wish(3, 40, "w1", time.monotonic_ns(), FOREVER_NS, "running", 1, Wishes(20.0))
+    made["wishes"].write(wish.encode())
+    yield made
+    for each in made.values():
+        each.close()
+
+
+@pytest.mark.parametrize("what", DEEDS)
+def test_whatever_the_vandal_does_a_reader_gets_a_message_or_none(tmp_path, rings, what: str) -> None:
+    vandal = Vandal(tmp_path)
+    vandal.remember()
+    before = {name: bytes(each._map) for name, each in rings.items()}
+    vandal.do(what, 5, 0.02)
+    assert any(bytes(each._map) != before[name] for name, each in rings.items() if name != "orders") or "orders" in what
+    for name, each in rings.items():
+        message = each.latest()
+        if name == "wishes" and message is not None:
+            try:
+                wish = Wish.decode(message.payload)
+            except MessageError:
+                continue
+            assert 0.0 <= (wish.wishes.target_speed_mps or 0.0) <= 100.0
+
+
+def asked(url: str, words: str) -> tuple[int, bytes]:
+    parts = urlsplit(url)
+    connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=5.0)
+    body = json.dumps({"messages": [{"role": "user", "content": words}]})
+    connection.request("POST", "/v1/chat/completions", body)
+    answer = connection.getresponse()
+    try:
+        return answer.status, answer.read(200_000)
+    except (OSError, http.client.HTTPException):
+        return answer.status, b"cut"
+    finally:
+        connection.close()
+
+
+@pytest.mark.server
+def test_the_model_answers_well_unless_told_otherwise() -> None:
+    good = dict(replies.WISHES["highway"])
+    with ModelServer() as server:
+        server.script = Script(good=good, fault="http-500", times=1)
+        assert asked(server.url, "Drive 27 m/s.")[0] == 500
+        status, body = asked(server.url, "Slow down to 20 m/s. Drive 27 m/s.")
+        assert status == 200 and b"27.0" in body and b"[DONE]" in body
+        assert (server.script.asked, server.script.hit) == (2, 1)
+
+
+@pytest.mark.server
+@pytest.mark.parametrize("fault", [name for name in FAULTS if name not in ("", "silent", "trickle")])
+def test_every_fault_is_another_answer_than_the_good_one(fault: str) -> None:
+    good = dict(replies.WISHES["highway"])
+    with ModelServer() as server:
+        server.script = Script(good=good)
+        right = asked(server.url, "Drive 27 m/s.")
+        server.script = Script(good=good, fault=fault, times=1)
+        assert asked(server.url, "Drive 27 m/s.") != right
+        assert server.script.hit == 1
+
+
+def row(**changes):
+    plain = {
+        "case": 1, "kind": "policy-killed", "family": "process", "stage": "running", "unsafe": [], "lost": [],
+        "left_behind": [], "wishes": [{"words": "a"}], "ticks": 100, "deeds": {"missed": 0}, "worst": "hold",
+        "to_follow_s": 0.5, "to_new_plan_s": None,
+    }  # fmt: skip
+    return plain | changes
+
+
+def test_the_table_counts_and_names_what_failed() -> None:
+    rows = [
+        row(),
+        row(case=2, unsafe=["too fast"], worst="stop", to_follow_s=None),
+        row(case=3, lost=["a"], to_follow_s=0.0, deeds={"missed": 4}),
+    ]
+    found = figures(rows)["policy-killed"]
+    assert (found["cases"], found["unsafe"], found["lost"], found["missed"]) == ("3", "1", "1", "4")
+    assert (found["worst rung"], found["back s p50"], found["not back"]) == ("stop", "0.50", "1")
+    assert len(failures(rows)) == 2 and "case 2" in failures(rows)[0]
+    assert "3 cases 1 led to unsafe actuation and 1 of 3 wishes" in headline(rows)
+    assert "| policy-killed | 3 | 1 | 1 |" in table_markdown(rows, "T")
