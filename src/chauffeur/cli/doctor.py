@@ -32,7 +32,7 @@ _PURPOSES = {
     "chroma": "Chroma as the memory's store",
     "cluster": "benchmarks on a Ray cluster",
 }
-_DEVELOPMENT = ("dev", "docs")
+_DEVELOPMENT = ("dev", "docs", "fuzz", "mutation", "oracle")
 _REQUIREMENT = re.compile(r"^\s*([A-Za-z0-9._-]+)")
 _EXTRA = re.compile(r"""extra\s*==\s*['"]([^'"]+)['"]""")
 
