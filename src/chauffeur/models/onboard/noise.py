@@ -160,6 +160,10 @@ _NEAR: dict[str, str] = {
     for row, keys in enumerate(_KEYS)
     for column, key in enumerate(keys)
 }
+_PAUSES = re.compile(
+    rf"(?<!\bone)[,.!?;:]+(?=\s|$)|[,.!?;:]+(?=\s|$)(?!\s(?:\d|{_NUMBERS.replace(' ', '|')}))", re.IGNORECASE
+)
+"""Commas and stops, but not in "quick one, sixty": without it that is another number."""
 _TOKEN = re.compile(r"^(\W*)(.*?)(\W*)$")
 
 
@@ -197,7 +201,7 @@ def noisy(text: str, rng: np.random.Generator, level: int) -> str:
     text = " ".join(words)
     # a recognizer writes neither commas nor capitals
     if rng.random() < (0.85 if heard else 0.35):
-        text = re.sub(r"[,.!?;:]+(?=\s|$)", "", text)
+        text = _PAUSES.sub("", text)
     draw = rng.random()
     if draw < (0.85 if heard else 0.5):
         text = text.lower()

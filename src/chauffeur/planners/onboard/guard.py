@@ -20,6 +20,12 @@ _DIGITS: Final = re.compile(r"\d+(?:\.\d+)?")
 _CLOSE: Final = 0.011
 _ROUND: Final = 0.01
 _SIDES: Final = ("left", "right")
+_SERVICE: Final = re.compile(
+    r"(?:please|hey|ok|okay|can you|could you|would you|will you|just|now|\W)*"
+    r"(?:play|sing|order|book|ring|phone|email|text|google|tell (?:me|us) (?:a|about)|put on (?:the|some))\b",
+    re.IGNORECASE,
+)
+"""How a sentence begins that asks for something else than driving."""
 _WHICH_SIDE: Final = "Do you mean left or right?"
 
 
@@ -36,6 +42,8 @@ def doubt(wish: str, history: Sequence[str], steps: Sequence[Step]) -> str:
         return f"I am not sure about the number: did you mean {strange.value:g}?"
     reading = understand(wish)
     if isinstance(reading, NotUnderstood):
+        if reading.why == "off_topic" and _SERVICE.match(wish):
+            return reading.words
         both = set(_SIDES) <= set(re.findall(r"[a-z]+", wish.lower()))
         sided = any(step.meaning.direction in _SIDES for step in steps)
         return _WHICH_SIDE if reading.why == "ambiguous" and both and sided else ""
