@@ -14,7 +14,7 @@ from chauffeur.drive.live import planning as module
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.orders import Event, Order, Request, encode, read_event, read_order
 from chauffeur.drive.live.planning import Planning, PlanningRings
-from chauffeur.drive.live.ring import Ring
+from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import SIZES, RingName
 from chauffeur.drive.session import Forgetful
 from chauffeur.planners.base import Planner
@@ -72,7 +72,7 @@ class Rig:
         return self.kinds()
 
     def told(self) -> list[Event]:
-        return [read_event(message.payload) for message in self.events.since(0)[0]]
+        return [read_event(message.payload) for message in Reader(self.events, old=True).news()[0]]
 
     def kinds(self) -> list[tuple[str, str]]:
         return [(event.kind, event.wish) for event in self.told()]

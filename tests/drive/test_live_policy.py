@@ -14,7 +14,7 @@ from chauffeur.drive.live.messages import Observation, Wish
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.orders import Event, Order, Scene, encode, read_event
 from chauffeur.drive.live.policy import MOST_RESUMPTIONS, Policy, PolicyRings
-from chauffeur.drive.live.ring import Ring
+from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import SIZES, RingName
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
@@ -70,7 +70,7 @@ class Rig:
         self.starts, self.sandbox = starts, sandbox
         self.policy = self.new_policy()
         self.bench.control.begin_trip()
-        self._heard = 0
+        self._heard = Reader(self.events, old=True)
 
     def new_policy(self) -> Policy:
         mirror = Mirror(HighwayWorld(), self.starts, self.bench.observations)
@@ -101,9 +101,7 @@ class Rig:
         self.orders.write(encode(replace(made, **changes)))  # pyright: ignore[reportArgumentType]
 
     def told(self) -> list[Event]:
-        messages, _ = self.events.since(self._heard)
-        self._heard = self.events.head
-        return [read_event(message.payload) for message in messages]
+        return [read_event(message.payload) for message in self._heard.news()[0]]
 
     def kinds(self) -> list[tuple[str, str]]:
         return [(event.kind, event.wish) for event in self.told()]

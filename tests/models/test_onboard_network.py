@@ -23,7 +23,7 @@ from chauffeur.models.onboard.examples import questions, reasons
 from chauffeur.models.onboard.export import Stepped, export, export_transformers
 from chauffeur.models.onboard.packed import Packed
 from chauffeur.models.onboard.tokens import blanks_of, train_tokenizer
-from chauffeur.models.onboard.training import SIZES, Recipe, blank, collate, evaluate_loss, network, train
+from chauffeur.models.onboard.training import SIZES, Recipe, blank, collate, evaluate_loss, network, rate_at, train
 from chauffeur.planners.onboard.dialect import Number, Step, read
 from chauffeur.planners.onboard.engine import Engine
 from chauffeur.planners.onboard.hot import HotPlanner
@@ -68,11 +68,11 @@ def data(tokenizer: Any) -> Packed:
     return Packed(np.array(tokens, np.uint16), np.array(starts), np.array(replies))
 
 
-def trained(data: Packed, tokenizer: Any, folder: Path, steps: int, **more: Any) -> Any:
-    recipe = Recipe(size="tiny", steps=steps, batch_tokens=1024, rate=3e-3, warmup=20)
+def trained(data: Packed, tokenizer: Any, folder: Path, steps: int, more: int = 0, **options: Any) -> Any:
+    recipe = Recipe(size="tiny", steps=steps, batch_tokens=1024, rate=3e-3, warmup=20, more=more)
     end = tokenizer.token_to_id(END)
     folder.mkdir(exist_ok=True)
-    return train(data, folder, recipe, vocabulary=tokenizer.get_vocab_size(), end=end, device="cpu", **more)
+    return train(data, folder, recipe, vocabulary=tokenizer.get_vocab_size(), end=end, device="cpu", **options)
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +104,18 @@ def test_a_run_that_stopped_ends_like_one_that_did_not(data: Packed, tokenizer: 
         trained(data, tokenizer, tmp_path / "parts", 24, blanks=blanks, watch=stop, save_s=0.0)
     parts = trained(data, tokenizer, tmp_path / "parts", 24, blanks=blanks)
     for a, b in zip(whole.parameters(), parts.parameters(), strict=True):
+        assert torch.equal(a, b)
+
+
+def test_a_second_round_goes_on_from_a_finished_first_one(data: Packed, tokenizer: Any, tmp_path: Path) -> None:
+    rounds = Recipe(steps=100, more=50, warmup=10)
+    assert max(rate_at(step, rounds) for step in range(100)) == rounds.rate
+    assert rate_at(99, rounds) < rounds.rate / 20 < max(rate_at(step, rounds) for step in range(100, 150))
+    assert max(rate_at(step, rounds) for step in range(100, 150)) == rounds.rate / 2
+    trained(data, tokenizer, tmp_path / "first", 12)
+    gone_on = trained(data, tokenizer, tmp_path / "first", 12, more=6)
+    whole = trained(data, tokenizer, tmp_path / "whole", 12, more=6)
+    for a, b in zip(gone_on.parameters(), whole.parameters(), strict=True):
         assert torch.equal(a, b)
 
 

@@ -17,6 +17,8 @@ Examples:
 
     chauffeur train onboard --out runs/large --size large --steps 20000 --draws 60000
 
+    chauffeur train onboard --out runs/onboard --more 4000
+
     chauffeur train onboard --out runs/onboard --data-only
 
     chauffeur bench passengers --planner onboard/runs/onboard/model
@@ -39,6 +41,9 @@ def onboard(
     per_case: Annotated[int, typer.Option(min=1, help="Wordings tried for each case.")] = 26,
     size: Annotated[str, typer.Option(help="`small` (an hour on two cores), `medium`, or `large` (GPU).")] = "small",
     steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 4,096 tokens.")] = 6_500,
+    more: Annotated[
+        int, typer.Option(min=0, help="Steps of a second round, its rate half as high; also for a finished run.")
+    ] = 0,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes that make data; default one per core.")] = None,
     threads: Annotated[int, typer.Option(min=0, help="Threads that train; 0 leaves it to PyTorch.")] = 0,
     device: Annotated[str, typer.Option(help="`cpu` or `cuda`; default the best at hand.")] = "",
@@ -51,7 +56,7 @@ def onboard(
     from chauffeur.models.onboard.pipeline import Plan, build_data, train_model
 
     console = stdout()
-    plan = Plan(seed, draws, per_case, size, steps)
+    plan = Plan(seed, draws, per_case, size, steps, more)
     told = stage_lines(console)
     try:
         build_data(out, plan, workers or os.cpu_count() or 1, told)

@@ -255,6 +255,11 @@ class Limits:
     max_time_headway_s: float = 10.0
     max_speed_mps: float | None = None
 
+    def most_mps(self, sign_mps: float) -> float:
+        """Highest speed where the lane's speed limit is `sign_mps`, m/s."""
+        tolerated = sign_mps + self.max_over_limit_mps
+        return tolerated if self.max_speed_mps is None else min(tolerated, self.max_speed_mps)
+
 
 LAMPILOT_LIMITS = Limits(name="lampilot", max_over_limit_mps=9.0, min_time_headway_s=0.01)
 """What LaMPilot's own APIs accept. Its tasks ask for 38.3 m/s on a 31.3 m/s road and for gaps of 15 m at 30 m/s."""

@@ -25,12 +25,12 @@ from chauffeur.concept import (
     Wishes,
 )
 from chauffeur.drive.actuate import actuate
+from chauffeur.drive.fallback import keep_lane_and_gap
 from chauffeur.safety.shield import Shield
 from chauffeur.worlds.base import EGO, World
 
 FALLBACK_S = 10.0
 """How long the fallback drives after a policy failed, before the trip is ended."""
-SAFE_HEADWAY_S = 2.0
 AFTER_END_S = 3.0
 """How long a trip without a goal goes on after its program finished."""
 
@@ -163,7 +163,8 @@ def run_episode(
         said.extend((at_s, text) for text in tick.said)
         if tick.error is not None:
             failure = tick.error
-            safe = _safe(world, tick.wishes)
+            ego = world.perception().vehicle(EGO)
+            safe = keep_lane_and_gap(tick.wishes, max(0.0, ego.speed_mps), ego.lane)
             tick = HeldWishes(safe, state="failed", line=tick.line, said=tick.said, calls=tick.calls)
             end = min(end, ticks + round(FALLBACK_S / world.dt_s))
         wishes = driver.settle(tick.wishes)
@@ -227,17 +228,6 @@ def _ask(policy: RunningPolicy | None, held: Wishes) -> PolicyTick:
         return policy.tick()
     except SandboxError as error:
         return HeldWishes(held, state="failed", error=error)
-
-
-def _safe(world: World, wishes: Wishes) -> Wishes:
-    """The fallback: stay in the lane one is in, no faster than now, with a generous gap; routes are kept."""
-    ego = world.perception().vehicle(EGO)
-    return replace(
-        wishes,
-        target_speed_mps=max(0.0, ego.speed_mps),
-        time_headway_s=max(SAFE_HEADWAY_S, wishes.time_headway_s),
-        target_lane=ego.lane,
-    )
 
 
 def _outcome(final: Snapshot, referee: Referee | None, failure: ChauffeurError | None) -> Outcome:

@@ -15,9 +15,7 @@ def bounded(wishes: Wishes, limits: Limits, speed_limit_mps: float) -> tuple[Wis
         limits: Of the person and the operator.
         speed_limit_mps: Of the lane that is driven.
     """
-    most_mps = speed_limit_mps + limits.max_over_limit_mps
-    if limits.max_speed_mps is not None:
-        most_mps = min(most_mps, limits.max_speed_mps)
+    most_mps = limits.most_mps(speed_limit_mps)
     changed: list[str] = []
     speed = wishes.target_speed_mps
     if speed is not None and not 0.0 <= speed <= most_mps:

@@ -189,9 +189,7 @@ def _since_s(heard: Heard, then_ns: int) -> float:
 def _over_mps(snapshot: Snapshot, limits: Limits) -> float:
     """By how much the car is faster than it may be."""
     allowed = [lane.speed_limit_mps for lane in snapshot.lanes if lane.id == snapshot.ego.lane]
-    sign = max(allowed, default=math.inf)
-    cap = math.inf if limits.max_speed_mps is None else limits.max_speed_mps
-    return snapshot.ego.speed_mps - min(sign + limits.max_over_limit_mps, cap)
+    return snapshot.ego.speed_mps - limits.most_mps(max(allowed, default=math.inf))
 
 
 def _differs(one: Command, other: Command) -> bool:

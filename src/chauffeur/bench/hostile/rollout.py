@@ -189,8 +189,7 @@ def _speed(frame: Frame) -> float:
 def _allowed(frame: Frame, limits: Limits) -> float:
     lane = next((one for one in frame.snapshot.lanes if one.id == frame.snapshot.ego.lane), None)
     sign = min(one.speed_limit_mps for one in frame.snapshot.lanes) if lane is None else lane.speed_limit_mps
-    cap = math.inf if limits.max_speed_mps is None else limits.max_speed_mps
-    return min(sign + limits.max_over_limit_mps, cap)
+    return limits.most_mps(sign)
 
 
 def _most(excesses: Iterable[float]) -> float:

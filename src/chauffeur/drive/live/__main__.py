@@ -16,6 +16,7 @@ from pathlib import Path
 
 from chauffeur.concept.registry import load_plugin
 from chauffeur.drive.live.settings import Settings, ring
+from chauffeur.worlds.base import MirroredWorld
 
 FIGURES_FILE = "punctuality.json"
 READY_SUFFIX = ".ready"
@@ -43,14 +44,20 @@ def _ready(folder: Path, role: str) -> None:
     (folder / f"{role}{READY_SUFFIX}").touch()
 
 
+def _world(settings: Settings) -> MirroredWorld:
+    """The world of the drive; what is slow about its starts is done before anything moves."""
+    world: MirroredWorld = load_plugin("chauffeur.worlds", settings.starts[0].scenario.world)()
+    for start in settings.starts:
+        world.reset(start.scenario, start.seed)
+    return world
+
+
 def _control(folder: Path, settings: Settings, over: Callable[[], bool]) -> None:
     from chauffeur.drive.live.control import Control, Rings, run
     from chauffeur.drive.live.realtime import Ticker, become_realtime, punctuality
 
-    world = load_plugin("chauffeur.worlds", settings.starts[0].scenario.world)()
+    world = _world(settings)
     rings = Rings(ring(folder, "wishes"), ring(folder, "observations"), ring(folder, "reports"))
-    for start in settings.starts:  # what is slow about a start is done before anything moves
-        world.reset(start.scenario, start.seed)
     control = Control(world, settings.starts, rings, speed=settings.speed)
     control.warm_up()
     allowed = become_realtime(settings.realtime)
@@ -91,13 +98,11 @@ def _policy(
     from chauffeur.drive.live.realtime import become_favoured
     from chauffeur.programs import Sandbox
 
-    world = load_plugin("chauffeur.worlds", settings.starts[0].scenario.world)()
+    world = _world(settings)
     mirror = Mirror(world, settings.starts, ring(folder, "observations"))
     rings = PolicyRings(
         ring(folder, "orders"), ring(folder, "wishes"), ring(folder, "policy_events"), ring(folder, "checkpoints")
     )
-    for start in settings.starts:
-        world.reset(start.scenario, start.seed)
     pause_s = world.dt_s / settings.speed / 20.0
     if settings.realtime:
         become_favoured()
@@ -122,7 +127,7 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     from chauffeur.drive.session import Forgetful
     from chauffeur.planners.registry import make_planner
 
-    world = load_plugin("chauffeur.worlds", settings.starts[0].scenario.world)()
+    world = _world(settings)
     mirror = Mirror(world, settings.starts, ring(folder, "observations"))
     rings = PlanningRings(ring(folder, "requests"), ring(folder, "orders"), ring(folder, "planner_events"))
     options = {} if settings.base_url is None else {"base_url": settings.base_url}
@@ -138,8 +143,6 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     )
     if settings.planner.startswith("openai/"):
         importlib.import_module("openai")  # seconds on a busy machine: not at the first wish
-    for start in settings.starts:
-        world.reset(start.scenario, start.seed)
     _ready(folder, "planner")
     asyncio.run(planning.run(over))
 

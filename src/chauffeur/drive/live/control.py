@@ -76,6 +76,7 @@ class Control:
         self._shield: Shield | None = None
         self._driver: Driver | None = None
         self._held = Wishes()
+        self._now: Snapshot | None = None
         self._refused: Counter[str] = Counter()
         self._faults = 0
         self._stopping = False
@@ -124,6 +125,7 @@ class Control:
         self._ladder = Ladder()
         self._wish = None
         self._tick = 0
+        self._now = self._world.snapshot()
         self._show()
         return True
 
@@ -134,8 +136,8 @@ class Control:
         rung: Rung = "keep"
         clipped: tuple[str, ...] = ()
         age_s = 0.0
-        snapshot = self._world.snapshot()
-        wishes = self._held
+        snapshot, wishes = self._now, self._held
+        assert snapshot is not None, "no trip was begun"
         try:
             age_s = self._hear()
             rung, wishes = self._choose(at_s, age_s, snapshot)
@@ -147,7 +149,8 @@ class Control:
             self._faults += 1
             done = self._brake(snapshot)
         self._tick += 1
-        outcome = self._outcome(snapshot, start)
+        self._now = self._world.snapshot()
+        outcome = self._outcome(snapshot, self._now, start)
         wish = self._wish
         report = Report(
             trip=self._trip,
@@ -237,8 +240,7 @@ class Control:
         braking = min(FAULT_BRAKING_MPS2, max(0.0, snapshot.ego.speed_mps) / self.dt_s)
         return actuate(self._world, snapshot, Command(-braking, 0.0), None, None)
 
-    def _outcome(self, before: Snapshot, start: Start) -> str:
-        now = self._world.snapshot()
+    def _outcome(self, before: Snapshot, now: Snapshot, start: Start) -> str:
         if now.ego.crashed:
             return "collision"
         if now.off_road:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import LaneId, Snapshot, Wishes
+from chauffeur.drive.fallback import keep_lane_and_gap
 from chauffeur.drive.live.messages import Rung, Wish
 
 RUNGS: Final[tuple[Rung, ...]] = ("follow", "hold", "keep", "slow", "stop")
@@ -31,7 +32,6 @@ class LadderTable:
         keep_s: How long lane and gap are kept after that.
         slow_s: How long the car is slow at most before it stops.
         slow_mps: Speed of the rung `slow`, 30 km/h.
-        headway_s: Time headway from `keep` downwards.
     """
 
     fresh_s: float = 0.3
@@ -39,7 +39,6 @@ class LadderTable:
     keep_s: float = 6.0
     slow_s: float = 10.0
     slow_mps: float = 30.0 / 3.6
-    headway_s: float = 2.0
 
 
 class Ladder:
@@ -79,12 +78,7 @@ class Ladder:
         gone_s = at_s - self._entered_s
         wished = base.target_speed_mps
         speed = self._kept_mps if wished is None else min(wished, self._kept_mps)
-        safe = replace(
-            base,
-            target_speed_mps=speed,
-            time_headway_s=max(table.headway_s, base.time_headway_s),
-            target_lane=snapshot.ego.lane,
-        )
+        safe = keep_lane_and_gap(base, speed, snapshot.ego.lane)
         if gone_s < table.keep_s:
             return "keep", safe
         lane = _towards_shoulder(snapshot)

@@ -109,11 +109,6 @@ class Ring:
         _HEADER.pack_into(self._map, 0, _MAGIC, self._slots, self._size)
 
     @property
-    def slots(self) -> int:
-        """Messages kept."""
-        return self._slots
-
-    @property
     def head(self) -> int:
         """Number of the newest message, 0 for none."""
         return int(_HEAD.unpack_from(self._map, _HEAD_AT)[0])
@@ -147,15 +142,6 @@ class Ring:
                 return message
         self.torn += 1
         return None
-
-    def since(self, number: int) -> tuple[tuple[Message, ...], int]:
-        """Whole messages after one's number, oldest first, and how many of them are lost: overwritten or broken."""
-        head = self.head
-        if head <= number:
-            return (), 0
-        first = max(number + 1, head - self._slots + 1)
-        found = tuple(message for k in range(first, head + 1) if (message := self._read(k)) is not None)
-        return found, head - number - len(found)
 
     def newer(self, than_ns: int, until_ns: int) -> tuple[Message, ...]:
         """Whole messages written in a time, oldest first. It goes back from the newest one until one is older."""

@@ -107,7 +107,6 @@ class Runtime:
             tell: Hears events, reports of control, and which process was replaced.
             folder: For the shared memory; default a new one in `/dev/shm`, removed at the end.
         """
-        self._settings = settings
         self._tell: Listener = tell or (lambda heard: None)  # noqa: ARG005
         self._own = folder is None
         self.folder = _new_folder() if folder is None else folder
@@ -154,9 +153,7 @@ class Runtime:
         """Hear what came, see who lives."""
         for each in self._rings.values():
             each.renew()
-        self._hear_reports()
-        self._hear_events("planner_events")
-        self._hear_events("policy_events")
+        self._hear()
         now_s = time.monotonic()
         self._look_after_children(now_s)
         self._look_after_wishes(now_s)
@@ -209,9 +206,7 @@ class Runtime:
             if child.role != "control":
                 _end(child.process)
         if self._rings:
-            self._hear_reports()
-            self._hear_events("planner_events")
-            self._hear_events("policy_events")
+            self._hear()
         for interaction in self.open_wishes:
             self._close(interaction, Event("interrupted", interaction.request.wish, "The drive is over."))
 
@@ -272,9 +267,7 @@ class Runtime:
         if head != self._wish_number or not self._ready_file("policy").exists():
             self._wish_number, self._wish_at_s = head, now_s
         elif now_s - self._wish_at_s > SILENT_S and policy.process.poll() is None and policy.restart_at_s is None:
-            policy.process.kill()
-            policy.process.wait()
-            self._replace(policy, "It hung.", now_s)
+            self._replace_hung(policy, now_s)
         helpers: tuple[Role, ...] = ("policy", "planner", "spare")
         for role in helpers:
             child = self._children[role]
@@ -296,6 +289,11 @@ class Runtime:
         self._ready_file("spare").unlink(missing_ok=True)
         spare.restart_at_s = now_s + SPARE_PAUSE_S
         return True
+
+    def _replace_hung(self, child: _Child, now_s: float) -> None:
+        child.process.kill()
+        child.process.wait()
+        self._replace(child, "It hung.", now_s)
 
     def _replace(self, child: _Child, why: str, now_s: float) -> None:
         """Start anew: at once if it lived a while, later and later if it dies again and again."""
@@ -345,9 +343,7 @@ class Runtime:
                 planner = self._children["planner"]
                 if planner.restart_at_s is None and self._ready_file("planner").exists():
                     if interaction.request.turn > 1 and interaction.since_s > planner.started_s:  # asked anew in vain
-                        planner.process.kill()
-                        planner.process.wait()
-                        self._replace(planner, "It hung.", now_s)
+                        self._replace_hung(planner, now_s)
                     else:
                         self._again(interaction, "unplanned", "The planner does not answer.")
             elif interaction.stage == "planned" and waited_s > UNSTARTED_S:
@@ -385,6 +381,11 @@ class Runtime:
         self._tell(answer)
 
     # Hearing ----------------------------------------------------------------------------------------------------------
+
+    def _hear(self) -> None:
+        self._hear_reports()
+        self._hear_events("planner_events")
+        self._hear_events("policy_events")
 
     def _hear_reports(self) -> None:
         messages, lost = self._heard["reports"].news()

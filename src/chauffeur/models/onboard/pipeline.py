@@ -39,7 +39,7 @@ from chauffeur.models.onboard.examples import Example, checked_reasons, question
 from chauffeur.models.onboard.packed import Packed
 from chauffeur.planners.onboard.prompt import END
 
-MODEL_VERSION: Final = "onboard-lm-v3"
+MODEL_VERSION: Final = "onboard-lm-v4"
 _SPLITS: Final = ("train", "seen", "unseen")
 _TOKENIZER_EXAMPLES: Final = 60_000
 
@@ -57,6 +57,7 @@ class Plan:
         per_case: Wordings tried for each.
         size: Network's size, see `training.SIZES`.
         steps: Optimiser steps.
+        more: Steps of a second round after them.
     """
 
     seed: int = 0
@@ -64,6 +65,7 @@ class Plan:
     per_case: int = PER_CASE
     size: str = "small"
     steps: int = 14_000
+    more: int = 0
 
 
 def build_data(folder: Path, plan: Plan, workers: int, told: Told) -> None:
@@ -190,7 +192,7 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
     tokenizer: Any = load_tokenizer(data)
     state = folder / "training"
     state.mkdir(exist_ok=True)
-    recipe = Recipe(size=plan.size, steps=plan.steps, seed=plan.seed)
+    recipe = Recipe(size=plan.size, steps=plan.steps, seed=plan.seed, more=plan.more)
     model = train(
         Packed.load(data / "train.npz"),
         state,
@@ -199,7 +201,9 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
         end=tokenizer.token_to_id(END),
         blanks=blanks_of(tokenizer),
         held_back=Packed.load(data / "unseen.npz"),
-        watch=lambda step, loss, rate: told(f"training, loss {loss:.3f}, {rate:,.0f} tokens/s", step + 1, plan.steps),
+        watch=lambda step, loss, rate: told(
+            f"training, loss {loss:.3f}, {rate:,.0f} tokens/s", step + 1, recipe.all_steps
+        ),
         device=device,
     )
     facts = json.loads((data / "data.json").read_text(encoding="utf-8"))
@@ -228,7 +232,8 @@ def model_card(about: dict[str, Any], facts: dict[str, Any], parameters: int) ->
         parameters: How many the network has.
     """
     recipe = about["recipe"]
-    tokens = recipe["steps"] * recipe["batch_tokens"] / 1e6
+    steps = recipe["steps"] + recipe["more"]
+    tokens = steps * recipe["batch_tokens"] / 1e6
     return f"""# Model card: {about["version"]}
 
 Writes driving programs for passengers' wishes, on board, offline. {parameters / 1e6:.1f} million parameters, Llama
@@ -237,12 +242,15 @@ architecture (`{recipe["size"]}`), int8 weights for ONNX Runtime, trained from n
 - **Input**: situation and remembered trips in a few words, the wish (English, one sentence or a few), and what the
   rule-based reader made of it. **Output**: a program of the dialect and one sentence that says the same, a question
   back, or a reason to refuse.
-- **Training**: {recipe["steps"]:,} steps of {recipe["batch_tokens"]:,} tokens ({tokens:.0f} M with padding) on
+- **Training**: {steps:,} steps of {recipe["batch_tokens"]:,} tokens ({tokens:.0f} M with padding), the last
+  {recipe["more"]:,} of them a second round at half the rate, on
   {facts["examples"]["train"]:,} examples; AdamW, rate {recipe["rate"]}, decay {recipe["decay"]},
-  {recipe["blanked"]:.0%} of the words blanked in half of the examples; seed {recipe["seed"]}.
+  {recipe["blanked"]:.0%} of the words ({recipe["blanked_more"]:.0%} in the second round) blanked in half of the
+  examples; seed {recipe["seed"]}.
   Data `{about["data"][:16]}`: see `DATA_CARD.md`.
-  The same command makes it again: `chauffeur train onboard --out DIR --size {recipe["size"]} --steps {recipe["steps"]}
-  --seed {recipe["seed"]} --draws {facts["plan"]["draws"]} --per-case {facts["plan"]["per_case"]}`.
+  The same command makes it again: `chauffeur train onboard --out DIR --size {recipe["size"]}
+  --steps {recipe["steps"]} --more {recipe["more"]} --seed {recipe["seed"]}
+  --draws {facts["plan"]["draws"]} --per-case {facts["plan"]["per_case"]}`.
 - **Meant for** the `onboard` planner of Chauffeur, behind its grammar, guard, linking and checks, in simulation. Alone
   it has none of them: it may copy a number wrongly or mistake a wish, more often on phrasings unlike its grammar's.
 - **Not for** a vehicle on a road, other languages, conversations, or any task but this one.

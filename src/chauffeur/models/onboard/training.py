@@ -11,7 +11,7 @@ import math
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -70,6 +70,9 @@ class Recipe:
         blanked: Share of a wish's words that are blanked, in half of the examples: so that no template is learned by
             one word, and the draft is listened to.
         seed: Of weights and order.
+        more: Steps of a second round after `steps`: the rate rises once more, to half its height, and falls again
+            (warm restart, Loshchilov and Hutter 2017); it goes on from a finished first round.
+        blanked_more: `blanked` in the second round, where the templates' words are known well.
     """
 
     size: str = "small"
@@ -80,6 +83,18 @@ class Recipe:
     decay: float = 0.05
     blanked: float = 0.15
     seed: int = 0
+    more: int = 0
+    blanked_more: float = 0.25
+
+    @property
+    def all_steps(self) -> int:
+        """Of both rounds."""
+        return self.steps + self.more
+
+    def goes_on_from(self, stored: dict[str, Any], step: int) -> bool:
+        """Whether a run's stored state is one of this recipe, or of its first round when that is finished."""
+        first = asdict(replace(self, more=0))
+        return stored == asdict(self) or (step == self.steps and first | stored == first)
 
 
 def network(size: Size, vocabulary: int, end: int) -> Network:
@@ -171,10 +186,13 @@ def compiled_body(model: Network) -> Network | None:
 
 def rate_at(step: int, recipe: Recipe) -> float:
     """Learning rate of a step."""
+    highest, steps = recipe.rate, recipe.steps
+    if step >= steps:
+        highest, steps, step = recipe.rate / 2.0, recipe.more, step - steps
     if step < recipe.warmup:
-        return recipe.rate * (step + 1) / recipe.warmup
-    share = (step - recipe.warmup) / max(1, recipe.steps - recipe.warmup)
-    return recipe.rate * (0.02 + 0.98 * 0.5 * (1.0 + math.cos(math.pi * min(1.0, share))))
+        return highest * (step + 1) / recipe.warmup
+    share = (step - recipe.warmup) / max(1, steps - recipe.warmup)
+    return highest * (0.02 + 0.98 * 0.5 * (1.0 + math.cos(math.pi * min(1.0, share))))
 
 
 def train(
@@ -221,7 +239,7 @@ def train(
     first = 0
     if state_path.exists():
         state: dict[str, Any] = torch.load(state_path, map_location=where, weights_only=True)
-        if state["recipe"] != asdict(recipe):
+        if not recipe.goes_on_from(state["recipe"], int(state["step"])):
             raise ConfigError(f"{folder} holds a run of another recipe.", hint="Choose another folder, or delete it.")
         model.load_state_dict(state["model"])
         optimiser.load_state_dict(state["optimiser"])
@@ -231,19 +249,20 @@ def train(
         next(feed)
     model.train()
     # Making kernels for all lengths takes some minutes, a step then three quarters of its time.
-    body = compiled_body(model) if recipe.steps >= COMPILED_FROM else None
+    body = compiled_body(model) if recipe.all_steps >= COMPILED_FROM else None
     # The flash kernels are for long rows; of these, plain products are the faster.
     attention = [SDPBackend.MATH] if where.type == "cpu" else [SDPBackend.FLASH_ATTENTION, SDPBackend.MATH]
     saved = time.monotonic()
     log = (folder / "log.jsonl").open("a", encoding="utf-8")
     with log:
-        for step in range(first, recipe.steps):
+        for step in range(first, recipe.all_steps):
             begun = time.perf_counter()
             for group in optimiser.param_groups:
                 group["lr"] = rate_at(step, recipe)
             ids, targets = collate(data, next(feed), end)
             if blanks is not None:
-                blank(ids, blanks, recipe.blanked, np.random.default_rng([recipe.seed, 2, step]))
+                share = recipe.blanked if step < recipe.steps else recipe.blanked_more
+                blank(ids, blanks, share, np.random.default_rng([recipe.seed, 2, step]))
             optimiser.zero_grad(set_to_none=True)
             with sdpa_kernel(attention):
                 with torch.autocast(where.type, torch.bfloat16):
@@ -253,7 +272,7 @@ def train(
             optimiser.step()
             if watch is not None:
                 watch(step, float(loss.detach()), ids.numel() / (time.perf_counter() - begun))
-            last = step + 1 == recipe.steps
+            last = step + 1 == recipe.all_steps
             if last or (step + 1) % 250 == 0:
                 row = {"step": step + 1, "loss": float(loss.detach())}
                 if held_back is not None:

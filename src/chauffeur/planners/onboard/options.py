@@ -96,8 +96,7 @@ class Options:
     @property
     def cap_mps(self) -> float:
         """Speed the limits allow, m/s."""
-        allowed = self.sign_mps + self.limits.max_over_limit_mps
-        return allowed if self.limits.max_speed_mps is None else min(allowed, self.limits.max_speed_mps)
+        return self.limits.most_mps(self.sign_mps)
 
     @property
     def own_cap_mps(self) -> float:

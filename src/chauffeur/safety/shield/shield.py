@@ -270,9 +270,7 @@ class Shield:
         """The strictest bound of the acceleration; where roads cross, those who do are minded elsewhere."""
         table, ego = self._table, scene.ego
         speed = max(math.hypot(ego.along_mps, ego.across_mps), 0.0)
-        most = scene.speed_limit_mps + self._limits.max_over_limit_mps
-        if self._limits.max_speed_mps is not None:
-            most = min(most, self._limits.max_speed_mps)
+        most = self._limits.most_mps(scene.speed_limit_mps)
         towards = (most - speed) / self._dt_s
         allowed = towards if towards >= 0.0 else max(towards, -_SLOWING_MPS2)
         strictest = _Cap(min(allowed, table.acceleration_mps2), "speed", f"No faster than {speed_words(most)} here.")

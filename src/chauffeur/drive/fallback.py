@@ -1,0 +1,27 @@
+"""What is wished when the policy can no longer be asked: the same for a program that died and for one not heard of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from chauffeur.concept import LaneId, Wishes
+
+FALLBACK_HEADWAY_S: Final = 2.0
+"""Time headway of the fallback: the two seconds of driving schools."""
+
+
+def keep_lane_and_gap(wishes: Wishes, speed_mps: float, lane: LaneId | None) -> Wishes:
+    """Stay in a lane, at a speed, with a generous gap; routes are kept.
+
+    Args:
+        wishes: The last ones.
+        speed_mps: Highest speed from now on.
+        lane: The one the car is in.
+    """
+    return replace(
+        wishes,
+        target_speed_mps=speed_mps,
+        time_headway_s=max(FALLBACK_HEADWAY_S, wishes.time_headway_s),
+        target_lane=lane,
+    )
