@@ -9,15 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from chauffeur.concept import Command, DataError, Instruction, Intervention, PersonId, Wishes
+from chauffeur.concept import Command, DataError, Feedback, Instruction, Intervention, PersonId, Wishes
 from chauffeur.drive.auditing import Auditor, open_audit
 from chauffeur.drive.live.books import Books, Unanswered, unanswered
 from chauffeur.drive.live.messages import Report, Rung
-from chauffeur.drive.live.orders import Event
+from chauffeur.drive.live.orders import Brief, Event
+from chauffeur.drive.live.remembering import Remembering
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Replaced, Runtime
 from chauffeur.drive.scenarios import find
+from chauffeur.memory.vault import VaultMemory
 from chauffeur.safety.audit import AuditLog, Record, read_records, redact, verify, words_of
 
 WISH = "Überhol ihn for Zebedee."
@@ -37,6 +39,7 @@ RECKLESS = """def drive():
 ZEBEDEE = PersonId("zebedee")
 SCENARIO = find("overtake")
 DT_S = 0.1
+MEMORY = "home"
 
 
 def report(
@@ -82,29 +85,40 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
     start = Start(SCENARIO, 3, most_s=600.0)
     settings = Settings(starts=(start,), planner=f"replay/{answers}", speed=2.0, realtime=False)
     log = folder / "audit.jsonl"
-    with (
-        Books(open_audit(log, SCENARIO, 3), DT_S) as books,
-        Runtime(settings, books.tell) as runtime,
-    ):
-        books.follow(runtime, settings)
-        for words in (WISH, UNWANTED, TOO_FAST):
-            books.wish(runtime.next_wish, Instruction(words, ZEBEDEE))
-            assert books.kept().result()
-            asked = runtime.ask(words, ZEBEDEE)
-            assert [each.wish for each in unanswered(log)] == [asked], "on the disk before it is asked, and yet open"
-            until_s = time.monotonic() + 60.0
-            while runtime.open_wishes:
-                assert time.monotonic() < until_s
-                runtime.poll()
-                time.sleep(0.01)
-        runtime.halt()
-        while runtime.driving:
+    memory = Remembering(VaultMemory(folder / MEMORY), start, DT_S)
+    with Books(open_audit(log, SCENARIO, 3), DT_S) as books:
+
+        def tell(heard: Event | Report | Brief | Replaced) -> None:
+            books.tell(heard)
+            memory.tell(heard)
+
+        opened = Runtime(settings, tell)
+        books.follow(opened, settings)
+        memory.follow(opened)
+        with opened as runtime:
+            _three_wishes(runtime, books, log)
+        assert memory.trouble == ""
+    return log
+
+
+def _three_wishes(runtime: Runtime, books: Books, log: Path) -> None:
+    for words in (WISH, UNWANTED, TOO_FAST):
+        books.wish(runtime.next_wish, Instruction(words, ZEBEDEE))
+        assert books.kept().result()
+        asked = runtime.ask(words, ZEBEDEE)
+        assert [each.wish for each in unanswered(log)] == [asked], "on the disk before it is asked, and yet open"
+        until_s = time.monotonic() + 60.0
+        while runtime.open_wishes:
+            assert time.monotonic() < until_s
             runtime.poll()
             time.sleep(0.01)
+    runtime.halt()
+    while runtime.driving:
         runtime.poll()
-        assert runtime.report is not None
-        books.end(runtime.report.outcome, runtime.figures(), runtime.lost_reports)
-    return log
+        time.sleep(0.01)
+    runtime.poll()
+    assert runtime.report is not None
+    books.end(runtime.report.outcome, runtime.figures(), runtime.lost_reports)
 
 
 def test_a_drive_is_told_from_the_first_wish_to_the_last_command(driven: Path) -> None:
@@ -121,6 +135,30 @@ def test_a_drive_is_told_from_the_first_wish_to_the_last_command(driven: Path) -
     assert outcomes == {"w1": "finished", "w2": "declined", "w3": "refused", "": "stopped"}
     assert [record.body["passed"] for record in records(driven, "verdict")] == [True, False]
     assert unanswered(driven) == ()
+
+
+def test_the_situation_and_the_history_of_a_plan_are_there(driven: Path) -> None:
+    letters = {
+        (each.body["letter"], each.body["wish"]): each for each in records(driven, "context") if "letter" in each.body
+    }
+    assert set(letters) == {(letter, wish) for letter in "CH" for wish in ("w1", "w2", "w3")}
+    assert "highway" in words_of(letters["C", "w1"])["situation"]
+    assert letters["H", "w3"].body["items"] == 0, "nothing was recalled: the planner was given no memory"
+    order = [
+        (record.kind, record.body.get("letter", "")) for record in records(driven) if record.body.get("wish") == "w1"
+    ]
+    assert [each for each in order if each[1] or each[0] != "context"][:4] == [
+        ("wish", ""), ("context", "C"), ("context", "H"), ("plan", ""),
+    ]  # fmt: skip
+
+
+def test_what_was_driven_and_what_was_refused_is_remembered(driven: Path) -> None:
+    memory = VaultMemory(driven.parent / MEMORY)
+    document = json.loads(memory.export(ZEBEDEE))
+    assert [(trip["instruction"], trip["outcome"]) for trip in document["trips"]] == [
+        (WISH, "ended"), (UNWANTED, "refused"), (TOO_FAST, "refused"),
+    ]  # fmt: skip
+    assert memory.attach_feedback(ZEBEDEE, Feedback("Too fast for me.", speed=-1)), "about the last wish"
 
 
 def test_the_words_are_there_and_can_be_erased(driven: Path, tmp_path: Path) -> None:

@@ -10,9 +10,10 @@ import pytest
 from live_bench import OVERTAKE, Bench
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
+from chauffeur.describe import describe
 from chauffeur.drive.live import planning as module
 from chauffeur.drive.live.mirror import Mirror
-from chauffeur.drive.live.orders import Event, Order, Request, encode, read_event, read_order
+from chauffeur.drive.live.orders import Event, Order, Request, encode, read_brief, read_event, read_order
 from chauffeur.drive.live.planning import Planning, PlanningRings
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import SIZES, RingName
@@ -52,11 +53,13 @@ class Rig:
     def __init__(self, folder: Path, planner: Planner) -> None:
         self.bench = Bench(folder, (OVERTAKE,))
         self.bench.control.begin_trip()
-        names: tuple[RingName, ...] = ("requests", "orders", "planner_events")
-        self.requests, self.orders, self.events = (Ring(folder / name, *SIZES[name], create=True) for name in names)
+        names: tuple[RingName, ...] = ("requests", "orders", "briefs", "planner_events")
+        self.requests, self.orders, self.briefs, self.events = (
+            Ring(folder / name, *SIZES[name], create=True) for name in names
+        )
         self.planning = Planning(
             Mirror(HighwayWorld(), (OVERTAKE,), self.bench.observations),
-            PlanningRings(self.requests, self.orders, self.events),
+            PlanningRings(self.requests, self.orders, self.briefs, self.events),
             planner,
             Forgetful(),
             clock_ns=lambda: self.bench.now_ns,
@@ -114,6 +117,18 @@ def test_what_goes_wrong_is_an_answer(rig: Rig, wish: str, kind: str, words: str
     assert asyncio.run(rig.answered()) == [("planning", "w1"), (kind, "w1")]
     assert words in rig.told()[-1].text
     assert rig.orders.latest() is None
+
+
+def test_what_a_plan_was_made_of_is_left_for_the_books(rig: Rig) -> None:
+    rig.bench.tick()
+    rig.ask("decline")
+    asyncio.run(rig.answered())
+    message = rig.briefs.latest()
+    assert message is not None
+    brief = read_brief(message.payload)
+    assert (brief.wish, brief.instruction.text, brief.trip, brief.tick) == ("w1", "decline", 1, 1)
+    assert brief.context == describe(rig.bench.world.snapshot())
+    assert (brief.history.items, brief.plan.refusal) == ((), "Cars cannot fly.")
 
 
 def test_a_planner_without_end_is_given_up_on(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:

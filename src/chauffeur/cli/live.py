@@ -64,9 +64,10 @@ def live(
     from chauffeur.cli.lines import Lines, standard_input
     from chauffeur.cli.live_drive import STOP, LiveDrive, is_stop
     from chauffeur.cli.live_screen import LiveScreen, QuietScreen
-    from chauffeur.cli.parts import limits_named, planner_named
+    from chauffeur.cli.parts import limits_named, memory_named, planner_named
     from chauffeur.concept import PersonId, SandboxError
     from chauffeur.drive.live.books import Books, unanswered
+    from chauffeur.drive.live.remembering import Remembering
     from chauffeur.drive.live.settings import Settings
     from chauffeur.drive.live.starts import Start
     from chauffeur.drive.live.supervisor import Runtime
@@ -98,7 +99,8 @@ def live(
             screen.note(f"Without an answer since the last session: {wish.wish} “{wish.text}”")
         stack.enter_context(screen)
         screen.refresh(None, stopping=False)
-        drive = LiveDrive(screen, books, given, who, every)
+        memory = Remembering(memory_named(), start, dt_s) if who else None
+        drive = LiveDrive(screen, books, memory, given, who, every)
         lines = stack.enter_context(Lines(standard_input(), edited=console.is_terminal))
         try:
             runtime = stack.enter_context(Runtime(settings, drive.tell))
@@ -107,6 +109,8 @@ def live(
             raise
         if books is not None:
             books.follow(runtime, settings)
+        if memory is not None:
+            memory.follow(runtime)
         drive.run(runtime, lines)
     closing = None if books is None else books.close()
     if audit is not None and closing is not None and not quiet:

@@ -13,7 +13,8 @@ from chauffeur.cli.live_screen import QuietScreen, last_words
 from chauffeur.concept import Instruction, InstructionError, PersonId
 from chauffeur.drive.live.books import Books
 from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.orders import Event
+from chauffeur.drive.live.orders import Brief, Event
+from chauffeur.drive.live.remembering import Remembering
 from chauffeur.drive.live.supervisor import Interaction, Replaced, Runtime
 from chauffeur.drive.session import MAX_WISH_CHARACTERS, parse_wish
 
@@ -35,9 +36,16 @@ class LiveDrive:
     """Asks wishes, listens, and looks at the clock, until the car stands or the trip is over."""
 
     def __init__(
-        self, screen: QuietScreen, books: Books | None, given: list[str], person: PersonId, every_s: float | None
+        self,
+        screen: QuietScreen,
+        books: Books | None,
+        memory: Remembering | None,
+        given: list[str],
+        person: PersonId,
+        every_s: float | None,
     ) -> None:
-        self._screen, self._books, self._person, self._every_s = screen, books, person, every_s
+        self._screen, self._books, self._memory = screen, books, memory
+        self._person, self._every_s = person, every_s
         self._given = given
         self._typed: list[str] = []
         self._keeping: tuple[Instruction, Future[bool]] | None = None
@@ -47,7 +55,7 @@ class LiveDrive:
         self.interrupts = 0
         self.well = False
 
-    def tell(self, heard: Event | Report | Replaced) -> None:
+    def tell(self, heard: Event | Report | Brief | Replaced) -> None:
         """What the runtime tells."""
         match heard:
             case Report():
@@ -59,6 +67,8 @@ class LiveDrive:
         if self._books is not None:
             self._books.tell(heard)
         self._screen.tell(heard)
+        if self._memory is not None:
+            self._memory.tell(heard)
 
     def run(self, runtime: Runtime, lines: Lines) -> None:
         """Drive to the end."""
@@ -186,6 +196,8 @@ class LiveDrive:
         figures = runtime.figures()
         if self._books is not None:
             self._books.end(outcome, figures, runtime.lost_reports)
+        if self._memory is not None and self._memory.trouble:
+            self._screen.note(f"Not remembered: {self._memory.trouble}")
         self._screen.end(outcome, figures, tuple(unasked), last_words(runtime) if outcome == "died" else "")
         driven = all(_driven(each) for each in runtime.interactions.values())
         self.well = outcome in _WELL and driven and not unasked and not self._passed_over

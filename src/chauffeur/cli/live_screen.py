@@ -16,7 +16,7 @@ from rich.text import Text
 from chauffeur.cli.console import columns, plain
 from chauffeur.concept import Intervention, LaneId, Scenario
 from chauffeur.drive.live.messages import Report, Rung
-from chauffeur.drive.live.orders import Event, EventKind
+from chauffeur.drive.live.orders import Brief, Event, EventKind
 from chauffeur.drive.live.supervisor import Interaction, Replaced, Runtime
 from chauffeur.hmi import words
 
@@ -104,7 +104,7 @@ class QuietScreen:
     def asked(self, wish: str, text: str) -> None:
         """A wish goes to the planner."""
 
-    def tell(self, heard: Event | Report | Replaced) -> None:
+    def tell(self, heard: Event | Report | Brief | Replaced) -> None:
         """What the drive tells."""
         if isinstance(heard, Report):
             self.changes += heard.interventions
@@ -161,7 +161,7 @@ class LiveScreen(QuietScreen):
         """Print a wish."""
         self._line(wish, "asked", "bold cyan", Text.assemble("“", plain(text), "”"))
 
-    def tell(self, heard: Event | Report | Replaced) -> None:
+    def tell(self, heard: Event | Report | Brief | Replaced) -> None:
         """Print what became of a wish; keep what control says for the status line."""
         super().tell(heard)
         match heard:
@@ -173,6 +173,8 @@ class LiveScreen(QuietScreen):
             case Report():
                 if self._live is None:
                     self._plain_status(heard)
+            case Brief():
+                pass  # what the plan says comes with the event that tells of it
 
     def refresh(self, typed: str | None, stopping: bool) -> None:
         """Draw the status line anew, ten times a second at most."""

@@ -213,12 +213,9 @@ class Auditor:
                 self._intervened.clear()
                 self._personal("wish", {"source": value.source}, {"wish": value.text})
             case Context():
-                situation = json.dumps(asdict(value.situation), sort_keys=True)
-                self._personal("context", {"letter": "C"}, {"context": value.text, "situation": situation})
+                self._personal("context", *context_record(value))
             case History():
-                # A trip's id is a hash that somebody who guesses the wish can compute: it counts as a text.
-                trips = " ".join(item.trip_id for item in value.items)
-                self._personal("context", {"letter": "H", "items": len(value.items)}, {"trips": trips})
+                self._personal("context", *history_record(value))
             case SystemMessage():
                 digest = hashlib.sha256(value.text.encode("utf-8", "surrogatepass")).hexdigest()
                 self._log.append("context", {"letter": "S", "setting": value.setting, "sha256": digest})
@@ -376,6 +373,18 @@ def with_head(recorded: RecordedTrip, closing: Closing) -> RecordedTrip:
     """The trip with the head of its audit log among its provenance: the recording then vouches for the log's length."""
     trip = recorded.trip
     return replace(recorded, trip=replace(trip, record=(*trip.record, ("audit_head", closing.head))))
+
+
+def context_record(context: Context) -> tuple[dict[str, Any], dict[str, str]]:
+    """What a log holds of C, as `plan_record`."""
+    situation = json.dumps(asdict(context.situation), sort_keys=True)
+    return {"letter": "C"}, {"context": context.text, "situation": situation}
+
+
+def history_record(history: History) -> tuple[dict[str, Any], dict[str, str]]:
+    """What a log holds of H, as `plan_record`."""
+    # A trip's id is a hash that somebody who guesses the wish can compute: it counts as a text.
+    return {"letter": "H", "items": len(history.items)}, {"trips": " ".join(item.trip_id for item in history.items)}
 
 
 def plan_record(plan: Plan) -> tuple[dict[str, Any], dict[str, str]]:

@@ -263,7 +263,7 @@ def make_trip(
     else:
         causes = episode.causes
     return Trip(
-        id=trip_id(request, plan, scenario, seed),
+        id=trip_id(request.instruction, request.limits, plan, scenario, seed),
         instruction=request.instruction,
         context=request.context,
         history=request.history,
@@ -280,21 +280,24 @@ def make_trip(
     )
 
 
-def trip_id(request: PlanRequest, plan: Plan, scenario: Scenario, seed: int) -> str:
-    """Content hash of what decides a trip: wish, scenario, seed, limits, planner and policy."""
+def trip_id(
+    instruction: Instruction, limits: Limits, plan: Plan, scenario: Scenario, seed: int, *, tick: int = 0
+) -> str:
+    """Content hash of what decides a trip: wish, scenario, seed, limits, planner and policy, and when it was wished."""
     policy = str(plan.policy)
     if isinstance(plan.policy, Program):
         policy = "\0".join(text for text in (plan.policy.source, plan.policy.library) if text)
     parts = [
-        request.instruction.text,
-        str(request.instruction.person),
+        instruction.text,
+        str(instruction.person),
         scenario_hash(scenario),
         str(seed),
-        str(request.limits),
+        str(limits),
         plan.planner,
         plan.model,
         policy,
         plan.refusal,
+        *([str(tick)] if tick else []),
     ]
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
 

@@ -129,7 +129,9 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
 
     world = _world(settings)
     mirror = Mirror(world, settings.starts, ring(folder, "observations"))
-    rings = PlanningRings(ring(folder, "requests"), ring(folder, "orders"), ring(folder, "planner_events"))
+    rings = PlanningRings(
+        ring(folder, "requests"), ring(folder, "orders"), ring(folder, "briefs"), ring(folder, "planner_events")
+    )
     options = {} if settings.base_url is None else {"base_url": settings.base_url}
     planner = make_planner(settings.planner, **options)
     memory: Memory = load_plugin("chauffeur.memories", settings.memory)() if settings.memory else Forgetful()

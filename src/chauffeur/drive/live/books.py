@@ -4,8 +4,8 @@ A wish is on the disk before it goes to the planner (`kept`); all else is handed
 nor raises. A session that was killed leaves its open wishes behind; `unanswered` finds them.
 
 Besides the records of any drive (`drive/auditing.py`), each with the id of its wish: `verdict` of `live`, whether a
-plan was started; `outcome`, what became of a wish, and of the drive; `context`, what happened in between: `event` is
-one of the events of a wish, `replaced`, `rung` or `settings`.
+plan was started; `outcome`, what became of a wish, and of the drive; `context`, with a `letter`, C and H of a plan, and, with
+an `event`, what happened in between: one of the events of a wish, `replaced`, `rung` or `settings`.
 """
 
 from __future__ import annotations
@@ -19,11 +19,10 @@ from types import TracebackType
 from typing import Any, Final, Self
 
 from chauffeur.concept import NOBODY, Instruction
-from chauffeur.drive.auditing import FLUSH_TIMEOUT_S, Auditor, plan_record
-from chauffeur.drive.live.messages import MessageError, Report, Rung
-from chauffeur.drive.live.orders import Event, read_order
-from chauffeur.drive.live.ring import Reader, Ring
-from chauffeur.drive.live.settings import Settings, ring
+from chauffeur.drive.auditing import FLUSH_TIMEOUT_S, Auditor, context_record, history_record, plan_record
+from chauffeur.drive.live.messages import Report, Rung
+from chauffeur.drive.live.orders import Brief, Event
+from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.supervisor import Replaced, Runtime
 from chauffeur.safety.audit.reading import read_records
 from chauffeur.safety.audit.redaction import PERSON
@@ -89,7 +88,7 @@ class Books:
         self._auditor, self._log, self._dt_s = auditor, auditor.log, dt_s
         self._disk = ThreadPoolExecutor(1, "audit flush")
         self._runtime: Runtime | None = None
-        self._orders: tuple[Ring, Reader] | None = None
+        self._lost_briefs = 0
         self._people: dict[str, str] = {}
         self._rung: Rung = "follow"
         self._rungs: Counter[Rung] = Counter()
@@ -114,8 +113,6 @@ class Books:
             settings: What they were told.
         """
         self._runtime = runtime
-        orders = ring(runtime.folder, "orders")
-        self._orders = orders, Reader(orders, old=True)
         about = {name: value for name, value in asdict(settings).items() if name not in ("starts", "base_url")}
         starts = [{"limits": asdict(start.limits), "most_s": start.most_s} for start in settings.starts]
         self._note("settings", {**about, "starts": starts})
@@ -138,15 +135,16 @@ class Books:
         """What became of a wish that the drive itself never heard of."""
         self._personal("outcome", wish, {"wish": wish, "outcome": kind}, {"detail": why})
 
-    def tell(self, heard: Event | Report | Replaced) -> None:
+    def tell(self, heard: Event | Report | Brief | Replaced) -> None:
         """Hear what the drive tells."""
         match heard:
             case Report():
                 self._auditor.guarded("actuation", lambda: self._report(heard))
             case Replaced():
                 self._note("replaced", {"process": heard.role, "why": heard.why})
+            case Brief():
+                self._auditor.guarded("plan", lambda: self._brief(heard))
             case Event():
-                self._auditor.guarded("plan", self._plans)
                 self._auditor.guarded("outcome", lambda: self._event(heard))
 
     def end(self, outcome: str, figures: Mapping[str, Any] | None, lost_reports: int) -> None:
@@ -162,9 +160,6 @@ class Books:
     def close(self) -> Closing:
         """Write what is left, close the log, and say how it ended; a second call says the same."""
         self._disk.shutdown()
-        if self._orders is not None:
-            self._orders[0].close()
-            self._orders = None
         return self._auditor.close()
 
     def _report(self, report: Report) -> None:
@@ -194,16 +189,14 @@ class Books:
         interaction = None if self._runtime is None else self._runtime.interactions.get(event.wish)
         closed = interaction is not None and interaction.answer is event
         match event.kind:
-            case "planned":
-                pass  # the plan itself has been written down
+            case "planned" | "declined":
+                pass  # the plan itself has been written down, with its refusal
             case "started":
                 self._verdict(event, "")
             case "refused":
                 self._verdict(event, event.text)
             case "stale" if not closed:  # told once as it comes, and once more if it is the last word
                 self._verdict(event, event.text)
-            case "declined":
-                self._personal("plan", event.wish, {**at, "policy": None, "refused": True}, {"refusal": event.text})
             case _ if not closed:
                 self._personal("context", event.wish, {"event": event.kind, **at}, {"text": event.text})
             case _:
@@ -215,21 +208,17 @@ class Books:
         body = {"wish": event.wish, "check": JUDGED, "passed": not why, "line": None, "tick": self._tick}
         self._personal("verdict", event.wish, body, {"reason": why})
 
-    def _plans(self) -> None:
-        """Write down the plans that came since: the planner sends one before anybody tells of it."""
-        if self._orders is None:
-            return
-        messages, lost = self._orders[1].news()
-        if lost:
-            self._log.append("gap", {"lost": {"plan": lost}, "why": "plans were overwritten before they were read"})
-        for message in messages:
-            try:
-                order = read_order(message.payload)
-            except MessageError as error:
-                self._note("garbage", {"process": "planner", "why": str(error)})
-                continue
-            body, texts = plan_record(order.plan)
-            self._personal("plan", order.wish, {"wish": order.wish, **body, "tick": order.scene.tick}, texts)
+    def _brief(self, brief: Brief) -> None:
+        """Write down C, H, R and P: they are told before anything becomes of the plan."""
+        if self._runtime is not None and self._runtime.lost_briefs > self._lost_briefs:
+            lost, self._lost_briefs = self._runtime.lost_briefs - self._lost_briefs, self._runtime.lost_briefs
+            self._log.append("gap", {"lost": {"plan": lost}, "why": "what plans were made of was not heard in time"})
+        for kind, (body, texts) in (
+            ("context", context_record(brief.context)),
+            ("context", history_record(brief.history)),
+            ("plan", plan_record(brief.plan)),
+        ):
+            self._personal(kind, brief.wish, {"wish": brief.wish, **body, "tick": brief.tick}, texts)
 
     def _over(self, outcome: str, body: Mapping[str, Any]) -> None:
         if not self._outcome_written:

@@ -1,4 +1,4 @@
-"""What goes between planner, policy and supervisor: wishes, plans, events. Control reads none of it."""
+"""What goes between planner, policy and supervisor: wishes, plans, events, briefs. Control reads none of it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final, Literal, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from chauffeur.concept import NOBODY, LaneId, Plan, Snapshot
+from chauffeur.concept import NOBODY, Context, History, Instruction, LaneId, Plan, Snapshot
 from chauffeur.drive.live.messages import MessageError
 
 EventKind = Literal[
@@ -108,11 +108,30 @@ class Event:
     again: bool = True
 
 
+@dataclass(frozen=True, slots=True)
+class Brief:
+    """What a plan was made of: for the books and the memory, whatever becomes of the plan.
+
+    Attributes:
+        wish: Id of the wish.
+        instruction, context, history, plan: I, C, H, and (R, P), as the planner had and gave them.
+        trip, tick: The instant the context tells of.
+    """
+
+    wish: str
+    instruction: Instruction
+    context: Context
+    history: History
+    plan: Plan
+    trip: int
+    tick: int
+
+
 _T = TypeVar("_T")
-_request, _order, _event = TypeAdapter(Request), TypeAdapter(Order), TypeAdapter(Event)
+_request, _order, _event, _brief = TypeAdapter(Request), TypeAdapter(Order), TypeAdapter(Event), TypeAdapter(Brief)
 
 
-def encode(message: Request | Order | Event) -> bytes:
+def encode(message: Request | Order | Event | Brief) -> bytes:
     """As bytes."""
     match message:
         case Request():
@@ -121,6 +140,8 @@ def encode(message: Request | Order | Event) -> bytes:
             return _order.dump_json(message)
         case Event():
             return _event.dump_json(message)
+        case Brief():
+            return _brief.dump_json(message)
 
 
 def read_request(payload: bytes) -> Request:
@@ -136,6 +157,11 @@ def read_order(payload: bytes) -> Order:
 def read_event(payload: bytes) -> Event:
     """From bytes. Raises MessageError."""
     return _read(_event, payload)
+
+
+def read_brief(payload: bytes) -> Brief:
+    """From bytes. Raises MessageError."""
+    return _read(_brief, payload)
 
 
 def _read(adapter: TypeAdapter[_T], payload: bytes) -> _T:

@@ -7,18 +7,20 @@ unanswered until the supervisor has started another one, and the car drives on w
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
-from chauffeur.concept import ChauffeurError, PersonId, Plan, PlanRequest
+from chauffeur.concept import ChauffeurError, History, PersonId, Plan, PlanRequest
 from chauffeur.describe import describe
 from chauffeur.drive.live.messages import MessageError
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.orders import (
     MOST_SAID,
     START_WITHIN_S,
+    Brief,
     Event,
     EventKind,
     Order,
@@ -48,6 +50,7 @@ class PlanningRings:
 
     requests: Ring
     orders: Ring
+    briefs: Ring
     events: Ring
 
 
@@ -144,6 +147,7 @@ class Planning:
         system = build_system_message(self._setting, limits=limits)
         asked, _ = screen_request(PlanRequest(instruction, context, system, history, limits=limits))
         plan: Plan = await self._planner.plan(asked)
+        self._brief(Brief(request.wish, instruction, context, history, plan, self._mirror.trip, snapshot.tick))
         return Order(
             wish=request.wish,
             plan=plan,
@@ -152,6 +156,13 @@ class Planning:
             start_by_ns=issued_ns + round(START_WITHIN_S / self._speed * 1e9),
             expires_ns=issued_ns + round(FOLLOW_FOR_S / self._speed * 1e9),
         )
+
+    def _brief(self, brief: Brief) -> None:
+        """Leave word of what the plan was made of; one that is too long without the history, or else not at all."""
+        for each in (brief, replace(brief, history=History())):
+            with contextlib.suppress(ValueError):
+                self._rings.briefs.write(encode(each))
+                return
 
     def _tell(self, kind: EventKind, wish: str, text: str, *, again: bool = True) -> None:
         event = Event(kind, wish, text[:MOST_SAID], self._mirror.trip, self._mirror.tick, again)

@@ -14,13 +14,22 @@ from chauffeur.drive.live.starts import Start
 SETTINGS_FILE: Final = "settings.json"
 
 RingName = Literal[
-    "observations", "reports", "wishes", "orders", "requests", "policy_events", "planner_events", "checkpoints"
+    "observations",
+    "reports",
+    "wishes",
+    "orders",
+    "briefs",
+    "requests",
+    "policy_events",
+    "planner_events",
+    "checkpoints",
 ]
 SIZES: Final[dict[RingName, tuple[int, int]]] = {
     "observations": (4, 64 << 10),
     "reports": (512, 16 << 10),
     "wishes": (8, 2 << 10),
     "orders": (8, 256 << 10),
+    "briefs": (8, 512 << 10),
     "requests": (16, 16 << 10),
     "policy_events": (256, 16 << 10),
     "planner_events": (256, 16 << 10),

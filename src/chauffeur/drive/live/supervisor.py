@@ -25,8 +25,8 @@ from typing import Any, Final, Literal, Self
 from chauffeur.concept import NOBODY, SandboxError
 from chauffeur.drive.live.__main__ import FIGURES_FILE, READY_SUFFIX
 from chauffeur.drive.live.messages import MessageError, Report, Wish
-from chauffeur.drive.live.orders import FINAL, Event, EventKind, Request, encode, read_event
-from chauffeur.drive.live.ring import Reader
+from chauffeur.drive.live.orders import FINAL, Brief, Event, EventKind, Request, encode, read_brief, read_event
+from chauffeur.drive.live.ring import Message, Reader
 from chauffeur.drive.live.settings import SIZES, RingName, Settings, ring
 
 Role = Literal["control", "policy", "spare", "planner"]
@@ -52,7 +52,7 @@ OWNER_FILE: Final = "supervisor"
 LEFT_FOR_S: Final = 120.0
 """A folder whose supervisor is gone, and which nobody has written to for so long, is removed."""
 
-_HEARD: Final[tuple[RingName, ...]] = ("reports", "policy_events", "planner_events")
+_HEARD: Final[tuple[RingName, ...]] = ("reports", "policy_events", "planner_events", "briefs")
 
 Stage = Literal["asked", "planned", "driven", "closed"]
 
@@ -67,6 +67,7 @@ class Interaction:
         since_s: When it got there, by the clock.
         answer: The event that closed it.
         events: All that was told of it.
+        brief: What its last plan was made of; None before there is one.
     """
 
     request: Request
@@ -74,6 +75,12 @@ class Interaction:
     since_s: float = 0.0
     answer: Event | None = None
     events: list[Event] = field(default_factory=list[Event])
+    brief: Brief | None = None
+
+    @property
+    def started_tick(self) -> int | None:
+        """When driving it began; None if it never did."""
+        return next((event.tick for event in self.events if event.kind in ("started", "resumed")), None)
 
 
 @dataclass(slots=True)
@@ -93,7 +100,7 @@ class Replaced:
     why: str
 
 
-Listener = Callable[[Event | Report | Replaced], None]
+Listener = Callable[[Event | Report | Brief | Replaced], None]
 
 
 class Runtime:
@@ -115,7 +122,7 @@ class Runtime:
         self._heard = {name: Reader(self._rings[name], old=True) for name in _HEARD}
         self.interactions: dict[str, Interaction] = {}
         self.report: Report | None = None
-        self.lost_reports = 0
+        self.lost_reports = self.lost_briefs = 0
         self.replaced: list[Replaced] = []
         self._children: dict[Role, _Child] = {}
         self._wish_number, self._wish_at_s = 0, time.monotonic()
@@ -384,8 +391,27 @@ class Runtime:
 
     def _hear(self) -> None:
         self._hear_reports()
-        self._hear_events("planner_events")
-        self._hear_events("policy_events")
+        # Events first, for a brief is left before its plan is told of: but what it says is known before they are taken.
+        told: tuple[tuple[Role, tuple[Message, ...]], ...] = (
+            ("planner", self._heard["planner_events"].news()[0]),
+            ("policy", self._heard["policy_events"].news()[0]),
+        )
+        self._hear_briefs()
+        for role, messages in told:
+            self._hear_events(role, messages)
+
+    def _hear_briefs(self) -> None:
+        messages, lost = self._heard["briefs"].news()
+        self.lost_briefs += lost
+        for message in messages:
+            try:
+                brief = read_brief(message.payload)
+            except MessageError:
+                self.lost_briefs += 1
+                continue
+            if brief.wish in self.interactions:
+                self.interactions[brief.wish].brief = brief
+            self._tell(brief)
 
     def _hear_reports(self) -> None:
         messages, lost = self._heard["reports"].news()
@@ -394,14 +420,13 @@ class Runtime:
             self.report = Report.decode(message.payload)
             self._tell(self.report)
 
-    def _hear_events(self, name: Literal["policy_events", "planner_events"]) -> None:
-        messages, _ = self._heard[name].news()
+    def _hear_events(self, sent_by: Role, messages: tuple[Message, ...]) -> None:
         for message in messages:
             try:
                 event = read_event(message.payload)
             except MessageError:
                 continue
-            self._take(event, sent_by="policy" if name == "policy_events" else "planner")
+            self._take(event, sent_by)
 
     def _take(self, event: Event, sent_by: Role) -> None:
         interaction = self.interactions.get(event.wish)
