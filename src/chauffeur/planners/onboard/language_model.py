@@ -7,20 +7,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any, Final
 
-from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Usage
+from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Situation, Usage
 from chauffeur.planners.base import OnText, Planner, declined
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import Step, tell
 from chauffeur.planners.onboard.engine import Engine, Written
 from chauffeur.planners.onboard.guard import doubt, named, unnamed
-from chauffeur.planners.onboard.link import link
+from chauffeur.planners.onboard.link import Linked, link
 from chauffeur.planners.onboard.options import Declined
-from chauffeur.planners.onboard.personal import corrections_of, leaning_of
+from chauffeur.planners.onboard.personal import Leaning, corrections_of, leaning_of
 from chauffeur.planners.onboard.prompt import history_words, prompt
 from chauffeur.planners.onboard.reply import Reply, read_reply
 from chauffeur.planners.onboard.thoughts import thoughts_of
@@ -92,6 +93,25 @@ def _told(on_text: OnText, attempt: int, piece: str) -> None:
     on_text(piece, attempt)
 
 
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """A wish understood and fitted to the road, not yet a policy.
+
+    Attributes:
+        source: The model's program.
+        linked: Its skills with their numbers.
+        used: What the person's history said about each.
+        situation: Where we are.
+        written: What the network wrote.
+    """
+
+    source: str
+    linked: Linked
+    used: tuple[Leaning, ...]
+    situation: Situation
+    written: Written
+
+
 class LanguageModelPlanner:
     """Plans with the on-board language model, in this process."""
 
@@ -161,6 +181,37 @@ class LanguageModelPlanner:
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; what is not understood, not possible or not to be done is declined in words."""
         begun = time.perf_counter()
+        settled = self.settle(request, begun)
+        if isinstance(settled, Plan):
+            return settled
+        linked, used = settled.linked, settled.used
+        settings = {name: value for step in linked.choice.steps for name, value in step.settings}
+        settings |= {name: value for one in used for name, value in one.settings}
+        return Plan(
+            thoughts=thoughts_of(
+                linked.reading,
+                [step.does for step in linked.choice.steps],
+                settled.situation,
+                assumed=[sentence for step in linked.choice.steps for sentence in step.assumed],
+                because=[one.because for one in used],
+            ),
+            policy=Program(settled.source, library=linked.library),
+            intent=linked.choice.intent,
+            settings=tuple(settings.items()),
+            planner=self.id,
+            model=self.model,
+            latency_s=time.perf_counter() - begun,
+            usage=usage_of(settled.written),
+            raw=settled.written.text,
+        )
+
+    def settle(self, request: PlanRequest, begun: float) -> Settled | Plan:
+        """What is to be done here, before it is a policy of some kind; or the plan that declines.
+
+        Args:
+            request: What is asked.
+            begun: When planning began, by `time.perf_counter`.
+        """
         wish = request.instruction.text
         situation = request.context.situation
         history = history_words(request.history, self._steps_of) if self._history else ()
@@ -180,26 +231,14 @@ class LanguageModelPlanner:
         if not reply.steps:
             words = reply.question or reply.refusal
             intent = "ask" if reply.question else "refuse"
-            return declined(self, words, begun, intent=intent, usage=_usage(written), raw=written.text)
+            return declined(self, words, begun, intent=intent, usage=usage_of(written), raw=written.text)
         leaning = partial(leaning_of, request.history, corrections=corrections_of(request.rounds))
         linked = link(reply.steps, situation, request.limits, leaning)
         if isinstance(linked, Declined):
             intent = "+".join(step.meaning.family for step in reply.steps)
-            return declined(self, linked.words, begun, intent=intent, usage=_usage(written), raw=written.text)
-        used = [leaning(step.meaning.family) for step in reply.steps]
-        settings = {name: value for step in linked.choice.steps for name, value in step.settings}
-        settings |= {name: value for one in used for name, value in one.settings}
-        return Plan(
-            thoughts=thoughts_of(linked.reading, linked.choice, situation, [one.because for one in used]),
-            policy=Program(reply.source, library=linked.library),
-            intent=linked.choice.intent,
-            settings=tuple(settings.items()),
-            planner=self.id,
-            model=self.model,
-            latency_s=time.perf_counter() - begun,
-            usage=_usage(written),
-            raw=written.text,
-        )
+            return declined(self, linked.words, begun, intent=intent, usage=usage_of(written), raw=written.text)
+        used = tuple(leaning(step.meaning.family) for step in reply.steps)
+        return Settled(reply.source, linked, used, situation, written)
 
     def _steps_of(self, wish: str) -> tuple[Step, ...]:
         """What an earlier wish asked for, for trips that were driven by another planner; empty when that is unclear."""
@@ -211,5 +250,6 @@ class LanguageModelPlanner:
         return self._read[wish]
 
 
-def _usage(written: Written) -> Usage:
+def usage_of(written: Written) -> Usage:
+    """What it cost."""
     return Usage(prompt_tokens=written.prompt_tokens, completion_tokens=written.tokens)

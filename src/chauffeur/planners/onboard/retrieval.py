@@ -56,7 +56,13 @@ class RetrievalPlanner:
         settings |= {name: value for one in used for name, value in one.settings}
         source = program_of([step.filled for step in choice.steps])
         return Plan(
-            thoughts=thoughts_of(reading, choice, request.context.situation, [one.because for one in used]),
+            thoughts=thoughts_of(
+                reading,
+                [step.does for step in choice.steps],
+                request.context.situation,
+                assumed=[sentence for step in choice.steps for sentence in step.assumed],
+                because=[one.because for one in used],
+            ),
             policy=Program(source),
             intent=choice.intent,
             settings=tuple(settings.items()),

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from chauffeur.concept import Situation, Thoughts
-from chauffeur.planners.onboard.choose import Choice
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.meaning import Meaning, Reading
 
 
-def thoughts_of(reading: Reading, choice: Choice, situation: Situation, because: list[str]) -> Thoughts:
-    """R for a choice. The numbers are those of the program, written the same way."""
+def thoughts_of(
+    reading: Reading, does: Sequence[str], situation: Situation, *, assumed: Sequence[str], because: Sequence[str]
+) -> Thoughts:
+    """R for what was settled. The numbers are those of the policy, written the same way.
+
+    Args:
+        reading: What was understood.
+        does: What is done, clauses after "I".
+        situation: Where we are.
+        assumed: What was taken for granted, full sentences.
+        because: Which earlier trips say so, full sentences or nothing.
+    """
     understood = "; then ".join(_understood(meaning) for meaning in reading.steps)
-    plan = ". Then I ".join(step.does for step in choice.steps)
-    sentences = [f"You want: {understood}.", _situation(situation), f"I {plan}."]
-    sentences += [sentence for step in choice.steps for sentence in step.assumed]
+    sentences = [f"You want: {understood}.", _situation(situation), f"I {'. Then I '.join(does)}.", *assumed]
     sentences += [sentence for sentence in dict.fromkeys(because) if sentence]
     return Thoughts(" ".join(sentences))
 

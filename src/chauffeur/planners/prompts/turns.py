@@ -70,13 +70,21 @@ def _history(history: History) -> str:
     return "Remembered trips of this passenger, most relevant first:\n" + "\n".join(blocks)
 
 
-def wish_turn(request: PlanRequest) -> str:
-    """C, H and I, each quoted; the instruction comes last, right before the question."""
+def wish_turn(request: PlanRequest, *, history: str | None = None, ask: str = _ASK) -> str:
+    """C, H and I, each quoted; the instruction comes last, right before the question.
+
+    Args:
+        request: What is asked.
+        history: H in words, quoted already; default the remembered trips with their programs.
+        ask: The question.
+    """
     parts = [data_block("context", request.context.text, CONTEXT_CHARS)]
-    if request.history.items:
-        parts.append(_history(request.history))
+    if history is None and request.history.items:
+        history = _history(request.history)
+    if history:
+        parts.append(history)
     parts.append(data_block("instruction", request.instruction.text, INSTRUCTION_CHARS))
-    parts.append(_ASK)
+    parts.append(ask)
     return "\n\n".join(parts)
 
 
@@ -100,13 +108,13 @@ def build_messages(request: PlanRequest) -> list[Message]:
     return messages
 
 
-def repair_turns(reply: str, findings: list[str]) -> list[Message]:
-    """The model's own answer, and what the checks found in it, for one more try."""
+def repair_turns(reply: str, findings: list[str], *, ask: str = _ASK_AGAIN) -> list[Message]:
+    """The model's own answer, and what the checks found in it, for one more try; `ask` is the question."""
     shown = findings[:MAX_FINDINGS]
     if len(findings) > len(shown):
         shown = [*shown, f"and {len(findings) - len(shown)} more"]
     listed = data_block("findings", "\n".join(f"- {finding}" for finding in shown), FEEDBACK_CHARS)
     return [
         {"role": "assistant", "content": defuse(clean(cap(reply, PROGRAM_CHARS))) or "(empty)"},
-        {"role": "user", "content": f"The checks refused this answer:\n{listed}\n\n{_ASK_AGAIN}"},
+        {"role": "user", "content": f"The checks refused this answer:\n{listed}\n\n{ask}"},
     ]

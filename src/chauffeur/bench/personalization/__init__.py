@@ -1,0 +1,12 @@
+"""Talk2Drive's evaluation (seed Sec. V-C): how a drive scores, and how often a person takes over."""
+
+from chauffeur.bench.personalization.scoring import (
+    SCORE_VERSION,
+    DrivingScore,
+    ScoreWeights,
+    Statistics,
+    driving_score,
+    statistics_of,
+)
+
+__all__ = ["SCORE_VERSION", "DrivingScore", "ScoreWeights", "Statistics", "driving_score", "statistics_of"]

@@ -1,0 +1,118 @@
+"""A model's reply as parameters: one JSON object, typed, within bounds. Nothing of it is ever run."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from chauffeur.concept import Parameters
+from chauffeur.concept.units import MPS_PER_KMH
+from chauffeur.planners.talk2drive.style import DISTANCE_M, RATIO_S
+
+_MOST_KMH: Final = 250.0
+_MOST_SAID: Final = 4_000
+_LANES: Final[dict[str, Literal[-1, 0, 1]]] = {"left": -1, "keep": 0, "right": 1}
+
+
+class _Written(BaseModel):
+    """The object as the system message asks for it."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    thoughts: Annotated[str, Field(max_length=_MOST_SAID)] = ""
+    refusal: Annotated[str, Field(max_length=_MOST_SAID)] = ""
+    velocity_kmh: Annotated[float, Field(ge=0.0, le=_MOST_KMH, strict=True)] | None = None
+    lookahead_distance_m: Annotated[float, Field(ge=DISTANCE_M[0], le=DISTANCE_M[1], strict=True)] | None = None
+    lookahead_ratio_s: Annotated[float, Field(ge=RATIO_S[0], le=RATIO_S[1], strict=True)] | None = None
+    lane: Literal["left", "keep", "right"] = "keep"
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a reply holds: parameters, a refusal, or what is wrong with it.
+
+    Attributes:
+        thoughts: R.
+        parameters: P; None where there are none.
+        refusal: Why the model declines.
+        problem: What is wrong, for the model's second try.
+    """
+
+    thoughts: str
+    parameters: Parameters | None = None
+    refusal: str = ""
+    problem: str = ""
+
+
+def read_answer(text: str, *, whole: bool = True) -> Answer:
+    """Read a reply; nothing raises.
+
+    Args:
+        text: As the model wrote it; words around the object are passed over.
+        whole: Whether the model came to its end by itself.
+    """
+    try:
+        found = _last_object(text)
+    except RecursionError:
+        return Answer("", problem="the JSON object is nested too deep")
+    if found is None:
+        why = (
+            "the answer was cut off at its length limit; answer more briefly"
+            if not whole
+            else "there is no JSON object"
+        )
+        return Answer("", problem=why)
+    try:
+        written = _Written.model_validate(found)
+    except ValidationError as error:
+        return Answer(_words(found.get("thoughts")), problem=_said(error))
+    if written.refusal.strip():
+        return Answer(written.thoughts.strip(), refusal=written.refusal.strip())
+    missing = [
+        name for name in ("velocity_kmh", "lookahead_distance_m", "lookahead_ratio_s") if getattr(written, name) is None
+    ]
+    if missing:
+        return Answer(written.thoughts.strip(), problem=f"missing: {', '.join(missing)}")
+    assert written.velocity_kmh is not None
+    assert written.lookahead_distance_m is not None
+    assert written.lookahead_ratio_s is not None
+    return Answer(
+        written.thoughts.strip(),
+        Parameters(
+            written.velocity_kmh * MPS_PER_KMH,
+            written.lookahead_distance_m,
+            written.lookahead_ratio_s,
+            _LANES[written.lane],
+        ),
+    )
+
+
+_OPENS = re.compile(r"\{")
+
+
+def _last_object(text: str) -> dict[str, Any] | None:
+    """The last JSON object that stands whole in a text: models think aloud before they answer."""
+    decoder = json.JSONDecoder()
+    found: dict[str, Any] | None = None
+    end = 0
+    for opening in _OPENS.finditer(text):
+        if opening.start() < end:
+            continue  # inside the one before
+        try:
+            value, end = decoder.raw_decode(text, opening.start())
+        except ValueError:
+            continue
+        found = value
+    return found
+
+
+def _words(value: object) -> str:
+    return value.strip()[:_MOST_SAID] if isinstance(value, str) else ""
+
+
+def _said(error: ValidationError) -> str:
+    return "; ".join(f"{'.'.join(map(str, each['loc'])) or 'object'}: {each['msg']}" for each in error.errors()[:6])
