@@ -6,7 +6,6 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable
-from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -192,7 +191,7 @@ def test_the_same_name_in_other_code_points_is_the_same_person(vault: VaultMemor
 
 
 def test_retention_hides_at_once_and_deletes_at_the_next_write(tmp_path: Path, clock: Clock, wishes: Wishes) -> None:
-    vault = VaultMemory(tmp_path, clock=clock, retention=timedelta(days=90))
+    vault = VaultMemory(tmp_path, clock=clock)
     vault.remember(trip("Ann", "drive faster"))
     clock.pass_by(days=89)
     vault.remember(trip("Ann", "drive much faster"))

@@ -59,15 +59,16 @@ def drive(
     from chauffeur.cli.audit import auditor_for, tell_closing
     from chauffeur.cli.console import stdout
     from chauffeur.cli.failures import FAILED
-    from chauffeur.cli.parts import limits_named, memory_named, planner_named, referee_for, setting_named
+    from chauffeur.cli.parts import limits_named, memory_named, not_kept, planner_named, referee_for, setting_named
     from chauffeur.cli.show import Quiet, Teller
     from chauffeur.concept import PersonId
     from chauffeur.drive.auditing import told_to, with_head
     from chauffeur.drive.scenarios import find, suiting
     from chauffeur.drive.session import Forgetful, Session, parse_wish
+    from chauffeur.memory.personal_limits import personal_limits
 
     instruction = parse_wish(wish, PersonId(person.strip()))
-    bounds = limits_named(limits)
+    bounds = personal_limits(instruction.person, limits_named(limits))
     place = suiting(instruction.text) if scenario is None else find(scenario, data)
     console = stdout()
     teller = Quiet(console) if quiet else Teller(console)
@@ -85,6 +86,8 @@ def drive(
             auditor = stack.enter_context(auditor_for(audit, place, start_seed))
             session.tell = told_to(auditor.tell, teller.tell)
         teller.begin(place, start_seed)
+        if private := not_kept(instruction.person):
+            console.print(private, style="bold yellow", markup=False)
         stack.enter_context(teller)
         recorded = asyncio.run(session.drive(instruction, place, start_seed, bounds))
     closing = None if auditor is None else auditor.close()

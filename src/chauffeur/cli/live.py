@@ -64,7 +64,7 @@ def live(
     from chauffeur.cli.lines import Lines, standard_input
     from chauffeur.cli.live_drive import STOP, LiveDrive, is_stop
     from chauffeur.cli.live_screen import LiveScreen, QuietScreen
-    from chauffeur.cli.parts import limits_named, memory_named, planner_named
+    from chauffeur.cli.parts import limits_named, memory_named, not_kept, planner_named
     from chauffeur.concept import PersonId, SandboxError
     from chauffeur.drive.live.books import Books, unanswered
     from chauffeur.drive.live.remembering import Remembering
@@ -73,11 +73,13 @@ def live(
     from chauffeur.drive.live.supervisor import Runtime
     from chauffeur.drive.scenarios import find, suiting
     from chauffeur.drive.session import make_world, parse_wish
+    from chauffeur.memory.personal_limits import personal_limits
 
     who = PersonId(person.strip())
     given = [STOP if is_stop(wish) else parse_wish(wish, who).text for wish in wishes or ()]
     place = find(scenario) if scenario is not None else suiting(given[0] if given else "")
-    start = Start(place, place.seed if seed is None else seed, limits_named(limits), duration)
+    bounds = personal_limits(who, limits_named(limits))
+    start = Start(place, place.seed if seed is None else seed, bounds, duration)
     settings = Settings(
         starts=(start,),
         planner=planner,
@@ -95,6 +97,8 @@ def live(
         if audit is not None:  # before anything moves: a log that cannot be had is refused here
             books = stack.enter_context(Books(auditor_for(audit, place, start.seed), dt_s))
         screen.begin(place, start.seed, planner)
+        if private := not_kept(who):
+            screen.note(private)
         for wish in left:
             screen.note(f"Without an answer since the last session: {wish.wish} “{wish.text}”")
         stack.enter_context(screen)

@@ -28,6 +28,7 @@ from chauffeur.cli.adapt import adapt_app
 from chauffeur.cli.audit import audit_app
 from chauffeur.cli.bench import bench_app
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
+from chauffeur.cli.me import me_app
 from chauffeur.cli.policies import policies_app
 from chauffeur.cli.scenes import scenes_app
 from chauffeur.cli.serve import serve_app
@@ -90,6 +91,7 @@ bench_app.command(epilog=coach.EXAMPLES)(coach.coach)
 bench_app.command(epilog=bench_alignment.EXAMPLES)(bench_alignment.alignment)
 bench_app.command(epilog=bench_hostile.EXAMPLES)(bench_hostile.hostile)
 app.add_typer(bench_app, name="bench")
+app.add_typer(me_app, name="me")
 app.add_typer(policies_app, name="policies")
 app.add_typer(scenes_app, name="scenes")
 app.add_typer(train_app, name="train")

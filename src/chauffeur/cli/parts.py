@@ -52,6 +52,15 @@ def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
     return judge(world, scenario, plan)
 
 
+def not_kept(person: str) -> str:
+    """What to tell a person of whom nothing new is kept; empty where it is."""
+    from chauffeur.memory.privacy import read_privacy
+
+    if not person or read_privacy().keeps:
+        return ""
+    return f"Privacy mode: nothing of this drive is kept in the profile of {person}."
+
+
 def memory_named(name: str = "vault") -> Memory:
     """The memory of this installation."""
     from chauffeur.concept.registry import load_plugin

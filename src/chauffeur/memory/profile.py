@@ -108,6 +108,11 @@ class Profile:
                 self._add_feedback(found[0][0], feedback, when)
         return bool(found)
 
+    def forget_before(self, when: str) -> int:
+        """Remove the trips before a time; how many they were."""
+        with self._writing():
+            return self._connection.execute("DELETE FROM trips WHERE at < ?", (when,)).rowcount
+
     def forget_last(self) -> HistoryItem | None:
         """Remove the most recent trip."""
         with self._writing():

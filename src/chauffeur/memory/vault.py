@@ -8,7 +8,7 @@ import os
 import threading
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
 
 from chauffeur.concept import (
@@ -25,6 +25,7 @@ from chauffeur.concept import (
 from chauffeur.memory.cipher import DatabaseError
 from chauffeur.memory.files import data_home, locked, private_directory, sync_directory
 from chauffeur.memory.keys import KeyRing
+from chauffeur.memory.privacy import Privacy, read_privacy
 from chauffeur.memory.profile import VERSION, Profile, create_profile, open_profile
 from chauffeur.memory.retrieval import Entry, rank
 from chauffeur.memory.similarity import mark
@@ -49,7 +50,7 @@ class VaultMemory:
         *,
         keys: Path | None = None,
         passphrase: str | None = None,
-        retention: timedelta | None = None,
+        privacy: Privacy | None = None,
         clock: Callable[[], datetime] = _utc_now,
     ) -> None:
         """Nothing is written before there is something to remember.
@@ -58,14 +59,14 @@ class VaultMemory:
             home: Data directory; CHAUFFEUR_HOME or the user's data directory by default.
             keys: Directory of the key files; `keys` in the data directory by default.
             passphrase: Seals the keys; CHAUFFEUR_PASSPHRASE by default, else they are not sealed.
-            retention: Trips older than this are neither recalled nor kept; None keeps them.
+            privacy: How long trips are kept, and whether new ones are; the data directory's own settings by default.
             clock: Present time, with a time zone.
         """
         root = data_home() if home is None else home
         self._profiles = root / "profiles"
         self._keys = root / "keys" if keys is None else keys
         self._ring = KeyRing(self._keys, os.environ.get("CHAUFFEUR_PASSPHRASE") if passphrase is None else passphrase)
-        self._retention = retention
+        self._privacy = read_privacy(root) if privacy is None else privacy
         self._clock = clock
         self._guard = threading.RLock()
         self._indexes: dict[str, tuple[str, tuple[Entry, ...]]] = {}
@@ -83,7 +84,7 @@ class VaultMemory:
     def remember(self, trip: Trip, feedback: Feedback | None = None) -> None:
         """As `Memory.remember`."""
         person = trip.instruction.person
-        if not _is_somebody(person):
+        if not _is_somebody(person) or not self._privacy.keeps:
             return
         when, keep_from = _stamp(self._clock()), self._keep_from()
         with self._guard:
@@ -126,6 +127,15 @@ class VaultMemory:
             sync_directory(self._profiles)
         return existed
 
+    def sweep(self) -> int:
+        """Delete every trip that is older than the retention, of everybody; how many there were."""
+        keep_from = self._keep_from()
+        swept = 0
+        for person in self.people() if keep_from else ():
+            with self._reading(person) as profile:
+                swept += 0 if profile is None else profile.forget_before(keep_from)
+        return swept
+
     def people(self) -> tuple[PersonId, ...]:
         """As `Memory.people`; profiles that cannot be opened are logged and left out."""
         found: list[PersonId] = []
@@ -143,7 +153,8 @@ class VaultMemory:
         return self._profiles / "lock"
 
     def _keep_from(self) -> str:
-        return "" if self._retention is None else _stamp(self._clock() - self._retention)
+        retention = self._privacy.retention
+        return "" if retention is None else _stamp(self._clock() - retention)
 
     def _entries(self, profile: Profile, person: PersonId) -> tuple[Entry, ...]:
         """The index of a profile, read again only after somebody wrote to it."""
@@ -154,9 +165,9 @@ class VaultMemory:
         self._indexes[alias] = (profile.edition, entries)
         while len(self._indexes) > _CACHED_PEOPLE:
             del self._indexes[next(iter(self._indexes))]
-        if self._retention is None:
+        if self._privacy.retention is None:
             return entries
-        keep_from = self._clock() - self._retention
+        keep_from = self._clock() - self._privacy.retention
         return tuple(entry for entry in entries if entry.when >= keep_from)
 
     def _ensure(self, person: PersonId) -> None:
