@@ -14,6 +14,7 @@ from chauffeur.cli import (
     bench_hostile,
     chaos,
     coach,
+    context,
     doctor,
     drive,
     feedback,
@@ -80,6 +81,7 @@ app.command(epilog=drive.EXAMPLES)(drive.drive)
 app.command(epilog=live.EXAMPLES)(live.live)
 app.command(epilog=chaos.EXAMPLES)(chaos.chaos)
 app.command(epilog=feedback.EXAMPLES)(feedback.feedback)
+app.command(epilog=context.EXAMPLES)(context.context)
 app.command(epilog=scenarios.EXAMPLES)(scenarios.scenarios)
 app.command(epilog=apis.EXAMPLES)(apis.apis)
 app.command(epilog=replay.EXAMPLES)(replay.replay)

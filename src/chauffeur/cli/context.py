@@ -1,0 +1,145 @@
+"""`chauffeur context`: what the driving context would say of a place on the earth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from chauffeur.describe.services import Position, ServiceSettings, Surroundings
+    from chauffeur.describe.services.surroundings import Row
+
+EXAMPLES = """
+Examples:
+
+    chauffeur context --at 48.137,11.575 --region germany
+
+    chauffeur context --at 40.4237,-86.9212 --heading 90 --map lafayette.osm.pbf --region indiana
+
+    chauffeur context --at 51.5074,-0.1278 --region united_kingdom --online weather --online map --budget 3
+
+    chauffeur context --at 35.681,139.767 --region japan --online map --map-url http://localhost:12345
+
+Keys are read from OPENWEATHER_API_KEY and TOMTOM_API_KEY. Nothing is asked over the network unless --online names it.
+"""
+
+
+def context(
+    at: Annotated[str, typer.Option(metavar="LAT,LON", help="The place, in degrees (WGS 84).")],
+    heading: Annotated[float | None, typer.Option(help="Compass heading of the car: 0 north, 90 east.")] = None,
+    accuracy: Annotated[float, typer.Option(help="Standard deviation of the position, in metres.")] = 5.0,
+    map_file: Annotated[Path | None, typer.Option("--map", metavar="FILE", help="An OpenStreetMap file.")] = None,
+    region: Annotated[str, typer.Option(help="Whose traffic rules hold: a name, or a rule file (.toml).")] = "",
+    online: Annotated[
+        list[str] | None, typer.Option(help="A service to ask: `weather`, `map` or `traffic`; may be repeated.")
+    ] = None,
+    budget: Annotated[float, typer.Option(help="Seconds that all services together may take.")] = 0.3,
+    weather_url: Annotated[str, typer.Option(help="A server that speaks OpenWeather 2.5.")] = "",
+    map_url: Annotated[str, typer.Option(help="A server that speaks Overpass.")] = "",
+    traffic_url: Annotated[str, typer.Option(help="A server that speaks TomTom's flow segment data.")] = "",
+    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON.")] = False,
+) -> None:
+    """Tell what a driving context would say of a place: weather, road, limit, traffic, rules; with ages and sources."""
+    import asyncio
+
+    from chauffeur.describe.services import ContextServices, load_road_map, load_rules
+
+    here = position(at, heading, accuracy)
+    settings = _settings(online or [], weather_url, map_url, traffic_url)
+    rules = load_rules(region) if region else None
+    road_map = load_road_map(map_file) if map_file is not None else None
+
+    async def tell() -> None:
+        async with ContextServices(settings, rules=rules, road_map=road_map) as services:
+            found = await services.around(here, budget_s=budget)
+            # Told before the services are closed: a resolver of names that hangs would hold up the closing.
+            if as_json:
+                _print_json(found)
+            else:
+                _print_words(found)
+
+    asyncio.run(tell())
+
+
+def position(at: str, heading: float | None, accuracy: float) -> Position:
+    """The place that was given.
+
+    Raises:
+        ConfigError: It is none.
+    """
+    from chauffeur.concept import ConfigError
+    from chauffeur.describe.services import Position
+
+    try:
+        latitude, longitude = (float(one) for one in at.split(","))
+    except ValueError as error:
+        raise ConfigError(
+            f"{at!r} is not a place.", hint="Give latitude and longitude in degrees, e.g. --at 48.137,11.575"
+        ) from error
+    return Position(latitude, longitude, heading, accuracy)
+
+
+def _settings(online: list[str], weather_url: str, map_url: str, traffic_url: str) -> ServiceSettings:
+    from chauffeur.concept import ConfigError
+    from chauffeur.describe.services import ServiceSettings
+    from chauffeur.describe.services.settings import MAP_URL, ONLINE, TRAFFIC_URL, WEATHER_URL
+
+    for name in online:
+        if name not in ONLINE:
+            raise ConfigError(f"There is no online service {name!r}.", hint=f"Known: {', '.join(ONLINE)}.")
+    return ServiceSettings(
+        online=frozenset(name for name in ONLINE if name in online),
+        weather_url=weather_url or WEATHER_URL,
+        map_url=map_url or MAP_URL,
+        traffic_url=traffic_url or TRAFFIC_URL,
+    )
+
+
+def _print_words(found: Surroundings) -> None:
+    from rich.table import Table
+
+    from chauffeur.cli.console import plain, stdout
+    from chauffeur.describe.services.units import age_words
+
+    console = stdout()
+    console.print("What the driving context would say", style="bold")
+    for words in found.words():
+        console.print(plain(words))
+    rows = found.rows()
+    if any(row.note.startswith("the service did not answer within") for row in rows):
+        console.print("Some services did not answer in time; they may with more of it: --budget 3", style="dim")
+    known = [row for row in rows if row.source]
+    if not known:
+        return
+    console.print()
+    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+    for heading in ("Reading", "Value", "Source", "Age", "Confidence"):
+        table.add_column(heading, overflow="fold")
+    for row in known:
+        age = "" if row.age_s is None else age_words(row.age_s)
+        table.add_row(row.name, plain(_value(row)), plain(row.source), age, f"{row.confidence:.2f}")
+    console.print(table)
+    if any(row.source.startswith("OpenStreetMap") for row in known):
+        console.print("Map data: OpenStreetMap contributors, ODbL.", style="dim")
+
+
+def _value(row: Row) -> str:
+    if row.value is None:
+        return "none"
+    return row.value if isinstance(row.value, str) else f"{row.value:.1f} {row.unit}".strip()
+
+
+def _print_json(found: Surroundings) -> None:
+    import json
+    from dataclasses import asdict
+
+    at = found.at
+    told = {
+        "at": {"latitude_deg": at.latitude_deg, "longitude_deg": at.longitude_deg, "heading_deg": at.heading_deg},
+        "when_s": found.when_s,
+        "words": found.words(),
+        "readings": [asdict(row) for row in found.rows()],
+    }
+    typer.echo(json.dumps(told, ensure_ascii=False, indent=2))

@@ -1,0 +1,24 @@
+"""What services and maps know of the place a car is at: weather, road and limit, traffic, local rules."""
+
+from chauffeur.describe.services.gathering import ContextServices
+from chauffeur.describe.services.osm_file import load_road_map
+from chauffeur.describe.services.readings import Position, Reading, Unknown
+from chauffeur.describe.services.road_map import RoadMap
+from chauffeur.describe.services.rules import Rules, load_rules, packaged_regions
+from chauffeur.describe.services.settings import ServiceSettings
+from chauffeur.describe.services.surroundings import Surroundings, with_surroundings
+
+__all__ = [
+    "ContextServices",
+    "Position",
+    "Reading",
+    "RoadMap",
+    "Rules",
+    "ServiceSettings",
+    "Surroundings",
+    "Unknown",
+    "load_road_map",
+    "load_rules",
+    "packaged_regions",
+    "with_surroundings",
+]
