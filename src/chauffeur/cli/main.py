@@ -34,6 +34,7 @@ from chauffeur.cli.policies import policies_app
 from chauffeur.cli.scenes import scenes_app
 from chauffeur.cli.serve import serve_app
 from chauffeur.cli.train import train_app
+from chauffeur.cli.vehicle import vehicle_app
 
 EXAMPLES = """
 Examples:
@@ -100,6 +101,7 @@ app.add_typer(train_app, name="train")
 app.add_typer(serve_app, name="serve")
 app.add_typer(adapt_app, name="adapt")
 app.add_typer(audit_app, name="audit")
+app.add_typer(vehicle_app, name="vehicle")
 
 
 def run() -> None:
