@@ -3,9 +3,9 @@
     python benchmarks/mutation/run.py [--modules envelope,gate] [--out DIR]
 
 Needs mutmut 3 (`pip install mutmut`). It works on a copy in the folder of `--out` and never touches this repository;
-a second run goes on with what the first has left and tries only what has changed. Each module is tried against the few
-test files that are about it. `RESULT.json` there has the figures, `survivors.txt` every mutant that no test noticed, as
-a difference; SURVIVORS.md beside this file says of those that stay why they do not matter.
+a second run goes on where the first ended, and tries again what has changed and what no test had noticed. Each module
+is tried against the few test files that are about it. `RESULT.json` there has the figures, `survivors.txt` every mutant
+that no test noticed, as a difference; SURVIVORS.md beside this file says of those that stay why they do not matter.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ ROOT: Final = Path(__file__).resolve().parents[2]
 KILLED, SURVIVED, UNTESTED, TIMED_OUT, SUSPICIOUS = "killed", "survived", "untested", "timed out", "suspicious"
 _BY_EXIT_CODE: Final = {1: KILLED, 3: KILLED, 0: SURVIVED, 5: UNTESTED, 33: UNTESTED, 36: TIMED_OUT, 24: TIMED_OUT}
 """mutmut's own table; -24 and 152 are a CPU limit that was reached."""
+_LEFT: Final = (SURVIVED, UNTESTED, SUSPICIOUS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +42,7 @@ class Module:
 
 _WORDS: Final = "tests/safety/test_verdict_words.py"
 _CHECKS: Final = "tests/safety/test_checks_edges.py"
+_FRAME: Final = ("tests/safety/test_shield_frame_edges.py",)
 _GATE_TESTS: Final = ("tests/programs/test_gate_edges.py", "tests/programs/test_placing.py")
 MODULES: Final = {
     "envelope": Module("safety/envelope.py", ("tests/safety/test_parameters_check.py", _WORDS)),
@@ -52,6 +54,13 @@ MODULES: Final = {
     "screening": Module(
         "safety/screening.py", ("tests/safety/test_screening.py", _CHECKS, "tests/safety/test_screening_edges.py")
     ),
+    "reading": Module("safety/reading.py", ("tests/safety/test_reading.py", "tests/safety/test_reach.py", _CHECKS)),
+    "bounds": Module("safety/bounds.py", ("tests/safety/test_bounds.py",)),
+    "blame": Module("safety/blame.py", ("tests/safety/test_blame_edges.py",)),
+    "gaps": Module("safety/shield/gaps.py", ("tests/safety/test_shield_gaps.py",)),
+    "frame": Module("safety/shield/frame.py", _FRAME),
+    "sweep": Module("safety/shield/sweep.py", _FRAME),
+    "shield": Module("safety/shield/shield.py", ("tests/safety/test_shield_edges.py", "tests/safety/test_shield.py")),
     "gate": Module("programs/gate.py", _GATE_TESTS),
     "placing": Module("programs/placing.py", _GATE_TESTS),
 }
@@ -61,6 +70,11 @@ _SLOW: Final = (
     "tests/programs/test_placing.py::test_benign_programs_have_nothing_misplaced",
     "tests/safety/test_reach.py::test_no_program_of_the_retrieval_planner_is_refused_that_passed_before",
     "tests/safety/test_screening.py::test_long_texts_cost_little",
+    "tests/safety/test_shield.py::test_a_hostile_policy_hurts_nobody_under_the_shield",
+    "tests/safety/test_shield.py::test_who_cuts_in_is_to_blame_not_who_was_cut_off",
+    "tests/safety/test_shield.py::test_running_into_somebody_is_the_egos_own_blame",
+    "tests/safety/test_shield.py::test_nobody_is_blamed_for_a_trip_without_a_collision",
+    "tests/safety/test_shield.py::test_who_never_yields_is_made_to_and_gets_across",
 )
 
 
@@ -116,6 +130,8 @@ def main() -> int:
 
 def _tried(name: str, module: Module, folder: Path) -> dict[str, Any]:
     _laid_out(module, folder)
+    meta = folder / "mutants" / "src" / "chauffeur" / f"{module.path}.meta"
+    _forget_what_was_left(meta)
     begun = time.monotonic()
     environment = {**os.environ, "PYTHONPATH": ""}
     with (folder / "log.txt").open("wb") as log:
@@ -123,9 +139,9 @@ def _tried(name: str, module: Module, folder: Path) -> dict[str, Any]:
             [sys.executable, "-m", "mutmut", "run", "--max-children", "1"],
             cwd=folder, stdout=log, stderr=log, env=environment, check=False,
         )  # fmt: skip
-    verdicts = _verdicts(folder / "mutants" / "src" / "chauffeur" / f"{module.path}.meta")
+    verdicts = _verdicts(meta)
     counts = Counter(verdicts.values())
-    left = sorted(key for key, verdict in verdicts.items() if verdict in (SURVIVED, UNTESTED, SUSPICIOUS))
+    left = sorted(key for key, verdict in verdicts.items() if verdict in _LEFT)
     (folder / "survivors.txt").write_text(_shown(left, folder), encoding="utf-8")
     print(
         f"{name}: {len(verdicts)} mutants in {time.monotonic() - begun:.0f} s, {len(left)} left; {folder / 'log.txt'}"
@@ -181,6 +197,18 @@ def _mirrored(source: Path, copy: Path) -> None:
         if not other.is_file() or other.stat().st_mtime != one.stat().st_mtime:
             other.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(one, other)
+
+
+def _forget_what_was_left(meta: Path) -> None:
+    """Mutants that no test noticed are tried again: there may be new tests."""
+    if not meta.is_file():
+        return
+    kept: dict[str, Any] = json.loads(meta.read_text("utf-8"))
+    codes: dict[str, int | None] = kept["exit_code_by_key"]
+    for key, verdict in _verdicts(meta).items():
+        if verdict in _LEFT:
+            codes[key] = None
+    meta.write_text(json.dumps(kept), encoding="utf-8")
 
 
 def _verdicts(meta: Path) -> dict[str, str]:

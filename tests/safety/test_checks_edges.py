@@ -50,6 +50,23 @@ def test_a_program_that_is_not_followed_to_its_end_is_said(reach: Callable[[str]
     assert "the program was not followed to its end (line 4 has what the language does not know)." in reason
 
 
+def test_of_loops_nothing_is_said_where_the_program_is_not_followed_to_its_end(
+    reach: Callable[[str], tuple[bool, str]],
+) -> None:
+    passed, reason = reach("async def f():\n    pass\nwhile True:\n    pass")
+    assert passed
+    assert "was not followed to its end" in reason
+    assert "loop" not in reason
+
+
+def test_one_number_that_only_a_faster_lane_allows_is_told_as_it_is(
+    snap: Callable[..., Snapshot], plan: Callable[..., Plan]
+) -> None:
+    verdict = check_reach(plan(program("set_target_speed(35)")), snap(limits=(40.0, 30.0, 30.0)), Limits())
+    assert not verdict.passed
+    assert verdict.reason.startswith("A target speed of 35 m/s (126 km/h) is more than 1 m/s (4 km/h) above")
+
+
 def test_a_keyword_that_no_api_has_is_the_gates_business(reach: Callable[[str], tuple[bool, str]]) -> None:
     assert reach("set_target_speed(foo=500)")[0]
     assert not reach("set_target_speed(target_speed=500)")[0]
@@ -67,6 +84,37 @@ def test_every_number_of_the_catalogue_has_bounds() -> None:
     numbers = [param for api in APIS.values() for param in api.params if param.kind == "number"]
     assert numbers
     assert all(param.low is not None and param.high is not None and param.low < param.high for param in numbers)
+    assert all(param.unit for param in numbers), "the verdict says it"
+
+
+def test_where_cap_and_limit_are_the_same_the_limit_is_told(
+    snap: Callable[..., Snapshot], plan: Callable[..., Plan]
+) -> None:
+    def reason(cap_mps: float) -> str:
+        limits = Limits(max_speed_mps=cap_mps, max_over_limit_mps=1.0)
+        return check_reach(plan(program("set_target_speed(40)")), snap(), limits).reason
+
+    assert "above the speed limit" in reason(31.0)
+    assert "above the cap of 30.5 m/s" in reason(30.5)
+
+
+def test_a_speed_between_nothing_and_one_is_not_called_negative(
+    snap: Callable[..., Snapshot], plan: Callable[..., Plan]
+) -> None:
+    verdict = check_reach(plan(program("set_target_speed(0.5)")), snap(), Limits(max_speed_mps=0.2))
+    assert not verdict.passed
+    assert "is above the cap" in verdict.reason
+
+
+def test_what_depends_on_the_road_may_be_what_the_fastest_lane_allows(
+    snap: Callable[..., Snapshot], plan: Callable[..., Plan]
+) -> None:
+    """The ego's lane allows 30 m/s, the one beside it 40, and a little more is tolerated on each."""
+    body = "set_target_speed(get_speed_limit(get_left_lane(ego)) + {})"
+    for more, passed in ((10.5, True), (11.5, False)):
+        policy = program(body.format(more))
+        verdict = check_reach(plan(policy), snap(limits=(40.0, 30.0, 30.0)), Limits(max_over_limit_mps=1.0))
+        assert verdict.passed is passed, verdict.reason
 
 
 @pytest.mark.parametrize(("times", "found"), [(0, "override"), (1, "encoded"), (2, "encoded"), (3, None)])

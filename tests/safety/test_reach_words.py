@@ -133,6 +133,22 @@ REFUSED: list[tuple[str, str, str, int | None, str]] = [
         3,
         USE_SPEED,
     ),
+    (
+        "yield from go()\nset_target_speed(40)",
+        "def go():\n    set_target_speed(50)\n    yield autopilot()\n",
+        "A target speed of 40 m/s (144 km/h) is more than 1 m/s (4 km/h) above the speed limit "
+        "of 30 m/s (108 km/h) here. A target speed of 50 m/s (180 km/h) is more than 1 m/s (4 km/h) above the speed "
+        "limit of 30 m/s (108 km/h) here. (In a helper function.)",
+        4,
+        USE_SPEED,
+    ),
+    (
+        "set_target_speed(other=500, target_speed=-1)",
+        "",
+        "A target speed of -1 m/s (-4 km/h) is negative.",
+        3,
+        USE_SPEED,
+    ),
 ]
 
 DOUBTED: list[tuple[str, str, str]] = [
@@ -207,6 +223,13 @@ DOUBTED: list[tuple[str, str, str]] = [
         "km/h) is not proven. line 7: the time headway cannot be foreseen; that it stays from "
         "0.5 to 10 s is not proven. line 9: set_target_lane fails if its lane is None. And 1 "
         "more.",
+    ),
+    (
+        "for i in range(200000):\n    pass\nyield autopilot()\nset_target_speed(get_speed_of(ego) + 50)\n"
+        "yield autopilot()\nset_target_lane(get_left_lane(ego))",
+        "",
+        "line 3: this loop may make 200000 passes without a yield. line 6: the target speed cannot be foreseen; that "
+        "it stays from 0 to 31 m/s (112 km/h) is not proven. line 8: set_target_lane fails if its lane is None.",
     ),
     (
         "import os\nasync def f():\n    pass\nset_target_speed(500)",

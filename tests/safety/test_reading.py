@@ -81,6 +81,9 @@ def test_what_is_no_constant_is_not_read(expression: str) -> None:
         ("v = 1\nmatch x:\n    case v: pass\nset_target_speed(v)", []),
         ("v = 1\ndef f():\n    global v\n    v = 2\ndef g():\n    set_target_speed(v)", []),
         ("a = b\nb = a\nset_target_speed(a)", []),
+        ("if (v := 40) > x: pass\nset_target_speed(v)", [40.0]),
+        ("v = 1\nif (v := 40) > x: pass\nset_target_speed(v)", []),
+        ("b = 5\na, *b = 10, 20\nset_target_speed(b)", []),
         ("x.v = 3\nv = 4\nset_target_speed(v)", [4.0]),
         ("set_target_speed(30 if x else 50)", [30.0, 50.0]),
         ("set_target_speed(2 * (30 if x else 50))", [60.0, 100.0]),
@@ -109,6 +112,8 @@ def test_calls_come_in_source_order_with_their_lines() -> None:
         ("set_target_lane(get_left_lane())", [-1]),
         ("set_target_lane(get_right_lane(None))", [1]),
         ("ego = get_ego_vehicle()\nset_target_lane(get_lane_of(ego))", [0]),
+        ("def f():\n    beside = get_left_lane\n    set_target_lane(beside())", [-1]),
+        ("def f():\n    me = get_ego_vehicle\n    set_target_lane(get_right_lane(me()))", [1]),
         ("set_target_lane(get_left_lane(front))", [None]),
         ("set_target_lane(get_left_lane(detect_front_vehicle_in(None)))", [None]),
         ("set_target_lane(lane)", [None]),
@@ -132,6 +137,8 @@ def test_lanes_beside_the_ego(source: str, expected: list[int | None]) -> None:
         ("while not is_safe_enter(left): yield", False),
         ("if is_safe_enter(left): go()\nelse: yield", False),
         ("if is_safe_enter(left): go()\nelif y: set_target_lane(right)", True),
+        ("def f():\n  safe = is_safe_enter\n  if safe(left): go()\n  elif y: set_target_lane(right)", True),
+        ("def f():\n  go = set_target_lane\n  if is_safe_enter(left): pass\n  else: go(right)", True),
         ("if is_safe_enter(): go()\nelse: set_target_lane(right)", False),
         ("if y: go()\nelse: set_target_lane(right)", False),
     ],
@@ -144,6 +151,44 @@ def test_sides_tested_before_use(source: str, tested: bool) -> None:
 @pytest.mark.parametrize("source", ["def (", "\x00", "x = " + "(" * 300 + ")" * 300, " " * 100_001])
 def test_what_cannot_be_parsed_reads_as_nothing(source: str) -> None:
     assert read_program(source).uses == ()
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        ("-v", [-20.0]), ("+v", [20.0]), ("v if x else 50", [20.0, 50.0]), ("50 if x else v", [50.0, 20.0]),
+        ("v * 2", [40.0]), ("2 * v", [40.0]), ("max(v, 10)", [20.0]), ("max(10, v)", [20.0]), ("abs(-v)", [20.0]),
+        ("1 / (0 if x else 2)", [0.5]),  # what fails on one way does not hide the other
+    ],
+)  # fmt: skip
+def test_names_are_followed_within_sums(expression: str, expected: list[float]) -> None:
+    assert values(f"def f():\n    v = 20\n    set_target_speed({expression})") == expected
+
+
+def test_a_hundred_thousand_characters_are_read_and_no_more() -> None:
+    source = "set_target_speed(9)"
+    assert values(source.ljust(100_000)) == [9.0]
+    assert values(source.ljust(100_001)) == []
+
+
+def test_forty_levels_are_read_and_no_more() -> None:
+    assert values(f"set_target_speed({'-' * 40}1)") == [1.0]
+    assert values(f"set_target_speed({'-' * 41}1)") == []
+
+
+@pytest.mark.parametrize(("levels", "expected"), [(14, [2.0**14]), (15, []), (18, [])])
+def test_fifty_thousand_steps_are_made_for_all_numbers_together(levels: int, expected: list[float]) -> None:
+    """Names used twice, level upon level: two steps more than twice as many on each."""
+    doubling = "a0 = 1\n" + "".join(f"a{i + 1} = a{i} + a{i}\n" for i in range(levels))
+    assert values(f"{doubling}set_target_speed(a{levels})") == expected
+    twice = values(f"{doubling}set_target_speed(a{levels})\nset_target_speed(a{levels})")
+    assert twice == expected, "nothing is left for the second"
+
+
+@pytest.mark.parametrize(("deeds", "tested"), [(12_000, True), (17_000, False)])
+def test_fifty_thousand_steps_are_made_in_looking_for_another_lane(deeds: int, tested: bool) -> None:
+    source = f"left = get_left_lane()\nif is_safe_enter(left): pass\nelse:\n    {'y;' * deeds}set_target_lane(left)"
+    assert (-1 in read_program(source).sides_tested) is tested
 
 
 def test_deep_and_doubling_programs_cost_little() -> None:

@@ -38,6 +38,61 @@ def test_the_bound_is_the_greatest_that_still_stops(speed: float, gap: float, le
             assert left(bound + 0.01) < 1e-3
 
 
+BRAKES = st.sampled_from([(8.0, 6.0), (8.0, 7.5), (8.0, 8.0), (6.0, 8.0)])
+"""Of the ego and of the lead: better, a little better, as good, worse."""
+
+
+def allowed(speed: float, then: float, gap: float, lead: float, braking: float, others: float) -> bool:
+    """Whether a speed a period later still leaves the ego room, however the lead brakes: both ways one can meet it."""
+    travelled = max(speed, then) * DT  # who gains speed travels the next period at the new one
+    stopped = gap + lead**2 / (2.0 * others) - travelled >= then**2 / (2.0 * braking) + 0.5 * then * DT
+    stronger, slowed = braking - others, max(0.0, lead - others * DT)
+    if stronger <= 0.0 or slowed == 0.0:
+        return stopped
+    # The better brakes: they are closest when it is as slow as the lead, if that is before the lead stands.
+    room = gap + (lead - speed) * DT
+
+    def fits(closing: float) -> bool:
+        return closing**2 / (2.0 * stronger) + 0.5 * closing * DT <= room
+
+    if room <= 0.0:
+        return False
+    stands_first = fits(stronger * slowed / others)
+    return stopped and (stands_first or then <= slowed or fits(then - slowed))
+
+
+@given(speed=speeds, gap=st.floats(0.0, 60.0), lead=speeds, brakes=BRAKES)
+def test_the_bound_is_the_greatest_behind_a_lead_that_moves_too(
+    speed: float, gap: float, lead: float, brakes: tuple[float, float]
+) -> None:
+    bound = greatest_acceleration(speed, gap, lead, *brakes, DT)
+    assert bound >= -brakes[0]
+    for off in (-1e-6, 1e-6):
+        then = speed + (bound + off) * DT
+        if then >= 0.0 and bound + off > -brakes[0]:
+            assert allowed(speed, then, gap, lead, *brakes) is (off < 0.0), (bound, off)
+
+
+@given(speed=speeds, lead=speeds, brakes=BRAKES, near=st.floats(-1.0, 3.0))
+def test_the_bound_is_the_greatest_where_it_matters(
+    speed: float, lead: float, brakes: tuple[float, float], near: float
+) -> None:
+    """About as near as braking allows."""
+    gap = max(0.0, braking_gap_m(speed, lead, *brakes, DT) + near)
+    bound = greatest_acceleration(speed, gap, lead, *brakes, DT)
+    for off in (-1e-6, 1e-6):
+        then = speed + (bound + off) * DT
+        if then >= 0.0 and bound + off > -brakes[0]:
+            assert allowed(speed, then, gap, lead, *brakes) is (off < 0.0), (bound, off)
+
+
+def test_without_any_room_left_it_is_full_braking() -> None:
+    """Though as slow as the lead, or hardly moving, it has nothing to spare."""
+    assert greatest_acceleration(10.0, 0.0, 10.0, BRAKING, OTHERS, DT) == -BRAKING
+    assert greatest_acceleration(0.5, 0.05, 0.0, BRAKING, OTHERS, DT) == -BRAKING
+    assert greatest_acceleration(1.75, 0.04, 1.32, 9.0, 4.0, DT) == -9.0, "the lead is slow, and brakes much worse"
+
+
 @given(speed=speeds, lead=speeds, gap=gaps, draws=st.lists(st.floats(0.0, 1.0), min_size=80, max_size=80))
 def test_who_obeys_it_never_touches_whatever_the_lead_does(
     speed: float, lead: float, gap: float, draws: list[float]
@@ -81,6 +136,9 @@ def test_a_gap_for_braking_by_hand() -> None:
     assert braking_gap_m(20.0, 0.0, 8.0, 6.0, 0.1) == pytest.approx(25.0 + 1.0)
     assert braking_gap_m(20.0, 20.0, 5.0, 6.0, 0.0) == pytest.approx(40.0 - 400.0 / 12.0)
     assert braking_gap_m(10.0, 20.0, 8.0, 6.0, 0.1) == 0.0
+    assert braking_gap_m(20.5, 20.0, 8.0, 6.0, 0.1) == pytest.approx(0.0625 + 0.025)
+    assert braking_gap_m(8.0, 6.0, 8.0, 6.0, 0.1) == pytest.approx(1.0 + 0.1), "the lead stands at that very instant"
+    assert braking_gap_m(1.0, 1.0, 8.0, 6.0, 0.1) == pytest.approx(1.0 / 16.0 + 0.05 - 1.0 / 12.0)
 
 
 def test_ad_rss_agrees_on_the_safe_gap() -> None:

@@ -65,25 +65,25 @@ def blame(
     crossed = _pair(lens.look(last, last.ego.lane), other)
     if crossed is not None and (crossed[1].crosses or crossed[1].along_mps < -_STILL_MPS):
         return _at_a_crossing(frames, final, other)
-    pairs = [_pair(lens.look(frame.snapshot, frame.snapshot.ego.lane), other) for frame in frames]
-    unsafe_from = len(pairs)
-    while unsafe_from > 0 and not _safe(pairs[unsafe_from - 1], dt_s, parameters):
+    looked = ((frame, _pair(lens.look(frame.snapshot, frame.snapshot.ego.lane), other)) for frame in frames)
+    seen = [(frame, pair) for frame, pair in looked if pair is not None]
+    unsafe_from = len(seen)
+    while unsafe_from > 0 and not _safe(seen[unsafe_from - 1][1], dt_s, parameters):
         unsafe_from -= 1
     if unsafe_from == 0:
-        return Blame("nobody", other, None, "They were too close from the beginning.")
-    since = frames[unsafe_from - 1].snapshot.time_s
-    before = pairs[unsafe_from - 1]
-    assert before is not None
+        return Blame("nobody", other, None, "They were never seen at a safe distance.")
+    frame, before = seen[unsafe_from - 1]
+    since = frame.snapshot.time_s
+    answered = _answered(seen[unsafe_from:], parameters)
     if _apart(before, parameters):
-        came_over = _ego_came_over(pairs[unsafe_from - 1 :])
-        if came_over:
+        if _ego_came_over([pair for _, pair in seen[unsafe_from - 1 :]]):
             return Blame("ego", other, since, "The ego came over to the other's side.")
-        if not _answered(frames[unsafe_from:], pairs[unsafe_from:], parameters):
+        if not answered:
             return Blame("ego", other, since, "The other came over, but the ego did not brake with all it has.")
         return Blame("other", other, since, "The other came over to the ego's side.")
     if before[1].s_m < 0.0:
         return Blame("other", other, since, "The other followed too closely.")
-    if _answered(frames[unsafe_from:], pairs[unsafe_from:], parameters):
+    if answered:
         return Blame("other", other, since, "The other ahead braked harder than anyone may be expected to.")
     return Blame("ego", other, since, "The ego followed too closely.")
 
@@ -137,8 +137,8 @@ def _apart(pair: Pair, parameters: ShieldParameters) -> bool:
     return _clear_m(pair) >= parameters.side_m
 
 
-def _safe(pair: Pair | None, dt_s: float, parameters: ShieldParameters) -> bool:
-    if pair is None or _apart(pair, parameters):
+def _safe(pair: Pair, dt_s: float, parameters: ShieldParameters) -> bool:
+    if _apart(pair, parameters):
         return True
     ego, other = pair
     gap = ego.gap_m(other)
@@ -157,12 +157,10 @@ def _safe(pair: Pair | None, dt_s: float, parameters: ShieldParameters) -> bool:
     return gap >= needed
 
 
-def _ego_came_over(pairs: Sequence[Pair | None]) -> bool:
+def _ego_came_over(pairs: Sequence[Pair]) -> bool:
     """Whether, until their sides met, it was the ego that moved over rather than the other."""
     ego_way = other_way = 0.0
     for pair in pairs:
-        if pair is None:
-            continue
         ego, other = pair
         side = 1.0 if other.d_m >= ego.d_m else -1.0
         ego_way += max(0.0, side * ego.across_mps - _TOWARDS_MPS)
@@ -172,10 +170,10 @@ def _ego_came_over(pairs: Sequence[Pair | None]) -> bool:
     return ego_way > other_way
 
 
-def _answered(frames: Sequence[Frame], pairs: Sequence[Pair | None], parameters: ShieldParameters) -> bool:
+def _answered(seen: Sequence[tuple[Frame, Pair]], parameters: ShieldParameters) -> bool:
     """Whether the ego braked with all it has whenever the other was ahead, one period for noticing aside."""
-    for frame, pair in list(zip(frames, pairs, strict=True))[1:]:
-        if pair is None or pair[1].s_m <= 0.0 or frame.snapshot.ego.speed_mps < _STILL_MPS:
+    for frame, (_, other) in seen[1:]:
+        if other.s_m <= 0.0 or frame.snapshot.ego.speed_mps < _STILL_MPS:
             continue
         if frame.applied.acceleration_mps2 > -_FULL * parameters.braking_mps2:
             return False

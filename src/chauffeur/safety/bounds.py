@@ -15,7 +15,7 @@ def bounded(wishes: Wishes, limits: Limits, speed_limit_mps: float) -> tuple[Wis
         limits: Of the person and the operator.
         speed_limit_mps: Of the lane that is driven.
     """
-    most_mps = limits.most_mps(speed_limit_mps)
+    most_mps = max(0.0, limits.most_mps(speed_limit_mps))  # below 0, or no number: the car stops
     changed: list[str] = []
     speed = wishes.target_speed_mps
     if speed is not None and not 0.0 <= speed <= most_mps:

@@ -56,7 +56,7 @@ class _Bounds:
 
     def words(self, number: float) -> str:
         """A number with its unit."""
-        return speed_words(number) if self.unit == "m/s" else f"{number:.4g} {self.unit}".rstrip()
+        return speed_words(number) if self.unit == "m/s" else f"{number:.4g} {self.unit}"
 
     @property
     def remedy(self) -> str:

@@ -64,7 +64,8 @@ class Ways(Comparison):
         if claim.count == 99:
             return
         if most != claim.count and not (most > 1 and claim.count == 1):
-            yield Mismatch("wrong-number", claim.sentence, f"it crosses {most} lanes at most", moves[0].line)
+            lanes = "1 lane" if most == 1 else f"{most} lanes"
+            yield Mismatch("wrong-number", claim.sentence, f"it crosses {lanes} at most", moves[0].line)
 
     def _denied_lane(self, claim: Claim) -> Iterator[Mismatch]:
         positive = any(

@@ -87,14 +87,17 @@ class Shield:
         """The command, changed as little as needed.
 
         Args:
-            snapshot: The instant the command is for.
+            snapshot: The instant the command is for; one in which a place, speed or size is no number stops the car.
             command: What the controllers ask; numbers that are none stop the car.
             aim: Lane the controllers steer for. Where ways part, the nearest lane need not be the car's own.
         """
-        scene = self._lens.look(snapshot, snapshot.ego.lane)
+        scene = self._lens.look(snapshot, snapshot.ego.lane) if _known(snapshot.ego) else None
         if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
             safe = self._standing_still(snapshot, scene)
             return Guarded(safe, (Intervention("finite", "A command that is no number was replaced.", command, safe),))
+        if not all(_known(one) for one in (snapshot.ego, *snapshot.others, *snapshot.objects)):
+            safe = self._standing_still(snapshot, scene)
+            return Guarded(safe, (Intervention("finite", "Where somebody is cannot be told.", command, safe),))
         if scene is None:
             return Guarded(command)
         crossings = snapshot.kind == "intersection"
@@ -270,7 +273,7 @@ class Shield:
         """The strictest bound of the acceleration; where roads cross, those who do are minded elsewhere."""
         table, ego = self._table, scene.ego
         speed = max(math.hypot(ego.along_mps, ego.across_mps), 0.0)
-        most = self._limits.most_mps(scene.speed_limit_mps)
+        most = max(0.0, self._limits.most_mps(scene.speed_limit_mps))  # no number: no bound could be compared with it
         towards = (most - speed) / self._dt_s
         allowed = towards if towards >= 0.0 else max(towards, -_SLOWING_MPS2)
         strictest = _Cap(min(allowed, table.acceleration_mps2), "speed", f"No faster than {speed_words(most)} here.")
@@ -304,6 +307,12 @@ class Shield:
             if gap < needed:
                 return -table.gentle_mps2
         return wanted
+
+
+def _known(vehicle: VehicleState) -> bool:
+    """Whether all of its numbers are numbers."""
+    total = vehicle.x_m + vehicle.y_m + vehicle.heading_rad + vehicle.speed_mps + vehicle.length_m + vehicle.width_m
+    return math.isfinite(total)
 
 
 def _parts_from(lane: LaneId, other: LaneId) -> bool:
