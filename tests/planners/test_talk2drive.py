@@ -126,6 +126,37 @@ def test_a_lane_that_is_not_there_is_declined(embedded: Planner) -> None:
     assert "leftmost" in plan.refusal
 
 
+LOT = Situation("parking", 3.0, 4.2, 1, 0, False, None, None)
+
+
+@pytest.mark.parametrize(
+    ("wish", "place"),
+    [
+        ("Park near the stadium.", "stadium"),
+        ("Find a spot close to the exit, please", "exit"),
+        ("Park in the nearest free spot", "nearest"),
+        ("park anywhere", "nearest"),
+        ("Park in B4.", "B4"),
+        ("take bay c 11", "C11"),
+        ("Park in spot Z9", "Z9"),
+    ],
+)
+def test_in_a_lot_it_takes_the_spot_that_is_meant(embedded: Planner, wish: str, place: str) -> None:
+    plan = planned(embedded, wish, LOT)
+    assert parameters(plan).route == place
+    assert parameters(plan).target_speed_mps <= 3.0
+
+
+def test_what_is_said_in_a_lot_and_is_no_place_is_no_place(embedded: Planner) -> None:
+    assert parameters(planned(embedded, "Drive a bit slower.", LOT)).route == ""
+    assert planned(embedded, "Park near the stadium.", HIGHWAY).policy is None, "there is no lot on a highway"
+
+
+def test_turns_become_the_route(embedded: Planner) -> None:
+    junction = Situation("intersection", 9.0, 10.0, 1, 0, False, None, 40.0, ("left", "straight", "right"))
+    assert parameters(planned(embedded, "Turn left at the junction.", junction)).route == "left"
+
+
 # Behind an endpoint ---------------------------------------------------------------------------------------------------
 
 

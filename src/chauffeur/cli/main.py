@@ -18,6 +18,7 @@ from chauffeur.cli import (
     doctor,
     drive,
     feedback,
+    hear,
     live,
     page,
     replay,
@@ -82,6 +83,7 @@ app.command(epilog=drive.EXAMPLES)(drive.drive)
 app.command(epilog=live.EXAMPLES)(live.live)
 app.command(epilog=chaos.EXAMPLES)(chaos.chaos)
 app.command(epilog=feedback.EXAMPLES)(feedback.feedback)
+app.command(epilog=hear.EXAMPLES)(hear.hear)
 app.command(epilog=context.EXAMPLES)(context.context)
 app.command(epilog=scenarios.EXAMPLES)(scenarios.scenarios)
 app.command(epilog=apis.EXAMPLES)(apis.apis)

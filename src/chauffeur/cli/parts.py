@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, Plan, Scenario
+from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, Parameters, Plan, Scenario
 
 if TYPE_CHECKING:
     from chauffeur.drive.episode import Referee
@@ -46,10 +46,24 @@ def planner_named(spec: str, base_url: str | None, on_text: Callable[[str, int],
 
 
 def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
-    """LaMPilot's referee: by the scenario's own goal, else by what the planner understood, else none."""
+    """LaMPilot's referee: by the scenario's own goal, else by what the planner understood, else none. In a parking lot,
+    the judge of the spot that is meant.
+
+    Raises:
+        ScenarioError: There is no such spot.
+    """
+    if scenario.world == "parking":
+        return _parking_referee(world, plan)
     from chauffeur.bench.lampilot.understood import referee_for as judge
 
     return judge(world, scenario, plan)
+
+
+def _parking_referee(world: World, plan: Plan) -> Referee | None:
+    from chauffeur.worlds.parking import ParkingReferee, ParkingWorld
+
+    place = plan.policy.route if isinstance(plan.policy, Parameters) else ""
+    return ParkingReferee(world, world.spot(place)) if place and isinstance(world, ParkingWorld) else None
 
 
 def not_kept(person: str) -> str:

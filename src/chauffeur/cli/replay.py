@@ -52,20 +52,19 @@ def drive_again(recorded: RecordedTrip) -> RecordedTrip:
     from dataclasses import replace
 
     from chauffeur.cli.parts import referee_for
-    from chauffeur.concept import DataError, Limits, Program
-    from chauffeur.drive.session import MAX_TRIP_S, drive_program, make_world
-    from chauffeur.safety.shield import Shield
+    from chauffeur.concept import DataError, Limits
+    from chauffeur.drive.session import drive_policy, make_world, trip_s
 
     trip, scenario = recorded.trip, recorded.scenario
     policy = trip.plan.policy
-    if not recorded.frames or not isinstance(policy, Program):
+    if not recorded.frames or policy is None:
         raise DataError(f"The recording holds no drive: its outcome is {trip.outcome}.", hint="Replay a driven trip.")
     world = make_world(scenario)
     world.reset(scenario, trip.seed)
     referee = referee_for(world, scenario, trip.plan)
     record = dict(trip.record)
-    shield = Shield(world.dt_s, Limits(**record["limits"])) if "shield" in record else None
-    episode = drive_program(world, policy.source, referee, MAX_TRIP_S, library=policy.library, shield=shield)
+    limits = Limits(**record["limits"])
+    episode = drive_policy(world, policy, referee, trip_s(scenario), limits, shielded="shield" in record)
     driven = replace(
         trip,
         outcome=episode.outcome,

@@ -128,12 +128,15 @@ class Parameters:
         look_ahead_m: Pure-pursuit look-ahead distance.
         look_ahead_ratio: Look-ahead per speed, in seconds.
         lane: Lane wish relative to the present one: -1 left, 0 stay, +1 right.
+        route: Where to go where ways part: `left`, `straight`, `right`; in a parking lot `nearest`, `stadium`, `exit`
+            or the name of a spot. Empty for the way as it goes.
     """
 
     target_speed_mps: float
     look_ahead_m: float
     look_ahead_ratio: float
     lane: Literal[-1, 0, 1] = 0
+    route: str = ""
     kind: Literal["parameters"] = "parameters"
 
 

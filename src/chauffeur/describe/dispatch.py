@@ -7,10 +7,12 @@ from collections.abc import Callable, Mapping
 from chauffeur.concept import Context, ScenarioError, Snapshot
 from chauffeur.describe.highway import describe_highway
 from chauffeur.describe.intersection import describe_intersection
+from chauffeur.describe.parking import describe_parking
 
 DESCRIPTORS: Mapping[str, Callable[[Snapshot], Context]] = {
     "highway": describe_highway,
     "intersection": describe_intersection,
+    "parking": describe_parking,
 }
 
 

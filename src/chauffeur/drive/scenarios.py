@@ -9,7 +9,10 @@ from pathlib import Path
 
 from chauffeur.concept import Scenario, ScenarioError
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
-from chauffeur.worlds.highway.scenarios import BUILT_IN
+from chauffeur.worlds.highway.scenarios import BUILT_IN as ROADS
+from chauffeur.worlds.parking.scenarios import BUILT_IN as LOTS
+
+BUILT_IN = ROADS + LOTS
 
 DATA_VARIABLE = "CHAUFFEUR_LAMPILOT"
 """Environment variable naming a DbLv1 folder, used when no folder is given."""

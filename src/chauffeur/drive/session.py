@@ -19,11 +19,14 @@ from chauffeur.concept import (
     Instruction,
     InstructionError,
     Limits,
+    Parameters,
     PersonId,
     Plan,
     PlanRequest,
+    Policy,
     Program,
     Scenario,
+    ScenarioError,
     Snapshot,
     SystemMessage,
     Trip,
@@ -34,6 +37,7 @@ from chauffeur.describe import describe
 from chauffeur.drive.effects import effect_of
 from chauffeur.drive.episode import Episode, Referee, run_episode
 from chauffeur.drive.loop import Memory, Stages, drive
+from chauffeur.drive.parameters import drive_parameters, shield_for
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
@@ -47,6 +51,9 @@ from chauffeur.worlds.base import World
 
 MAX_WISH_CHARACTERS = 2000
 MAX_TRIP_S = 60.0
+"""Simulated time a trip may take on a road."""
+MAX_PARKING_S = 180.0
+"""The same in a parking lot."""
 
 RefereeMaker = Callable[[World, Scenario, Plan], Referee | None]
 
@@ -102,7 +109,7 @@ class Session:
         referee: Makes the judge of a trip; returning None drives freely.
         tell: Called with the loop's letters as they come, and with `frame` for each control period.
         setting: Whether S carries examples.
-        max_s: Bound of the trip in simulated time.
+        max_s: Bound of the trip in simulated time; default that of the kind of world.
         shielded: Whether the run-time shield has the last word on every command.
     """
 
@@ -111,7 +118,7 @@ class Session:
     referee: RefereeMaker = _no_referee
     tell: Callable[[str, object], None] = _silent
     setting: Setting = "few-shot"
-    max_s: float = MAX_TRIP_S
+    max_s: float | None = None
     shielded: bool = True
     _episode: Episode | None = None
     _system: SystemMessage | None = None
@@ -160,17 +167,21 @@ class Session:
         refused = declined(plan, verdicts)
         if refused:
             return make_trip(request, plan, verdicts, scenario, seed, None, refused, shielded=self.shielded)
-        assert isinstance(plan.policy, Program)
-        referee = self.referee(world, scenario, plan)
-        self._episode = drive_program(
-            world,
-            plan.policy.source,
-            referee,
-            self.max_s,
-            partial(self.tell, "frame"),
-            library=plan.policy.library,
-            shield=Shield(world.dt_s, request.limits) if self.shielded else None,
-        )
+        assert plan.policy is not None
+        shown = partial(self.tell, "frame")
+        try:
+            referee = self.referee(world, scenario, plan)
+            self._episode = drive_policy(
+                world,
+                plan.policy,
+                referee,
+                self.max_s or trip_s(scenario),
+                request.limits,
+                watch=shown,
+                shielded=self.shielded,
+            )
+        except ScenarioError as error:  # the road has no such way: known only when the policy meets the world
+            return make_trip(request, plan, verdicts, scenario, seed, None, str(error), shielded=self.shielded)
         told = _check_driven(plan, self._episode, request.limits)
         self.tell("V", told)
         return make_trip(request, plan, verdicts + told, scenario, seed, self._episode, "", shielded=self.shielded)
@@ -197,6 +208,39 @@ def _check_driven(plan: Plan, episode: Episode, limits: Limits) -> tuple[Verdict
 def _told(plan: Plan, snapshot: Snapshot, limits: Limits, check: Check) -> tuple[Verdict, ...]:
     """What a check says that only informs: if it breaks, that is told as well, and stops nothing."""
     return tuple(replace(verdict, vetoes=False) for verdict in run_checks(plan, snapshot, limits, (check,)))
+
+
+def trip_s(scenario: Scenario) -> float:
+    """How long a trip may take, in simulated time."""
+    return MAX_PARKING_S if scenario.world == "parking" else MAX_TRIP_S
+
+
+def drive_policy(
+    world: World,
+    policy: Policy,
+    referee: Referee | None,
+    max_s: float,
+    limits: Limits,
+    *,
+    watch: Callable[[Frame], None] | None = None,
+    shielded: bool = True,
+) -> Episode:
+    """Drive a checked policy of any kind that drives simulated cars, on a world just reset.
+
+    Raises:
+        ScenarioError: The road has no such way, or this kind of policy drives no car here.
+    """
+    match policy:
+        case Program():
+            shield = Shield(world.dt_s, limits) if shielded else None
+            return drive_program(world, policy.source, referee, max_s, watch, library=policy.library, shield=shield)
+        case Parameters():
+            shield = shield_for(world, limits) if shielded else None
+            return drive_parameters(world, policy, referee, max_s=max_s, limits=limits, shield=shield, watch=watch)
+        case _:
+            raise ScenarioError(
+                f"A policy of the kind {policy.kind!r} drives no simulated car.", hint="Use another planner."
+            )
 
 
 def drive_program(

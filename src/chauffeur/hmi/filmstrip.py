@@ -185,7 +185,7 @@ def _title(draw: ImageDraw.ImageDraw, recorded: RecordedTrip, shielded: str) -> 
         f"{label}   |   {trip.plan.planner or 'no planner'}   |   {trip.scenario}, seed {words.seed_words(trip.seed)}"
     )
     small = _font(_HEAD_PX)
-    line = _fit(draw, f"{facts}   |   {words.SIMULATED}", small, room)
+    line = _fit(draw, f"{facts}   |   {words.simulated(recorded.scenario.world)}", small, room)
     below = _MARGIN + _TITLE_PX + 14
     draw.text((_MARGIN * k, below * k), line, _MUTED, small)
     if shielded:

@@ -43,7 +43,7 @@ def page_payload(recorded: RecordedTrip) -> Json:
     trip = recorded.trip
     label, tone = words.outcome_words(trip.outcome)
     return {
-        "simulated": words.SIMULATED,
+        "simulated": words.simulated(recorded.scenario.world),
         "wish": trip.instruction.text,
         "person": trip.instruction.person,
         "source": trip.instruction.source,

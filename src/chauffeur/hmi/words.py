@@ -15,6 +15,17 @@ from chauffeur.safety.alignment import ALIGNMENT_CHECK, DRIVEN_CHECK
 Tone = Literal["good", "bad", "neutral"]
 
 SIMULATED = "Simulated drive (highway-env physics)"
+_OTHER_PHYSICS = {"parking": "Simulated drive (kinematic bicycle model)"}
+
+
+def simulated(world: str) -> str:
+    """What every picture of a simulated drive says of itself.
+
+    Args:
+        world: Kind of world as its scenario names it.
+    """
+    return _OTHER_PHYSICS.get(world, SIMULATED)
+
 
 _OUTCOMES: dict[Outcome, tuple[str, Tone]] = {
     "success": ("Done as asked", "good"),

@@ -88,6 +88,8 @@ def _policy_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]:
             yield from _speed_faults("target speed", _number(values.target_speed_mps), road, limits)
             if values.lane in _SIDES:
                 yield from _lane_faults(values.lane, road)
+            if values.route in ("left", "right") and road.kind != "intersection":
+                yield _Fault(f"There is no intersection ahead to turn {values.route} at.", "Leave out the route.")
             if not _number(values.look_ahead_m) > 0:
                 # A vehicle's path follower with a look-ahead of 0 m no longer stops at the end of its path.
                 yield _Fault(f"A look-ahead of {values.look_ahead_m} m is none.", "Look ahead more than 0 m.")

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable
+from typing import Final
 
 from chauffeur.concept import ActionMatrix, Limits, Parameters, Plan, Program, Snapshot, Trajectory, Verdict
 
 FORMAT_CHECK = "format-v1"
+
+
+MOST_ROUTE_CHARS: Final = 40
+"""Of the name of a place that parameters lead to."""
 
 
 def check_format(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:  # noqa: ARG001 - one shape for all checks
@@ -22,6 +27,8 @@ def check_format(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:  # 
         case Parameters() as values:
             if values.lane not in (-1, 0, 1):
                 return _fail(f"The lane wish is {values.lane!r}.", "Give -1 (left), 0 (stay) or 1 (right).")
+            if len(values.route) > MOST_ROUTE_CHARS:
+                return _fail("The route is no name of a place.", "Give a turn or a place of the lot.")
             return _finite(
                 "parameters",
                 (

@@ -4,8 +4,8 @@ A wish is on the disk before it goes to the planner (`kept`); all else is handed
 nor raises. A session that was killed leaves its open wishes behind; `unanswered` finds them.
 
 Besides the records of any drive (`drive/auditing.py`), each with the id of its wish: `verdict` of `live`, whether a
-plan was started; `outcome`, what became of a wish, and of the drive; `context`, with a `letter`, C and H of a plan, and, with
-an `event`, what happened in between: one of the events of a wish, `replaced`, `rung` or `settings`.
+plan was started; `outcome`, what became of a wish, and of the drive; `context`, with a `letter`, C and H of a plan,
+and, with an `event`, what happened in between: one of the events of a wish, `replaced`, `rung` or `settings`.
 """
 
 from __future__ import annotations

@@ -9,19 +9,18 @@ from __future__ import annotations
 import time
 from typing import Final, Literal
 
-from chauffeur.concept import Parameters, Plan, PlanRequest
+from chauffeur.concept import Parameters, Plan, PlanRequest, Thoughts
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.language_model import LanguageModelPlanner, Settled, usage_of
 from chauffeur.planners.onboard.options import Chosen, Declined, speed_words
 from chauffeur.planners.onboard.thoughts import thoughts_of
-from chauffeur.planners.talk2drive.style import LOOK_AHEAD, manner_of
+from chauffeur.planners.talk2drive.style import LOOK_AHEAD, LOOK_AHEAD_PARKING, PARKING_MPS, manner_of, place_of
 
 _STANDING: Final = frozenset({"stop", "pull_over"})
 _ELSEWHERE: Final[dict[str, str]] = {
     "gap": "With these parameters the cruise control keeps the gap; I can drive slower or faster instead.",
     "yield": "With these parameters I cannot make room for others; I can slow down if you want.",
-    "turn": "With these parameters I follow the route as it is; which way to turn is not mine to change.",
     "pull_over": "With these parameters I cannot pull over; I can slow down or stop.",
 }
 """What cannot be said in parameters, by the first part of its intent."""
@@ -47,6 +46,8 @@ class EmbeddedParameters:
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; what is not understood, not possible or no matter of parameters is declined in words."""
         begun = time.perf_counter()
+        if request.context.situation.world == "parking" and (place := place_of(request.instruction.text)):
+            return self._park(place, request, begun)
         settled = self._model.settle(request, begun)
         if isinstance(settled, Plan):
             return settled
@@ -72,6 +73,20 @@ class EmbeddedParameters:
             raw=settled.written.text,
         )
 
+    def _park(self, place: str, request: PlanRequest, begun: float) -> Plan:
+        look = LOOK_AHEAD_PARKING
+        speed = round(min(PARKING_MPS, request.limits.most_mps(request.context.situation.speed_limit_mps)), 2)
+        found = Parameters(speed, look.distance_m, look.ratio_s, 0, place)
+        return Plan(
+            thoughts=Thoughts(f"You want to park. I {does(found)}."),
+            policy=found,
+            intent="park",
+            settings=(("target_speed_mps", found.target_speed_mps),),
+            planner=self.id,
+            model=self.model,
+            latency_s=time.perf_counter() - begun,
+        )
+
 
 def parameters_of(settled: Settled) -> Parameters | Declined:
     """What was settled as parameters, or why it is no matter of parameters."""
@@ -84,8 +99,10 @@ def parameters_of(settled: Settled) -> Parameters | Declined:
             return Declined(_ELSEWHERE[kind])
     if settled.situation.lane_index == 0 and _lane(steps) < 0:
         return Declined("We are in the leftmost lane; with these parameters I pass others on the left only.")
+    turn = next((step.intent.partition(".")[2] for step in steps if step.intent.startswith("turn.")), "")
     look = LOOK_AHEAD[manner_of(settled.linked.choice.intent, gentle=any(one.gentle for one in settled.used))]
-    return Parameters(_speed(steps, settled.situation.speed_mps), look.distance_m, look.ratio_s, _lane(steps))
+    speed = _speed(steps, settled.situation.speed_mps)
+    return Parameters(speed, look.distance_m, look.ratio_s, _lane(steps), turn)
 
 
 def _speed(steps: tuple[Chosen, ...], now_mps: float) -> float:
@@ -107,11 +124,22 @@ def _lane(steps: tuple[Chosen, ...]) -> Literal[-1, 0, 1]:
 _LANE_WORDS: Final = {-1: ", change one lane to the left", 0: ", keep my lane", 1: ", change one lane to the right"}
 
 
+_WAY_WORDS: Final = {
+    "left": ", turn left",
+    "right": ", turn right",
+    "straight": ", go straight on",
+    "nearest": ", take the nearest free spot",
+    "stadium": ", take the free spot nearest to the stadium",
+    "exit": ", take the free spot nearest to the exit",
+}
+
+
 def does(parameters: Parameters) -> str:
     """What parameters make the car do, as a clause after "I"."""
     speed = parameters.target_speed_mps
     pace = "stop" if speed == 0.0 else f"set the target speed to {speed_words(speed)}"
+    way = _WAY_WORDS.get(parameters.route, f", take the way to {parameters.route}") if parameters.route else ""
     return (
-        f"{pace}{_LANE_WORDS[parameters.lane]}, and look ahead {number(parameters.look_ahead_ratio)} s along my path, "
-        f"{number(parameters.look_ahead_m)} m at least"
+        f"{pace}{_LANE_WORDS[parameters.lane]}{way}, and look ahead {number(parameters.look_ahead_ratio)} s "
+        f"along my path, {number(parameters.look_ahead_m)} m at least"
     )

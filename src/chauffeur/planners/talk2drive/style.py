@@ -6,6 +6,7 @@ A long look-ahead cuts corners and is smooth, a short one is exact and busy. The
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -31,9 +32,34 @@ LOOK_AHEAD: Final[dict[Manner, LookAhead]] = {
     "lively": LookAhead(9.0, 1.5),
 }
 
+LOOK_AHEAD_PARKING: Final = LookAhead(4.0, 1.0)
+PARKING_MPS: Final = 3.0
+"""In a parking lot, where ways are narrow."""
+
 DISTANCE_M: Final = (3.0, 60.0)
 RATIO_S: Final = (0.5, 4.0)
 """What a model may choose between."""
+
+_PARKS: Final = re.compile(r"\b(?:park|parking|spot|space|place|bay|stall)\b", re.IGNORECASE)
+_SPOT: Final = re.compile(
+    r"\b(?:spot|space|bay|stall|place|in|into|at|on)\s+(?:number\s+)?([A-Z])\s?(\d{1,2})\b", re.IGNORECASE
+)
+_PLACES: Final[tuple[tuple[str, re.Pattern[str]], ...]] = (
+    ("stadium", re.compile(r"\b(?:stadium|entrance|gate|game)\b", re.IGNORECASE)),
+    ("exit", re.compile(r"\b(?:exit|way out|leave|get away)\b", re.IGNORECASE)),
+    ("nearest", re.compile(r"\b(?:near|nearest|close|closest|next|first|any|free|here)\b", re.IGNORECASE)),
+)
+
+
+def place_of(wish: str) -> str:
+    """Which spot of a parking lot a wish means: `stadium`, `exit`, `nearest` or a name; empty where none is."""
+    named = _SPOT.search(wish)
+    if named is not None:
+        return f"{named[1].upper()}{int(named[2])}"
+    if not _PARKS.search(wish):
+        return ""
+    return next((place for place, words in _PLACES if words.search(wish)), "nearest")
+
 
 _MANNERS: Final[dict[str, Manner]] = {
     "style.comfort": "gentle",

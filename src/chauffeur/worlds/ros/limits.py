@@ -63,6 +63,11 @@ def checked(parameters: Parameters, limits: VehicleLimits) -> CheckedWish:
         raise VehicleRefusalError(
             f"A lane wish of {str(parameters.lane)[:40]!r} is none.", hint="Use -1 (left), 0 (stay) or 1 (right)."
         )
+    if parameters.route:
+        raise VehicleRefusalError(
+            f"A route ({str(parameters.route)[:40]!r}) is not published to this vehicle.",
+            hint="The vehicle's own planner chooses the way.",
+        )
     return CheckedWish(min(speed, most), look_ahead, ratio, parameters.lane)
 
 

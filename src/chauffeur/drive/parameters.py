@@ -1,0 +1,487 @@
+"""Drives a `Parameters` policy (Talk2Drive, seed Eq. 15): target speed, look-ahead distance, look-ahead ratio, lane.
+
+The same parameters drive on a highway, over an intersection and in a parking lot. The vehicle follows a path with pure
+pursuit; what the path is depends on the road: the middle of its lane, that of the wished lane once there is a gap, the
+way through the crossing, or the way onto a spot. It stops at stop signs, lets go first who crosses, and stands at the
+end of its path. The shield has the last word, and the command passes the one door (`drive/actuate.py`).
+
+The policy's `route` says where to go where ways part: a turn (`left`, `straight`, `right`), or a place in a lot (`nearest`,
+`stadium`, `exit`, or the name of a spot).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Protocol, runtime_checkable
+
+from chauffeur.concept import (
+    Command,
+    Frame,
+    Intervention,
+    LaneId,
+    LaneView,
+    Limits,
+    Parameters,
+    ScenarioError,
+    Snapshot,
+    Turn,
+    VehicleState,
+    Wishes,
+)
+from chauffeur.control.pure_pursuit import Path
+from chauffeur.drive.episode import Episode, Referee, run_episode
+from chauffeur.geometry import wrap_to_pi
+from chauffeur.safety.shield import LAMPILOT_SHIELD, Guarded, Shield
+from chauffeur.safety.shield.gaps import braking_gap_m, rss_gap_m
+from chauffeur.worlds.base import EGO, World
+from chauffeur.worlds.parking.boxes import Box
+from chauffeur.worlds.parking.corridor import Body
+from chauffeur.worlds.parking.driver import JAM_M
+from chauffeur.worlds.parking.following import LOT_BEND_MPS2, Chassis, Follower, Look
+from chauffeur.worlds.parking.guard import Guard
+from chauffeur.worlds.parking.lot import LIMIT_MPS, Spot
+from chauffeur.worlds.parking.places import PLACES
+from chauffeur.worlds.parking.routes import Way
+
+HEADWAY_S: Final = 1.5
+"""Time headway to who is ahead: Talk2Drive's parameters have none, its adaptive cruise control keeps its own."""
+TURNS: Final[tuple[Turn, ...]] = "left", "straight", "right"
+
+_JAM_M: Final = 2.0
+_ACCELERATION_MPS2: Final = 2.5
+_CHANGE_S: Final = 4.0
+"""Time a lane change takes: 1.5 m/s2 sideways at most for a lane of 4 m."""
+_CHANGE_M: Final = 20.0
+"""Way it takes at least."""
+_BEFORE_M: Final = 10.0
+_STEP_M: Final = 1.0
+_RESERVE_M: Final = 2.0
+"""More than the shield asks for when a lane is entered: it should have nothing to mend."""
+_JOINT_M: Final = 0.5
+_SHORT_M: Final = 0.2
+"""How far before the end of its path the front bumper stops."""
+_STOP_LINE_M: Final = 0.5
+_AT_LINE_M: Final = 3.0
+_STANDING_MPS: Final = 0.1
+_LOOKS_S: Final = 1.0
+"""How long the car stands at a stop sign before it may go."""
+_CLEAR_S: Final = 2.0
+"""By how much time somebody who crosses must be missed when the car leaves a stop sign."""
+_SHORTEST_LOOK_M: Final = 0.1
+
+
+@runtime_checkable
+class ParkingPlaces(Protocol):
+    """What a world with spots offers beyond the `World` contract."""
+
+    @property
+    def chassis(self) -> Chassis:
+        """The ego's size and axles."""
+        ...
+
+    @property
+    def ground(self) -> Box:
+        """What is paved."""
+        ...
+
+    @property
+    def steering_rate(self) -> float:
+        """How fast the ego's wheel turns, rad/s."""
+        ...
+
+    def spot(self, place: str) -> Spot:
+        """The free spot that is meant. Raises ScenarioError, saying why there is none."""
+        ...
+
+    def way_to(self, spot: Spot) -> Way | None:
+        """The way onto a spot from here."""
+        ...
+
+    def way_on(self) -> Way:
+        """The way on where no spot is meant."""
+        ...
+
+    def parked(self) -> str | None:
+        """Name of the spot the ego is parked in."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class _Stretch:
+    """Lanes one after the other, as one path, and where along it each begins."""
+
+    lanes: tuple[LaneView, ...]
+    path: Path
+    starts_m: tuple[float, ...]
+
+    def lane_at(self, station_m: float) -> LaneView:
+        """The lane a place along the path is in."""
+        index = 0
+        while index + 1 < len(self.lanes) and self.starts_m[index + 1] <= station_m:
+            index += 1
+        return self.lanes[index]
+
+
+class LotShield(Shield):
+    """The shield of a parking lot: the same last word, said by the lot's own rules (worlds/parking/guard.py).
+
+    The shield of roads keeps a car in its lane and off others' by distances that no parking car has.
+    """
+
+    def __init__(self, world: ParkingPlaces, dt_s: float, limits: Limits | None = None) -> None:
+        """Args: a world just reset; its control period; bounds no command may cross."""
+        super().__init__(dt_s, limits)
+        self._most = Limits() if limits is None else limits
+        self._guard = Guard(world.chassis, world.ground, dt_s, world.steering_rate)
+
+    def guard(self, snapshot: Snapshot, command: Command, aim: LaneId | None = None) -> Guarded:
+        """The command, changed as little as needed."""
+        del aim
+        ruling = self._guard.judge(snapshot, command, self._most.most_mps(LIMIT_MPS))
+        if not ruling.rule:
+            return Guarded(ruling.command)
+        return Guarded(ruling.command, (Intervention(ruling.rule, ruling.reason, command, ruling.command),))
+
+
+def shield_for(world: World, limits: Limits | None = None) -> Shield:
+    """The shield that fits a world, just reset: of roads, or of a parking lot."""
+    if isinstance(world, ParkingPlaces):
+        return LotShield(world, world.dt_s, limits)
+    return Shield(world.dt_s, limits)
+
+
+class ParametersDriver:
+    """Person at the wheel of `run_episode`: acts on `Parameters` where another policy wishes.
+
+    Nothing in the parameters makes it fail: what is no number is taken for the most careful value.
+    """
+
+    def __init__(self, world: World, policy: Parameters, *, limits: Limits | None = None) -> None:
+        """Bind a policy to a world that was just reset.
+
+        Raises:
+            ScenarioError: The road has no such turn or place, the spot is taken, or no way leads there.
+        """
+        self._world = world
+        self._limits = Limits() if limits is None else limits
+        self._target = _number(policy.target_speed_mps, 0.0)
+        self._look = Look(
+            max(_number(policy.look_ahead_m, _SHORTEST_LOOK_M), _SHORTEST_LOOK_M),
+            max(_number(policy.look_ahead_ratio, 0.0), 0.0),
+        )
+        self._notes: list[tuple[float, str]] = []
+        snapshot = world.snapshot()
+        self._lanes = {lane.id: lane for lane in snapshot.lanes}
+        self._turn: Turn | None = _turn_of(policy.route, snapshot)
+        self.spot: Spot | None = None
+        if isinstance(world, ParkingPlaces):
+            self._follower = Follower(world.chassis, world.dt_s, jam_m=JAM_M, bend_mps2=LOT_BEND_MPS2)
+            self._wished = 0
+            self._stretch: _Stretch | None = None
+            way = world.way_on()
+            if policy.route:
+                self.spot = world.spot(policy.route)
+                way = world.way_to(self.spot) or way
+            self._follower.take(way.path, way.room_m)
+        else:
+            self._follower = Follower(_highway_chassis(snapshot.ego), world.dt_s, jam_m=_JAM_M)
+            self._wished = policy.lane
+            self._stretch = self._stretch_from(self._here(snapshot))
+            self._follow(self._stretch.path)
+        self._before: _Stretch | None = None
+        self._served: frozenset[int] = frozenset()
+        self._stood_s = 0.0
+        self._target_now = 0.0
+
+    @property
+    def notes(self) -> tuple[tuple[float, str], ...]:
+        """What there was to tell the passenger, as (time s, text)."""
+        return tuple(self._notes)
+
+    def wishes(self, settled: Wishes) -> Wishes:
+        """What is wanted in this period, in the place of what the world's own driver would keep to."""
+        del settled
+        snapshot = self._world.snapshot()
+        lane: LaneId | None
+        if self._stretch is None:
+            lane = self.spot.lane if self.spot is not None else snapshot.ego.lane
+            limit = self._lanes[lane].speed_limit_mps if lane in self._lanes else 0.0
+        else:
+            self._mind_the_lane(snapshot)
+            station = self._stretch.path.nearest(snapshot.ego.x_m, snapshot.ego.y_m)
+            view = self._stretch.lane_at(station)
+            lane, limit = view.id, view.speed_limit_mps
+        self._target_now = max(0.0, min(self._target, self._limits.most_mps(limit)))
+        return Wishes(self._target_now, HEADWAY_S, lane, self._turn, self._served)
+
+    def command(self) -> Command:
+        """Acceleration and steering for this period."""
+        snapshot = self._world.snapshot()
+        others = _solid(snapshot)
+        stop = self._stop_line(snapshot, others)
+        return self._follower.command(snapshot.ego, others, self._look, self._target_now, HEADWAY_S, stop)
+
+    # Lanes ------------------------------------------------------------------------------------------------------------
+
+    def _here(self, snapshot: Snapshot) -> LaneView:
+        lane = snapshot.ego.lane
+        if lane is None or lane not in self._lanes:
+            raise ScenarioError("The car is on no lane of this road.", hint="Reset the world first.")
+        return self._lanes[lane]
+
+    def _follow(self, path: Path) -> None:
+        lane = next(iter(self._lanes.values()))
+        ego = self._world.snapshot().ego
+        self._follower.take(path, max(0.2, (lane.width_m - ego.width_m) / 2.0))
+
+    def _stretch_from(self, first: LaneView) -> _Stretch:
+        """A lane and what follows it on the route, up to where the front bumper is to stop."""
+        lanes = [first]
+        while len(lanes) <= len(self._lanes):
+            onward = self._onward(lanes[-1])
+            if onward is None:
+                break
+            lanes.append(onward)
+        starts, points = [0.0], list(lanes[0].centre_m)
+        for lane in lanes[1:]:
+            starts.append(Path.of(points).length_m)
+            points.extend(lane.centre_m)
+        return _Stretch(tuple(lanes), _ended(Path.of(points), self._overhang_m + _SHORT_M), tuple(starts))
+
+    @property
+    def _overhang_m(self) -> float:
+        return _highway_chassis(self._world.snapshot().ego).body.overhang_m
+
+    def _onward(self, lane: LaneView) -> LaneView | None:
+        """The lane that follows, on the route where there is a choice."""
+        end = lane.centre_m[-1]
+        follow = [
+            one
+            for one in self._lanes.values()
+            if one.id[0] == lane.id[1] and math.dist(one.centre_m[0], end) < _JOINT_M
+        ]
+        if not follow:
+            return None
+        if self._turn == "left":
+            return min(follow, key=_turned)
+        if self._turn == "right":
+            return max(follow, key=_turned)
+        return min(follow, key=lambda one: abs(_turned(one)))
+
+    def _mind_the_lane(self, snapshot: Snapshot) -> None:
+        """Begin a lane change that is wished and has room; go back while that is still the shorter way."""
+        assert self._stretch is not None
+        if self._before is not None:
+            self._go_on_or_back(snapshot)
+        elif self._wished:
+            lane = self._stretch.lane_at(self._stretch.path.nearest(snapshot.ego.x_m, snapshot.ego.y_m))
+            side = "left" if self._wished < 0 else "right"
+            goal = self._lanes.get((lane.id[0], lane.id[1], lane.id[2] + self._wished))
+            if goal is None:
+                self._say(snapshot, f"There is no lane to the {side}; I stay in this one.")
+                self._wished = 0
+                return
+            if goal.forbidden and not goal.emergency:
+                self._say(snapshot, f"The lane to the {side} ends; I stay in this one.")
+                self._wished = 0
+                return
+            there = self._stretch_from(goal)
+            hindrance = self._hindrance(snapshot, there.path, goal.width_m, _RESERVE_M)
+            if hindrance:
+                self._say(snapshot, f"The lane to the {side} is not free yet: {hindrance}")
+            elif self._change(snapshot, there):
+                self._before, self._stretch = self._stretch, there
+                self._say(snapshot, f"Changing to the {side} lane.")
+
+    def _go_on_or_back(self, snapshot: Snapshot) -> None:
+        assert self._stretch is not None
+        assert self._before is not None
+        ego, there = snapshot.ego, self._stretch
+        station = there.path.nearest(ego.x_m, ego.y_m)
+        lane = there.lane_at(station)
+        away = abs(there.path.offset(ego.x_m, ego.y_m, station))
+        if away < 0.3:
+            self._before, self._wished = None, 0
+        elif away > lane.width_m / 2.0 + ego.width_m / 2.0:  # all of the car is in its old lane
+            hindrance = self._hindrance(snapshot, there.path, lane.width_m, 0.0)
+            if hindrance and self._change(snapshot, self._before):
+                self._say(snapshot, f"Back into the lane: {hindrance}")
+                self._stretch, self._before = self._before, None
+
+    def _change(self, snapshot: Snapshot, there: _Stretch) -> bool:
+        """Follow a smooth way from where the car is to another lane; False where the lanes end too soon."""
+        ego, path = snapshot.ego, self._follower.path
+        assert path is not None
+        station = self._follower.locate(ego)
+        way = max(_CHANGE_M, ego.speed_mps * _CHANGE_S)
+        if station + way > path.length_m:
+            return False
+        points: list[tuple[float, float]] = []
+        for i in range(-round(_BEFORE_M / _STEP_M), math.ceil(way / _STEP_M)):
+            share = max(0.0, i * _STEP_M / way)
+            here = path.at(station + i * _STEP_M)
+            goal = there.path.at(there.path.nearest(here.x_m, here.y_m))
+            blend = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+            points.append((here.x_m + blend * (goal.x_m - here.x_m), here.y_m + blend * (goal.y_m - here.y_m)))
+        last = path.at(station + way)
+        begin = there.path.nearest(last.x_m, last.y_m)
+        rest = zip(there.path.points_m, there.path.stations_m, strict=True)
+        points.extend([point for point, at in rest if at > begin])
+        self._follow(Path.of(points))
+        return True
+
+    def _hindrance(self, snapshot: Snapshot, path: Path, width_m: float, reserve_m: float) -> str:
+        """Who keeps the car from entering a lane, in words; empty where the gap allows it, with a reserve."""
+        ego, table = snapshot.ego, LAMPILOT_SHIELD
+        here = path.nearest(ego.x_m, ego.y_m)
+        for other in _solid(snapshot):
+            there = path.nearest(other.x_m, other.y_m)
+            pose = path.at(there)
+            sideways = other.speed_mps * math.sin(wrap_to_pi(other.heading_rad - pose.heading_rad))
+            reach = width_m / 2.0 + other.width_m / 2.0
+            across = pose.sees(other.x_m, other.y_m)[1]
+            if min(abs(across), abs(across + sideways)) > reach:
+                continue
+            gap = abs(there - here) - (ego.length_m + other.length_m) / 2.0 - table.margin_m - reserve_m
+            if gap < 0.0:
+                return "a car is beside."
+            if there > here:
+                lead = max(other.speed_mps, 0.0)
+                needed = braking_gap_m(
+                    ego.speed_mps, lead, table.gentle_mps2, table.others_braking_mps2, self._world.dt_s
+                )
+                needed = max(min(needed, ego.speed_mps * HEADWAY_S), _least_ahead(ego.speed_mps, lead))
+                if gap < needed:
+                    return f"a car {gap:.0f} m ahead in it is too close."
+            else:
+                needed = rss_gap_m(
+                    other.speed_mps,
+                    ego.speed_mps,
+                    table.others_response_s,
+                    table.others_acceleration_mps2,
+                    table.others_sure_braking_mps2,
+                    table.gentle_mps2,
+                )
+                if gap < needed:
+                    return f"a car {gap:.0f} m behind in it needs {needed:.0f} m."
+        return ""
+
+    # Stop signs -------------------------------------------------------------------------------------------------------
+
+    def _stop_line(self, snapshot: Snapshot, others: Sequence[VehicleState]) -> float:
+        """Way along the path at which the rear axle has to stop for a sign; infinite where none is left to serve."""
+        path, ego = self._follower.path, snapshot.ego
+        if self._stretch is None or path is None:
+            return math.inf
+        nearest = math.inf
+        for sign in snapshot.objects:
+            if sign.kind != "stop_sign" or sign.id in self._served:
+                continue
+            at = path.nearest(sign.x_m, sign.y_m)
+            here = path.at(at)
+            if math.dist((here.x_m, here.y_m), (sign.x_m, sign.y_m)) > 1.0:
+                continue  # of another lane
+            line = at - self._overhang_m - _STOP_LINE_M
+            station = self._follower.locate(ego)
+            if station > line + _AT_LINE_M:
+                self._served |= {sign.id}
+                continue
+            if ego.speed_mps < _STANDING_MPS and abs(station - line) < _AT_LINE_M:
+                self._stood_s += self._world.dt_s
+                clear = not self._follower.crossing(ego, others, self._target_now, _CLEAR_S)
+                if self._stood_s >= _LOOKS_S and clear:
+                    self._served |= {sign.id}
+                    continue
+            nearest = min(nearest, line)
+        return nearest
+
+    def _say(self, snapshot: Snapshot, text: str) -> None:
+        """A note, once while it stays the same in substance."""
+        if not self._notes or self._notes[-1][1].partition(":")[0] != text.partition(":")[0]:
+            self._notes.append((snapshot.time_s, text))
+
+
+def drive_parameters(
+    world: World,
+    policy: Parameters,
+    referee: Referee | None = None,
+    *,
+    max_s: float,
+    limits: Limits | None = None,
+    shield: Shield | None = None,
+    record: bool = True,
+    watch: Callable[[Frame], None] | None = None,
+) -> Episode:
+    """Drive a policy of parameters, on a world just reset, until the goal is decided or `max_s` have passed.
+
+    Raises:
+        ScenarioError: The route leads nowhere here.
+    """
+    driver = ParametersDriver(world, policy, limits=limits)
+    episode = run_episode(
+        world,
+        None,
+        referee,
+        max_s=max_s,
+        record=record,
+        adjust=driver.wishes,
+        watch=watch,
+        hands=driver,
+        shield=shield,
+    )
+    return replace(episode, said=tuple(sorted((*episode.said, *driver.notes))))
+
+
+def _highway_chassis(ego: VehicleState) -> Chassis:
+    """A car of the highway worlds: its axles are at its ends (control/lane_keeping.py)."""
+    body = Body(ego.length_m, ego.width_m, ego.length_m / 2.0)
+    return Chassis(body, ego.length_m, math.pi / 4.0, _ACCELERATION_MPS2)
+
+
+def _turn_of(route: str, snapshot: Snapshot) -> Turn | None:
+    """The turn that is meant; None in a lot, where routes are places, and where nothing is said."""
+    if not route or snapshot.kind == "parking":
+        return None
+    if route not in TURNS:
+        places = " Places are for parking lots." if route in PLACES else ""
+        raise ScenarioError(f"There is no route {route!r} on this road.{places}", hint=f"Say {', '.join(TURNS)}.")
+    if route != "straight" and snapshot.kind != "intersection":
+        raise ScenarioError(f"There is no intersection ahead to turn {route} at.", hint="Leave out the route.")
+    return route
+
+
+def _solid(snapshot: Snapshot) -> list[VehicleState]:
+    """Everybody and everything that can be touched."""
+    return [one for one in (*snapshot.others, *snapshot.objects) if one.kind != "stop_sign" and one.id != EGO]
+
+
+def _turned(lane: LaneView) -> float:
+    """By how much a lane turns; positive to the right."""
+    (ax, ay), (bx, by) = lane.centre_m[0], lane.centre_m[1]
+    (cx, cy), (dx, dy) = lane.centre_m[-2], lane.centre_m[-1]
+    return wrap_to_pi(math.atan2(dy - cy, dx - cx) - math.atan2(by - ay, bx - ax))
+
+
+def _ended(path: Path, short_m: float) -> Path:
+    """A path that ends a way earlier."""
+    end = max(path.length_m - short_m, path.length_m / 2.0)
+    last = path.at(end)
+    kept: Iterable[tuple[float, float]] = (
+        point for point, at in zip(path.points_m, path.stations_m, strict=True) if at < end
+    )
+    return Path.of([*kept, (last.x_m, last.y_m)])
+
+
+def _least_ahead(speed_mps: float, lead_mps: float) -> float:
+    """Gap at which a slower car ahead in the new lane can be braked for with 3 m/s2."""
+    closing = max(0.0, speed_mps - lead_mps)
+    return 0.5 * speed_mps + closing**2 / (2.0 * LAMPILOT_SHIELD.gentle_mps2)
+
+
+def _number(value: object, otherwise: float) -> float:
+    """A finite number, or what stands in for one that is none."""
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        return float(value)
+    return otherwise

@@ -1,0 +1,53 @@
+"""The low-level driver of a lot: a path to where the wished lane is, followed with pure pursuit and a gap."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final
+
+from chauffeur.concept import Command, LaneId, Snapshot, Wishes
+from chauffeur.worlds.parking.following import LOT_BEND_MPS2, Chassis, Follower, Look
+from chauffeur.worlds.parking.lot import LIMIT_MPS
+from chauffeur.worlds.parking.routes import Way
+
+OWN_LOOK: Final = Look(look_ahead_m=3.0, look_ahead_ratio_s=1.0)
+"""Pure pursuit where nobody wishes for other parameters."""
+JAM_M: Final = 1.0
+"""Clear distance to somebody who stands."""
+
+
+class ParkingDriver:
+    """Drives to a wished lane; a spot is one. Its only state is the way there."""
+
+    def __init__(
+        self, chassis: Chassis, dt_s: float, now: Callable[[], Snapshot], way_to: Callable[[LaneId | None], Way]
+    ) -> None:
+        """Args: the car; its control period; the present instant; the way to a lane, or on along the present one."""
+        self._follower = Follower(chassis, dt_s, jam_m=JAM_M, bend_mps2=LOT_BEND_MPS2)
+        self._now = now
+        self._way_to = way_to
+        self._aim: tuple[LaneId | None] | None = None
+
+    def initial_wishes(self) -> Wishes:
+        """Keep the present speed, and drive on: to the exit, where nothing else is wished."""
+        return Wishes(target_speed_mps=self._now().ego.speed_mps)
+
+    def settle(self, wishes: Wishes) -> Wishes:
+        """Wishes with the present speed filled in, and no more than the lot allows."""
+        speed = wishes.target_speed_mps
+        if speed is None:
+            speed = self._now().ego.speed_mps
+        speed = max(0.0, min(speed, LIMIT_MPS))
+        return wishes if speed == wishes.target_speed_mps else replace(wishes, target_speed_mps=speed)
+
+    def command(self, wishes: Wishes) -> Command:
+        """Acceleration and steering for settled wishes."""
+        assert wishes.target_speed_mps is not None
+        if self._aim != (wishes.target_lane,):
+            self._aim = (wishes.target_lane,)
+            way = self._way_to(wishes.target_lane)
+            self._follower.take(way.path, way.room_m)
+        snapshot = self._now()
+        others = (*snapshot.others, *snapshot.objects)
+        return self._follower.command(snapshot.ego, others, OWN_LOOK, wishes.target_speed_mps, wishes.time_headway_s)

@@ -1,0 +1,162 @@
+"""The parking lot: a drive in along the north, one-way aisles with slanted spots on both sides, a drive out.
+
+```
+   entrance ->  n1 ------- n2 ------- n3        x grows to the east, y to the south: to the right of +x,
+                 \\          \\          \\        as on the highway worlds' roads
+                 a1         a2         a3
+              A  |  B    C  |  D    E  |  F     | stadium gate
+                 b1         b2         b3
+                 /          /          /
+   exit  <-- s1 ------- s2 ------- s3
+```
+
+A spot's lines are its rectangle. Spots stand at 60 degrees to their aisle, as is usual where aisles are one-way: a car
+can drive in forwards in one turn. Sizes follow ordinary practice (spots 2.75 m by 5.5 m, aisles 5.5 m).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+from chauffeur.concept import LaneId, LaneView
+from chauffeur.worlds.parking.boxes import Box
+
+Points = tuple[tuple[float, float], ...]
+
+AISLE_M: Final = 5.5
+"""Width of a drive or an aisle."""
+SPOT_WIDTH_M: Final = 2.75
+SPOT_LENGTH_M: Final = 5.5
+SLANT_RAD: Final = math.radians(60.0)
+"""Angle between an aisle and its spots."""
+CORNER_M: Final = 6.0
+"""Radius, along the middle, of the corners between drives and aisles."""
+ISLAND_M: Final = 1.2
+"""Between rows that stand back to back."""
+LIMIT_MPS: Final = 15.0 / 3.6
+_APPROACH_M: Final = 24.0
+_END_M: Final = 12.0
+"""From the middle of a drive to the first spot."""
+_MARGIN_M: Final = 6.0
+_ARC_STEP_RAD: Final = math.radians(3.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A parking spot.
+
+    Attributes:
+        name: Row letter and number, counted from the north: `B4`.
+        aisle: Number of its aisle, from 1 in the west.
+        box: The ground between its lines.
+        lane: Id of its lane in the snapshot: wishing for that lane is wishing for this spot.
+    """
+
+    name: str
+    aisle: int
+    box: Box
+    lane: LaneId
+
+    @property
+    def mouth_m(self) -> tuple[float, float]:
+        """Middle of its open end."""
+        half = self.box.length_m / 2.0
+        return (
+            self.box.x_m - math.cos(self.box.heading_rad) * half,
+            self.box.y_m - math.sin(self.box.heading_rad) * half,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Lot:
+    """A lot's ground.
+
+    Attributes:
+        aisles: How many.
+        spots: By name.
+        lanes: Drives, corners, aisles and spots.
+        ground: What is paved.
+        gate_m: Where people enter the stadium.
+        exit_m: Where cars leave.
+    """
+
+    aisles: int
+    spots: dict[str, Spot]
+    lanes: tuple[LaneView, ...]
+    ground: Box
+    gate_m: tuple[float, float]
+    exit_m: tuple[float, float]
+
+    def lane(self, lane: LaneId) -> LaneView:
+        """A lane by its id. Raises KeyError for an unknown one."""
+        found = next((view for view in self.lanes if view.id == lane), None)
+        if found is None:
+            raise KeyError(lane)
+        return found
+
+
+def build_lot(aisles: int, spots_a_row: int, taken: frozenset[str] = frozenset()) -> Lot:
+    """A lot with `aisles` aisles and `spots_a_row` spots on each side of each; lanes of `taken` spots are forbidden."""
+    depth = SPOT_LENGTH_M * math.sin(SLANT_RAD) + SPOT_WIDTH_M * math.cos(SLANT_RAD)
+    module = AISLE_M + 2.0 * depth + ISLAND_M
+    pitch = SPOT_WIDTH_M / math.sin(SLANT_RAD)
+    south = 2.0 * _END_M + spots_a_row * pitch
+    middles = [depth + module * j for j in range(aisles)]
+    views = _ways(middles, south)
+    spots: dict[str, Spot] = {}
+    for j, x in enumerate(middles):
+        for side in (0, 1):
+            letter = chr(ord("A") + 2 * j + side)
+            out = -1.0 if side == 0 else 1.0  # west of the aisle, or east of it
+            heading = math.pi / 2.0 - out * SLANT_RAD
+            for number in range(spots_a_row):
+                name = f"{letter}{number + 1}"
+                y = _END_M + (number + 0.5) * pitch + SPOT_LENGTH_M / 2.0 * math.cos(SLANT_RAD)
+                box = Box(x + out * (AISLE_M + depth) / 2.0, y, heading, SPOT_LENGTH_M, SPOT_WIDTH_M)
+                spots[name] = Spot(name, j + 1, box, (f"a{j + 1}", name, 0))
+    views.extend(_spot_view(spot, spot.name in taken) for spot in spots.values())
+    west, east = -_APPROACH_M, middles[-1] + AISLE_M / 2.0 + depth + _MARGIN_M
+    top, bottom = -AISLE_M / 2.0 - 1.0, south + AISLE_M / 2.0 + 1.0
+    ground = Box((west + east) / 2.0, (top + bottom) / 2.0, 0.0, east - west, bottom - top)
+    return Lot(aisles, spots, tuple(views), ground, (east, south / 2.0), (west, south))
+
+
+def _ways(middles: list[float], south: float) -> list[LaneView]:
+    """Drives, corners and aisles."""
+    views: list[LaneView] = []
+    last = len(middles)
+    for j, x in enumerate(middles, start=1):
+        before = (-_APPROACH_M, 0.0) if j == 1 else (middles[j - 2] - CORNER_M, 0.0)
+        come = "entrance" if j == 1 else f"n{j - 1}"
+        views.append(_view((come, f"n{j}", 0), (before, (x - CORNER_M, 0.0))))
+        views.append(_view((f"n{j}", f"a{j}", 0), _corner(x - CORNER_M, CORNER_M, -math.pi / 2.0)))
+        views.append(_view((f"a{j}", f"b{j}", 0), ((x, CORNER_M), (x, south - CORNER_M))))
+        views.append(_view((f"b{j}", f"s{j}", 0), _corner(x - CORNER_M, south - CORNER_M, 0.0)))
+        after = (-_APPROACH_M, south) if j == 1 else (middles[j - 2] - CORNER_M, south)
+        go = "exit" if j == 1 else f"s{j - 1}"
+        views.append(_view((f"s{j}", go, 0), ((x - CORNER_M, south), after)))
+    assert last
+    return views
+
+
+def _corner(x: float, y: float, phase: float) -> Points:
+    """A quarter of a circle about a point, driven to the right."""
+    count = round(math.pi / 2.0 / _ARC_STEP_RAD)
+    angles = [phase + math.pi / 2.0 * i / count for i in range(count + 1)]
+    return tuple((x + CORNER_M * math.cos(a), y + CORNER_M * math.sin(a)) for a in angles)
+
+
+def _view(lane: LaneId, centre: Points, *, width: float = AISLE_M, forbidden: bool = False) -> LaneView:
+    length = sum(math.dist(a, b) for a, b in pairwise(centre))
+    return LaneView(lane, width, length, LIMIT_MPS, forbidden, False, centre)
+
+
+def _spot_view(spot: Spot, forbidden: bool) -> LaneView:
+    box = spot.box
+    half = box.length_m / 2.0
+    c, s = math.cos(box.heading_rad), math.sin(box.heading_rad)
+    ends = (box.x_m - c * half, box.y_m - s * half), (box.x_m + c * half, box.y_m + s * half)
+    return _view(spot.lane, ends, width=box.width_m, forbidden=forbidden)

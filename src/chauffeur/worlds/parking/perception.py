@@ -1,0 +1,117 @@
+"""Answers to questions about the present instant of a lot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from chauffeur.concept import LaneId, Snapshot, VehicleState
+from chauffeur.control import LAMPILOT_EGO
+from chauffeur.control.idm import idm_acceleration
+from chauffeur.control.pure_pursuit import Path
+from chauffeur.worlds.base import EGO
+from chauffeur.worlds.parking.lot import Lot
+
+
+class LaneMap:
+    """The lanes of a lot as paths, and which of them a place is in."""
+
+    def __init__(self, lot: Lot) -> None:
+        """Args: the lot."""
+        self.paths = {view.id: Path.of(view.centre_m) for view in lot.lanes}
+        self._spots = tuple(lot.spots.values())
+        self._ways: list[tuple[LaneId, Path, tuple[float, float, float, float]]] = []
+        for lane, path in self.paths.items():
+            if lane[1] not in lot.spots:
+                xs, ys = zip(*path.points_m, strict=True)
+                self._ways.append((lane, path, (min(xs), min(ys), max(xs), max(ys))))
+
+    def closest(self, x_m: float, y_m: float) -> LaneId:
+        """The spot a place is in, or else the drive, corner or aisle whose middle is nearest."""
+        for spot in self._spots:
+            if abs(spot.box.x_m - x_m) < spot.box.length_m and spot.box.holds(x_m, y_m):
+                return spot.lane
+        best, found = math.inf, self._ways[0][0]
+        for lane, path, (x0, y0, x1, y1) in self._ways:
+            if math.hypot(max(x0 - x_m, 0.0, x_m - x1), max(y0 - y_m, 0.0, y_m - y1)) >= best:
+                continue
+            pose = path.at(path.nearest(x_m, y_m, 0.0, path.length_m))
+            distance = math.dist((pose.x_m, pose.y_m), (x_m, y_m))
+            if distance < best:
+                best, found = distance, lane
+        return found
+
+
+class ParkingPerception:
+    """Perception of a lot; stays valid as it is stepped."""
+
+    def __init__(self, lot: Lot, lanes: LaneMap, now: Callable[[], Snapshot]) -> None:
+        """Args: the ground; its lanes; the present instant."""
+        self._lot = lot
+        self._lanes = lanes
+        self._now = now
+
+    def vehicle(self, vehicle_id: int) -> VehicleState:
+        """State of somebody. Raises KeyError for an id that is not, or no longer, there."""
+        snapshot = self._now()
+        if vehicle_id == EGO:
+            return snapshot.ego
+        for other in snapshot.others:
+            if other.id == vehicle_id:
+                return other
+        raise KeyError(vehicle_id)
+
+    def has_lane(self, lane: LaneId) -> bool:
+        """Whether the lot has this lane; each spot is one."""
+        return lane in self._lanes.paths
+
+    def lane_of(self, vehicle_id: int) -> LaneId:
+        """Closest lane."""
+        vehicle = self.vehicle(vehicle_id)
+        return vehicle.lane or self._lanes.closest(vehicle.x_m, vehicle.y_m)
+
+    def adjacent_lane(self, lane: LaneId, offset: int) -> LaneId | None:
+        """None: no lane of a lot has one beside it."""
+        del lane, offset
+
+    def speed_limit(self, lane: LaneId) -> float:
+        """Speed limit, m/s."""
+        return self._lot.lane(lane).speed_limit_mps
+
+    def neighbours(self, lane: LaneId) -> tuple[int | None, int | None]:
+        """Nearest ahead of and behind the ego in a lane."""
+        path, snapshot = self._lanes.paths[lane], self._now()
+        here = path.nearest(snapshot.ego.x_m, snapshot.ego.y_m)
+        placed = [(path.nearest(o.x_m, o.y_m) - here, o.id) for o in snapshot.others if o.lane == lane]
+        front = min((one for one in placed if one[0] > 0.0), default=None)
+        rear = max((one for one in placed if one[0] <= 0.0), default=None)
+        return None if front is None else front[1], None if rear is None else rear[1]
+
+    def distance_along(self, from_id: int, to_id: int) -> float:
+        """Signed centre-to-centre distance, m, along the first one's lane."""
+        one, two = self.vehicle(from_id), self.vehicle(to_id)
+        path = self._lanes.paths[self.lane_of(from_id)]
+        return path.nearest(two.x_m, two.y_m) - path.nearest(one.x_m, one.y_m)
+
+    def cross_traffic_lanes(self, from_left: bool) -> tuple[LaneId, ...]:
+        """Nothing: there is no intersection."""
+        del from_left
+        return ()
+
+    def stop_sign_ahead(self, served: frozenset[int]) -> tuple[int, float] | None:
+        """None: there is no stop sign."""
+        del served
+
+    def front_blocker(self, served: frozenset[int]) -> int | None:
+        """Nearest ahead on the ego's own lane."""
+        del served
+        return self.neighbours(self.lane_of(EGO))[0]
+
+    def idm_entering(self, follower_id: int, leader_id: int, time_headway_s: float) -> float:
+        """IDM acceleration, m/s2, of `follower` at its present speed if `leader` drove right ahead of it."""
+        follower, leader = self.vehicle(follower_id), self.vehicle(leader_id)
+        gap = math.dist((follower.x_m, follower.y_m), (leader.x_m, leader.y_m))
+        speed = follower.speed_mps
+        parameters = replace(LAMPILOT_EGO, time_headway_s=time_headway_s)
+        return idm_acceleration(speed, speed, parameters, gap, speed - leader.speed_mps)

@@ -1,0 +1,55 @@
+"""A wish driven as parameters from end to end: planned, checked, driven, judged, replayed, refused."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from chauffeur.cli.parts import referee_for
+from chauffeur.cli.replay import drive_again
+from chauffeur.concept import Instruction, Limits, Parameters
+from chauffeur.drive.recording import RecordedTrip
+from chauffeur.drive.scenarios import find
+from chauffeur.drive.session import Session
+from chauffeur.planners.base import Planner
+from chauffeur.planners.registry import make_planner
+
+
+@pytest.fixture(scope="module")
+def planner() -> Planner:
+    return make_planner("talk2drive")
+
+
+def driven(planner: Planner, wish: str, name: str) -> RecordedTrip:
+    scenario = find(name)
+    session = Session(planner, referee=referee_for)
+    return asyncio.run(session.drive(Instruction(wish), scenario, scenario.seed, Limits()))
+
+
+def test_a_spoken_spot_is_parked_in_and_the_trip_replays(planner: Planner) -> None:
+    recorded = driven(planner, "Park near the stadium.", "parking-stadium")
+    assert recorded.trip.outcome == "success"
+    assert isinstance(recorded.trip.plan.policy, Parameters)
+    again = drive_again(recorded)
+    assert again.trip == recorded.trip
+    assert again.frames == recorded.frames
+
+
+def test_a_speed_is_driven_on_a_highway(planner: Planner) -> None:
+    recorded = driven(planner, "Drive at 100 km/h.", "cruise")
+    assert recorded.trip.outcome == "success"
+    assert recorded.frames[-1].snapshot.ego.speed_mps == pytest.approx(27.8, abs=1.0)
+
+
+def test_a_spot_that_is_not_there_is_refused_before_the_car_moves(planner: Planner) -> None:
+    recorded = driven(planner, "Park in spot Z9.", "parking")
+    assert recorded.trip.outcome == "refused"
+    assert "Z9" in recorded.trip.causes.detail
+    assert recorded.frames == ()
+
+
+def test_a_turn_where_there_is_none_is_refused_by_the_checks(planner: Planner) -> None:
+    recorded = driven(planner, "Turn left.", "cruise")
+    assert recorded.trip.outcome == "refused"
+    assert recorded.frames == ()

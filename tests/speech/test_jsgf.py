@@ -1,0 +1,78 @@
+"""The grammar of what the offline engine hears: read rightly, and understood by the planner it is for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from chauffeur.concept import DataError
+from chauffeur.planners.onboard.meaning import NotUnderstood
+from chauffeur.planners.onboard.understand import understand
+from chauffeur.speech.grammar import SAFE_INTENTS
+from chauffeur.speech.jsgf import Grammar, driving_grammar
+
+HEAD = "#JSGF V1.0;\ngrammar test;\n"
+
+
+def test_options_groups_and_rules() -> None:
+    grammar = Grammar(HEAD + "public <a> = please (go | drive [very] <how>) [now]; // said\n<how> = fast | slow;")
+    for said in ("please go", "please drive fast", "please drive very slow now", "please  go now "):
+        assert grammar.matches("a", said)
+    for not_said in ("", "please", "go now", "please drive", "please go fast", "please gonow", "please go now now"):
+        assert not grammar.matches("a", not_said)
+    assert grammar.words() == {"please", "go", "drive", "very", "fast", "slow", "now"}
+    assert grammar.public == ("a",) and grammar.members("how") == () and grammar.members("a") == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("grammar test; public <a> = b;", "does not begin with #JSGF"),
+        ("#JSGF V1.0; public <a> = b;", "no grammar declaration"),
+        (HEAD + "public <a> = (b | c;", "does not close a bracket"),
+        (HEAD + "public <a> = b );", "does not close a bracket"),
+        (HEAD + "public <a> = b | ;", "empty alternative"),
+        (HEAD + "public <a> = [];", "empty alternative"),
+        (HEAD + "public <a> = /10/ b;", "'/', which is not read"),
+        (HEAD + "public <a> = b*;", "not read here"),
+        (HEAD + "public <a> = <b>;", "no rule <b>"),
+        (HEAD + "public <a> = b <a>;", "never ends"),
+        (HEAD + "nonsense;", "cannot read"),
+    ],
+)
+def test_what_is_not_read_is_refused_in_words(text: str, words: str) -> None:
+    with pytest.raises(DataError, match=words):
+        Grammar(text)
+
+
+def test_a_drawn_sentence_belongs_to_its_rule_and_to_no_safe_one() -> None:
+    grammar = driving_grammar()
+    rng = np.random.default_rng(3)
+    intents = grammar.members("wish")
+    assert len(intents) >= 15 and set(intents) > SAFE_INTENTS
+    for intent in intents:
+        for _ in range(40):
+            said = grammar.sample(intent, rng)
+            assert grammar.matches(intent, said) and grammar.matches("wish", said)
+            assert grammar.matches("open", f"command {said}") and grammar.matches("command", said)
+            assert not grammar.matches("open", said)
+            assert intent in SAFE_INTENTS or not any(grammar.matches(safe, said) for safe in SAFE_INTENTS), said
+
+
+def test_the_planner_understands_what_the_grammar_hears() -> None:
+    grammar = driving_grammar()
+    rng = np.random.default_rng(4)
+    said = [grammar.sample(intent, rng) for intent in grammar.members("wish") for _ in range(30)]
+    assert [one for one in said if isinstance(understand(one), NotUnderstood)] == []
+
+
+def test_the_safe_intents_mean_slower_and_stop() -> None:
+    grammar = driving_grammar()
+    rng = np.random.default_rng(5)
+    for _ in range(60):
+        slower = understand(grammar.sample("slower", rng))
+        assert not isinstance(slower, NotUnderstood)
+        assert all(step.manoeuvre == "speed" and step.change == -1 for step in slower.steps), slower
+        stop = understand(grammar.sample("stop", rng))
+        assert not isinstance(stop, NotUnderstood)
+        assert {step.manoeuvre for step in stop.steps} <= {"stop", "pull_over"}, stop
