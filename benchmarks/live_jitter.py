@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.orders import Event
+from chauffeur.drive.live.orders import Brief, Event
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Replaced, Role, Runtime
@@ -59,7 +59,7 @@ class Watch:
         if self._lost_at is None:
             self._lost_at = at_s
 
-    def __call__(self, heard: Event | Report | Replaced) -> None:
+    def __call__(self, heard: Event | Report | Brief | Replaced) -> None:
         if isinstance(heard, Event):
             self.events[heard.kind] += 1
         if not isinstance(heard, Report):

@@ -16,7 +16,7 @@ import pytest
 from chauffeur.concept import SandboxError
 from chauffeur.drive.live import supervisor
 from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.orders import Event
+from chauffeur.drive.live.orders import Brief, Event
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Replaced, Runtime
@@ -32,7 +32,7 @@ class Heard:
         self.events: list[Event] = []
         self.replaced: list[Replaced] = []
 
-    def __call__(self, heard: Event | Report | Replaced) -> None:
+    def __call__(self, heard: Event | Report | Brief | Replaced) -> None:
         match heard:
             case Report():
                 self.reports.append(heard)

@@ -5,8 +5,8 @@ pursuit; what the path is depends on the road: the middle of its lane, that of t
 way through the crossing, or the way onto a spot. It stops at stop signs, lets go first who crosses, and stands at the
 end of its path. The shield has the last word, and the command passes the one door (`drive/actuate.py`).
 
-The policy's `route` says where to go where ways part: a turn (`left`, `straight`, `right`), or a place in a lot (`nearest`,
-`stadium`, `exit`, or the name of a spot).
+The policy's `route` says where to go where ways part: a turn (`left`, `straight`, `right`), or a place in a lot
+(`nearest`, `stadium`, `exit`, or the name of a spot).
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ from chauffeur.concept import ConfigError, PersonId
 from chauffeur.drive.auditing import open_audit
 from chauffeur.drive.live.books import Books
 from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.orders import Event
+from chauffeur.drive.live.orders import Brief, Event
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.supervisor import Replaced, Role, Runtime
 from chauffeur.drive.session import parse_wish
@@ -79,10 +79,10 @@ class Host:
             del self._waiting[0]
             _say({"asked": runtime.ask(asked["ask"], asked["person"]), "of": asked["of"]})
 
-    def _hear(self, heard: Event | Report | Replaced) -> None:
+    def _hear(self, heard: Event | Report | Brief | Replaced) -> None:
         self._books.tell(heard)
         match heard:
-            case Report():
+            case Report() | Brief():
                 return
             case Event():
                 interaction = None if self._runtime is None else self._runtime.interactions.get(heard.wish)
