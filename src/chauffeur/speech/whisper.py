@@ -53,7 +53,7 @@ class WhisperRecogniser:
                 hint="Download one for faster-whisper (e.g. small.en, CTranslate2 format) and give its folder.",
             )
         try:
-            from faster_whisper import WhisperModel
+            from faster_whisper import WhisperModel  # pyright: ignore[reportMissingImports]
         except ImportError as error:
             raise MissingExtraError(
                 "Whisper needs faster-whisper.", hint="Run: pip install 'chauffeur[speech]'"
