@@ -28,7 +28,7 @@ def scenarios(
 
     from chauffeur.cli.console import plain, stdout
     from chauffeur.concept import ScenarioError
-    from chauffeur.drive.scenarios import DATA_VARIABLE, list_scenarios
+    from chauffeur.drive.scenarios import BUILT_IN, DATA_VARIABLE, list_scenarios
 
     console = stdout()
     wanted = find.casefold()
@@ -44,7 +44,7 @@ def scenarios(
     console.print(table)
     if len(shown) < len(found):
         console.print(f"... and {len(found) - len(shown)} more: add --all, or --find WORD.")
-    if data is None and not any(s.goal for s in found):
+    if data is None and all(scenario in BUILT_IN for scenario in found):
         console.print(
             f"LaMPilot's 490 samples: add --data DIR (its DbLv1 folder), or set {DATA_VARIABLE}.", style="dim"
         )

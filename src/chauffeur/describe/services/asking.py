@@ -36,7 +36,7 @@ class ServiceError(ChauffeurError):
         retry_after_s: How long the server asked to be left alone; None when it did not.
     """
 
-    def __init__(self, kind: FailureKind, message: str, *, retry_after_s: float | None = None) -> None:
+    def __init__(self, message: str, kind: FailureKind = "broken", *, retry_after_s: float | None = None) -> None:
         super().__init__(message, retryable=kind not in ("key", "refused"))
         self.kind: FailureKind = kind
         self.retry_after_s = retry_after_s
@@ -97,24 +97,24 @@ class Caller:
             raise
         except (TimeoutError, httpx.TimeoutException):
             message = f"the service did not answer within {self._patience_s:g} s"
-            failure = ServiceError("timeout", message)
+            failure = ServiceError(message, "timeout")
         except httpx.ConnectError:
-            failure = ServiceError("unreachable", "the service cannot be reached")
+            failure = ServiceError("the service cannot be reached", "unreachable")
         except (httpx.HTTPError, httpx.StreamError, OSError, ValueError, ssl.SSLError):
-            failure = ServiceError("broken", "the connection to the service broke")
+            failure = ServiceError("the connection to the service broke", "broken")
         # Raised outside of the handlers: what the client raised is no part of it.
         raise failure
 
     async def _body(self, response: httpx.Response) -> bytes:
         if response.headers.get("content-encoding", "identity").lower() not in ("", "identity"):
             # Not asked for; a small packed answer may unpack to any size.
-            raise ServiceError("garbage", "the answer of the service is packed")
+            raise ServiceError("the answer of the service is packed", "garbage")
         parts: list[bytes] = []
         room = self._max_bytes
         async for part in response.aiter_raw():
             room -= len(part)
             if room < 0:
-                raise ServiceError("garbage", "the answer of the service is too long")
+                raise ServiceError("the answer of the service is too long", "garbage")
             parts.append(part)
         return b"".join(parts)
 
@@ -122,12 +122,12 @@ class Caller:
         wait_s = retry_after_s(headers)
         if status in (401, 403):
             what = f"key in {self._key_variable}" if self._key_variable else "request"
-            return ServiceError("key", f"the service refused the {what} ({status})", retry_after_s=wait_s)
+            return ServiceError(f"the service refused the {what} ({status})", "key", retry_after_s=wait_s)
         if status == 429:
-            return ServiceError("busy", "the service takes no more requests for now (429)", retry_after_s=wait_s)
+            return ServiceError("the service takes no more requests for now (429)", "busy", retry_after_s=wait_s)
         if status >= 500:
-            return ServiceError("server", f"the service failed ({status})", retry_after_s=wait_s)
-        return ServiceError("refused", f"the service refused the request ({status})", retry_after_s=wait_s)
+            return ServiceError(f"the service failed ({status})", "server", retry_after_s=wait_s)
+        return ServiceError(f"the service refused the request ({status})", "refused", retry_after_s=wait_s)
 
     def _connect(self) -> httpx.AsyncClient:
         import httpx

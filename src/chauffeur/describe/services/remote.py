@@ -211,10 +211,10 @@ class Remote(Generic[T]):
             else:
                 self._failed(failure)
         except DataError as error:
-            self._failed(ServiceError("garbage", error.message))
+            self._failed(ServiceError(error.message, "garbage"))
         except Exception as error:  # noqa: BLE001 - whatever a service makes our own code do, the drive goes on
             # The type only: texts of exceptions may quote what the service sent.
-            self._failed(ServiceError("garbage", f"the answer cannot be read ({type(error).__name__})"))
+            self._failed(ServiceError(f"the answer cannot be read ({type(error).__name__})", "garbage"))
         else:
             self._failure, self._failures = None, 0
             now_s = self._clock()
