@@ -156,6 +156,7 @@ def test_numbers_carry_their_units() -> None:
     assert words.metric_name("lampilot-time-efficiency-v1") == "Time-efficiency score"
     assert words.metric_name("stop-compliance-v2") == "Stop compliance"
     assert "10.0 m/s (36 km/h)" in policy_words(Parameters(10.0, 5.0, 0.5))
+    assert "way: stadium" in policy_words(Parameters(3.0, 4.0, 1.0, route="stadium")), "what is shown is what is driven"
 
 
 def test_causes_and_feedback_in_words() -> None:

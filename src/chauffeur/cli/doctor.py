@@ -28,9 +28,12 @@ _PURPOSES = {
     "speech": "speaking to the car",
     "town": "the town world (SUMO)",
     "carla": "the CARLA world",
-    "ros": "ROS vehicles and recordings",
+    "map": "OpenStreetMap files",
+    "ros": "vehicles behind ROS",
     "chroma": "Chroma as the memory's store",
     "cluster": "benchmarks on a Ray cluster",
+    "inspect": "reports as Inspect AI logs",
+    "page": "pages that talk back",
 }
 _DEVELOPMENT = ("dev", "docs", "fuzz", "mutation", "oracle")
 _REQUIREMENT = re.compile(r"^\s*([A-Za-z0-9._-]+)")

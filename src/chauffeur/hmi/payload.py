@@ -109,6 +109,8 @@ def policy_words(policy: Policy | None) -> str:
         names = ("target_speed_mps", "look_ahead_m", "look_ahead_ratio")
         rows = [words.setting(name, float(getattr(policy, name))) for name in names]
         rows.append(("lane", {-1: "one to the left", 0: "stay", 1: "one to the right"}[policy.lane]))
+        if policy.route:
+            rows.append(("way", policy.route))
         return "\n".join(f"{label}: {value}" for label, value in rows)
     if isinstance(policy, ActionMatrix):
         pid, mpc = policy.pid, policy.mpc

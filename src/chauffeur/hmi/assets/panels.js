@@ -39,6 +39,7 @@ function fillUnderstood() {
 function fillProgram() {
   const box = $('program');
   if (!trip.program) {
+    if (trip.policy) $('policy-kind').textContent = 'Policy';
     box.append(trip.policy ? make('pre', trip.policy) : make('p', trip.refusal || 'There is no program.'));
     return [];
   }

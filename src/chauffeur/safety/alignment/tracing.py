@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Final
 
+from chauffeur.programs.extract import parse_quietly
 from chauffeur.programs.rewrite import main_function
 from chauffeur.safety.alignment.evaluating import Evaluating
 from chauffeur.safety.alignment.facts import Facts
@@ -27,11 +28,13 @@ def read_facts(source: str, library: str = "") -> Facts:
     """What a program does, as far as reading tells; never raises on bad programs. One read before is remembered."""
     if len(source) + len(library) > _MAX_CHARS:
         return Facts(readable=False)
+    helpers, program = parse_quietly(library), parse_quietly(source)
+    if helpers is None or program is None:
+        return Facts(readable=False)
     try:
-        trees = ast.parse(library), ast.parse(source)
-        main = main_function(trees[1])
-        return Facts(readable=False) if main is None else _Tracer(*trees).facts(main.name)
-    except (SyntaxError, ValueError, RecursionError, MemoryError, TooMuchError):
+        main = main_function(program)
+        return Facts(readable=False) if main is None else _Tracer(helpers, program).facts(main.name)
+    except (RecursionError, MemoryError, TooMuchError):
         return Facts(readable=False)
 
 
