@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from pathlib import Path
 
 import pytest
 from straight_road import LANES, StraightRoad
@@ -228,6 +229,8 @@ def test_a_stopped_worker_does_not_stop_the_host(road: StraightRoad) -> None:
         pid = executor.worker_pid
         assert pid is not None
         os.kill(pid, signal.SIGSTOP)
+        while Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "T":
+            time.sleep(0.001)  # it is sent, but not stopped yet: an answer may still come
         before = time.perf_counter()
         result = executor.tick()
         assert time.perf_counter() - before < 0.5
