@@ -206,6 +206,15 @@ def _type_and_interrupt(log: Path, answers: str) -> None:
     assert DECLINED in _until(process, ours, DECLINED), "what is typed is shown, as it was corrected"
     os.write(ours, b"\r")
     _until(process, ours, "A car cannot fly.")
+    for typed, answer in (
+        ("take over", "You have the wheel: faster, slower, left, right, brake, or give back."),
+        ("brake", "you drive"),
+        (WISH, "Not while you have the wheel"),
+        ("give back", "The car has the wheel."),
+        (WISH, "The lane is good."),
+    ):
+        os.write(ours, f"{typed}\r".encode())
+        assert answer in _until(process, ours, answer)
     process.send_signal(signal.SIGINT)
     shown = _until(process, ours, "audit head")
     assert "Stopped" in shown

@@ -6,13 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from chauffeur.concept import Wishes
+from chauffeur.concept.registry import load_plugin
 from chauffeur.drive.live.control import Control, Rings
-from chauffeur.drive.live.messages import Observation, Report, Wish
+from chauffeur.drive.live.messages import Hand, Key, Observation, Report, Wish
 from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.settings import SIZES, RingName
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
-from chauffeur.worlds.highway import HighwayWorld
+from chauffeur.worlds.base import MirroredWorld
 
 DT_NS = 100_000_000
 OVERTAKE = Start(find("overtake"), 3)
@@ -23,17 +24,28 @@ class Bench:
 
     def __init__(self, folder: Path, starts: tuple[Start, ...], speed: float = 1.0) -> None:
         self.now_ns = 1_000_000_000
-        names: tuple[RingName, ...] = ("wishes", "observations", "reports")
-        self.wishes, self.observations, self.reports = (Ring(folder / n, *SIZES[n], create=True) for n in names)
-        self.world = HighwayWorld()
+        names: tuple[RingName, ...] = ("wishes", "observations", "reports", "hand")
+        made = (Ring(folder / n, *SIZES[n], create=True) for n in names)
+        self.wishes, self.observations, self.reports, self.hand = made
+        self.starts = starts
+        self.world = self.new_world()
         self.control = Control(
             self.world,
             starts,
-            Rings(self.wishes, self.observations, self.reports),
+            Rings(self.wishes, self.observations, self.reports, self.hand),
             speed=speed,
             clock_ns=lambda: self.now_ns,
         )
         self.speed = speed
+
+    def new_world(self) -> MirroredWorld:
+        """Of the kind that is driven in."""
+        world: MirroredWorld = load_plugin("chauffeur.worlds", self.starts[0].scenario.world)()
+        return world
+
+    def take_over(self, on: bool, key: Key | None = None) -> None:
+        """The person takes the wheel, or gives it back, or presses a key."""
+        self.hand.write(Hand(on, key).encode(), self.now_ns)
 
     def tick(self) -> Report:
         self.now_ns += round(DT_NS / self.speed)

@@ -299,6 +299,18 @@ def test_interventions_replacements_and_rungs_are_told(books: Books, path: Path)
     assert outcome.body["periods_by_rung"] == {"follow": 3, "hold": 2, "keep": 2, "slow": 1, "stop": 1}
 
 
+def test_taking_over_is_told_and_counted(books: Books, path: Path) -> None:
+    for tick, taken in enumerate((False, True, True, False, True)):
+        books.tell(report(tick, "hand" if taken else "follow", taken_over=taken))
+    books.end("ended", None, 0)
+    books.close()
+    notes = [record.body for record in records(path, "context") if record.body.get("event") == "taken_over"]
+    assert [(note["on"], note["tick"]) for note in notes] == [(True, 1), (False, 3), (True, 4)]
+    (outcome,) = records(path, "outcome")
+    assert (outcome.body["takeovers"], outcome.body["periods_by_rung"]) == (2, {"follow": 2, "hand": 3})
+    assert verify(path).ok
+
+
 def test_a_drive_that_breaks_off_says_so(path: Path) -> None:
     with pytest.raises(RuntimeError), Books(open_audit(path, SCENARIO, 3), DT_S) as books:
         books.tell(report(0))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Any
+from typing import Any, get_args
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chauffeur.concept import Command, Intervention, Wishes
-from chauffeur.drive.live.messages import MessageError, Observation, Report, Wish
+from chauffeur.concept import Command, Intervention, Parameters, Wishes
+from chauffeur.drive.live.messages import Hand, Key, MessageError, Observation, Report, Steered, Wish
 
 WISH = Wish(
     trip=1,
@@ -22,6 +22,8 @@ WISH = Wish(
     state="running",
     line=3,
     wishes=Wishes(25.0, 1.5, ("a", "b", 1), "left", frozenset({4, 2})),
+    steered=Steered(Parameters(20.0, 8.0, 1.5, -1, "left"), ("a", "b", 1)),
+    hands=2,
 )
 
 
@@ -66,6 +68,11 @@ def test_a_wish_comes_back_as_it_was() -> None:
         ("served", ["1"], "bad stops"),
         ("served", [True], "bad stops"),
         ("served", list(range(65)), "bad stops"),
+        ("hands", -1, "bad hands"),
+        ("hands", None, "bad hands"),
+        ("parameters", [], "bad parameters"),
+        ("parameters", "left", "bad parameters"),
+        ("parameters", {}, "bad lane wish"),
     ],
 )
 def test_each_field_must_be_of_its_kind(name: str, value: Any, why: str) -> None:
@@ -73,15 +80,85 @@ def test_each_field_must_be_of_its_kind(name: str, value: Any, why: str) -> None
         Wish.decode(json.dumps(fields() | {name: value}).encode())
 
 
-@pytest.mark.parametrize("name", sorted(set(fields()) - {"speed", "lane", "turn", "line"}))
+@pytest.mark.parametrize(
+    ("name", "value", "why"),
+    [
+        ("speed", math.nan, "bad speed"),
+        ("speed", None, "bad speed"),
+        ("speed", -0.1, "speed out of range"),
+        ("speed", 100.1, "speed out of range"),
+        ("ahead", math.inf, "bad ahead"),
+        ("ahead", "12", "bad ahead"),
+        ("ahead", 10_001, "ahead out of range"),
+        ("ratio", -1, "ratio out of range"),
+        ("ratio", 10**400, "ratio out of range"),
+        ("ratio", True, "bad ratio"),
+        ("lane", 2, "bad lane wish"),
+        ("lane", 1.0, "bad lane wish"),
+        ("lane", True, "bad lane wish"),
+        ("lane", "left", "bad lane wish"),
+        ("route", None, "bad route"),
+        ("route", ["B4"], "bad route"),
+        ("route", "x" * 65, "bad route"),
+        ("origin", ["a", "b"], "bad lane"),
+        ("origin", 5, "bad lane"),
+    ],
+)
+def test_each_of_the_parameters_must_be_of_its_kind(name: str, value: Any, why: str) -> None:
+    bad = fields()["parameters"] | {name: value}
+    with pytest.raises(MessageError, match=f"^{why}$"):
+        Wish.decode(json.dumps(fields() | {"parameters": bad}).encode())
+
+
+@pytest.mark.parametrize("name", sorted(set(fields()["parameters"]) - {"origin"}))
+def test_none_of_the_parameters_may_be_missing(name: str) -> None:
+    short = {key: value for key, value in fields()["parameters"].items() if key != name}
+    with pytest.raises(MessageError):
+        Wish.decode(json.dumps(fields() | {"parameters": short}).encode())
+
+
+@settings(deadline=None)
+@given(
+    st.floats(0.0, 100.0), st.floats(0.0, 1e4), st.floats(0.0, 1e3), st.sampled_from([-1, 0, 1]), st.text(max_size=64)
+)
+def test_parameters_come_back_as_they_were(speed: float, ahead: float, ratio: float, lane: Any, route: str) -> None:
+    steered = Steered(Parameters(speed, ahead, ratio, lane, route), None)
+    assert Steered.read(json.loads(json.dumps(steered.fields()))) == steered
+
+
+@pytest.mark.parametrize("hand", [Hand(True), Hand(False), *(Hand(True, key) for key in get_args(Key))], ids=str)
+def test_what_the_hand_does_comes_back(hand: Hand) -> None:
+    assert Hand.decode(hand.encode()) == hand
+
+
+@pytest.mark.parametrize(
+    ("payload", "why"),
+    [
+        (b"", "no hand"),
+        (b"HAND", "no hand"),
+        (b"HEAD" + bytes(9), "no hand"),
+        (b"HAND\x02" + bytes(8), "no hand"),
+        (b"HAND\x01" + bytes(9), "no hand"),
+        (b"HAND\x01faster!!", "no key"),
+        (b"HAND\x01\0faster\0", "no key"),
+        (b"HAND\x01\xff\xfe" + bytes(6), "no key"),
+    ],
+)
+def test_what_is_no_hand_is_refused(payload: bytes, why: str) -> None:
+    with pytest.raises(MessageError, match=f"^{why}$"):
+        Hand.decode(payload)
+
+
+@pytest.mark.parametrize("name", sorted(set(fields()) - {"speed", "lane", "turn", "line", "parameters"}))
 def test_a_missing_field_is_none(name: str) -> None:
     with pytest.raises(MessageError):
         Wish.decode(json.dumps({k: v for k, v in fields().items() if k != name}).encode())
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=400))
 def test_no_bytes_do_more_than_be_refused(payload: bytes) -> None:
-    for kind in (Wish, Observation):
+    for kind in (Wish, Observation, Hand):
         try:
             kind.decode(payload)
         except MessageError:
@@ -95,7 +172,7 @@ def test_what_is_no_object_is_no_wish(payload: bytes) -> None:
 
 
 def test_an_observation_comes_back_and_a_short_one_is_none() -> None:
-    shown = Observation(3, 99, b"world")
+    shown = Observation(3, 99, b"world", 5)
     assert Observation.decode(shown.encode()) == shown
     with pytest.raises(MessageError, match="too short"):
         Observation.decode(b"0123456789")
@@ -107,6 +184,7 @@ def test_a_report_comes_back_as_it_was() -> None:
         trip=1, tick=2, late_ns=3, rung="hold", plan="w1", state="running", line=None, age_s=0.5,
         wishes=WISH.wishes, requested=before, applied=after,
         interventions=(Intervention("gap", "Too close.", before, after),), clipped=("target_speed",),
-        refused={"not JSON": 2}, missed=1, faults=0, speed_mps=20.0, lane=("a", "b", 0),
+        refused={"not JSON": 2}, missed=1, faults=0, speed_mps=20.0, lane=("a", "b", 0), taken_over=True,
+        said=("Changing to the left lane.",),
     )  # fmt: skip
     assert Report.decode(report.encode()) == report

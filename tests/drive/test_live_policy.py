@@ -7,19 +7,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from live_bench import OVERTAKE, Bench
+from live_bench import OVERTAKE
+from live_rig import Rig
 
-from chauffeur.concept import Plan, Program, Thoughts
-from chauffeur.drive.live.messages import Observation, Wish
-from chauffeur.drive.live.mirror import Mirror
-from chauffeur.drive.live.orders import Event, Order, Scene, encode, read_event
-from chauffeur.drive.live.policy import MOST_RESUMPTIONS, Policy, PolicyRings
-from chauffeur.drive.live.ring import Reader, Ring
-from chauffeur.drive.live.settings import SIZES, RingName
+from chauffeur.concept import Plan, Thoughts
+from chauffeur.drive.live.messages import Wish
+from chauffeur.drive.live.orders import Scene
+from chauffeur.drive.live.policy import MOST_RESUMPTIONS
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
 from chauffeur.programs import UNHURRIED, Sandbox
-from chauffeur.worlds.highway import HighwayWorld
 
 HOLD_20 = """
 def drive():
@@ -56,55 +53,6 @@ def drive():
     y = x[3]
     yield autopilot()
 """
-
-
-class Rig:
-    """Control and policy side by side, period by period."""
-
-    def __init__(self, folder: Path, sandbox: Sandbox, starts: tuple[Start, ...] = (OVERTAKE,)) -> None:
-        self.bench = Bench(folder, starts)
-        names: tuple[RingName, ...] = ("orders", "policy_events", "checkpoints")
-        orders, events, checkpoints = (Ring(folder / name, *SIZES[name], create=True) for name in names)
-        self.orders, self.events = orders, events
-        self.rings = PolicyRings(orders, self.bench.wishes, events, checkpoints)
-        self.starts, self.sandbox = starts, sandbox
-        self.policy = self.new_policy()
-        self.bench.control.begin_trip()
-        self._heard = Reader(self.events, old=True)
-
-    def new_policy(self) -> Policy:
-        mirror = Mirror(HighwayWorld(), self.starts, self.bench.observations)
-        return Policy(mirror, self.rings, self.sandbox, clock_ns=lambda: self.bench.now_ns)
-
-    def period(self, count: int = 1) -> Wish:
-        """Let both run; the policy's last wish."""
-        for _ in range(count):
-            self.policy.tick()
-            self.bench.tick()
-        message = self.bench.wishes.latest()
-        assert message is not None
-        return Wish.decode(message.payload)
-
-    def order(self, source: str, wish: str = "w1", **changes: object) -> None:
-        snapshot = self.bench.world.snapshot()
-        message = self.bench.observations.latest()
-        assert message is not None
-        seen = Observation.decode(message.payload)
-        made = Order(
-            wish,
-            Plan(Thoughts("As you wish."), Program(source)),
-            Scene.of(seen.trip, snapshot),
-            self.bench.now_ns,
-            self.bench.now_ns + 10**10,
-            self.bench.now_ns + 10**12,
-        )
-        self.orders.write(encode(replace(made, **changes)))  # pyright: ignore[reportArgumentType]
-
-    def told(self) -> list[Event]:
-        return [read_event(message.payload) for message in self._heard.news()[0]]
-
-    def kinds(self) -> list[tuple[str, str]]:
-        return [(event.kind, event.wish) for event in self.told()]
 
 
 @pytest.fixture(scope="module")
@@ -158,6 +106,27 @@ def test_a_new_plan_takes_over_at_the_beginning_of_a_period_with_the_wishes_of_t
     wish = rig.period()
     assert (wish.plan, wish.wishes.target_speed_mps, wish.wishes.time_headway_s) == ("w2", 31.0, 2.0)
     assert rig.kinds() == [("started", "w1"), ("superseded", "w1"), ("started", "w2")]
+
+
+def test_a_plan_begins_without_waiting_for_the_next_instant(rig: Rig) -> None:
+    rig.period(2)
+    assert rig.policy.tick()
+    assert not rig.policy.tick()  # nothing new was shown
+    rig.order(HOLD_20)
+    assert rig.policy.tick()
+    message = rig.bench.wishes.latest()
+    assert message is not None
+    assert Wish.decode(message.payload).plan == "w1"
+    assert not rig.policy.tick()
+
+
+def test_between_instants_no_plan_begins_on_a_picture_that_is_old(rig: Rig) -> None:
+    rig.period(2)
+    assert rig.policy.tick()
+    rig.order(HOLD_20)
+    rig.bench.now_ns += 200_000_000
+    assert not rig.policy.tick()
+    assert rig.kinds() == []
 
 
 @pytest.mark.parametrize(

@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
-from chauffeur.concept import Command, History, Instruction, Outcome, PersonId, Plan, Program, Thoughts, Wishes
+from chauffeur.concept import (
+    Command,
+    Feedback,
+    History,
+    Instruction,
+    Outcome,
+    Parameters,
+    PersonId,
+    Plan,
+    Program,
+    Thoughts,
+    Wishes,
+)
 from chauffeur.describe import describe
 from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.orders import Brief, Event, EventKind, Request
+from chauffeur.drive.live.orders import TOOK_OVER, Brief, Event, EventKind, Request
 from chauffeur.drive.live.remembering import trip_of
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Interaction
 from chauffeur.drive.scenarios import find
+from chauffeur.memory.vault import VaultMemory
 from chauffeur.worlds.highway import HighwayWorld
 
 DT_S = 0.1
@@ -64,8 +78,28 @@ def test_how_a_wish_ended_is_how_its_trip_ended(
     assert (trip.causes.refused, trip.causes.policy_failed) == (outcome == "refused", outcome == "failure")
     assert trip.causes.detail == ("Why." if outcome in ("refused", "failure") else "")
     assert dict(trip.record)["live"] is True
+    assert "taken_over" not in dict(trip.record)
     if begun is not None:
         assert trip.said == ((pytest.approx(1.5), "Now."),)
+
+
+def test_parameters_are_remembered_and_recalled_with_what_was_said_of_them(brief: Brief, tmp_path: Path) -> None:
+    plan = Plan(Thoughts("I park."), Parameters(3.0, 5.0, 1.0, route="B4"), planner="talk2drive", intent="park")
+    trip = trip_of(closed(replace(brief, plan=plan), "finished", begun=10, at=60), START, DT_S, report(60))
+    assert trip is not None
+    assert trip.plan == plan
+    memory = VaultMemory(tmp_path)
+    memory.remember(trip, None)
+    assert memory.attach_feedback(PersonId("ana"), Feedback("Too slow.", speed=1, strength=0.6))
+    (item,) = memory.recall(PersonId("ana"), brief.instruction, brief.context, 3).items
+    assert "B4" in item.policy
+    assert [feedback.text for feedback in item.feedback] == ["Too slow."]
+
+
+def test_that_the_person_took_over_is_kept_with_the_trip(brief: Brief) -> None:
+    trip = trip_of(closed(brief, "interrupted", begun=10, at=60, text=TOOK_OVER), START, DT_S, report(60))
+    assert trip is not None
+    assert (trip.outcome, dict(trip.record)["taken_over"]) == ("ended", True)
 
 
 @pytest.mark.parametrize("kind", ["finished", "superseded", "interrupted", "failed"])

@@ -15,9 +15,10 @@ import pytest
 
 from chauffeur.concept import SandboxError
 from chauffeur.drive.live import supervisor
-from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.orders import Brief, Event
-from chauffeur.drive.live.settings import Settings
+from chauffeur.drive.live.messages import Hand, Report
+from chauffeur.drive.live.orders import TOOK_OVER, Brief, Event
+from chauffeur.drive.live.remembering import trip_of
+from chauffeur.drive.live.settings import Settings, ring
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Replaced, Runtime
 from chauffeur.drive.scenarios import find
@@ -92,6 +93,92 @@ def test_a_wish_is_driven_while_every_other_process_is_killed(tmp_path: Path) ->
     assert not any(Path(f"/proc/{pid}/cmdline").exists() for pid in pids)
 
 
+PARKS = "Park near the stadium."
+SLOWER = "Slow down to 20 m/s."
+
+
+@pytest.fixture(scope="module")
+def parameters(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Specification of a planner that answers with parameters."""
+    policies = {
+        PARKS: {"target_speed_mps": 3.5, "look_ahead_m": 5.0, "look_ahead_ratio": 1.0, "route": "stadium"},
+        SLOWER: {"target_speed_mps": 20.0, "look_ahead_m": 12.0, "look_ahead_ratio": 1.0},
+    }
+    plans = {
+        words: {"thoughts": {"text": "Yes."}, "policy": policy | {"kind": "parameters"}}
+        for words, policy in policies.items()
+    }
+    path = tmp_path_factory.mktemp("parameters") / "answers.jsonl"
+    path.write_text(
+        "\n".join(json.dumps({"version": 1, "instruction": words, "plan": plan}) for words, plan in plans.items())
+    )
+    return f"replay/{path}"
+
+
+def test_a_car_parks_in_real_time_although_the_policy_dies_on_the_way(parameters: str) -> None:
+    heard = Heard()
+    start = Start(find("parking-stadium"), 8, most_s=150.0)
+    settings = Settings((start,), planner=parameters, speed=8.0, realtime=False)
+    with Runtime(settings, heard) as runtime:
+        wish = runtime.ask(PARKS)
+        until(runtime, lambda: bool(heard.reports) and heard.reports[-1].plan == wish)
+        os.kill(runtime.pid("policy"), signal.SIGKILL)
+        until(runtime, lambda: runtime.interactions[wish].answer is not None)
+        answer = runtime.interactions[wish].answer
+        assert answer is not None
+        assert (answer.kind, answer.text.startswith("Parked in ")) == ("finished", True)
+        assert any(event.kind == "resumed" for event in heard.events)
+    last = heard.reports[-1]
+    assert (last.outcome, last.faults, last.refused) == ("stopped", 0, {})
+    assert last.speed_mps < 0.1
+
+
+def test_a_person_takes_the_wheel_and_gives_it_back(parameters: str) -> None:
+    heard = Heard()
+    with Runtime(Settings(STARTS, planner=parameters, realtime=False), heard) as runtime:
+        wish = runtime.ask(SLOWER)
+        runtime.hand("brake")  # of somebody who does not have the wheel
+        runtime.take_over(True)
+        early = runtime.interactions[wish].answer
+        assert early is not None
+        assert (early.kind, early.text) == ("interrupted", TOOK_OVER), "what has no plan yet ends as well"
+        until(runtime, lambda: bool(heard.reports) and heard.reports[-1].taken_over)
+        assert heard.reports[-1].wishes.target_speed_mps != 0.0
+        runtime.take_over(False)
+        until(runtime, lambda: heard.reports[-1].rung == "follow")
+        assert heard.reports[-1].plan == ""
+
+        first = runtime.ask(SLOWER)
+        until(runtime, lambda: following(heard, first))
+        runtime.take_over(True)
+        runtime.take_over(True)
+        assert runtime.taken_over
+        until(runtime, lambda: heard.reports[-1].taken_over and runtime.interactions[first].answer is not None)
+        interaction = runtime.interactions[first]
+        assert interaction.taken_over
+        assert interaction.answer in heard.events
+        runtime.hand("brake")
+        until(runtime, lambda: heard.reports[-1].wishes.target_speed_mps == 0.0)
+        asked = runtime.ask(SLOWER)
+        until(runtime, lambda: runtime.interactions[asked].answer is not None)
+        answer = runtime.interactions[asked].answer
+        assert answer is not None
+        assert (answer.kind, answer.text) == ("interrupted", "You have the wheel.")
+        runtime.take_over(False)
+        until(runtime, lambda: not heard.reports[-1].taken_over)
+        again = runtime.ask(SLOWER)
+        until(runtime, lambda: following(heard, again))
+        with ring(runtime.folder, "hand") as other:
+            other.write(Hand(True).encode())  # of nobody: the supervisor, who knows better, says so
+        until(runtime, lambda: heard.reports[-1].taken_over)
+        until(runtime, lambda: not heard.reports[-1].taken_over)
+    assert {report.rung for report in heard.reports if report.taken_over} == {"hand"}
+    assert heard.reports[-1].faults == 0
+    trip = trip_of(interaction, STARTS[0], 0.1, heard.reports[-1])
+    assert trip is not None
+    assert dict(trip.record)["taken_over"] is True
+
+
 def test_a_policy_that_hangs_is_replaced_and_control_does_not_wait_for_it() -> None:
     heard = Heard()
     with Runtime(SETTINGS, heard) as runtime:
@@ -128,7 +215,7 @@ def test_a_planner_that_cannot_be_had_is_said_and_leaves_nothing_behind(tmp_path
 _SUPERVISOR = """
 import sys, time
 from pathlib import Path
-from chauffeur.drive.live.settings import Settings
+from chauffeur.drive.live.settings import Settings, ring
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Runtime
 from chauffeur.drive.scenarios import find

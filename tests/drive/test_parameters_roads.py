@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from chauffeur.concept import Parameters, Scenario, ScenarioError
@@ -165,6 +165,7 @@ numbers = st.one_of(st.floats(), st.floats(0.0, 80.0), st.sampled_from([0.0, -1.
 
 
 @given(numbers, numbers, numbers, st.sampled_from([-1, 0, 1]), st.sampled_from([*NAMED]))
+@example(0.5, 0.0, 0.0, -1, "intersection")
 @settings(max_examples=10, deadline=None)
 def test_no_parameters_are_a_danger(speed: float, ahead: float, ratio: float, lane: int, name: str) -> None:
     episode = drive_parameters(

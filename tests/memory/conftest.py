@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from memory_trips import Clock, context
 
 from chauffeur.concept import Instruction, PersonId
-from chauffeur.memory import VaultMemory
+from chauffeur.memory import VaultMemory, cipher
 
 
 @pytest.fixture
@@ -20,6 +21,15 @@ def clock() -> Clock:
 @pytest.fixture(autouse=True)
 def _no_passphrase(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("CHAUFFEUR_PASSPHRASE", raising=False)
+
+
+@pytest.fixture(scope="module")
+def unsynced() -> Iterator[None]:
+    """Files are not synced to the disk: many of them, and no power is cut."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cipher, "_PRAGMAS", tuple(one.replace("FULL", "OFF") for one in cipher._PRAGMAS))
+        patch.setattr(os, "fsync", lambda descriptor: None)
+        yield
 
 
 @pytest.fixture

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime, timedelta
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.memory.retrieval import Entry, rank
 from chauffeur.memory.similarity import DIMENSIONS, encode, likeness, mark, tags_of
-
-NOW = datetime(2026, 3, 1, tzinfo=UTC)
 
 
 def like(a: str, b: str) -> float:
@@ -93,39 +88,3 @@ def test_any_text_can_be_encoded(text: str) -> None:
     vector = encode(text)
     assert np.isfinite(vector).all()
     assert np.array_equal(vector, encode(text))
-
-
-def entry(row: int, text: str, *, days: float = 1.0, world: str = "highway", judged: bool = False) -> Entry:
-    return Entry(row, mark(text), world, NOW - timedelta(days=days), judged)
-
-
-def rows(entries: list[Entry], k: int = 2, text: str = "drive faster") -> list[int]:
-    return [row for row, _ in rank(mark(text), "highway", NOW, entries, k)]
-
-
-def test_recent_and_same_world_come_first() -> None:
-    assert rows([entry(1, "drive faster", days=90), entry(2, "drive faster", days=1)]) == [2, 1]
-    assert rows([entry(1, "drive faster"), entry(2, "drive faster", world="intersection")]) == [1, 2]
-    assert rows([entry(1, "drive faster", days=-5)]) == [1]
-
-
-def test_unrelated_and_opposite_wishes_are_left_out() -> None:
-    assert rows([entry(1, "drive slower"), entry(2, "play some music")]) == []
-
-
-def test_the_latest_verdict_is_always_among_the_chosen() -> None:
-    entries = [entry(1, "drive faster"), entry(2, "drive faster"), entry(3, "please hurry up a bit", judged=True)]
-    assert rows(entries) == [2, 3]
-    entries.append(entry(4, "drive faster", judged=True))
-    assert rows(entries) == [4, 2]
-
-
-def test_nothing_asked_nothing_found() -> None:
-    assert rows([], 3) == []
-    assert rows([entry(1, "drive faster")], 0) == []
-    assert rows([entry(1, "drive faster")], -1) == []
-
-
-def test_similarity_stays_between_0_and_1() -> None:
-    ((_, similarity),) = rank(mark("drive faster"), "highway", NOW, [entry(1, "drive faster", days=0)], 1)
-    assert similarity == pytest.approx(1.0)

@@ -241,7 +241,7 @@ def test_indexes_of_many_people_do_not_pile_up(vault: VaultMemory, wishes: Wishe
     for number in range(12):
         vault.remember(trip(f"p{number}", "drive faster"))
         assert wishes(vault, f"p{number}") == ["drive faster"]
-    assert len(vault._indexes) == 8
+    assert len(vault._opened) == 8
 
 
 def test_vectors_of_another_encoder_are_made_anew(
@@ -290,3 +290,15 @@ def test_any_unicode_goes_there_and_back(
 def test_importing_memory_brings_no_heavy_library() -> None:
     code = "import sys, chauffeur.memory; print([m for m in ('torch', 'openai', 'highway_env') if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_the_latest_judged_trips_of_a_kind_of_world_whatever_was_wished(tmp_path: Path) -> None:
+    vault = VaultMemory(tmp_path, clock=Clock())
+    for number, wish in enumerate(("drive faster", "keep more distance", "park near the exit", "overtake")):
+        vault.remember(trip("Ann", wish, id=f"t{number}"), Feedback("too fast", speed=-1) if number != 3 else None)
+    found = vault.latest(PersonId("Ann"), "highway", 2)
+    assert [item.trip_id for item in found.items] == ["t2", "t1"]
+    assert {item.similarity for item in found.items} == {-1.0}
+    assert vault.latest(PersonId("Ann"), "parking", 2).items == ()
+    assert vault.latest(PersonId("Ben"), "highway", 2).items == ()
+    assert vault.latest(PersonId("Ann"), "highway", 0).items == ()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from chauffeur.language import read_quantities
-from chauffeur.models.onboard.noise import SAFE_SLIPS, noisy, protected, said_in_full
+from chauffeur.models.onboard.noise import SAFE_SLIPS, noisy, protected, reworded, said_in_full
 from chauffeur.models.onboard.words import utter, wordings
 
 SLOTS = {
@@ -81,6 +81,71 @@ def test_protected(word: str) -> None:
 @pytest.mark.parametrize("word", ["lane", "please", "brake", "gap", "overtake", "truck"])
 def test_open(word: str) -> None:
     assert not protected(word)
+
+
+UNCHANGED = re.compile(
+    r"\b(?:left|right(?! now)|straight(?! away)|not|don't|never|no|neither|nothing|isn't|can't|won't|up to|"
+    r"at least|at most|between|before|after|until|if(?! you)|unless|when|\d+(?:\.\d+)?|sixty-five|twice|two)\b",
+    re.IGNORECASE,
+)
+
+
+def test_other_words_change_no_side_no_number_no_condition_and_no_denial() -> None:
+    rng = np.random.default_rng(5)
+    changed = 0
+    for section in wordings().sections():
+        for _ in range(25):
+            text = utter(section, SLOTS | {"c": "stop"}, rng, None).text
+            other = reworded(text, rng)
+            changed += other != text
+            assert UNCHANGED.findall(other) == UNCHANGED.findall(text), (text, other)
+            before, after = (
+                [(q.dimension, q.value) for q in read_quantities(said) if q.dimension != "bare"]
+                for said in (text, other)
+            )
+            assert after == before, (text, other)
+    assert changed > 500
+
+
+UP = (
+    r"faster|quick|speedier|speed up|rapidly|swifter|accelerate|(?:more|gain|up) speed|raise|increase|boost|lift|"
+    r"step up|jack|heighten"
+)
+DOWN = r"slow|less|reduce|lose speed|decelerate|lower|slacken|decrease|cut|drop|diminish|curb|trim"
+
+
+@pytest.mark.parametrize(
+    ("text", "stays", "never"),
+    [
+        ("Could you go faster?", UP, DOWN),
+        ("Please speed up.", UP, DOWN),
+        ("Slow down, please.", DOWN, r"faster|quicker|accelerate|raise|gain"),
+        ("I'd like to go slower", DOWN, r"faster|quicker|accelerate|raise|gain"),
+        ("Increase the gap to the truck", r"increase|widen|extend|enlarge|stretch|lengthen|expand", r"reduce|narrow"),
+        ("Reduce our distance.", r"reduce|decrease|shorten|shrink|tighten|narrow", r"increase|widen|lengthen"),
+        ("Go much closer to him", r"closer|nearer", r"further|farther|back"),
+        ("Stay further back.", r"further|farther|more distant", r"closer|nearer"),
+    ],
+)
+def test_other_words_keep_the_direction(text: str, stays: str, never: str) -> None:
+    rng = np.random.default_rng(6)
+    said = {reworded(text, rng) for _ in range(200)}
+    assert len(said) > 2
+    for other in said:
+        assert re.search(stays, other, re.IGNORECASE), other
+        assert not re.search(never, other, re.IGNORECASE), other
+
+
+def test_small_amounts_stay_small_and_great_ones_great() -> None:
+    rng = np.random.default_rng(7)
+    small = {reworded("a bit faster", rng) for _ in range(300)}
+    great = {reworded("much faster", rng) for _ in range(300)}
+    assert len(small) > 8 < len(great)
+    assert not small & great
+    assert not any(re.search(r"\b(?:much|way|far|lot|hugely|oceans)\b", text) for text in small)
+    assert not any(re.search(r"\b(?:bit|tad|slightly|little|speck)\b", text) for text in great)
+    assert reworded("not much faster", rng).startswith("not much")
+    assert "car lengths" in reworded("two car lengths behind the car", np.random.default_rng(1))
 
 
 def test_noise_repeats_with_the_seed() -> None:

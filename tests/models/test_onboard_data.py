@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from chauffeur.concept import DataError
+from chauffeur.models.onboard import examples
 from chauffeur.models.onboard.cases import Case, case_of, make_case
 from chauffeur.models.onboard.engine import distinct, gathered, make_cases, masked, worded
 from chauffeur.models.onboard.examples import questions, reasons
@@ -57,6 +60,21 @@ def test_tests_share_neither_scenes_nor_held_out_words_with_training(cases: list
     assert not any(masked(example.wish) in known for example in splits.unseen)
 
 
+def test_only_training_is_said_with_other_words_reasons_and_talk(
+    cases: list[Case], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def wishes(shares: float) -> tuple[list[str], list[str]]:
+        for name in ("REWORDED_SHARE", "CHATTER_SHARE", "REASON_SHARE"):
+            monkeypatch.setattr(examples, name, shares)
+        splits = worded(cases[:30], 0, per_case=4)
+        return [e.wish for e in splits.train], [e.wish for e in splits.seen + splits.unseen]
+
+    plain, tests = wishes(0.0)
+    wide, same_tests = wishes(1.0)
+    assert same_tests == tests
+    assert sum(map(len, wide)) > 1.5 * sum(map(len, plain))
+
+
 def test_near_duplicates_are_left_out(cases: list[Case]) -> None:
     some = worded(cases[:3], 0, per_case=3).train
     assert len(distinct(some + some)) == len(distinct(some))
@@ -103,3 +121,18 @@ def test_the_data_set_is_built_packed_and_described(tmp_path: Path) -> None:
     assert np.all(packed.replies < np.diff(packed.starts))
     card = (data / "DATA_CARD.md").read_text()
     assert f"{facts['examples']['train']:,} examples" in card
+
+
+def test_data_for_a_finished_network_are_read_with_its_tokenizer(tmp_path: Path) -> None:
+    pytest.importorskip("tokenizers", reason="tokenizers is not installed (extra: models)")
+    first, second = tmp_path / "first", tmp_path / "second"
+    build_data(first, Plan(seed=3, draws=100, per_case=2), 1, lambda stage, done, of: None)
+    second.mkdir()
+    (second / "cases.jsonl").write_bytes((first / "cases.jsonl").read_bytes())
+    build_data(second, Plan(seed=3, draws=100, per_case=3, base=first), 1, lambda stage, done, of: None)
+    known, kept = ((folder / "data" / "tokenizer.json").read_bytes() for folder in (first, second))
+    assert kept == known
+    plan = json.loads((second / "data" / "data.json").read_text())["plan"]
+    assert plan["tokenizer"] == hashlib.sha256(known).hexdigest()
+    with pytest.raises(DataError, match="cannot be read"):
+        build_data(tmp_path / "third", Plan(draws=100, base=tmp_path / "nothing"), 1, lambda stage, done, of: None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from dataclasses import asdict, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -22,8 +23,19 @@ from chauffeur.describe import describe
 from chauffeur.models.onboard.examples import questions, reasons
 from chauffeur.models.onboard.export import Stepped, export, export_transformers
 from chauffeur.models.onboard.packed import Packed
+from chauffeur.models.onboard.pipeline import model_card
 from chauffeur.models.onboard.tokens import blanks_of, train_tokenizer
-from chauffeur.models.onboard.training import SIZES, Recipe, blank, collate, evaluate_loss, network, rate_at, train
+from chauffeur.models.onboard.training import (
+    SIZES,
+    Recipe,
+    blank,
+    collate,
+    evaluate_loss,
+    finished,
+    network,
+    rate_at,
+    train,
+)
 from chauffeur.planners.onboard.dialect import Number, Step, read
 from chauffeur.planners.onboard.engine import Engine
 from chauffeur.planners.onboard.hot import HotPlanner
@@ -117,6 +129,52 @@ def test_a_second_round_goes_on_from_a_finished_first_one(data: Packed, tokenize
     whole = trained(data, tokenizer, tmp_path / "whole", 12, more=6)
     for a, b in zip(gone_on.parameters(), whole.parameters(), strict=True):
         assert torch.equal(a, b)
+
+
+def test_a_finished_network_is_trained_on(data: Packed, tokenizer: Any, model: Any, tmp_path: Path) -> None:
+    trained(data, tokenizer, tmp_path / "base", 8)
+    before, weights = finished(tmp_path / "base")
+    assert (before.size, before.all_steps) == ("tiny", 8)
+    onwards = Recipe.onwards("v1/abc", "tiny", 6, 0)
+    assert (onwards.rate, onwards.blanked) == (Recipe().rate / 2.0, Recipe().blanked_more)
+    assert not onwards.goes_on_from(asdict(before), 8)
+    end = tokenizer.token_to_id(END)
+    numbers = {"vocabulary": tokenizer.get_vocab_size(), "end": end, "device": "cpu"}
+    (tmp_path / "on").mkdir()
+    frozen = replace(onwards, steps=1, rate=0.0)
+    kept = train(data, tmp_path / "on", frozen, begin=weights, **numbers)
+    for name, values in kept.state_dict().items():
+        assert torch.equal(values, weights[name])
+
+
+def test_what_is_not_finished_is_no_base(data: Packed, tokenizer: Any, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no training run"):
+        finished(tmp_path)
+
+    def stop(step: int, loss: float, rate: float) -> None:
+        if step == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        trained(data, tokenizer, tmp_path / "run", 9, watch=stop, save_s=0.0)
+    with pytest.raises(ConfigError, match="not finished"):
+        finished(tmp_path / "run")
+
+
+def test_a_card_names_the_version_a_network_was_trained_on_from() -> None:
+    plan = {"seed": 0, "draws": 100, "per_case": 3}
+    facts = {"plan": plan, "examples": {"train": 1000}}
+    first = {"version": "v1", "recipe": asdict(Recipe(steps=70, more=30)), "data": "a" * 64}
+    card = model_card(first, facts, 3_000_000)
+    assert "100 steps" in card
+    assert "--steps 70 --more 30" in card
+    assert "Trained on from" not in card
+    onwards = asdict(Recipe.onwards("v1/aaa", "small", 50, 0))
+    second = {"version": "v2", "recipe": onwards, "data": "b" * 64, "base": {**first, "plan": plan}}
+    card = model_card(second, facts, 3_000_000)
+    assert "**Trained on from** `v1` (100 steps on data `aaaaaaaaaaaaaaaa`)" in card
+    assert "--base BASE --size small\n  --steps 50" in card
+    assert "--steps 70 --more 30" in card
 
 
 def test_a_folder_of_another_recipe_is_refused(data: Packed, tokenizer: Any, tmp_path: Path) -> None:

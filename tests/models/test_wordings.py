@@ -11,8 +11,9 @@ import pytest
 from chauffeur.concept import units
 from chauffeur.language import read_quantities
 from chauffeur.language.grammar import Grammar
+from chauffeur.models.onboard.examples import REASONS
 from chauffeur.models.onboard.speech import Unit, spoken
-from chauffeur.models.onboard.wordings import FILES, MANNER, PACKAGE
+from chauffeur.models.onboard.wordings import FILES, MANNER, MOST_FORMS, PACKAGE, because, beside
 from chauffeur.models.onboard.words import clause, conditioned, in_order, levels, utter, wordings
 
 SKILLS = {
@@ -289,6 +290,42 @@ def test_quantities_are_read_as_they_were_meant(unit: Unit, si: float, dimension
             text = spoken(value, unit, rng)
             found = read_quantities(text)
             assert [(q.dimension, q.value) for q in found] == [(dimension, pytest.approx(value * si))], text
+
+
+def test_what_can_be_said_in_more_ways_is_said_more_often_in_training() -> None:
+    rng = np.random.default_rng(10)
+    grammar = wordings()
+    drawn = [utter("relax/3", {}, rng).template for _ in range(6000)]
+    many, one = [], []
+    for template in grammar.templates("relax/3", held=False):
+        forms = grammar.forms(template)
+        (many if forms >= MOST_FORMS else one if forms == 1 else []).append(drawn.count(template.id))
+    assert 4.0 * np.mean(one) < np.mean(many) < 2.0 * MOST_FORMS * np.mean(one)
+
+
+@pytest.mark.parametrize("wish", ["Slow down, please", "Could you go left?", "I want the left lane."])
+def test_talk_and_reasons_stand_beside_a_wish_and_leave_it_whole(wish: str) -> None:
+    rng = np.random.default_rng(11)
+    core = wish.lower().rstrip(".")
+    for text in (
+        f(wish) for _ in range(200) for f in (lambda w: beside(w, rng), lambda w: because(w, "slower/2", rng))
+    ):
+        assert core in text.lower(), text
+        assert len(text) > len(wish) + 4, text
+        assert not re.search(r"\{|,,|\?\.|\.\.|\s[,.?]", text), text
+    assert beside(wish, np.random.default_rng(1)) == beside(wish, np.random.default_rng(1))
+
+
+def test_reasons_are_complaints_or_moods_that_go_with_the_wish() -> None:
+    for skill, sections in REASONS.items():
+        assert skill in SLOT_OF
+        for section in sections:
+            assert section.partition("/")[2] in ("2", "3")
+            assert not any(wordings().slots(t) for t in wordings().templates(section))
+            if re.search(r"left|right", skill) and not section.startswith("hurry"):
+                assert ("left" in skill) == ("left" in section), (skill, section)
+    for skill, never in (("faster", "carefully"), ("slower", "hurry"), ("closer", "further"), ("further", "closer")):
+        assert not any(section.startswith(never) for section in REASONS[skill])
 
 
 def test_factors_and_counts() -> None:

@@ -12,8 +12,9 @@ import pytest
 from server import ModelServer
 
 from chauffeur.concept import Context, Instruction, Plan, PlanRequest, Situation, SystemMessage
+from chauffeur.concept.addresses import Address
 from chauffeur.planners.llm import LlmPlanner
-from chauffeur.planners.llm_address import Address, parse_address
+from chauffeur.planners.llm_address import parse_address
 
 SECRET = "sk-test-0123456789abcdef-secret"
 

@@ -9,9 +9,9 @@ import pytest
 from server import PROGRAM, REPLY, events, fails, stream, whole
 
 from chauffeur.concept import Feedback, History, HistoryItem, InstructionError, Program, Round
+from chauffeur.concept.addresses import Address
 from chauffeur.planners.cache import ReplyCache
 from chauffeur.planners.llm import INTENT_DECLINED, INTENT_UNUSABLE
-from chauffeur.planners.llm_address import Address
 from chauffeur.planners.llm_endpoint import Sampling
 
 pytestmark = pytest.mark.server

@@ -134,7 +134,15 @@ def test_what_is_unclear_is_asked(planner: LanguageModelPlanner) -> None:
     assert plan.refusal.endswith("?")
 
 
-def test_a_correction_reads_history(planner: LanguageModelPlanner) -> None:
+@pytest.mark.parametrize(
+    ("wish", "call"),
+    [
+        ("same as last time", "gap_of(40)"),
+        ("like last time", "gap_of(40)"),
+        ("a bit more distance than last time", "gap_of(1.15 * 40)"),
+    ],
+)
+def test_a_correction_reads_history(planner: LanguageModelPlanner, wish: str, call: str) -> None:
     item = HistoryItem(
         trip_id="t1",
         when="2026-01-01T08:00:00Z",
@@ -145,8 +153,8 @@ def test_a_correction_reads_history(planner: LanguageModelPlanner) -> None:
         thoughts="",
         policy="def drive():\n    yield from gap_of(40)\n",
     )
-    plan = planned(planner, "same distance as last time", history=History((item,)))
-    assert [step.call() for step in steps(plan)] == ["gap_of(40)"]
+    plan = planned(planner, wish, history=History((item,)))
+    assert [step.call() for step in steps(plan)] == [call]
 
 
 def test_the_same_request_gives_the_same_plan(planner: LanguageModelPlanner) -> None:

@@ -296,6 +296,32 @@ def test_an_ego_that_stands_clear_of_the_way_is_not_to_blame_from_when_it_stood(
     assert aside(5.0, 5.0, 0.0, 0.0, 0.5, 0.0).who == "ego"
 
 
+@pytest.mark.parametrize(
+    ("ego_mps", "other_mps", "heading", "who"),
+    [
+        (0.0, -0.6, 0.0, "other"),
+        (0.0, -0.2, 0.3, "other"),
+        (0.5, -0.6, 0.0, "ego"),  # still rolls towards it
+        (0.0, 0.6, math.pi, "ego"),  # drives towards the ego, and does not reverse
+    ],
+)
+def test_who_reverses_into_an_ego_that_stands_is_to_blame(
+    ego_mps: float, other_mps: float, heading: float, who: str
+) -> None:
+    scenes: list[Scene] = [
+        (body(EGO, 500.0, 0.0, ego_mps), body(1, 505.1 - 0.02 * tick, 0.0, other_mps, heading)) for tick in range(6)
+    ]
+    found = judged(scenes)
+    assert found.who == who
+    assert ("reversed" in found.reason) == (who == "other")
+
+
+@pytest.mark.parametrize(("x", "heading"), [(495.0, 0.0), (505.0, math.pi / 2.0)])
+def test_who_rolls_away_or_across_backwards_does_not_reverse_into_the_ego(x: float, heading: float) -> None:
+    scenes: list[Scene] = [(body(EGO, 500.0, 0.0, 0.0), body(1, x, 0.0, -0.6, heading)) for _ in range(6)]
+    assert "reversed" not in judged(scenes).reason
+
+
 @given(
     x=st.floats(-20.0, 20.0), y=st.floats(-6.0, 6.0), heading=st.floats(-3.0, 3.0), turned=st.floats(-3.0, 3.0),
     place=st.floats(-100.0, 100.0), wide=st.floats(1.5, 3.0),

@@ -185,6 +185,9 @@ def episodes() -> ModuleType:
         ("saboteur", 20123),  # was made to clear what it was not in
         ("saboteur", 20002),  # stood in a lane that was empty, until a car came
         ("never-yield", 20283),  # stood with its nose in the way
+        ("saboteur", 22718),  # left the place it might have stood in, for a lane of its own fork
+        ("saboteur", 22771),  # braked in the middle because it could still have cleared the crossing a period later
+        ("saboteur", 22903),  # braked for its lead while it promised to be through
     ],
 )
 def test_what_once_ended_in_a_collision_does_not(episodes: ModuleType, kind: str, seed: int) -> None:

@@ -36,10 +36,10 @@ try:
         for chunk in microphone:
             assert chunk.dtype == np.int16 and chunk.ndim == 1
             found.append(chunk)
-            if len(found) == 8 and sys.argv[1:] == ["unplug"]:
+            if len(found) == 20 and sys.argv[1:] == ["unplug"]:
                 module.SILENT_S = 0.3
                 microphone._stream.abort()  # what the driver does when the device goes
-            elif len(found) == 8:
+            elif len(found) == 20:
                 break
         sound = np.concatenate(found)
         print(len(sound), int(np.abs(sound).max()), int(np.abs(sound[1600:8000] - sound[1600]).max()))

@@ -8,11 +8,14 @@ import threading
 import time
 import xmlrpc.client
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from socketserver import ThreadingMixIn
-from typing import Any
+from typing import Any, TypeVar
 from xmlrpc.server import SimpleXMLRPCServer
+
+from chauffeur.concept import Parameters
+from chauffeur.worlds.ros import VehicleInterface
 
 HOST = "127.0.0.1"
 FOLLOWER = "/config/waypoint_follower"
@@ -31,6 +34,8 @@ MD5 = {
 """Checksums of the public builds, written down here so that our own computation is compared with something."""
 
 TWIST_MD5 = "98d34b0043a2093cf9d9345ab6eef12e"
+
+Car = TypeVar("Car", bound=VehicleInterface)
 
 
 def eventually(true: Callable[[], Any], within_s: float = 5.0) -> Any:
@@ -345,6 +350,23 @@ def closing_all(*things: Any) -> Iterator[None]:
     finally:
         for thing in things:
             thing.close()
+
+
+@contextmanager
+def opening(make: Callable[..., Car]) -> Iterator[Callable[..., Car]]:
+    """`make`; whatever it made is closed in the end."""
+    with ExitStack() as made:
+        yield lambda *given, **settings: made.enter_context(closing(make(*given, **settings)))
+
+
+def wish(speed_mps: float) -> Parameters:
+    """A speed, with a look-ahead that every stack of the tests takes."""
+    return Parameters(speed_mps, 8.0, 2.0)
+
+
+def counts(car: VehicleInterface) -> dict[str, int]:
+    """What an interface counted."""
+    return dict(car.state().counts)
 
 
 def listening() -> set[str]:

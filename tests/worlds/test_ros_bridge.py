@@ -20,7 +20,7 @@ import pytest
 pytest.importorskip("websockets", reason="websockets is not installed: pip install 'chauffeur[ros]'")
 pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'chauffeur[ros]'")
 
-from ros_graph import FOLLOWER, HOST, REPLANNER, eventually, free_port
+from ros_graph import FOLLOWER, HOST, REPLANNER, counts, eventually, free_port, opening, wish
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import Server, ServerConnection, serve
 
@@ -120,23 +120,11 @@ def bridge() -> Iterator[Bridge]:
 
 @pytest.fixture
 def vehicle() -> Iterator[Opened]:
-    cars: list[RosbridgeVehicle] = []
+    def make(url: str, stack: AutowareAi | Autoware = AI) -> RosbridgeVehicle:
+        return RosbridgeVehicle(stack, RosbridgeSettings(url), retry_s=0.05)
 
-    def opened(url: str, stack: AutowareAi | Autoware = AI) -> RosbridgeVehicle:
-        cars.append(RosbridgeVehicle(stack, RosbridgeSettings(url), retry_s=0.05))
-        return cars[-1]
-
-    yield opened
-    for car in cars:
-        car.close()
-
-
-def wish(speed_mps: float) -> Parameters:
-    return Parameters(speed_mps, 8.0, 2.0)
-
-
-def counts(car: VehicleInterface) -> dict[str, int]:
-    return dict(car.state().counts)
+    with opening(make) as opened:
+        yield opened
 
 
 def test_a_wish_reaches_another_client_with_every_field(bridge: Bridge, vehicle: Opened) -> None:

@@ -18,7 +18,7 @@ import pytest
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed: pip install 'chauffeur[ros]'")
 pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'chauffeur[ros]'")
 
-from ros_graph import eventually
+from ros_graph import eventually, wish
 
 from chauffeur.concept import Parameters
 from chauffeur.worlds.ros import VehicleError, VehicleInterface, VehicleLimits, VehicleRefusalError
@@ -167,10 +167,6 @@ def car() -> Iterator[Ros2Vehicle]:
     vehicle = Ros2Vehicle(STACK, Ros2Settings(domain=DOMAIN))
     yield vehicle
     vehicle.close()
-
-
-def wish(speed_mps: float) -> Parameters:
-    return Parameters(speed_mps, 8.0, 2.0)
 
 
 def test_a_wish_is_a_velocity_limit_of_our_own_sender_byte_for_byte(car: Ros2Vehicle) -> None:

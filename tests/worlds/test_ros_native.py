@@ -21,9 +21,21 @@ pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'ch
 import ros_graph as ros
 from hypothesis import given
 from hypothesis import strategies as st
-from ros_graph import ENGAGE, FOLLOWER, HOST, MD5, REPLANNER, Master, Subscriber, VelocityPublisher, eventually
+from ros_graph import (
+    ENGAGE,
+    FOLLOWER,
+    HOST,
+    MD5,
+    REPLANNER,
+    Master,
+    Subscriber,
+    VelocityPublisher,
+    counts,
+    eventually,
+    opening,
+    wish,
+)
 
-from chauffeur.concept import Parameters
 from chauffeur.worlds.ros import VehicleError, VehicleInterface, VehicleLimits, VehicleRefusalError, node, outlet
 from chauffeur.worlds.ros.autoware_ai import (
     DEFINITIONS,
@@ -63,23 +75,11 @@ def master() -> Iterator[Master]:
 
 @pytest.fixture
 def vehicle() -> Iterator[Opened]:
-    cars: list[Ros1Vehicle] = []
+    def make(uri: str, **settings: Any) -> Ros1Vehicle:
+        return Ros1Vehicle(STACK, Ros1Settings(master=uri, **settings), check_s=QUICK_S)
 
-    def opened(uri: str, **settings: Any) -> Ros1Vehicle:
-        cars.append(Ros1Vehicle(STACK, Ros1Settings(master=uri, **settings), check_s=QUICK_S))
-        return cars[-1]
-
-    yield opened
-    for car in cars:
-        car.close()
-
-
-def wish(speed_mps: float) -> Parameters:
-    return Parameters(speed_mps, 8.0, 2.0)
-
-
-def counts(car: VehicleInterface) -> dict[str, int]:
-    return dict(car.state().counts)
+    with opening(make) as opened:
+        yield opened
 
 
 def uri_of(master: Master) -> str:

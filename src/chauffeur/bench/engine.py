@@ -11,6 +11,7 @@ import threading
 from collections import OrderedDict, deque
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import wait
@@ -28,7 +29,11 @@ LIVES: Final = 2
 """Workers one job may take with it before it is given up."""
 JOB_LIMIT_S: Final = 900.0
 """Longest a job may take; the longest episode takes seconds."""
+_FALSE_STARTS: Final = 3
+"""Workers that may die before they begin with a job; from then on the job itself is taken for the cause."""
 _NICE: Final = 5
+_begun: Any = None
+"""In a worker: 1 once it has begun with its job, in memory that its parent reads, also when it is dead."""
 
 
 class WorkerLostError(ChauffeurError):
@@ -200,9 +205,11 @@ class _Worker:
         self._context = context
         self._pool: ProcessPoolExecutor | None = None
         self._pid = 0
+        self._begun: Any = None
 
     async def start(self) -> None:
-        self._pool = ProcessPoolExecutor(1, mp_context=self._context, initializer=_settle_in)
+        self._begun = self._context.RawValue("q", 0)
+        self._pool = ProcessPoolExecutor(1, mp_context=self._context, initializer=_settle_in, initargs=(self._begun,))
         try:
             self._pid = await asyncio.wrap_future(self._pool.submit(os.getpid))
         except BrokenExecutor as error:
@@ -216,11 +223,19 @@ class _Worker:
 
     async def do(self, work: Work, job: Any, limit_s: float) -> Row:
         """The work's row. Raises BrokenExecutor when the process died of it or had to be ended."""
-        try:
-            future = self._submit(work, job)
-        except BrokenExecutor:  # it died while it was idle
+        for _ in range(_FALSE_STARTS):
+            try:
+                return await self._do_once(work, job, limit_s)
+            except BrokenProcessPool:
+                if self._begun.value:
+                    raise
+            # It died while it was idle, which its pool notices late: the job may have been handed to it all the same.
             await self.restart()
-            future = self._submit(work, job)
+        raise BrokenExecutor(f"{_FALSE_STARTS} processes died before they began with it")
+
+    async def _do_once(self, work: Work, job: Any, limit_s: float) -> Row:
+        self._begun.value = 0
+        future = self._submit(work, job)
         try:
             async with asyncio.timeout(limit_s):
                 return await asyncio.wrap_future(future)
@@ -232,7 +247,7 @@ class _Worker:
     def _submit(self, work: Work, job: Any) -> Any:
         if self._pool is None:
             raise EngineError("The simulation process could not be started again.")
-        return self._pool.submit(work, job)
+        return self._pool.submit(_begin, work, job)
 
     def close(self, *, now: bool) -> None:
         if self._pool is None:
@@ -245,14 +260,22 @@ class _Worker:
         self._pid = 0
 
 
-def _settle_in() -> None:
+def _settle_in(begun: Any) -> None:
     """How a worker begins: Ctrl-C is the parent's business, the parent goes first, and without a parent all ends."""
+    global _begun  # noqa: PLW0603 - a worker's process has no other place for what it is given at its start
+    _begun = begun
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(OSError, AttributeError):
         os.nice(_NICE)
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def _begin(work: Work, job: Any) -> Row:
+    """Do a job, in a worker."""
+    _begun.value = 1
+    return work(job)
 
 
 def _end_with(sentinel: int) -> None:

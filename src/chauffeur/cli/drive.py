@@ -59,13 +59,22 @@ def drive(
     from chauffeur.cli.audit import auditor_for, tell_closing
     from chauffeur.cli.console import stdout
     from chauffeur.cli.failures import FAILED
-    from chauffeur.cli.parts import limits_named, memory_named, not_kept, planner_named, referee_for, setting_named
+    from chauffeur.cli.parts import (
+        limits_named,
+        memory_named,
+        not_kept,
+        planner_named,
+        referee_for,
+        setting_named,
+        standing_sources,
+    )
     from chauffeur.cli.show import Quiet, Teller
     from chauffeur.concept import PersonId
     from chauffeur.drive.auditing import told_to, with_head
     from chauffeur.drive.scenarios import find, suiting
     from chauffeur.drive.session import Forgetful, Session, parse_wish
     from chauffeur.memory.personal_limits import personal_limits
+    from chauffeur.planners.talk2drive.recent import fitting
 
     instruction = parse_wish(wish, PersonId(person.strip()))
     bounds = personal_limits(instruction.person, limits_named(limits))
@@ -74,7 +83,8 @@ def drive(
     teller = Quiet(console) if quiet else Teller(console)
     session = Session(
         planner=planner_named(planner, base_url, teller.writing),
-        memory=memory_named() if instruction.person else Forgetful(),
+        memory=fitting(memory_named(), planner) if instruction.person else Forgetful(),
+        sources=standing_sources(),
         referee=referee_for,
         tell=teller.tell,
         setting=setting_named(setting),

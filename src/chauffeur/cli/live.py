@@ -18,9 +18,12 @@ Examples:
 
     chauffeur live --planner openai/qwen2.5 --base-url http://localhost:11434/v1
 
+    chauffeur live "Park near the stadium." --planner talk2drive --scenario parking-stadium
+
     chauffeur live --speed 4 < wishes.txt
 
-Type a wish and press Enter; `stop` or Ctrl-C brings the car to a stand and ends, a second Ctrl-C ends at once.
+Type a wish and press Enter. `take over` gives you the wheel: `faster`, `slower`, `left`, `right` and `brake` move the
+car until `give back`. `stop` or Ctrl-C brings the car to a stand and ends, a second Ctrl-C ends at once.
 Exit code 1 says that a wish was not driven, or that the drive ended badly. Every drive is simulated.
 """
 
@@ -33,7 +36,10 @@ def live(
     ] = None,
     scenario: Annotated[str | None, typer.Option(help="Where to drive; default one that suits the first wish.")] = None,
     planner: Annotated[
-        str, typer.Option(help="`onboard`, `keyword`, `openai/<model>`, `replay/<file>`, or an installed one.")
+        str,
+        typer.Option(
+            help="`onboard`, `talk2drive`, `keyword`, `openai/<model>`, `replay/<file>`, or an installed one."
+        ),
     ] = "onboard",
     person: Annotated[str, typer.Option("--as", help="Whose wishes they are; their history is recalled.")] = "",
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of the traffic; default the scenario's own.")] = None,
@@ -73,6 +79,8 @@ def live(
     from chauffeur.drive.live.supervisor import Runtime
     from chauffeur.drive.scenarios import find, suiting
     from chauffeur.drive.session import make_world, parse_wish
+    from chauffeur.drive.surroundings import services_file
+    from chauffeur.memory.choice import chosen_memory
     from chauffeur.memory.personal_limits import personal_limits
 
     who = PersonId(person.strip())
@@ -84,7 +92,8 @@ def live(
         starts=(start,),
         planner=planner,
         base_url=base_url,
-        memory="vault" if who else "",
+        memory=chosen_memory() if who else "",
+        services=str(services_file() or ""),
         speed=speed,
         realtime=realtime,
     )

@@ -6,13 +6,13 @@ import signal
 import time
 from concurrent.futures import Future
 from types import FrameType
-from typing import Final
+from typing import Final, get_args
 
 from chauffeur.cli.lines import Lines
 from chauffeur.cli.live_screen import QuietScreen, last_words
 from chauffeur.concept import Instruction, InstructionError, PersonId
 from chauffeur.drive.live.books import Books
-from chauffeur.drive.live.messages import Report
+from chauffeur.drive.live.messages import Key, Report
 from chauffeur.drive.live.orders import Brief, Event
 from chauffeur.drive.live.remembering import Remembering
 from chauffeur.drive.live.supervisor import Interaction, Replaced, Runtime
@@ -20,6 +20,11 @@ from chauffeur.drive.session import MAX_WISH_CHARACTERS, parse_wish
 
 STOP: Final = "stop"
 """The line that ends the drive."""
+TAKE_OVER: Final = "take over"
+GIVE_BACK: Final = "give back"
+"""The lines with which the person takes the wheel and gives it back."""
+KEYS: Final[dict[str, Key]] = {key: key for key in get_args(Key)}
+"""Lines that move the car meanwhile."""
 
 DRIVEN_FOR_S: Final = 10.0
 """So long a given wish is driven, in the car's time, before the next one is asked: some have no end of their own."""
@@ -98,7 +103,7 @@ class LiveDrive:
         else:
             time.sleep(LOOK_EVERY_S)
         runtime.poll()
-        if not self._stopping:
+        if not self._stopping and not runtime.taken_over:
             self._ask(runtime)
         if self.interrupts and not self._stopping:
             self._stop(runtime)
@@ -126,8 +131,24 @@ class LiveDrive:
             self._given.append(line)
         elif is_stop(line):
             self._stop(runtime)
-        else:
+        elif not self._at_the_wheel(runtime, " ".join(line.lower().split())):
             self._typed.append(line)
+
+    def _at_the_wheel(self, runtime: Runtime, said: str) -> bool:
+        """Whether a line is of the person who has the wheel, takes it, or gives it back; then it is done."""
+        if said == TAKE_OVER and not runtime.taken_over:
+            runtime.take_over(True)
+            self._screen.note(f"You have the wheel: {', '.join(KEYS)}, or {GIVE_BACK}.", "bold green")
+        elif not runtime.taken_over:
+            return False
+        elif said == GIVE_BACK:
+            runtime.take_over(False)
+            self._screen.note("The car has the wheel. It holds speed and lane until you wish something.", "bold green")
+        elif (key := KEYS.get(said)) is not None:
+            runtime.hand(key)
+        else:
+            self._screen.note(f"Not while you have the wheel; {GIVE_BACK} first.")
+        return True
 
     def _ask(self, runtime: Runtime) -> None:
         """Write the next wish down, and hand it on once it is on the disk."""
@@ -213,4 +234,6 @@ def _driven(interaction: Interaction) -> bool:
     answer = interaction.answer
     if answer is None or answer.kind in _UNDRIVEN:
         return False
-    return answer.kind != "interrupted" or any(event.kind == "started" for event in interaction.events)
+    if answer.kind != "interrupted" or interaction.taken_over:
+        return True
+    return any(event.kind == "started" for event in interaction.events)

@@ -35,6 +35,7 @@ _RUNGS: Final[dict[Rung, str]] = {
     "keep": "keeps lane and distance",
     "slow": "slows down",
     "stop": "stops",
+    "hand": "you drive",
 }
 """The ladder of fallbacks in words."""
 
@@ -250,7 +251,7 @@ class LiveScreen(QuietScreen):
             case "said":
                 text = Text.assemble("“", text, "”")
             case "finished":
-                text = Text("The program has ended; what it wished stays.", "dim")
+                text = text or Text("The program has ended; what it wished stays.", "dim")
             case "stale" | "unplanned" if interaction is not None and interaction.answer is event:
                 if len(interaction.events) > 1 and interaction.events[-2].text == event.text:
                     text = Text(f"Given up on, asked {turn} times." if turn > 1 else "Given up on.", "dim")
@@ -288,7 +289,7 @@ class LiveScreen(QuietScreen):
 
     def _plain_status(self, report: Report) -> None:
         at_s = report.tick * self.dt_s
-        let_go = {"keep", "slow", "stop"}
+        let_go = {"keep", "slow", "stop", "hand"}
         stepped = report.rung != self._plain_rung and bool({report.rung, self._plain_rung} & let_go)
         self._plain_rung = report.rung
         if stepped or at_s >= self._plain_due_s:

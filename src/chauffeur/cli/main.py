@@ -12,6 +12,7 @@ from chauffeur.cli import (
     apis,
     bench_alignment,
     bench_hostile,
+    bench_personalization,
     chaos,
     coach,
     context,
@@ -24,6 +25,7 @@ from chauffeur.cli import (
     replay,
     report,
     scenarios,
+    talk,
     wheel,
 )
 from chauffeur.cli.adapt import adapt_app
@@ -34,6 +36,7 @@ from chauffeur.cli.me import me_app
 from chauffeur.cli.policies import policies_app
 from chauffeur.cli.scenes import scenes_app
 from chauffeur.cli.serve import serve_app
+from chauffeur.cli.study import study_app
 from chauffeur.cli.train import train_app
 from chauffeur.cli.vehicle import vehicle_app
 
@@ -45,6 +48,8 @@ Examples:
     chauffeur drive "I'm in a hurry" --as ana --save trips/hurry --open
 
     chauffeur live "Overtake the car in front of you."
+
+    chauffeur talk --as ana
 
     chauffeur feedback "A bit too close for me." --as ana
 
@@ -81,6 +86,7 @@ def chauffeur(
 
 app.command(epilog=drive.EXAMPLES)(drive.drive)
 app.command(epilog=live.EXAMPLES)(live.live)
+app.command(epilog=talk.EXAMPLES)(talk.talk)
 app.command(epilog=chaos.EXAMPLES)(chaos.chaos)
 app.command(epilog=feedback.EXAMPLES)(feedback.feedback)
 app.command(epilog=hear.EXAMPLES)(hear.hear)
@@ -95,10 +101,12 @@ bench_app.command(epilog=wheel.EXAMPLES)(wheel.human)
 bench_app.command(epilog=coach.EXAMPLES)(coach.coach)
 bench_app.command(epilog=bench_alignment.EXAMPLES)(bench_alignment.alignment)
 bench_app.command(epilog=bench_hostile.EXAMPLES)(bench_hostile.hostile)
+bench_app.command(epilog=bench_personalization.EXAMPLES)(bench_personalization.personalization)
 app.add_typer(bench_app, name="bench")
 app.add_typer(me_app, name="me")
 app.add_typer(policies_app, name="policies")
 app.add_typer(scenes_app, name="scenes")
+app.add_typer(study_app, name="study")
 app.add_typer(train_app, name="train")
 app.add_typer(serve_app, name="serve")
 app.add_typer(adapt_app, name="adapt")

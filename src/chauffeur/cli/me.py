@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from chauffeur.memory.base import Memory
     from chauffeur.memory.privacy import Privacy
-    from chauffeur.memory.vault import VaultMemory
 
 me_app = typer.Typer(
     no_args_is_help=True,
@@ -43,10 +43,10 @@ def me() -> None:
     """What is remembered of you."""
 
 
-def _vault() -> VaultMemory:
-    from chauffeur.memory.vault import VaultMemory
+def _memory() -> Memory:
+    from chauffeur.cli.parts import memory_named
 
-    return VaultMemory()
+    return memory_named()
 
 
 @me_app.command()
@@ -59,12 +59,13 @@ def show(person: Person, most: Annotated[int, typer.Option(min=1, help="Trips at
 
     from chauffeur.cli.console import path_text, plain, stdout
     from chauffeur.concept import Limits, PersonId
+    from chauffeur.concept.units import kmh
     from chauffeur.memory.files import data_home
     from chauffeur.memory.personal_limits import LIMITS_FILE, personal_limits
     from chauffeur.memory.privacy import read_privacy
 
     console, privacy = stdout(), read_privacy()
-    trips = json.loads(_vault().export(PersonId(person)))["trips"]
+    trips = json.loads(_memory().export(PersonId(person)))["trips"]
     if trips:
         table = Table("when", "wish", "what came of it", "what you said", box=None, pad_edge=False)
         for trip in trips[::-1][:most]:
@@ -80,8 +81,8 @@ def show(person: Person, most: Annotated[int, typer.Option(min=1, help="Trips at
         console.print(Text("Privacy mode is on: nothing new is kept.", "bold yellow"))
     limits = personal_limits(PersonId(person), Limits())
     if limits != Limits():
-        cap = "" if limits.max_speed_mps is None else f"never above {limits.max_speed_mps * 3.6:.0f} km/h, "
-        over = f"{limits.max_over_limit_mps * 3.6:.0f} km/h above the sign at most"
+        cap = "" if limits.max_speed_mps is None else f"never above {kmh(limits.max_speed_mps):.0f} km/h, "
+        over = f"{kmh(limits.max_over_limit_mps):.0f} km/h above the sign at most"
         words = f"Your limits: {cap}{over}, {limits.min_time_headway_s:g} s headway or more "
         console.print(Text.assemble(words, "(", path_text(data_home() / LIMITS_FILE), ")"))
 
@@ -93,7 +94,7 @@ def export(person: Person, out: Annotated[Path | None, typer.Option(help="File; 
     from chauffeur.concept import PersonId
     from chauffeur.memory.files import publish
 
-    document = _vault().export(PersonId(person))
+    document = _memory().export(PersonId(person))
     if out is None:
         stdout().print(document, markup=False, highlight=False, soft_wrap=True)
         return
@@ -109,7 +110,7 @@ def forget_last(person: Person) -> None:
     from chauffeur.cli.console import plain, stdout
     from chauffeur.concept import PersonId
 
-    item = _vault().forget_last(PersonId(person))
+    item = _memory().forget_last(PersonId(person))
     if item is None:
         stdout().print(Text.assemble("Nothing is remembered of ", plain(person), "."))
         return
@@ -126,7 +127,7 @@ def erase(person: Person, yes: Annotated[bool, typer.Option("--yes", help="Do no
 
     if not yes:
         typer.confirm(f"Erase everything that is remembered of {person}? It cannot be undone", abort=True)
-    gone = _vault().erase(PersonId(person))
+    gone = _memory().erase(PersonId(person))
     words = (
         ("Erased: the profile of ", plain(person), ".") if gone else ("There was no profile of ", plain(person), ".")
     )
@@ -147,7 +148,7 @@ def retention(
     if days != "forever" and not days.isdecimal():
         raise ConfigError(f"{days!r} is no number of days.", hint="Write for example: chauffeur me retention 90")
     write_privacy(replace(_settings(), retention_days=None if days == "forever" else int(days)))
-    swept = _vault().sweep()
+    swept = _memory().sweep()
     kept = "until they are erased" if days == "forever" else f"for {int(days)} days"
     stdout().print(f"Trips are kept {kept}. {swept} older ones were deleted.")
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, Parameters, Plan, Scenario
 
 if TYPE_CHECKING:
+    from chauffeur.describe.services.sources import SourceSettings
     from chauffeur.drive.episode import Referee
     from chauffeur.memory.base import Memory
     from chauffeur.planners.base import Planner
@@ -75,9 +76,24 @@ def not_kept(person: str) -> str:
     return f"Privacy mode: nothing of this drive is kept in the profile of {person}."
 
 
-def memory_named(name: str = "vault") -> Memory:
-    """The memory of this installation."""
-    from chauffeur.concept.registry import load_plugin
+def memory_named(name: str | None = None) -> Memory:
+    """A memory by name; the one of this installation if left out."""
+    from chauffeur.memory.choice import open_memory
 
-    memory: Memory = load_plugin("chauffeur.memories", name)()
-    return memory
+    return open_memory(name)
+
+
+def standing_sources() -> SourceSettings | None:
+    """Where the context of this person's drives is completed from; None where their file does not exist.
+
+    Raises:
+        ConfigError: The file cannot be used.
+    """
+    from chauffeur.drive.surroundings import services_file
+
+    path = services_file()
+    if path is None:
+        return None
+    from chauffeur.describe.services.sources import read_sources
+
+    return read_sources(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -28,6 +29,7 @@ from chauffeur.concept import (
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.payload import policy_words
+from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.safety.alignment import mismatch_words, score_words
 
 _STYLES = {"good": "bold green", "bad": "bold red", "neutral": "bold"}
@@ -52,6 +54,8 @@ class Quiet:
 
     def tell(self, letter: str, value: object) -> None:
         """One of the loop's letters, or a frame."""
+        if letter == "memory":  # what went wrong with it is said even where little is
+            self.console.print(plain(str(value)), style="bold yellow")
 
     def writing(self, text: str, attempt: int) -> None:
         """A piece of a model's reply as it is written."""
@@ -113,7 +117,7 @@ class Teller(Quiet):
                     if isinstance(verdict, Verdict):
                         self._verdict(verdict)
             case _:
-                return
+                super().tell(letter, value)
 
     def writing(self, text: str, attempt: int) -> None:
         """Show the end of what the model has written so far; a new attempt begins anew."""
@@ -165,6 +169,8 @@ class Teller(Quiet):
             told = "; ".join(words.feedback_words(feedback) for feedback in item.feedback)
             facts = ", ".join(part for part in (item.intent, item.outcome, told) if part)
             lines.append(Text.assemble("“", plain(item.instruction), "” ", (f"({facts})", "dim")))
+        now = datetime.now(UTC)
+        lines.extend(Text(conflict.to_person(now), "yellow") for conflict in conflicts_in(history))
         self._letter("H", Text("\n").join(lines))
 
     def _plan(self, plan: Plan) -> None:

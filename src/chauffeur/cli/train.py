@@ -19,6 +19,8 @@ Examples:
 
     chauffeur train onboard --out runs/onboard --more 4000
 
+    chauffeur train onboard --out runs/wider --base runs/onboard --steps 8000
+
     chauffeur train onboard --out runs/onboard --data-only
 
     chauffeur bench passengers --planner onboard/runs/onboard/model
@@ -44,6 +46,9 @@ def onboard(
     more: Annotated[
         int, typer.Option(min=0, help="Steps of a second round, its rate half as high; also for a finished run.")
     ] = 0,
+    base: Annotated[
+        Path | None, typer.Option(help="Folder of a finished run whose network is trained on, at half the rate.")
+    ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes that make data; default one per core.")] = None,
     threads: Annotated[int, typer.Option(min=0, help="Threads that train; 0 leaves it to PyTorch.")] = 0,
     device: Annotated[str, typer.Option(help="`cpu` or `cuda`; default the best at hand.")] = "",
@@ -56,7 +61,7 @@ def onboard(
     from chauffeur.models.onboard.pipeline import Plan, build_data, train_model
 
     console = stdout()
-    plan = Plan(seed, draws, per_case, size, steps, more)
+    plan = Plan(seed, draws, per_case, size, steps, more, base)
     told = stage_lines(console)
     try:
         build_data(out, plan, workers or os.cpu_count() or 1, told)
@@ -76,3 +81,30 @@ def onboard(
         console.print(f"Stopped. What is done is kept in {out}; run the same command to go on.", soft_wrap=True)
         raise typer.Exit(130) from None
     console.print(f"Model: {model}. Try it: chauffeur bench passengers --planner onboard/{model}", soft_wrap=True)
+
+
+GGUF_EXAMPLES = """
+Examples:
+
+    chauffeur train gguf runs/onboard/transformers onboard.gguf
+
+    chauffeur train gguf runs/onboard/transformers onboard-q8.gguf --eight-bit
+
+    llama-server --model onboard.gguf --jinja --port 8080
+
+    chauffeur drive "Take the left lane." --planner openai/onboard --base-url http://localhost:8080/v1
+"""
+
+
+@train_app.command(epilog=GGUF_EXAMPLES)
+def gguf(
+    checkpoint: Annotated[Path, typer.Argument(help="Folder `transformers` of a run.")],
+    file: Annotated[Path, typer.Argument(help="GGUF file to write.")],
+    eight_bit: Annotated[bool, typer.Option("--eight-bit", help="Half the size: matrices in 8 bits (Q8_0).")] = False,
+) -> None:
+    """A trained model as one file for llama.cpp and what is built on it."""
+    from chauffeur.cli.console import stdout
+    from chauffeur.models.onboard.to_gguf import to_gguf
+
+    written = to_gguf(checkpoint, file, eight_bit=eight_bit)
+    stdout().print(f"Written: {written}, {written.stat().st_size / 1e6:.1f} MB", soft_wrap=True)

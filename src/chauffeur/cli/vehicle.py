@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from chauffeur.cli.vehicle_drive import DRIVE_EXAMPLES, drive
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -28,6 +30,8 @@ Examples:
     chauffeur vehicle apply vehicle.toml --speed 8 --look-ahead 10 --ratio 2
 
     chauffeur vehicle watch vehicle.toml
+
+    chauffeur vehicle drive vehicle.toml "Drive a bit slower." --as ana --dry-run
 
     chauffeur vehicle engage vehicle.toml
 
@@ -159,6 +163,9 @@ def watch(
         pass
     finally:
         car.close()
+
+
+vehicle_app.command(epilog=DRIVE_EXAMPLES)(drive)
 
 
 @vehicle_app.command()

@@ -20,7 +20,7 @@ def load_plugin(group: str, name: str) -> Any:
     Raises:
         ConfigError: No such name (with the nearest one), or the plug-in cannot be imported.
     """
-    kind = group.rsplit(".", 1)[-1].removesuffix("s")
+    kind = group.rsplit(".", 1)[-1].removesuffix("s").replace("memorie", "memory")
     found = [point for point in entry_points(group=group) if point.name == name]
     if not found:
         known = plugin_names(group)

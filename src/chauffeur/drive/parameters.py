@@ -69,7 +69,8 @@ _LOOKS_S: Final = 1.0
 """How long the car stands at a stop sign before it may go."""
 _CLEAR_S: Final = 2.0
 """By how much time somebody who crosses must be missed when the car leaves a stop sign."""
-_SHORTEST_LOOK_M: Final = 0.1
+_SHORTEST_LOOK_M: Final = 2.0
+"""Nearer than this a car that creeps winds itself off its path."""
 
 
 @runtime_checkable
@@ -158,42 +159,76 @@ class ParametersDriver:
     Nothing in the parameters makes it fail: what is no number is taken for the most careful value.
     """
 
-    def __init__(self, world: World, policy: Parameters, *, limits: Limits | None = None) -> None:
-        """Bind a policy to a world that was just reset.
+    def __init__(
+        self, world: World, policy: Parameters, *, limits: Limits | None = None, origin: LaneId | None = None
+    ) -> None:
+        """Bind a policy to a world, wherever its car is.
+
+        Args:
+            world: To drive in.
+            policy: To drive.
+            limits: No speed beyond them.
+            origin: Lane the policy's lane wish counts from; the ego's own by default.
 
         Raises:
             ScenarioError: The road has no such turn or place, the spot is taken, or no way leads there.
         """
         self._world = world
         self._limits = Limits() if limits is None else limits
-        self._target = _number(policy.target_speed_mps, 0.0)
-        self._look = Look(
-            max(_number(policy.look_ahead_m, _SHORTEST_LOOK_M), _SHORTEST_LOOK_M),
-            max(_number(policy.look_ahead_ratio, 0.0), 0.0),
-        )
         self._notes: list[tuple[float, str]] = []
         snapshot = world.snapshot()
         self._lanes = {lane.id: lane for lane in snapshot.lanes}
+        self._route = policy.route
         self._turn: Turn | None = _turn_of(policy.route, snapshot)
         self.spot: Spot | None = None
+        self._stretch: _Stretch | None = None
+        self._goal: _Stretch | None = None
         if isinstance(world, ParkingPlaces):
             self._follower = Follower(world.chassis, world.dt_s, jam_m=JAM_M, bend_mps2=LOT_BEND_MPS2)
-            self._wished = 0
-            self._stretch: _Stretch | None = None
-            way = world.way_on()
-            if policy.route:
-                self.spot = world.spot(policy.route)
-                way = world.way_to(self.spot) or way
+            way = self._way_in(world, policy.route)
             self._follower.take(way.path, way.room_m)
         else:
             self._follower = Follower(_highway_chassis(snapshot.ego), world.dt_s, jam_m=_JAM_M)
-            self._wished = policy.lane
             self._stretch = self._stretch_from(self._here(snapshot))
             self._follow(self._stretch.path)
         self._before: _Stretch | None = None
         self._served: frozenset[int] = frozenset()
         self._stood_s = 0.0
-        self._target_now = 0.0
+        self._target_now, self._headway_s = 0.0, HEADWAY_S
+        self._tune(policy, origin)
+
+    def retune(self, policy: Parameters, origin: LaneId | None = None) -> bool:
+        """Go on along the same way with other numbers; False, and nothing is changed, where the way is another one.
+
+        Args:
+            policy: To drive from now on.
+            origin: Lane its lane wish counts from; the ego's own by default.
+        """
+        if policy.route != self._route:
+            return False
+        self._tune(policy, origin)
+        return True
+
+    def _tune(self, policy: Parameters, origin: LaneId | None) -> None:
+        self._target = _number(policy.target_speed_mps, 0.0)
+        self._look = Look(
+            max(_number(policy.look_ahead_m, _SHORTEST_LOOK_M), _SHORTEST_LOOK_M),
+            max(_number(policy.look_ahead_ratio, 0.0), 0.0),
+        )
+        if self._stretch is None or (policy.lane == 0 and self._before is not None):
+            self._goal = self._stretch  # a change that has begun is finished
+        else:
+            self._goal = self._goal_of(policy.lane, origin)
+
+    def _way_in(self, world: ParkingPlaces, route: str) -> Way:
+        """The way through a lot: onto the spot that is meant, or on."""
+        if not route:
+            stands = world.parked()
+            if stands is not None:
+                raise ScenarioError(f"The car is parked in {stands}, and does not reverse.")
+            return world.way_on()
+        self.spot = world.spot(route)
+        return world.way_to(self.spot) or world.way_on()
 
     @property
     def notes(self) -> tuple[tuple[float, str], ...]:
@@ -204,24 +239,41 @@ class ParametersDriver:
         """What is wanted in this period, in the place of what the world's own driver would keep to."""
         del settled
         snapshot = self._world.snapshot()
+        if self._goal is not None and not self._mind_the_lane(snapshot, _lane_beside(self._goal, snapshot.ego)):
+            self._goal = self._stretch
+        least, most = self._limits.min_time_headway_s, self._limits.max_time_headway_s
+        return self._driven(snapshot, self._target, min(max(HEADWAY_S, least), most))
+
+    def held_to(self, safe: Wishes) -> Wishes:
+        """What is wanted in this period where others say how fast, with what gap, and in which lane.
+
+        Args:
+            safe: Theirs, within the limits: of the ladder of fallbacks, for one.
+        """
+        snapshot = self._world.snapshot()
+        lane = None if safe.target_lane is None else self._lanes.get(safe.target_lane)
+        if self._stretch is not None and lane is not None:
+            self._mind_the_lane(snapshot, lane)
+        return self._driven(snapshot, _number(safe.target_speed_mps, 0.0), safe.time_headway_s)
+
+    def _driven(self, snapshot: Snapshot, target_mps: float, headway_s: float) -> Wishes:
         lane: LaneId | None
         if self._stretch is None:
             lane = self.spot.lane if self.spot is not None else snapshot.ego.lane
             limit = self._lanes[lane].speed_limit_mps if lane in self._lanes else 0.0
         else:
-            self._mind_the_lane(snapshot)
-            station = self._stretch.path.nearest(snapshot.ego.x_m, snapshot.ego.y_m)
-            view = self._stretch.lane_at(station)
+            view = _lane_beside(self._stretch, snapshot.ego)
             lane, limit = view.id, view.speed_limit_mps
-        self._target_now = max(0.0, min(self._target, self._limits.most_mps(limit)))
-        return Wishes(self._target_now, HEADWAY_S, lane, self._turn, self._served)
+        self._target_now = max(0.0, min(target_mps, self._limits.most_mps(limit)))
+        self._headway_s = headway_s
+        return Wishes(self._target_now, headway_s, lane, self._turn, self._served)
 
     def command(self) -> Command:
         """Acceleration and steering for this period."""
         snapshot = self._world.snapshot()
         others = _solid(snapshot)
         stop = self._stop_line(snapshot, others)
-        return self._follower.command(snapshot.ego, others, self._look, self._target_now, HEADWAY_S, stop)
+        return self._follower.command(snapshot.ego, others, self._look, self._target_now, self._headway_s, stop)
 
     # Lanes ------------------------------------------------------------------------------------------------------------
 
@@ -270,30 +322,49 @@ class ParametersDriver:
             return max(follow, key=_turned)
         return min(follow, key=lambda one: abs(_turned(one)))
 
-    def _mind_the_lane(self, snapshot: Snapshot) -> None:
-        """Begin a lane change that is wished and has room; go back while that is still the shorter way."""
+    def _goal_of(self, side: int, origin: LaneId | None) -> _Stretch | None:
+        """Where a lane wish leads: the lane beside the one it counts from, and what follows that."""
+        assert self._stretch is not None
+        ego = self._world.snapshot().ego
+        first = self._lanes.get(origin) if origin is not None else None
+        from_here = _lane_beside(self._stretch if first is None else self._stretch_from(first), ego)
+        index = from_here.id[2] + side
+        goal = self._lanes.get((from_here.id[0], from_here.id[1], index))
+        if goal is not None:
+            return self._stretch_from(goal)
+        if side:
+            self._say(self._world.snapshot(), f"There is no lane to the {_name_of(side)}; I stay in this one.")
+        return self._stretch
+
+    def _mind_the_lane(self, snapshot: Snapshot, goal: LaneView) -> bool:
+        """Begin a lane change towards a lane once it has room; go back while that is still the shorter way.
+
+        Returns:
+            False where that lane cannot be had, which is said.
+        """
         assert self._stretch is not None
         if self._before is not None:
             self._go_on_or_back(snapshot)
-        elif self._wished:
-            lane = self._stretch.lane_at(self._stretch.path.nearest(snapshot.ego.x_m, snapshot.ego.y_m))
-            side = "left" if self._wished < 0 else "right"
-            goal = self._lanes.get((lane.id[0], lane.id[1], lane.id[2] + self._wished))
-            if goal is None:
-                self._say(snapshot, f"There is no lane to the {side}; I stay in this one.")
-                self._wished = 0
-                return
-            if goal.forbidden and not goal.emergency:
-                self._say(snapshot, f"The lane to the {side} ends; I stay in this one.")
-                self._wished = 0
-                return
-            there = self._stretch_from(goal)
-            hindrance = self._hindrance(snapshot, there.path, goal.width_m, _RESERVE_M)
-            if hindrance:
-                self._say(snapshot, f"The lane to the {side} is not free yet: {hindrance}")
-            elif self._change(snapshot, there):
-                self._before, self._stretch = self._stretch, there
-                self._say(snapshot, f"Changing to the {side} lane.")
+            return True
+        lane = _lane_beside(self._stretch, snapshot.ego)
+        if goal.id[:2] != lane.id[:2] or goal.id == lane.id:
+            return True
+        step = 1 if goal.id[2] > lane.id[2] else -1
+        beside = self._lanes.get((lane.id[0], lane.id[1], lane.id[2] + step))
+        if beside is None:
+            return False
+        side = _name_of(step)
+        if beside.forbidden and not beside.emergency:
+            self._say(snapshot, f"The lane to the {side} ends; I stay in this one.")
+            return False
+        there = self._stretch_from(beside)
+        hindrance = self._hindrance(snapshot, there.path, beside.width_m, _RESERVE_M)
+        if hindrance:
+            self._say(snapshot, f"The lane to the {side} is not free yet: {hindrance}")
+        elif self._change(snapshot, there):
+            self._before, self._stretch = self._stretch, there
+            self._say(snapshot, f"Changing to the {side} lane.")
+        return True
 
     def _go_on_or_back(self, snapshot: Snapshot) -> None:
         assert self._stretch is not None
@@ -303,7 +374,7 @@ class ParametersDriver:
         lane = there.lane_at(station)
         away = abs(there.path.offset(ego.x_m, ego.y_m, station))
         if away < 0.3:
-            self._before, self._wished = None, 0
+            self._before = None
         elif away > lane.width_m / 2.0 + ego.width_m / 2.0:  # all of the car is in its old lane
             hindrance = self._hindrance(snapshot, there.path, lane.width_m, 0.0)
             if hindrance and self._change(snapshot, self._before):
@@ -432,6 +503,15 @@ def drive_parameters(
         shield=shield,
     )
     return replace(episode, said=tuple(sorted((*episode.said, *driver.notes))))
+
+
+def _lane_beside(stretch: _Stretch, ego: VehicleState) -> LaneView:
+    """The lane of a stretch that is beside the car, or that the car is in."""
+    return stretch.lane_at(stretch.path.nearest(ego.x_m, ego.y_m))
+
+
+def _name_of(side: int) -> str:
+    return "left" if side < 0 else "right"
 
 
 def _highway_chassis(ego: VehicleState) -> Chassis:

@@ -13,6 +13,7 @@ from typing import Any
 
 from chauffeur.concept import (
     Causes,
+    Context,
     Feedback,
     Frame,
     History,
@@ -34,11 +35,14 @@ from chauffeur.concept import (
 )
 from chauffeur.concept.registry import load_plugin
 from chauffeur.describe import describe
+from chauffeur.describe.services.sources import Sources, SourceSettings
 from chauffeur.drive.effects import effect_of
 from chauffeur.drive.episode import Episode, Referee, run_episode
 from chauffeur.drive.loop import Memory, Stages, drive
 from chauffeur.drive.parameters import drive_parameters, shield_for
 from chauffeur.drive.recording import RecordedTrip
+from chauffeur.drive.surroundings import describing
+from chauffeur.memory.tolerant import TolerantMemory
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.programs import ProgramExecutor
@@ -106,6 +110,7 @@ class Session:
     Attributes:
         planner: Who plans.
         memory: Who remembers.
+        sources: Whom C is completed from; None for nobody.
         referee: Makes the judge of a trip; returning None drives freely.
         tell: Called with the loop's letters as they come, and with `frame` for each control period.
         setting: Whether S carries examples.
@@ -115,6 +120,7 @@ class Session:
 
     planner: Planner
     memory: Memory = field(default_factory=Forgetful)
+    sources: SourceSettings | None = None
     referee: RefereeMaker = _no_referee
     tell: Callable[[str, object], None] = _silent
     setting: Setting = "few-shot"
@@ -133,8 +139,8 @@ class Session:
         world = make_world(scenario)
         stages = Stages(
             world=world,
-            describe=describe,
-            memory=self.memory,
+            describe=await self._describing(),
+            memory=TolerantMemory(self.memory, partial(self.tell, "memory")),
             system=self._build_system,
             planner=self.planner,
             check=check_drive,
@@ -150,6 +156,12 @@ class Session:
             system=self._system,
             final=None if episode is None else episode.final,
         )
+
+    async def _describing(self) -> Callable[[Snapshot], Context]:
+        if self.sources is None:
+            return describe
+        async with Sources(self.sources) as sources:
+            return await describing(sources)
 
     def _build_system(self, limits: Limits) -> SystemMessage:
         self._system = build_system_message(self.setting, limits=limits)
@@ -230,12 +242,11 @@ def drive_policy(
     Raises:
         ScenarioError: The road has no such way, or this kind of policy drives no car here.
     """
+    shield = shield_for(world, limits) if shielded else None
     match policy:
         case Program():
-            shield = Shield(world.dt_s, limits) if shielded else None
             return drive_program(world, policy.source, referee, max_s, watch, library=policy.library, shield=shield)
         case Parameters():
-            shield = shield_for(world, limits) if shielded else None
             return drive_parameters(world, policy, referee, max_s=max_s, limits=limits, shield=shield, watch=watch)
         case _:
             raise ScenarioError(

@@ -19,6 +19,13 @@ class Memory(Protocol):
         """Up to `k` remembered interactions that bear on the present wish, most relevant first; never writes."""
         ...
 
+    def latest(self, person: PersonId, world: str, k: int) -> History:
+        """The newest interactions with feedback in a kind of world, newest first, whatever was wished; never writes.
+
+        Their similarity is -1: nothing was compared.
+        """
+        ...
+
     def remember(self, trip: Trip, feedback: Feedback | None = None) -> None:
         """Keep a trip under the person of its instruction; on return it is on disk."""
         ...
@@ -37,6 +44,10 @@ class Memory(Protocol):
 
     def erase(self, person: PersonId) -> bool:
         """Remove a person and all that is kept of them for good; False where there was nothing."""
+        ...
+
+    def sweep(self) -> int:
+        """Remove what is older than retention allows, of everyone; how many trips that were."""
         ...
 
     def people(self) -> tuple[PersonId, ...]:

@@ -65,8 +65,14 @@ _PHRASES = (
 _MOVES = tuple((re.compile(rf"\b(?:{phrase})\b"), tag) for phrase, tag in _PHRASES)
 _NEGATED = re.compile(r"\b(?:not|never|no|without|avoid|instead of)\b(?: \w+){0,4} ?$")
 
-_CONFLICT = 0.15
-"""What is left of the likeness of opposite wishes: enough to be found when nothing else is asked for."""
+CONFLICT = 0.15
+"""What is left of the likeness of opposite wishes: less than what is ever recalled."""
+
+TEXT_SHARE, MEANING_SHARE = 0.4, 0.6
+"""Of the likeness, where either wish has tags."""
+
+NUMBERS_SHARE, STEEPNESS = 0.15, 3.0
+"""What numbers weigh where both wishes have some, and how fast they part as they differ."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +116,11 @@ def tags_of(text: str) -> frozenset[str]:
     return frozenset(found)
 
 
+def opposed_to(tags: int) -> int:
+    """Bits of the tags that contradict any of some tags."""
+    return sum(_AGAINST[tag] for tag in TAGS if tags & _BIT[tag])
+
+
 def likeness(wish: Mark, texts: Vector, others: Iterable[Mark]) -> Iterator[float]:
     """0..1 for each remembered wish: by meaning where either has tags, by text otherwise.
 
@@ -118,19 +129,19 @@ def likeness(wish: Mark, texts: Vector, others: Iterable[Mark]) -> Iterator[floa
         texts: Cosine of each remembered wish's text with the present one's.
         others: The remembered wishes, in the same order.
     """
-    against = sum(_AGAINST[tag] for tag in TAGS if wish.tags & _BIT[tag])
+    against = opposed_to(wish.tags)
     for cosine, other in zip(texts.tolist(), others, strict=True):
         text = max(0.0, min(1.0, cosine))
         union = wish.tags | other.tags
         if union:
             same = (wish.tags & other.tags).bit_count() / union.bit_count()
-            meaning = 0.4 * text + 0.6 * same
+            meaning = TEXT_SHARE * text + MEANING_SHARE * same
         else:
             meaning = text
         near = _numbers(wish.quantities, other.quantities)
         if near is not None:
-            meaning = 0.85 * meaning + 0.15 * near
-        yield meaning * (_CONFLICT if against & other.tags else 1.0)
+            meaning = (1.0 - NUMBERS_SHARE) * meaning + NUMBERS_SHARE * near
+        yield meaning * (CONFLICT if against & other.tags else 1.0)
 
 
 def _features(text: str) -> Iterator[tuple[str, float]]:
@@ -164,4 +175,4 @@ def _numbers(a: tuple[tuple[str, float], ...], b: tuple[tuple[str, float], ...])
     pairs = [(x, y) for of_a, x in a for of_b, y in b if of_a == of_b]
     if not pairs:
         return None
-    return max(1.0 if x == y else math.exp(-3.0 * abs(x - y) / max(abs(x), abs(y))) for x, y in pairs)
+    return max(1.0 if x == y else math.exp(-STEEPNESS * abs(x - y) / max(abs(x), abs(y))) for x, y in pairs)

@@ -6,10 +6,14 @@ import json
 import logging
 import os
 import threading
+import time
+import weakref
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Final
 
 from chauffeur.concept import (
     NOBODY,
@@ -26,22 +30,50 @@ from chauffeur.memory.cipher import DatabaseError
 from chauffeur.memory.files import data_home, locked, private_directory, sync_directory
 from chauffeur.memory.keys import KeyRing
 from chauffeur.memory.privacy import Privacy, read_privacy
-from chauffeur.memory.profile import VERSION, Profile, create_profile, open_profile
-from chauffeur.memory.retrieval import Entry, rank
+from chauffeur.memory.profile import VERSION, Index, Profile, create_profile
+from chauffeur.memory.retrieval import UNCOMPARED, latest, nearest
 from chauffeur.memory.similarity import mark
+from chauffeur.memory.weather import weather_of
 
 _log = logging.getLogger(__name__)
-_CACHED_PEOPLE = 8
+
+_OPEN_PEOPLE: Final = 8
+"""So many profiles stay open, those used last."""
+
+_SETTLED_NS: Final = 100_000_000
+"""File times are coarse: a file that changed less than this before it was looked at may have changed again unseen."""
 
 
 def _utc_now() -> datetime:
     return datetime.now(UTC)
 
 
+@dataclass(slots=True)
+class _Opened:
+    """A profile that stays open.
+
+    Attributes:
+        profile: It.
+        index: Its columns.
+        key: What it was opened with.
+        looks: Device, number, size and time of its file when it was last used; None where they tell nothing.
+    """
+
+    profile: Profile
+    index: Index
+    key: bytes
+    looks: tuple[int, ...] | None
+
+    def close(self) -> None:
+        self.index.wipe()
+        self.profile.close()
+
+
 class VaultMemory:
     """Memory in encrypted files on this machine; safe for several processes and threads at once.
 
-    A file is open only while it is worked on, so another process may erase a profile at any time.
+    Files stay open from one piece of work to the next, and each piece of work begins with a look at them: another
+    process may write to a profile, replace it or erase it at any time.
     """
 
     def __init__(
@@ -69,7 +101,14 @@ class VaultMemory:
         self._privacy = read_privacy(root) if privacy is None else privacy
         self._clock = clock
         self._guard = threading.RLock()
-        self._indexes: dict[str, tuple[str, tuple[Entry, ...]]] = {}
+        self._opened: dict[str, _Opened] = {}
+        self._process = os.getpid()
+        weakref.finalize(self, _close_all, self._opened, self._process)
+
+    def close(self) -> None:
+        """Close all files and overwrite what was read of them; the next use opens them again."""
+        with self._guard:
+            _close_all(self._opened, self._process)
 
     def recall(self, person: PersonId, instruction: Instruction, context: Context, k: int) -> History:
         """As `Memory.recall`; similarity is set on every item."""
@@ -77,9 +116,20 @@ class VaultMemory:
         with self._reading(person) as profile:
             if profile is None:
                 return History()
-            entries = self._entries(profile, person)
-            nearest = rank(mark(instruction.text), context.situation.world, now, entries, k)
-            return History(tuple(profile.item(row, similarity) for row, similarity in nearest))
+            wish, place, since = mark(instruction.text), context.situation, self._since(now)
+            with profile.reading() as columns:
+                return History(
+                    profile.items(nearest(columns, wish, place.world, weather_of(place), now, k, since=since))
+                )
+
+    def latest(self, person: PersonId, world: str, k: int) -> History:
+        """As `Memory.latest`."""
+        with self._reading(person) as profile:
+            if profile is None:
+                return History()
+            with profile.reading() as columns:
+                rows = latest(columns, world, k, since=self._since(self._clock()))
+                return History(profile.items([(row, UNCOMPARED) for row in rows]))
 
     def remember(self, trip: Trip, feedback: Feedback | None = None) -> None:
         """As `Memory.remember`."""
@@ -118,7 +168,7 @@ class VaultMemory:
             return False
         with self._guard, self._errors(person), locked(self._lock, alone=True):
             alias = self._ring.alias(person)
-            self._indexes.pop(alias, None)
+            self._shut(alias)
             existed = self._ring.destroy(alias)
             for leftover in (*self._keys.glob(f"{alias}.*"), *self._profiles.glob(f"{alias}.*")):
                 leftover.unlink(missing_ok=True)
@@ -152,23 +202,14 @@ class VaultMemory:
     def _lock(self) -> Path:
         return self._profiles / "lock"
 
+    def _since(self, now: datetime) -> datetime | None:
+        """From when on trips count; None if all do."""
+        retention = self._privacy.retention
+        return None if retention is None else now - retention
+
     def _keep_from(self) -> str:
         retention = self._privacy.retention
         return "" if retention is None else _stamp(self._clock() - retention)
-
-    def _entries(self, profile: Profile, person: PersonId) -> tuple[Entry, ...]:
-        """The index of a profile, read again only after somebody wrote to it."""
-        alias = self._ring.alias(person)
-        edition, entries = self._indexes.pop(alias, ("", ()))
-        if edition != profile.edition:
-            entries = profile.entries()
-        self._indexes[alias] = (profile.edition, entries)
-        while len(self._indexes) > _CACHED_PEOPLE:
-            del self._indexes[next(iter(self._indexes))]
-        if self._privacy.retention is None:
-            return entries
-        keep_from = self._clock() - self._privacy.retention
-        return tuple(entry for entry in entries if entry.when >= keep_from)
 
     def _ensure(self, person: PersonId) -> None:
         """Make the profile unless it is there. Key first: a profile without one is never on disk."""
@@ -176,7 +217,7 @@ class VaultMemory:
         private_directory(self._keys)
         with self._errors(person):
             alias = self._ring.alias(person)
-            path = self._profiles / f"{alias}.db"
+            path = self._path(alias)
             if path.exists():
                 return
             with locked(self._lock, alone=True):
@@ -202,19 +243,64 @@ class VaultMemory:
     @contextmanager
     def _open(self, alias: str, person: str) -> Generator[Profile | None]:
         with self._guard, self._errors(person), locked(self._lock, alone=False):
-            path = self._profiles / f"{alias}.db"
+            self._leave_what_is_gone()
+            path = self._path(alias)
             if not path.exists():
                 yield None
                 return
-            key = self._ring.find(alias)
-            if key is None:
-                raise ProfileError(
-                    f"The profile of {person!r} has no key ({self._ring.path(alias)} is missing).",
-                    hint="Restore the key from a backup, or erase the profile to start afresh. "
-                    "Other profiles are not affected.",
-                )
-            with open_profile(path, key) as profile:
-                yield profile
+            try:
+                opened = self._current(alias, person)
+                yield opened.profile
+                opened.looks = _looks(path)
+            except BaseException:
+                self._shut(alias)  # which undoes what was half done
+                raise
+
+    def _key(self, alias: str, person: str) -> bytes:
+        key = self._ring.find(alias)
+        if key is None:
+            raise ProfileError(
+                f"The profile of {person!r} has no key ({self._ring.path(alias)} is missing).",
+                hint="Restore the key from a backup, or erase the profile to start afresh. "
+                "Other profiles are not affected.",
+            )
+        return key
+
+    def _current(self, alias: str, person: str) -> _Opened:
+        """The profile as it is on disk: opened anew unless the file is the one this process used last."""
+        path, key = self._path(alias), self._key(alias, person)
+        opened = self._opened.pop(alias, None)
+        if opened is None or opened.key != key or opened.looks is None or opened.looks != _looks(path):
+            index = Index() if opened is None else opened.index
+            if opened is not None:
+                opened.profile.close()
+            try:
+                opened = _Opened(Profile(path, key, index), index, key, None)
+            except BaseException:
+                index.wipe()
+                raise
+        self._opened[alias] = opened
+        while len(self._opened) > _OPEN_PEOPLE:
+            self._shut(next(iter(self._opened)))
+        return opened
+
+    def _leave_what_is_gone(self) -> None:
+        """Close the profiles that another process erased; nothing that was read of them stays."""
+        if os.getpid() != self._process:
+            # An open database must not be used, nor closed, on this side of a fork.
+            _inherited.extend(self._opened.values())
+            self._opened.clear()
+            self._process = os.getpid()
+        for alias in [alias for alias in self._opened if not self._path(alias).exists()]:
+            self._shut(alias)
+
+    def _shut(self, alias: str) -> None:
+        opened = self._opened.pop(alias, None)
+        if opened is not None:
+            opened.close()
+
+    def _path(self, alias: str) -> Path:
+        return self._profiles / f"{alias}.db"
 
     @contextmanager
     def _errors(self, person: str) -> Generator[None]:
@@ -227,6 +313,23 @@ class VaultMemory:
                 "file is busy or the disk full, try again. Other profiles are not affected.",
                 retryable=isinstance(error, OSError) or any(word in str(error) for word in ("locked", "full")),
             ) from error
+
+
+_inherited: list[_Opened] = []
+"""Profiles that were open in the process this one was forked from."""
+
+
+def _close_all(opened: dict[str, _Opened], process: int) -> None:
+    while opened and os.getpid() == process:
+        opened.popitem()[1].close()
+
+
+def _looks(path: Path) -> tuple[int, ...] | None:
+    """What tells that a file is still the same; None where it changed too recently to tell."""
+    found = path.stat()
+    if time.time_ns() - found.st_mtime_ns < _SETTLED_NS:
+        return None
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
 
 
 def _is_somebody(person: PersonId) -> bool:

@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chauffeur.concept import ConfigError, InstructionError, Plan, PlanRequest, Program, Thoughts, Usage
+from chauffeur.concept.addresses import Address
 from chauffeur.planners.base import OnText, Prose
 from chauffeur.planners.cache import Completion, ReplyCache, default_cache_dir, endpoint_key
-from chauffeur.planners.llm_address import Address, parse_address
+from chauffeur.planners.llm_address import parse_address
 from chauffeur.planners.llm_endpoint import Endpoint, Sampling
 from chauffeur.planners.llm_errors import timed_out
 from chauffeur.planners.llm_reply import MAX_REPLY_CHARS, Reply, read_reply, without_thinking

@@ -9,9 +9,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from chauffeur.concept.addresses import Address, read_key
 from chauffeur.planners.cache import Completion
-from chauffeur.planners.llm_address import PLACEHOLDER_KEY, Address, read_key
+from chauffeur.planners.llm_address import PLACEHOLDER_KEY
 from chauffeur.planners.llm_errors import (
+    KEY_VARIABLES,
     EndpointError,
     from_sdk,
     garbage,
@@ -121,7 +123,7 @@ class Endpoint:
         loop = asyncio.get_running_loop()
         if self._client is not None and self._client[0] is loop:
             return self._client[1]
-        found = read_key(self._address, self._environ)
+        found = self._found_key()
         if found is None and not self._address.local:
             raise missing_key(self._address.url)
         import openai
@@ -136,12 +138,15 @@ class Endpoint:
         self._client = (loop, client)
         return client
 
+    def _found_key(self) -> tuple[str, str] | None:
+        return read_key(self._address, KEY_VARIABLES, self._environ)
+
     def _key_variable(self) -> str | None:
-        found = read_key(self._address, self._environ)
+        found = self._found_key()
         return found[1] if found else None
 
     def _scrub(self, text: str) -> str:
-        found = read_key(self._address, self._environ)
+        found = self._found_key()
         return text.replace(found[0], "***") if found else text
 
     def _body(self, messages: list[Message], sampling: Sampling) -> dict[str, Any]:

@@ -5,8 +5,8 @@ safe while there is clear room to the side, or the rear one keeps a responsibili
 to blame: the one that came over to the other's side, or the rear one in a lane; and an ego that was wronged is to blame
 all the same if it did not brake with all it has. Where ways cross, and where a car comes towards the ego, the others go
 first: the ego is to blame for every such collision, unless it stood, and the other left its straight way to strike it.
-(To stand is not enough: a car that came to a stop across the lane of the oncoming traffic was once absolved.) What was
-unsafe from the beginning is nobody's.
+(To stand is not enough: a car that came to a stop across the lane of the oncoming traffic was once absolved.) Whoever
+rolls backwards into an ego that stands behind it is to blame for that. What was unsafe from the beginning is nobody's.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from chauffeur.concept import Frame, Snapshot, VehicleState
-from chauffeur.safety.shield.frame import Body, Lens, Scene
+from chauffeur.safety.shield.frame import CROSSING_RAD, Body, Lens, Scene
 from chauffeur.safety.shield.gaps import braking_gap_m, rss_gap_m
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
 
@@ -25,6 +25,7 @@ _FULL: Final = 0.9
 """Share of full braking that counts as braking with all one has."""
 _STILL_MPS: Final = 0.5
 _TOWARDS_MPS: Final = 0.05
+_ALONG: Final = math.cos(CROSSING_RAD)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +64,8 @@ def blame(
     if other is None:
         return Blame("nobody", None, None, "The ego crashed, but into nobody that is seen.")
     crossed = _pair(lens.look(last, last.ego.lane), other)
+    if final.ego.speed_mps < _STILL_MPS and _reversed(last, other):
+        return Blame("other", other, last.time_s, "The other reversed into the ego, which stood.")
     if crossed is not None and (crossed[1].crosses or crossed[1].along_mps < -_STILL_MPS):
         return _at_a_crossing(frames, final, other)
     looked = ((frame, _pair(lens.look(frame.snapshot, frame.snapshot.ego.lane), other)) for frame in frames)
@@ -101,6 +104,15 @@ def _at_a_crossing(frames: Sequence[Frame], final: Snapshot, other: int) -> Blam
         if found is not None and not _in_the_way(final.ego, found):
             return Blame("other", other, stood.time_s, "The ego stood clear of the way of the one that ran into it.")
     return Blame("ego", other, None, "The ego was in the way of one that crossed.")
+
+
+def _reversed(snapshot: Snapshot, other: int) -> bool:
+    """Whether another, in a lane of the ego's direction, rolls backwards against its own heading, towards the ego."""
+    ego = snapshot.ego
+    car = next((car for car in snapshot.others if car.id == other), None)
+    if car is None or car.speed_mps >= 0.0 or math.cos(car.heading_rad - ego.heading_rad) < _ALONG:
+        return False
+    return math.cos(car.heading_rad) * (ego.x_m - car.x_m) + math.sin(car.heading_rad) * (ego.y_m - car.y_m) < 0.0
 
 
 def _in_the_way(ego: VehicleState, other: VehicleState) -> bool:

@@ -13,8 +13,9 @@ Hotword = Literal["command", "evaluate"]
 HOTWORDS: Final[tuple[Hotword, ...]] = ("command", "evaluate")
 """Every hotword."""
 
-Expect = Literal["open", "command", "evaluate"]
-"""`open`: the microphone hears everything, so a hotword has to come first. Otherwise the button that was held."""
+Expect = Literal["open", "command", "evaluate", "answer"]
+"""`open`: the microphone hears everything, so a hotword has to come first. `answer`: the same, but yes or no may be
+said as well, without one. Otherwise the button that was held."""
 
 Status = Literal["heard", "no_hotword", "not_understood", "nothing", "failed"]
 """`heard`: there is a wish. `nothing`: no speech. `failed`: the engine did not answer. The others say themselves."""
@@ -63,6 +64,29 @@ class Recogniser(Protocol):
         ...
 
 
+class FollowingRecogniser(Recogniser, Protocol):
+    """An engine that goes along with an utterance while it is spoken, and so knows sooner what was said.
+
+    What it guesses on the way is not believed before it has been checked against the whole sound. For one stream.
+    """
+
+    def begin(self, expect: Expect) -> None:
+        """An utterance begins; the one before is forgotten."""
+        ...
+
+    def follow(self, samples: Samples) -> None:
+        """The next samples of it. Keeps nothing of the sound."""
+        ...
+
+    def guess(self) -> str:
+        """Words that were said so far, if they make a whole sentence; else empty."""
+        ...
+
+    def check(self, samples: Samples, expect: Expect, text: str) -> Transcript:
+        """Whether the whole utterance so far says exactly that: quicker than `recognise`, which asks what it says."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Timing:
     """Where the time went, in s.
@@ -71,7 +95,7 @@ class Timing:
         speech_s: From the first to the last voiced frame.
         wait_s: Silence that was waited for after the last of them, to be sure that it was the last.
         detect_s: Work of voice activity detection over the whole utterance. It runs while the person speaks.
-        recognise_s: Work of the engine, after the wait.
+        recognise_s: Work of the engine, as far as it was not done during the wait.
     """
 
     speech_s: float = 0.0
@@ -92,7 +116,7 @@ class Heard:
     Attributes:
         status: What became of it.
         text: The words without their hotword. Empty unless `heard`: what is not said to the car is not kept.
-        hotword: `command` or `evaluate`; None where neither was said and no button was held.
+        hotword: `command` or `evaluate`; None where neither was said and no button was held, as in a yes or no.
         button: Whether a button was held instead.
         engine: Name of the recogniser.
         confidence: How sure it is, 0 to 1; None where the engine does not say.
@@ -100,6 +124,8 @@ class Heard:
         reason: In words, unless `heard`.
         notes: What was wrong with the sound, in words.
         timing: Where the time went.
+        end_sample: Where in the stream its last voiced frame ended, in samples since the listener began.
+        again: The person went on after a part of this was given: it takes the place of that part.
     """
 
     status: Status
@@ -112,3 +138,5 @@ class Heard:
     reason: str = ""
     notes: tuple[str, ...] = ()
     timing: Timing = Timing()
+    end_sample: int = 0
+    again: bool = False

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-import ipaddress
 import json
 import math
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final, cast
-from urllib.parse import urlsplit
 
 import httpx
 
 from chauffeur.concept import ConfigError
+from chauffeur.concept.addresses import http_address, read_key
 from chauffeur.language.letters import clean
 from chauffeur.speech.audio import Samples, wave_bytes
 from chauffeur.speech.base import Expect, Transcript
@@ -36,7 +35,6 @@ _CONNECT_S: Final = 3.0
 _MOST_BYTES: Final = 64 * 1024
 _MOST_CHARS: Final = 1000
 _SAID_CHARS: Final = 200
-_LOCAL_SUFFIXES: Final = (".localhost", ".local", ".lan", ".internal", ".home.arpa")
 
 
 class EndpointRecogniser:
@@ -62,10 +60,10 @@ class EndpointRecogniser:
             ConfigError: Not an HTTP address, or a key would cross a public network unencrypted.
         """
         given = base_url or next((environ[name] for name in URL_VARIABLES if environ.get(name)), DEFAULT_URL)
-        self._url, local = _address(given)
-        self._key, self._key_variable = _key(environ)
-        if self._key and self._url.startswith("http://") and not local:
-            raise ConfigError(f"The key in {self._key_variable} would be sent unencrypted.", hint="Use https://.")
+        what, example = "The address of the speech endpoint", "http://host:8000/v1"
+        address = http_address(given, what, example=example, key_place=KEY_VARIABLES[0])
+        self._url = address.url
+        self._key, self._key_variable = read_key(address, KEY_VARIABLES, environ) or ("", "")
         if not (math.isfinite(timeout_s) and timeout_s > 0.0):
             raise ConfigError(f"A timeout of {timeout_s:g} s is none.", hint="Give seconds, e.g. 10.")
         self._model = model
@@ -212,37 +210,3 @@ def _message(body: bytes) -> str:
         if isinstance(found, dict):
             found = cast("dict[str, Any]", found).get(name, cast("dict[str, Any]", found))
     return found if isinstance(found, str) else ""
-
-
-def _address(given: str) -> tuple[str, bool]:
-    """(base URL that may be shown, whether it is on this machine or network by its form)."""
-    try:
-        parts = urlsplit(given.strip())
-        host, port = (parts.hostname or "").lower(), parts.port
-    except ValueError:
-        parts, host, port = urlsplit(""), "", None
-    if parts.scheme not in ("http", "https") or not host:
-        raise ConfigError("The address of the speech endpoint is not an HTTP address.", hint="E.g. http://host:8000/v1")
-    if parts.username or parts.password or parts.query or parts.fragment:
-        raise ConfigError(
-            f"The address for {host} carries more than host and path.", hint=f"Put a key into {KEY_VARIABLES[0]}."
-        )
-    shown = f"[{host}]" if ":" in host else host
-    url = f"{parts.scheme}://{shown}{'' if port is None else f':{port}'}{parts.path.rstrip('/')}"
-    try:
-        numbers = ipaddress.ip_address(host)
-    except ValueError:
-        return url, "." not in host or host.endswith(_LOCAL_SUFFIXES)
-    return url, numbers.is_private or numbers.is_loopback or numbers.is_link_local
-
-
-def _key(environ: Mapping[str, str]) -> tuple[str, str]:
-    """(key, name of its variable); empty where there is none."""
-    for name in KEY_VARIABLES:
-        key = environ.get(name, "").strip()
-        if not key:
-            continue
-        if not key.isascii() or not key.isprintable() or " " in key:
-            raise ConfigError(f"{name} holds characters no key has.", hint="Set it again, without line breaks.")
-        return key, name
-    return "", ""

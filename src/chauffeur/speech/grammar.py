@@ -50,6 +50,19 @@ _WEIGHTS: Final = (3.8, 1.74, 0.24, 2.64)
 _SURE: Final = 0.5
 """Confidence from which words are believed."""
 
+_SURE_AHEAD: Final = 0.9
+_SURE_SAFE: Final = 0.7
+"""The same for words that were guessed while they were spoken (a check of given words passes more easily), and of these
+for words that mean nothing but to go slower or to stop."""
+
+_BEGUN: Final = 2
+"""Words at the end of a guess that may be taken back; whether the rest was said is checked against the sound."""
+
+_FIRST_PEAK: Final = 0.33
+"""Level that the first moments of an utterance are brought to: it mostly becomes louder."""
+
+_MOST_GAIN: Final = 30.0
+
 
 class GrammarRecogniser:
     """Hears sentences of a closed grammar, in English, on this machine, and says so when it hears something else.
@@ -81,21 +94,29 @@ class GrammarRecogniser:
         self._sure = sure
         self._version = version("pocketsphinx")
         folder = Path(library.get_model_path("en-us"))
-        config = library.Config(
-            hmm=str(folder / "en-us"),
-            dict=str(folder / "cmudict-en-us.dict"),
-            lm=None,
-            cmn="batch",  # the level of the whole utterance, not of what came before it
-            bestpath=False,  # a second search, through the lattice, takes as long again and changes little
-            loglevel="FATAL",
-        )
-        self._decoder: Any = library.Decoder(config)
+
+        def decoder(level: str) -> Any:
+            config = library.Config(
+                hmm=str(folder / "en-us"),
+                dict=str(folder / "cmudict-en-us.dict"),
+                lm=None,
+                cmn=level,
+                bestpath=False,  # a second search, through the lattice, takes as long again and changes little
+                loglevel="FATAL",
+            )
+            return library.Decoder(config)
+
+        self._decoder: Any = decoder("batch")  # the level of the whole utterance, not of what came before it
         unknown = sorted(word for word in self.grammar.words() if self._decoder.lookup_word(word) is None)
         if unknown:
             raise DataError(f"The pronouncing dictionary does not have {', '.join(unknown[:5])}.")
         for rule in self.grammar.public:
             self._decoder.add_fsg(rule, self._decoder.parse_jsgf(self.grammar.text, f"{self.grammar.name}.{rule}"))
         self._decoder.add_allphone_file(_PHONES, None)
+        self._make_follower = lambda: decoder("live")
+        self._follower: Any = None
+        self._expect = ""
+        self._gain = 0.0
         # One decoder, one utterance at a time.
         self._lock = threading.Lock()
 
@@ -127,6 +148,61 @@ class GrammarRecogniser:
             return Transcript("", confidence, to_confirm=True, reason="That sounded like something else than driving.")
         return Transcript(text, confidence, to_confirm=not self.safe(text))
 
+    # Following (base.FollowingRecogniser) ----------------------------------------------------------------------------
+
+    def begin(self, expect: Expect) -> None:
+        """An utterance begins; the one before is forgotten. The first time takes a moment: 30 MB more."""
+        if self._follower is None:
+            self._follower = self._make_follower()
+            for rule in self.grammar.public:
+                parsed = self._follower.parse_jsgf(self.grammar.text, f"{self.grammar.name}.{rule}")
+                self._follower.add_fsg(rule, parsed)
+        else:
+            self._end_following()
+        self._follower.reinit_feat()
+        self._follower.activate_search(expect)
+        self._follower.start_utt()
+        self._expect, self._gain = expect, 0.0
+
+    def follow(self, samples: Samples) -> None:
+        """The next samples of it: some 10 % of their length in CPU time."""
+        sound = to_float(samples)
+        if self._gain == 0.0:
+            peak = float(np.abs(sound).max(initial=0.0))
+            self._gain = min(_MOST_GAIN, max(1.0, _FIRST_PEAK / max(peak, _LEAST)))
+        sound *= self._gain
+        sound += np.random.default_rng(0).standard_normal(len(sound), dtype=np.float32) * np.float32(_DITHER)
+        self._follower.process_raw(to_int16(sound).view(np.uint8), full_utt=False)
+
+    def guess(self) -> str:
+        """Words that were said so far, if they make a whole sentence of the grammar; else empty."""
+        best = self._follower.hyp()
+        words = [] if best is None else str(best.hypstr).split()
+        # On the way the best path often has a word begun that is not there in the end: "slow down a".
+        whole = (" ".join(words[:end]) for end in range(len(words), max(0, len(words) - _BEGUN - 1), -1))
+        return next((text for text in whole if self.grammar.matches(self._expect, text)), "")
+
+    def check(self, samples: Samples, expect: Expect, text: str) -> Transcript:
+        """Whether the whole utterance so far says exactly that sentence of the grammar."""
+        with self._lock:
+            sound = _levelled(samples)
+            try:
+                self._decoder.set_align_text(text)
+                found, words = self._searched(sound)
+                phones = self._search(_PHONES, sound)[1] if found else ()
+            finally:
+                sound.fill(0)
+                self._forget()
+        confidence = _confidence(_features(words, _per_frame(phones, len(samples))))
+        safe = self.safe(text)
+        if not found or confidence < (_SURE_SAFE if safe else _SURE_AHEAD) or not self.grammar.matches(expect, text):
+            return Transcript("", confidence, to_confirm=True, reason="It is not certain yet what was said.")
+        return Transcript(text, confidence, to_confirm=not safe)
+
+    def _end_following(self) -> None:
+        with contextlib.suppress(RuntimeError):  # there is none
+            self._follower.end_utt()
+
     def features(self, samples: Samples, expect: Expect = "open") -> tuple[str, npt.NDArray[np.float64]]:
         """(best sentence or half sentence, what its confidence is computed from), whatever comes of it: for fitting."""
         with self._lock:
@@ -150,8 +226,12 @@ class GrammarRecogniser:
 
     def _search(self, search: str, sound: Samples) -> tuple[str, tuple[tuple[str, int, int, float], ...]]:
         """(sentence, segments as (word, first frame, frame after the last, likelihood)) of one pass."""
-        self._decoder.reinit_feat()  # else what was heard before changes what is heard now
         self._decoder.activate_search(search)
+        return self._searched(sound)
+
+    def _searched(self, sound: Samples) -> tuple[str, tuple[tuple[str, int, int, float], ...]]:
+        """The same, of the search that was set."""
+        self._decoder.reinit_feat()  # else what was heard before changes what is heard now
         self._decoder.start_utt()
         self._decoder.process_raw(sound.view(np.uint8), full_utt=True)
         self._decoder.end_utt()

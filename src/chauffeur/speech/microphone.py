@@ -16,8 +16,10 @@ from chauffeur.speech.errors import MicrophoneError
 SILENT_S: Final = 3.0
 """A microphone that gives nothing for this long is taken to be gone: some drivers never say so."""
 
-_CHUNK_S: Final = 0.1
-_WAITING: Final = 50
+_CHUNK_S: Final = 0.04
+"""Short: what is said is heard half of this later on average."""
+
+_WAITING: Final = 125
 """Chunks that may wait (5 s); when nobody takes them, the newest are dropped."""
 
 

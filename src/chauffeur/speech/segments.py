@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Final
 
 import numpy as np
@@ -45,19 +45,28 @@ class Utterance:
         speech_s: From the first to the last voiced frame.
         wait_s: Silence that was waited for after the last voiced frame.
         detect_s: Time that voice activity detection took for it.
+        end_sample: Where in the stream its last voiced frame ended, in samples.
         cut: Whether it was longer than allowed, so that its end is missing.
     """
 
-    __slots__ = ("cut", "detect_s", "samples", "speech_s", "wait_s")
+    __slots__ = ("cut", "detect_s", "end_sample", "samples", "speech_s", "wait_s")
 
     def __init__(
-        self, samples: Samples, *, speech_s: float, wait_s: float = 0.0, detect_s: float = 0.0, cut: bool = False
+        self,
+        samples: Samples,
+        *,
+        speech_s: float,
+        wait_s: float = 0.0,
+        detect_s: float = 0.0,
+        end_sample: int = 0,
+        cut: bool = False,
     ) -> None:
         """Take the samples over; they are overwritten by `erase`."""
         self.samples = samples
         self.speech_s = speech_s
         self.wait_s = wait_s
         self.detect_s = detect_s
+        self.end_sample = end_sample
         self.cut = cut
 
     def erase(self) -> None:
@@ -91,6 +100,7 @@ class Segmenter:
         self._kept: Samples = np.zeros(self._most * FRAME, np.int16)
         self._rest = bytearray()
         self._frames = 0
+        self._passed = 0
         self._begin()
 
     @property
@@ -103,13 +113,37 @@ class Segmenter:
         """Whether an utterance is going on."""
         return self._speaking
 
+    @property
+    def quiet_frames(self) -> int:
+        """Frames without voice since the last voiced one of the utterance that is going on; 0 while there is none."""
+        return self._quiet if self._speaking else 0
+
+    @property
+    def end_sample(self) -> int:
+        """Where in the stream the last voiced frame of the utterance that is going on ended."""
+        return self._passed - self._quiet * FRAME
+
+    def frames_from(self, first: int) -> Samples:
+        """Samples of the utterance that is going on, from a frame of it to now; a view that is good until the next one.
+
+        Empty while there is none.
+        """
+        return self._kept[first * FRAME : self._frames * FRAME] if self._speaking else self._kept[:0]
+
+    def so_far(self) -> Utterance | None:
+        """A copy of the utterance that is going on, which goes on; None if there is too little voice in it yet."""
+        return self._take(waited=self._quiet) if self._speaking else None
+
     def push(self, chunk: bytes | bytearray | memoryview | Samples) -> list[Utterance]:
         """Take sound, and give the utterances that ended in it.
 
         Args:
             chunk: Samples, or their bytes (16 bit, little-endian), of any length; half a sample waits for its rest.
         """
-        found: list[Utterance] = []
+        return [utterance for utterance in self.steps(chunk) if utterance is not None]
+
+    def steps(self, chunk: bytes | bytearray | memoryview | Samples) -> Iterator[Utterance | None]:
+        """The same frame by frame: for each frame the utterance that ended with it, or None."""
         view = memoryview(_bytes(chunk))
         size = 2 * FRAME
         start = 0
@@ -118,11 +152,13 @@ class Segmenter:
             frame = bytes(self._rest) + bytes(view[start : start + need])
             start += need
             self._rest.clear()
-            utterance = self._frame(np.frombuffer(frame, "<i2").astype(np.int16))
-            if utterance is not None:
-                found.append(utterance)
+            self._passed += FRAME
+            yield self._frame(np.frombuffer(frame, "<i2").astype(np.int16))
         self._rest += view[start:]
-        return found
+
+    def skip(self, length: int) -> None:
+        """So many bytes of the stream are not heard."""
+        self._passed += length // 2
 
     def flush(self) -> list[Utterance]:
         """The stream ends: give the utterance that was going on, if it is one."""
@@ -134,6 +170,7 @@ class Segmenter:
         """Overwrite what is held and begin anew."""
         self._detector.reset()
         self._kept.fill(0)
+        self.skip(len(self._rest))
         self._rest[:] = bytes(len(self._rest))
         self._rest.clear()
         self._begin()
@@ -210,6 +247,7 @@ class Segmenter:
             speech_s=(self._last - self._first) * FRAME_S,
             wait_s=waited * FRAME_S,
             detect_s=self._detect_s,
+            end_sample=self._passed - self._quiet * FRAME,
             cut=cut,
         )
 

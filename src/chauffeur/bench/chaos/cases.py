@@ -67,7 +67,7 @@ _MEMORY: Final = (
     "wishes-early-clock", "wishes-late-clock", "wishes-dropped", "wishes-flood", "wishes-forged", "frozen-snapshot",
     "orders-garbage", "orders-nonsense", "orders-replayed", "orders-flood", "requests-garbage", "requests-flood",
     "policy-events-garbage", "policy-events-flood", "planner-events-garbage", "planner-events-flood",
-    "checkpoints-garbage",
+    "checkpoints-garbage", "hand-garbage",
 )  # fmt: skip
 
 KINDS: Final[tuple[Kind, ...]] = (

@@ -122,6 +122,7 @@ def _wish(vandal: Vandal, **changes: Any) -> bytes | None:
     fields: dict[str, Any] = {
         "trip": trip, "tick": tick, "plan": "", "issued_ns": time.monotonic_ns(), "expires_ns": (1 << 63) - 1,
         "state": "running", "line": 1, "speed": 20.0, "headway": 1.5, "lane": None, "turn": None, "served": [],
+        "hands": 0, "parameters": None,
     }  # fmt: skip
     newest = vandal.latest("wishes")
     if newest is not None:
@@ -138,6 +139,8 @@ def _nonsense(vandal: Vandal, rng: np.random.Generator) -> bytes | None:
         {"headway": float("nan")}, {"headway": -1.0}, {"headway": 10**400}, {"lane": ["c", "d", 99]}, {"lane": "left"},
         {"turn": "up"}, {"served": list(range(300))}, {"state": "flying"}, {"tick": -1}, {"tick": 1 << 70},
         {"plan": "x" * 500}, {"line": 1.5}, {"issued_ns": None}, {"expires_ns": "never"}, {"trip": True},
+        {"hands": -1}, {"hands": "two"}, {"parameters": {"speed": -1.0}}, {"parameters": [20.0, 8.0, 2.0]},
+        {"parameters": {"speed": 1e9, "ahead": float("nan"), "ratio": 1.0, "lane": 9, "route": "", "origin": None}},
     ]  # fmt: skip
     return _wish(vandal, **changes[int(rng.integers(len(changes)))])
 
@@ -278,6 +281,7 @@ DEEDS: Final[dict[str, Deed]] = {
     "planner-events-garbage": _garbage("planner_events"),
     "planner-events-flood": _events("planner_events", ("planned", "unplanned", "declined", "planning"), 0.0005),
     "checkpoints-garbage": _garbage("checkpoints"),
+    "hand-garbage": _garbage("hand"),
 }
 """Deeds by name."""
 

@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from statistics import fmean, pvariance
 from typing import Final
 
 from chauffeur.concept import ScenarioError
@@ -121,12 +122,10 @@ def statistics_of(
     """
     if len(speeds_mps) < 2 or len(accelerations_mps2) < 2:
         raise ScenarioError("A drive of less than two control periods cannot be scored.", hint="Let it drive longer.")
-    mean = math.fsum(speeds_mps) / len(speeds_mps)
-    variance = math.fsum((speed - mean) ** 2 for speed in speeds_mps) / len(speeds_mps)
     jerks = [abs(after - before) / dt_s for before, after in pairwise(accelerations_mps2)]
     return Statistics(
         min_ttc_s=min((each for each in ttc_s if each is not None), default=None),
-        speed_variance=variance,
-        mean_abs_acceleration_mps2=math.fsum(map(abs, accelerations_mps2)) / len(accelerations_mps2),
-        mean_abs_jerk_mps3=math.fsum(jerks) / len(jerks),
+        speed_variance=pvariance(speeds_mps),
+        mean_abs_acceleration_mps2=fmean(map(abs, accelerations_mps2)),
+        mean_abs_jerk_mps3=fmean(jerks),
     )

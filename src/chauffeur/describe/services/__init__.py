@@ -6,6 +6,8 @@ from chauffeur.describe.services.readings import Position, Reading, Unknown
 from chauffeur.describe.services.road_map import RoadMap
 from chauffeur.describe.services.rules import Rules, load_rules, packaged_regions
 from chauffeur.describe.services.settings import ServiceSettings
+from chauffeur.describe.services.sourced import with_sources
+from chauffeur.describe.services.sources import Sources, SourceSettings, read_sources
 from chauffeur.describe.services.surroundings import Surroundings, with_surroundings
 
 __all__ = [
@@ -15,10 +17,14 @@ __all__ = [
     "RoadMap",
     "Rules",
     "ServiceSettings",
+    "SourceSettings",
+    "Sources",
     "Surroundings",
     "Unknown",
     "load_road_map",
     "load_rules",
     "packaged_regions",
+    "read_sources",
+    "with_sources",
     "with_surroundings",
 ]

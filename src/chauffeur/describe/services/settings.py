@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import ipaddress
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
-from urllib.parse import urlsplit
 
-from chauffeur.concept import ConfigError
+from chauffeur.concept import ConfigError, addresses
+from chauffeur.concept.addresses import Address, http_address
 
 Online = Literal["weather", "map", "traffic"]
 """Services that are reached over the network."""
@@ -54,7 +53,7 @@ class ServiceSettings:
         if unknown:
             raise ConfigError(f"There is no online service {unknown[0]!r}.", hint=f"Known: {', '.join(ONLINE)}.")
         for name in ("weather_url", "map_url", "traffic_url"):
-            object.__setattr__(self, name, _checked(name, getattr(self, name)))
+            object.__setattr__(self, name, _address(name, getattr(self, name)).url)
         if not 0.0 < self.patience_s <= 60.0:
             raise ConfigError(f"patience_s is {self.patience_s:g}.", hint="Give seconds, above 0 and at most 60.")
         if not 0 <= self.weather_decimals <= 5:
@@ -67,36 +66,9 @@ def read_key(variable: str, url: str, environ: Mapping[str, str]) -> str | None:
     Raises:
         ConfigError: It cannot be a key, or would cross a public network unencrypted. Its text is never shown.
     """
-    key = environ.get(variable, "").strip()
-    if not key:
-        return None
-    if not key.isascii() or not key.isprintable() or " " in key:
-        raise ConfigError(f"{variable} holds characters no API key has.", hint="Set it again, without line breaks.")
-    if url.startswith("http://") and not _own(urlsplit(url).hostname or ""):
-        raise ConfigError(f"The key in {variable} would be sent to {url} unencrypted.", hint="Use an https:// address.")
-    return key
+    found = addresses.read_key(_address("The service's address", url), (variable,), environ)
+    return None if found is None else found[0]
 
 
-def _checked(name: str, given: str) -> str:
-    try:
-        parts = urlsplit(given.strip())
-        host, port = (parts.hostname or "").lower(), parts.port
-    except ValueError:
-        host, port, parts = "", None, urlsplit("")
-    if parts.scheme not in ("http", "https") or not host:
-        raise ConfigError(f"{name} is not an HTTP address.", hint="Give one such as http://localhost:8080.")
-    if parts.username or parts.password or parts.query or parts.fragment:
-        raise ConfigError(
-            f"{name} carries more than host and path.", hint="Keys come from environment variables, not addresses."
-        )
-    shown = f"[{host}]" if ":" in host else host
-    return f"{parts.scheme}://{shown if port is None else f'{shown}:{port}'}{parts.path.rstrip('/')}"
-
-
-def _own(host: str) -> bool:
-    """Whether a host is on this machine or network, by its form."""
-    try:
-        address = ipaddress.ip_address(host)
-    except ValueError:
-        return "." not in host or host.endswith((".localhost", ".local", ".lan", ".internal", ".home.arpa"))
-    return address.is_private or address.is_loopback or address.is_link_local
+def _address(what: str, given: str) -> Address:
+    return http_address(given, what, example="http://localhost:8080")

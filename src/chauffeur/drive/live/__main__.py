@@ -57,11 +57,11 @@ def _control(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     from chauffeur.drive.live.realtime import Ticker, become_realtime, punctuality
 
     world = _world(settings)
-    rings = Rings(ring(folder, "wishes"), ring(folder, "observations"), ring(folder, "reports"))
+    rings = Rings(ring(folder, "wishes"), ring(folder, "observations"), ring(folder, "reports"), ring(folder, "hand"))
     control = Control(world, settings.starts, rings, speed=settings.speed)
     control.warm_up()
     allowed = become_realtime(settings.realtime)
-    for each in (rings.wishes, rings.observations, rings.reports):
+    for each in (rings.wishes, rings.observations, rings.reports, rings.hand):
         each.touch_pages()
     _ready(folder, "control")
     ticker = Ticker(control.dt_s / settings.speed)
@@ -121,11 +121,14 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     import asyncio
     import importlib
 
+    from chauffeur.describe.services.sources import read_sources
     from chauffeur.drive.live.mirror import Mirror
     from chauffeur.drive.live.planning import Planning, PlanningRings
     from chauffeur.drive.loop import Memory
     from chauffeur.drive.session import Forgetful
+    from chauffeur.memory.choice import open_memory
     from chauffeur.planners.registry import make_planner
+    from chauffeur.planners.talk2drive.recent import fitting
 
     world = _world(settings)
     mirror = Mirror(world, settings.starts, ring(folder, "observations"))
@@ -134,12 +137,14 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     )
     options = {} if settings.base_url is None else {"base_url": settings.base_url}
     planner = make_planner(settings.planner, **options)
-    memory: Memory = load_plugin("chauffeur.memories", settings.memory)() if settings.memory else Forgetful()
+    sources = read_sources(Path(settings.services)) if settings.services else None
+    memory: Memory = fitting(open_memory(settings.memory), settings.planner) if settings.memory else Forgetful()
     planning = Planning(
         mirror,
         rings,
         planner,
         memory,
+        sources=sources,
         setting="zero-shot" if settings.setting == "zero-shot" else "few-shot",
         speed=settings.speed,
     )

@@ -5,7 +5,8 @@ nor raises. A session that was killed leaves its open wishes behind; `unanswered
 
 Besides the records of any drive (`drive/auditing.py`), each with the id of its wish: `verdict` of `live`, whether a
 plan was started; `outcome`, what became of a wish, and of the drive; `context`, with a `letter`, C and H of a plan,
-and, with an `event`, what happened in between: one of the events of a wish, `replaced`, `rung` or `settings`.
+and, with an `event`, what happened in between: one of the events of a wish, `replaced`, `rung`, `taken_over` or
+`settings`.
 """
 
 from __future__ import annotations
@@ -92,6 +93,8 @@ class Books:
         self._people: dict[str, str] = {}
         self._rung: Rung = "follow"
         self._rungs: Counter[Rung] = Counter()
+        self._taken_over = False
+        self._takeovers = 0
         self._tick = -1
         self._outcome_written = False
 
@@ -180,6 +183,10 @@ class Books:
             report.state,
             report.interventions,
         )
+        if report.taken_over != self._taken_over:
+            self._taken_over = report.taken_over
+            self._takeovers += report.taken_over
+            self._note("taken_over", {"on": report.taken_over, "tick": report.tick, "speed_mps": report.speed_mps})
         before, self._rung = self._rung, report.rung
         if before != report.rung and not {before, report.rung} <= _DRIVEN:
             self._note("rung", {"wish": report.plan, "rung": report.rung, "age_s": report.age_s, "tick": report.tick})
@@ -230,6 +237,7 @@ class Books:
                     "outcome": outcome,
                     "duration_s": round((self._tick + 1) * self._dt_s, 6),
                     "periods_by_rung": dict(self._rungs),
+                    "takeovers": self._takeovers,
                     **body,
                 },
             )

@@ -2,6 +2,8 @@
 
 It knows the world, the driver, the shield and the ladder of fallbacks. It reads the policy's newest wish without ever
 waiting for it, believes nothing of it that it cannot check, and goes on whatever has become of every other process.
+Wishes go through the world's own driver; parameters are driven with pure pursuit in its place (drive/parameters.py).
+While the person has the wheel, the policy is not listened to.
 """
 
 from __future__ import annotations
@@ -15,13 +17,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from chauffeur.concept import Command, Snapshot, Wishes
+from chauffeur.concept import Command, Parameters, Snapshot, Wishes
 from chauffeur.drive.actuate import Actuated, actuate
 from chauffeur.drive.live.ladder import Ladder
-from chauffeur.drive.live.messages import MessageError, Observation, Report, Rung, Wish
+from chauffeur.drive.live.messages import MessageError, Observation, Report, Rung, Steered, Wish
 from chauffeur.drive.live.realtime import Ticker
 from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
+from chauffeur.drive.live.wheel import Wheel, pressed
+from chauffeur.drive.parameters import LotShield, ParametersDriver, shield_for
 from chauffeur.safety.bounds import bounded
 from chauffeur.safety.shield import Shield
 from chauffeur.worlds.base import Driver, MirroredWorld
@@ -43,6 +47,7 @@ class Rings:
     wishes: Ring
     observations: Ring
     reports: Ring
+    hand: Ring
 
 
 class Control:
@@ -72,10 +77,19 @@ class Control:
         self._tick = 0
         self._heard = 0
         self._wish: Wish | None = None
+        self._alone_since = 0
+        """Period from which nobody has wished anything."""
+        self._wheel = Wheel(rings.hand, clock_ns)
+        self._pursuit: ParametersDriver | None = None
+        self._bound: tuple[str, Steered] | None = None
+        self._unbound: tuple[str, Steered] | None = None
+        """Parameters that cannot be driven here: tried once."""
         self._ladder = Ladder()
         self._shield: Shield | None = None
         self._driver: Driver | None = None
         self._held = Wishes()
+        self._steering = 0.0
+        """Angle of the wheel as the vehicle has it."""
         self._now: Snapshot | None = None
         self._refused: Counter[str] = Counter()
         self._faults = 0
@@ -100,15 +114,21 @@ class Control:
         while driving; then forget it."""
         start = self._starts[0]
         self._world.reset(start.scenario, start.seed)
-        driver, shield = self._world.driver(), Shield(self._world.dt_s, start.limits)
-        for rung in range(WARM_UP_PERIODS):
+        driver, shield = self._world.driver(), shield_for(self._world, start.limits)
+        pursuit = ParametersDriver(self._world, Parameters(0.0, 10.0, 1.0), limits=start.limits)
+        for period in range(WARM_UP_PERIODS):
             if self._world.ended:
                 break
             snapshot = self._world.snapshot()
-            ladder_wishes = self._ladder.choose(float(rung), None, math.inf, snapshot)[1]
+            ladder_wishes = self._ladder.choose(float(period), None, math.inf, snapshot)[1]
             wishes, _ = bounded(ladder_wishes, start.limits, self._limit_mps(ladder_wishes, snapshot))
-            settled = driver.settle(wishes)
-            actuate(self._world, snapshot, driver.command(settled), settled.target_lane, shield)
+            if period < WARM_UP_PERIODS // 2:
+                settled = driver.settle(wishes)
+                command = driver.command(settled)
+            else:
+                settled = pursuit.wishes(wishes)
+                command = pursuit.command()
+            actuate(self._world, snapshot, command, settled.target_lane, shield)
             self._world.observation()
 
     def begin_trip(self) -> bool:
@@ -121,10 +141,9 @@ class Control:
         self._world.reset(start.scenario, start.seed)
         self._driver = self._world.driver()
         self._held = self._driver.initial_wishes()
-        self._shield = Shield(self._world.dt_s, start.limits)
-        self._ladder = Ladder()
-        self._wish = None
-        self._tick = 0
+        self._shield = shield_for(self._world, start.limits)
+        self._tick, self._steering = 0, 0.0
+        self._let_go()
         self._now = self._world.snapshot()
         self._show()
         return True
@@ -135,20 +154,26 @@ class Control:
         start = self._starts[self._trip - 1]
         rung: Rung = "keep"
         clipped: tuple[str, ...] = ()
+        said: tuple[str, ...] = ()
         age_s = 0.0
         snapshot, wishes = self._now, self._held
         assert snapshot is not None, "no trip was begun"
         try:
-            age_s = self._hear()
+            said = self._hear_hand(snapshot)
+            if not self._wheel.taken:
+                age_s = self._hear(start)
             rung, wishes = self._choose(at_s, age_s, snapshot)
             wishes, clipped = bounded(wishes, start.limits, self._limit_mps(wishes, snapshot))
-            done = self._act(snapshot, wishes)
-            self._held = wishes
+            done, settled, told = self._act(rung, snapshot, wishes)
+            wishes = wishes if self._pursuit is None else settled
+            said += told
+            self._held = settled if rung == "hand" else wishes
         except Exception:  # noqa: BLE001 - whatever it is, the car is braked in this period and control goes on
             _log.exception("a control period failed")
             self._faults += 1
             done = self._brake(snapshot)
         self._tick += 1
+        self._steering = done.applied.steering_rad
         self._now = self._world.snapshot()
         outcome = self._outcome(snapshot, self._now, start)
         wish = self._wish
@@ -173,6 +198,8 @@ class Control:
             lane=snapshot.ego.lane,
             ended=bool(outcome),
             outcome=outcome,
+            taken_over=self._wheel.taken,
+            said=said,
         )
         self._show()
         self._report(report)
@@ -185,23 +212,55 @@ class Control:
         except ValueError:
             self._rings.reports.write(replace(report, interventions=(), refused={}).encode())
 
-    def _hear(self) -> float:
+    def _let_go(self) -> None:
+        """Nobody wishes anything any more."""
+        self._wish = None
+        self._pursuit = self._bound = self._unbound = None
+        self._ladder = Ladder()
+        self._alone_since = self._tick
+
+    def _hear_hand(self, snapshot: Snapshot) -> tuple[str, ...]:
+        """Who has the wheel, and what the person at it wishes; returns what there is to tell them."""
+        assert self._driver is not None
+        hands = self._wheel.hands
+        keys = self._wheel.hear(self._refused)
+        if self._wheel.hands != hands:
+            # What is, is kept: speed and lane; and the way, where a crossing is ahead.
+            held, self._held = self._held, self._driver.initial_wishes()
+            self._held = replace(
+                self._held, target_lane=snapshot.ego.lane, turn=held.turn, served_stops=held.served_stops
+            )
+            self._let_go()
+        said: list[str] = []
+        for key in keys:
+            self._held, text = pressed(key, self._held, snapshot, self._world.perception())
+            said += [text] if text else []
+        return tuple(said)
+
+    def _hear(self, start: Start) -> float:
         """Take in the policy's newest wish, if it is one; returns the age of what is followed, in vehicle time."""
         message = self._rings.wishes.latest()
         if message is not None and message.number != self._heard:
             self._heard = message.number
             try:
-                self._wish = self._believed(Wish.decode(message.payload))
+                wish = self._believed(Wish.decode(message.payload))
+                if wish is not None:
+                    self._bind(wish, start)
+                    self._wish = wish
             except MessageError as error:
                 self._refused[str(error)] += 1
         if self._wish is None:
-            return self._tick * self.dt_s
+            return (self._tick - self._alone_since) * self.dt_s
         # What was wished for an old instant is old, however lately it was written: the policy may see a frozen picture.
         since_issue_s = (self._clock_ns() - self._wish.issued_ns) * 1e-9 * self._speed
         return max(0.0, since_issue_s, (self._tick - self._wish.tick) * self.dt_s)
 
-    def _believed(self, wish: Wish) -> Wish:
-        """The wish, if it can be meant for now. Raises MessageError."""
+    def _believed(self, wish: Wish) -> Wish | None:
+        """The wish, if it can be meant for now; None if it was made before the wheel last changed hands.
+
+        Raises:
+            MessageError: It cannot be meant for now.
+        """
         if wish.trip != self._trip:
             raise MessageError("another trip")
         if wish.tick > self._tick:
@@ -210,14 +269,44 @@ class Control:
             raise MessageError("issued in the future")
         if self._wish is not None and wish.issued_ns < self._wish.issued_ns:
             raise MessageError("older than the one before")
+        if wish.hands > self._wheel.hands:
+            raise MessageError("of hands to come")
+        if wish.hands < self._wheel.hands:
+            return None
         lane = wish.wishes.target_lane
         if lane is not None and not self._world.perception().has_lane(lane):
             raise MessageError("no such lane")
         return wish
 
+    def _bind(self, wish: Wish, start: Start) -> None:
+        """Have the parameters of a wish driven from now on; nothing where they are already, or where it has none.
+
+        Raises:
+            MessageError: They cannot be driven here. What was driven goes on.
+        """
+        if wish.steered is None:
+            self._pursuit = self._bound = None
+            return
+        bound = wish.plan, wish.steered
+        if bound == self._bound:
+            return
+        if bound == self._unbound:
+            raise MessageError("no way for these parameters")
+        policy, origin = wish.steered.policy, wish.steered.origin
+        if self._pursuit is None or not self._pursuit.retune(policy, origin):
+            try:
+                self._pursuit = ParametersDriver(self._world, policy, limits=start.limits, origin=origin)
+            except Exception as error:
+                # The policy has tried them on its own copy of the world; whatever this is, it must not come up again.
+                self._unbound = bound
+                raise MessageError("no way for these parameters") from error
+        self._bound = bound
+
     def _choose(self, at_s: float, age_s: float, snapshot: Snapshot) -> tuple[Rung, Wishes]:
         if self._stopping:
             return "stop", replace(self._held, target_speed_mps=0.0, target_lane=snapshot.ego.lane)
+        if self._wheel.taken:
+            return "hand", self._held
         wish = self._wish
         if wish is None and age_s <= self._ladder.patience_s:
             return "hold", self._held  # nobody has wished anything yet
@@ -230,15 +319,30 @@ class Control:
         limits = [self._world.perception().speed_limit(lane) for lane in lanes]
         return max(limits, default=math.inf)
 
-    def _act(self, snapshot: Snapshot, wishes: Wishes) -> Actuated:
+    def _act(self, rung: Rung, snapshot: Snapshot, wishes: Wishes) -> tuple[Actuated, Wishes, tuple[str, ...]]:
+        """Drive a period; returns what was done, the wishes as they were driven, and what there is to tell."""
         assert self._driver is not None
-        settled = self._driver.settle(wishes)
-        return actuate(self._world, snapshot, self._driver.command(settled), settled.target_lane, self._shield)
+        pursuit = self._pursuit
+        if pursuit is None:
+            settled = self._driver.settle(wishes)
+            command = self._driver.command(settled)
+            if settled.target_speed_mps is not None and settled.target_speed_mps <= STANDING_MPS:
+                # LaMPilot's IDM has no standing still: it would start off again every other period.
+                command = replace(command, acceleration_mps2=min(command.acceleration_mps2, 0.0))
+            return self._actuated(snapshot, command, settled), settled, ()
+        known = len(pursuit.notes)
+        settled = pursuit.wishes(wishes) if rung in ("follow", "hold") else pursuit.held_to(wishes)
+        done = self._actuated(snapshot, pursuit.command(), settled)
+        return done, settled, tuple(text for _, text in pursuit.notes[known:])
+
+    def _actuated(self, snapshot: Snapshot, command: Command, settled: Wishes) -> Actuated:
+        return actuate(self._world, snapshot, command, settled.target_lane, self._shield)
 
     def _brake(self, snapshot: Snapshot) -> Actuated:
-        """Brake straight on, past driver and shield, which may be what failed."""
+        """Brake, past driver and shield, which may be what failed: straight on, or in a lot with the wheel held."""
         braking = min(FAULT_BRAKING_MPS2, max(0.0, snapshot.ego.speed_mps) / self.dt_s)
-        return actuate(self._world, snapshot, Command(-braking, 0.0), None, None)
+        steering = self._steering if isinstance(self._shield, LotShield) else 0.0
+        return actuate(self._world, snapshot, Command(-braking, steering), None, None)
 
     def _outcome(self, before: Snapshot, now: Snapshot, start: Start) -> str:
         if now.ego.crashed:
@@ -252,7 +356,7 @@ class Control:
         return "ended" if self._tick * self.dt_s >= start.most_s else ""
 
     def _show(self) -> None:
-        payload = Observation(self._trip, self._tick, self._world.observation()).encode()
+        payload = Observation(self._trip, self._tick, self._world.observation(), self._wheel.hands).encode()
         self._rings.observations.write(payload)
 
 

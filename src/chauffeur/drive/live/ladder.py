@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import LaneId, Snapshot, Wishes
+from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.drive.fallback import keep_lane_and_gap
 from chauffeur.drive.live.messages import Rung, Wish
 
@@ -38,7 +39,7 @@ class LadderTable:
     hold_s: float = 2.0
     keep_s: float = 6.0
     slow_s: float = 10.0
-    slow_mps: float = 30.0 / 3.6
+    slow_mps: float = 30.0 * MPS_PER_KMH
 
 
 class Ladder:

@@ -8,16 +8,23 @@ import struct
 from dataclasses import asdict, dataclass
 from typing import Any, Final, Literal, cast, get_args
 
-from chauffeur.concept import Command, Intervention, LaneId, ProgramState, Turn, Wishes
+from chauffeur.concept import Command, Intervention, LaneId, Parameters, ProgramState, Turn, Wishes
 
-_OBSERVATION = struct.Struct("<QQ")
+_OBSERVATION = struct.Struct("<QQQ")
+_HAND = struct.Struct("<4s?8s")
+_HAND_MARK: Final = b"HAND"
 MOST_SPEED_MPS: Final = 100.0
 MOST_HEADWAY_S: Final = 60.0
+MOST_LOOK_AHEAD_M: Final = 10_000.0
+MOST_LOOK_AHEAD_S: Final = 1000.0
 _MOST_NAME: Final = 64
 _MOST_STOPS: Final = 64
 
-Rung = Literal["follow", "hold", "keep", "slow", "stop"]
-"""Of the fallback ladder, best first (ladder.py)."""
+Rung = Literal["follow", "hold", "keep", "slow", "stop", "hand"]
+"""Of the fallback ladder, best first (ladder.py); beside it `hand`: the person has taken over."""
+
+Key = Literal["faster", "slower", "left", "right", "brake"]
+"""Of the person at the wheel."""
 
 
 class MessageError(ValueError):
@@ -32,23 +39,100 @@ class Observation:
         trip: Number of the trip since control started, from 1.
         tick: Control periods since the trip began.
         world: What `World.adopt` takes.
+        hands: How often the wheel has changed hands: odd while the person has it.
     """
 
     trip: int
     tick: int
     world: bytes
+    hands: int = 0
 
     def encode(self) -> bytes:
         """As bytes."""
-        return _OBSERVATION.pack(self.trip, self.tick) + self.world
+        return _OBSERVATION.pack(self.trip, self.tick, self.hands) + self.world
 
     @classmethod
     def decode(cls, payload: bytes) -> Observation:
         """From bytes. Raises MessageError."""
         if len(payload) < _OBSERVATION.size:
             raise MessageError("too short")
-        trip, tick = _OBSERVATION.unpack_from(payload)
-        return cls(trip, tick, payload[_OBSERVATION.size :])
+        trip, tick, hands = _OBSERVATION.unpack_from(payload)
+        return cls(trip, tick, payload[_OBSERVATION.size :], hands)
+
+
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """What the person at the wheel does. Each message says who has the wheel, so that none of them may be missed.
+
+    Attributes:
+        on: Whether the person has the wheel.
+        key: What they pressed, if anything.
+    """
+
+    on: bool
+    key: Key | None = None
+
+    def encode(self) -> bytes:
+        """As bytes."""
+        return _HAND.pack(_HAND_MARK, self.on, (self.key or "").encode())
+
+    @classmethod
+    def decode(cls, payload: bytes) -> Hand:
+        """From bytes. Raises MessageError."""
+        if len(payload) != _HAND.size or payload[: len(_HAND_MARK)] != _HAND_MARK or payload[len(_HAND_MARK)] > 1:
+            raise MessageError("no hand")
+        _, on, name = _HAND.unpack(payload)
+        key = next((each for each in get_args(Key) if each.encode() == name.rstrip(b"\0")), None)
+        if key is None and name.strip(b"\0"):
+            raise MessageError("no key")
+        return cls(on, key)
+
+
+@dataclass(frozen=True, slots=True)
+class Steered:
+    """Parameters to be driven, and what they are relative to: the same two mean the same way, however often they come.
+
+    Attributes:
+        policy: With its route resolved: a spot by its name.
+        origin: The ego's lane when the plan began; the lane wish counts from there.
+    """
+
+    policy: Parameters
+    origin: LaneId | None
+
+    def fields(self) -> dict[str, Any]:
+        """As JSON values."""
+        policy = self.policy
+        return {
+            "speed": policy.target_speed_mps,
+            "ahead": policy.look_ahead_m,
+            "ratio": policy.look_ahead_ratio,
+            "lane": policy.lane,
+            "route": policy.route,
+            "origin": self.origin,
+        }
+
+    @classmethod
+    def read(cls, value: object) -> Steered:
+        """From JSON values, each of its type and within what a car could mean. Raises MessageError."""
+        if not isinstance(value, dict):
+            raise MessageError("bad parameters")
+        fields = cast("dict[str, Any]", value)
+        lane, route = fields.get("lane"), fields.get("route")
+        if type(lane) is not int or lane not in (-1, 0, 1):
+            raise MessageError("bad lane wish")
+        if not isinstance(route, str) or len(route) > _MOST_NAME:
+            raise MessageError("bad route")
+        return cls(
+            Parameters(
+                target_speed_mps=_number(fields, "speed", 0.0, MOST_SPEED_MPS),
+                look_ahead_m=_number(fields, "ahead", 0.0, MOST_LOOK_AHEAD_M),
+                look_ahead_ratio=_number(fields, "ratio", 0.0, MOST_LOOK_AHEAD_S),
+                lane=lane,
+                route=route,
+            ),
+            _lane(fields.get("origin")),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +147,8 @@ class Wish:
         state: Of the program.
         line: Program line it waits at.
         wishes: For the driver.
+        steered: Parameters that are driven in the driver's place; None where a program, or nobody, wishes.
+        hands: How often the wheel had changed hands in that instant.
     """
 
     trip: int
@@ -73,10 +159,12 @@ class Wish:
     state: ProgramState
     line: int | None
     wishes: Wishes
+    steered: Steered | None = None
+    hands: int = 0
 
     def encode(self) -> bytes:
         """As bytes."""
-        wishes = self.wishes
+        wishes, steered = self.wishes, self.steered
         return json.dumps(
             {
                 "trip": self.trip,
@@ -91,6 +179,8 @@ class Wish:
                 "lane": wishes.target_lane,
                 "turn": wishes.turn,
                 "served": sorted(wishes.served_stops),
+                "parameters": None if steered is None else steered.fields(),
+                "hands": self.hands,
             }
         ).encode()
 
@@ -124,6 +214,8 @@ class Wish:
                 turn=None if fields.get("turn") is None else _one_of(fields["turn"], get_args(Turn), "turn"),
                 served_stops=_stops(fields.get("served")),
             ),
+            steered=None if fields.get("parameters") is None else Steered.read(fields["parameters"]),
+            hands=_count(fields, "hands"),
         )
 
 
@@ -149,6 +241,8 @@ class Report:
         speed_mps, lane: Of the ego, before the command.
         ended: The trip is over.
         outcome: How; empty while it goes on.
+        taken_over: The person has the wheel.
+        said: What there was to tell the passenger, of lane changes above all.
     """
 
     trip: int
@@ -171,6 +265,8 @@ class Report:
     lane: LaneId | None
     ended: bool = False
     outcome: str = ""
+    taken_over: bool = False
+    said: tuple[str, ...] = ()
 
     def encode(self) -> bytes:
         """As bytes."""
@@ -192,6 +288,7 @@ class Report:
             for i in fields["interventions"]
         )
         fields["clipped"], fields["lane"] = tuple(fields["clipped"]), _lane(fields["lane"])
+        fields["said"] = tuple(fields["said"])
         return cls(**fields)
 
 

@@ -20,6 +20,8 @@ class Mirror:
         self._seen = 0
         self.trip = 0
         self.tick = 0
+        self.hands = 0
+        """How often the wheel has changed hands: odd while the person has it."""
 
     @property
     def limits(self) -> Limits:
@@ -42,5 +44,5 @@ class Mirror:
             self.world.adopt(shown.world)
         except (MessageError, DataError):
             return False
-        self.trip, self.tick = shown.trip, shown.tick
+        self.trip, self.tick, self.hands = shown.trip, shown.tick, shown.hands
         return True

@@ -15,7 +15,8 @@ EventKind = Literal[
     "interrupted", "resumed", "said", "garbage",
 ]  # fmt: skip
 """What becomes of a wish, in about this order. `declined`: the planner says no, in words; `unplanned`: it could not;
-`refused`: a check says no; `stale`: the plan came too late; `interrupted`: the process that ran it is gone."""
+`refused`: a check says no; `stale`: the plan came too late; `interrupted`: the process that ran it is gone, or the
+person has taken over (`TOOK_OVER`)."""
 
 FINAL: Final[frozenset[EventKind]] = frozenset(
     {"declined", "unplanned", "superseded", "refused", "stale", "finished", "failed", "interrupted"}
@@ -25,6 +26,8 @@ FINAL: Final[frozenset[EventKind]] = frozenset(
 
 START_WITHIN_S: Final = 10.0
 """Vehicle time from the instant a plan was made for to its start."""
+TOOK_OVER: Final = "You took over."
+"""What is told of a wish that ended because the person took the wheel."""
 MOST_SAID: Final = 2000
 """Characters of an event's text: in JSON at most 6 bytes each, so that any event fits into its ring."""
 

@@ -15,6 +15,7 @@ from typing import Final
 
 from chauffeur.concept import ChauffeurError, History, PersonId, Plan, PlanRequest
 from chauffeur.describe import describe
+from chauffeur.describe.services.sources import Sources, SourceSettings
 from chauffeur.drive.live.messages import MessageError
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.orders import (
@@ -32,6 +33,8 @@ from chauffeur.drive.live.orders import (
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.loop import Memory
 from chauffeur.drive.session import parse_wish
+from chauffeur.drive.surroundings import describing
+from chauffeur.memory.tolerant import TolerantMemory
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.safety.screening import screen_request
@@ -64,11 +67,15 @@ class Planning:
         planner: Planner,
         memory: Memory,
         *,
+        sources: SourceSettings | None = None,
         setting: Setting = "few-shot",
         speed: float = 1.0,
         clock_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        self._mirror, self._rings, self._planner, self._memory = mirror, rings, planner, memory
+        self._mirror, self._rings, self._planner = mirror, rings, planner
+        self._memory = TolerantMemory(memory, self._say)
+        self._where = sources
+        self._sources: Sources | None = None
         self._setting: Setting = setting
         self._speed, self._clock_ns = speed, clock_ns
         self._asked = Reader(rings.requests)
@@ -77,10 +84,13 @@ class Planning:
 
     async def run(self, over: Callable[[], bool]) -> None:
         """Answer wishes until it is over."""
-        while not over():
-            await self.look()
-            await asyncio.sleep(LOOK_EVERY_S)
-        await self._give_up("The drive is over.")
+        async with contextlib.AsyncExitStack() as stack:
+            if self._where is not None:
+                self._sources = await stack.enter_async_context(Sources(self._where))
+            while not over():
+                await self.look()
+                await asyncio.sleep(LOOK_EVERY_S)
+            await self._give_up("The drive is over.")
 
     async def look(self) -> None:
         """Take up the newest wish, if there is a new one; whatever was worked on is given up."""
@@ -142,7 +152,7 @@ class Planning:
         snapshot, limits = self._mirror.world.snapshot(), self._mirror.limits
         scene = Scene.of(self._mirror.trip, snapshot)
         instruction = parse_wish(request.text, PersonId(request.person))
-        context = describe(snapshot)
+        context = (describe if self._sources is None else await describing(self._sources))(snapshot)
         history = self._memory.recall(instruction.person, instruction, context, _RECALLED)
         system = build_system_message(self._setting, limits=limits)
         asked, _ = screen_request(PlanRequest(instruction, context, system, history, limits=limits))
@@ -163,6 +173,9 @@ class Planning:
             with contextlib.suppress(ValueError):
                 self._rings.briefs.write(encode(each))
                 return
+
+    def _say(self, text: str) -> None:
+        self._tell("said", "" if self._request is None else self._request.wish, text)
 
     def _tell(self, kind: EventKind, wish: str, text: str, *, again: bool = True) -> None:
         event = Event(kind, wish, text[:MOST_SAID], self._mirror.trip, self._mirror.tick, again)

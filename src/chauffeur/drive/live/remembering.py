@@ -116,5 +116,6 @@ def trip_of(interaction: Interaction, start: Start, dt_s: float, last: Report | 
             ("shield", SHIELD_VERSION),
             ("live", True),
             ("tick", brief.tick),
+            *((("taken_over", True),) if interaction.taken_over else ()),
         ),
     )

@@ -23,6 +23,7 @@ RingName = Literal[
     "policy_events",
     "planner_events",
     "checkpoints",
+    "hand",
 ]
 SIZES: Final[dict[RingName, tuple[int, int]]] = {
     "observations": (4, 64 << 10),
@@ -34,8 +35,9 @@ SIZES: Final[dict[RingName, tuple[int, int]]] = {
     "policy_events": (256, 16 << 10),
     "planner_events": (256, 16 << 10),
     "checkpoints": (2, 1 << 20),
+    "hand": (64, 128),
 }
-"""Messages kept, and most bytes of one."""
+"""Messages kept, and most bytes of one. The person's `hand` is written by the supervisor and read by control alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +49,7 @@ class Settings:
         planner: Specification of the planner.
         base_url: Endpoint of a planner that is served.
         memory: Name of the memory, empty for none.
+        services: File of the services that C is completed from, empty for none.
         setting: Whether prompts carry examples.
         speed: Vehicle time per time of the clock.
         realtime: Whether control asks for real-time scheduling.
@@ -56,6 +59,7 @@ class Settings:
     planner: str = "onboard"
     base_url: str | None = None
     memory: str = ""
+    services: str = ""
     setting: str = "few-shot"
     speed: float = 1.0
     realtime: bool = True

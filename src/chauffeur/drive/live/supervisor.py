@@ -24,8 +24,18 @@ from typing import Any, Final, Literal, Self
 
 from chauffeur.concept import NOBODY, SandboxError
 from chauffeur.drive.live.__main__ import FIGURES_FILE, READY_SUFFIX
-from chauffeur.drive.live.messages import MessageError, Report, Wish
-from chauffeur.drive.live.orders import FINAL, Brief, Event, EventKind, Request, encode, read_brief, read_event
+from chauffeur.drive.live.messages import Hand, Key, MessageError, Report, Wish
+from chauffeur.drive.live.orders import (
+    FINAL,
+    TOOK_OVER,
+    Brief,
+    Event,
+    EventKind,
+    Request,
+    encode,
+    read_brief,
+    read_event,
+)
 from chauffeur.drive.live.ring import Message, Reader
 from chauffeur.drive.live.settings import SIZES, RingName, Settings, ring
 
@@ -41,6 +51,8 @@ UNHEARD_S: Final = 10.0
 """A planner that has not taken a wish up so long after it was sent did not hear it, or hangs."""
 UNSTARTED_S: Final = 5.0
 """A plan that was sent and is not heard of again so long after is lost."""
+UNHANDED_S: Final = 0.5
+"""Control is told again who has the wheel where it does not know so long after."""
 READY_WITHIN_S: Final = 120.0
 FIRST_PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 5.0
@@ -81,6 +93,11 @@ class Interaction:
     def started_tick(self) -> int | None:
         """When driving it began; None if it never did."""
         return next((event.tick for event in self.events if event.kind in ("started", "resumed")), None)
+
+    @property
+    def taken_over(self) -> bool:
+        """Whether it ended because the person took the wheel."""
+        return self.answer is not None and self.answer.kind == "interrupted" and self.answer.text == TOOK_OVER
 
 
 @dataclass(slots=True)
@@ -128,6 +145,8 @@ class Runtime:
         self._wish_number, self._wish_at_s = 0, time.monotonic()
         self._stopping = False
         self._doubtful: dict[str, float] = {}
+        self._taken_over = False
+        self._handed_s = 0.0
 
     def __enter__(self) -> Self:
         try:
@@ -156,6 +175,39 @@ class Runtime:
         """Id that the next wish will get."""
         return f"w{len(self.interactions) + 1}"
 
+    def take_over(self, on: bool) -> None:
+        """The person takes the wheel, or gives it back.
+
+        The plan that is driven ends with it, and so does every wish that has no plan yet. While the person has the
+        wheel, `hand` moves the car; when they give it back, the car holds speed and lane until a new wish is driven.
+        """
+        if on == self._taken_over or not self._rings:
+            return
+        self._taken_over = on
+        self._say_who_drives()
+        if on:
+            for interaction in self.open_wishes:
+                if interaction.stage != "driven":  # of what is driven, the policy tells
+                    self._close(interaction, Event("interrupted", interaction.request.wish, TOOK_OVER))
+
+    def _say_who_drives(self) -> None:
+        self._rings["hand"].write(Hand(self._taken_over).encode())
+        self._handed_s = time.monotonic()
+
+    @property
+    def taken_over(self) -> bool:
+        """Whether the person has the wheel, as told by `take_over`; `report.taken_over` says what control knows."""
+        return self._taken_over
+
+    def hand(self, key: Key) -> None:
+        """A key of the person at the wheel, pressed once; nothing while they do not have it.
+
+        `faster` and `slower` move the speed that is kept by 5 km/h (2.5 km/h in a lot), `left` and `right` mean one
+        lane, or a turn where a crossing is ahead, `brake` brakes to a stand. Limits and shield stay.
+        """
+        if self._taken_over and self._rings:
+            self._rings["hand"].write(Hand(True, key).encode())
+
     def poll(self) -> None:
         """Hear what came, see who lives."""
         for each in self._rings.values():
@@ -164,6 +216,7 @@ class Runtime:
         now_s = time.monotonic()
         self._look_after_children(now_s)
         self._look_after_wishes(now_s)
+        self._look_after_wheel(now_s)
 
     @property
     def driving(self) -> bool:
@@ -358,6 +411,12 @@ class Runtime:
             elif interaction.stage == "driven":
                 self._settle_doubt(interaction)
 
+    def _look_after_wheel(self, now_s: float) -> None:
+        """Say once more who has the wheel, where control goes by something else: what was said may have been lost."""
+        known = self.report is not None and self.report.taken_over
+        if known != self._taken_over and now_s - self._handed_s > UNHANDED_S:
+            self._say_who_drives()
+
     @staticmethod
     def _patience_s(interaction: Interaction) -> float:
         """How long a planner may be silent: it takes a wish up at once, and may then think."""
@@ -417,8 +476,10 @@ class Runtime:
         messages, lost = self._heard["reports"].news()
         self.lost_reports += lost
         for message in messages:
-            self.report = Report.decode(message.payload)
-            self._tell(self.report)
+            self.report = report = Report.decode(message.payload)
+            self._tell(report)
+            for text in report.said:
+                self._take(Event("said", report.plan, text, report.trip, report.tick), "control")
 
     def _hear_events(self, sent_by: Role, messages: tuple[Message, ...]) -> None:
         for message in messages:

@@ -119,7 +119,7 @@ def worded(cases: Sequence[Case], seed: int, per_case: int = PER_CASE) -> Splits
     for case in cases:
         rng = np.random.default_rng([seed, 29, case.index])
         if case.index % TEST_EVERY:
-            train += [_one(case, rng, held=False) for _ in range(per_case)]
+            train += [_one(case, rng, held=False, wider=True) for _ in range(per_case)]
         else:
             for _ in range(2):
                 seen.append(_one(case, rng, held=False))
@@ -139,19 +139,19 @@ def gathered(parts: Iterable[Splits]) -> Splits:
     return Splits(train, distinct(seen), [e for e in distinct(unseen) if masked(e.wish) not in known])
 
 
-def _one(case: Case, rng: np.random.Generator, *, held: bool) -> Example:
+def _one(case: Case, rng: np.random.Generator, *, held: bool, wider: bool = False) -> Example:
     draw = rng.random()
     if draw < ANSWER_SHARE:
         sections = answer_sections(case.situation)
         sizes = np.array([len(wordings().templates(section, held=held)) for section in sections], float)
         section = sections[int(rng.choice(len(sections), p=sizes / sizes.sum()))]
         situation = None if rng.random() < 0.1 else case.situation
-        return answer_example(section, situation, rng, held=held)
+        return answer_example(section, situation, rng, held=held, wider=wider)
     if draw < ANSWER_SHARE + CORRECTION_SHARE:
-        found = correction_example(case, rng, held=held)
+        found = correction_example(case, rng, held=held, wider=wider)
         if found is not None:
             return found
-    return wish_example(case, rng, held=held)
+    return wish_example(case, rng, held=held, wider=wider)
 
 
 def distinct(examples: Iterable[Example]) -> list[Example]:

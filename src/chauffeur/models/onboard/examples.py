@@ -9,15 +9,16 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Final
 
 import numpy as np
 
 from chauffeur.concept import Situation
 from chauffeur.models.onboard.cases import Case
-from chauffeur.models.onboard.noise import noisy, said_in_full
+from chauffeur.models.onboard.noise import noisy, reworded, said_in_full
 from chauffeur.models.onboard.speech import Unit, spoken
-from chauffeur.models.onboard.wordings import clause, conditioned, in_order, levels, utter, wordings
+from chauffeur.models.onboard.wordings import because, beside, clause, conditioned, in_order, levels, utter, wordings
 from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, Kind, Number, Step
 from chauffeur.planners.onboard.prompt import ASK, REFUSE, program_reply, prompt, remembered
 
@@ -31,6 +32,14 @@ IN_FULL_SHARE: Final = 0.15
 UNDRAFTED_SHARE: Final = 0.1
 """Share of examples without a draft: servers of the exported model show none."""
 UNKNOWN_CONTEXT_SHARE: Final = 0.08
+CHATTER_SHARE: Final = 0.05
+"""Share of examples of training with a sentence beside the wish that wishes for nothing."""
+REASON_SHARE: Final = 0.12
+"""Share of single wishes of training that are said with a reason or a complaint; what is said outright counts."""
+REWORDED_SHARE: Final = 0.3
+"""Share of sentences of training in which words are exchanged for others of the same meaning."""
+MOST_REASONED: Final = 140
+"""Characters of a sentence from which nothing is put beside it."""
 LEVELS: Final = (0.46, 0.29, 0.25)
 NOISE: Final = (0.55, 0.3, 0.15)
 
@@ -52,6 +61,34 @@ LESS: Final = {
     "much_faster": "faster", "faster": "a_bit_faster", "much_slower": "slower", "slower": "a_bit_slower",
     "much_closer": "closer", "closer": "a_bit_closer", "much_further": "further", "further": "a_bit_further",
 }  # fmt: skip
+_QUICK: Final = ("hurry/2", "hurry/3", "faster/2")
+_CALM: Final = ("carefully/3", "gently/3", "relax/3", "slower/2")
+_ROOM: Final = ("carefully/3", "gently/3", "further/2", "further/3")
+REASONS: Final[dict[str, tuple[str, ...]]] = {
+    **dict.fromkeys(("faster", "a_bit_faster", "much_faster", "faster_by", "as_fast_as_allowed", "at_least"), _QUICK),
+    **dict.fromkeys(("slower", "a_bit_slower", "much_slower", "slower_by", "at_most", "under_limit_by"), _CALM),
+    **dict.fromkeys(("further", "a_bit_further", "much_further", "further_by", "gap_at_least"), _ROOM),
+    **dict.fromkeys(("closer", "a_bit_closer", "much_closer", "closer_by", "gap_at_most"), ("closer/2", "hurry/3")),
+    **dict.fromkeys(("drive_at", "gap_of", "gap_of_seconds", "keep_lane", "hold_speed"), ("carefully/3", "gently/3")),
+    **dict.fromkeys(("overtake", "overtake_and_return"), ("overtake/2", "overtake/3", "hurry/3")),
+    **dict.fromkeys(("lane_left", "overtake_left", "lanes_left", "leftmost_lane"), ("lane_left/2", "hurry/3")),
+    **dict.fromkeys(("lane_right", "overtake_right", "lanes_right", "rightmost_lane"), ("lane_right/2", "hurry/3")),
+    **dict.fromkeys(("stop_here",), ("stop_here/3", "pull_over/3")),
+    **{
+        skill: (f"{skill}/2", f"{skill}/3")
+        for skill in ("hurry", "relax", "gently", "carefully", "sportily", "economically", "pull_over")
+    },
+    **{
+        skill: (f"{skill}/2",)
+        for skill in ("turn_left", "turn_right", "go_straight", "follow", "let_in", "no_overtaking", "match_traffic")
+    },
+    **{
+        skill: (f"{skill}/2",)
+        for skill in ("middle_lane", "back_on_the_road", "drive_at_limit", "hold_gap", "carry_on")
+    },
+}
+"""Sections of reasons and complaints that go with a skill's wish said outright."""
+
 HOLDS: Final = ("hold_speed", "hold_gap", "carry_on")
 """What keeps the present: "the same speed as last time" is not that."""
 BELOW: Final = ("under_limit_by",)
@@ -117,10 +154,14 @@ def checked_reasons() -> tuple[str, ...]:
     return tuple(dict.fromkeys([*(reason for _, reason in IMPOSSIBLE), NOT_HERE, *numbers]))
 
 
-def wish_example(case: Case, rng: Generator, *, held: bool) -> Example:
-    """An example of a case."""
+def wish_example(case: Case, rng: Generator, *, held: bool, wider: bool = False) -> Example:
+    """An example of a case; `wider` says it with reasons, other words and talk beside it, as training does."""
     words, template, level = _wish(case.steps, rng, held=held)
-    words, noise = _arriving(words, rng)
+    if wider and level == 1 and rng.random() < REASON_SHARE and case.steps[0].skill in REASONS:
+        reasons_of = REASONS[case.steps[0].skill]
+        if len(case.steps) == 1 and len(words) < MOST_REASONED:
+            words = because(words, reasons_of[int(rng.integers(len(reasons_of)))], rng)
+    words, noise = _arriving(words, rng, wider=wider)
     reply = refusal_reply(case.refusal) if case.refusal else program_reply(case.steps)
     known = bool(case.refusal) or _needs_context(case.steps) or rng.random() >= UNKNOWN_CONTEXT_SHARE
     history = _other_history(rng) if rng.random() < HISTORY_SHARE else ()
@@ -129,7 +170,7 @@ def wish_example(case: Case, rng: Generator, *, held: bool) -> Example:
     return Example(text, reply, words, template, skills, level, noise, held, "wish", case.index)
 
 
-def correction_example(case: Case, rng: Generator, *, held: bool) -> Example | None:
+def correction_example(case: Case, rng: Generator, *, held: bool, wider: bool = False) -> Example | None:
     """A wish that refers to a remembered trip; None where a case gives none."""
     step = case.steps[0]
     if case.refusal or len(case.steps) > 1 or step.condition is not None or step.wait_s is not None or step.manner:
@@ -154,7 +195,7 @@ def correction_example(case: Case, rng: Generator, *, held: bool) -> Example | N
             wanted = replace(step, number=replace(step.number, factor=LESS_FACTOR if way == "less" else MORE_FACTOR))
         else:
             wanted = replace(step, skill=(LESS if way == "less" else MORE)[step.skill])
-    words, noise = _arriving(wording.text, rng)
+    words, noise = _arriving(wording.text, rng, wider=wider)
     history = [remembered([step], str(rng.choice(SAID))), *_other_history(rng)[:1]]
     return Example(
         prompt(case.situation, history, words, drafted=_drafted(rng)),
@@ -170,10 +211,12 @@ def correction_example(case: Case, rng: Generator, *, held: bool) -> Example | N
     )
 
 
-def answer_example(section: str, situation: Situation | None, rng: Generator, *, held: bool) -> Example:
+def answer_example(
+    section: str, situation: Situation | None, rng: Generator, *, held: bool, wider: bool = False
+) -> Example:
     """A wish to ask back about, or to refuse, wherever we are."""
     wording = utter(section, _free_slots(section, rng), rng, held)
-    words, noise = _arriving(wording.text, rng)
+    words, noise = _arriving(wording.text, rng, wider=wider)
     question, reason = wordings().question(section), wordings().reason(section)
     reply = f"{ASK}{question}" if question else f"{REFUSE}{reason}"
     history = _other_history(rng) if rng.random() < HISTORY_SHARE else ()
@@ -182,8 +225,13 @@ def answer_example(section: str, situation: Situation | None, rng: Generator, *,
     return Example(text, reply, words, wording.template, kind, 0, noise, held, kind, -1)
 
 
-def _arriving(words: str, rng: Generator) -> tuple[str, int]:
+def _arriving(words: str, rng: Generator, *, wider: bool) -> tuple[str, int]:
     """A sentence as it may arrive, and how noisy that is."""
+    if wider:
+        if rng.random() < REWORDED_SHARE:
+            words = reworded(words, rng)
+        if rng.random() < CHATTER_SHARE and len(words) < MOST_REASONED:
+            words = beside(words, rng)
     noise = int(rng.choice(3, p=NOISE))
     return noisy(said_in_full(words) if rng.random() < IN_FULL_SHARE else words, rng, noise), noise
 
@@ -286,7 +334,7 @@ def _said(number: Number, kind: Kind, rng: Generator) -> str:
 
 def _free_slots(section: str, rng: Generator) -> dict[str, str]:
     """Values for wishes that are refused whatever they are: speeds far beyond any limit, gaps of no length."""
-    names = frozenset[str]().union(*(wordings().slots(t) for t in wordings().templates(section)))
+    names = _slot_names(section)
     out: dict[str, str] = {}
     if "v" in names:
         fast: tuple[tuple[Unit, int, int], ...] = (("mph", 110, 250), ("kmh", 190, 400), ("mps", 50, 110))
@@ -303,6 +351,11 @@ def _free_slots(section: str, rng: Generator) -> dict[str, str]:
     if "n" in names:
         out["n"] = str(int(rng.integers(2, 120)))
     return out
+
+
+@cache
+def _slot_names(section: str) -> frozenset[str]:
+    return frozenset[str]().union(*(wordings().slots(t) for t in wordings().templates(section)))
 
 
 _REMEMBERED: Final = (

@@ -167,6 +167,114 @@ _PAUSES = re.compile(
 _TOKEN = re.compile(r"^(\W*)(.*?)(\W*)$")
 
 
+_MORE = r"(?=faster|slower|closer|further|farther|quicker|nearer|more|less)"
+_CHANGED = r"(?=(?:the|our|your) (?:speed|pace|tempo)\b)"
+_SPACED = r"(?=(?:the|our|your) (?:gap|distance|following distance|spacing)\b)"
+_ENDS = r"(?=[,.?!]|$| please| now| by | a bit| a little| a touch| a tad| a lot| slightly)"
+_ALIKE: tuple[tuple[str, str], ...] = (
+    (r"(?<!pick-up )(?<!pickup )(?:truck|lorry)", "truck|lorry|HGV|juggernaut|artic|semi"),
+    (r"(?:car|vehicle)(?!'s|[ -]?(?:park|length|sick|seat|wash|ride|chase|transporter|keys))", "car|vehicle|motor"
+     "|automobile"),
+    (r"(?:cars|vehicles)", "cars|vehicles|motors|automobiles"),
+    (r"(?<=the )(?:car|vehicle|guy|one) (?:ahead|in front)(?! of)", "lead car|chap ahead|fellow in front|lad in front"
+     "|car up front"),
+    (r"(?<!why )(?:could|can|would|will) you", "could you|can you|would you|will you|might you|could ya|can ya"),
+    (r"(?<!you )please", "please|please please|pretty please|if you'd be so kind"),
+    (r"I(?:'d like| want| would like|'d love) (?=you to|us to|to )", "I'd like |I want |I need |I'd love "
+     "|I'd prefer |I wish "),
+    (r"I(?:'d like| want| would like) (?=more|less|some|a )", "I'd like |I could do with |I'd go for |let me have "
+     "|I fancy "),
+    (r"(?:maybe|perhaps|possibly)", "maybe|perhaps|possibly|might be|p'raps"),
+    (r"(?<!not )(?:a bit|a tad|a smidge|a wee bit|slightly|a touch)(?! of)", "a bit|a tad|a smidge|a wee bit"
+     "|slightly|a mite"
+     "|a speck|a whit|a crumb|a tiny amount|ever so little|a sliver"),
+    (rf"(?<!not )(?:a lot|loads|heaps|a great deal|a whole lot) {_MORE}", "a lot |loads |heaps |stacks |bags "
+     "|a good deal "),
+    (rf"(?<!so )(?<!too )(?<!not )(?<!how )(?<!very )(?<!that )(?<!this )(?<!it )(?:much|way|far) {_MORE}", "much |way "
+     "|far |hugely "
+     "|vastly |an awful lot |no end |oceans "),
+    (r"(?:faster|quicker)(?= *[,.?!]|$| please| than)", "faster|quicker|speedier|more quickly|more rapidly|swifter"
+     "|at more speed"),
+    (r"slower(?= *[,.?!]|$| please| than)", "slower|more slowly|less fast|less quickly|at less speed|slowlier"),
+    (r"(?:closer|nearer)(?= *[,.?!]|$| please| to )", "closer|nearer"),
+    (r"(?:further|farther) (?:back|away|behind)", "further back|farther back|further behind|farther away|more distant"),
+    (r"(?<!the )(?<!our )(?<!your )(?<!this )(?<!that )(?<!more )(?<!some )(?<!of )speed up" + _ENDS,
+     "speed up|go faster|accelerate|pick up speed|gain speed|get quicker|raise the pace|quicken"),
+    (r"slow down" + _ENDS, "slow down|go slower|drive slower|reduce speed|lose speed|decelerate|lower the pace"
+     "|slacken"),
+    (r"(?:overtake|get past|go past) (?=the|him|her|them|that|this|whoever)", "overtake |pass |get past |go past "
+     "|get by "
+     "|outstrip |get in front of "),
+    (r"pull over(?=[,.?!]|$| please| here| now| and)", "pull over|pull in|draw in|pull up at the side"
+     "|stop at the side"),
+    (r"(?<=the )gap (?=to|between|ahead|in front)", "gap |distance |spacing |separation |interval |headway "),
+    (r"(?:junction|intersection|crossroads)", "junction|intersection|crossroads|crossway"),
+    (r"(?<=the )(?:hard shoulder|verge|roadside)", "hard shoulder|verge|roadside|side strip|hard strip|berm"),
+    (r"in a hurry", "in a hurry|in a rush|pressed for time|pushed for time|short of time|in haste"),
+    (r"no (?:hurry|rush)", "no hurry|no rush|no haste|no urgency"),
+    (r"(?:I'm|I am) late", "I'm late|I'm running late|I'm behind time|I'm overdue|I'm tardy"),
+    (r"(?:we're|we are) late", "we're late|we're running late|we're behind time|we're overdue|we're tardy"),
+    (r"(?<=m )(?:scared|frightened|afraid|terrified|nervous)", "scared|frightened|afraid|terrified|nervous|petrified"
+     "|fearful|uneasy|freaking out|shaken"),
+    (r"(?:kids|children)", "kids|children|youngsters|nippers|bairns|little ones|kiddies"),
+    (r"(?:baby|newborn)", "baby|newborn|infant|bairn|bambino"),
+    (r"my (?:mum|mother|mom)", "my mum|my mother|my mom|my mama|my old lady"),
+    (r"(?:grandma|granny|gran|nan)", "grandma|granny|gran|nan|nana|grandmother|oma"),
+    (r"my wife", "my wife|the wife|the missus|my better half|my spouse"),
+    (r"(?:carsick|travel sick|nauseous|queasy)", "carsick|travel sick|nauseous|queasy|bilious|seasick|squeamish"),
+    (r"(?:meeting|appointment)", "meeting|appointment|conference|briefing|rendezvous"),
+    (r"my (?:flight|plane)", "my flight|my plane|my jet|my connection|my departure"),
+    (r"(?:coffee|tea|latte|cocoa)", "coffee|tea|latte|cocoa|cappuccino|espresso|hot chocolate"),
+    (r"(?:really|very|awfully|terribly)(?= (?:slow|fast|close|far|late|nervous|tired|scared|rough))", "really|very"
+     "|awfully"
+     "|terribly|dreadfully|frightfully|extremely|proper|mighty|dead"),
+    (r"(?:icy|slippery|slick)", "icy|slippery|slick|glassy|frozen|greasy"),
+    (r"(?:foggy|misty)", "foggy|misty|hazy|murky"),
+    (r"I (?:think|reckon|guess|believe|suppose)", "I think|I reckon|I guess|I believe|I suppose|I figure|I'd say"),
+    (r"(?:right now|straight away|immediately|at once)", "right now|straight away|immediately|at once|this instant"
+     "|forthwith"),
+    (r"keep (?=(?:a|the|this|that) (?:gap|distance|speed|pace)\b)", "keep |maintain |hold |preserve |retain "),
+    (rf"(?:reduce|lower|decrease|cut|drop) {_CHANGED}", "reduce |lower |decrease |cut |drop |diminish |curb |trim "),
+    (rf"(?:increase|raise|boost|lift) {_CHANGED}", "increase |raise |boost |lift |step up |jack up |heighten "),
+    (rf"(?:reduce|decrease|shorten|close|shrink) {_SPACED}", "reduce |decrease |shorten |shrink |tighten |narrow "),
+    (rf"(?:increase|widen|open|extend) {_SPACED}", "increase |widen |extend |enlarge |stretch |lengthen |expand "),
+    (r"(?:change|switch|move|shift) (?=(?:in)?to the (?:left|right|other|middle) lane)", "change |switch |move "
+     "|shift |cross "
+     "|hop |scoot |transfer "),
+    (r"turn (?=(?:left|right) (?:at|here|there))", "turn |swing |go |steer |head "),
+    (r"go straight (?=on|ahead|over|through|at)", "go straight |keep straight |drive straight |head straight "
+     "|carry straight "),
+    (r"(?:annoying|irritating)", "annoying|irritating|maddening|infuriating|vexing"),
+    (r"my (?:neck|back|spine)", "my neck|my back|my spine|my lumbago|my shoulders|my vertebrae"),
+    (r"(?:petrol|gas|fuel)(?= (?:is|bill|gauge|prices|station|tank))", "petrol|gas|fuel|diesel|gasoline"),
+    (r"(?:enormous|huge|massive)", "enormous|huge|massive|gigantic|colossal|humongous"),
+)  # fmt: skip
+"""Words, and others that a passenger may say for them: none changes a side, a direction, an amount or a denial."""
+_REWORDED = tuple(
+    (re.compile(rf"\b{find}(?<=\S)(?!\w)|\b{find}(?<=\s)", re.IGNORECASE), by.split("|")) for find, by in _ALIKE
+)
+MOST_REWORDED = 3
+
+
+def reworded(text: str, rng: np.random.Generator) -> str:
+    """The sentence with up to three words, or turns of phrase, exchanged for others of the same meaning."""
+    done = 0
+    for place in rng.permutation(len(_REWORDED)):
+        pattern, options = _REWORDED[int(place)]
+        found = pattern.search(text)
+        if found is None:
+            continue
+        others = [option for option in options if option.strip().lower() != found[0].strip().lower()]
+        new = others[int(rng.integers(len(others)))]
+        if found[0][0].isupper():
+            new = new[0].upper() + new[1:]
+        text = text[: found.start()] + new + text[found.end() :]
+        done += 1
+        if done == MOST_REWORDED:
+            break
+    return text
+
+
 def said_in_full(text: str) -> str:
     """The sentence without contractions: "I'm late" becomes "I am late"; the wish is the same."""
     for pattern, by in _FULL:

@@ -22,7 +22,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.concept import DataError
+from chauffeur.concept import ConfigError, DataError
 from chauffeur.drive.files import publish
 from chauffeur.models.onboard.cases import Case
 from chauffeur.models.onboard.engine import (
@@ -39,7 +39,7 @@ from chauffeur.models.onboard.examples import Example, checked_reasons, question
 from chauffeur.models.onboard.packed import Packed
 from chauffeur.planners.onboard.prompt import END
 
-MODEL_VERSION: Final = "onboard-lm-v4"
+MODEL_VERSION: Final = "onboard-lm-v5"
 _SPLITS: Final = ("train", "seen", "unseen")
 _TOKENIZER_EXAMPLES: Final = 60_000
 
@@ -58,6 +58,8 @@ class Plan:
         size: Network's size, see `training.SIZES`.
         steps: Optimiser steps.
         more: Steps of a second round after them.
+        base: Folder of a finished run whose network is trained on, with its tokenizer, on this plan's data; None to
+            begin from nothing. Rate and blanking are then those of a second round.
     """
 
     seed: int = 0
@@ -66,25 +68,29 @@ class Plan:
     size: str = "small"
     steps: int = 14_000
     more: int = 0
+    base: Path | None = None
+
+    @property
+    def of_data(self) -> dict[str, Any]:
+        """What decides the data, as `data.json` holds it."""
+        base = {} if self.base is None else {"tokenizer": _sha256(self.base / "data" / "tokenizer.json")}
+        return {"seed": self.seed, "draws": self.draws, "per_case": self.per_case} | base
 
 
 def build_data(folder: Path, plan: Plan, workers: int, told: Told) -> None:
     """Cases, examples and tokenizer. Raises DataError when a file cannot be written."""
     data = folder / "data"
-    if (data / "data.json").exists() and json.loads((data / "data.json").read_text(encoding="utf-8"))["plan"] == {
-        "seed": plan.seed,
-        "draws": plan.draws,
-        "per_case": plan.per_case,
-    }:
+    facts_file, wanted = data / "data.json", plan.of_data
+    if facts_file.exists() and json.loads(facts_file.read_text(encoding="utf-8"))["plan"] == wanted:
         return
     data.mkdir(parents=True, exist_ok=True)
     cases_file = folder / "cases.jsonl"
     cases = make_cases(plan.seed, plan.draws, cases_file, workers, lambda done, _: told("cases", done, plan.draws))
     splits = _examples(cases, plan, workers, told)
-    _pack(splits, data, plan.seed, told)
+    _pack(splits, data, plan, told)
     facts = _facts(cases, splits, left_out(cases_file), plan)
     publish(data / "DATA_CARD.md", data_card(facts).encode(), "data card")
-    publish(data / "data.json", (json.dumps(facts, indent=1, ensure_ascii=False) + "\n").encode(), "data set's facts")
+    publish(facts_file, (json.dumps(facts, indent=1, ensure_ascii=False) + "\n").encode(), "data set's facts")
 
 
 def _examples(cases: Sequence[Case], plan: Plan, workers: int, told: Told) -> Splits:
@@ -97,13 +103,17 @@ def _examples(cases: Sequence[Case], plan: Plan, workers: int, told: Told) -> Sp
     return gathered(found)
 
 
-def _pack(splits: Splits, data: Path, seed: int, told: Told) -> None:
-    from chauffeur.models.onboard.tokens import train_tokenizer
+def _pack(splits: Splits, data: Path, plan: Plan, told: Told) -> None:
+    from chauffeur.models.onboard.tokens import load_tokenizer, train_tokenizer
 
-    rng = np.random.default_rng([seed, 31])
-    count = min(_TOKENIZER_EXAMPLES, len(splits.train))
-    some = [splits.train[i] for i in sorted(rng.choice(len(splits.train), count, replace=False))]
-    tokenizer: Any = train_tokenizer(text for example in some for text in (example.prompt, example.reply))
+    tokenizer: Any
+    if plan.base is None:
+        rng = np.random.default_rng([plan.seed, 31])
+        count = min(_TOKENIZER_EXAMPLES, len(splits.train))
+        some = [splits.train[i] for i in sorted(rng.choice(len(splits.train), count, replace=False))]
+        tokenizer = train_tokenizer(text for example in some for text in (example.prompt, example.reply))
+    else:
+        tokenizer = load_tokenizer(plan.base / "data")
     tokenizer.save(str(data / "tokenizer.json"))
     end = tokenizer.token_to_id(END)
     for place, (name, examples) in enumerate(zip(_SPLITS, (splits.train, splits.seen, splits.unseen), strict=True)):
@@ -113,13 +123,22 @@ def _pack(splits: Splits, data: Path, seed: int, told: Told) -> None:
         publish(data / f"{name}.jsonl", lines.encode(), "examples")
 
 
+def _sha256(file: Path) -> str:
+    try:
+        return hashlib.sha256(file.read_bytes()).hexdigest()
+    except OSError as error:
+        raise DataError(
+            f"{file} cannot be read.", hint="--base is the folder of a finished run of `chauffeur train onboard`."
+        ) from error
+
+
 def _facts(cases: Sequence[Case], splits: Splits, why: Counter[str], plan: Plan) -> dict[str, Any]:
     train = splits.train
     skills = Counter(skill for case in cases if not case.refusal for skill in (step.skill for step in case.steps))
     return {
         "version": VERSION,
         "chauffeur": version("chauffeur"),
-        "plan": {"seed": plan.seed, "draws": plan.draws, "per_case": plan.per_case},
+        "plan": plan.of_data,
         "cases": len(cases),
         "cases_refused": sum(bool(case.refusal) for case in cases),
         "left_out": dict(why.most_common()),
@@ -150,8 +169,10 @@ words come from a grammar; no person's data is in it, and no sentence of LaMPilo
 - **Cases**: {facts["cases"]:,} scenes with a program each ({facts["cases_refused"]:,} of them not possible there, whose
   answer is a refusal). Every other program was linked, driven in its scene and did what its words say; what did not was
   left out (table below).
-- **Words**: {facts["wordings"]:,} different wishes from {facts["templates"]:,} templates; about a fifth of those
-  of each skill is held out for tests. Typing and speech-recognition errors in three levels.
+- **Words**: {facts["wordings"]:,} different wishes from {facts["templates"]:,} templates; about a seventh of those
+  of each skill is held out for tests. Typing and speech-recognition errors in three levels. In training
+  alone, words are exchanged for others of the same meaning, and sentences stand beside the wish: its reason, or talk
+  about something else.
 - **Near-duplicates**: no prompt comes twice, and no wording (numbers and politeness masked) more than 24 times for the
   same program; test wishes whose masked wording occurs in training are left out.
 - **Seed** {facts["plan"]["seed"]}; sha256 of the training examples `{facts["sha256"][:16]}`.
@@ -173,14 +194,14 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
     """Train on built data, and export; gives the folder of what ships.
 
     Raises:
-        ConfigError: The folder holds a training run of another plan.
+        ConfigError: The folder holds a training run of another plan, or the base is not a finished run of this size.
         DataError: There is no built data.
     """
     import torch
 
     from chauffeur.models.onboard.export import export, export_transformers
     from chauffeur.models.onboard.tokens import blanks_of, load_tokenizer
-    from chauffeur.models.onboard.training import Recipe, train
+    from chauffeur.models.onboard.training import Recipe, finished, train
 
     data = folder / "data"
     if not (data / "data.json").exists():
@@ -192,7 +213,18 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
     tokenizer: Any = load_tokenizer(data)
     state = folder / "training"
     state.mkdir(exist_ok=True)
-    recipe = Recipe(size=plan.size, steps=plan.steps, seed=plan.seed, more=plan.more)
+    recipe, begin = Recipe(size=plan.size, steps=plan.steps, seed=plan.seed, more=plan.more), None
+    lineage: dict[str, Any] = {}
+    if plan.base is not None:
+        before, begin = finished(plan.base / "training")
+        if plan.more or before.size != plan.size:
+            raise ConfigError("A network is trained on in its own size, in one round.", hint="Leave out --more.")
+        lineage = json.loads((plan.base / "model" / "model.json").read_text(encoding="utf-8"))
+        lineage = {name: lineage[name] for name in ("version", "recipe", "data")} | {
+            "base": lineage.get("base"),
+            "plan": json.loads((plan.base / "data" / "data.json").read_text())["plan"],
+        }
+        recipe = Recipe.onwards(f"{lineage['version']}/{lineage['data'][:16]}", plan.size, plan.steps, plan.seed)
     model = train(
         Packed.load(data / "train.npz"),
         state,
@@ -205,12 +237,14 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
             f"training, loss {loss:.3f}, {rate:,.0f} tokens/s", step + 1, recipe.all_steps
         ),
         device=device,
+        begin=begin,
     )
     facts = json.loads((data / "data.json").read_text(encoding="utf-8"))
     about = {
         "version": MODEL_VERSION,
         "recipe": asdict(recipe),
         "data": facts["sha256"],
+        "base": lineage or None,
         "questions": list(questions()),
         "reasons": list(reasons()),
         "checked": list(checked_reasons()),
@@ -231,9 +265,32 @@ def model_card(about: dict[str, Any], facts: dict[str, Any], parameters: int) ->
         facts: What `data.json` says of the data.
         parameters: How many the network has.
     """
-    recipe = about["recipe"]
+    recipe, base = about["recipe"], about.get("base")
     steps = recipe["steps"] + recipe["more"]
     tokens = steps * recipe["batch_tokens"] / 1e6
+    made = f"--draws {facts['plan']['draws']} --per-case {facts['plan']['per_case']}"
+    command = (
+        f"chauffeur train onboard --out DIR --size {recipe['size']}\n"
+        f"  --steps {recipe['steps']} --more {recipe['more']} --seed {recipe['seed']}\n  {made}"
+    )
+    more = f"the last\n  {recipe['more']:,} of them a second round at half the rate,"
+    rounds = more if recipe["more"] else "in one round,"
+    blanked = f"{recipe['blanked']:.0%} of the words"
+    if recipe["more"]:
+        blanked += f" ({recipe['blanked_more']:.0%} in the second round)"
+    lineage = ""
+    if base is not None:
+        earlier = base["recipe"]
+        command = (
+            f"chauffeur train onboard --out DIR --base BASE --size {recipe['size']}\n"
+            f"  --steps {recipe['steps']} --seed {recipe['seed']} {made}"
+        )
+        lineage = f"""
+- **Trained on from** `{base["version"]}` ({earlier["steps"] + earlier["more"]:,} steps on data `{base["data"][:16]}`),
+  whose tokenizer it keeps: the numbers above are of the training since. `BASE` is that version's folder, made by the
+  version of this repository that shipped it: `chauffeur train onboard --out BASE --size {earlier["size"]}
+  --steps {earlier["steps"]} --more {earlier["more"]} --seed {earlier["seed"]}
+  --draws {base["plan"]["draws"]} --per-case {base["plan"]["per_case"]}`."""
     return f"""# Model card: {about["version"]}
 
 Writes driving programs for passengers' wishes, on board, offline. {parameters / 1e6:.1f} million parameters, Llama
@@ -242,15 +299,12 @@ architecture (`{recipe["size"]}`), int8 weights for ONNX Runtime, trained from n
 - **Input**: situation and remembered trips in a few words, the wish (English, one sentence or a few), and what the
   rule-based reader made of it. **Output**: a program of the dialect and one sentence that says the same, a question
   back, or a reason to refuse.
-- **Training**: {steps:,} steps of {recipe["batch_tokens"]:,} tokens ({tokens:.0f} M with padding), the last
-  {recipe["more"]:,} of them a second round at half the rate, on
+- **Training**: {steps:,} steps of {recipe["batch_tokens"]:,} tokens ({tokens:.0f} M with padding), {rounds} on
   {facts["examples"]["train"]:,} examples; AdamW, rate {recipe["rate"]}, decay {recipe["decay"]},
-  {recipe["blanked"]:.0%} of the words ({recipe["blanked_more"]:.0%} in the second round) blanked in half of the
+  {blanked} blanked in half of the
   examples; seed {recipe["seed"]}.
   Data `{about["data"][:16]}`: see `DATA_CARD.md`.
-  The same command makes it again: `chauffeur train onboard --out DIR --size {recipe["size"]}
-  --steps {recipe["steps"]} --more {recipe["more"]} --seed {recipe["seed"]}
-  --draws {facts["plan"]["draws"]} --per-case {facts["plan"]["per_case"]}`.
+  The same command makes it again: `{command}`.{lineage}
 - **Meant for** the `onboard` planner of Chauffeur, behind its grammar, guard, linking and checks, in simulation. Alone
   it has none of them: it may copy a number wrongly or mistake a wish, more often on phrasings unlike its grammar's.
 - **Not for** a vehicle on a road, other languages, conversations, or any task but this one.

@@ -73,6 +73,7 @@ class Recipe:
         more: Steps of a second round after `steps`: the rate rises once more, to half its height, and falls again
             (warm restart, Loshchilov and Hutter 2017); it goes on from a finished first round.
         blanked_more: `blanked` in the second round, where the templates' words are known well.
+        base: The finished run whose weights it begins with ("version/data"); empty to begin from nothing.
     """
 
     size: str = "small"
@@ -85,6 +86,13 @@ class Recipe:
     seed: int = 0
     more: int = 0
     blanked_more: float = 0.25
+    base: str = ""
+
+    @classmethod
+    def onwards(cls, base: str, size: str, steps: int, seed: int) -> Recipe:
+        """Training a finished network on, with other data: at the rate and the blanking of a second round."""
+        plain = cls()
+        return cls(size, steps, rate=plain.rate / 2.0, blanked=plain.blanked_more, seed=seed, base=base)
 
     @property
     def all_steps(self) -> int:
@@ -207,6 +215,7 @@ def train(
     watch: Callable[[int, float, float], None] | None = None,
     device: str = "",
     save_s: float = 120.0,
+    begin: dict[str, torch.Tensor] | None = None,
 ) -> Network:
     """Train, or go on where a run in this folder stopped.
 
@@ -220,6 +229,7 @@ def train(
         watch: Called after each step with (step, loss, tokens per second).
         device: `cpu`, `cuda`; empty for the best at hand.
         save_s: Seconds between two saves.
+        begin: Weights to begin with; None for new ones.
 
     Raises:
         ConfigError: The folder holds a run of another recipe.
@@ -227,6 +237,8 @@ def train(
     where = torch.device(device or ("cuda" if torch.cuda.is_available() else "cpu"))
     torch.manual_seed(recipe.seed)
     model: Any = network(SIZES[recipe.size], vocabulary, end).to(where)
+    if begin is not None:
+        model.load_state_dict(begin)
     matrices = [p for p in model.parameters() if p.dim() >= 2]
     vectors = [p for p in model.parameters() if p.dim() < 2]
     optimiser = torch.optim.AdamW(
@@ -283,6 +295,23 @@ def train(
                 _save(state_path, recipe, model, optimiser, step + 1)
                 saved = time.monotonic()
     return model
+
+
+def finished(folder: Path) -> tuple[Recipe, dict[str, torch.Tensor]]:
+    """(recipe, weights) of a finished run's state.
+
+    Raises:
+        ConfigError: There is none, or it is not finished.
+    """
+    hint = "--base is the folder of a finished run of `chauffeur train onboard`."
+    try:
+        state: dict[str, Any] = torch.load(folder / "state.pt", map_location="cpu", weights_only=True)
+    except OSError as error:
+        raise ConfigError(f"{folder} holds no training run.", hint=hint) from error
+    recipe = Recipe(**state["recipe"])
+    if int(state["step"]) < recipe.all_steps:
+        raise ConfigError(f"The training run in {folder} is not finished.", hint=hint)
+    return recipe, state["model"]
 
 
 def _save(path: Path, recipe: Recipe, model: Network, optimiser: torch.optim.Optimizer, step: int) -> None:

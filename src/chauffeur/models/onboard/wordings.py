@@ -46,6 +46,14 @@ FILES = (
     "not_driven",
     "plain_rare",
     "steps_more",
+    "voices_moods",
+    "voices_pace",
+    "voices_numbers",
+    "voices_room",
+    "voices_lanes",
+    "voices_answers",
+    "voices_joins",
+    "chatter",
 )
 
 _NOT = r"^(?:don't|do not|never|neither|no|patiently|really|not|either)\b"
@@ -75,6 +83,19 @@ _CLASH = re.compile(
 _TRIES = 12
 MAX_CHARS = 200
 """A sentence of several wishes that comes out longer is said another way, if there is one."""
+MOST_FORMS = 8
+"""In training a template is drawn as often as there are ways of saying it, but no more than so many times as often."""
+
+_BESIDE = (
+    "{c}. {w}", "{c}. {w}", "{c}, {w}", "{c}, anyway, {w}", "{c}, so, {w}", "{c}. Anyway, {w}", "{c}. Right, {w}",
+    "{c}. Oh, {w}", "{w} {c}.", "{w} {c}.", "{w} By the way, {c}.", "{w} {c}, by the way.", "{w} You know, {c}.",
+)  # fmt: skip
+"""A wish with a sentence beside it that wishes for nothing."""
+_BECAUSE = (
+    "{c}. {w}", "{c}. {w}", "{c}, {w}", "{c}, so {w}", "{c}. So {w}", "{c}. Please, {w}", "{w} {c}.", "{w} {c}.",
+    "{w} It's just that {c}.", "{w} You see, {c}.",
+)  # fmt: skip
+"""A wish with its reason."""
 
 _NAME = "(driver|car|chauffeur|buddy|mate|pal|man|my friend|boss|sir|dude|love|dear|robot|James)"
 _HEY = "(hey|okay|ok|alright|so|well|um|uh|look|listen|sorry|oh|yo|hi|excuse me|now then|hello|hm)"
@@ -293,8 +314,7 @@ def utter(section: str, slots: Mapping[str, str], rng: np.random.Generator, held
     Raises:
         KeyError: The section is unknown, or a slot has no text.
     """
-    grammar = wordings()
-    return grammar.say(_drawn(grammar.templates(section, held=held), rng), slots, rng)
+    return wordings().say(_drawn(section, held, False, rng), slots, rng)
 
 
 def clause(section: str, slots: Mapping[str, str], rng: np.random.Generator, held: bool | None = False) -> Wording:
@@ -303,9 +323,7 @@ def clause(section: str, slots: Mapping[str, str], rng: np.random.Generator, hel
     Raises:
         KeyError: The section is unknown, or a slot has no text.
     """
-    grammar = wordings()
-    found = [t for t in grammar.templates(section, held=held) if not t.sentence]
-    return grammar.clause(_drawn(found, rng), slots, rng)
+    return wordings().clause(_drawn(section, held, True, rng), slots, rng)
 
 
 def conditioned(condition: str, wish: str, rng: np.random.Generator, held: bool | None = False) -> Wording:
@@ -330,5 +348,40 @@ def _joined(section: str, slots: Mapping[str, str], rng: np.random.Generator, he
     return found
 
 
-def _drawn(found: Sequence[Template], rng: np.random.Generator) -> Template:
-    return found[int(rng.integers(len(found)))]
+def beside(wish: str, rng: np.random.Generator) -> str:
+    """A wish with a sentence of training beside it that has nothing to do with it."""
+    return _put_together(_BESIDE, "chatter", wish, rng)
+
+
+def because(wish: str, reason: str, rng: np.random.Generator) -> str:
+    """A wish with its reason or complaint, from a section of sentences without slots, as training says it."""
+    return _put_together(_BECAUSE, reason, wish, rng)
+
+
+def _put_together(ways: Sequence[str], section: str, wish: str, rng: np.random.Generator) -> str:
+    grammar = wordings()
+    words = grammar.clause(_drawn(section, False, False, rng), {}, rng).text
+    way = ways[int(rng.integers(len(ways)))]
+    if not wish.endswith((".", "?", "!")):
+        wish += "."
+    if not way.startswith("{w}") and not way.startswith("{c}. {w}"):
+        wish = wish if re.match(r"I\b", wish) else wish[0].lower() + wish[1:]
+    if words.endswith(("?", "!")):
+        way = way.replace("{c}.", "{c}").replace("{c}, so ", "{c} ").replace("{c},", "{c}")
+    if way.startswith("{c}") or way == "{w} {c}.":
+        words = words[0].upper() + words[1:]
+    return way.replace("{c}", words).replace("{w}", wish)
+
+
+@cache
+def _lot(section: str, held: bool | None, bare: bool) -> tuple[Sequence[Template], np.ndarray]:
+    """Templates of a section, and the shares they are drawn with, summed up."""
+    grammar = wordings()
+    found = [t for t in grammar.templates(section, held=held) if not (bare and t.sentence)]
+    most = MOST_FORMS if held is False else 1
+    return found, np.cumsum([min(most, grammar.forms(t)) for t in found])
+
+
+def _drawn(section: str, held: bool | None, bare: bool, rng: np.random.Generator) -> Template:
+    found, shares = _lot(section, held, bare)
+    return found[int(np.searchsorted(shares, rng.integers(shares[-1]), side="right"))]

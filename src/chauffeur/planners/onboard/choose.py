@@ -6,7 +6,7 @@ What the planner chooses itself stays inside the limits it was told.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from chauffeur.concept import Limits, Situation
@@ -45,6 +45,11 @@ class Choice:
 
     steps: tuple[Chosen, ...]
     intent: str
+
+    def settings(self, used: Sequence[Leaning]) -> tuple[tuple[str, float], ...]:
+        """Numbers the program relies on, and what the person's history added to them; of one name, the last counts."""
+        pairs = [pair for part in (*self.steps, *used) for pair in part.settings]
+        return tuple(dict(pairs).items())
 
 
 def choose(

@@ -185,19 +185,11 @@ class LanguageModelPlanner:
         if isinstance(settled, Plan):
             return settled
         linked, used = settled.linked, settled.used
-        settings = {name: value for step in linked.choice.steps for name, value in step.settings}
-        settings |= {name: value for one in used for name, value in one.settings}
         return Plan(
-            thoughts=thoughts_of(
-                linked.reading,
-                [step.does for step in linked.choice.steps],
-                settled.situation,
-                assumed=[sentence for step in linked.choice.steps for sentence in step.assumed],
-                because=[one.because for one in used],
-            ),
+            thoughts=thoughts_of(linked.reading, linked.choice, settled.situation, used),
             policy=Program(settled.source, library=linked.library),
             intent=linked.choice.intent,
-            settings=tuple(settings.items()),
+            settings=linked.choice.settings(used),
             planner=self.id,
             model=self.model,
             latency_s=time.perf_counter() - begun,

@@ -52,20 +52,12 @@ class RetrievalPlanner:
             intent = "+".join(step.family for step in reading.steps)
             return declined(self, choice.words, begun, intent=intent)
         used = [leaning(step.family) for step in reading.steps]
-        settings = {name: value for step in choice.steps for name, value in step.settings}
-        settings |= {name: value for one in used for name, value in one.settings}
         source = program_of([step.filled for step in choice.steps])
         return Plan(
-            thoughts=thoughts_of(
-                reading,
-                [step.does for step in choice.steps],
-                request.context.situation,
-                assumed=[sentence for step in choice.steps for sentence in step.assumed],
-                because=[one.because for one in used],
-            ),
+            thoughts=thoughts_of(reading, choice, request.context.situation, used),
             policy=Program(source),
             intent=choice.intent,
-            settings=tuple(settings.items()),
+            settings=choice.settings(used),
             planner=self.id,
             model=self.model,
             latency_s=time.perf_counter() - begun,

@@ -5,25 +5,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from chauffeur.concept import Situation, Thoughts
+from chauffeur.planners.onboard.choose import Choice
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.meaning import Meaning, Reading
+from chauffeur.planners.onboard.personal import Leaning
 
 
 def thoughts_of(
-    reading: Reading, does: Sequence[str], situation: Situation, *, assumed: Sequence[str], because: Sequence[str]
+    reading: Reading, choice: Choice, situation: Situation, used: Sequence[Leaning], *, does: str = ""
 ) -> Thoughts:
     """R for what was settled. The numbers are those of the policy, written the same way.
 
     Args:
         reading: What was understood.
-        does: What is done, clauses after "I".
+        choice: What was settled.
         situation: Where we are.
-        assumed: What was taken for granted, full sentences.
-        because: Which earlier trips say so, full sentences or nothing.
+        used: What the person's history said about it.
+        does: What is done, a clause after "I", where that is not what the steps say.
     """
     understood = "; then ".join(_understood(meaning) for meaning in reading.steps)
-    sentences = [f"You want: {understood}.", _situation(situation), f"I {'. Then I '.join(does)}.", *assumed]
-    sentences += [sentence for sentence in dict.fromkeys(because) if sentence]
+    done = does or ". Then I ".join(step.does for step in choice.steps)
+    sentences = [f"You want: {understood}.", _situation(situation), f"I {done}."]
+    sentences += [sentence for step in choice.steps for sentence in step.assumed]
+    sentences += dict.fromkeys(one.because for one in used if one.because)
     return Thoughts(" ".join(sentences))
 
 

@@ -64,10 +64,16 @@ def _row(label: str, text: str, limit: int) -> str:
 
 
 def _history(history: History) -> str:
+    from chauffeur.memory.conflicts import conflicts_in  # with its memory it is heavy; prompts are imported early
+
     limit = len(history.items) and (4 * HISTORY_FIELD_CHARS + HISTORY_POLICY_CHARS)
     shown = history.items[:HISTORY_ITEMS]
     blocks = (data_block(f"trip-{index}", _item(item), limit) for index, item in enumerate(shown, start=1))
-    return "Remembered trips of this passenger, most relevant first:\n" + "\n".join(blocks)
+    told = "Remembered trips of this passenger, most relevant first:\n" + "\n".join(blocks)
+    conflicts = "\n".join(conflict.to_model() for conflict in conflicts_in(History(shown)))
+    if not conflicts:
+        return told
+    return f"{told}\nWhat of it contradicts itself:\n{data_block('conflicts', conflicts, limit)}"
 
 
 def wish_turn(request: PlanRequest, *, history: str | None = None, ask: str = _ASK) -> str:

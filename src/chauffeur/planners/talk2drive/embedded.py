@@ -6,16 +6,31 @@ control. A wish for something else is declined in words, and so is one that take
 
 from __future__ import annotations
 
+import re
 import time
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final, Literal
 
-from chauffeur.concept import Parameters, Plan, PlanRequest, Thoughts
+from chauffeur.concept import History, Parameters, Plan, PlanRequest, Situation, Thoughts
+from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.language_model import LanguageModelPlanner, Settled, usage_of
 from chauffeur.planners.onboard.options import Chosen, Declined, speed_words
+from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.thoughts import thoughts_of
-from chauffeur.planners.talk2drive.style import LOOK_AHEAD, LOOK_AHEAD_PARKING, PARKING_MPS, manner_of, place_of
+from chauffeur.planners.talk2drive.habits import SIGN_SETTING, meaning_of, pace_of, speed_for
+from chauffeur.planners.talk2drive.lanes import (
+    complaint_mps,
+    fitting_mps,
+    mood_lane,
+    of_left_lane,
+    passing_mps,
+    unsaid_turn,
+)
+from chauffeur.planners.talk2drive.lot import parks, wanted_place
+from chauffeur.planners.talk2drive.style import LOOK_AHEAD, LOOK_AHEAD_PARKING, PARKING_MPS, manner_of
 
 _STANDING: Final = frozenset({"stop", "pull_over"})
 _ELSEWHERE: Final[dict[str, str]] = {
@@ -24,6 +39,17 @@ _ELSEWHERE: Final[dict[str, str]] = {
     "pull_over": "With these parameters I cannot pull over; I can slow down or stop.",
 }
 """What cannot be said in parameters, by the first part of its intent."""
+_GIVES_WAY: Final = re.compile(
+    r"\b(?:yield|give way|let (?:them|him|her|others?|the \w+|cross\w*)\b.*\b(?:go|pass|by|through|first|cross)"
+    r"|wait for (?:them|the|those|others?|cross\w*))\b",
+    re.IGNORECASE,
+)
+_RIGHT: Final = "Change to the right lane."
+_WHERE_TO: Final = "I am not sure what you want. Shall I turn at the junction, and to which side?"
+_OFF_TOPIC: Final = "I only drive"
+"""How the model declines what is no wish about driving."""
+_GIVES_WAY_SHARE: Final = 0.8
+"""Of the present speed, as for a careful drive."""
 _ONE_BY_ONE: Final = "With these parameters I can do one thing at a time. What shall I do first?"
 
 
@@ -46,26 +72,56 @@ class EmbeddedParameters:
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; what is not understood, not possible or no matter of parameters is declined in words."""
         begun = time.perf_counter()
-        if request.context.situation.world == "parking" and (place := place_of(request.instruction.text)):
+        first = self._read(request, begun)
+        situation = request.context.situation
+        meaning = meaning_of(request.history, situation.world, first.intent)
+        if meaning is None:
+            return first
+        meant = replace(request, instruction=replace(request.instruction, text=meaning.words))
+        second = self._read(meant, begun)
+        if second.policy is None or second.intent == first.intent:
+            return first
+        intent = f"{second.intent}+{first.intent}" if first.intent else second.intent
+        return replace(second, intent=intent, thoughts=Thoughts(f"{meaning.because} {second.thoughts.text}"))
+
+    def _read(self, request: PlanRequest, begun: float) -> Plan:
+        """The wish as its words say, with the speed this person likes for such wishes."""
+        wish, situation = request.instruction.text, request.context.situation
+        in_lot = situation.world == "parking"
+        if in_lot and (place := wanted_place(wish)):
             return self._park(place, request, begun)
-        settled = self._model.settle(request, begun)
+        if situation.world == "intersection" and _GIVES_WAY.search(wish):
+            return self._give_way(request, begun)
+        alike = History(tuple(item for item in request.history.items if item.similarity >= 0.0))
+        settled = self._model.settle(replace(request, history=alike), begun)
         if isinstance(settled, Plan):
+            if _forbidden(settled):
+                return settled
+            if of_left_lane(wish, settled.intent, situation):
+                right = replace(request, instruction=replace(request.instruction, text=_RIGHT))
+                return replace(self._read(right, begun), intent=f"lane.right+{settled.intent}")
+            if settled.intent in ("ask", "refuse") and (change := complaint_mps(wish, situation)):
+                return self._changed(change, request, begun, settled)
+            if in_lot and parks(settled.intent):
+                return self._park("nearest", request, begun)
             return settled
-        found = parameters_of(settled)
-        if isinstance(found, Declined):
-            return declined(self, found.words, begun, intent=settled.linked.choice.intent, raw=settled.written.text)
         linked, used = settled.linked, settled.used
+        if in_lot and parks(linked.choice.intent):
+            return self._park("nearest", request, begun)
+        if unsaid_turn(wish, linked.choice.intent):
+            return declined(self, _WHERE_TO, begun, intent="ask", raw=settled.written.text)
+        found = parameters_of(settled)
+        if isinstance(found, Declined) and situation.world == "intersection" and linked.choice.intent == "yield":
+            return self._give_way(request, begun)
+        if isinstance(found, Declined):
+            return declined(self, found.words, begun, intent=linked.choice.intent, raw=settled.written.text)
+        found, why = _at_pace(found, linked.choice.intent, request)
+        thoughts = thoughts_of(linked.reading, linked.choice, settled.situation, used, does=does(found))
         return Plan(
-            thoughts=thoughts_of(
-                linked.reading,
-                [does(found)],
-                settled.situation,
-                assumed=[sentence for step in linked.choice.steps for sentence in step.assumed],
-                because=[one.because for one in used],
-            ),
+            thoughts=Thoughts(" ".join((*why, thoughts.text, *_overruled(request.history, used)))),
             policy=found,
             intent=linked.choice.intent,
-            settings=(("target_speed_mps", found.target_speed_mps), *(pair for one in used for pair in one.settings)),
+            settings=_settings(found, situation, used),
             planner=self.id,
             model=self.model,
             latency_s=time.perf_counter() - begun,
@@ -73,19 +129,89 @@ class EmbeddedParameters:
             raw=settled.written.text,
         )
 
-    def _park(self, place: str, request: PlanRequest, begun: float) -> Plan:
-        look = LOOK_AHEAD_PARKING
-        speed = round(min(PARKING_MPS, request.limits.most_mps(request.context.situation.speed_limit_mps)), 2)
-        found = Parameters(speed, look.distance_m, look.ratio_s, 0, place)
+    def _give_way(self, request: PlanRequest, begun: float) -> Plan:
+        """Towards a crossing where others go first: the car gives way by itself, so it is the approach that counts."""
+        look, situation = LOOK_AHEAD["gentle"], request.context.situation
+        speed = round(_GIVES_WAY_SHARE * situation.speed_mps, 2)
+        found = Parameters(speed, look.distance_m, look.ratio_s, 0, "straight")
+        found, why = _at_pace(found, "yield", request)
         return Plan(
-            thoughts=Thoughts(f"You want to park. I {does(found)}."),
+            thoughts=Thoughts(" ".join((*why, f"You want others to go first. I {does(found)}."))),
             policy=found,
-            intent="park",
-            settings=(("target_speed_mps", found.target_speed_mps),),
+            intent="yield",
+            settings=_settings(found, situation, ()),
             planner=self.id,
             model=self.model,
             latency_s=time.perf_counter() - begun,
         )
+
+    def _changed(self, change_mps: float, request: PlanRequest, begun: float, settled: Plan) -> Plan:
+        """A complaint on the pace that is no wish the model knows: another speed in the same lane."""
+        situation = request.context.situation
+        look = (
+            LOOK_AHEAD_PARKING if situation.world == "parking" else LOOK_AHEAD["gentle" if change_mps < 0 else "usual"]
+        )
+        cap = min(situation.speed_limit_mps, request.limits.most_mps(situation.speed_limit_mps))
+        found = Parameters(round(min(situation.speed_mps + change_mps, cap), 2), look.distance_m, look.ratio_s)
+        intent = "speed.decrease" if change_mps < 0 else "speed.increase"
+        found, why = _at_pace(found, intent, request)
+        pace = "too fast" if change_mps < 0 else "too slow"
+        return replace(
+            settled,
+            thoughts=Thoughts(" ".join((*why, f"You find this {pace}. I {does(found)}."))),
+            policy=found,
+            refusal="",
+            intent=intent,
+            settings=_settings(found, situation, ()),
+            latency_s=time.perf_counter() - begun,
+        )
+
+    def _park(self, place: str, request: PlanRequest, begun: float) -> Plan:
+        look, situation = LOOK_AHEAD_PARKING, request.context.situation
+        speed = round(min(PARKING_MPS, request.limits.most_mps(situation.speed_limit_mps)), 2)
+        found = Parameters(speed, look.distance_m, look.ratio_s, 0, place)
+        found, why = _at_pace(found, "park", request)
+        return Plan(
+            thoughts=Thoughts(" ".join((*why, f"You want to park. I {does(found)}."))),
+            policy=found,
+            intent="park",
+            settings=_settings(found, situation, ()),
+            planner=self.id,
+            model=self.model,
+            latency_s=time.perf_counter() - begun,
+        )
+
+
+def _forbidden(declined: Plan) -> bool:
+    """Whether it was declined for what it asks for, not for want of understanding."""
+    return declined.intent == "refuse" and not declined.refusal.startswith(_OFF_TOPIC)
+
+
+def _at_pace(found: Parameters, intent: str, request: PlanRequest) -> tuple[Parameters, tuple[str, ...]]:
+    """Parameters at the speed this person likes for such wishes, and why in words."""
+    situation = request.context.situation
+    sign = situation.speed_limit_mps
+    if found.target_speed_mps == 0.0 or sign <= 0.0:
+        return found, ()
+    pace = pace_of(request.history, situation.world, intent, found.target_speed_mps / sign)
+    if pace is None:
+        return found, ()
+    speed = speed_for(pace, intent, situation.speed_mps, sign, request.limits.most_mps(sign))
+    if speed is None or speed == found.target_speed_mps:
+        return found, ()
+    return replace(found, target_speed_mps=speed), (pace.because,) if pace.because else ()
+
+
+def _settings(found: Parameters, situation: Situation, used: Sequence[Leaning]) -> tuple[tuple[str, float], ...]:
+    own = (("target_speed_mps", found.target_speed_mps), (SIGN_SETTING, round(situation.speed_limit_mps, 3)))
+    return (*own, *(pair for one in used for pair in one.settings))
+
+
+def _overruled(history: History, used: Sequence[Leaning]) -> Iterator[str]:
+    """Where what is kept to contradicts what the person said before: both, with their dates."""
+    for conflict in conflicts_in(history):
+        if conflict.used.source == "feedback" and any(conflict.used.words in one.because for one in used):
+            yield conflict.to_person()
 
 
 def parameters_of(settled: Settled) -> Parameters | Declined:
@@ -101,8 +227,12 @@ def parameters_of(settled: Settled) -> Parameters | Declined:
         return Declined("We are in the leftmost lane; with these parameters I pass others on the left only.")
     turn = next((step.intent.partition(".")[2] for step in steps if step.intent.startswith("turn.")), "")
     look = LOOK_AHEAD[manner_of(settled.linked.choice.intent, gentle=any(one.gentle for one in settled.used))]
-    speed = _speed(steps, settled.situation.speed_mps)
-    return Parameters(speed, look.distance_m, look.ratio_s, _lane(steps), turn)
+    intent, lane = settled.linked.choice.intent, _lane(steps)
+    speed = fitting_mps(_speed(steps, settled.situation.speed_mps), intent, settled.situation)
+    mood = mood_lane(intent, settled.situation) if not lane else 0
+    if mood < 0:
+        speed = passing_mps(settled.situation, speed, sum(one.speed_mps for one in settled.used))
+    return Parameters(round(speed, 2), look.distance_m, look.ratio_s, lane or mood, turn)
 
 
 def _speed(steps: tuple[Chosen, ...], now_mps: float) -> float:

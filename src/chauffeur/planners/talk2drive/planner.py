@@ -10,15 +10,26 @@ from __future__ import annotations
 import time
 from typing import Final
 
-from chauffeur.concept import ConfigError, HistoryItem, InstructionError, Limits, Plan, PlanRequest, Thoughts, Usage
+from chauffeur.concept import (
+    ConfigError,
+    History,
+    HistoryItem,
+    InstructionError,
+    Limits,
+    Plan,
+    PlanRequest,
+    Thoughts,
+    Usage,
+)
 from chauffeur.concept.units import kmh
+from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.planners.base import OnText, Planner, Prose, Writer, declined
 from chauffeur.planners.prompts import Message, data_block, repair_turns, wish_turn
 from chauffeur.planners.prompts.system import fill, template
 from chauffeur.planners.talk2drive.answer import Answer, read_answer
 from chauffeur.planners.talk2drive.style import DISTANCE_M, RATIO_S
 
-PROMPT_VERSION: Final = "talk2drive-prompt-v1"
+PROMPT_VERSION: Final = "talk2drive-prompt-v2"
 
 _ASK: Final = "Answer with the JSON object for the instruction above."
 _ASK_AGAIN: Final = "Answer again with one JSON object that takes this into account."
@@ -137,12 +148,17 @@ def system_text(limits: Limits) -> str:
 
 
 def _history(request: PlanRequest) -> str:
-    """H (Eq. 17): command, action and evaluation of earlier trips, newest first, each with its date."""
+    """H (Eq. 17): command, action and evaluation of earlier trips, newest first, each with its date; then what in them
+    does not go together, both sides with their dates."""
     items = sorted(request.history.items, key=lambda item: item.when, reverse=True)[:_ITEMS]
     if not items:
         return ""
     blocks = (data_block(f"trip-{index}", _item(item), _ITEM_CHARS) for index, item in enumerate(items, start=1))
-    return "The history commands, actions, and the passenger's feedback, newest first:\n" + "\n".join(blocks)
+    told = "The history commands, actions, and the passenger's feedback, newest first:\n" + "\n".join(blocks)
+    conflicts = "\n".join(conflict.to_model() for conflict in conflicts_in(History(tuple(items))))
+    if not conflicts:
+        return told
+    return f"{told}\nWhat of it contradicts itself:\n{data_block('conflicts', conflicts, _ITEM_CHARS)}"
 
 
 def _item(item: HistoryItem) -> str:

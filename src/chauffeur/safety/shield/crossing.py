@@ -67,6 +67,8 @@ _LOST: Final = _Care(after_s=1.0, merge_s=1.5, side_m=0.6, room_m=4.5, turn_rad=
 """The same for a car that got off its way: it needs room to get back to it."""
 _LAST: Final = _Care(after_s=0.2, merge_s=0.6, side_m=0.2, room_m=math.inf, turn_rad=math.inf)
 """What is left where that is gone, because others or tyres did what was not foreseen."""
+_BESIDE: Final = replace(_LAST, side_m=0.05)
+"""To stand beside somebody's way without touching it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +88,17 @@ class _Way:
     at: int
     beyond: int
     hold_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """A straight lane: its first point and its direction."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    cos: float
+    sin: float
 
 
 class Motion:
@@ -132,16 +145,20 @@ class Junction:
             self._onward.setdefault(lane.id[0], []).append(lane)
         self._ways: dict[tuple[LaneId, LaneId | None], list[Array]] = {}
         self._straight = {lane.id: line for lane in lanes if (line := _straight(lane)) is not None}
-        self._keep_clear = np.array(
-            [
-                (x, y, math.cos(heading), math.sin(heading), self._named[lane].length_m)
-                for lane, (x, y, heading) in self._straight.items()
-            ]
-        ).reshape(-1, 5)
+        self._clear_from: dict[LaneId, Array] = {}
         self._promised: Array | None = None
         self._motion = Motion(dt_s)
 
-    def mend(self, snapshot: Snapshot, lane: LaneId, aim: LaneId | None, command: Command, most_mps2: float) -> Mended:
+    def mend(
+        self,
+        snapshot: Snapshot,
+        lane: LaneId,
+        aim: LaneId | None,
+        command: Command,
+        most_mps2: float,
+        *,
+        held_up: bool = False,
+    ) -> Mended:
         """The command, changed as little as is needed.
 
         Args:
@@ -150,10 +167,13 @@ class Junction:
             aim: The lane it steers for: where it follows, the only way on that counts.
             command: As all other rules let it through.
             most_mps2: Hardest acceleration that they would.
+            held_up: Whether a lead is so close that it has to brake for it.
         """
-        outlook = self._outlook(snapshot)
+        outlook = self._outlook(snapshot, lane)
         ways = [outlook.way(points) for points in self._candidates(lane, aim, outlook.state)]
-        found = _mend(outlook, ways, command, most_mps2, _KIND) or _mend(outlook, ways, command, most_mps2, _DUE)
+        found = None
+        for care in (_KIND, _DUE):
+            found = found or _mend(outlook, ways, command, most_mps2, care, held_up=held_up)
         if found is not None:
             mended, way = found
             self._promised = way.points
@@ -163,13 +183,29 @@ class Junction:
         self._motion.commanded(snapshot, outlook.state, mended.command)
         return mended
 
-    def _outlook(self, snapshot: Snapshot) -> _Outlook:
+    def _outlook(self, snapshot: Snapshot, lane: LaneId) -> _Outlook:
         ego = snapshot.ego
         solid = [other for other in (*snapshot.others, *snapshot.objects) if other.kind != "stop_sign"]
         rows = [row for other in solid if (row := self._row(other, ego)) is not None]
         others = np.array(rows, dtype=np.float64).reshape(len(rows), 7)
         size = ego.length_m / 2.0, ego.width_m / 2.0
-        return _Outlook(self._motion.observe(snapshot), size, others, self._keep_clear, self._table, self._dt_s)
+        return _Outlook(self._motion.observe(snapshot), size, others, self._keep_clear(lane), self._table, self._dt_s)
+
+    def _keep_clear(self, lane: LaneId) -> Array:
+        """The straight lanes nobody may stand in who is in a lane, as `foresight` wants them.
+
+        Who is to come along its own lane, the one before it, or one that forks off where it does, comes from behind.
+        """
+        if lane not in self._clear_from:
+            fork = self._named[lane].centre_m[0]
+            rows = [
+                (line.x_m, line.y_m, line.cos, line.sin, self._named[one].length_m)
+                for one, line in self._straight.items()
+                if math.dist((line.x_m, line.y_m), fork) >= _JOINT_M
+                and math.dist(self._named[one].centre_m[-1], fork) >= _JOINT_M
+            ]
+            self._clear_from[lane] = np.array(rows, dtype=np.float64).reshape(-1, 5)
+        return self._clear_from[lane]
 
     def _row(self, other: VehicleState, ego: VehicleState) -> tuple[float, ...] | None:
         """Another as `foresight` wants it; None if nothing can be said of where it will go, far away as it is.
@@ -179,14 +215,15 @@ class Junction:
         x, y, heading = other.x_m, other.y_m, other.heading_rad
         long, wide = other.length_m / 2.0, other.width_m / 2.0
         line = None if other.lane is None else self._straight.get(other.lane)
-        if line is not None and math.cos(heading - line[2]) > _ALONG:
-            c, s = math.cos(line[2]), math.sin(line[2])
-            off = -s * (x - line[0]) + c * (y - line[1])
-            wide += abs(off) / 2.0 + abs(math.sin(heading - line[2])) * long
-            x, y, heading = x + s * off / 2.0, y - c * off / 2.0, line[2]
-        elif math.hypot(x - ego.x_m, y - ego.y_m) > _FAR_M:
+        speed = max(other.speed_mps, 0.0)
+        if line is not None and math.cos(heading - line.heading_rad) > _ALONG:
+            c, s = line.cos, line.sin
+            off = -s * (x - line.x_m) + c * (y - line.y_m)
+            wide += abs(off) / 2.0 + abs(math.sin(heading - line.heading_rad)) * long
+            return x + s * off / 2.0, y - c * off / 2.0, c, s, speed, long, wide
+        if math.hypot(x - ego.x_m, y - ego.y_m) > _FAR_M:
             return None
-        return x, y, math.cos(heading), math.sin(heading), max(other.speed_mps, 0.0), long, wide
+        return x, y, math.cos(heading), math.sin(heading), speed, long, wide
 
     def _candidates(self, lane: LaneId, aim: LaneId | None, state: Array) -> list[Array]:
         """The ways a command has to leave open: those from the ego's lane, unless that is another's, driven across."""
@@ -226,12 +263,13 @@ def _sampled(lanes: Sequence[LaneView]) -> Array:
     return np.ascontiguousarray(np.stack([x, y, heading], axis=1), dtype=np.float64)
 
 
-def _straight(lane: LaneView) -> tuple[float, float, float] | None:
-    """(x, y) of a straight lane's first point and its heading; None for a bend."""
+def _straight(lane: LaneView) -> _Line | None:
+    """A straight lane as a line; None for a bend."""
     (x, y), *rest = lane.centre_m
     heading = math.atan2(rest[-1][1] - y, rest[-1][0] - x)
-    off = max(abs(math.cos(heading) * (b - y) - math.sin(heading) * (a - x)) for a, b in rest)
-    return (x, y, heading) if off < _BENT_M else None
+    line = _Line(x, y, heading, math.cos(heading), math.sin(heading))
+    off = max(abs(line.cos * (b - y) - line.sin * (a - x)) for a, b in rest)
+    return line if off < _BENT_M else None
 
 
 def _turned(way: Array) -> float:
@@ -339,11 +377,13 @@ _STRAYS: Final = "The car would leave its way, or get into that of somebody who 
 
 
 def _mend(
-    outlook: _Outlook, ways: Sequence[_Way], command: Command, most_mps2: float, care: _Care
+    outlook: _Outlook, ways: Sequence[_Way], command: Command, most_mps2: float, care: _Care, *, held_up: bool
 ) -> tuple[Mended, _Way] | None:
     """The command with its acceleration mended, if that is enough, and the way that is then promised."""
     asked, steering = command.acceleration_mps2, command.steering_rad
-    way = outlook.stops(command, ways, care) or outlook.clears(command, ways, care)
+    way = outlook.stops(command, ways, care)
+    if way is None and not held_up:  # who has to brake for a lead cannot promise to be through soon
+        way = outlook.clears(command, ways, care)
     if way is not None:
         return Mended(command), way
     low, high = outlook.least_mps2, asked
@@ -380,11 +420,17 @@ def _rescue(outlook: _Outlook, way: _Way, command: Command, most_mps2: float) ->
                     if ends_well(trial, [way], care):
                         return Mended(trial, "lane", _STRAYS)
     best, latest = Command(least, 0.0), -1.0
-    for acceleration in (least, *clearing):
+    # Each begins with its own plan: to brake now, since it could still be cleared later, ends in the middle of it.
+    for acceleration, plans in ((least, _STOPS), *((mps2, _CLEARS) for mps2 in clearing)):
         for law in range(foresight.LAWS):
             trial = Command(acceleration, outlook.wheel_rad(law, way, acceleration))
-            for plan in (*_STOPS, *_CLEARS):
+            for plan in plans:
                 trouble = outlook.trouble_s(trial, way, plan, _LAST)
                 if trouble > latest:
                     best, latest = trial, trouble
+    if latest < math.inf:  # rather stand close by somebody's way than drive into it
+        for law in range(foresight.LAWS):
+            trial = Command(least, outlook.wheel_rad(law, way, least))
+            if outlook.stops(trial, [way], _BESIDE):
+                return Mended(trial, "yield", _STRAYS)
     return Mended(best, "yield" if best.acceleration_mps2 <= asked else "clear", _STRAYS)

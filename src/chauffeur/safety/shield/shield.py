@@ -258,7 +258,9 @@ class Shield:
             wanted, rule, reason = standing, "reverse", "The car stands; it does not reverse."
         mended = Command(wanted, command.steering_rad)
         if crossings:
-            result = self._guard_of(snapshot).mend(snapshot, lane, aim, mended, bound.acceleration_mps2)
+            most = bound.acceleration_mps2
+            held_up = bound.rule == "gap" and most <= 0.0
+            result = self._guard_of(snapshot).mend(snapshot, lane, aim, mended, most, held_up=held_up)
             if result.rule:
                 mended, rule, reason = result.command, result.rule, result.reason
         faster = mended.acceleration_mps2 - asked

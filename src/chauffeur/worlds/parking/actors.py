@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 from chauffeur.concept import LaneId, VehicleState
 from chauffeur.worlds.parking.boxes import Box, overlap
@@ -26,6 +26,15 @@ _STANDS_MPS: Final = 0.1
 _PREVIEW_S: Final = 0.5
 _PATIENCE_S: Final = 3.0
 """After this time in front of a car they turn round."""
+
+
+class CarMoved(NamedTuple):
+    """What changes of a car that leaves: way driven, speed, whether it has crashed, where its follower has it."""
+
+    station_m: float
+    speed_mps: float
+    crashed: bool
+    located_m: float | None
 
 
 @dataclass(slots=True)
@@ -82,7 +91,19 @@ class LeavingCar:
 
     def copy(self) -> LeavingCar:
         """The same car, to be moved on its own."""
-        return LeavingCar(self.id, self.way, self.station_m, self.target_mps, self.lane, self.speed_mps, self.crashed)
+        return self.moved_to(self.moved())
+
+    def moved(self) -> CarMoved:
+        """All of it that changes from step to step."""
+        return CarMoved(self.station_m, self.speed_mps, self.crashed, self._follower.located_m)
+
+    def moved_to(self, moved: CarMoved) -> LeavingCar:
+        """The same car at another instant."""
+        twin = LeavingCar(
+            self.id, self.way, moved.station_m, self.target_mps, self.lane, moved.speed_mps, moved.crashed
+        )
+        twin._follower.located_m = moved.located_m
+        return twin
 
 
 @dataclass(slots=True)

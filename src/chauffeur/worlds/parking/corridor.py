@@ -65,6 +65,18 @@ class Ahead(NamedTuple):
     crosses: bool
 
 
+def poses_along(path: Path, step_m: float) -> tuple[_Array, _Array, _Array]:
+    """(x, y, heading) every so many metres of a path, its end included: what `Path.at` says, all at once."""
+    count = max(2, math.ceil(path.length_m / step_m) + 1)
+    way = np.minimum(np.arange(count) * step_m, path.length_m)
+    corners, stations = np.array(path.points_m), np.array(path.stations_m)
+    leg = np.clip(np.searchsorted(stations, way, side="right"), 1, len(stations) - 1) - 1
+    here, step = corners[leg], np.diff(corners, axis=0)
+    share = (way - stations[leg]) / (stations[leg + 1] - stations[leg])
+    headings = np.array([math.atan2(dy, dx) for dx, dy in step.tolist()])
+    return here[:, 0] + share * step[leg, 0], here[:, 1] + share * step[leg, 1], headings[leg]
+
+
 class Corridor:
     """The ground along one path, for one body."""
 
@@ -72,12 +84,10 @@ class Corridor:
         """Args: path of the rear axle; the body; clear distance to be left at its sides."""
         self.path = path
         self._body = body
-        count = max(2, math.ceil(path.length_m / STEP_M) + 1)
-        poses = [path.at(min(i * STEP_M, path.length_m)) for i in range(count)]
-        heading = np.array([pose.heading_rad for pose in poses])
+        x, y, heading = poses_along(path, STEP_M)
         self._cos, self._sin, self._heading = np.cos(heading), np.sin(heading), heading
-        self._x = np.array([pose.x_m for pose in poses]) + self._cos * body.rear_to_middle_m
-        self._y = np.array([pose.y_m for pose in poses]) + self._sin * body.rear_to_middle_m
+        self._x = x + self._cos * body.rear_to_middle_m
+        self._y = y + self._sin * body.rear_to_middle_m
         self._half_length, self._half_width = body.length_m / 2.0, body.width_m / 2.0 + side_m
         self._reach = math.hypot(self._half_length, self._half_width)
 

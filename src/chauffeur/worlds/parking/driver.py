@@ -18,7 +18,7 @@ JAM_M: Final = 1.0
 
 
 class ParkingDriver:
-    """Drives to a wished lane; a spot is one. Its only state is the way there."""
+    """Drives to a wished lane; a spot is one. Its only state is the way there, taken anew if others drove meanwhile."""
 
     def __init__(
         self, chassis: Chassis, dt_s: float, now: Callable[[], Snapshot], way_to: Callable[[LaneId | None], Way]
@@ -28,6 +28,7 @@ class ParkingDriver:
         self._now = now
         self._way_to = way_to
         self._aim: tuple[LaneId | None] | None = None
+        self._asked = 0
 
     def initial_wishes(self) -> Wishes:
         """Keep the present speed, and drive on: to the exit, where nothing else is wished."""
@@ -44,10 +45,11 @@ class ParkingDriver:
     def command(self, wishes: Wishes) -> Command:
         """Acceleration and steering for settled wishes."""
         assert wishes.target_speed_mps is not None
-        if self._aim != (wishes.target_lane,):
+        snapshot = self._now()
+        if self._aim != (wishes.target_lane,) or snapshot.tick > self._asked + 1:
             self._aim = (wishes.target_lane,)
             way = self._way_to(wishes.target_lane)
             self._follower.take(way.path, way.room_m)
-        snapshot = self._now()
+        self._asked = snapshot.tick
         others = (*snapshot.others, *snapshot.objects)
         return self._follower.command(snapshot.ego, others, OWN_LOOK, wishes.target_speed_mps, wishes.time_headway_s)

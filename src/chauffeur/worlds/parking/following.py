@@ -25,7 +25,7 @@ from chauffeur.control.pure_pursuit import Path, Pose, kept_within, look_ahead_d
 from chauffeur.control.pure_pursuit import steering_angle as angle_of
 from chauffeur.geometry import wrap_to_pi
 from chauffeur.worlds.parking.boxes import Box, overlap
-from chauffeur.worlds.parking.corridor import Ahead, Body, Corridor
+from chauffeur.worlds.parking.corridor import Ahead, Body, Corridor, poses_along
 
 STEADY_S: Final = 0.5
 """Shortest look-ahead, as a time: twice that below which a car weaves whose steering answers after 0.1 s."""
@@ -95,7 +95,8 @@ class Follower:
         self._bend_mps2 = bend_mps2
         self._corridor: Corridor | None = None
         self._fastest: tuple[float, ...] = ()
-        self._station: float | None = None
+        self.located_m: float | None = None
+        """Way along the path to where the car was last; None where it has not been looked for on this path."""
         self._room_m = 0.0
 
     @property
@@ -106,7 +107,7 @@ class Follower:
     @property
     def station_m(self) -> float:
         """Way along the path to where the car was last, m."""
-        return 0.0 if self._station is None else self._station
+        return 0.0 if self.located_m is None else self.located_m
 
     @property
     def left_m(self) -> float:
@@ -117,7 +118,7 @@ class Follower:
         """Follow a path of the rear axle from now on, with so much room beside it."""
         self._corridor = Corridor(path, self._chassis.body, min(_SIDE_M, room_m))
         self._fastest = _speeds_for_bends(path, self._bend_mps2)
-        self._station = None
+        self.located_m = None
         self._room_m = room_m
 
     def locate(self, ego: VehicleState) -> float:
@@ -125,12 +126,12 @@ class Follower:
         if self._corridor is None:
             raise ValueError("There is no path to follow.")
         rear, path = self._chassis.rear(ego), self._corridor.path
-        if self._station is None:
-            self._station = path.nearest(rear.x_m, rear.y_m)
+        if self.located_m is None:
+            self.located_m = path.nearest(rear.x_m, rear.y_m)
         else:
-            ahead = self._station + max(ego.speed_mps, 0.0) * self._dt_s + 2.0
-            self._station = path.nearest(rear.x_m, rear.y_m, self._station - 1.0, ahead)
-        return self._station
+            ahead = self.located_m + max(ego.speed_mps, 0.0) * self._dt_s + 2.0
+            self.located_m = path.nearest(rear.x_m, rear.y_m, self.located_m - 1.0, ahead)
+        return self.located_m
 
     def command(
         self,
@@ -238,7 +239,7 @@ class Follower:
     def _free(self, speed: float, target: float) -> float:
         if target < _STILL_MPS:  # IDM's free road has no standing still
             return max(-FIRM_MPS2, -speed / self._dt_s)
-        return max(-FIRM_MPS2, idm_acceleration(speed, target, self._manners))
+        return max(-EASY_MPS2, idm_acceleration(speed, target, self._manners))  # a lower target is no emergency
 
     def _behind(self, one: Ahead, speed: float, target: float, headway_s: float, *, car: bool) -> float:
         """Acceleration, m/s2, that somebody ahead leaves."""
@@ -276,8 +277,8 @@ def stopping_acceleration(speed_mps: float, distance_m: float, braking_mps2: flo
 
 def _speeds_for_bends(path: Path, sideways_mps2: float) -> tuple[float, ...]:
     """Highest speed every 2 m of a path, m/s: what its bends allow, there and farther on."""
-    count = max(2, math.ceil(path.length_m / _BEND_M) + 1)
-    headings = [path.at(min(i * _BEND_M, path.length_m)).heading_rad for i in range(count)]
+    headings: list[float] = poses_along(path, _BEND_M)[2].tolist()
+    count = len(headings)
     speeds = [math.inf] * count
     for i, (one, two) in enumerate(pairwise(headings)):
         curvature = abs(wrap_to_pi(two - one)) / _BEND_M

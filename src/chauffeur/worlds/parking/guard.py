@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from chauffeur.concept import Command, Snapshot, VehicleState
+from chauffeur.concept.units import kmh
 from chauffeur.control.pure_pursuit import Pose
 from chauffeur.worlds.parking.boxes import Box, overlap
 from chauffeur.worlds.parking.following import HARDEST_MPS2, Chassis
@@ -70,7 +71,7 @@ class Guard:
         most = (most_mps - speed) / self._dt_s
         most = most if most >= 0.0 else max(most, -_EASY_MPS2)
         if asked > most + _LEVEL:
-            rule, reason = "speed", f"No faster than {most_mps * 3.6:.0f} km/h here."
+            rule, reason = "speed", f"No faster than {kmh(most_mps):.0f} km/h here."
         wanted = min(asked, most)
         others = [one for one in (*snapshot.others, *snapshot.objects) if self._near(snapshot.ego, one)]
         if self._ends_well(snapshot.ego, wanted, wheel, others):

@@ -22,6 +22,7 @@ from itertools import pairwise
 from typing import Final
 
 from chauffeur.concept import LaneId, LaneView
+from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.worlds.parking.boxes import Box
 
 Points = tuple[tuple[float, float], ...]
@@ -36,7 +37,7 @@ CORNER_M: Final = 6.0
 """Radius, along the middle, of the corners between drives and aisles."""
 ISLAND_M: Final = 1.2
 """Between rows that stand back to back."""
-LIMIT_MPS: Final = 15.0 / 3.6
+LIMIT_MPS: Final = 15.0 * MPS_PER_KMH
 _APPROACH_M: Final = 24.0
 _END_M: Final = 12.0
 """From the middle of a drive to the first spot."""

@@ -23,6 +23,7 @@ from chauffeur.worlds.parking.boxes import Box, overlap
 from chauffeur.worlds.parking.corridor import Body
 from chauffeur.worlds.parking.driver import ParkingDriver
 from chauffeur.worlds.parking.following import Chassis
+from chauffeur.worlds.parking.instant import Ego, pack, unpack
 from chauffeur.worlds.parking.lot import AISLE_M, Lot, Spot, build_lot
 from chauffeur.worlds.parking.perception import LaneMap, ParkingPerception
 from chauffeur.worlds.parking.places import parked_in, spot_for
@@ -74,16 +75,19 @@ class _Ground:
     parked: tuple[VehicleState, ...]
     boxes: tuple[tuple[int, Box], ...]
     free: frozenset[str]
+    cars: tuple[LeavingCar, ...]
+    walkers: tuple[Walker, ...]
 
 
-@dataclass(slots=True)
-class _Ego:
-    """The car: its rear axle, speed, and the angle of its front wheels."""
+class _Ego(Ego):
+    """The car, as it moves."""
 
-    rear: Pose
-    speed_mps: float
-    steering_rad: float = 0.0
-    crashed: bool = False
+    __slots__ = ()
+
+    @classmethod
+    def at(cls, ego: Ego) -> _Ego:
+        """A car of its own in the same state."""
+        return cls(ego.rear, ego.speed_mps, ego.steering_rad, ego.crashed)
 
     @property
     def box(self) -> Box:
@@ -151,11 +155,12 @@ class ParkingWorld:
         lot = build_lot(config.aisles, config.spots_a_row, taken)
         parked = tuple(_park(lot.spots[name], i, rng) for i, name in enumerate(sorted(taken), start=1))
         lanes, boxes = LaneMap(lot), tuple((car.id, Box.of(car)) for car in parked)
-        self._scene = _Ground(lot, config, lanes, parked, boxes, frozenset(lot.spots) - taken)
-        self._ego = _Ego(Pose(_START_X_M - CHASSIS.body.rear_to_middle_m, 0.0, 0.0), config.ego_speed)
         first = len(parked) + 1
         self._cars = [_leaving(lot, first + i, i, rng) for i in range(config.cars)]
         self._walkers = [_walking(lot, first + config.cars + i, rng) for i in range(config.walkers)]
+        cars, walkers = tuple(car.copy() for car in self._cars), tuple(replace(walker) for walker in self._walkers)
+        self._scene = _Ground(lot, config, lanes, parked, boxes, frozenset(lot.spots) - taken, cars, walkers)
+        self._ego = _Ego(Pose(_START_X_M - CHASSIS.body.rear_to_middle_m, 0.0, 0.0), config.ego_speed)
         self._hit, self._tick, self._shown = set(), 0, None
         self._perception = ParkingPerception(lot, lanes, self.snapshot)
         self._driver = ParkingDriver(CHASSIS, DT_S, self.snapshot, self._way_to_lane)
@@ -166,13 +171,26 @@ class ParkingWorld:
         scene = self._started()
         twin = ParkingWorld()
         twin._scene = scene
-        twin._ego = replace(self._ego)
+        twin._ego = _Ego.at(self._ego)
         twin._cars = [car.copy() for car in self._cars]
         twin._walkers = [replace(walker) for walker in self._walkers]
         twin._hit, twin._tick = set(self._hit), self._tick
         twin._perception = ParkingPerception(scene.lot, scene.lanes, twin.snapshot)
         twin._driver = ParkingDriver(CHASSIS, DT_S, twin.snapshot, twin._way_to_lane)
         return twin
+
+    def observation(self) -> bytes:
+        """The present instant, for a copy of this world in another process."""
+        self._started()
+        return pack(self._tick, self._ego, self._cars, self._walkers, self._hit)
+
+    def adopt(self, observation: bytes) -> None:
+        """Be at an instant of the same scenario and seed, stepped elsewhere. Raises DataError if it is none."""
+        scene = self._started()
+        instant = unpack(observation, scene.cars, scene.walkers, (car.id for car in scene.parked))
+        self._tick, self._ego = instant.tick, _Ego.at(instant.ego)
+        self._cars, self._walkers, self._hit = list(instant.cars), list(instant.walkers), set(instant.hit)
+        self._shown = None
 
     def step(self, command: Command) -> Command:
         """Advance 0.1 s under `command`; returns what the vehicle really applied."""

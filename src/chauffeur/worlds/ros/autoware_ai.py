@@ -20,7 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
-from chauffeur.concept.units import kmh
+from chauffeur.concept.units import MPS_PER_KMH, kmh
 from chauffeur.worlds.ros.base import Asked, Fields, TopicMessage, VehicleRefusalError
 from chauffeur.worlds.ros.limits import CheckedWish, VehicleLimits
 
@@ -129,7 +129,7 @@ class Replanner:
     slow_in_curves: bool = True
     curve_radius_m: float = 20.0
     curve_radius_min_m: float = 6.0
-    curve_speed_mps: float = 4.0 / 3.6
+    curve_speed_mps: float = 4.0 * MPS_PER_KMH
     curve_lead_points: int = 4
     stop_at_end: bool = False
     end_points: int = 1

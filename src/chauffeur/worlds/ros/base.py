@@ -7,9 +7,12 @@ planner for a speed cap and a look-ahead; the vehicle's planner, its obstacle st
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, TypeAlias, runtime_checkable
+from typing import Final, Literal, Protocol, TypeAlias, runtime_checkable
 
 from chauffeur.concept import ChauffeurError, Parameters
+
+FRESH_S: Final = 1.0
+"""A velocity older than this is not the present one; vehicles publish it 10 times a second and more."""
 
 Fields: TypeAlias = "dict[str, Value]"
 """Fields of a ROS message by name, in the order of its definition."""

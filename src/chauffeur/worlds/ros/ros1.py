@@ -11,14 +11,11 @@ from typing import Final
 from chauffeur.concept import Parameters
 from chauffeur.worlds.ros import autoware_ai
 from chauffeur.worlds.ros.autoware_ai import AutowareAi
-from chauffeur.worlds.ros.base import Fields, Published, TopicMessage, VehicleState
+from chauffeur.worlds.ros.base import FRESH_S, Fields, Published, TopicMessage, VehicleState
 from chauffeur.worlds.ros.limits import CheckedWish
 from chauffeur.worlds.ros.node import CHECK_S, Node, Ros1Settings
 from chauffeur.worlds.ros.stack import Wishes
 from chauffeur.worlds.ros.types import Types
-
-FRESH_S: Final = 1.0
-"""A velocity older than this is not the present one; Autoware.AI publishes it 10 times a second and more."""
 
 _PUBLISHED: Final = {
     autoware_ai.REPLANNER_TOPIC: autoware_ai.REPLANNER_TYPE,

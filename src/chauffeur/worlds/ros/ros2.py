@@ -7,29 +7,25 @@ wish takes the place of one not yet written. DDS itself finds late and returning
 from __future__ import annotations
 
 import math
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any, Final
 
-from chauffeur.concept import MissingExtraError, Parameters
+from chauffeur.concept import MissingExtraError
+from chauffeur.concept.units import kmh
 from chauffeur.worlds.ros import autoware
 from chauffeur.worlds.ros.autoware import Autoware
-from chauffeur.worlds.ros.base import Fields, Link, Published, TopicMessage, VehicleError, VehicleState
+from chauffeur.worlds.ros.base import Fields, Link, TopicMessage, VehicleError, VehicleState
 from chauffeur.worlds.ros.dds import Participant, stamp_of
-from chauffeur.worlds.ros.notes import Notes
-from chauffeur.worlds.ros.stack import Wishes
+from chauffeur.worlds.ros.threaded import ThreadedVehicle
 
 PERIOD_S: Final = 0.05
 """How often the graph is looked at when there is nothing to write."""
 
 RETRY_S: Final = 2.0
 """Pause after the graph could not be joined, or a message not be written."""
-
-FRESH_S: Final = 1.0
-"""A velocity older than this is not the present one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +43,7 @@ class Ros2Settings:
     peers: tuple[str, ...] = ("127.0.0.1",)
 
 
-class Ros2Vehicle:
+class Ros2Vehicle(ThreadedVehicle):
     """Publishes our velocity limit, reads mode, velocity and the limit in force."""
 
     def __init__(self, stack: Autoware, settings: Ros2Settings, *, clock: Callable[[], float] = time.time) -> None:
@@ -63,58 +59,34 @@ class Ros2Vehicle:
         """
         if find_spec("cyclonedds") is None:  # said here; the thread that uses it could not raise it
             raise MissingExtraError("A ROS 2 vehicle needs cyclonedds.", hint="Run: pip install 'chauffeur[ros]'")
+        super().__init__(stack, "ros2-vehicle", close_s=3.0)
         self._stack, self._settings, self._clock = stack, settings, clock
-        self._notes = Notes()
-        self._lock = threading.Lock()
         self._pending: dict[str, TopicMessage] = {}
-        self._written: set[str] = set()
         self._fault = "The ROS 2 graph has not been joined yet."
         self._receivers = 0
         self._misfits = ""
         self._mode = ""
         self._limit_mps: float | None = None
-        self._velocity: tuple[float, float] | None = None
-        self._woken, self._ending = threading.Event(), threading.Event()
-        self._closed = False
-        self._wishes = Wishes(stack, self._send)
-        self._thread = threading.Thread(target=self._run, name="ros2-vehicle", daemon=True)
         self._thread.start()
-
-    def apply(self, parameters: Parameters) -> Published:
-        """See `VehicleInterface.apply`."""
-        return self._wishes.apply(parameters)
-
-    def release(self) -> Published:
-        """See `VehicleInterface.release`."""
-        return self._wishes.release()
 
     def state(self) -> VehicleState:
         """See `VehicleInterface.state`."""
         with self._lock:
             fault, misfits, receivers, mode = self._fault, self._misfits, self._receivers, self._mode
-            velocity, limit_mps, pending = self._velocity, self._limit_mps, bool(self._pending)
-        fresh = velocity is not None and time.monotonic() - velocity[1] <= FRESH_S
+            limit_mps, pending = self._limit_mps, bool(self._pending)
         link, words = self._link(fault, misfits, receivers)
         if limit_mps is not None and link == "up":
-            words += f" The velocity limit in force is {limit_mps * 3.6:.4g} km/h."
+            words += f" The velocity limit in force is {kmh(limit_mps):.4g} km/h."
         return VehicleState(
             link=link,
             words=words,
             receivers=receivers,
             delivered=bool(receivers) and not pending and self._wishes.number > 0,
-            speed_mps=velocity[0] if velocity is not None and fresh else None,
+            speed_mps=self._speed_mps(),
             mode=mode,
             counts=self._notes.counted(),
             notes=self._notes.said(),
         )
-
-    def close(self) -> None:
-        """See `VehicleInterface.close`."""
-        self._wishes.end("This vehicle interface is closed.")
-        self._closed = True
-        self._ending.set()
-        self._woken.set()
-        self._thread.join(timeout=3.0)
 
     def _link(self, fault: str, misfits: str, receivers: int) -> tuple[Link, str]:
         if self._closed:
@@ -189,10 +161,8 @@ class Ros2Vehicle:
             if (heard := graph.newest(limit)) is not None and math.isfinite(heard.max_velocity):
                 with self._lock:
                     self._limit_mps = float(heard.max_velocity)
-            if (heard := graph.newest(velocity)) is not None and math.isfinite(heard.longitudinal_velocity):
-                with self._lock:
-                    self._velocity = (float(heard.longitudinal_velocity), time.monotonic())
-                self._notes.count("heard")
+            if (heard := graph.newest(velocity)) is not None:
+                self._hear(float(heard.longitudinal_velocity))
             self._woken.wait(PERIOD_S)
             self._woken.clear()
 

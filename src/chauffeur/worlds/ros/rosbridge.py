@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import threading
 import time
 from collections.abc import Callable
@@ -20,13 +19,12 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
-from chauffeur.concept import MissingExtraError, Parameters
+from chauffeur.concept import MissingExtraError
 from chauffeur.worlds.ros import autoware, autoware_ai
 from chauffeur.worlds.ros.autoware import Autoware
 from chauffeur.worlds.ros.autoware_ai import AutowareAi
-from chauffeur.worlds.ros.base import Fields, Link, Published, TopicMessage, VehicleError, VehicleState
-from chauffeur.worlds.ros.notes import Notes
-from chauffeur.worlds.ros.stack import Wishes
+from chauffeur.worlds.ros.base import Fields, Link, TopicMessage, VehicleError, VehicleState
+from chauffeur.worlds.ros.threaded import ThreadedVehicle
 
 if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection
@@ -39,9 +37,6 @@ OPENING_S: Final = 3.0
 
 SILENCE_S: Final = 5.0
 """A server that does not answer a ping for so long is gone."""
-
-FRESH_S: Final = 1.0
-"""A velocity older than this is not the present one."""
 
 LARGEST: Final = 64 * 1024
 """Bytes of a message from the server."""
@@ -59,7 +54,7 @@ class RosbridgeSettings:
     url: str = "ws://127.0.0.1:9090"
 
 
-class RosbridgeVehicle:
+class RosbridgeVehicle(ThreadedVehicle):
     """Publishes a stack's messages through a rosbridge server."""
 
     def __init__(
@@ -84,43 +79,21 @@ class RosbridgeVehicle:
         """
         if find_spec("websockets") is None:  # said here; the thread that uses it could not raise it
             raise MissingExtraError("A rosbridge vehicle needs websockets.", hint="Run: pip install 'chauffeur[ros]'")
+        super().__init__(stack, "rosbridge", close_s=OPENING_S + 1.0)
         self._url, self._clock, self._retry_s = _checked_url(settings.url), clock, retry_s
         self._ros: Final = 1 if isinstance(stack, AutowareAi) else 2
         self._types = _types_of(stack)
-        self._notes = Notes()
-        self._lock = threading.Lock()
         self._pending: dict[str, tuple[int, TopicMessage]] = {}
         self._newest: dict[str, tuple[int, TopicMessage]] = {}
         self._fault = f"The rosbridge server at {self._url} has not answered yet."
         self._refusal = ""
         self._mode = ""
-        self._velocity: tuple[float, float] | None = None
-        self._woken, self._ending = threading.Event(), threading.Event()
-        self._closed = False
-        self._connection: ClientConnection | None = None
-        self._wishes = Wishes(stack, self._send)
-        self._thread = threading.Thread(target=self._run, name="rosbridge", daemon=True)
         self._thread.start()
-
-    def apply(self, parameters: Parameters) -> Published:
-        """See `VehicleInterface.apply`."""
-        return self._wishes.apply(parameters)
-
-    def release(self) -> Published:
-        """See `VehicleInterface.release`."""
-        return self._wishes.release()
 
     def state(self) -> VehicleState:
         """See `VehicleInterface.state`. `receivers` counts the server; who listens behind it, it does not say."""
         with self._lock:
-            fault, refusal, pending, velocity, mode = (
-                self._fault,
-                self._refusal,
-                bool(self._pending),
-                self._velocity,
-                self._mode,
-            )
-        fresh = velocity is not None and time.monotonic() - velocity[1] <= FRESH_S
+            fault, refusal, pending, mode = self._fault, self._refusal, bool(self._pending), self._mode
         link: Link = "closed" if self._closed else "connecting" if fault else "refused" if refusal else "up"
         words = {
             "closed": "Closed; the last wish stays in force in the vehicle.",
@@ -132,19 +105,11 @@ class RosbridgeVehicle:
             words=words,
             receivers=int(not fault),
             delivered=not fault and not refusal and not pending and self._wishes.number > 0,
-            speed_mps=velocity[0] if velocity is not None and fresh else None,
+            speed_mps=self._speed_mps(),
             mode=mode,
             counts=self._notes.counted(),
             notes=self._notes.said(),
         )
-
-    def close(self) -> None:
-        """See `VehicleInterface.close`."""
-        self._wishes.end("This vehicle interface is closed.")
-        self._closed = True
-        self._ending.set()
-        self._woken.set()
-        self._thread.join(timeout=OPENING_S + 1.0)
 
     def _send(self, number: int, messages: tuple[TopicMessage, ...]) -> None:
         for message in messages:
@@ -243,11 +208,11 @@ class RosbridgeVehicle:
 
         with contextlib.suppress(ConnectionClosed):  # why, `_talk` says
             for text in connection:
-                self._hear(text)
+                self._understand(text)
         ended.set()
         self._woken.set()
 
-    def _hear(self, text: str | bytes) -> None:
+    def _understand(self, text: str | bytes) -> None:
         try:
             said: Any = json.loads(text)
             op, topic, message = said.get("op"), said.get("topic"), said.get("msg")
@@ -277,10 +242,7 @@ class RosbridgeVehicle:
         except (KeyError, TypeError, ValueError, OverflowError):
             self._notes.say(f"The rosbridge server sent a {topic} that cannot be read.")
             return
-        if math.isfinite(speed_mps):
-            with self._lock:
-                self._velocity = (speed_mps, time.monotonic())
-            self._notes.count("heard")
+        self._hear(speed_mps)
 
     def _lost(self, words: str) -> None:
         with self._lock:

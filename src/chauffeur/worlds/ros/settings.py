@@ -14,6 +14,7 @@ from urllib.parse import urlsplit
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from chauffeur.concept import ConfigError
+from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.worlds.ros.autoware import Autoware, Package
 from chauffeur.worlds.ros.autoware_ai import (
     Acknowledgement,
@@ -90,7 +91,7 @@ class _Replanner(_Table):
     slow_in_curves: bool = True
     curve_radius_m: Positive = 20.0
     curve_radius_min_m: Positive = 6.0
-    curve_speed_mps: Speed = 4.0 / 3.6
+    curve_speed_mps: Speed = 4.0 * MPS_PER_KMH
     curve_lead_points: Count = 4
     stop_at_end: bool = False
     end_points: Count = 1

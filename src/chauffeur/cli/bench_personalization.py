@@ -1,0 +1,114 @@
+"""`chauffeur bench personalization`: Talk2Drive's evaluation with simulated passengers."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from chauffeur.bench.personalization.runner import StudyRun
+    from chauffeur.bench.store import Row
+
+EXAMPLES = """
+Examples:
+
+    chauffeur bench personalization --passengers 10
+
+    chauffeur bench personalization --passengers 100 --workers 2 --out runs/personal
+
+    chauffeur bench personalization --planner talk2drive/openai/qwen2.5 --base-url http://localhost:11434/v1
+
+Passengers and drives are simulated. Ctrl-C keeps what is done; the same command goes on. For people: `chauffeur study`.
+
+Exit codes: 0 done, 1 trips failed for want of a planner or of workers, 2 bad input, 130 Ctrl-C.
+"""
+
+
+def personalization(
+    planner: Annotated[
+        str, typer.Option(help="Who plans without and with memory, e.g. `talk2drive` or `talk2drive/openai/MODEL`.")
+    ] = "talk2drive",
+    passengers: Annotated[int, typer.Option(min=1, help="How many simulated passengers.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of passengers, moods, words and order.")] = 1,
+    trips: Annotated[int, typer.Option(min=0, help="Trips the memory learns from, for each task.")] = 5,
+    words: Annotated[str, typer.Option(help="Wordings: `test`, or `tuning` to improve a planner.")] = "test",
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/personalization-PLANNER.")] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Simulation processes.")] = 1,
+    shard: Annotated[str | None, typer.Option(help="Only part i of n, as for `bench lampilot`.")] = None,
+    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+) -> None:
+    """Takeover rates of simulated passengers (seed Tab. VIII, IX, X): keywords, Talk2Drive, and with memory."""
+    from chauffeur.bench.personalization.report import markdown
+    from chauffeur.bench.personalization.runner import StudyConfig, StudyRun
+    from chauffeur.bench.shards import WHOLE, Shard
+    from chauffeur.cli.console import stdout
+    from chauffeur.cli.failures import FAILED
+    from chauffeur.concept import ConfigError
+    from chauffeur.drive.files import publish
+
+    console = stdout()
+    if words not in ("test", "tuning"):
+        raise ConfigError(f"There are no wordings {words!r}.", hint="Write --words test or --words tuning.")
+    part = WHOLE if shard is None else Shard.parse(shard, os.environ)
+    folder = out or Path("runs") / f"personalization-{planner.replace('/', '-')}"
+    if part != WHOLE:
+        folder = folder / part.folder
+    config = StudyConfig(passengers, seed, planner, "test" if words == "test" else "tuning", trips)
+    options = () if base_url is None else (("base_url", base_url),)
+    run = StudyRun(folder, config, shard=part, options=options)
+    console.print(
+        f"Personalization: {passengers} simulated passengers, planner {planner}, {len(run.jobs)} sittings, "
+        f"run folder {folder}",
+        soft_wrap=True,
+    )
+    if run.damaged:
+        console.print(f"trips.jsonl has {run.damaged} damaged rows; they are set aside and done again.")
+    rows = _drive(console, run, workers)
+    if rows:
+        title = f"Personalization, planner {planner}, simulated passengers"
+        publish(folder / "table.md", markdown(rows, title).encode(), "table")
+        _show(console, run, rows)
+    if run.failed:
+        first = next(iter(run.failed.values()))
+        console.print(f"{len(run.failed)} sittings failed, and the same command tries them again. First: {first}")
+        raise typer.Exit(FAILED)
+
+
+def _drive(console: Console, run: StudyRun, workers: int) -> list[Row]:
+    from chauffeur.cli.bench_progress import shown
+
+    try:
+        with shown(console, time.monotonic) as watch:
+            return run.run(watch, workers=workers)
+    except KeyboardInterrupt:
+        console.print(f"Stopped. What is done is kept in {run.folder}; run the same command to go on.", soft_wrap=True)
+        raise typer.Exit(130) from None
+
+
+def _show(console: Console, run: StudyRun, rows: list[Row]) -> None:
+    import chauffeur
+    from chauffeur.bench.personalization.figures import latencies
+    from chauffeur.bench.personalization.report import NOTE, headline, tables
+    from chauffeur.bench.personalization.study import BENCH_VERSION
+    from chauffeur.cli.tables import show_table
+
+    for title, header, lines in tables(rows):
+        show_table(console, title, header, lines)
+        console.print()
+    console.print(headline(rows), soft_wrap=True)
+    p50, p95 = latencies(rows, "with")
+    console.print(
+        f"Chauffeur {chauffeur.__version__}; planner {run.config.planner}, model {run.model}; {BENCH_VERSION}; "
+        f"{run.config.half} wordings; seed {run.config.seed}; from words to policy {1000 * p50:.0f} ms (median), "
+        f"{1000 * p95:.0f} ms (95 %). {NOTE}",
+        soft_wrap=True,
+    )
+    if run.done < len(run.jobs):
+        console.print(f"{len(run.jobs) - run.done} of {len(run.jobs)} sittings are still to be done.")
+    console.print(f"Rows: {run.folder / 'results.jsonl'}", soft_wrap=True)

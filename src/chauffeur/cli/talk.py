@@ -1,0 +1,148 @@
+"""`chauffeur talk`: a drive that one talks with."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+if TYPE_CHECKING:
+    from chauffeur.drive.talk.hearing import Engine
+    from chauffeur.hmi.cabin import Cabin
+
+EXAMPLES = """
+Examples:
+
+    chauffeur talk --as ana
+
+    chauffeur talk --as ana --page
+
+    chauffeur talk --as ana --microphone --planner talk2drive
+
+    chauffeur talk --engine whisper/models/small.en --microphone --speak
+
+    chauffeur talk --scenario intersection --audit trips/talk.jsonl < wishes.txt
+
+Type a wish and Enter; `!too fast` is an opinion, `take over` and `give back` are the wheel, `help` tells the rest.
+`stop` or Ctrl-C brings the car to a stand and ends, a second Ctrl-C ends at once. Every drive is simulated.
+"""
+
+STOPPED_WITH_CTRL_C: Final = 130
+_TRIP_S: Final = 75.0
+"""A road takes about so long; then another begins."""
+
+
+def talk(
+    person: Annotated[str, typer.Option("--as", help="Whose wishes they are; their memory is used.")] = "",
+    planner: Annotated[
+        str, typer.Option(help="`onboard`, `talk2drive`, `keyword`, `openai/<model>`, or an installed one.")
+    ] = "onboard",
+    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint of the planner.")] = None,
+    scenario: Annotated[str, typer.Option(help="Where to drive.")] = "overtake",
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the traffic; default the scenario's own.")] = None,
+    duration: Annotated[float, typer.Option(min=1.0, max=7200.0, help="Seconds to drive at most.")] = 900.0,
+    engine: Annotated[
+        str, typer.Option(help="For speech: `grammar`, `whisper/<folder>`, `endpoint/<model>`, or `none`.")
+    ] = "grammar",
+    microphone: Annotated[
+        bool, typer.Option("--microphone/--no-microphone", help="Listen to this machine's microphone.")
+    ] = False,
+    device: Annotated[str, typer.Option(help="Which one: number or part of its name.")] = "",
+    page: Annotated[bool, typer.Option("--page/--no-page", help="Open the cabin page in the browser.")] = False,
+    speak: Annotated[bool, typer.Option("--speak", help="Say replies aloud (espeak-ng).")] = False,
+    audit: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
+    ] = None,
+) -> None:
+    """Talk with the car while it drives: it says what it thinks, what was checked, and remembers how you liked it."""
+    from contextlib import ExitStack
+
+    from chauffeur.cli.audit import auditor_for, tell_closing
+    from chauffeur.cli.console import stdout
+    from chauffeur.cli.failures import FAILED
+    from chauffeur.cli.interrupts import Interrupts
+    from chauffeur.cli.lines import Lines, standard_input
+    from chauffeur.cli.parts import not_kept, planner_named
+    from chauffeur.cli.talk_drive import TalkDrive
+    from chauffeur.cli.talk_screen import TalkScreen
+    from chauffeur.concept import Limits, PersonId, SandboxError
+    from chauffeur.drive.live.books import Books, unanswered
+    from chauffeur.drive.live.settings import Settings
+    from chauffeur.drive.live.starts import Start
+    from chauffeur.drive.scenarios import find
+    from chauffeur.drive.session import make_world
+    from chauffeur.drive.talk.session import WELL, Talk
+    from chauffeur.drive.talk.sound import Sound
+    from chauffeur.drive.talk.voice import Voice
+    from chauffeur.memory.personal_limits import personal_limits
+
+    who = PersonId(person.strip())
+    place = find(scenario)
+    first = place.seed if seed is None else seed
+    bounds = personal_limits(who, Limits())
+    trips = math.ceil(duration / _TRIP_S)
+    settings = Settings(
+        starts=tuple(Start(place, first + number, bounds, duration) for number in range(trips)),
+        planner=planner,
+        base_url=base_url,
+        memory="vault" if who else "",
+    )
+    ear = _engine_named(engine, wanted=microphone or page)
+    console = stdout()
+    screen = TalkScreen(console)
+    books = None
+    with ExitStack() as stack:
+        left = () if audit is None else unanswered(audit)
+        if audit is not None:
+            books = stack.enter_context(Books(auditor_for(audit, place, first), make_world(place).dt_s))
+        sound = stack.enter_context(Sound(device)) if microphone else None
+        voice = Voice() if speak else None
+        drive = TalkDrive(screen, stack.enter_context(_cabin()) if page else None)
+        if private := not_kept(who):
+            screen.note(private)
+        for wish in left:
+            screen.note(f"Without an answer since the last session: {wish.wish} “{wish.text}”")
+        stack.enter_context(screen)
+        interrupts = stack.enter_context(Interrupts())
+        lines = stack.enter_context(Lines(standard_input(), edited=console.is_terminal))
+        session = Talk(
+            settings, drive.tell, person=who, books=books, engine=ear, sound=sound, voice=voice, most_s=duration
+        )
+        screen.refresh(None)
+        try:
+            stack.enter_context(session)
+        except SandboxError:
+            planner_named(planner, base_url)  # says better what is wrong with the planner, if it is that
+            raise
+        drive.run(session, lines, interrupts)
+    closing = None if books is None else books.close()
+    if audit is not None and closing is not None:
+        tell_closing(console, audit, closing)
+    if interrupts.count:
+        raise typer.Exit(STOPPED_WITH_CTRL_C)
+    if session.outcome not in WELL or (closing is not None and not closing.complete):
+        raise typer.Exit(FAILED)
+
+
+def _engine_named(spec: str, *, wanted: bool) -> Engine | None:
+    """The speech engine a specification names; None where nobody listens.
+
+    Raises:
+        ConfigError: There is no such engine.
+    """
+    from chauffeur.concept import ConfigError
+    from chauffeur.drive.talk.hearing import Engine
+    from chauffeur.speech.engines import ENGINES
+
+    name, _, model = spec.strip().partition("/")
+    if name not in (*ENGINES, "none"):
+        raise ConfigError(f"Unknown speech engine {spec!r}.", hint=f"Known: {', '.join(ENGINES)}, none.")
+    return Engine(name, model, favoured=True) if wanted and name != "none" else None
+
+
+def _cabin() -> Cabin:
+    from chauffeur.hmi.cabin import Cabin
+
+    return Cabin()

@@ -1,0 +1,120 @@
+"""The person at the wheel: who has it, and what keys mean, as control hears it from a ring that nobody else reads.
+
+A key is a wish of the person, for the world's own driver: limits, gap and shield stay as they are. Every message says
+who has the wheel, so that none may be missed; keys that come late are not meant for now, and are passed over.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final
+
+from chauffeur.concept import LaneView, Snapshot, Wishes
+from chauffeur.concept.units import MPS_PER_KMH
+from chauffeur.drive.live.messages import Hand, Key, MessageError
+from chauffeur.drive.live.ring import Reader, Ring
+from chauffeur.worlds.base import EGO, Perception
+
+STEP_MPS: Final = 5.0 * MPS_PER_KMH
+"""What a key changes the speed by: 5 km/h, or less where the limit is low."""
+_STEPS: Final = 6.0
+"""So many steps at least lead from a stand to the speed limit."""
+MEANT_WITHIN_NS: Final = 1_000_000_000
+"""A key that was pressed longer ago, by the clock, is not meant for now."""
+_STANDING_MPS: Final = 0.5
+_AT_SIGN_M: Final = 10.0
+"""A stop sign no farther ahead has been stood at."""
+
+
+class Wheel:
+    """Who has the wheel."""
+
+    def __init__(self, hand: Ring, clock_ns: Callable[[], int] = time.monotonic_ns) -> None:
+        """Args: the ring; the clock of all processes."""
+        self._heard = Reader(hand, old=True)
+        self._clock_ns = clock_ns
+        self.hands = 0
+        """How often it has changed hands: odd while the person has it."""
+
+    @property
+    def taken(self) -> bool:
+        """Whether the person has it."""
+        return self.hands % 2 == 1
+
+    def hear(self, refused: Counter[str]) -> tuple[Key, ...]:
+        """Who has the wheel now, and what they pressed since they took it, oldest first.
+
+        Args:
+            refused: Counts messages that are none, by reason.
+        """
+        keys: tuple[Key, ...] = ()
+        for message in self._heard.news()[0]:
+            try:
+                hand = Hand.decode(message.payload)
+            except MessageError as error:
+                refused[str(error)] += 1
+                continue
+            if hand.on != self.taken:
+                self.hands += 1
+                keys = ()
+            if hand.on and hand.key is not None and self._clock_ns() - message.written_ns <= MEANT_WITHIN_NS:
+                keys = (*keys, hand.key)
+        return keys
+
+
+def pressed(key: Key, wishes: Wishes, snapshot: Snapshot, perception: Perception) -> tuple[Wishes, str]:
+    """The person's wishes after a key, and what there is to tell them; empty where it was just done.
+
+    Args:
+        key: What they pressed.
+        wishes: Theirs so far, settled.
+        snapshot: The instant.
+        perception: Of the same instant.
+    """
+    speed = max(0.0, snapshot.ego.speed_mps)
+    wished = speed if wishes.target_speed_mps is None else wishes.target_speed_mps
+    match key:
+        case "faster":
+            if speed < _STANDING_MPS:
+                wishes = _past_the_sign(wishes, perception)
+            return replace(wishes, target_speed_mps=max(wished, speed) + _step(snapshot, perception)), ""
+        case "slower":
+            return replace(wishes, target_speed_mps=max(0.0, min(wished, speed) - _step(snapshot, perception))), ""
+        case "brake":
+            return replace(wishes, target_speed_mps=0.0), ""
+        case "left":
+            return _aside(-1, wishes, snapshot, perception)
+        case "right":
+            return _aside(1, wishes, snapshot, perception)
+
+
+def _step(snapshot: Snapshot, perception: Perception) -> float:
+    lane = snapshot.ego.lane
+    return min(STEP_MPS, (math.inf if lane is None else perception.speed_limit(lane)) / _STEPS)
+
+
+def _past_the_sign(wishes: Wishes, perception: Perception) -> Wishes:
+    """Whoever goes on from a stand at a stop sign has stopped at it."""
+    sign = perception.stop_sign_ahead(wishes.served_stops)
+    if sign is None or sign[1] > _AT_SIGN_M:
+        return wishes
+    return replace(wishes, served_stops=wishes.served_stops | {sign[0]})
+
+
+def _aside(side: int, wishes: Wishes, snapshot: Snapshot, perception: Perception) -> tuple[Wishes, str]:
+    """One lane to a side (left is -1); a turn, where a crossing is ahead and there is no lane."""
+    name = "left" if side < 0 else "right"
+    here = wishes.target_lane or perception.lane_of(EGO)
+    lane = perception.adjacent_lane(here, side)
+    if lane is None:
+        if snapshot.kind == "intersection":
+            return replace(wishes, turn=name), ""
+        return wishes, f"There is no lane to the {name}."
+    view: LaneView | None = next((each for each in snapshot.lanes if each.id == lane), None)
+    if view is not None and view.forbidden and not view.emergency:
+        return wishes, f"The lane to the {name} ends."
+    return replace(wishes, target_lane=lane), ""

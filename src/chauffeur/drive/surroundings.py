@@ -1,0 +1,30 @@
+"""Weather and traffic rules of a real place in a simulated drive's C, where the person keeps a file that says so.
+
+The file is `services.toml` in the data folder (docs/services.md). Without it nothing is asked and nothing is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from chauffeur.concept import Context, Snapshot
+from chauffeur.describe import describe
+from chauffeur.describe.services.sourced import FOR_SIMULATED, with_sources
+from chauffeur.describe.services.sources import Sources
+from chauffeur.memory.files import data_home
+
+SERVICES_FILE: Final = "services.toml"
+
+
+def services_file() -> Path | None:
+    """The person's file; None where there is none."""
+    path = data_home() / SERVICES_FILE
+    return path if path.is_file() else None
+
+
+async def describing(sources: Sources) -> Callable[[Snapshot], Context]:
+    """How C is made with what the sources know by now; bounded in time, and never an error of theirs."""
+    found = await sources.look()
+    return lambda snapshot: with_sources(describe(snapshot), found, sources.place_words(), FOR_SIMULATED)

@@ -1,0 +1,199 @@
+"""What the session listens to, and what it makes of it: words to act on, or a question whether they are meant.
+
+Sound of this machine's microphone, or of a screen, goes to the ear. What the speech engine is not sure of is asked
+back, and is acted on only after a yes: said, typed or pressed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+from chauffeur.drive.talk.asking import Words
+from chauffeur.drive.talk.ear import Ear, Ears, HeardAt, Trouble
+from chauffeur.drive.talk.hearing import Engine
+from chauffeur.drive.talk.messages import Answered, Button, HeardWords, Listening, Note, Said
+from chauffeur.drive.talk.sound import Sound
+from chauffeur.drive.talk.voice import Voice
+from chauffeur.speech.answers import answer_in
+from chauffeur.speech.base import Heard
+
+ANSWER_WITHIN_S: Final = 15.0
+"""A question whether something was heard rightly is asked no more after so long: nobody knows then what it meant."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Question:
+    """Something that was heard, and is driven only when the person says that they meant it."""
+
+    shown: HeardWords
+    heard: Heard
+    until_s: float
+
+
+class Attention:
+    """Listens for one session."""
+
+    def __init__(
+        self,
+        engine: Engine | None,
+        sound: Sound | None,
+        voice: Voice | None,
+        say: Callable[[Said], None],
+        act: Callable[[str, Words], None],
+    ) -> None:
+        """Nobody is listened to yet.
+
+        Args:
+            engine: For speech; None where nobody listens.
+            sound: Microphone of this machine; None where sound comes from a screen.
+            voice: The car's own, which it must not listen to.
+            say: Takes what is to be shown.
+            act: Takes what was heard and is meant: its hotword, and the words.
+        """
+        self._ear = None if engine is None else Ear(engine)
+        self._sound, self._voice, self._say, self._act = sound, voice, say, act
+        self._question: _Question | None = None
+        self._button = ""
+        self._refused_sound = self._muted = False
+
+    @property
+    def question(self) -> HeardWords | None:
+        """What the person is asked about; None where nothing is."""
+        return None if self._question is None else self._question.shown
+
+    @property
+    def engine(self) -> tuple[str, bool]:
+        """Name of the engine, empty for none, and whether sound leaves this machine."""
+        return ("", False) if self._ear is None else (self._ear.name, self._ear.remote)
+
+    def start(self) -> None:
+        """Begin. Raises ChauffeurError: the engine cannot be had."""
+        if self._ear is not None:
+            self._ear.__enter__()
+
+    def close(self) -> None:
+        """Listen no more."""
+        if self._ear is not None:
+            self._ear.close()
+
+    def introduce(self) -> None:
+        """Tell how listening stands."""
+        off = "There is no speech engine." if self._ear is None else ""
+        self._say(Listening("off", why=off) if self._ear is None else Listening(self._ear.state))
+
+    def take_sound(self, chunk: bytes) -> None:
+        """Sound of a screen; passed over where this machine has a microphone of its own."""
+        if self._sound is None:
+            self._pass_on(chunk)
+        elif not self._refused_sound:
+            self._refused_sound = True
+            self._say(Note("The car listens to its own microphone, and not to this one."))
+
+    def press(self, told: Button) -> None:
+        """A button is held, or let go."""
+        if self._ear is None or not self._ear.hears:
+            self._say(Note("Nobody listens: hearing is off. Type what you want.", trouble=True))
+            return
+        self._ear.button(told.button, held=told.held)
+        self._button = told.button if told.held else ""
+        self._say(Listening(self._ear.state, self._button))
+
+    def poll(self) -> None:
+        """Hear what there is to hear."""
+        if self._ear is None:
+            return
+        self._take_microphone()
+        for news in self._ear.poll():
+            match news:
+                case Ears():
+                    self._button = "" if news.state == "off" else self._button
+                    self._say(Listening(news.state, self._button, news.why))
+                case Trouble():
+                    self._say(Note(news.text, trouble=True))
+                case HeardAt():
+                    self._understand(news)
+        if self._question is not None and time.monotonic() > self._question.until_s:
+            self.withdraw(f"Nobody said yes: “{self._question.heard.text}” is not driven.")
+
+    def confirm(self, yes: bool, answer: Words) -> None:
+        """Yes or no to what was heard; nothing where nothing was asked.
+
+        Args:
+            yes: Whether it is meant.
+            answer: When the answer was there; its words do not matter.
+        """
+        question = self._question
+        if question is None:
+            return
+        self.withdraw("" if yes else f"“{question.heard.text}” is not driven.")
+        if yes:
+            words = replace(answer, text=question.heard.text, spoken=True)
+            self._act(question.heard.hotword or "command", words)
+
+    def withdraw(self, why: str = "") -> None:
+        """Ask no more whether something was heard rightly, and say why."""
+        if self._question is None:
+            return
+        self._question = None
+        if self._ear is not None:
+            self._ear.expect_answer(False)
+        self._say(Answered("heard"))
+        if why:
+            self._say(Note(why))
+
+    def _take_microphone(self) -> None:
+        sound = self._sound
+        if sound is None or self._ear is None:
+            return
+        for chunk in sound.take():
+            self._pass_on(chunk)
+        if sound.trouble:
+            self._sound = None
+            self._say(Note(f"{sound.trouble} Until then: type, or speak to the page.", trouble=True))
+            self._say(Listening("off", why=sound.trouble))
+
+    def _pass_on(self, chunk: bytes) -> None:
+        """Sound to the ear, but for the car's own voice."""
+        if self._ear is None:
+            return
+        speaking = self._voice is not None and self._voice.speaking
+        if speaking and not self._muted:
+            self._ear.forget()
+        self._muted = speaking
+        if not speaking:
+            self._ear.sound(chunk)
+
+    def _understand(self, at: HeardAt) -> None:
+        heard = at.heard
+        wait_s = max(0.0, at.at_s - at.ended_s - heard.timing.recognise_s)
+        words = Words(heard.text, True, at.ended_s, wait_s, heard.timing.recognise_s)
+        understood = heard.status == "heard"
+        # With a button held, yes comes as a command.
+        answers = understood and (heard.hotword is None or (self._question is not None and heard.hotword == "command"))
+        answer = answer_in(heard.text) if answers else None
+        asks = understood and heard.to_confirm and answer is None
+        shown = HeardWords(
+            status=heard.status,
+            text=heard.text,
+            hotword=heard.hotword or "",
+            engine=heard.engine,
+            confidence=heard.confidence,
+            to_confirm=asks,
+            reason=" ".join((heard.reason, *heard.notes)).strip(),
+            after_speech_s=max(0.0, at.at_s - at.ended_s),
+        )
+        if answer is None and (understood or heard.again):
+            self.withdraw()  # something newer was said, or what was asked about was a part of this
+        self._say(shown)
+        if answer is not None:
+            self.confirm(answer, words)
+        elif asks and self._ear is not None:
+            self._question = _Question(shown, heard, time.monotonic() + ANSWER_WITHIN_S)
+            self._ear.expect_answer(True)
+            if self._voice is not None:
+                self._voice.say(f"Did you mean: {heard.text}?")
+        elif understood:
+            self._act(heard.hotword or "command", words)

@@ -1,0 +1,115 @@
+"""The road and the scene as a screen shows them: from what control shows every process, and from its report."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from typing import Final
+
+from chauffeur.concept import DataError, Snapshot, VehicleState
+from chauffeur.concept.registry import load_plugin
+from chauffeur.drive.live.messages import MessageError, Observation, Report
+from chauffeur.drive.live.ring import Reader, Ring
+from chauffeur.drive.live.settings import Settings
+from chauffeur.drive.talk.messages import Body, Road, RoadLane, Scene
+from chauffeur.worlds.base import MirroredWorld
+
+_INSTANTS: Final = 100
+"""Instants that are kept, 10 s of them: plans are judged a moment after they were seen."""
+
+
+class View:
+    """Follows a drive; each `look` says what is new."""
+
+    def __init__(self, settings: Settings, observations: Ring) -> None:
+        """Look on.
+
+        Args:
+            settings: Of the drive.
+            observations: What control shows.
+        """
+        self._starts = settings.starts
+        self._world: MirroredWorld = load_plugin("chauffeur.worlds", settings.starts[0].scenario.world)()
+        self._world.reset(self._starts[0].scenario, self._starts[0].seed)
+        self._world.adopt(self._world.observation())  # what is slow the first time is done before anything moves
+        self._world.snapshot()
+        self._observations = Reader(observations, old=True)
+        self._instants: OrderedDict[tuple[int, int], Snapshot] = OrderedDict()
+        self._trip = 0
+
+    def at(self, trip: int, tick: int) -> Snapshot | None:
+        """An instant of the last seconds; None where it was not seen."""
+        return self._instants.get((trip, tick))
+
+    def look(self, report: Report | None) -> tuple[Road | None, Scene | None]:
+        """The road where it is another one, and the scene where there is a new one.
+
+        Args:
+            report: Control's newest.
+        """
+        before = self._trip
+        seen: Observation | None = None
+        # Every instant, and not the newest alone: a plan was judged in one of them.
+        for message in self._observations.news()[0]:
+            seen = self._follow(message.payload) or seen
+        if seen is None:
+            return None, None
+        snapshot = self._instants[seen.trip, seen.tick]
+        return (_road(snapshot) if self._trip != before else None), self._scene(seen, snapshot, report)
+
+    def _follow(self, payload: bytes) -> Observation | None:
+        """Be at an instant; None where it is none."""
+        try:
+            shown = Observation.decode(payload)
+            if not 1 <= shown.trip <= len(self._starts):
+                return None
+            if shown.trip != self._trip:
+                start = self._starts[shown.trip - 1]
+                self._world.reset(start.scenario, start.seed)
+            self._world.adopt(shown.world)
+        except (MessageError, DataError):
+            return None
+        self._trip = shown.trip
+        self._instants[shown.trip, shown.tick] = self._world.snapshot()
+        while len(self._instants) > _INSTANTS:
+            self._instants.popitem(last=False)
+        return shown
+
+    def _scene(self, seen: Observation, snapshot: Snapshot, report: Report | None) -> Scene:
+        lane = snapshot.ego.lane
+        limit = 0.0 if lane is None else self._world.perception().speed_limit(lane)
+        told = report if report is not None and report.trip == seen.trip else None
+        return Scene(
+            time_s=round(seen.tick * self._world.dt_s, 3),
+            taken_over=seen.hands % 2 == 1,
+            ego=_body(snapshot.ego),
+            others=tuple(_body(each) for each in (*snapshot.others, *snapshot.objects)),
+            acceleration_mps2=0.0 if told is None else told.applied.acceleration_mps2,
+            steering_rad=0.0 if told is None else told.applied.steering_rad,
+            limit_mps=limit,
+            target_mps=None if told is None else told.wishes.target_speed_mps,
+            headway_s=0.0 if told is None else told.wishes.time_headway_s,
+            lane=None if told is None else told.wishes.target_lane,
+            rung="hold" if told is None else told.rung,
+            wish="" if told is None else told.plan,
+            line=None if told is None else told.line,
+            shield="" if told is None else " ".join(change.reason for change in told.interventions),
+            missed=0 if told is None else told.missed,
+        )
+
+
+def _body(state: VehicleState) -> Body:
+    return Body(
+        state.id,
+        state.kind,
+        state.x_m,
+        state.y_m,
+        state.heading_rad,
+        state.length_m,
+        state.width_m,
+        state.speed_mps,
+    )
+
+
+def _road(snapshot: Snapshot) -> Road:
+    lanes = (RoadLane(lane.id, lane.width_m, lane.forbidden, lane.centre_m) for lane in snapshot.lanes)
+    return Road(snapshot.kind, tuple(lanes))

@@ -1,0 +1,99 @@
+"""What the session has said, for whichever screen looks: a late one gets what still holds, a slow one no backlog."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncGenerator, Mapping
+from typing import Final
+
+from chauffeur.drive.talk.messages import Answered, Conversation, HeardWords, HowWasIt, Note, Road, Said, encode
+from chauffeur.hmi.cabin.road import drawn
+
+MOST_WAITING: Final = 500
+"""Messages that may wait for a screen; a slower one is let go, and begins anew."""
+MOST_CONVERSATIONS: Final = 200
+"""Of a session, that a late screen is shown; the books have all of them."""
+_QUESTIONS: Final = ("heard", "how_was_it")
+"""Kinds of message that ask the person something."""
+
+
+class Outbox:
+    """What waits for one screen. Kept by one event loop."""
+
+    def __init__(self, backlog: Mapping[str, str]) -> None:
+        self._waiting = dict(backlog)
+        self._news = asyncio.Event()
+        self._news.set()
+        self._single = 0
+        self._handing_on = False
+
+    @property
+    def full(self) -> bool:
+        """Whether its screen has fallen too far behind."""
+        return len(self._waiting) > MOST_WAITING
+
+    @property
+    def empty(self) -> bool:
+        """Whether everything was handed on."""
+        return not self._waiting and not self._handing_on
+
+    def put(self, text: str, key: str = "") -> None:
+        """A message; it takes the place of one with the same key that was not read yet. Without a key, none is lost."""
+        if not key:
+            self._single += 1
+            key = f"#{self._single}"
+        self._waiting[key] = text
+        self._news.set()
+
+    async def follow(self) -> AsyncGenerator[str]:
+        """Everything that waits, oldest first, and then whatever comes. Never ends by itself."""
+        while True:
+            await self._news.wait()
+            while self._waiting:
+                self._handing_on = True
+                yield self._waiting.pop(next(iter(self._waiting)))
+            self._handing_on = False
+            self._news.clear()
+
+
+class Board:
+    """All that a screen has to be told which joins now."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, str] = {}
+        self._conversations: dict[str, str] = {}
+
+    def write(self, said: Said) -> tuple[str, str]:
+        """Keep what will still hold when another screen joins.
+
+        Returns:
+            The message as JSON, and its key for `Outbox.put`; empty where each one counts.
+        """
+        text = json.dumps(drawn(said)) if isinstance(said, Road) else encode(said).decode()
+        match said:
+            case Conversation(wish=wish):
+                key = f"conversation {wish}"
+                self._conversations[key] = text
+                if len(self._conversations) > MOST_CONVERSATIONS:
+                    del self._conversations[next(iter(self._conversations))]
+                return text, key
+            case Note():
+                return text, ""
+            case Answered(question=question):
+                self._kept.pop(question, None)
+                return text, ""
+            case HeardWords(to_confirm=False):
+                self._kept.pop(said.kind, None)
+                return text, ""
+            case HeardWords() | HowWasIt():
+                self._kept[said.kind] = text
+                return text, ""
+            case _:
+                self._kept[said.kind] = text
+                return text, said.kind
+
+    def backlog(self) -> dict[str, str]:
+        """Key and message, in the order in which a screen wants them: questions come last."""
+        first = {key: text for key, text in self._kept.items() if key not in _QUESTIONS}
+        return first | self._conversations | self._kept

@@ -1,0 +1,212 @@
+"""Serving a page that talks back: on this machine unless told otherwise, and to nobody without the token.
+
+Any web page open in the person's browser can reach a server on this machine, so each request must show three things
+that a foreign page cannot: the random token in its path, a Host that is this server by name or number (a name that
+was made to point here is refused), and, to talk, the page's own Origin. What is served loads nothing from elsewhere.
+"""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import logging
+import secrets
+import ssl
+from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from http import HTTPStatus
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from chauffeur.concept import ConfigError, MissingExtraError
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import ServerConnection
+    from websockets.http11 import Request, Response
+
+HOST: Final = "127.0.0.1"
+"""This machine alone."""
+
+_HEADERS: Final = {
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    "img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",  # the token stands in the address
+    "X-Content-Type-Options": "nosniff",
+}
+_PERMISSIONS: Final = "camera=(), display-capture=(), geolocation=(), payment=(), usb=(), microphone="
+
+
+@dataclass(frozen=True, slots=True)
+class PageFile:
+    """A file of the folder `assets` of a package, and its media type."""
+
+    package: str
+    name: str
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """Two PEM files that let a server be reached from other machines, encrypted."""
+
+    chain: Path
+    key: Path
+
+
+class LocalPage:
+    """A page, where it is, and who may open it."""
+
+    def __init__(
+        self,
+        files: Mapping[str, PageFile],
+        socket: str,
+        *,
+        microphone: bool = False,
+        host: str = HOST,
+        certificate: Certificate | None = None,
+    ) -> None:
+        """A page with a new token.
+
+        Args:
+            files: What is served, by the path behind the token; the page itself at the empty one.
+            socket: Path of the WebSocket behind the token.
+            microphone: Whether the page may ask for it.
+            host: Name or number of this server; anything but this machine alone needs a certificate.
+            certificate: For that.
+
+        Raises:
+            ConfigError: Other machines could reach the page, and read along.
+        """
+        if host in ("", "0.0.0.0", "::"):  # noqa: S104 - refused
+            raise ConfigError(
+                f"The page needs one name or number of its own, not {host!r}.", hint="Give the one that is opened."
+            )
+        if certificate is None and not _is_loopback(host):
+            raise ConfigError(
+                f"The page would be open to the network at {host} without encryption.",
+                hint="Give a certificate and its key, or leave the address out: then only this machine can open it.",
+            )
+        self._files = files
+        self._socket = socket
+        self._host = host
+        self._port = 0
+        self._token = secrets.token_urlsafe(18)
+        self._tls = _tls(certificate)
+        self._headers = _HEADERS | {"Permissions-Policy": _PERMISSIONS + ("(self)" if microphone else "()")}
+
+    @property
+    def url(self) -> str:
+        """Address of the page, token included."""
+        return f"{self._origins()[0]}/{self._token}/"
+
+    def _names(self) -> list[str]:
+        shown = f"[{self._host}]" if ":" in self._host else self._host
+        names = [f"{shown}:{self._port}"]
+        return [*names, f"localhost:{self._port}"] if _is_loopback(self._host) else names
+
+    def _origins(self) -> list[str]:
+        scheme = "http" if self._tls is None else "https"
+        return [f"{scheme}://{name}" for name in self._names()]
+
+    def admit(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Answer a request for a file, refuse what may not pass; None lets a WebSocket handshake go on."""
+        if request.headers.get_all("Host") not in [[name] for name in self._names()]:
+            return self._answer(connection, HTTPStatus.MISDIRECTED_REQUEST, "This server answers to its own name only.")
+        token, _, rest = request.path.removeprefix("/").partition("/")
+        if not hmac.compare_digest(token.encode(), self._token.encode()):
+            return self._answer(connection, HTTPStatus.FORBIDDEN, "Open the address that the command printed.")
+        if rest == self._socket:
+            if request.headers.get_all("Origin") not in [[origin] for origin in self._origins()]:
+                return self._answer(connection, HTTPStatus.FORBIDDEN, "Only the page itself may talk to this server.")
+            return None
+        file = self._files.get(rest)
+        if file is None:
+            return self._answer(connection, HTTPStatus.NOT_FOUND, "There is nothing here.")
+        text = resources.files(file.package).joinpath("assets", file.name).read_text(encoding="utf-8")
+        return self._answer(connection, HTTPStatus.OK, text, file.kind)
+
+    def _answer(
+        self, connection: ServerConnection, status: HTTPStatus, text: str, kind: str = "text/plain"
+    ) -> Response:
+        response = connection.respond(status, text)
+        del response.headers["Content-Type"]
+        response.headers["Content-Type"] = f"{kind}; charset=utf-8"
+        for name, value in self._headers.items():
+            response.headers[name] = value
+        return response
+
+    @asynccontextmanager
+    async def serving(
+        self,
+        talk: Callable[[ServerConnection], Awaitable[None]],
+        *,
+        port: int = 0,
+        most_bytes: int,
+        purpose: str,
+    ) -> AsyncGenerator[None]:
+        """Serve the page while the context lasts.
+
+        Args:
+            talk: Carries a WebSocket that was let in.
+            port: TCP port; 0 takes a free one.
+            most_bytes: A longer message ends its connection.
+            purpose: What needs the server's package, as an error says it.
+
+        Raises:
+            MissingExtraError: The server's package is not installed.
+            ConfigError: The address cannot be used.
+        """
+        try:
+            from websockets.asyncio.server import serve
+        except ImportError as error:
+            raise MissingExtraError(
+                f"{purpose} needs the package websockets.", hint='Install it with: pip install "chauffeur[page]"'
+            ) from error
+        # Its messages about strangers' broken handshakes are no concern of the person's terminal.
+        quiet = logging.getLogger("chauffeur.hmi.local_page")
+        quiet.setLevel(logging.CRITICAL)
+        try:
+            server = await serve(
+                talk,
+                self._host,
+                port,
+                process_request=self.admit,
+                compression=None,
+                max_size=most_bytes,
+                logger=quiet,
+                close_timeout=1,
+                ssl=self._tls,
+            )
+        except OSError as error:
+            where = f"Port {port}" if self._host == HOST else f"{self._host}, port {port},"
+            why = error.strerror or str(error)
+            raise ConfigError(f"{where} cannot be used: {why}.", hint="Choose another, or 0.") from error
+        async with server:
+            self._port = server.sockets[0].getsockname()[1]
+            yield
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _tls(certificate: Certificate | None) -> ssl.SSLContext | None:
+    if certificate is None:
+        return None
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    try:
+        context.load_cert_chain(certificate.chain, certificate.key)
+    except (OSError, ssl.SSLError) as error:
+        raise ConfigError(
+            f"{certificate.chain} and {certificate.key} are no certificate and key: {error.strerror or error}.",
+            hint="Both are PEM files; the key must not be encrypted and must belong to the certificate.",
+        ) from error
+    return context

@@ -1,0 +1,71 @@
+"""What the vehicle interfaces with a thread of their own share. Who applies a wish leaves it there and never waits."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from abc import ABC, abstractmethod
+
+from chauffeur.concept import Parameters
+from chauffeur.worlds.ros.base import FRESH_S, Published, TopicMessage
+from chauffeur.worlds.ros.notes import Notes
+from chauffeur.worlds.ros.stack import Stack, Wishes
+
+
+class ThreadedVehicle(ABC):
+    """A vehicle interface whose thread reaches the vehicle, writes and reads, until it is closed."""
+
+    def __init__(self, stack: Stack, name: str, *, close_s: float) -> None:
+        """Make everything ready; the thread is started by whoever derives from this, with all else in place.
+
+        Args:
+            stack: The messages.
+            name: Name of the thread.
+            close_s: How long `close` waits for it at most.
+        """
+        self._close_s = close_s
+        self._notes = Notes()
+        self._lock = threading.Lock()
+        self._velocity: tuple[float, float] | None = None
+        self._woken, self._ending = threading.Event(), threading.Event()
+        self._closed = False
+        self._wishes = Wishes(stack, self._send)
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+
+    def apply(self, parameters: Parameters) -> Published:
+        """See `VehicleInterface.apply`."""
+        return self._wishes.apply(parameters)
+
+    def release(self) -> Published:
+        """See `VehicleInterface.release`."""
+        return self._wishes.release()
+
+    def close(self) -> None:
+        """See `VehicleInterface.close`."""
+        self._wishes.end("This vehicle interface is closed.")
+        self._closed = True
+        self._ending.set()
+        self._woken.set()
+        self._thread.join(timeout=self._close_s)
+
+    @abstractmethod
+    def _send(self, number: int, messages: tuple[TopicMessage, ...]) -> None:
+        """Leave numbered messages for the thread, all or (raising) none."""
+
+    @abstractmethod
+    def _run(self) -> None:
+        """What the thread does until `_ending` is set; `_woken` says that there is something to do."""
+
+    def _hear(self, speed_mps: float) -> None:
+        """Take note of the vehicle's speed as it was just heard; what is no number is not."""
+        if math.isfinite(speed_mps):
+            with self._lock:
+                self._velocity = (speed_mps, time.monotonic())
+            self._notes.count("heard")
+
+    def _speed_mps(self) -> float | None:
+        """The vehicle's present speed, if it was heard of late."""
+        with self._lock:
+            velocity = self._velocity
+        return velocity[0] if velocity is not None and time.monotonic() - velocity[1] <= FRESH_S else None

@@ -1,0 +1,148 @@
+"""Simulated passengers: who they are, what they say, and when they take over."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chauffeur.bench.personalization.population import Passenger, draw_passengers
+from chauffeur.bench.personalization.sayings import FEEDBACK, LEVELS, WISHES, feedback_of, sayings_sha256, wishes_of
+from chauffeur.bench.personalization.scenes import AIMS, TASKS
+from chauffeur.bench.personalization.takeover import Mood, aim_of, judge, wanted_mps
+from chauffeur.bench.personalization.traces import Trace
+from chauffeur.concept import ConfigError
+from chauffeur.memory.feedback import interpret_feedback
+
+ANA = Passenger(
+    "p0001", usual_share=0.9, brisk_share=1.0, calm_share=0.8, lot_share=0.75, tolerance=0.1, headway_s=0.8,
+    braking_mps2=4.0, accelerating_mps2=3.5, sideways_mps2=3.0, jerk_mps3=5.0, encroachment_s=1.5, patience_s=10.0,
+    standing_s=5.0, walk_m=10.0, lane_habit="moves", talk="open", noise=0.02,
+)  # fmt: skip
+RELAXED = Mood("follow", "follow", "I")
+
+
+def trace(speed: float = 24.0, seconds: float = 30.0, limit: float = 30.0, **changes: object) -> Trace:
+    n = round(seconds / 0.1)
+    away = np.full(n, np.inf)
+    plain = Trace(
+        dt_s=0.1, outcome="ended", limit_mps=limit, speed=np.full(n, speed), acceleration=np.zeros(n),
+        sideways=np.zeros(n), turning=np.zeros(n), gap_m=away, lead_speed=away, somebody_m=away,
+        lane=np.zeros(n, np.int64), passed=np.zeros(n, np.bool_), ttc_s=away, stop_m=away,
+        crossing=np.zeros(n, np.bool_), across=np.zeros(n, np.bool_),
+    )  # fmt: skip
+    return replace(plain, **changes)  # type: ignore[arg-type]
+
+
+def test_the_same_seed_gives_the_same_people_and_more_people_change_none() -> None:
+    few, many = draw_passengers(5, 7), draw_passengers(40, 7)
+    assert many[:5] == few
+    assert draw_passengers(5, 8) != few
+    assert len({one.usual_share for one in many}) > 30
+    with pytest.raises(ConfigError):
+        draw_passengers(0, 1)
+
+
+def test_preferences_have_the_spread_that_the_sources_give() -> None:
+    people = draw_passengers(400, 3)
+    shares = np.array([one.usual_share for one in people])
+    assert 0.89 < shares.mean() < 0.95
+    assert 0.06 < shares.std() < 0.10
+    assert all(0.6 * one.calm_share < one.calm_share < one.brisk_share for one in people)
+    assert 0.8 < float(np.median([one.headway_s for one in people])) < 0.95
+    assert {one.lane_habit for one in people} == {"moves", "stays"}
+
+
+def test_every_aim_has_words_at_every_level_in_two_halves_that_share_none() -> None:
+    assert {aim for task in TASKS for aim in AIMS[task]} == {aim for aim, _ in WISHES}
+    for aim, level in WISHES:
+        test, tuning = wishes_of(aim, level, "test"), wishes_of(aim, level, "tuning")
+        assert len(test) == len(tuning) == 5
+        assert not set(test) & set(tuning)
+    said = [text for texts in WISHES.values() for text in texts]
+    assert len(set(said)) == len(said)
+    assert len(LEVELS) * 10 == len(WISHES)
+    assert len(sayings_sha256()) == 64
+
+
+def test_most_feedback_is_understood_by_the_memory_that_gets_it_and_none_the_wrong_way() -> None:
+    about_speed = [
+        (topic, text) for (topic, _), texts in FEEDBACK.items() for text in texts if topic.startswith("too_")
+    ]
+    wanted = {"too_fast": -1, "too_slow": 1, "too_close": 0}
+    heard = [(wanted[topic], interpret_feedback(text).speed, text) for topic, text in about_speed]
+    assert not [text for meant, found, text in heard if meant * found < 0]
+    assert sum(meant == found for meant, found, _ in heard) >= 0.9 * len(heard)
+    assert feedback_of("waited", "much") == feedback_of("waited", "plain")
+
+
+def test_a_drive_to_their_liking_is_left_alone() -> None:
+    assert not judge(trace(), ANA, RELAXED).takes_over
+
+
+@pytest.mark.parametrize(
+    ("changed", "mood", "topic"),
+    [
+        (trace(29.0), RELAXED, "too_fast"),
+        (trace(18.0), RELAXED, "too_slow"),
+        (trace(lane=np.array([0] * 100 + [-1] * 200)), RELAXED, "passed"),
+        (trace(gap_m=np.full(300, 15.0), lead_speed=np.full(300, 24.0)), RELAXED, "too_close"),
+        (trace(acceleration=np.array([0.0] * 50 + [-6.0] * 15 + [0.0] * 235)), RELAXED, "harsh"),
+        (trace(sideways=np.array([0.0] * 50 + [4.0] * 15 + [0.0] * 235)), RELAXED, "swerving"),
+        (trace(outcome="collision"), RELAXED, "close_call"),
+        (trace(30.0), Mood("overtake", "overtake", "I"), "no_overtake"),
+        (trace(), Mood("right_lane", "right_lane", "II"), "not_right"),
+        (trace(8.0, 20.0, 10.0, encroachment=((90, 0.9),)), Mood("yield", "yield", "I"), "close_call"),
+        (trace(0.0, 20.0, 10.0), Mood("go", "go", "I"), "waited"),
+        (trace(3.0, 30.0, 4.17), Mood("park", "park.stadium", "I"), "not_parked"),
+        (
+            trace(3.0, 30.0, 4.17, parked="B4", walk_m={"stadium": 40.0, "exit": 0.0, "nearest": 0.0}),
+            Mood("park", "park.stadium", "I"),
+            "wrong_spot",
+        ),
+        (trace(3.0, 30.0, 4.0, parked="B4"), Mood("pace", "pace.slower", "I"), "parked"),
+    ],
+)
+def test_what_makes_them_take_over(changed: Trace, mood: Mood, topic: str) -> None:
+    found = judge(changed, ANA, mood)
+    assert found.takes_over
+    assert found.topic == topic
+    assert 0.0 <= found.at_s <= changed.seconds
+
+
+def test_slow_is_forgiven_behind_somebody_slower_and_not_behind_somebody_faster() -> None:
+    behind = trace(18.0, gap_m=np.full(300, 40.0), lead_speed=np.full(300, 18.5))
+    assert not judge(behind, ANA, RELAXED).takes_over
+    assert judge(replace(behind, lead_speed=np.full(300, 26.0)), ANA, RELAXED).topic == "too_slow"
+
+
+def test_a_mere_hint_means_a_lane_to_some_and_a_pace_to_others() -> None:
+    hint = Mood("overtake", "overtake", "III")
+    held_up = trace(24.0, gap_m=np.full(300, 40.0), lead_speed=np.full(300, 24.0))
+    assert judge(held_up, ANA, hint).topic == "no_overtake"
+    assert not judge(held_up, replace(ANA, lane_habit="stays"), hint).takes_over
+
+
+def test_how_far_off_decides_how_it_is_said() -> None:
+    assert judge(trace(26.9), ANA, RELAXED).force == "bit"
+    assert judge(trace(30.5), ANA, RELAXED).force == "much"
+    assert judge(trace(26.0), ANA, RELAXED).topic == "too_fast"  # a remark, no takeover
+    assert not judge(trace(26.0), ANA, RELAXED).takes_over
+
+
+@given(speed=st.floats(5.0, 35.0), tolerance=st.floats(0.05, 0.2), wider=st.floats(1.0, 3.0))
+def test_whoever_is_more_tolerant_never_takes_over_more(speed: float, tolerance: float, wider: float) -> None:
+    strict, lax = replace(ANA, tolerance=tolerance), replace(ANA, tolerance=tolerance * wider)
+    if judge(trace(speed), lax, RELAXED).takes_over:
+        assert judge(trace(speed), strict, RELAXED).takes_over
+
+
+def test_which_way_somebody_wants_the_pace_to_change_follows_from_what_they_like() -> None:
+    wanted = wanted_mps(ANA, Mood("pace", "pace.faster", "I"), 4.0)
+    assert wanted == pytest.approx(3.0)
+    assert aim_of(ANA, "pace", 0, 2.0, 4.0) == "pace.faster"
+    assert aim_of(ANA, "pace", 0, 3.5, 4.0) == "pace.slower"
+    assert {aim_of(ANA, "park", choice, 3.0, 4.0) for choice in range(6)} == set(AIMS["park"])

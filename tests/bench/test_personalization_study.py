@@ -1,0 +1,140 @@
+"""A sitting, a run that resumes, and the figures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from chauffeur.bench.engine import Work
+from chauffeur.bench.personalization import figures, report
+from chauffeur.bench.personalization.runner import StudyConfig, StudyRun
+from chauffeur.bench.personalization.study import ARMS, StudyJob, do_job, sit
+from chauffeur.bench.shards import Shard
+from chauffeur.bench.store import Row
+from chauffeur.concept import ConfigError
+
+
+@pytest.fixture(scope="module")
+def sitting() -> Row:
+    return do_job(StudyJob("p0001.go", 0, "go", 5, "talk2drive", "tuning", 2))
+
+
+def test_every_system_gets_the_same_words_scenes_and_moods_in_an_order_of_its_own(sitting: Row) -> None:
+    measured = [trip for trip in sitting["trips"] if trip["phase"] == "measured"]
+    orders = []
+    for level in ("I", "II", "III"):
+        block = [trip for trip in measured if trip["level"] == level]
+        assert {trip["arm"] for trip in block} == set(ARMS)
+        assert len({(trip["wish"], trip["scene"], trip["wanted_mps"]) for trip in block}) == 1
+        assert [trip["place"] for trip in block] == list(range(1, len(ARMS) + 1))
+        orders.append(tuple(trip["arm"] for trip in block))
+    assert len(set(orders)) > 1
+
+
+def test_memory_learns_in_the_trips_before_and_from_none_that_measures(sitting: Row) -> None:
+    learning = [trip for trip in sitting["trips"] if trip["phase"] == "learning"]
+    assert [trip["trip"] for trip in learning] == [1, 2]
+    assert learning[0]["recalled"] == 0
+    assert all(trip["feedback"] for trip in learning if trip["takeover"])
+    assert all(trip.get("recalled", 0) <= 2 for trip in sitting["trips"])
+    assert all(trip.get("recalled", 0) == 0 for trip in sitting["trips"] if trip["arm"] != "with")
+    assert json.loads(json.dumps(sitting)) == sitting
+
+
+def test_the_same_seed_gives_the_same_sitting(sitting: Row) -> None:
+    again = do_job(StudyJob("p0001.go", 0, "go", 5, "talk2drive", "tuning", 2))
+
+    def timeless(row: Row) -> list[Row]:
+        return [{name: value for name, value in trip.items() if name != "latency_s"} for trip in row["trips"]]
+
+    assert timeless(again) == timeless(sitting)
+
+
+class _Here:
+    """An engine of one worker: this process. It gives up after `most` jobs, as a machine that is switched off."""
+
+    slots = 1
+
+    def __init__(self, most: int) -> None:
+        self._left = most
+
+    async def start(self) -> None:
+        return
+
+    async def run(self, work: Work, job: Any, *, near: str = "", urgent: bool = False) -> Row:
+        del work, near, urgent
+        if not self._left:
+            raise KeyboardInterrupt
+        self._left -= 1
+        return await sit(job)
+
+    def close(self, *, now: bool) -> None:
+        del now
+
+
+def _opened(folder: Path, passengers: int = 2) -> StudyRun:
+    """A run of the quickest sittings alone."""
+    run = StudyRun(folder, StudyConfig(passengers=passengers, seed=5, half="tuning", trips=0))
+    run.jobs = tuple(job for job in run.jobs if job.task == "go")
+    return run
+
+
+def test_a_run_goes_on_where_it_stopped_and_refuses_another_configuration(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with pytest.raises(KeyboardInterrupt):
+        _opened(folder).run(lambda standing: None, engine=lambda workers: _Here(1))
+    assert _opened(folder).done == 1
+    rows = _opened(folder).run(lambda standing: None, engine=lambda workers: _Here(1))
+    assert _opened(folder).done == 2
+    again = _opened(folder).run(lambda standing: None, engine=lambda workers: _Here(0))
+    assert again == rows
+    assert len(rows) == 2 * 3 * len(ARMS)
+    assert all("simulated" in row["note"] for row in rows)
+    with pytest.raises(ConfigError, match="another configuration"):
+        _opened(folder, 3)
+    text = report.markdown(rows, "T")
+    assert "Simulated passengers" in text
+    assert "2 simulated passengers" in text
+
+
+def test_shards_share_the_work(tmp_path: Path) -> None:
+    config = StudyConfig(passengers=3, seed=5, trips=0)
+    parts = [StudyRun(tmp_path / str(number), config, shard=Shard(number, 3)).jobs for number in (1, 2, 3)]
+    keys = [job.key for jobs in parts for job in jobs]
+    assert sorted(keys) == sorted(job.key for job in StudyRun(tmp_path / "all", config).jobs)
+    assert len(set(keys)) == 21
+
+
+def _rows(persons: int, before: int, after: int) -> list[Row]:
+    """Ten trips a person and system, of which so many are taken over."""
+    return [
+        {
+            "passenger": f"p{person}", "task": "overtake", "ground": "highway", "level": "I", "trip": trip,
+            "phase": "measured", "arm": arm, "takeover": trip < (before if arm == "keyword" else after),
+            "topic": "too_fast",
+        }
+        for person in range(persons)
+        for trip in range(10)
+        for arm in ("keyword", "without")
+    ]  # fmt: skip
+
+
+def test_rates_and_reductions_are_those_of_the_rows() -> None:
+    found = figures.table_ix(_rows(12, 8, 2))[0]
+    assert (found.persons, found.trips) == (12, 120)
+    assert found.before.value == pytest.approx(0.8)
+    assert found.after.value == pytest.approx(0.2)
+    assert found.reduction.value == pytest.approx(0.75)
+    zero = figures.table_ix(_rows(12, 8, 0))[0]
+    assert zero.after.high == pytest.approx(0.2646, abs=1e-3)  # exact for 0 of 12 persons
+    assert figures.table_ix(_rows(12, 0, 2))[0].reduction.value is None
+
+
+def test_trips_that_only_one_system_made_are_not_compared() -> None:
+    rows = _rows(12, 8, 2)
+    rows = [row for row in rows if row["arm"] == "keyword" or row["trip"] < 5]
+    assert figures.table_ix(rows)[0].trips == 60
+    assert figures.table_ix([row for row in rows if row["arm"] == "keyword"]) == []

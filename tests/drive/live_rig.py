@@ -1,0 +1,75 @@
+"""A policy process on a table, beside a control process."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from live_bench import OVERTAKE, Bench
+
+from chauffeur.concept import Plan, Policy, Program, Thoughts
+from chauffeur.drive.live.messages import Observation, Report, Wish
+from chauffeur.drive.live.mirror import Mirror
+from chauffeur.drive.live.orders import Event, Order, Scene, encode, read_event
+from chauffeur.drive.live.policy import Policy as PolicyProcess
+from chauffeur.drive.live.policy import PolicyRings
+from chauffeur.drive.live.ring import Reader, Ring
+from chauffeur.drive.live.settings import SIZES, RingName
+from chauffeur.drive.live.starts import Start
+from chauffeur.programs import Sandbox
+
+
+class Rig:
+    """Control and policy side by side, period by period."""
+
+    def __init__(self, folder: Path, sandbox: Sandbox, starts: tuple[Start, ...] = (OVERTAKE,)) -> None:
+        self.bench = Bench(folder, starts)
+        names: tuple[RingName, ...] = ("orders", "policy_events", "checkpoints")
+        orders, events, checkpoints = (Ring(folder / name, *SIZES[name], create=True) for name in names)
+        self.orders, self.events = orders, events
+        self.rings = PolicyRings(orders, self.bench.wishes, events, checkpoints)
+        self.starts, self.sandbox = starts, sandbox
+        self.policy = self.new_policy()
+        self.bench.control.begin_trip()
+        self.reports: list[Report] = []
+        self._heard = Reader(self.events, old=True)
+
+    def new_policy(self) -> PolicyProcess:
+        mirror = Mirror(self.bench.new_world(), self.starts, self.bench.observations)
+        return PolicyProcess(mirror, self.rings, self.sandbox, clock_ns=lambda: self.bench.now_ns)
+
+    def period(self, count: int = 1) -> Wish:
+        """Let both run; the policy's last wish."""
+        for _ in range(count):
+            self.policy.tick()
+            self.reports.append(self.bench.tick())
+        message = self.bench.wishes.latest()
+        assert message is not None
+        return Wish.decode(message.payload)
+
+    def order(self, asked: str | Policy, wish: str = "w1", **changes: object) -> None:
+        """A plan, made for the present instant: the text of a program, or another policy."""
+        snapshot = self.bench.world.snapshot()
+        message = self.bench.observations.latest()
+        assert message is not None
+        seen = Observation.decode(message.payload)
+        made = Order(
+            wish,
+            Plan(Thoughts("As you wish."), Program(asked) if isinstance(asked, str) else asked),
+            Scene.of(seen.trip, snapshot),
+            self.bench.now_ns,
+            self.bench.now_ns + 10**10,
+            self.bench.now_ns + 10**12,
+        )
+        self.orders.write(encode(replace(made, **changes)))  # pyright: ignore[reportArgumentType]
+
+    def die(self) -> None:
+        """The policy process ends, and another one takes its place."""
+        self.policy.close()
+        self.policy = self.new_policy()
+
+    def told(self) -> list[Event]:
+        return [read_event(message.payload) for message in self._heard.news()[0]]
+
+    def kinds(self) -> list[tuple[str, str]]:
+        return [(event.kind, event.wish) for event in self.told()]

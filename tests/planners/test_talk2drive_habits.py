@@ -1,0 +1,176 @@
+"""What earlier trips say about parameters: what a wish means, how fast, which lane and which spot."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from chauffeur.concept import Feedback, History, HistoryItem, Situation
+from chauffeur.concept.nouns import Lead
+from chauffeur.memory.feedback import interpret_feedback
+from chauffeur.planners.talk2drive.habits import Pace, meaning_of, meant_by, pace_of, speed_for
+from chauffeur.planners.talk2drive.lanes import fitting_mps, mood_lane, of_left_lane, passing_mps, unsaid_turn
+from chauffeur.planners.talk2drive.lot import hinted_place, parks
+
+BEHIND = Situation("highway", 24.0, 31.3, 2, 1, False, Lead(7, 45.0, 24.0), None)
+FREE = Situation("highway", 30.0, 31.3, 2, 0, False, None, None)
+LOT = Situation("parking", 3.0, 4.2, 1, 0, False, None, None)
+
+
+def item(day: int, intent: str, said: str = "", speed: float = 27.0, *, similarity: float = -1.0) -> HistoryItem:
+    feedback = (interpret_feedback(said),) if said else ()
+    return HistoryItem(
+        f"t{day}", f"2026-01-{day:02d}T08:00:00.000+00:00", "I'm late.", "", "highway", intent, "",
+        json.dumps({"route": "stadium"}), (("target_speed_mps", speed), ("speed_limit_mps", 31.3)), feedback, "ended",
+        similarity,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("said", "meant"),
+    [
+        ("I wanted you to overtake that car.", "Overtake that car."),
+        ("Next time, stay behind it.", "Stay behind it."),
+        ("Wrong spot. Park by the gate next time.", "Park by the gate."),
+        ("Why did you stay there? Take the right lane.", "Take the right lane."),
+        ("I wanted you to go slower, not to park.", "Go slower."),
+        ("Don't park next time, just drive faster.", "Drive faster."),
+        ("No parking yet. I meant: drive slower.", "Drive slower."),
+        ("I did not want to park, only to go slower.", "Go slower."),
+        ("A bit slower next time.", ""),
+        ("Too close to the car in front.", ""),
+        ("I wanted you to be nicer.", ""),
+        ("That was perfect.", ""),
+        ("", ""),
+    ],
+)
+def test_a_remark_can_say_what_had_been_wanted(said: str, meant: str) -> None:
+    assert meant_by(said) == meant
+
+
+def test_such_a_wish_means_that_from_then_on() -> None:
+    told = item(3, "style.hurry", "I wanted you to overtake that car.")
+    meaning = meaning_of(History((told,)), "highway", "style.hurry")
+    assert meaning is not None
+    assert meaning.words == "Overtake that car."
+    assert "2026-01-03" in meaning.because
+    assert meaning_of(History((told,)), "intersection", "style.hurry") is None
+    assert meaning_of(History((told,)), "highway", "style.relax") is None
+    liked = item(4, "overtake.left+style.hurry", "Perfect.")
+    still = meaning_of(History((liked, told)), "highway", "style.hurry")
+    assert still is not None
+    assert still.words.startswith("Overtake")
+
+
+def test_the_last_word_on_what_it_means_holds() -> None:
+    told = item(3, "style.hurry", "I wanted you to overtake that car.")
+    taken_back = item(5, "overtake.left+style.hurry", "Next time stay in your lane.")
+    meaning = meaning_of(History((told, taken_back)), "highway", "style.hurry")
+    assert meaning is not None
+    assert meaning.words == "Stay in your lane."
+    plain = item(6, "style.hurry", "That was good.")
+    assert meaning_of(History((told, plain)), "highway", "style.hurry") is None
+
+
+def test_a_wish_nobody_understood_needs_the_same_words_again() -> None:
+    told = item(3, "ask", "I wanted you to change to the right lane.", similarity=0.9)
+    assert meaning_of(History((told,)), "highway", "ask") is not None
+    other = item(3, "ask", "I wanted you to change to the right lane.", similarity=0.3)
+    assert meaning_of(History((other,)), "highway", "ask") is None
+
+
+def test_remarks_on_the_speed_add_up_from_trip_to_trip() -> None:
+    first = item(1, "style.hurry", "A bit too fast.", 30.0)
+    once = pace_of(History((first,)), "highway", "speed.increase", 30.0 / 31.3)
+    assert once is not None
+    assert once.share == pytest.approx(30.0 / 31.3 * (1.0 - 0.35 * 0.35**1.5))
+    assert "A bit too fast" in once.because
+    liked = item(2, "style.hurry", "That was good.", once.share * 31.3)
+    kept = pace_of(History((first, liked)), "highway", "style.hurry", 30.0 / 31.3)
+    assert kept is not None
+    assert kept.share == pytest.approx(once.share)
+    assert kept.because == ""
+    again = item(2, "style.hurry", "A bit too fast.", once.share * 31.3)
+    twice = pace_of(History((again, first)), "highway", "style.hurry", 30.0 / 31.3)
+    assert twice is not None
+    assert twice.share < once.share
+
+
+def test_what_was_complained_about_bounds_a_choice_and_does_not_replace_it() -> None:
+    history = History((item(1, "style.relax", "Far too slow.", 15.0),))
+    fast_enough = pace_of(history, "highway", "style.relax", 0.9)
+    assert fast_enough is None
+    too_slow = pace_of(history, "highway", "style.relax", 0.5)
+    assert too_slow is not None
+    assert too_slow.share > 15.0 / 31.3 * 1.3
+
+
+def test_haste_and_ease_bound_one_another_from_one_side() -> None:
+    hasty = History((item(1, "style.hurry", "Too fast.", 25.0),))
+    assert pace_of(hasty, "highway", "style.relax", 0.85) is not None
+    assert pace_of(hasty, "highway", "style.relax", 0.5) is None
+    slow_haste = History((item(1, "style.hurry", "Too slow.", 25.0),))
+    assert pace_of(slow_haste, "highway", "style.relax", 0.5) is None
+    assert pace_of(hasty, "highway", "ask", 0.9) is None
+    assert pace_of(hasty, "highway", "speed.set_up", 0.9) is None  # a number that was said is kept to
+    assert pace_of(hasty, "parking", "style.hurry", 0.9) is None
+
+
+def test_faster_is_never_slower_than_now() -> None:
+    pace = Pace(0.7, "")
+    assert speed_for(pace, "speed.increase", 25.0, 31.3, 31.3) is None
+    assert speed_for(pace, "speed.decrease", 25.0, 31.3, 31.3) == pytest.approx(21.91)
+    assert speed_for(pace, "speed.decrease", 20.0, 31.3, 31.3) is None
+    assert speed_for(Pace(3.0, ""), "style.hurry", 25.0, 31.3, 28.0) == 28.0
+    assert speed_for(Pace(-2.0, ""), "style.relax", 25.0, 30.0, 30.0) == 9.0
+
+
+def test_feedback_that_is_broken_moves_nothing() -> None:
+    broken = HistoryItem(
+        "t", "", "", "", "highway", "style.hurry", "", "{", (("target_speed_mps", 20.0),), (Feedback(""),)
+    )
+    assert pace_of(History((broken,)), "highway", "style.hurry", 0.9) is None
+    assert meaning_of(History((broken,)), "highway", "style.hurry") is None
+
+
+def test_moods_choose_lanes_where_there_is_a_reason() -> None:
+    assert mood_lane("style.hurry", BEHIND) == -1
+    assert mood_lane("style.hurry", FREE) == 0
+    assert mood_lane("style.relax", FREE) == 1
+    assert mood_lane("style.relax", BEHIND) == 0
+    assert mood_lane("speed.increase", BEHIND) == 0
+    assert mood_lane("style.hurry", LOT) == 0
+    assert passing_mps(BEHIND, 27.0) == 29.0
+    assert passing_mps(BEHIND, 27.0, -10.0) == 27.0
+    assert passing_mps(FREE, 27.0) == 27.0
+
+
+def test_speeds_fit_the_place() -> None:
+    assert fitting_mps(19.0, "style.relax", BEHIND) == 24.0
+    assert fitting_mps(25.0, "style.relax", FREE) == 25.0
+    assert fitting_mps(4.2, "speed.increase", LOT) == pytest.approx(3.9)
+    assert fitting_mps(1.0, "speed.decrease", LOT) == pytest.approx(2.1)
+
+
+def test_who_speaks_of_the_left_lane_in_it_wants_to_be_out_of_it() -> None:
+    assert of_left_lane("You are hogging the left lane.", "lane.left", FREE)
+    assert not of_left_lane("Move to the left lane.", "lane.left", FREE)
+    assert not of_left_lane("You are hogging the left lane.", "lane.left", BEHIND)
+    assert not of_left_lane("You are hogging the left lane.", "lane.keep", FREE)
+
+
+def test_nobody_turns_to_a_side_that_was_not_said() -> None:
+    assert unsaid_turn("My train won't wait.", "turn.right")
+    assert not unsaid_turn("Turn Right here.", "turn.right")
+    assert not unsaid_turn("Go straight on.", "turn.straight")
+    assert not unsaid_turn("My train won't wait.", "style.hurry")
+
+
+def test_hints_in_a_lot_point_to_places() -> None:
+    assert hinted_place("The game starts soon.") == "stadium"
+    assert hinted_place("We leave again in a minute.") == "exit"
+    assert hinted_place("I want to get out of the car.") == ""
+    assert hinted_place("Nice weather.") == ""
+    assert parks("keep")
+    assert not parks("speed.increase")
