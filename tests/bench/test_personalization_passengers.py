@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from string import Formatter
+from typing import Final, get_args
 
 import numpy as np
 import pytest
@@ -10,7 +13,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chauffeur.bench.personalization.population import Passenger, draw_passengers
-from chauffeur.bench.personalization.sayings import FEEDBACK, LEVELS, WISHES, feedback_of, sayings_sha256, wishes_of
+from chauffeur.bench.personalization.sayings import (
+    FEEDBACK,
+    LEVELS,
+    WISHES,
+    Aim,
+    Half,
+    Level,
+    Topic,
+    feedback_of,
+    sayings_sha256,
+    wishes_of,
+)
 from chauffeur.bench.personalization.scenes import AIMS, TASKS
 from chauffeur.bench.personalization.takeover import Mood, aim_of, judge, wanted_mps
 from chauffeur.bench.personalization.traces import Trace
@@ -22,6 +36,7 @@ ANA = Passenger(
     braking_mps2=4.0, accelerating_mps2=3.5, sideways_mps2=3.0, jerk_mps3=5.0, encroachment_s=1.5, patience_s=10.0,
     standing_s=5.0, walk_m=10.0, lane_habit="moves", talk="open", noise=0.02,
 )  # fmt: skip
+HALVES: Final[tuple[Half, ...]] = get_args(Half)
 RELAXED = Mood("follow", "follow", "I")
 
 
@@ -56,27 +71,68 @@ def test_preferences_have_the_spread_that_the_sources_give() -> None:
     assert {one.lane_habit for one in people} == {"moves", "stays"}
 
 
-def test_every_aim_has_words_at_every_level_in_two_halves_that_share_none() -> None:
-    assert {aim for task in TASKS for aim in AIMS[task]} == {aim for aim, _ in WISHES}
-    for aim, level in WISHES:
-        test, tuning = wishes_of(aim, level, "test"), wishes_of(aim, level, "tuning")
-        assert len(test) == len(tuning) == 5
-        assert not set(test) & set(tuning)
-    said = [text for texts in WISHES.values() for text in texts]
-    assert len(set(said)) == len(said)
-    assert len(LEVELS) * 10 == len(WISHES)
-    assert len(sayings_sha256()) == 64
+def plain(text: str) -> str:
+    """Without case and punctuation."""
+    return " ".join(re.findall(r"\w+", text.casefold()))
+
+
+def test_every_aim_has_ten_wordings_at_every_level_in_both_halves() -> None:
+    wanted: list[tuple[Aim, Level]] = [(aim, level) for task in TASKS for aim in AIMS[task] for level in LEVELS]
+    for half in HALVES:
+        assert set(WISHES[half]) == set(wanted)
+        assert [len(wishes_of(aim, level, half)) for aim, level in wanted] == [10] * len(wanted)
+
+
+def test_no_sentence_is_said_twice_in_a_half_or_across_halves() -> None:
+    where: dict[str, list[str]] = {}  # a failure names places: it is no occasion to read the test half
+    for name, tables in (("wish", WISHES), ("feedback", FEEDBACK)):
+        for half in HALVES:
+            for key, texts in tables[half].items():
+                for number, text in enumerate(texts):
+                    where.setdefault(plain(text), []).append(f"{name} {half} {' '.join(key)} {number}")
+    assert where.get("") is None
+    assert [places for places in where.values() if len(places) > 1] == []
+
+
+def test_feedback_of_both_halves_has_the_same_topics_forces_and_placeholders() -> None:
+    assert set(FEEDBACK["test"]) == set(FEEDBACK["tuning"])
+    assert {topic for topic, _ in FEEDBACK["test"]} == set(get_args(Topic))
+    for key, texts in FEEDBACK["tuning"].items():
+        others = FEEDBACK["test"][key]
+        assert len(others) >= len(texts)
+        assert len({placeholders(text) for text in (*texts, *others)}) == 1
+    for half in HALVES:
+        assert {placeholders(text) for text in FEEDBACK[half]["wrong_spot", "plain"]} == {("place",)}
+        assert {placeholders(text) for text in FEEDBACK[half]["parked", "plain"]} == {("pace",)}
+        assert feedback_of("waited", "much", half) == FEEDBACK[half]["waited", "plain"]
+
+
+def placeholders(text: str) -> tuple[str, ...]:
+    return tuple(field for _, field, _, _ in Formatter().parse(text) if field is not None)
+
+
+@pytest.mark.parametrize("half", HALVES)
+def test_the_hash_of_the_words_changes_with_either_half(half: Half, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = sayings_sha256()
+    assert re.fullmatch("[0-9a-f]{64}", before)
+    with monkeypatch.context() as changed:
+        changed.setitem(WISHES[half], ("go", "I"), ("Something else.",))
+        assert sayings_sha256() != before
+    with monkeypatch.context() as changed:
+        changed.setitem(FEEDBACK[half], ("fine", "plain"), ("Something else.",))
+        assert sayings_sha256() != before
+    assert sayings_sha256() == before
 
 
 def test_most_feedback_is_understood_by_the_memory_that_gets_it_and_none_the_wrong_way() -> None:
+    # Of the tuning half alone: whoever mended the memory until the other passed would have looked at it.
     about_speed = [
-        (topic, text) for (topic, _), texts in FEEDBACK.items() for text in texts if topic.startswith("too_")
+        (topic, text) for (topic, _), texts in FEEDBACK["tuning"].items() for text in texts if topic.startswith("too_")
     ]
     wanted = {"too_fast": -1, "too_slow": 1, "too_close": 0}
     heard = [(wanted[topic], interpret_feedback(text).speed, text) for topic, text in about_speed]
     assert not [text for meant, found, text in heard if meant * found < 0]
     assert sum(meant == found for meant, found, _ in heard) >= 0.9 * len(heard)
-    assert feedback_of("waited", "much") == feedback_of("waited", "plain")
 
 
 def test_a_drive_to_their_liking_is_left_alone() -> None:

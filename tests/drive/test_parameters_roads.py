@@ -56,6 +56,19 @@ def test_behind_a_slower_car_it_keeps_a_gap() -> None:
     assert not episode.final.ego.crashed
 
 
+@pytest.mark.parametrize("target", [14.0, 5.0, 0.0])
+def test_a_far_lower_speed_is_no_emergency_because_somebody_is_ahead(target: float) -> None:
+    """What the gap asks for at the present speed is braked, and no more: a lower target is gone down to gently."""
+
+    def hardest(target_mps: float) -> float:
+        episode = _drive("overtake", Parameters(target_mps, 12.0, 1.0), max_s=3.0)
+        return min(frame.applied.acceleration_mps2 for frame in episode.frames)
+
+    begun = _world("overtake").snapshot()
+    assert begun.front is not None
+    assert hardest(target) == pytest.approx(hardest(begun.ego.speed_mps))
+
+
 @pytest.mark.parametrize(
     ("name", "lane", "index"), [("overtake", -1, 0), ("left-lane", 1, 1), ("emergency-lane", 0, 1)]
 )

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
-from chauffeur.concept import Feedback, History, HistoryItem, Situation
+from chauffeur.concept import Feedback, History, HistoryItem, Limits, Situation
 from chauffeur.concept.nouns import Lead
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.planners.talk2drive.habits import Pace, meaning_of, meant_by, pace_of, speed_for
-from chauffeur.planners.talk2drive.lanes import fitting_mps, mood_lane, of_left_lane, passing_mps, unsaid_turn
+from chauffeur.planners.talk2drive.lanes import fitting_mps, mood_lane, passing_mps, unsaid_turn
 from chauffeur.planners.talk2drive.lot import hinted_place, parks
 
 BEHIND = Situation("highway", 24.0, 31.3, 2, 1, False, Lead(7, 45.0, 24.0), None)
@@ -147,17 +148,12 @@ def test_moods_choose_lanes_where_there_is_a_reason() -> None:
 
 
 def test_speeds_fit_the_place() -> None:
-    assert fitting_mps(19.0, "style.relax", BEHIND) == 24.0
-    assert fitting_mps(25.0, "style.relax", FREE) == 25.0
-    assert fitting_mps(4.2, "speed.increase", LOT) == pytest.approx(3.9)
-    assert fitting_mps(1.0, "speed.decrease", LOT) == pytest.approx(2.1)
-
-
-def test_who_speaks_of_the_left_lane_in_it_wants_to_be_out_of_it() -> None:
-    assert of_left_lane("You are hogging the left lane.", "lane.left", FREE)
-    assert not of_left_lane("Move to the left lane.", "lane.left", FREE)
-    assert not of_left_lane("You are hogging the left lane.", "lane.left", BEHIND)
-    assert not of_left_lane("You are hogging the left lane.", "lane.keep", FREE)
+    calm = 0.8 * FREE.speed_limit_mps
+    assert fitting_mps(19.0, "style.relax", BEHIND, Limits()) == pytest.approx(calm)  # goes on with who is ahead
+    assert fitting_mps(19.0, "style.relax", FREE, Limits()) == pytest.approx(calm)
+    assert fitting_mps(19.0, "style.relax", replace(FREE, speed_mps=20.0), Limits()) == 19.0
+    assert fitting_mps(4.2, "speed.increase", LOT, Limits()) == pytest.approx(3.9)
+    assert fitting_mps(1.0, "speed.decrease", LOT, Limits()) == pytest.approx(2.1)
 
 
 def test_nobody_turns_to_a_side_that_was_not_said() -> None:
@@ -170,7 +166,7 @@ def test_nobody_turns_to_a_side_that_was_not_said() -> None:
 def test_hints_in_a_lot_point_to_places() -> None:
     assert hinted_place("The game starts soon.") == "stadium"
     assert hinted_place("We leave again in a minute.") == "exit"
-    assert hinted_place("I want to get out of the car.") == ""
+    assert hinted_place("I want to get out of the car.") == "nearest"
     assert hinted_place("Nice weather.") == ""
     assert parks("keep")
     assert not parks("speed.increase")

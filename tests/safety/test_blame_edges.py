@@ -244,6 +244,13 @@ def test_of_two_that_come_over_the_faster_one_is_to_blame(side: float) -> None:
     assert judged(scenes(0.05, 0.1), FULL).who == "other"
 
 
+def test_who_comes_over_in_the_very_last_period_is_to_blame() -> None:
+    """The ego drifted a little within its lane; the other left its own at once, and that is seen at the end alone."""
+    drifting = [*beside(1.1, ego_heading=0.02), *beside(1.0, ego_heading=0.02)]
+    assert judged([*drifting, *beside(0.3, ego_heading=0.0, other_heading=-0.2)], FULL).who == "other"
+    assert judged([*drifting, *beside(0.3, ego_heading=0.2, other_heading=-0.02)], FULL).who == "ego"
+
+
 def test_what_each_does_after_their_sides_met_does_not_count() -> None:
     """The other came over; that the ego is then thrown over to it is no fault of the ego's."""
     came = beside(0.5, 0.3, -0.1, other_heading=-0.02)

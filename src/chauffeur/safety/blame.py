@@ -79,7 +79,8 @@ def blame(
     since = frame.snapshot.time_s
     answered = _answered(seen[unsafe_from:], parameters)
     if _apart(before, parameters):
-        if _ego_came_over([pair for _, pair in seen[unsafe_from - 1 :]]):
+        end = _pair(lens.look(final, last.ego.lane), other)  # what was begun in the last period counts, too
+        if _ego_came_over([*(pair for _, pair in seen[unsafe_from - 1 :]), *([] if end is None else [end])]):
             return Blame("ego", other, since, "The ego came over to the other's side.")
         if not answered:
             return Blame("ego", other, since, "The other came over, but the ego did not brake with all it has.")

@@ -38,7 +38,7 @@ from chauffeur.worlds.parking import ParkingReferee, ParkingWorld
 from chauffeur.worlds.parking.lot import Spot, build_lot
 from chauffeur.worlds.parking.places import PLACES
 
-RIDE_VERSION: Final = "ride-v1"
+RIDE_VERSION: Final = "ride-v2"
 """Changes whenever the same plan could drive differently here."""
 
 _KEPT: Final = 1_500

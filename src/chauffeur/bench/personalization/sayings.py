@@ -1,8 +1,9 @@
 """What the simulated passengers say: wishes at three levels of directness (seed Tab. VII), and feedback on a drive.
 
-All of it was written by hand for this evaluation, before any planner was tried on it, and no planner is trained on it.
-Each list falls into two halves by position: `tuning` may be looked at while a planner is improved, `test` is what
-figures are reported on.
+The words are two halves of the same shape, and no planner is trained on either. `tuning` was written by the authors of
+the planner and may be looked at while a planner is improved. `test` is what figures are reported on: it was written
+afterwards by a writer (a large language model) who had not seen the planner nor, but for a few sentences
+(`sayings_test` says which), the tuning half, and was never looked at while the planner was improved.
 
 Level I asks directly; level II comments on what the car does, or on the road; level III only hints at how the passenger
 is or what awaits them.
@@ -12,6 +13,8 @@ from __future__ import annotations
 
 import hashlib
 from typing import Final, Literal
+
+from chauffeur.bench.personalization import sayings_test, sayings_tuning
 
 Level = Literal["I", "II", "III"]
 Half = Literal["test", "tuning"]
@@ -23,370 +26,6 @@ Aim = Literal[
 ]  # fmt: skip
 """What a passenger is after; the parts behind the dot are their own choice."""
 
-WISHES: Final[dict[tuple[Aim, Level], tuple[str, ...]]] = {
-    ("overtake", "I"): (
-        "Can you pass the car ahead?",
-        "Please overtake that vehicle.",
-        "Go around the car in front, would you?",
-        "Get past this guy.",
-        "Overtake him, please.",
-        "Would you pass the one in front of us?",
-        "Switch lanes and go past that car.",
-        "Let's overtake the car before us.",
-        "Please get ahead of that car.",
-        "Could you move to the left and pass it?",
-    ),
-    ("overtake", "II"): (
-        "The car in front is crawling.",
-        "We have been stuck behind this car for ages.",
-        "I don't see why we sit behind him, the left lane is empty.",
-        "This car is holding us up.",
-        "That driver in front of us is so slow.",
-        "There is a slowpoke ahead of us.",
-        "We do not need to stay behind that one.",
-        "I'm tired of looking at the back of this car.",
-        "We're losing time behind that vehicle.",
-        "The fellow ahead is slower than everybody else.",
-    ),
-    ("overtake", "III"): (
-        "My train leaves in twenty minutes.",
-        "I really can't be late today.",
-        "The meeting starts soon and I'm the speaker.",
-        "They close at six, and it is nearly six.",
-        "I should have been there already.",
-        "My flight boards in half an hour.",
-        "My daughter is waiting at school.",
-        "I'm afraid I won't make it to the interview.",
-        "The doctor said to come as soon as possible.",
-        "Oh no, look at the time.",
-    ),
-    ("follow", "I"): (
-        "Just follow the car ahead.",
-        "Please stay behind this car.",
-        "Keep behind the vehicle in front of us.",
-        "Don't overtake, follow that car.",
-        "Stay in this lane behind him, please.",
-        "Follow the one in front, no passing.",
-        "Would you simply stay behind that car?",
-        "Keep following the car before us.",
-        "Remain behind this vehicle, please.",
-        "Tag along behind the car ahead.",
-    ),
-    ("follow", "II"): (
-        "There is no need to pass anybody.",
-        "The car in front drives at a nice pace.",
-        "I don't like it when we change lanes all the time.",
-        "You are driving a bit wildly.",
-        "That car ahead sets a good speed for us.",
-        "All this overtaking is unnecessary.",
-        "Your driving is too aggressive for me.",
-        "It is fine back here behind this one.",
-        "I think we go faster than we have to.",
-        "You don't have to race anyone.",
-    ),
-    ("follow", "III"): (
-        "We have all the time in the world.",
-        "My coffee is still full to the brim.",
-        "The baby has just fallen asleep.",
-        "I feel a little queasy.",
-        "There's a nice view here.",
-        "I would like to read a few pages.",
-        "I'm not expected before noon.",
-        "My grandmother gets nervous in cars.",
-        "It's my day off, nobody is waiting for me.",
-        "I have a bit of a headache.",
-    ),
-    ("right_lane", "I"): (
-        "Change to the right lane, please.",
-        "Could you get over to the right?",
-        "Please take the right-hand lane.",
-        "Move one lane to the right.",
-        "Go back into the right lane.",
-        "Would you shift to the lane on the right?",
-        "Please pull into the right lane.",
-        "Can we drive in the right lane instead?",
-        "Get into the slower lane on the right.",
-        "Merge right when you can.",
-    ),
-    ("right_lane", "II"): (
-        "We don't have to stay out here in the passing lane.",
-        "There is a lot of room on our right.",
-        "This is the fast lane and we are not fast.",
-        "The people behind us want to get by.",
-        "We are in the wrong lane for this speed.",
-        "Somebody behind us is flashing his lights.",
-        "You are hogging the left lane.",
-        "The lane next to us on the right is free.",
-        "I feel exposed over here on the left.",
-        "We're blocking the faster cars.",
-    ),
-    ("right_lane", "III"): (
-        "Our exit is not far from here.",
-        "I would rather let the hurried ones go by.",
-        "I'd like to look at the fields for a while.",
-        "Fast traffic makes me uneasy.",
-        "I need to make a phone call, let's take it easy.",
-        "We'll have to get off this road soon.",
-        "I am in no hurry at all.",
-        "It would be nice to roll along quietly.",
-        "My stomach is a bit upset.",
-        "Let's just cruise for a bit.",
-    ),
-    ("yield", "I"): (
-        "Slow down at the crossing and let the others go first.",
-        "Please wait for the cars that cross.",
-        "Give way to the traffic at the junction.",
-        "Let them pass before we go.",
-        "Stop at the line and yield, please.",
-        "Drive up slowly and give way.",
-        "Please let the cross traffic through first.",
-        "Take it slowly here and let them by.",
-        "Yield at the intersection.",
-        "Brake gently and let the others cross.",
-    ),
-    ("yield", "II"): (
-        "There are cars coming from the side.",
-        "We are coming up to that crossing rather fast.",
-        "They were here before us.",
-        "I can see somebody coming from the left.",
-        "That intersection looks busy.",
-        "You are approaching this too quickly for my taste.",
-        "I don't think they can see us.",
-        "The others seem to have the right of way.",
-        "It's pretty crowded at that junction.",
-        "That truck won't stop for us.",
-    ),
-    ("yield", "III"): (
-        "I'm nervous at crossings.",
-        "I had an accident at a place like this once.",
-        "There is no rush today.",
-        "My grandchild sits in the back.",
-        "We are early anyway.",
-        "My neck still hurts from yesterday.",
-        "I carry a cake on my lap.",
-        "I have plenty of time.",
-        "Better safe than sorry.",
-        "I never liked this corner.",
-    ),
-    ("go", "I"): (
-        "Go straight across without dawdling.",
-        "Drive on through the junction.",
-        "Cross quickly when it is clear.",
-        "Go ahead, straight over.",
-        "Get across as soon as you can.",
-        "Keep going straight, at a good speed.",
-        "Please go over the crossing swiftly.",
-        "Go on straight, and don't crawl.",
-        "Drive straight through as soon as it's free.",
-        "Cross the junction briskly.",
-    ),
-    ("go", "II"): (
-        "There is nobody around here.",
-        "I don't think we need to creep up to this.",
-        "The road is empty on both sides.",
-        "This approach is awfully slow.",
-        "The crossing is clear.",
-        "You drive like my grandfather.",
-        "They are still far away.",
-        "I don't see anyone coming.",
-        "We could have been across by now.",
-        "No one is coming from either side.",
-    ),
-    ("go", "III"): (
-        "I have to be home in five minutes.",
-        "The shop closes any moment.",
-        "My class has started already.",
-        "They won't hold the table for us much longer.",
-        "The bus to the airport won't wait for me.",
-        "I left the stove on, I think.",
-        "I'm running behind schedule.",
-        "My boss hates it when I come late.",
-        "The film begins at eight sharp.",
-        "Somebody is waiting for me in the rain.",
-    ),
-    ("park.nearest", "I"): (
-        "Park in the next free space.",
-        "Take the first spot you find.",
-        "Please park right here, anywhere is fine.",
-        "Find the closest free spot.",
-        "Park at the nearest place.",
-        "Use whichever space comes first.",
-        "Pull into the nearest parking space.",
-        "Park as near to us as possible.",
-        "Just take the closest one.",
-        "Stop in the first free bay.",
-    ),
-    ("park.nearest", "II"): (
-        "We don't have to drive through the whole lot.",
-        "It does not matter where we stand.",
-        "There's a free one right there.",
-        "I don't mind walking, any space will do.",
-        "We passed three free spots already.",
-        "One space is as good as another.",
-        "No point in searching long.",
-        "You are driving around too much in here.",
-        "This row looks fine to me.",
-        "We could be parked already.",
-    ),
-    ("park.nearest", "III"): (
-        "I want to get out of the car soon.",
-        "My legs are stiff from sitting.",
-        "I need a restroom, badly.",
-        "I feel sick, I need some air.",
-        "My phone is ringing, it is urgent.",
-        "I'd love to stretch my legs now.",
-        "The kids can't sit still any more.",
-        "The dog has to go out.",
-        "It's getting hot in here.",
-        "I am dying for a coffee.",
-    ),
-    ("park.stadium", "I"): (
-        "Park next to the stadium.",
-        "Find a spot close to the stadium, please.",
-        "Please park by the stadium gate.",
-        "Take a space near the stadium entrance.",
-        "Get us a spot beside the stadium.",
-        "Park as close to the arena entrance as you can.",
-        "I want a place near the stadium.",
-        "Go to the stadium side and park there.",
-        "Park in front of the stadium.",
-        "A space by the stadium gate, please.",
-    ),
-    ("park.stadium", "II"): (
-        "The gate is at the far side over there.",
-        "We are still a long way from the stadium.",
-        "It is a long walk to the stadium from here.",
-        "People go in over there on the east side.",
-        "The entrance to the game is at the other end.",
-        "These spots are too far from the arena.",
-        "I'd rather not walk all the way to the gate.",
-        "The stadium is over there.",
-        "From here it's half a mile to our seats.",
-        "The ticket gate is further on.",
-    ),
-    ("park.stadium", "III"): (
-        "Kick-off is in ten minutes.",
-        "My knee hurts and we have seats for the game.",
-        "I hope we don't miss the anthem.",
-        "I'm meeting my friends before the match.",
-        "We have tickets for tonight's game.",
-        "I don't want to carry all this to the match.",
-        "It is about to rain, and I wear my team's new jersey.",
-        "The concert is about to begin.",
-        "Grandpa can't walk far, and he loves football.",
-        "The players are warming up by now.",
-    ),
-    ("park.exit", "I"): (
-        "Park near the exit.",
-        "Take a spot close to the way out.",
-        "Please find a place by the exit.",
-        "Park where we can leave quickly.",
-        "I'd like a space next to the exit.",
-        "Get a spot right by the way out.",
-        "Look for a space near the exit gate.",
-        "Please park close to where cars leave.",
-        "Choose a spot at the exit.",
-        "Park beside the way out, please.",
-    ),
-    ("park.exit", "II"): (
-        "It will be jammed here when everybody leaves.",
-        "The way out is on the other side.",
-        "It always takes an hour to get out of here.",
-        "In the middle we'd be stuck after the game.",
-        "The exit is over there.",
-        "We are too deep inside the lot to leave again.",
-        "Getting out of this lot is a nightmare.",
-        "Last time we were trapped in the back.",
-        "Cars leave at the other end.",
-        "From here we won't get out later.",
-    ),
-    ("park.exit", "III"): (
-        "We only stay for a minute and leave again.",
-        "I have to drive on right afterwards.",
-        "I'll have to be away before the crowd.",
-        "I'm just dropping off a parcel.",
-        "I must catch my plane right after this.",
-        "I will be back in a second, then we head home.",
-        "I want to be gone before the final whistle.",
-        "I need to get home early tonight.",
-        "I only pick up my friend, then off we go.",
-        "The babysitter leaves at ten.",
-    ),
-    ("pace.faster", "I"): (
-        "Drive a bit faster.",
-        "Can you speed up?",
-        "Go quicker, please.",
-        "You may go faster in here.",
-        "Please pick up the pace.",
-        "Could you drive faster?",
-        "A little more speed, please.",
-        "Step on it a little.",
-        "Speed up some.",
-        "Move along faster, please.",
-    ),
-    ("pace.faster", "II"): (
-        "We are crawling.",
-        "I could walk faster than this.",
-        "You are very slow in here.",
-        "This is slower than it has to be.",
-        "At this pace we will be here all night.",
-        "You drive too timidly.",
-        "There is no need to be so slow.",
-        "We hardly move.",
-        "This is a snail's pace.",
-        "You are overly careful.",
-    ),
-    ("pace.faster", "III"): (
-        "My friends are waiting at the gate.",
-        "I'm late already.",
-        "I have an appointment in two minutes.",
-        "I'm getting impatient.",
-        "The show has started.",
-        "They are about to close the doors.",
-        "I have to catch the shuttle.",
-        "I'm in a bit of a hurry.",
-        "I do not have all day.",
-        "It is nearly time.",
-    ),
-    ("pace.slower", "I"): (
-        "Drive a bit slower.",
-        "Slow down, please.",
-        "Can you go slower?",
-        "Less speed in here, please.",
-        "Please take it slower.",
-        "Could you reduce the speed?",
-        "Go more slowly, please.",
-        "Ease off a little.",
-        "Drive slowly here.",
-        "Please lower the speed a little.",
-    ),
-    ("pace.slower", "II"): (
-        "You are too fast for a parking lot.",
-        "This feels quick between all these cars.",
-        "We are going rather fast in here.",
-        "That is too much speed for this place.",
-        "There are people walking around here.",
-        "You're rushing through here.",
-        "It is narrow here and you are quick.",
-        "You drive in here as if it were a race.",
-        "Someone could step out between the cars.",
-        "That was a fast corner.",
-    ),
-    ("pace.slower", "III"): (
-        "I feel dizzy.",
-        "I'm holding a hot cup of tea.",
-        "The children are asleep in the back.",
-        "I'm a bit scared in here.",
-        "There might be kids playing around.",
-        "I get carsick easily.",
-        "I'd like to look around first.",
-        "My back hurts at every bump.",
-        "I have eggs in my bag.",
-        "My heart is pounding.",
-    ),
-}
-"""Ten wordings an aim and level."""
-
 Topic = Literal[
     "too_fast", "too_slow", "too_close", "harsh", "swerving", "close_call", "no_overtake", "passed", "not_right",
     "waited", "not_parked", "wrong_spot", "parked", "fine",
@@ -394,157 +33,39 @@ Topic = Literal[
 """What a passenger has to say of a drive."""
 Force = Literal["bit", "plain", "much"]
 
-FEEDBACK: Final[dict[tuple[Topic, Force], tuple[str, ...]]] = {
-    ("too_fast", "bit"): (
-        "A bit too fast for me.",
-        "It was a little too quick.",
-        "Slightly slower next time, please.",
-        "Fine, but a touch too fast.",
-        "I'd have liked it a little slower.",
-        "Just a bit slower would be nicer.",
-    ),
-    ("too_fast", "plain"): (
-        "That was too fast.",
-        "You drove too fast for me.",
-        "Slower next time, please.",
-        "Too fast, I didn't feel comfortable.",
-        "I want you to drive slower than that.",
-        "Please drive more slowly.",
-    ),
-    ("too_fast", "much"): (
-        "That was much too fast!",
-        "Way too fast for my taste.",
-        "Far too fast, I had to step in.",
-        "You were going a lot too fast.",
-        "Drive much slower next time.",
-        "Really, that was way too quick.",
-    ),
-    ("too_slow", "bit"): (
-        "A bit too slow for me.",
-        "A little faster next time.",
-        "It was slightly too slow.",
-        "Okay, but a touch slow.",
-        "You could have gone a little faster.",
-        "Somewhat slow, I'd say.",
-    ),
-    ("too_slow", "plain"): (
-        "That was too slow.",
-        "Please drive faster next time.",
-        "You were too slow for me.",
-        "Too slow, I took over.",
-        "I want to go faster than that.",
-        "Faster next time, please.",
-    ),
-    ("too_slow", "much"): (
-        "That was much too slow.",
-        "Way too slow!",
-        "Far too slow, I lost my patience.",
-        "You could go a lot faster.",
-        "Drive much faster next time.",
-        "Incredibly slow, really.",
-    ),
-    ("too_close", "bit"): ("A bit too close to the car ahead.", "Leave slightly more room in front."),
-    ("too_close", "plain"): (
-        "Too close to the car in front.",
-        "You followed too closely.",
-        "Keep more distance to the one ahead.",
-        "I want more room to the car in front.",
-    ),
-    ("too_close", "much"): ("Much too close to that car!", "Way too close to the car ahead."),
-    ("harsh", "bit"): ("A bit jerky.", "Brake a little more gently, please."),
-    ("harsh", "plain"): (
-        "You braked too hard.",
-        "That was too jerky for me.",
-        "Please drive more smoothly.",
-        "Too abrupt, be gentler.",
-    ),
-    ("harsh", "much"): ("You braked way too hard.", "That was really jerky, much gentler please."),
-    ("swerving", "bit"): ("The steering was a little sharp.", "Take the bends a bit more gently."),
-    ("swerving", "plain"): ("Too sharp around the corner.", "Please steer more smoothly."),
-    ("swerving", "much"): ("You threw me around in that bend.", "Way too sharp in the corner."),
-    ("close_call", "plain"): (
-        "That was too close to the crossing car.",
-        "You cut in right before them, that scared me.",
-    ),
-    ("no_overtake", "plain"): (
-        "I wanted you to overtake that car.",
-        "You should have passed the car ahead.",
-        "Next time, overtake the slow car.",
-        "I meant: pass the car in front of us.",
-        "Why didn't you overtake? Pass the slow car next time.",
-        "When I say that, get past the car ahead.",
-    ),
-    ("passed", "plain"): (
-        "I wanted you to stay behind that car.",
-        "You should not have overtaken. Stay in the lane.",
-        "Next time stay behind the car ahead.",
-        "I meant: keep following the car in front.",
-        "No overtaking next time, please.",
-        "When I say that, stay in your lane and follow.",
-    ),
-    ("not_right", "plain"): (
-        "I wanted you to change to the right lane.",
-        "You should have moved to the right lane.",
-        "Next time, go to the right lane.",
-        "I meant: move over to the right lane.",
-        "Why did you stay on the left? Take the right lane.",
-        "When I say that, change to the right lane.",
-    ),
-    ("waited", "plain"): (
-        "You waited too long.",
-        "You should have gone straight on earlier.",
-        "Go sooner next time.",
-        "We stood there for ages.",
-    ),
-    ("not_parked", "plain"): (
-        "I wanted you to park.",
-        "You should have parked the car.",
-        "Next time, park in a free spot.",
-        "I meant: find us a parking spot.",
-    ),
-    ("wrong_spot", "plain"): (
-        "I wanted you to park {place}.",
-        "Wrong spot. Park {place} next time.",
-        "You should have parked {place}.",
-        "I meant a spot {place}.",
-        "Next time, park {place}.",
-        "When I say that, park {place}.",
-    ),
-    ("parked", "plain"): (
-        "I did not want to park, only to go {pace}.",
-        "I wanted you to go {pace}, not to park.",
-        "Don't park next time, just drive {pace}.",
-        "No parking yet. I meant: drive {pace}.",
-    ),
-    ("fine", "plain"): (
-        "That was good.",
-        "Just right.",
-        "Thank you, perfect.",
-        "I liked that.",
-        "Nice drive.",
-        "That was comfortable, thanks.",
-    ),
+WISHES: Final[dict[Half, dict[tuple[Aim, Level], tuple[str, ...]]]] = {
+    "test": sayings_test.WISHES,
+    "tuning": sayings_tuning.WISHES,
 }
-"""Feedback by what it is about and how strongly it is meant."""
-
+FEEDBACK: Final[dict[Half, dict[tuple[Topic, Force], tuple[str, ...]]]] = {
+    "test": sayings_test.FEEDBACK,
+    "tuning": sayings_tuning.FEEDBACK,
+}
 PLACE_WORDS: Final[dict[str, str]] = {
     "nearest": "in the nearest free spot",
     "stadium": "near the stadium",
     "exit": "near the exit",
 }
+"""A place of parking as feedback names it."""
 
 
 def wishes_of(aim: Aim, level: Level, half: Half) -> tuple[str, ...]:
     """The wordings of one half."""
-    return WISHES[aim, level][0 if half == "tuning" else 1 :: 2]
+    return WISHES[half][aim, level]
 
 
-def feedback_of(topic: Topic, force: Force) -> tuple[str, ...]:
-    """What can be said; plainly where nothing is written for that force."""
-    return FEEDBACK.get((topic, force)) or FEEDBACK[topic, "plain"]
+def feedback_of(topic: Topic, force: Force, half: Half) -> tuple[str, ...]:
+    """What can be said in the words of one half; plainly where nothing is written for that force."""
+    return FEEDBACK[half].get((topic, force)) or FEEDBACK[half][topic, "plain"]
 
 
 def sayings_sha256() -> str:
-    """Content hash of all words, for provenance."""
-    parts = [f"{key}:{text}" for table in (WISHES, FEEDBACK) for key, texts in table.items() for text in texts]
+    """Content hash of all words of both halves, for provenance."""
+    parts = [
+        f"{half}:{key}:{text}"
+        for tables in (WISHES, FEEDBACK)
+        for half, table in tables.items()
+        for key, texts in table.items()
+        for text in texts
+    ]
     return hashlib.sha256("\n".join([*parts, *PLACE_WORDS.values()]).encode()).hexdigest()

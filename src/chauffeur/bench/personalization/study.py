@@ -40,7 +40,7 @@ from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.base import Planner
 from chauffeur.planners.talk2drive.recent import RecentToo
 
-BENCH_VERSION: Final = "personalization-v1"
+BENCH_VERSION: Final = "personalization-v2"
 
 Arm = Literal["keyword", "keyword-fair", "without", "with", "ideal"]
 ARMS: Final[tuple[Arm, ...]] = ("keyword", "keyword-fair", "without", "with", "ideal")
@@ -190,7 +190,7 @@ class _Sitting:
             chance = {"silent": 0.0, "brief": 0.5, "open": 1.0}[talk]
             if self._rng.random() >= chance:
                 return ""
-        texts = feedback_of(found.topic, found.force)
+        texts = feedback_of(found.topic, found.force, self._job.half)
         text = texts[int(self._rng.integers(len(texts)))]
         choice = mood.aim.partition(".")[2]  # a place, or a direction of speed
         return text.format(place=PLACE_WORDS.get(choice, "in a free spot"), pace=choice)

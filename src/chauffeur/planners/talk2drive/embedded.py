@@ -12,25 +12,36 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final, Literal
 
-from chauffeur.concept import History, Parameters, Plan, PlanRequest, Situation, Thoughts
+from chauffeur.concept import History, Limits, Parameters, Plan, PlanRequest, Situation, Thoughts
 from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.planners.base import declined
+from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.language_model import LanguageModelPlanner, Settled, usage_of
 from chauffeur.planners.onboard.options import Chosen, Declined, speed_words
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.thoughts import thoughts_of
+from chauffeur.planners.talk2drive import remarks
 from chauffeur.planners.talk2drive.habits import SIGN_SETTING, meaning_of, pace_of, speed_for
 from chauffeur.planners.talk2drive.lanes import (
-    complaint_mps,
+    complaint_in,
+    eased_mps,
     fitting_mps,
     mood_lane,
-    of_left_lane,
     passing_mps,
     unsaid_turn,
 )
 from chauffeur.planners.talk2drive.lot import parks, wanted_place
-from chauffeur.planners.talk2drive.style import LOOK_AHEAD, LOOK_AHEAD_PARKING, PARKING_MPS, manner_of
+from chauffeur.planners.talk2drive.moods import EASE, HURRY, mood_of, pace_complaint
+from chauffeur.planners.talk2drive.remarks import Remark, taken_for
+from chauffeur.planners.talk2drive.style import (
+    BRISK_SHARE,
+    LOOK_AHEAD,
+    LOOK_AHEAD_PARKING,
+    PARKING_MPS,
+    Manner,
+    manner_of,
+)
 
 _STANDING: Final = frozenset({"stop", "pull_over"})
 _ELSEWHERE: Final[dict[str, str]] = {
@@ -44,12 +55,15 @@ _GIVES_WAY: Final = re.compile(
     r"|wait for (?:them|the|those|others?|cross\w*))\b",
     re.IGNORECASE,
 )
-_RIGHT: Final = "Change to the right lane."
 _WHERE_TO: Final = "I am not sure what you want. Shall I turn at the junction, and to which side?"
 _OFF_TOPIC: Final = "I only drive"
 """How the model declines what is no wish about driving."""
 _GIVES_WAY_SHARE: Final = 0.8
 """Of the present speed, as for a careful drive."""
+_OPEN: Final = ("ask", "refuse", "style.", "speed.", "gap.", "lane.keep", "follow")
+"""Readings of words that may have named nothing to do."""
+_HASTY: Final = ("style.hurry", "style.sporty", "speed.increase", "speed.max")
+_NOT_EASY: Final = ("ask", "refuse", "style.hurry", "style.sporty", "speed.increase", "speed.max", "gap.decrease")
 _ONE_BY_ONE: Final = "With these parameters I can do one thing at a time. What shall I do first?"
 
 
@@ -77,109 +91,146 @@ class EmbeddedParameters:
         meaning = meaning_of(request.history, situation.world, first.intent)
         if meaning is None:
             return first
-        meant = replace(request, instruction=replace(request.instruction, text=meaning.words))
-        second = self._read(meant, begun)
+        second = self._read(_saying(request, meaning.words), begun)
         if second.policy is None or second.intent == first.intent:
             return first
         intent = f"{second.intent}+{first.intent}" if first.intent else second.intent
         return replace(second, intent=intent, thoughts=Thoughts(f"{meaning.because} {second.thoughts.text}"))
 
-    def _read(self, request: PlanRequest, begun: float) -> Plan:
-        """The wish as its words say, with the speed this person likes for such wishes."""
+    def _read(self, request: PlanRequest, begun: float, *, moody: bool = True) -> Plan:
+        """The wish as its words say, with the speed this person likes for such wishes.
+
+        Args:
+            request: What is asked for.
+            begun: When, for the latency.
+            moody: Whether words that name nothing to do may be read for the mood they show.
+        """
         wish, situation = request.instruction.text, request.context.situation
         in_lot = situation.world == "parking"
-        if in_lot and (place := wanted_place(wish)):
-            return self._park(place, request, begun)
-        if situation.world == "intersection" and _GIVES_WAY.search(wish):
-            return self._give_way(request, begun)
+        complaint = pace_complaint(wish, in_lot=in_lot) if moody else 0
+        if not danger(wish):  # which the model's own reading refuses
+            if in_lot and not complaint and (place := wanted_place(wish)):
+                return self._park(place, request, begun)
+            if situation.world == "intersection" and _GIVES_WAY.search(wish):
+                return self._give_way(request, begun)
         alike = History(tuple(item for item in request.history.items if item.similarity >= 0.0))
         settled = self._model.settle(replace(request, history=alike), begun)
+        intent = settled.intent if isinstance(settled, Plan) else settled.linked.choice.intent
+        if isinstance(settled, Plan) and _forbidden(settled):
+            return settled
+        if (remark := taken_for(wish, situation)) is not None:
+            return self._as_taken(remark, request, begun)
+        if complaint:
+            return self._changed(complaint, request, begun)
+        if moody and (mood := _unheard_mood(wish, intent)):
+            return self._read(_saying(request, mood), begun, moody=False)
         if isinstance(settled, Plan):
-            if _forbidden(settled):
-                return settled
-            if of_left_lane(wish, settled.intent, situation):
-                right = replace(request, instruction=replace(request.instruction, text=_RIGHT))
-                return replace(self._read(right, begun), intent=f"lane.right+{settled.intent}")
-            if settled.intent in ("ask", "refuse") and (change := complaint_mps(wish, situation)):
-                return self._changed(change, request, begun, settled)
+            if settled.intent in ("ask", "refuse") and (sign := complaint_in(wish)):
+                return self._changed(sign, request, begun)
             if in_lot and parks(settled.intent):
                 return self._park("nearest", request, begun)
             return settled
         linked, used = settled.linked, settled.used
-        if in_lot and parks(linked.choice.intent):
+        if in_lot and parks(intent):
             return self._park("nearest", request, begun)
-        if unsaid_turn(wish, linked.choice.intent):
+        if unsaid_turn(wish, intent):
             return declined(self, _WHERE_TO, begun, intent="ask", raw=settled.written.text)
-        found = parameters_of(settled)
-        if isinstance(found, Declined) and situation.world == "intersection" and linked.choice.intent == "yield":
+        found = parameters_of(settled, request.limits)
+        if isinstance(found, Declined) and situation.world == "intersection" and intent == "yield":
             return self._give_way(request, begun)
         if isinstance(found, Declined):
-            return declined(self, found.words, begun, intent=linked.choice.intent, raw=settled.written.text)
-        found, why = _at_pace(found, linked.choice.intent, request)
+            return declined(self, found.words, begun, intent=intent, raw=settled.written.text)
+        found, why = _at_pace(found, intent, request)
         thoughts = thoughts_of(linked.reading, linked.choice, settled.situation, used, does=does(found))
-        return Plan(
-            thoughts=Thoughts(" ".join((*why, thoughts.text, *_overruled(request.history, used)))),
-            policy=found,
-            intent=linked.choice.intent,
-            settings=_settings(found, situation, used),
-            planner=self.id,
-            model=self.model,
-            latency_s=time.perf_counter() - begun,
-            usage=usage_of(settled.written),
-            raw=settled.written.text,
-        )
+        words = " ".join((*why, thoughts.text, *_overruled(request.history, used)))
+        plan = self._plan(found, words, intent, request, begun, used)
+        return replace(plan, usage=usage_of(settled.written), raw=settled.written.text)
+
+    def _as_taken(self, remark: Remark, request: PlanRequest, begun: float) -> Plan:
+        """A remark on the road, as the wish it was taken for."""
+        match remark.wish:
+            case remarks.GIVE_WAY:
+                plan = self._give_way(request, begun)
+            case remarks.GO:
+                plan = self._go(request, begun)
+            case wish:
+                plan = self._read(_saying(request, wish), begun, moody=False)
+        return replace(plan, thoughts=Thoughts(f"{remark.because} {plan.thoughts.text}"))
+
+    def _go(self, request: PlanRequest, begun: float) -> Plan:
+        """Over a crossing without dawdling; the stop at the sign is the car's own."""
+        situation = request.context.situation
+        sign = situation.speed_limit_mps
+        speed = min(BRISK_SHARE * sign, request.limits.most_mps(sign))
+        return self._paced(_parameters(speed, "usual", "straight"), "turn.straight", request, begun)
 
     def _give_way(self, request: PlanRequest, begun: float) -> Plan:
         """Towards a crossing where others go first: the car gives way by itself, so it is the approach that counts."""
-        look, situation = LOOK_AHEAD["gentle"], request.context.situation
-        speed = round(_GIVES_WAY_SHARE * situation.speed_mps, 2)
-        found = Parameters(speed, look.distance_m, look.ratio_s, 0, "straight")
-        found, why = _at_pace(found, "yield", request)
-        return Plan(
-            thoughts=Thoughts(" ".join((*why, f"You want others to go first. I {does(found)}."))),
-            policy=found,
-            intent="yield",
-            settings=_settings(found, situation, ()),
-            planner=self.id,
-            model=self.model,
-            latency_s=time.perf_counter() - begun,
-        )
+        speed = _GIVES_WAY_SHARE * request.context.situation.speed_mps
+        wants = "You want others to go first."
+        return self._paced(_parameters(speed, "gentle", "straight"), "yield", request, begun, wants)
 
-    def _changed(self, change_mps: float, request: PlanRequest, begun: float, settled: Plan) -> Plan:
-        """A complaint on the pace that is no wish the model knows: another speed in the same lane."""
+    def _changed(self, sign: int, request: PlanRequest, begun: float) -> Plan:
+        """A complaint on the pace: another speed in the same lane."""
         situation = request.context.situation
-        look = (
-            LOOK_AHEAD_PARKING if situation.world == "parking" else LOOK_AHEAD["gentle" if change_mps < 0 else "usual"]
-        )
-        cap = min(situation.speed_limit_mps, request.limits.most_mps(situation.speed_limit_mps))
-        found = Parameters(round(min(situation.speed_mps + change_mps, cap), 2), look.distance_m, look.ratio_s)
-        intent = "speed.decrease" if change_mps < 0 else "speed.increase"
-        found, why = _at_pace(found, intent, request)
-        pace = "too fast" if change_mps < 0 else "too slow"
-        return replace(
-            settled,
-            thoughts=Thoughts(" ".join((*why, f"You find this {pace}. I {does(found)}."))),
-            policy=found,
-            refusal="",
-            intent=intent,
-            settings=_settings(found, situation, ()),
-            latency_s=time.perf_counter() - begun,
-        )
+        speed = eased_mps(sign, situation, request.limits)
+        route = "straight" if situation.world == "intersection" else ""
+        found = _parameters(speed, "gentle" if sign < 0 else "usual", route)
+        if situation.world == "parking":
+            found = Parameters(found.target_speed_mps, LOOK_AHEAD_PARKING.distance_m, LOOK_AHEAD_PARKING.ratio_s)
+        wants = f"You find this too {'fast' if sign < 0 else 'slow'}."
+        return self._paced(found, "speed.decrease" if sign < 0 else "speed.increase", request, begun, wants)
 
     def _park(self, place: str, request: PlanRequest, begun: float) -> Plan:
         look, situation = LOOK_AHEAD_PARKING, request.context.situation
         speed = round(min(PARKING_MPS, request.limits.most_mps(situation.speed_limit_mps)), 2)
         found = Parameters(speed, look.distance_m, look.ratio_s, 0, place)
-        found, why = _at_pace(found, "park", request)
+        return self._paced(found, "park", request, begun, "You want to park.")
+
+    def _paced(self, found: Parameters, intent: str, request: PlanRequest, begun: float, wants: str = "") -> Plan:
+        """A plan by rule, at the speed this person likes for such wishes."""
+        found, why = _at_pace(found, intent, request)
+        words = " ".join(part for part in (*why, wants, f"I {does(found)}.") if part)
+        return self._plan(found, words, intent, request, begun)
+
+    def _plan(
+        self,
+        found: Parameters,
+        words: str,
+        intent: str,
+        request: PlanRequest,
+        begun: float,
+        used: Sequence[Leaning] = (),
+    ) -> Plan:
         return Plan(
-            thoughts=Thoughts(" ".join((*why, f"You want to park. I {does(found)}."))),
+            thoughts=Thoughts(words),
             policy=found,
-            intent="park",
-            settings=_settings(found, situation, ()),
+            intent=intent,
+            settings=_settings(found, request.context.situation, used),
             planner=self.id,
             model=self.model,
             latency_s=time.perf_counter() - begun,
         )
+
+
+def _saying(request: PlanRequest, words: str) -> PlanRequest:
+    """The same request in other words."""
+    return replace(request, instruction=replace(request.instruction, text=words))
+
+
+def _parameters(speed_mps: float, manner: Manner, route: str) -> Parameters:
+    look = LOOK_AHEAD[manner]
+    return Parameters(round(speed_mps, 2), look.distance_m, look.ratio_s, 0, route)
+
+
+def _unheard_mood(wish: str, intent: str) -> str:
+    """The mood that words show and their reading misses, as a wish; empty where it stands as it was read."""
+    mood = mood_of(wish)
+    if not mood or not intent.startswith(_OPEN):
+        return ""
+    if mood == "hurry":
+        return "" if intent.startswith(_HASTY) else HURRY
+    return EASE if intent.startswith(_NOT_EASY) else ""
 
 
 def _forbidden(declined: Plan) -> bool:
@@ -214,7 +265,7 @@ def _overruled(history: History, used: Sequence[Leaning]) -> Iterator[str]:
             yield conflict.to_person()
 
 
-def parameters_of(settled: Settled) -> Parameters | Declined:
+def parameters_of(settled: Settled, limits: Limits) -> Parameters | Declined:
     """What was settled as parameters, or why it is no matter of parameters."""
     steps = settled.linked.choice.steps
     if len(steps) > 1 and any(step.lanes_moved for step in steps[1:]):
@@ -228,10 +279,11 @@ def parameters_of(settled: Settled) -> Parameters | Declined:
     turn = next((step.intent.partition(".")[2] for step in steps if step.intent.startswith("turn.")), "")
     look = LOOK_AHEAD[manner_of(settled.linked.choice.intent, gentle=any(one.gentle for one in settled.used))]
     intent, lane = settled.linked.choice.intent, _lane(steps)
-    speed = fitting_mps(_speed(steps, settled.situation.speed_mps), intent, settled.situation)
+    leaning = sum(one.speed_mps for one in settled.used)
+    speed = fitting_mps(_speed(steps, settled.situation.speed_mps), intent, settled.situation, limits, leaning)
     mood = mood_lane(intent, settled.situation) if not lane else 0
     if mood < 0:
-        speed = passing_mps(settled.situation, speed, sum(one.speed_mps for one in settled.used))
+        speed = passing_mps(settled.situation, speed, leaning)
     return Parameters(round(speed, 2), look.distance_m, look.ratio_s, lane or mood, turn)
 
 

@@ -6,20 +6,21 @@ by changing lanes. Whether the lane is free is for the driver to see, who waits 
 
 from __future__ import annotations
 
-import re
 from typing import Final, Literal
 
-from chauffeur.concept import Situation
+from chauffeur.concept import Limits, Situation
 from chauffeur.memory.feedback import interpret_feedback
+from chauffeur.planners.talk2drive.style import BRISK_SHARE, CALM_SHARE, LOT_SHARE
 
 _HURRIES: Final = ("style.hurry", "style.sporty")
 _EASES: Final = ("style.relax", "style.comfort", "style.careful", "style.eco")
-_MOVES: Final = re.compile(
-    r"\b(?:change|move|switch|go|get|take|merge|pull|shift|steer|use|drive|keep|stay|head)\b", re.IGNORECASE
-)
-_STEPS: Final = ("speed.increase", "speed.decrease")
+_STAYS: Final = ("follow", "lane.keep")
 _LOT_STEP: Final = 0.3
+_LOT_MOST: Final = 0.6
+"""Shares of the present speed in a lot by which a step changes it, and by which it may to come up to what is usual."""
 _ROAD_STEP: Final = 0.12
+_CALM_ENOUGH: Final = 0.85
+"""Share of the limit above which a car that is found too fast goes down to a calm speed."""
 _NEAR_S: Final = 4.0
 """A car farther ahead than this holds nobody up yet."""
 _SLOWER_SHARE: Final = 0.92
@@ -65,36 +66,81 @@ def passing_mps(situation: Situation, wanted_mps: float, leaning_mps: float = 0.
     return max(wanted_mps, min(enough, situation.speed_limit_mps))
 
 
-def fitting_mps(speed_mps: float, intent: str, situation: Situation) -> float:
+def fitting_mps(speed_mps: float, intent: str, situation: Situation, limits: Limits, leaning_mps: float = 0.0) -> float:
     """A speed that was chosen for a highway, made fit for where we are, m/s.
 
-    At ease behind a slower car, in the lane for it, nothing needs to change: it sets a calm pace. And in a lot, where
-    speeds are small, so are the steps between them.
+    Who is in a hurry drives close to the limit. At ease, four fifths of it are enough; behind somebody, whom the cruise
+    control follows in any case, that is what the car goes up to when they go on. In a lot speeds are small, and so are
+    the steps between them.
+
+    Args:
+        speed_mps: As it was chosen.
+        intent: For which wish.
+        situation: Where we are.
+        limits: No speed beyond them.
+        leaning_mps: What the person's history added to the chosen speed.
     """
-    now = situation.speed_mps
-    stays = mood_lane(intent, situation) == 0
-    if intent.startswith(_EASES) and stays and held_up(situation) and situation.front is not None:
-        return max(speed_mps, min(now, situation.front.speed_mps))
-    if situation.world == "parking" and intent.startswith(_STEPS):
-        return max((1.0 - _LOT_STEP) * now, min(speed_mps, (1.0 + _LOT_STEP) * now))
+    now, sign = situation.speed_mps, situation.speed_limit_mps
+    sign = min(sign, limits.most_mps(sign))
+    if situation.world == "parking":
+        return _in_lot(speed_mps, intent, now, sign)
+    if situation.world != "highway" or not speed_mps:
+        return speed_mps
+    brisk, calm = BRISK_SHARE * sign + leaning_mps, CALM_SHARE * sign + leaning_mps
+    if intent.startswith(_HURRIES):
+        return min(max(speed_mps, brisk), max(speed_mps, sign))
+    if intent.startswith("overtake") and situation.front is not None:
+        return min(speed_mps, max(brisk, situation.front.speed_mps + _PASSES_BY_MPS))
+    if intent.startswith(_EASES):
+        keeps_behind = _follows(situation) and mood_lane(intent, situation) == 0
+        return calm if keeps_behind or now > CALM_SHARE * sign else min(speed_mps, now)
+    if intent.startswith(_STAYS) and _follows(situation):
+        return max(speed_mps, calm)
     return speed_mps
 
 
-def complaint_mps(wish: str, situation: Situation) -> float:
-    """By how much words that are no wish, but a complaint on the pace, ask to change the speed, m/s; 0 where they do
-    not complain."""
+def _in_lot(speed_mps: float, intent: str, now_mps: float, sign_mps: float) -> float:
+    usual = LOT_SHARE * sign_mps
+    if intent.startswith(_HURRIES):
+        return max(speed_mps, usual)
+    if intent.startswith("speed.increase"):
+        return max(min(speed_mps, (1.0 + _LOT_STEP) * now_mps), min(usual, (1.0 + _LOT_MOST) * now_mps))
+    if intent == "speed.decrease":
+        return (1.0 - _LOT_STEP) * now_mps
+    if intent.startswith("speed.decrease"):
+        return max((1.0 - _LOT_MOST) * now_mps, speed_mps)
+    return speed_mps
+
+
+def _follows(situation: Situation) -> bool:
+    """Whether somebody ahead is near enough to be followed."""
+    front = situation.front
+    return front is not None and front.distance_m < max(20.0, _NEAR_S * situation.speed_mps)
+
+
+def complaint_in(wish: str) -> Literal[-1, 0, 1]:
+    """Whether words that are no wish complain of the pace as feedback does: 1 wants it faster, -1 slower."""
     heard = interpret_feedback(wish)
-    sign = heard.speed or (-1 if heard.comfort < 0 else 0)
-    if not sign or heard.approval > 0:
-        return 0.0
-    step = _LOT_STEP if situation.world == "parking" else _ROAD_STEP
-    return sign * step * situation.speed_mps
+    if heard.approval > 0:
+        return 0
+    return heard.speed or (-1 if heard.comfort < 0 else 0)
 
 
-def of_left_lane(wish: str, intent: str, situation: Situation) -> bool:
-    """Whether words speak of the left lane we are in already, and do not ask for it: nobody praises it that way."""
-    in_it = situation.lane_index == 0 and situation.lane_count > 1 + situation.emergency_lane
-    return in_it and intent.startswith("lane.left") and _MOVES.search(wish) is None
+def eased_mps(sign: int, situation: Situation, limits: Limits) -> float:
+    """The speed after a complaint on the pace, m/s.
+
+    Args:
+        sign: 1 where it was too slow, -1 where it was too fast.
+        situation: The speed now, and the limit.
+        limits: No speed beyond them.
+    """
+    now, limit = situation.speed_mps, situation.speed_limit_mps
+    cap = min(limit, limits.most_mps(limit))
+    if situation.world == "parking":
+        return _in_lot((1.0 + sign * _LOT_STEP) * now, "speed.increase" if sign > 0 else "speed.decrease", now, cap)
+    if sign > 0:
+        return min((1.0 + _ROAD_STEP) * now, cap)
+    return CALM_SHARE * limit if now > _CALM_ENOUGH * limit else (1.0 - _ROAD_STEP) * now
 
 
 def unsaid_turn(wish: str, intent: str) -> bool:

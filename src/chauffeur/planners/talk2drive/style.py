@@ -33,6 +33,12 @@ LOOK_AHEAD: Final[dict[Manner, LookAhead]] = {
 }
 
 LOOK_AHEAD_PARKING: Final = LookAhead(4.0, 1.0)
+BRISK_SHARE: Final = 0.95
+CALM_SHARE: Final = 0.8
+LOT_SHARE: Final = 0.75
+"""Speeds as shares of the limit where words name none: in a hurry, at ease, and in a lot. Chosen by trips of simulated
+passengers (`bench personalization --words tuning`)."""
+
 PARKING_MPS: Final = 3.0
 """In a parking lot, where ways are narrow."""
 
@@ -40,13 +46,14 @@ DISTANCE_M: Final = (3.0, 60.0)
 RATIO_S: Final = (0.5, 4.0)
 """What a model may choose between."""
 
-_PARKS: Final = re.compile(r"\b(?:park|parking|spot|space|place|bay|stall)\b", re.IGNORECASE)
+_PARKS: Final = re.compile(r"\b(?:park|parking|spots?|spaces?|places?|bays?|stalls?|rows?)\b", re.IGNORECASE)
 _SPOT: Final = re.compile(
     r"\b(?:spot|space|bay|stall|place|in|into|at|on)\s+(?:number\s+)?([A-Z])\s?(\d{1,2})\b", re.IGNORECASE
 )
 _PLACES: Final[tuple[tuple[str, re.Pattern[str]], ...]] = (
+    ("exit", re.compile(r"\b(?:exits?|way out)\b", re.IGNORECASE)),
     ("stadium", re.compile(r"\b(?:stadium|entrance|gate|game)\b", re.IGNORECASE)),
-    ("exit", re.compile(r"\b(?:exit|way out|leave|get away)\b", re.IGNORECASE)),
+    ("exit", re.compile(r"\b(?:leave|get away)\b", re.IGNORECASE)),
     ("nearest", re.compile(r"\b(?:near|nearest|close|closest|next|first|any|free|here)\b", re.IGNORECASE)),
 )
 

@@ -250,7 +250,8 @@ class Follower:
             room = one.gap_m - (_STOP_SHORT_M if one.crosses else jam)
             return stopping_acceleration(speed, room, EASY_MPS2, self._dt_s)
         manners = IdmParameters(self._manners.acceleration_mps2, FIRM_MPS2, 4.0, jam, headway_s)
-        return idm_acceleration(speed, max(target, _SLOW_MPS), manners, one.gap_m, speed - one.speed_mps)
+        # What the gap asks for and no more: to slow down to a lower target is `_free`'s part, which does it gently.
+        return idm_acceleration(speed, max(target, speed, _SLOW_MPS), manners, one.gap_m, speed - one.speed_mps)
 
     def _bend_speed(self, station: float) -> float:
         index = max(0, min(int(station / _BEND_M), len(self._fastest) - 1))
