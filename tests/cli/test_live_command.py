@@ -9,12 +9,11 @@ import signal
 import socket
 import subprocess
 import sys
-import termios
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from terminal import WITHIN_S, at_a_terminal, until
 from typer.testing import CliRunner, Result
 
 from chauffeur.cli.lines import MOST_CHARACTERS, Lines
@@ -30,8 +29,6 @@ PROGRAM = """def drive():
         yield autopilot()
 """
 COMMAND = [sys.executable, "-c", "from chauffeur.cli.main import run; run()", "live"]
-WITHIN_S = 120.0
-"""For a busy machine; a drive here takes a few seconds."""
 
 
 @pytest.fixture(scope="module")
@@ -150,21 +147,6 @@ def test_the_log_tells_of_every_wish(given: tuple[subprocess.CompletedProcess[st
 # A session that is killed, and the one after it -----------------------------------------------------------------------
 
 
-def _until(process: subprocess.Popen[bytes], screen: int, words: str) -> str:
-    """What a process shows, until it shows some words."""
-    shown = b""
-    deadline_s = time.monotonic() + WITHIN_S
-    while words.encode() not in shown:
-        assert time.monotonic() < deadline_s, shown.decode(errors="replace")
-        try:
-            piece = os.read(screen, 65536)
-        except OSError:  # the other end of a terminal is gone
-            piece = b""
-        assert piece or process.poll() is None, shown.decode(errors="replace")
-        shown += piece
-    return shown.decode(errors="replace")
-
-
 def test_a_killed_session_loses_no_wish(silent_endpoint: str, answers: str, tmp_path: Path) -> None:
     log = tmp_path / "audit.jsonl"
     options = ["--planner", "openai/silent", "--base-url", silent_endpoint, "--audit", str(log), "--no-realtime"]
@@ -177,7 +159,7 @@ def test_a_killed_session_loses_no_wish(silent_endpoint: str, answers: str, tmp_
     )
     assert process.stdout is not None
     with process.stdout as screen:
-        _until(process, screen.fileno(), "Slow down a bit.")
+        until(process, screen.fileno(), "Slow down a bit.")
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
     assert [each.text for each in unanswered(log)] == ["Slow down a bit."]
@@ -191,37 +173,25 @@ def test_a_killed_session_loses_no_wish(silent_endpoint: str, answers: str, tmp_
 
 def _type_and_interrupt(log: Path, answers: str) -> None:
     """Drive at a terminal with the same log: it names the lost wish, takes typed lines, and ends with Ctrl-C."""
-    ours, theirs = pty.openpty()
-    before = termios.tcgetattr(theirs)
-    process = subprocess.Popen(
-        [*COMMAND, "--planner", answers, "--audit", str(log), "--no-realtime"],
-        stdin=theirs,
-        stdout=theirs,
-        stderr=theirs,
-        env=os.environ | {"TERM": "xterm", "COLUMNS": "110", "LINES": "40"},
-    )
-    shown = _until(process, ours, "no plan")
-    assert "Without an answer since the last session: w1 “Slow down a bit.”" in shown
-    os.write(ours, DECLINED.replace("over", "ovee\x7fr").encode())
-    assert DECLINED in _until(process, ours, DECLINED), "what is typed is shown, as it was corrected"
-    os.write(ours, b"\r")
-    _until(process, ours, "A car cannot fly.")
-    for typed, answer in (
-        ("take over", "You have the wheel: faster, slower, left, right, brake, or give back."),
-        ("brake", "you drive"),
-        (WISH, "Not while you have the wheel"),
-        ("give back", "The car has the wheel."),
-        (WISH, "The lane is good."),
-    ):
-        os.write(ours, f"{typed}\r".encode())
-        assert answer in _until(process, ours, answer)
-    process.send_signal(signal.SIGINT)
-    shown = _until(process, ours, "audit head")
-    assert "Stopped" in shown
-    assert process.wait(WITHIN_S) == 130
-    assert termios.tcgetattr(theirs) == before, "the terminal is as it was"
-    os.close(ours)
-    os.close(theirs)
+    with at_a_terminal([*COMMAND, "--planner", answers, "--audit", str(log), "--no-realtime"]) as (process, screen):
+        shown = until(process, screen, "no plan")
+        assert "Without an answer since the last session: w1 “Slow down a bit.”" in shown
+        os.write(screen, DECLINED.replace("over", "ovee\x7fr").encode())
+        assert DECLINED in until(process, screen, DECLINED), "what is typed is shown, as it was corrected"
+        os.write(screen, b"\r")
+        until(process, screen, "A car cannot fly.")
+        for typed, answer in (
+            ("take over", "You have the wheel: faster, slower, left, right, brake, or give back."),
+            ("brake", "you drive"),
+            (WISH, "Not while you have the wheel"),
+            ("give back", "The car has the wheel."),
+            (WISH, "The lane is good."),
+        ):
+            os.write(screen, f"{typed}\r".encode())
+            assert answer in until(process, screen, answer)
+        process.send_signal(signal.SIGINT)
+        assert "Stopped" in until(process, screen, "audit head")
+        assert process.wait(WITHIN_S) == 130
 
 
 # Lines ----------------------------------------------------------------------------------------------------------------

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-import pty
-import re
 import signal
 import subprocess
 import sys
-import termios
-import time
 from pathlib import Path
 
 import pytest
 from rich.console import Console
+from terminal import WITHIN_S, at_a_terminal, until
 from typer.testing import CliRunner
 
 from chauffeur.cli.main import app
@@ -45,8 +42,6 @@ from chauffeur.memory import VaultMemory
 from chauffeur.safety.audit import verify
 
 COMMAND = [sys.executable, "-c", "from chauffeur.cli.main import run; run()", "talk"]
-WITHIN_S = 180.0
-"""For a busy machine."""
 EGO = Body(0, "car", 0.0, 0.0, 0.0, 5.0, 2.0, 25.0)
 SCENE = Scene(12.0, EGO, (), 0.0, 0.0, 31.0, 20.0, 1.5, ("a", "b", 1), "follow", "w1", 3, "", False, 0)
 
@@ -97,6 +92,18 @@ def test_what_cannot_be_had_is_said_at_once(arguments: tuple[str, ...], said: st
     result = CliRunner().invoke(app, ["talk", *arguments])
     assert result.exit_code == 2
     assert said in result.output
+
+
+@pytest.mark.parametrize(
+    ("memory", "said"),
+    [("vaults", "Unknown memory 'vaults'"), ("chroma", "pip install 'chauffeur[chroma]'")],
+)
+def test_a_memory_that_cannot_be_had_is_said_at_once(memory: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "chromadb", None)
+    monkeypatch.setenv("CHAUFFEUR_MEMORY", memory)
+    result = CliRunner().invoke(app, ["talk", "--as", "ana"])
+    assert result.exit_code == 2
+    assert said in " ".join(result.output.split())
 
 
 def test_help_has_examples() -> None:
@@ -156,6 +163,8 @@ def test_a_question_stands_until_it_is_answered_and_trouble_is_marked() -> None:
     text = shown(Listening("idle"), SCENE, private, failed, unplugged, terminal=True)
     for words in ("PRIVATE: nothing is kept", "trouble", "It failed.", "Unplugged.", "not listening"):
         assert words in text
+    plain = MemoryState("ana", False, 90.0, 2, (), "chroma", encrypted=False)
+    assert shown(SCENE, plain, plain).count("Kept in the memory “chroma”; the car does not encrypt it.") == 1
     unheard = shown(HeardWords("no_hotword", "", "", "grammar/1", None, False, "Not for the car.", 0.8))
     assert "Not for the car." in unheard
 
@@ -195,23 +204,13 @@ def test_lines_of_a_pipe_are_driven_one_after_the_other(answers: str, tmp_path: 
 
 
 def test_at_a_terminal_it_is_typed_and_ctrl_c_brings_the_car_to_a_stand(answers: str) -> None:
-    ours, theirs = pty.openpty()
-    before = termios.tcgetattr(theirs)
-    process = subprocess.Popen(
-        [*COMMAND, "--planner", answers],
-        stdin=theirs, stdout=theirs, stderr=theirs,
-        env=os.environ | {"TERM": "xterm", "COLUMNS": "110", "LINES": "40"},
-    )  # fmt: skip
-    _until(process, ours, "no plan")
-    os.write(ours, b"Hold the lanf\x7fe.\r")
-    _until(process, ours, "Holding.")
-    process.send_signal(signal.SIGINT)
-    shown = _until(process, ours, "(simulated drive)")
-    assert "The car stands" in shown
-    assert process.wait(WITHIN_S) == 130
-    assert termios.tcgetattr(theirs) == before, "the terminal is as it was"
-    os.close(ours)
-    os.close(theirs)
+    with at_a_terminal([*COMMAND, "--planner", answers]) as (process, screen):
+        until(process, screen, "no plan")
+        os.write(screen, b"Hold the lanf\x7fe.\r")
+        until(process, screen, "Holding.")
+        process.send_signal(signal.SIGINT)
+        assert "The car stands" in until(process, screen, "(simulated drive)")
+        assert process.wait(WITHIN_S) == 130
 
 
 @pytest.mark.server
@@ -249,15 +248,3 @@ def test_the_page_drives_the_same_session(answers: str) -> None:
             assert {"road", "listening", "note"} <= kinds
         assert "(simulated drive)" in screen.read(), "the terminal was told the same"
     assert process.wait(WITHIN_S) == 0
-
-
-def _until(process: subprocess.Popen[bytes], screen: int, words: str) -> str:
-    shown = ""
-    deadline_s = time.monotonic() + WITHIN_S
-    while words not in re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown):
-        assert time.monotonic() < deadline_s, shown
-        try:
-            shown += os.read(screen, 65536).decode(errors="replace")
-        except OSError:
-            assert process.poll() is None, shown
-    return re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown)

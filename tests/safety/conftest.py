@@ -7,9 +7,21 @@ from typing import Any
 
 import pytest
 
-from chauffeur.concept import LaneView, Lead, Plan, Policy, Snapshot, Thoughts, VehicleState
+from chauffeur.concept import Command, LaneView, Lead, Plan, Policy, Snapshot, Thoughts, VehicleState
+from chauffeur.safety.shield import Shield
 
 LIMIT = 30.0
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _machine_code() -> None:
+    """The shield's compiled parts are made before any test is timed."""
+    for points in (((0.0, 0.0), (9.0, 0.0)), ((0.0, 0.0), (1.0, 0.0), (2.0, 0.1), (3.0, 0.4))):
+        lane = LaneView(("a", "b", 0), 4.0, 9.0, LIMIT, False, False, points)
+        ego = VehicleState(0, "car", 1.0, 0.0, 0.0, 5.0, 5.0, 2.0, lane.id)
+        Shield(0.1).guard(
+            Snapshot(0.0, 0, "highway", ego, (), (), (lane,), None, None, False, False), Command(0.0, 0.0)
+        )
 
 
 @pytest.fixture

@@ -189,6 +189,26 @@ def test_the_best_of_nine_wheels_leaves_the_car_straightest_on_its_way(
     assert cost(best) == pytest.approx(min(cost(wheel) for wheel in wheels))
 
 
+@given(
+    across=st.floats(-3.0, 3.0), heading=st.floats(-0.6, 0.6), speed=st.floats(-0.99, 0.99),
+    acceleration=st.floats(-8.0, 8.0),
+)  # fmt: skip
+@settings(max_examples=50, deadline=None)
+def test_below_walking_pace_no_wheel_is_better_than_none(
+    across: float, heading: float, speed: float, acceleration: float
+) -> None:
+    assume(abs(speed + acceleration * DT) < 1.0)
+    start = state(20.0, across, heading, speed)
+    start[4:] = 0.2, -0.3
+    assert foresight.wheel(2, start, EAST, 40, acceleration, DT) == 0.0
+    straight = start.copy()
+    foresight.move(straight, acceleration, 0.0, DT)
+    for wheel in (-0.78, 0.2, 0.78):
+        turned = start.copy()
+        foresight.move(turned, acceleration, wheel, DT)
+        assert turned.tolist() == straight.tolist()
+
+
 # How far others get ---------------------------------------------------------------------------------------------------
 
 
@@ -269,6 +289,53 @@ def test_what_is_turned_by_less_than_40_degrees_drives_along(turned: float, alon
 def test_one_is_in_a_stream_up_to_a_metre_and_a_half_beside_it() -> None:
     assert foresight._joined(1.0, -1.4)
     assert not foresight._joined(1.0, 1.6)
+
+
+# Where others go ------------------------------------------------------------------------------------------------------
+
+ALIGNED = math.cos(math.radians(40.0))
+NORTHWARDS = (10.0, 0.0, math.pi / 2.0, math.cos(math.pi / 2.0), 1.0)
+"""A lane along x = 10."""
+
+
+def seen(x: float, y: float, heading: float, speed: float) -> tuple[float, ...]:
+    """A car of 5 by 2 metres, as a snapshot has it."""
+    return x, y, heading, speed, 5.0, 2.0
+
+
+def expected(*cars: tuple[float, ...], on: tuple[int, ...]) -> list[list[float]]:
+    """The rows of cars around an ego at the origin, on no lane (-1) or the one northwards (0)."""
+    numbers = np.array([seen(0.0, 0.0, 0.0, 5.0), *cars])
+    return foresight.expected(numbers, np.array(on, dtype=np.int64), np.array([NORTHWARDS]), ALIGNED, 40.0).tolist()
+
+
+@settings(deadline=None)
+@given(x=st.floats(7.0, 13.0), y=st.floats(-99.0, 99.0), turned=st.floats(-0.6, 0.6), speed=st.floats(-2.0, 20.0))
+def test_along_a_straight_lane_one_goes_on_as_the_lane_does(x: float, y: float, turned: float, speed: float) -> None:
+    """As wide as its body, turned as it is, and half of what it is beside the middle; its own place is covered."""
+    ((px, py, c, s, v, long, wide),) = expected(seen(x, y, math.pi / 2.0 + turned, speed), on=(0,))
+    assert (px, py) == pytest.approx(((x + 10.0) / 2.0, y))
+    assert (c, s, v, long) == (math.cos(math.pi / 2.0), 1.0, max(speed, 0.0), 2.5)
+    assert wide == pytest.approx(1.0 + abs(x - 10.0) / 2.0 + 2.5 * abs(math.sin(turned)))
+
+
+def test_who_is_on_no_such_lane_goes_straight_on_and_is_minded_up_to_40_m() -> None:
+    on_a_bend, across = seen(24.0, 32.0, 0.3, 7.0), seen(10.0, 20.0, 0.2, 7.0)
+    plain = [[x, y, math.cos(h), math.sin(h), v, 2.5, 1.0] for x, y, h, v, _, _ in (on_a_bend, across)]
+    assert expected(on_a_bend, across, on=(-1, 0)) == plain
+    far = seen(24.1, 32.0, 0.3, 7.0)
+    assert expected(far, across, on=(-1, 0)) == plain[1:]
+    assert expected(on=()) == []
+
+
+def test_somebody_follows_who_comes_from_behind_in_the_same_stream() -> None:
+    here = state(50.0, 0.0, 0.1, 8.0)
+    behind, ahead, beside = (other(x, y, 0.0, 8.0) for x, y in ((30.0, 1.0), (70.0, 0.0), (30.0, 2.0)))
+    crossing = other(50.0, -20.0, math.pi / 2.0, 8.0)
+    assert foresight.followed(here, many(behind))
+    assert foresight.followed(here, many(ahead, crossing, behind))
+    assert not foresight.followed(here, many(ahead, beside, crossing))
+    assert not foresight.followed(here, NOBODY)
 
 
 # Where somebody may be ------------------------------------------------------------------------------------------------

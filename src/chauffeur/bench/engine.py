@@ -197,6 +197,14 @@ def hand(future: asyncio.Future[Row], row: Row | None = None, error: Exception |
         future.set_result(row)
 
 
+def first_error(group: BaseExceptionGroup[BaseException]) -> BaseException:
+    """The error that stopped a run, out of the groups that its tasks wrapped it in."""
+    error: BaseException = group
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    return error
+
+
 class _Worker:
     """One process, started anew when it dies."""
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from chauffeur.concept import ChauffeurError, ConfigError
+from chauffeur.concept import ChauffeurError, ConfigError, DataError
 from chauffeur.drive.files import publish
 
 Row = dict[str, Any]
@@ -223,6 +223,41 @@ class Scribe:
         except ChauffeurError as error:
             self._error = error
             self._failed(error)
+
+
+def freeze(
+    path: Path, content: bytes, what: str = "run's configuration", same: Callable[[bytes], bool] | None = None
+) -> bool:
+    """Store what decides a run, or find that it is what is stored; whether it was stored only now.
+
+    Args:
+        path: In the run's folder.
+        content: What decides it.
+        what: That is, in words.
+        same: Whether what is stored decides the same; by default byte by byte.
+
+    Raises:
+        ConfigError: The folder holds another run.
+        DataError: What is stored cannot be read.
+    """
+    if not path.exists():
+        publish(path, content, what)
+        return True
+    try:
+        stored = path.read_bytes()
+    except OSError as error:
+        raise DataError(f"Cannot read {path}: {error.strerror or error}.") from error
+    if not (stored == content if same is None else same(stored)):
+        raise another_run(path.parent)
+    return False
+
+
+def another_run(folder: Path) -> ConfigError:
+    """A folder holds a run that something else decided."""
+    return ConfigError(
+        f"{folder} holds a run with another configuration.",
+        hint="Continue it with the options it was started with, or choose another --out folder.",
+    )
 
 
 @contextmanager

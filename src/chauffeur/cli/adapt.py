@@ -60,9 +60,9 @@ def onboard(
     from rich.text import Text
 
     from chauffeur.cli.console import stdout
-    from chauffeur.cli.parts import memory_named
     from chauffeur.cli.stages import stage_lines
     from chauffeur.concept import ConfigError, PersonId
+    from chauffeur.memory.choice import open_memory
     from chauffeur.models.onboard.adapting import AdaptRecipe
     from chauffeur.models.onboard.adapting import adapt as adapt_model
     from chauffeur.models.onboard.interactions import (
@@ -84,7 +84,7 @@ def onboard(
     for path in interactions or ():
         found += load_interactions(path)
     if person:
-        found += interactions_of(exported_items(memory_named().export(PersonId(person))))
+        found += interactions_of(exported_items(open_memory().export(PersonId(person))))
     recipe = AdaptRecipe(
         validation=validation or data / "seen.jsonl",
         replay=replay,

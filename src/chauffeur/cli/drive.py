@@ -61,7 +61,6 @@ def drive(
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.parts import (
         limits_named,
-        memory_named,
         not_kept,
         planner_named,
         referee_for,
@@ -73,6 +72,7 @@ def drive(
     from chauffeur.drive.auditing import told_to, with_head
     from chauffeur.drive.scenarios import find, suiting
     from chauffeur.drive.session import Forgetful, Session, parse_wish
+    from chauffeur.memory.choice import open_memory
     from chauffeur.memory.personal_limits import personal_limits
     from chauffeur.planners.talk2drive.recent import fitting
 
@@ -83,7 +83,7 @@ def drive(
     teller = Quiet(console) if quiet else Teller(console)
     session = Session(
         planner=planner_named(planner, base_url, teller.writing),
-        memory=fitting(memory_named(), planner) if instruction.person else Forgetful(),
+        memory=fitting(open_memory(), planner) if instruction.person else Forgetful(),
         sources=standing_sources(),
         referee=referee_for,
         tell=teller.tell,

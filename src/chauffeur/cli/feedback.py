@@ -24,16 +24,16 @@ def feedback(
     from rich.text import Text
 
     from chauffeur.cli.console import plain, stdout
-    from chauffeur.cli.parts import memory_named
     from chauffeur.concept import InstructionError, PersonId, ProfileError
     from chauffeur.hmi.words import feedback_words
+    from chauffeur.memory.choice import open_memory
     from chauffeur.memory.feedback import interpret_feedback
 
     said = " ".join(words.split())
     if not said:
         raise InstructionError("The feedback is empty.", hint='Say it in words, e.g. "a bit too fast".')
     meant = interpret_feedback(said)
-    if not memory_named().attach_feedback(PersonId(person), meant, trip):
+    if not open_memory().attach_feedback(PersonId(person), meant, trip):
         which = f"trip {trip}" if trip else "a trip"
         raise ProfileError(
             f"The profile of {person!r} holds no {which.removeprefix('a ')}.",

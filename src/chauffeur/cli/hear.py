@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chauffeur.cli.labels import NOT_HEARD
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -30,14 +32,6 @@ Examples:
 
 Exit codes: 0 a wish or an opinion was heard, 1 none was, 2 bad input.
 """
-
-
-_NOT = {
-    "no_hotword": "not for the car",
-    "not_understood": "not understood",
-    "nothing": "nothing",
-    "failed": "no answer",
-}
 
 
 def hear(
@@ -132,7 +126,7 @@ def _show(console: Console, heard: Heard) -> None:
     if heard.status == "heard":
         console.print(Text.assemble((f"{heard.hotword}: ", "bold"), plain(heard.text)))
     else:
-        console.print(Text.assemble((f"{_NOT[heard.status]}: ", "yellow"), plain(heard.reason)))
+        console.print(Text.assemble((f"{NOT_HEARD[heard.status]}: ", "yellow"), plain(heard.reason)))
     time = heard.timing
     rows: list[tuple[str, Text]] = [("engine", plain(heard.engine))]
     if heard.confidence is not None:

@@ -70,7 +70,7 @@ def live(
     from chauffeur.cli.lines import Lines, standard_input
     from chauffeur.cli.live_drive import STOP, LiveDrive, is_stop
     from chauffeur.cli.live_screen import LiveScreen, QuietScreen
-    from chauffeur.cli.parts import limits_named, memory_named, not_kept, planner_named
+    from chauffeur.cli.parts import limits_named, not_kept, planner_named
     from chauffeur.concept import PersonId, SandboxError
     from chauffeur.drive.live.books import Books, unanswered
     from chauffeur.drive.live.remembering import Remembering
@@ -80,7 +80,7 @@ def live(
     from chauffeur.drive.scenarios import find, suiting
     from chauffeur.drive.session import make_world, parse_wish
     from chauffeur.drive.surroundings import services_file
-    from chauffeur.memory.choice import chosen_memory
+    from chauffeur.memory.choice import chosen_memory, open_memory
     from chauffeur.memory.personal_limits import personal_limits
 
     who = PersonId(person.strip())
@@ -112,7 +112,7 @@ def live(
             screen.note(f"Without an answer since the last session: {wish.wish} “{wish.text}”")
         stack.enter_context(screen)
         screen.refresh(None, stopping=False)
-        memory = Remembering(memory_named(), start, dt_s) if who else None
+        memory = Remembering(open_memory(), start, dt_s) if who else None
         drive = LiveDrive(screen, books, memory, given, who, every)
         lines = stack.enter_context(Lines(standard_input(), edited=console.is_terminal))
         try:
@@ -128,7 +128,7 @@ def live(
     closing = None if books is None else books.close()
     if audit is not None and closing is not None and not quiet:
         tell_closing(console, audit, closing)
-    if drive.interrupts:
+    if drive.interrupts.count:
         raise typer.Exit(STOPPED_WITH_CTRL_C)
     if not drive.well or (closing is not None and not closing.complete):
         raise typer.Exit(FAILED)

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import signal
 import time
-from concurrent.futures import Future
-from types import FrameType
 from typing import Final, get_args
 
+from chauffeur.cli.interrupts import Interrupts
 from chauffeur.cli.lines import Lines
 from chauffeur.cli.live_screen import QuietScreen, last_words
-from chauffeur.concept import Instruction, InstructionError, PersonId
+from chauffeur.concept import InstructionError, PersonId
 from chauffeur.drive.live.books import Books
 from chauffeur.drive.live.messages import Key, Report
 from chauffeur.drive.live.orders import Brief, Event
 from chauffeur.drive.live.remembering import Remembering
 from chauffeur.drive.live.supervisor import Interaction, Replaced, Runtime
-from chauffeur.drive.session import MAX_WISH_CHARACTERS, parse_wish
+from chauffeur.drive.talk.asking import OVER, Asking, Words
 
 STOP: Final = "stop"
 """The line that ends the drive."""
@@ -32,7 +30,6 @@ LOOK_EVERY_S: Final = 0.05
 
 _MOST_WAITING: Final = 64
 """Lines of a file that are read ahead."""
-_OVER: Final = "The drive was over before it came to this."
 _WELL: Final = ("ended", "stopped")
 _UNDRIVEN: Final = ("declined", "unplanned", "refused", "stale", "failed")
 
@@ -50,14 +47,13 @@ class LiveDrive:
         every_s: float | None,
     ) -> None:
         self._screen, self._books, self._memory = screen, books, memory
-        self._person, self._every_s = person, every_s
+        self._asking, self._every_s = Asking(person, books), every_s
         self._given = given
         self._typed: list[str] = []
-        self._keeping: tuple[Instruction, Future[bool]] | None = None
         self._at_s = self._asked_at_s = self._driven_at_s = 0.0
         self._stopping = False
         self._passed_over = 0
-        self.interrupts = 0
+        self.interrupts = Interrupts()
         self.well = False
 
     def tell(self, heard: Event | Report | Brief | Replaced) -> None:
@@ -78,21 +74,16 @@ class LiveDrive:
     def run(self, runtime: Runtime, lines: Lines) -> None:
         """Drive to the end."""
         self._screen.runtime = runtime
-        numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        heard = [number for number in numbers if signal.getsignal(number) != signal.SIG_IGN]  # nohup stays nohup
-        before = {number: signal.signal(number, self._interrupt) for number in heard}
         outcome = "aborted"
-        try:
-            while runtime.driving:
-                self._look(runtime, lines)
-            runtime.poll()
-            ended = runtime.report is not None and runtime.report.ended
-            outcome = runtime.report.outcome if ended and runtime.report is not None else "died"
-        except KeyboardInterrupt:
-            runtime.abort()
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
+        with self.interrupts:
+            try:
+                while runtime.driving:
+                    self._look(runtime, lines)
+                runtime.poll()
+                ended = runtime.report is not None and runtime.report.ended
+                outcome = runtime.report.outcome if ended and runtime.report is not None else "died"
+            except KeyboardInterrupt:
+                runtime.abort()
         runtime.stop()
         self._end(runtime, outcome)
 
@@ -105,16 +96,10 @@ class LiveDrive:
         runtime.poll()
         if not self._stopping and not runtime.taken_over:
             self._ask(runtime)
-        if self.interrupts and not self._stopping:
+        if self.interrupts.count and not self._stopping:
             self._stop(runtime)
         typing = lines.terminal and lines.open and not self._stopping
         self._screen.refresh(lines.typed if typing else None, self._stopping)
-
-    def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        del number, frame
-        self.interrupts += 1
-        if self.interrupts > 1:
-            raise KeyboardInterrupt
 
     def _stop(self, runtime: Runtime) -> None:
         self._stopping = True
@@ -151,23 +136,25 @@ class LiveDrive:
         return True
 
     def _ask(self, runtime: Runtime) -> None:
-        """Write the next wish down, and hand it on once it is on the disk."""
-        if self._keeping is not None:
-            instruction, kept = self._keeping
-            if not kept.done():
-                return
-            if not kept.result():
-                self._screen.note("The audit log could not be written in time; the wish is asked all the same.")
-            self._keeping = None
-            self._hand_on(runtime, instruction)
-        elif self._typed:
-            self._keep(runtime, self._typed.pop(0))
+        """Take up the next wish once the one before is handed on."""
+        if not self._asking.busy:
+            self._take_up(runtime)
+        asked, note = self._asking.look(runtime)
+        if note:
+            self._screen.note(note)
+        if asked is not None:
+            self._asked_at_s = self._at_s
+            self._screen.asked(asked[0], runtime.interactions[asked[0]].request.text)
+
+    def _take_up(self, runtime: Runtime) -> None:
+        if self._typed:
+            self._put(self._typed.pop(0))
         elif self._given and self._in_turn(runtime):
             line = self._given.pop(0)
             if is_stop(line):
                 self._stop(runtime)
             else:
-                self._keep(runtime, line)
+                self._put(line)
 
     def _in_turn(self, runtime: Runtime) -> bool:
         if not runtime.interactions:
@@ -179,41 +166,19 @@ class LiveDrive:
             return self._at_s - self._driven_at_s >= DRIVEN_FOR_S
         return last.stage == "closed"
 
-    def _keep(self, runtime: Runtime, line: str) -> None:
+    def _put(self, line: str) -> None:
         try:
-            instruction = parse_wish(line, self._person)
+            self._asking.put(Words(line))
         except InstructionError as error:
             self._screen.note(str(error))
-            self._pass_over(line, "refused", str(error))
-            return
-        if self._books is None:
-            self._hand_on(runtime, instruction)
-        else:
-            self._books.wish(runtime.next_wish, instruction)
-            self._keeping = instruction, self._books.kept()
-
-    def _hand_on(self, runtime: Runtime, instruction: Instruction) -> None:
-        self._asked_at_s = self._at_s
-        self._screen.asked(runtime.next_wish, instruction.text)
-        runtime.ask(instruction.text, instruction.person)
-
-    def _pass_over(self, line: str, kind: str, why: str) -> None:
-        """A wish that is not handed on stands in the books all the same."""
-        self._passed_over += 1
-        if self._books is not None:
-            self._books.wish("", Instruction(line[:MAX_WISH_CHARACTERS], self._person))
-            self._books.answer("", kind, why)
+            self._passed_over += 1
 
     def _end(self, runtime: Runtime, outcome: str) -> None:
-        unasked: list[str] = []
-        if self._keeping is not None:
-            unasked.append(self._keeping[0].text)
-            if self._books is not None:
-                self._books.answer(runtime.next_wish, "not_asked", _OVER)
+        unasked = list(self._asking.give_up(runtime))
         for line in (*self._typed, *self._given):
             if not is_stop(line):
                 unasked.append(line.strip())
-                self._pass_over(line, "not_asked", _OVER)
+                self._asking.pass_over(line, "not_asked", OVER)
         figures = runtime.figures()
         if self._books is not None:
             self._books.end(outcome, figures, runtime.lost_reports)

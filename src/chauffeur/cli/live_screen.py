@@ -14,9 +14,10 @@ from rich.live import Live
 from rich.text import Text
 
 from chauffeur.cli.console import columns, plain
+from chauffeur.cli.labels import EVENTS, RUNGS
 from chauffeur.concept import Intervention, LaneId, Scenario
 from chauffeur.drive.live.messages import Report, Rung
-from chauffeur.drive.live.orders import Brief, Event, EventKind
+from chauffeur.drive.live.orders import Brief, Event
 from chauffeur.drive.live.supervisor import Interaction, Replaced, Runtime
 from chauffeur.hmi import words
 
@@ -29,38 +30,11 @@ _MOST_TYPED: Final = 2
 _MOST_IN_SUMMARY: Final = 200
 """Characters of a wish that the summary repeats."""
 
-_RUNGS: Final[dict[Rung, str]] = {
-    "follow": "follows the plan",
-    "hold": "holds the last wish",
-    "keep": "keeps lane and distance",
-    "slow": "slows down",
-    "stop": "stops",
-    "hand": "you drive",
-}
-"""The ladder of fallbacks in words."""
-
 _SCHEDULING: Final = {
     "fifo": "Real time (fifo): no ordinary program takes its core",
     "nice": "Favoured (nice): other programs get less of its core, but some",
     "default": "As any other program (default): no more was asked for, or allowed",
 }
-
-_EVENTS: Final[dict[EventKind, tuple[str, str]]] = {
-    "planned": ("thinks", "cyan"),
-    "declined": ("declined", "bold yellow"),
-    "unplanned": ("no plan", "bold yellow"),
-    "superseded": ("superseded", "dim"),
-    "started": ("drives", "green"),
-    "refused": ("refused", "bold red"),
-    "stale": ("too late", "bold yellow"),
-    "finished": ("done", "bold green"),
-    "failed": ("failed", "bold red"),
-    "interrupted": ("broken off", "yellow"),
-    "resumed": ("goes on", "yellow"),
-    "said": ("says", "magenta"),
-    "garbage": ("garbage", "red"),
-}
-"""Label and style of what becomes of a wish."""
 
 _OUTCOMES: Final = {
     "ended": ("Drive ended", "bold"),
@@ -210,7 +184,7 @@ class LiveScreen(QuietScreen):
         if self.clipped:
             count = ", ".join(f"{name} {times}" for name, times in self.clipped.most_common())
             yield "limits", f"Wishes held within the limits, in control periods: {count}."
-        lower = [f"{_RUNGS[rung]}: {_periods(count)}" for rung, count in self.rungs.items() if rung != "follow"]
+        lower = [f"{RUNGS[rung]}: {_periods(count)}" for rung, count in self.rungs.items() if rung != "follow"]
         if lower:
             yield "ladder", "; ".join(lower) + "."
         if figures is not None:
@@ -243,7 +217,7 @@ class LiveScreen(QuietScreen):
             if turn > 1:
                 self._line(event.wish, "asked", "cyan", Text(f"once more ({turn - 1})", "dim"))
             return
-        label, style = _EVENTS[event.kind]
+        label, style = EVENTS[event.kind]
         text = plain(event.text)
         match event.kind:
             case "started":
@@ -327,7 +301,7 @@ def _line_of(report: Report, dt_s: float, stopping: bool) -> Text:
     if stopping:
         parts.append(Text("coming to a stand", "bold yellow"))
     elif report.rung != "follow":
-        parts.append(Text(_RUNGS[report.rung], "bold yellow"))
+        parts.append(Text(RUNGS[report.rung], "bold yellow"))
     if report.plan:
         line = "" if report.line is None or report.state != "running" else f", line {report.line}"
         parts.append(Text(f"{report.plan} {report.state}{line}"))
@@ -350,7 +324,7 @@ def _answered(interaction: Interaction) -> Text:
     answer = interaction.answer
     if answer is None:
         return wish.append("no answer", "bold red")
-    label, style = _EVENTS[answer.kind]
+    label, style = EVENTS[answer.kind]
     driven = any(event.kind == "started" for event in interaction.events)
     why = answer.text
     if answer.kind == "interrupted":

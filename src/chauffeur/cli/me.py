@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from chauffeur.memory.base import Memory
     from chauffeur.memory.privacy import Privacy
 
 me_app = typer.Typer(
@@ -43,12 +42,6 @@ def me() -> None:
     """What is remembered of you."""
 
 
-def _memory() -> Memory:
-    from chauffeur.cli.parts import memory_named
-
-    return memory_named()
-
-
 @me_app.command()
 def show(person: Person, most: Annotated[int, typer.Option(min=1, help="Trips at most, newest first.")] = 20) -> None:
     """Show what is remembered, the settings, and your limits."""
@@ -60,12 +53,13 @@ def show(person: Person, most: Annotated[int, typer.Option(min=1, help="Trips at
     from chauffeur.cli.console import path_text, plain, stdout
     from chauffeur.concept import Limits, PersonId
     from chauffeur.concept.units import kmh
+    from chauffeur.memory.choice import open_memory
     from chauffeur.memory.files import data_home
     from chauffeur.memory.personal_limits import LIMITS_FILE, personal_limits
     from chauffeur.memory.privacy import read_privacy
 
     console, privacy = stdout(), read_privacy()
-    trips = json.loads(_memory().export(PersonId(person)))["trips"]
+    trips = json.loads(open_memory().export(PersonId(person)))["trips"]
     if trips:
         table = Table("when", "wish", "what came of it", "what you said", box=None, pad_edge=False)
         for trip in trips[::-1][:most]:
@@ -92,9 +86,10 @@ def export(person: Person, out: Annotated[Path | None, typer.Option(help="File; 
     """Take everything that is kept with you, as JSON."""
     from chauffeur.cli.console import path_text, stdout
     from chauffeur.concept import PersonId
+    from chauffeur.memory.choice import open_memory
     from chauffeur.memory.files import publish
 
-    document = _memory().export(PersonId(person))
+    document = open_memory().export(PersonId(person))
     if out is None:
         stdout().print(document, markup=False, highlight=False, soft_wrap=True)
         return
@@ -109,8 +104,9 @@ def forget_last(person: Person) -> None:
 
     from chauffeur.cli.console import plain, stdout
     from chauffeur.concept import PersonId
+    from chauffeur.memory.choice import open_memory
 
-    item = _memory().forget_last(PersonId(person))
+    item = open_memory().forget_last(PersonId(person))
     if item is None:
         stdout().print(Text.assemble("Nothing is remembered of ", plain(person), "."))
         return
@@ -124,10 +120,11 @@ def erase(person: Person, yes: Annotated[bool, typer.Option("--yes", help="Do no
 
     from chauffeur.cli.console import plain, stdout
     from chauffeur.concept import PersonId
+    from chauffeur.memory.choice import open_memory
 
     if not yes:
         typer.confirm(f"Erase everything that is remembered of {person}? It cannot be undone", abort=True)
-    gone = _memory().erase(PersonId(person))
+    gone = open_memory().erase(PersonId(person))
     words = (
         ("Erased: the profile of ", plain(person), ".") if gone else ("There was no profile of ", plain(person), ".")
     )
@@ -143,12 +140,13 @@ def retention(
 
     from chauffeur.cli.console import stdout
     from chauffeur.concept import ConfigError
+    from chauffeur.memory.choice import open_memory
     from chauffeur.memory.privacy import write_privacy
 
     if days != "forever" and not days.isdecimal():
         raise ConfigError(f"{days!r} is no number of days.", hint="Write for example: chauffeur me retention 90")
     write_privacy(replace(_settings(), retention_days=None if days == "forever" else int(days)))
-    swept = _memory().sweep()
+    swept = open_memory().sweep()
     kept = "until they are erased" if days == "forever" else f"for {int(days)} days"
     stdout().print(f"Trips are kept {kept}. {swept} older ones were deleted.")
 

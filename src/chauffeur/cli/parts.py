@@ -1,4 +1,4 @@
-"""The exchangeable parts a command line can name: planner, memory, limits, referee."""
+"""The exchangeable parts a command line can name: planner, limits, referee."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, Parameters, 
 if TYPE_CHECKING:
     from chauffeur.describe.services.sources import SourceSettings
     from chauffeur.drive.episode import Referee
-    from chauffeur.memory.base import Memory
     from chauffeur.planners.base import Planner
     from chauffeur.planners.prompts import Setting
     from chauffeur.worlds.base import World
@@ -74,13 +73,6 @@ def not_kept(person: str) -> str:
     if not person or read_privacy().keeps:
         return ""
     return f"Privacy mode: nothing of this drive is kept in the profile of {person}."
-
-
-def memory_named(name: str | None = None) -> Memory:
-    """A memory by name; the one of this installation if left out."""
-    from chauffeur.memory.choice import open_memory
-
-    return open_memory(name)
 
 
 def standing_sources() -> SourceSettings | None:

@@ -76,6 +76,7 @@ def talk(
     from chauffeur.drive.talk.session import WELL, Talk
     from chauffeur.drive.talk.sound import Sound
     from chauffeur.drive.talk.voice import Voice
+    from chauffeur.memory.choice import chosen_memory, open_memory
     from chauffeur.memory.personal_limits import personal_limits
 
     who = PersonId(person.strip())
@@ -87,8 +88,10 @@ def talk(
         starts=tuple(Start(place, first + number, bounds, duration) for number in range(trips)),
         planner=planner,
         base_url=base_url,
-        memory="vault" if who else "",
+        memory=chosen_memory() if who else "",
     )
+    if who:
+        open_memory()  # one that cannot be had is refused here
     ear = _engine_named(engine, wanted=microphone or page)
     console = stdout()
     screen = TalkScreen(console)

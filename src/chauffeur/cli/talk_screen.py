@@ -16,6 +16,7 @@ from rich.syntax import Syntax
 from rich.text import Text
 
 from chauffeur.cli.console import columns, plain
+from chauffeur.cli.labels import EVENTS, NOT_HEARD, RUNGS
 from chauffeur.cli.talk_typed import HELP
 from chauffeur.drive.talk.messages import (
     Answered,
@@ -41,29 +42,8 @@ _MOST_TYPED: Final = 2
 _MOST_SOURCE: Final = 14
 """Lines of a program that are shown; the page shows all of it."""
 
-_RUNGS: Final = {
-    "hold": "holds the last wish",
-    "keep": "keeps lane and distance",
-    "slow": "slows down",
-    "stop": "stops",
-    "hand": "you have the wheel",
-}
-_OUTCOMES: Final = {
-    "declined": ("declined", "bold yellow"),
-    "unplanned": ("no plan", "bold yellow"),
-    "superseded": ("gave way", "dim"),
-    "refused": ("refused", "bold red"),
-    "stale": ("too late", "bold yellow"),
-    "finished": ("done", "bold green"),
-    "failed": ("failed", "bold red"),
-    "interrupted": ("broken off", "yellow"),
-}
-_NOT_HEARD: Final = {
-    "no_hotword": "not for the car",
-    "not_understood": "not understood",
-    "nothing": "nothing",
-    "failed": "no answer",
-}
+_RUNGS: Final[dict[str, str]] = {**RUNGS, "hand": "you have the wheel"}
+_OUTCOMES: Final[dict[str, tuple[str, str]]] = {**EVENTS, "superseded": ("gave way", "dim")}
 _LISTENING: Final = {
     "off": ("not listening", "dim"),
     "idle": ("listening", "green"),
@@ -187,7 +167,7 @@ class TalkScreen:
 
     def _heard(self, heard: HeardWords) -> None:
         if heard.status != "heard":
-            self._line("", _NOT_HEARD.get(heard.status, heard.status), "yellow", plain(heard.reason))
+            self._line("", NOT_HEARD.get(heard.status, heard.status), "yellow", plain(heard.reason))
             return
         sure = "" if heard.confidence is None else f", {heard.confidence:.0%} sure"
         after = Text(f"  ({heard.after_speech_s:.2f} s after you spoke{sure})", "dim")
@@ -250,6 +230,10 @@ class TalkScreen:
         before, self._memory = self._memory, state
         if state.private and before is None:
             self._line("", "private", "bold yellow", Text("Nothing new is kept."))
+        if not state.encrypted and before is None:
+            self._line(
+                "", "memory", "yellow", plain(f"Kept in the memory “{state.memory}”; the car does not encrypt it.")
+            )
         if self._show_memory:
             self._show_memory = False
             kept = "until erased" if state.retention_days is None else f"for {state.retention_days:g} days"
@@ -339,7 +323,7 @@ def _line_of(scene: Scene) -> Text:
     ]
     if scene.lane is not None:
         parts.append(Text(f"lane {scene.lane[2] + 1} from left"))
-    if scene.rung in _RUNGS:
+    if scene.rung != "follow":
         parts.append(Text(_RUNGS[scene.rung], "bold yellow"))
     parts.append(Text(f"{scene.wish}{f', line {scene.line}' if scene.line else ''}" if scene.wish else "no plan"))
     return Text("   ").join(parts)

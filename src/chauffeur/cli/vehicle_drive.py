@@ -9,11 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator
-
     from rich.console import Console
 
-    from chauffeur.describe.services.sources import Sources
     from chauffeur.drive.onroad import Answer, Event, OnRoad, RoadBooks
     from chauffeur.worlds.ros.settings import VehicleSettings
 
@@ -66,11 +63,12 @@ def drive(
     from chauffeur.cli.audit import tell_closing
     from chauffeur.cli.console import plain, stdout
     from chauffeur.cli.failures import FAILED
-    from chauffeur.cli.parts import memory_named, not_kept, planner_named
+    from chauffeur.cli.parts import not_kept, planner_named
     from chauffeur.concept import PersonId
-    from chauffeur.describe.services.sources import Sources as PlaceSources
     from chauffeur.describe.services.sources import read_sources
     from chauffeur.drive.onroad import OnRoad
+    from chauffeur.drive.surroundings import opened
+    from chauffeur.memory.choice import open_memory
     from chauffeur.planners.talk2drive.recent import fitting
     from chauffeur.worlds.ros.opening import open_vehicle
     from chauffeur.worlds.ros.settings import read_settings
@@ -93,13 +91,13 @@ def drive(
         async def session() -> None:
             _end_on_signals()
             async with (
-                _opened(None if sources is None else PlaceSources(sources)) as place,
+                opened(sources) as place,
                 OnRoad(
                     car,
                     settings,
                     mind,
                     person=who,
-                    memory=fitting(memory_named(), planner) if who else None,
+                    memory=fitting(open_memory(), planner) if who else None,
                     sources=place,
                     books=books,
                     tell=screen.tell,
@@ -158,15 +156,6 @@ def _end_on_signals() -> None:
         if signal.getsignal(number) != signal.SIG_IGN:
             with contextlib.suppress(ValueError, RuntimeError, NotImplementedError):  # not in the main thread
                 asyncio.get_running_loop().add_signal_handler(number, task.cancel)
-
-
-@contextlib.asynccontextmanager
-async def _opened(sources: Sources | None) -> AsyncGenerator[Sources | None]:
-    if sources is None:
-        yield None
-        return
-    async with sources:
-        yield sources
 
 
 async def _take(road: OnRoad, screen: _Screen, line: str) -> None:

@@ -20,7 +20,7 @@ def load_plugin(group: str, name: str) -> Any:
     Raises:
         ConfigError: No such name (with the nearest one), or the plug-in cannot be imported.
     """
-    kind = group.rsplit(".", 1)[-1].removesuffix("s").replace("memorie", "memory")
+    kind = _singular(group.rsplit(".", 1)[-1])
     found = [point for point in entry_points(group=group) if point.name == name]
     if not found:
         known = plugin_names(group)
@@ -31,3 +31,7 @@ def load_plugin(group: str, name: str) -> Any:
         return found[0].load()
     except (ImportError, AttributeError) as error:
         raise ConfigError(f"The {kind} {name!r} cannot be loaded: {error}.", hint="Run: chauffeur doctor") from error
+
+
+def _singular(plural: str) -> str:
+    return f"{plural[:-3]}y" if plural.endswith("ies") else plural.removesuffix("s")

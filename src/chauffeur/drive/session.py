@@ -34,14 +34,13 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.concept.registry import load_plugin
-from chauffeur.describe import describe
-from chauffeur.describe.services.sources import Sources, SourceSettings
+from chauffeur.describe.services.sources import SourceSettings
 from chauffeur.drive.effects import effect_of
 from chauffeur.drive.episode import Episode, Referee, run_episode
 from chauffeur.drive.loop import Memory, Stages, drive
 from chauffeur.drive.parameters import drive_parameters, shield_for
 from chauffeur.drive.recording import RecordedTrip
-from chauffeur.drive.surroundings import describing
+from chauffeur.drive.surroundings import describing, opened
 from chauffeur.memory.tolerant import TolerantMemory
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
@@ -158,9 +157,7 @@ class Session:
         )
 
     async def _describing(self) -> Callable[[Snapshot], Context]:
-        if self.sources is None:
-            return describe
-        async with Sources(self.sources) as sources:
+        async with opened(self.sources) as sources:
             return await describing(sources)
 
     def _build_system(self, limits: Limits) -> SystemMessage:

@@ -5,14 +5,15 @@ The file is `services.toml` in the data folder (docs/services.md). Without it no
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import AsyncGenerator, Callable
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Final
 
 from chauffeur.concept import Context, Snapshot
 from chauffeur.describe import describe
 from chauffeur.describe.services.sourced import FOR_SIMULATED, with_sources
-from chauffeur.describe.services.sources import Sources
+from chauffeur.describe.services.sources import Sources, SourceSettings
 from chauffeur.memory.files import data_home
 
 SERVICES_FILE: Final = "services.toml"
@@ -24,7 +25,22 @@ def services_file() -> Path | None:
     return path if path.is_file() else None
 
 
-async def describing(sources: Sources) -> Callable[[Snapshot], Context]:
-    """How C is made with what the sources know by now; bounded in time, and never an error of theirs."""
+@asynccontextmanager
+async def opened(where: SourceSettings | None) -> AsyncGenerator[Sources | None]:
+    """The sources of some settings, while they are used; None where there are none."""
+    if where is None:
+        yield None
+        return
+    async with Sources(where) as sources:
+        yield sources
+
+
+async def describing(sources: Sources | None) -> Callable[[Snapshot], Context]:
+    """How C is made with what the sources know by now; bounded in time, and never an error of theirs.
+
+    Without sources, of what is seen alone.
+    """
+    if sources is None:
+        return describe
     found = await sources.look()
     return lambda snapshot: with_sources(describe(snapshot), found, sources.place_words(), FOR_SIMULATED)

@@ -35,7 +35,7 @@ class Memory(Protocol):
         ...
 
     def export(self, person: PersonId) -> str:
-        """Everything kept of a person, as one JSON document."""
+        """Everything kept of a person, as one JSON document; its `trips` are in order, the oldest first."""
         ...
 
     def forget_last(self, person: PersonId) -> HistoryItem | None:

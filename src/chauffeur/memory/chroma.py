@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
@@ -66,7 +66,13 @@ def _utc_now() -> datetime:
 
 
 class ChromaMemory:
-    """Memory in Chroma's files on this machine, not encrypted; safe for several processes, one after another."""
+    """Memory in Chroma's files on this machine, not encrypted; safe for several processes, one after another.
+
+    Attributes:
+        encrypts: As for `VaultMemory`.
+    """
+
+    encrypts: ClassVar = False
 
     def __init__(
         self, home: Path | None = None, *, privacy: Privacy | None = None, clock: Callable[[], datetime] = _utc_now
@@ -96,8 +102,7 @@ class ChromaMemory:
     def recall(self, person: PersonId, instruction: Instruction, context: Context, k: int) -> History:
         """As `Memory.recall`, among the wishes that Chroma finds nearest."""
         now, wish, place = self._clock(), mark(instruction.text), context.situation
-        retention = self._privacy.retention
-        since = None if retention is None else now - retention
+        since = self._privacy.since(now)
         with self._reading(person) as store:
             if store is None or k <= 0:
                 return History()
@@ -205,8 +210,8 @@ class ChromaMemory:
             return True
 
     def _keep_from(self) -> str:
-        retention = self._privacy.retention
-        return "" if retention is None else _stamp(self._clock() - retention)
+        since = self._privacy.since(self._clock())
+        return "" if since is None else _stamp(since)
 
     def _leave_older(self, person: PersonId, folder: Path) -> int:
         """Write a profile anew without the trips that are older than the retention; how many there were."""

@@ -14,13 +14,18 @@ from chauffeur.memory.words import even
 
 _MILD, _PLAIN, _STRONG = 0.35, 0.6, 1.0
 _MILD_WORDS = re.compile(
-    r"\b(?:(?:a|the) (?:tiny |little |wee |small )?(?:bit|little|touch|tad|smidge|hair|notch)|slightly|somewhat"
+    r"\b(?:(?:a|the) (?:tiny |little |wee |small )?(?:bit|little|touch|tad|smidge|hair|notch|shade)|slightly|somewhat"
     r"|little bit|kind of|kinda|sort of|marginally|just a)\b"
 )
 _STRONG_WORDS = re.compile(
     r"\b(?:way|far(?= too)|(?<!too )(?<!not )much|a lot|lots|really|very|extremely|super|terribly|awfully|incredibly"
     r"|significantly|considerably|drastically|dangerously)\b"
 )
+_OF_A_PART = re.compile(
+    r"\b(?:speed|pace|gap|distance|brak\w+|steering|lanes?|turns?|corners?|curves?|bends?|acceleration|start|rest|other"
+    r"|otherwise|apart|aside)\b"
+)
+"""Who praises one thing, or all but one, has not praised that one."""
 _FULL = {"speed": 5.5, "distance": 20.0, "time": 1.5}
 """A change of this much is as strong as "much": about 20 km/h, four car lengths, or one and a half seconds."""
 
@@ -35,13 +40,20 @@ def interpret_feedback(text: str) -> Feedback:
 
     Returns:
         Signs as in `Feedback`: "too fast" and "slower, please" are both speed -1. Contradictory remarks on one topic
-        cancel out. A plain complaint counts as dislike; a mild one, or a request, does not.
+        cancel out. A plain complaint counts as dislike; a mild one, or a request, does not. What comes after a "but"
+        decides: "fine, but a bit slow" complains, "a bit slow, but fine" does not.
     """
     wants = read_wants(text)
-    praised = any(want.topic == "approval" and want.sign > 0 for want in wants)
-    blamed = any(want.topic == "approval" and want.sign < 0 for want in wants)
-    wants = tuple(want for want in wants if not (want.manner == "remark" and praised))
-    about = [want for want in wants if want.topic != "approval"]
+    opinions = [want for want in wants if want.topic == "approval"]
+    deciding = _deciding(opinions)
+    praised = any(want.sign > 0 for want in deciding)
+    blamed = any(want.sign < 0 for want in deciding)
+    about = [
+        want
+        for want in wants
+        if want.topic != "approval"
+        and not (want.manner in ("remark", "aside") and any(_covers(other, want) for other in wants))
+    ]
     signs: dict[Topic, Literal[-1, 0, 1]] = {
         topic: _sign(want.sign for want in about if want.topic == topic) for topic in TOPICS
     }
@@ -57,6 +69,24 @@ def interpret_feedback(text: str) -> Feedback:
     if approval < 0 and not telling:
         strength = _PLAIN
     return Feedback(text, signs["speed"], signs["gap"], signs["comfort"], approval, strength)
+
+
+def _deciding(opinions: list[Want]) -> list[Want]:
+    """Of opinions, those after the last turn; praise of a part takes nothing back."""
+    last = max((want.turn for want in opinions), default=0)
+    said = [want for want in opinions if want.turn == last]
+    praise = {want.clause for want in said if want.sign > 0}
+    return opinions if any(_OF_A_PART.search(clause) for clause in praise) else said
+
+
+def _covers(other: Want, remark: Want) -> bool:
+    """Whether something else that is said makes a remark no complaint: a request for the opposite ("slower, really
+    slow"), or praise, if said with it, or after it and of the whole."""
+    if other.topic != "approval":
+        return other.topic == remark.topic and other.sign != remark.sign and other.manner in ("request", "plea")
+    if other.sign < 0 or other.turn < remark.turn:
+        return False
+    return other.turn == remark.turn or _OF_A_PART.search(other.clause) is None
 
 
 def _sign(signs: Iterable[int]) -> Literal[-1, 0, 1]:

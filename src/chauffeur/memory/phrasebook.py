@@ -10,12 +10,13 @@ from __future__ import annotations
 from typing import Literal
 
 Topic = Literal["speed", "gap", "comfort", "approval"]
-Manner = Literal["complaint", "request", "remark", "opinion", "fixed", "plea", "nothing"]
+Manner = Literal["complaint", "request", "remark", "aside", "opinion", "fixed", "plea", "nothing"]
 """How a phrase takes a negation, and what it weighs.
 
 complaint: "not too fast" is none, but "do not drive too fast" asks for less.
 request: "do not go faster" asks for the opposite.
-remark: "really fast" is a complaint only if the drive was not praised.
+remark: "really fast" is a complaint unless the drive is praised with it.
+aside: "you were slow" is a complaint only after a turn: "fine, but you were slow".
 opinion: "not good" is the opposite.
 fixed: a complaint or opinion with the negation inside: "not fast enough".
 plea: a request with the negation inside: "not so fast".
@@ -28,9 +29,13 @@ _CLOSE = r"(?:close(?:ly)?|near|tight)"
 _GAP = r"(?:gap|distance|space|room|headway|clearance)"
 _SO = r"(?:so|that|this|as|quite so)"
 _VERY = (
-    r"(?:so|this|that|very|really|pretty|quite|rather|awfully|uncomfortably|dangerously|a bit|a little|little bit|bit)"
+    r"(?:so|this|that|very|really|pretty|quite|rather|awfully|uncomfortably|dangerously|slightly|somewhat|kind of|kinda"
+    r"|sort of|(?:a |the )?(?:wee |tiny |little )?(?:bit|touch|tad|smidge|hair|notch|shade)|a little)"
 )
 _WAS = r"(?:was|were|is|are|felt|seemed)"
+_ASIDE = rf"^(?:it|that|this|you|we|i|(?:the|this|that) (?:ride|drive|trip)) (?:{_WAS}|drove|went|got)"
+_SO_FAR = r"(?= (?:for|on|in|at|to|when|before|after|there|here|today|again|sometimes)\b|$)"
+_FOR_WHOM = r"(?= for\b|$)"
 _MID = r"(?:[\w']+ ){0,3}"
 _ROUGH = (
     r"(?:harsh(?:ly)?|hard|rough(?:ly)?|jerky|abrupt(?:ly)?|sudden(?:ly)?|aggressive(?:ly)?|sharp(?:ly)?|sporty|wild)"
@@ -135,6 +140,7 @@ PHRASE_BOOK: tuple[tuple[Topic, Literal[-1, 1], Manner, tuple[str, ...]], ...] =
         ),
     ),
     ("gap", -1, "remark", (rf"{_VERY} {_CLOSE}",)),
+    ("gap", -1, "aside", (rf"{_ASIDE} {_CLOSE}{_SO_FAR}", rf"^{_CLOSE}{_FOR_WHOM}")),
     (
         "speed",
         -1,
@@ -201,6 +207,8 @@ PHRASE_BOOK: tuple[tuple[Topic, Literal[-1, 1], Manner, tuple[str, ...]], ...] =
     ),
     ("speed", -1, "remark", (rf"{_VERY} {_FAST}",)),
     ("speed", 1, "remark", (rf"{_VERY} {_SLOW}",)),
+    ("speed", -1, "aside", (rf"{_ASIDE} {_FAST}{_SO_FAR}", rf"^{_FAST}{_FOR_WHOM}")),
+    ("speed", 1, "aside", (rf"{_ASIDE} {_SLOW}{_SO_FAR}", rf"^{_SLOW}{_FOR_WHOM}")),
     (
         "comfort",
         -1,

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from chauffeur.memory.phrasebook import PHRASE_BOOK, Manner, Topic
-from chauffeur.memory.words import clauses, even
+from chauffeur.memory.words import even, turned
 
 _PATTERNS: tuple[tuple[re.Pattern[str], Topic, Literal[-1, 1], Manner], ...] = tuple(
     (re.compile(rf"\b(?:{'|'.join(phrases)})\b"), topic, sign, manner) for topic, sign, manner, phrases in PHRASE_BOOK
@@ -28,24 +28,26 @@ class Want:
         sign: Direction, as in `Feedback`.
         manner: How it was said; a negated complaint that orders something is a `request`.
         clause: The words it was said in.
+        turn: How many turns ("X, but Y") its sentence had taken before it.
     """
 
     topic: Topic
     sign: Literal[-1, 1]
     manner: Manner
     clause: str
+    turn: int = 0
 
 
 def read_wants(text: str) -> tuple[Want, ...]:
     """Everything a text says about speed, gap, comfort and approval, in the order it is said."""
     found: list[Want] = []
-    for clause in clauses(even(text)):
+    for clause, turn in turned(even(text)):
         left = clause
         here: list[tuple[int, Want]] = []
         for pattern, topic, sign, manner in _PATTERNS:
             while (match := pattern.search(left)) is not None:
                 left = left[: match.start()] + "#" * (match.end() - match.start()) + left[match.end() :]
-                want = _negate(Want(topic, sign, manner, clause), clause[: match.start()])
+                want = _negate(Want(topic, sign, manner, clause, turn), clause[: match.start()])
                 if want is not None:
                     here.append((match.start(), want))
         found += [want for _, want in sorted(here, key=lambda item: item[0])]
@@ -53,11 +55,11 @@ def read_wants(text: str) -> tuple[Want, ...]:
 
 
 def _negate(want: Want, before: str) -> Want | None:
-    if want.manner == "nothing":
+    if want.manner == "nothing" or (want.manner == "aside" and not want.turn):
         return None
     if want.manner in ("fixed", "plea") or _NEGATED.search(before) is None:
         return want
-    if want.manner in ("complaint", "remark"):
+    if want.manner in ("complaint", "remark", "aside"):
         ordered = "please" in want.clause or _ORDERED.search(before) is not None
-        return Want(want.topic, want.sign, "request", want.clause) if ordered else None
-    return Want(want.topic, 1 if want.sign < 0 else -1, want.manner, want.clause)
+        return replace(want, manner="request") if ordered else None
+    return replace(want, sign=1 if want.sign < 0 else -1)

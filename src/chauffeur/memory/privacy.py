@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Final
 
@@ -28,10 +28,9 @@ class Privacy:
     retention_days: int | None = RETENTION_DAYS
     keeps: bool = True
 
-    @property
-    def retention(self) -> timedelta | None:
-        """As a time span."""
-        return None if self.retention_days is None else timedelta(days=self.retention_days)
+    def since(self, now: datetime) -> datetime | None:
+        """From when on trips count; None where all do."""
+        return None if self.retention_days is None else now - timedelta(days=self.retention_days)
 
 
 def read_privacy(home: Path | None = None) -> Privacy:

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import ClassVar, Final
 
 from chauffeur.concept import (
     NOBODY,
@@ -74,7 +74,12 @@ class VaultMemory:
 
     Files stay open from one piece of work to the next, and each piece of work begins with a look at them: another
     process may write to a profile, replace it or erase it at any time.
+
+    Attributes:
+        encrypts: What is kept cannot be read without its key.
     """
+
+    encrypts: ClassVar = True
 
     def __init__(
         self,
@@ -116,7 +121,7 @@ class VaultMemory:
         with self._reading(person) as profile:
             if profile is None:
                 return History()
-            wish, place, since = mark(instruction.text), context.situation, self._since(now)
+            wish, place, since = mark(instruction.text), context.situation, self._privacy.since(now)
             with profile.reading() as columns:
                 return History(
                     profile.items(nearest(columns, wish, place.world, weather_of(place), now, k, since=since))
@@ -128,7 +133,7 @@ class VaultMemory:
             if profile is None:
                 return History()
             with profile.reading() as columns:
-                rows = latest(columns, world, k, since=self._since(self._clock()))
+                rows = latest(columns, world, k, since=self._privacy.since(self._clock()))
                 return History(profile.items([(row, UNCOMPARED) for row in rows]))
 
     def remember(self, trip: Trip, feedback: Feedback | None = None) -> None:
@@ -202,14 +207,9 @@ class VaultMemory:
     def _lock(self) -> Path:
         return self._profiles / "lock"
 
-    def _since(self, now: datetime) -> datetime | None:
-        """From when on trips count; None if all do."""
-        retention = self._privacy.retention
-        return None if retention is None else now - retention
-
     def _keep_from(self) -> str:
-        retention = self._privacy.retention
-        return "" if retention is None else _stamp(self._clock() - retention)
+        since = self._privacy.since(self._clock())
+        return "" if since is None else _stamp(since)
 
     def _ensure(self, person: PersonId) -> None:
         """Make the profile unless it is there. Key first: a profile without one is never on disk."""

@@ -18,9 +18,10 @@ _EVEN: tuple[tuple[re.Pattern[str], str], ...] = (
     (re.compile(r"\bgonna\b"), "going to"),
     (re.compile(r"\s+"), " "),
 )
-_BREAK = re.compile(
-    r"[!?;:\n\u2014]|[.,](?!\d)| - |\b(?:but|however|although|though|yet|except|and then|and|then|because)\b"
-)
+_TURNS = frozenset({"but", "however", "although", "even though", "though", "yet", "except"})
+"""Words after which something else is said than before."""
+_ENDS = frozenset("!?;.\n")
+_BREAK = re.compile(rf"([!?;:\n\u2014]|[.,](?!\d)| - |\b(?:{'|'.join(sorted(_TURNS))}|and then|and|then|because)\b)")
 
 
 def even(text: str) -> str:
@@ -33,4 +34,24 @@ def even(text: str) -> str:
 
 def clauses(text: str) -> list[str]:
     """The clauses of an evened text; a negation reaches no further than its own."""
-    return [part.strip() for part in _BREAK.split(text) if part.strip()]
+    return [clause for clause, _ in turned(text)]
+
+
+def turned(text: str) -> list[tuple[str, int]]:
+    """The clauses, and how many turns ("X, but Y") their sentence has taken before each.
+
+    A sentence that begins with a turn turns from the one before; one that ends with it ("..., though") is meant so.
+    """
+    found: list[tuple[str, int]] = []
+    turns, turning = 0, False
+    for number, part in enumerate([*_BREAK.split(text), "."]):
+        if number % 2 == 0 and part.strip():
+            turns, turning = turns + turning, False
+            found.append((part.strip(), turns))
+        elif part in _TURNS:
+            turning = bool(found)
+        elif part in _ENDS:
+            if turning:
+                found[-1] = found[-1][0], turns + 1
+            turns, turning = 0, False
+    return found

@@ -9,16 +9,20 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 
 from chauffeur.concept import (
     Causes,
     Context,
+    Feedback,
     History,
+    HistoryItem,
     Instruction,
     PersonId,
     Plan,
+    ProfileError,
     Program,
     Situation,
     Thoughts,
@@ -185,3 +189,77 @@ def test_the_last_trip_is_forgotten_and_everything_is_exported(keeper: Keeper, h
 def test_orders_are_answered_in_words(keeper: Keeper, order: MemoryOrder, said: str) -> None:
     keeper.order(order)
     until(keeper, told(Note, said))
+
+
+class Notebook:
+    """A memory of somebody else's making: it keeps trips in a list, and cannot forget a single one."""
+
+    kept: ClassVar[list[Trip]] = []
+
+    def __init__(self, home: Path) -> None:
+        del home
+
+    def remember(self, trip: Trip, feedback: Feedback | None = None) -> None:
+        del feedback
+        self.kept.append(trip)
+
+    def attach_feedback(self, person: PersonId, feedback: Feedback, trip_id: str | None = None) -> bool:
+        del person, feedback
+        return any(trip.id == trip_id for trip in self.kept)
+
+    def export(self, person: PersonId) -> str:
+        trips = [
+            {"trip": trip.id, "when": "", "instruction": trip.instruction.text, "outcome": trip.outcome, "feedback": []}
+            for trip in self.kept
+        ]
+        return json.dumps({"person": person, "trips": trips})
+
+    def forget_last(self, person: PersonId) -> HistoryItem | None:
+        raise ProfileError(f"A notebook cannot forget one trip of {person}.", hint="Erase all of it.")
+
+
+def test_the_chosen_memory_is_used_and_says_what_it_cannot_do(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Notebook, "kept", [])
+    known = {"notebook": Notebook}
+    monkeypatch.setattr("chauffeur.memory.choice.load_plugin", lambda group, name: known[name])
+    monkeypatch.setenv("CHAUFFEUR_MEMORY", "notebook")
+    keeper = Keeper(ANA, home)
+    keeper.trip("w1", TRIP)
+    keeper.opinion("w1", TOO_FAST)
+    news = until(keeper, told(OpinionKept))
+    shown = [each for each in news + until(keeper, told(MemoryState)) if isinstance(each, MemoryState)][-1]
+    assert (shown.memory, shown.encrypted, shown.newest[0].text) == ("notebook", False, "Slow down a bit.")
+    keeper.order(MemoryOrder("forget_last"))
+    until(keeper, told(Note, "A notebook cannot forget one trip of ana."))
+    keeper.order(MemoryOrder("private"))
+    until(keeper, lambda news: any(isinstance(each, MemoryState) and each.private for each in news))
+    keeper.trip("w2", dataclasses.replace(TRIP, id="1123456789abcdef"))
+    until(keeper, told(Kept, "privacy mode"))
+    keeper.close(5.0)
+    assert [trip.id for trip in Notebook.kept] == [TRIP.id]
+    assert not (home / "profiles").exists(), "nothing of it goes into the vault"
+
+
+def test_all_that_can_be_done_with_the_vault_can_be_done_with_chroma(home: Path) -> None:
+    pytest.importorskip("chromadb", reason="Chroma is not installed: pip install 'chauffeur[chroma]'")
+    keeper = Keeper(ANA, home, memory="chroma")
+    keeper.trip("w1", TRIP)
+    keeper.opinion("w1", TOO_FAST)
+    news = until(keeper, told(MemoryState, "a bit too fast"))
+    assert not [each for each in news if isinstance(each, MemoryState)][-1].encrypted
+    keeper.order(MemoryOrder("export"))
+    until(keeper, told(Note, "was written to"))
+    keeper.order(MemoryOrder("retention", 30.0))
+    until(keeper, told(Note, "for 30 days"))
+    keeper.order(MemoryOrder("private"))
+    until(keeper, told(Note, "Privacy mode is on"))
+    keeper.trip("w2", dataclasses.replace(TRIP, id="1123456789abcdef"))
+    until(keeper, told(Kept, "privacy mode"))
+    keeper.order(MemoryOrder("forget_last"))
+    until(keeper, told(Note, "Forgotten: “Slow down a bit.”"))
+    keeper.order(MemoryOrder("public"))
+    keeper.trip("w3", dataclasses.replace(TRIP, id="2123456789abcdef"))
+    until(keeper, told(Kept, "2123456789abcdef"))
+    keeper.order(MemoryOrder("erase", sure=True))
+    until(keeper, told(Note, "Erased: the profile of ana."))
+    keeper.close(5.0)

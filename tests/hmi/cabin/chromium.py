@@ -26,6 +26,7 @@ _KEYS = {
     "Enter": ("Enter", 13),
     "Tab": ("Tab", 9),
     "Escape": ("Escape", 27),
+    "ArrowLeft": ("ArrowLeft", 37),
     "ArrowUp": ("ArrowUp", 38),
     "ArrowDown": ("ArrowDown", 40),
     "ArrowRight": ("ArrowRight", 39),

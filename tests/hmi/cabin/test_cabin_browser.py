@@ -251,8 +251,16 @@ def test_memory_is_looked_after_and_erased_only_when_sure(desk: Desk) -> None:
         await tab.click("#erase")
         assert await tab.value("document.activeElement.id") == "erase-sure"
         assert "cannot be undone" in await text(tab, "sure-words") and cabin.take(0.2) is None
+        assert "the key they are locked with" in await text(tab, "sure-words")
         await tab.click("#erase-sure")
         assert await told(cabin) == MemoryOrder("erase", sure=True)
+        assert "on this machine, encrypted" not in await text(tab, "memory"), "not while nothing is kept"
+        cabin.tell(MemoryState("ada", False, 90.0, 2, ENTRIES))
+        await tab.until("document.getElementById('memory').textContent.includes('on this machine, encrypted')")
+        cabin.tell(MemoryState("ada", False, 90.0, 2, ENTRIES, "chroma", encrypted=False))
+        await tab.until("document.getElementById('memory').textContent.includes('in the memory “chroma”; the car')")
+        await tab.click("#erase")
+        assert "locked" not in await text(tab, "sure-words")
 
     with Cabin() as cabin:
         desk.run(check(cabin))

@@ -15,9 +15,8 @@ from chauffeur.bench.chaos.outside import Drive, settings_for
 from chauffeur.bench.chaos.playing import Play, Trace, silent
 from chauffeur.bench.chaos.replies import WISHES
 from chauffeur.bench.standing import Speedometer, Standing
-from chauffeur.bench.store import Row, RowStore, sole_writer
+from chauffeur.bench.store import Row, RowStore, freeze, sole_writer
 from chauffeur.concept import ConfigError, SandboxError
-from chauffeur.drive.files import publish
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.worlds.highway.scenarios import BUILT_IN
@@ -116,17 +115,7 @@ class ChaosRun:
 
     def _freeze(self) -> None:
         content = (json.dumps({**asdict(self.config), "suite": SUITE_VERSION}, indent=1) + "\n").encode()
-        path = self.folder / "config.json"
-        if not path.exists():
-            publish(path, content, "run's configuration")
-            return
-        old, new = json.loads(path.read_bytes()), json.loads(content)
-        del old["cases"], new["cases"]  # more cases of the same suite may follow
-        if old != new:
-            raise ConfigError(
-                f"{self.folder} holds a run with another configuration.",
-                hint="Continue it with the options it was started with, or choose another --out folder.",
-            )
+        freeze(self.folder / "config.json", content, same=lambda stored: _but_cases(stored) == _but_cases(content))
 
     def _play(self, cases: Sequence[Case], server: ModelServer, watch: Watch, trace: Trace) -> None:
         for case in cases:
@@ -377,3 +366,8 @@ def replay(config: ChaosConfig, number: int, trace: Trace) -> Row | None:
         case = config.draw(number)
         play_drive([case], replace(config), server, rows.append, trace)
     return rows[0] if rows else None
+
+
+def _but_cases(stored: bytes) -> dict[str, Any]:
+    """A configuration without the number of cases: more of the same suite may follow."""
+    return {name: value for name, value in json.loads(stored).items() if name != "cases"}

@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from chauffeur.bench.calls import Caller, Halt, Patience
-from chauffeur.bench.engine import Engine, EngineError, LocalEngine
+from chauffeur.bench.engine import Engine, EngineError, LocalEngine, first_error
 from chauffeur.bench.hostile.asking import HostileRequests
 from chauffeur.bench.hostile.judging import RULER, served, verdict_of
 from chauffeur.bench.hostile.loading import Input, data_sha256, hostile_inputs, lookalikes, sample
@@ -29,8 +29,8 @@ from chauffeur.bench.hostile.scenes import scene_of
 from chauffeur.bench.pace import Gate, Window
 from chauffeur.bench.spending import Bill, Budget, Spending
 from chauffeur.bench.standing import Speedometer, Standing
-from chauffeur.bench.store import Row, RowStore, sole_writer
-from chauffeur.concept import ChauffeurError, ConfigError, Context, DataError, Limits, Plan, PlanRequest, Scenario
+from chauffeur.bench.store import Row, RowStore, freeze, sole_writer
+from chauffeur.concept import ChauffeurError, Context, Limits, Plan, PlanRequest, Scenario
 from chauffeur.describe import describe
 from chauffeur.drive.files import publish
 from chauffeur.drive.session import scenario_hash
@@ -141,7 +141,7 @@ class HostileRun:
                 if missing:
                     asyncio.run(self._work(missing, watch, engine(workers or os.cpu_count() or 1), concurrency))
             except BaseExceptionGroup as group:
-                raise _first(group) from group
+                raise first_error(group) from group
             finally:
                 self._plans.close()
                 self._drives.close()
@@ -178,19 +178,7 @@ class HostileRun:
         config = {**asdict(self.config), "bench": BENCH_VERSION, "rollout": ROLLOUT_VERSION, "data": data_sha256()}
         config["scenes"] = {scene.id: scenario_hash(scene)[:12] for scene in self._scenes.values()}
         content = (json.dumps({**config, "model": self._planner.model}, indent=1) + "\n").encode()
-        path = self.folder / "config.json"
-        if not path.exists():
-            publish(path, content, "run's configuration")
-            return
-        try:
-            same = path.read_bytes() == content
-        except OSError as error:
-            raise DataError(f"Cannot read {path}: {error.strerror or error}.") from error
-        if not same:
-            raise ConfigError(
-                f"{self.folder} holds a run with another configuration.",
-                hint="Continue it with the options it was started with, or choose another --out folder.",
-            )
+        freeze(self.folder / "config.json", content)
 
     def _plan_of(self, one: Input) -> dict[str, Any] | None:
         row = self._plans.rows.get(one.id)
@@ -332,11 +320,3 @@ def planner_of(spec: str, **options: Any) -> Planner:
     from chauffeur.planners.registry import make_planner
 
     return make_planner(spec, **options)
-
-
-def _first(group: BaseExceptionGroup[BaseException]) -> BaseException:
-    """The error that stopped the run, out of the group that its tasks wrapped it in."""
-    error: BaseException = group
-    while isinstance(error, BaseExceptionGroup):
-        error = error.exceptions[0]
-    return error

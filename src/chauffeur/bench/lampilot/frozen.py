@@ -16,8 +16,8 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from chauffeur.bench.shards import WHOLE, Shard
+from chauffeur.bench.store import freeze
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, DataError, Limits, Scenario
-from chauffeur.drive.files import publish
 from chauffeur.drive.session import scenario_hash
 from chauffeur.planners.prompts import Setting
 from chauffeur.worlds.highway.dblv1 import Dataset, Item
@@ -142,14 +142,12 @@ class Frozen:
             ConfigError: The folder holds another run.
             DataError: The stored plan is damaged or cannot be written.
         """
-        path = folder / "plan.json"
-        if not path.exists():
-            publish(path, self.content(), "run's plan")
-        elif _read(path) != self.content() and _read_json(path) != json.loads(self.content()):
-            raise ConfigError(
-                f"{folder} holds a run with another configuration.",
-                hint="Continue it with the options it was started with, or choose another --out folder.",
-            )
+        path, content = folder / "plan.json", self.content()
+
+        def same(stored: bytes) -> bool:
+            return stored == content or _parsed(path, stored) == json.loads(content)
+
+        freeze(path, content, "run's plan", same)
 
     @classmethod
     def read(cls, folder: Path) -> Self:
@@ -187,16 +185,16 @@ class Frozen:
             ) from error
 
 
-def _read(path: Path) -> bytes:
+def _read_json(path: Path) -> dict[str, Any]:
     try:
-        return path.read_bytes()
+        return _parsed(path, path.read_bytes())
     except OSError as error:
         raise DataError(f"Cannot read {path}: {error.strerror or error}.") from error
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def _parsed(path: Path, raw: bytes) -> dict[str, Any]:
     try:
-        value = json.loads(_read(path))
+        value = json.loads(raw)
     except ValueError as error:
         raise DataError(
             f"{path} is damaged ({error}).",

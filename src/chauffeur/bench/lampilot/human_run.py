@@ -28,7 +28,7 @@ from chauffeur.bench.lampilot.metrics import ORIGIN
 from chauffeur.bench.lampilot.results import Stages, publish_results, results
 from chauffeur.bench.lampilot.rollout import ROLLOUT_VERSION
 from chauffeur.bench.shards import WHOLE
-from chauffeur.bench.store import Row, RowStore
+from chauffeur.bench.store import Row, RowStore, another_run
 from chauffeur.concept import LAMPILOT_LIMITS, ChauffeurError, ConfigError, DataError
 from chauffeur.describe import describe
 from chauffeur.drive.files import publish
@@ -102,10 +102,7 @@ class HumanRun:
         path = self.folder / "plan.json"
         if path.exists():
             if _without_count(Frozen.read(self.folder)) != _without_count(frozen):
-                raise ConfigError(
-                    f"{self.folder} holds a run with another configuration.",
-                    hint="Continue it with the options it was started with, or choose another --out folder.",
-                )
+                raise another_run(self.folder)
             if self._attempts.rows.keys() - {item.id for item in self.items}:
                 raise ConfigError(
                     f"{self.done} items of the run in {self.folder} have been driven; they stay in it.",

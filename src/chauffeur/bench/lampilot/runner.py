@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from chauffeur.bench.calls import Caller, Halt, Patience
-from chauffeur.bench.engine import Engine, LocalEngine
+from chauffeur.bench.engine import Engine, LocalEngine, first_error
 from chauffeur.bench.lampilot.asking import PlainRequests, Requests
 from chauffeur.bench.lampilot.frozen import BENCH_VERSION, Frozen, RunConfig, choose_items
 from chauffeur.bench.lampilot.metrics import ruler_named
@@ -149,7 +149,7 @@ class LampilotRun:
                 if not self.stages.settled:
                     asyncio.run(self._work(watch, effort or Effort(), ruler))
             except BaseExceptionGroup as group:
-                raise _first(group) from group
+                raise first_error(group) from group
             finally:
                 for store in self.stages.stores:
                     store.close()
@@ -223,14 +223,6 @@ async def _close(planner: Planner | None) -> None:
     if close is not None:
         with suppress(Exception):
             await close()
-
-
-def _first(group: BaseExceptionGroup[BaseException]) -> BaseException:
-    """The error that stopped the run, out of the groups that its tasks wrapped it in."""
-    error: BaseException = group
-    while isinstance(error, BaseExceptionGroup):
-        error = error.exceptions[0]
-    return error
 
 
 class LampilotBenchmark:

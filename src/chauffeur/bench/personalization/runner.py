@@ -13,15 +13,15 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
-from chauffeur.bench.engine import Engine, LocalEngine, WorkerLostError
+from chauffeur.bench.engine import Engine, LocalEngine, WorkerLostError, first_error
 from chauffeur.bench.personalization.population import draw_passengers
 from chauffeur.bench.personalization.sayings import Half, sayings_sha256
 from chauffeur.bench.personalization.scenes import TASKS, scenes_of
 from chauffeur.bench.personalization.study import BENCH_VERSION, StudyJob, do_job, versions
 from chauffeur.bench.shards import WHOLE, Shard
 from chauffeur.bench.standing import Speedometer, Standing
-from chauffeur.bench.store import Row, RowStore, sole_writer
-from chauffeur.concept import ChauffeurError, ConfigError, DataError
+from chauffeur.bench.store import Row, RowStore, freeze, sole_writer
+from chauffeur.concept import ChauffeurError, ConfigError
 from chauffeur.drive.files import publish
 from chauffeur.drive.session import scenario_hash
 from chauffeur.planners.registry import make_planner
@@ -111,7 +111,7 @@ class StudyRun:
                 if missing:
                     asyncio.run(self._work(missing, watch, engine(workers)))
             except BaseExceptionGroup as group:
-                raise _first(group) from group
+                raise first_error(group) from group
             finally:
                 self._store.close()
             rows = self.rows()
@@ -150,21 +150,9 @@ class StudyRun:
             "simulated": SIMULATED,
         }
         text = (json.dumps(content, indent=1) + "\n").encode()
-        path = self.folder / "config.json"
-        if not path.exists():
-            publish(path, text, "run's configuration")
+        if freeze(self.folder / "config.json", text):
             where = {"chauffeur": version("chauffeur"), "python": platform.python_version(), "numpy": version("numpy")}
             publish(self.folder / "versions.json", (json.dumps(where, indent=1) + "\n").encode(), "run's versions")
-            return
-        try:
-            same = path.read_bytes() == text
-        except OSError as error:
-            raise DataError(f"Cannot read {path}: {error.strerror or error}.") from error
-        if not same:
-            raise ConfigError(
-                f"{self.folder} holds a run with another configuration.",
-                hint="Continue it with the options it was started with, or choose another --out folder.",
-            )
 
     async def _work(self, missing: list[StudyJob], watch: Watch, engine: Engine) -> None:
         speed, todo, whole = Speedometer(), iter(missing), False
@@ -207,11 +195,3 @@ class StudyRun:
 def _scenes_sha256() -> str:
     hashes = [scenario_hash(scene) for task in TASKS for scene in scenes_of(task)]
     return hashlib.sha256("\n".join(hashes).encode()).hexdigest()
-
-
-def _first(group: BaseExceptionGroup[BaseException]) -> BaseException:
-    """The error that stopped the run, out of the group that its tasks wrapped it in."""
-    error: BaseException = group
-    while isinstance(error, BaseExceptionGroup):
-        error = error.exceptions[0]
-    return error

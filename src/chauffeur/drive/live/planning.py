@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import ChauffeurError, History, PersonId, Plan, PlanRequest
-from chauffeur.describe import describe
 from chauffeur.describe.services.sources import Sources, SourceSettings
 from chauffeur.drive.live.messages import MessageError
 from chauffeur.drive.live.mirror import Mirror
@@ -33,7 +32,7 @@ from chauffeur.drive.live.orders import (
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.loop import Memory
 from chauffeur.drive.session import parse_wish
-from chauffeur.drive.surroundings import describing
+from chauffeur.drive.surroundings import describing, opened
 from chauffeur.memory.tolerant import TolerantMemory
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
@@ -84,9 +83,7 @@ class Planning:
 
     async def run(self, over: Callable[[], bool]) -> None:
         """Answer wishes until it is over."""
-        async with contextlib.AsyncExitStack() as stack:
-            if self._where is not None:
-                self._sources = await stack.enter_async_context(Sources(self._where))
+        async with opened(self._where) as self._sources:
             while not over():
                 await self.look()
                 await asyncio.sleep(LOOK_EVERY_S)
@@ -152,7 +149,7 @@ class Planning:
         snapshot, limits = self._mirror.world.snapshot(), self._mirror.limits
         scene = Scene.of(self._mirror.trip, snapshot)
         instruction = parse_wish(request.text, PersonId(request.person))
-        context = (describe if self._sources is None else await describing(self._sources))(snapshot)
+        context = (await describing(self._sources))(snapshot)
         history = self._memory.recall(instruction.person, instruction, context, _RECALLED)
         system = build_system_message(self._setting, limits=limits)
         asked, _ = screen_request(PlanRequest(instruction, context, system, history, limits=limits))

@@ -58,7 +58,7 @@ class Asking:
         try:
             instruction = parse_wish(words.text, self._person)
         except InstructionError as error:
-            self._pass_over(words.text, "refused", str(error))
+            self.pass_over(words.text, "refused", str(error))
             raise
         self._waiting.append((words, replace(instruction, source="speech" if words.spoken else "text")))
 
@@ -88,15 +88,15 @@ class Asking:
                 self._books.answer(runtime.next_wish, "not_asked", OVER)
         for words, _ in self._waiting:
             unasked.append(words.text)
-            self._pass_over(words.text, "not_asked", OVER)
+            self.pass_over(words.text, "not_asked", OVER)
         self._keeping, self._waiting = None, []
         return tuple(unasked)
 
-    def _hand_on(self, runtime: Runtime, instruction: Instruction) -> str:
-        return runtime.ask(instruction.text, instruction.person)
-
-    def _pass_over(self, text: str, kind: str, why: str) -> None:
+    def pass_over(self, text: str, kind: str, why: str) -> None:
         """A wish that is not handed on stands in the books all the same."""
         if self._books is not None:
             self._books.wish("", Instruction(text[:MAX_WISH_CHARACTERS], self._person))
             self._books.answer("", kind, why)
+
+    def _hand_on(self, runtime: Runtime, instruction: Instruction) -> str:
+        return runtime.ask(instruction.text, instruction.person)

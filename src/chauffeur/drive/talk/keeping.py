@@ -19,9 +19,10 @@ from typing import Any, Final, Literal, TypeVar
 
 from chauffeur.concept import ChauffeurError, ConfigError, Feedback, PersonId, Trip
 from chauffeur.drive.talk.messages import MemoryEntry, MemoryOrder, MemoryState, Note
+from chauffeur.memory.base import Memory
+from chauffeur.memory.choice import chosen_memory, open_memory
 from chauffeur.memory.files import data_home, private_directory, publish
 from chauffeur.memory.privacy import Privacy, read_privacy, write_privacy
-from chauffeur.memory.vault import VaultMemory
 
 RETRY_S: Final = 5.0
 """What could not be kept for now (a locked file, a full disk) is tried again after so long."""
@@ -102,21 +103,31 @@ class _Entry:
 class Keeper:
     """One person's memory. `poll` and the rest are for the thread that polls the drive."""
 
-    def __init__(self, person: PersonId, home: Path | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        person: PersonId,
+        home: Path | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        *,
+        memory: str = "",
+    ) -> None:
         """Open it.
 
         Args:
             person: Whose.
             home: Data directory; this installation's by default.
             clock: Monotonic time, s.
+            memory: Name of the memory; the chosen one if left out.
         """
-        self.person, self._home, self._clock = person, data_home() if home is None else home, clock
+        self.person, self._clock = person, clock
+        self._given, self._home = home, data_home() if home is None else home
+        self._name = memory or chosen_memory()
         self._entries: dict[str, _Entry] = {}
         self._work: queue.SimpleQueue[Callable[[], Callable[[], list[News]]] | None] = queue.SimpleQueue()
         self._done: queue.SimpleQueue[Callable[[], list[News]]] = queue.SimpleQueue()
         self._busy = 0
         self._privacy: Privacy | None = None
-        self._memory: VaultMemory | None = None
+        self._memory: Memory | None = None
         # A daemon: a lock that another process never gives back must not keep this one from ending.
         self._thread = threading.Thread(target=self._run, name="memory", daemon=True)
         self._thread.start()
@@ -262,39 +273,39 @@ class Keeper:
         while (job := self._work.get()) is not None:
             self._done.put(job())
 
-    def _vault(self) -> VaultMemory:
+    def _opened(self) -> Memory:
         """The memory under the present settings, which another program may have changed."""
-        privacy = read_privacy(self._home)
-        if self._memory is None or privacy != self._privacy:
-            self._memory, self._privacy = VaultMemory(self._home, privacy=privacy), privacy
+        while (privacy := read_privacy(self._home)) != self._privacy or self._memory is None:
+            self._memory, self._privacy = open_memory(self._name, self._given), privacy
         return self._memory
 
     def _remember(self, trip: Trip) -> tuple[Literal["kept", "private", "failed"], str]:
         try:
-            vault = self._vault()
+            memory = self._opened()
             if self._privacy is not None and not self._privacy.keeps:
                 return "private", ""
-            vault.remember(trip)
+            memory.remember(trip)
         except Exception as error:  # noqa: BLE001 - whatever it is, the trip waits and the person is told
             return "failed", _words(error)
         return "kept", ""
 
     def _attach(self, trip_id: str, feedback: Feedback) -> tuple[bool | None, str]:
         try:
-            return self._vault().attach_feedback(self.person, feedback, trip_id), ""
+            return self._opened().attach_feedback(self.person, feedback, trip_id), ""
         except Exception as error:  # noqa: BLE001
             return None, _words(error)
 
     def _state(self) -> MemoryState | Note:
         try:
-            vault = self._vault()
-            trips: list[dict[str, Any]] = json.loads(vault.export(self.person))["trips"]
+            memory = self._opened()
+            trips: list[dict[str, Any]] = json.loads(memory.export(self.person))["trips"]
         except Exception as error:  # noqa: BLE001
             return Note(f"Your memory cannot be shown. {_words(error)}", trouble=True)
         assert self._privacy is not None
         days = self._privacy.retention_days
         newest = tuple(_entry_of(trip) for trip in trips[::-1][:NEWEST])
-        return MemoryState(self.person, not self._privacy.keeps, days, len(trips), newest)
+        encrypted = bool(getattr(memory, "encrypts", False))
+        return MemoryState(self.person, not self._privacy.keeps, days, len(trips), newest, self._name, encrypted)
 
     def _obey(self, order: MemoryOrder) -> _Obeyed:
         try:
@@ -308,7 +319,7 @@ class Keeper:
             case "show":
                 return _Obeyed(Note(f"What is remembered of {self.person}:"))
             case "forget_last":
-                item = self._vault().forget_last(self.person)
+                item = self._opened().forget_last(self.person)
                 if item is None:
                     return _Obeyed(Note(f"Nothing is remembered of {self.person}."))
                 when = item.when[:16].replace("T", " ")
@@ -316,7 +327,7 @@ class Keeper:
             case "erase" if not order.sure:
                 return _Obeyed(Note("Everything would be erased, for good. Say that you are sure.", trouble=True))
             case "erase":
-                gone = self._vault().erase(self.person)
+                gone = self._opened().erase(self.person)
                 text = f"Erased: the profile of {self.person}." if gone else f"There was no profile of {self.person}."
                 return _Obeyed(Note(text), erased=True)
             case "export":
@@ -324,7 +335,7 @@ class Keeper:
             case "retention":
                 days = _whole_days(order.days)
                 write_privacy(replace(self._settings(), retention_days=days), self._home)
-                swept = self._vault().sweep()
+                swept = self._opened().sweep()
                 kept = "until they are erased" if days is None else f"for {days} days"
                 return _Obeyed(Note(f"Trips are kept {kept}, of everybody. {swept} older ones were deleted."))
             case "private":
@@ -335,7 +346,7 @@ class Keeper:
                 return _Obeyed(Note("Privacy mode is off: trips are kept."))
 
     def _export(self) -> Path:
-        document = self._vault().export(self.person)
+        document = self._opened().export(self.person)
         folder = private_directory(self._home / EXPORTS)
         slug = _NOT_SLUG.sub("-", self.person.lower()).strip("-") or "person"
         path = folder / f"{slug}-{datetime.now(UTC):%Y%m%d-%H%M%S}.json"

@@ -246,13 +246,16 @@ class MemoryEntry:
 
 @dataclass(frozen=True, slots=True)
 class MemoryState:
-    """What the person's memory holds, newest first, and its rules. `private`: nothing is written."""
+    """What the person's memory holds, newest first, and its rules. `private`: nothing is written. `encrypted`: by the
+    memory, whose name is `memory`."""
 
     person: str
     private: bool
     retention_days: float | None
     count: int
     newest: tuple[MemoryEntry, ...]
+    memory: str = "vault"
+    encrypted: bool = True
     kind: Literal["memory"] = "memory"
 
 

@@ -110,7 +110,7 @@ class Talk:
         """Set up; nothing moves yet.
 
         Args:
-            settings: Of the drive. Its memory is `vault` where there is a person.
+            settings: Of the drive. Its memory is the person's; the chosen one if it names none.
             tell: Hears all that is said, in the thread that polls.
             person: Whose wishes they are, and whose memory is used.
             books: Where the drive is written down, None for nowhere.
@@ -148,7 +148,7 @@ class Talk:
         try:
             self._attention.start()
             if self._person:
-                self._keeper = Keeper(self._person)
+                self._keeper = Keeper(self._person, memory=self._settings.memory)
             runtime = Runtime(self._settings, self._heard)
             self._runtime = runtime
             self._view = View(self._settings, ring(runtime.folder, "observations"))

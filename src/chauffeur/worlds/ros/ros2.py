@@ -101,13 +101,7 @@ class Ros2Vehicle(ThreadedVehicle):
 
     def _send(self, number: int, messages: tuple[TopicMessage, ...]) -> None:
         del number
-        with self._lock:
-            for message in messages:
-                self._notes.count("replaced", int(message.topic in self._pending))
-                self._pending.pop(message.topic, None)  # what comes last is also written last
-                self._pending[message.topic] = message
-        self._notes.count("published")
-        self._woken.set()
+        self._leave([(message.topic, message) for message in messages], self._pending)
 
     def _run(self) -> None:
         while not self._ending.is_set():

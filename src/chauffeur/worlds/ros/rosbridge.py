@@ -114,14 +114,7 @@ class RosbridgeVehicle(ThreadedVehicle):
     def _send(self, number: int, messages: tuple[TopicMessage, ...]) -> None:
         for message in messages:
             self._text(number, message)  # raises here, before anything is handed on
-        with self._lock:
-            for message in messages:
-                self._notes.count("replaced", int(message.topic in self._pending))
-                for waiting in (self._pending, self._newest):
-                    waiting.pop(message.topic, None)  # what comes last is also sent last
-                    waiting[message.topic] = (number, message)
-        self._notes.count("published")
-        self._woken.set()
+        self._leave([(each.topic, (number, each)) for each in messages], self._pending, self._newest)
 
     def _text(self, number: int, message: TopicMessage) -> str:
         now_s = self._clock()

@@ -6,11 +6,15 @@ import math
 import threading
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from typing import TypeVar
 
 from chauffeur.concept import Parameters
 from chauffeur.worlds.ros.base import FRESH_S, Published, TopicMessage
 from chauffeur.worlds.ros.notes import Notes
 from chauffeur.worlds.ros.stack import Stack, Wishes
+
+_T = TypeVar("_T")
 
 
 class ThreadedVehicle(ABC):
@@ -56,6 +60,17 @@ class ThreadedVehicle(ABC):
     @abstractmethod
     def _run(self) -> None:
         """What the thread does until `_ending` is set; `_woken` says that there is something to do."""
+
+    def _leave(self, left: Iterable[tuple[str, _T]], *places: dict[str, _T]) -> None:
+        """Leave the newest of each topic for the thread, in place of what waits there; what comes last goes last."""
+        with self._lock:
+            for topic, what in left:
+                self._notes.count("replaced", int(topic in places[0]))
+                for place in places:
+                    place.pop(topic, None)
+                    place[topic] = what
+        self._notes.count("published")
+        self._woken.set()
 
     def _hear(self, speed_mps: float) -> None:
         """Take note of the vehicle's speed as it was just heard; what is no number is not."""

@@ -40,7 +40,7 @@ export function makeMemory({ order }) {
       return make('button', { type: 'button', class: 'danger', id: 'erase', disabled: !state.count, text: 'Erase everything…', onclick: () => { sure = true; render('erase-sure'); } });
     }
     return make('div', { class: 'sure', role: 'group', 'aria-labelledby': 'sure-words' },
-      make('p', { id: 'sure-words', text: `Erase all ${state.count} ${state.count === 1 ? 'entry' : 'entries'} and the key they are locked with? This cannot be undone.` }),
+      make('p', { id: 'sure-words', text: `Erase all ${state.count} ${state.count === 1 ? 'entry' : 'entries'}${state.encrypted ? ' and the key they are locked with' : ''}? This cannot be undone.` }),
       make('p', { class: 'row' },
         make('button', { type: 'button', class: 'danger', id: 'erase-sure', text: 'Erase for good', onclick: () => { sure = false; order({ do: 'erase', sure: true }); render('erase'); } }),
         make('button', { type: 'button', text: 'Keep it', onclick: () => { sure = false; render('erase'); } })));
@@ -62,7 +62,7 @@ export function makeMemory({ order }) {
       })),
       make('p', { class: 'fine', text: state.private
         ? 'Nothing new is kept, of anybody in this car, until you switch it off. What was kept before still counts.'
-        : 'Your words, what became of them and your opinions are kept on this machine, encrypted. Sound is never kept.' }),
+        : `Your words, what became of them and your opinions are kept ${state.encrypted ? 'on this machine, encrypted' : `in the memory “${state.memory}”; the car does not encrypt them`}. Sound is never kept.` }),
       retention(),
       make('p', { class: 'row' },
         make('button', { type: 'button', id: 'forget-last', disabled: !state.count, text: 'Forget the last one', onclick: () => order({ do: 'forget_last' }) }),
