@@ -192,7 +192,9 @@ def test_points_that_are_drawn_twice_do_not_count(x: float, y: float, heading: f
     points = ((0.0, 0.0), (498.0, 0.0), (503.0, 1.0), (2000.0, 300.0))
     doubled = (*points[: twice + 1], points[twice], *points[twice + 1 :])
     ego, other = car(0, x, y, heading), car(1, x + 9.0, y)
-    assert looked(ego, other, lanes=(lane(1, *doubled),)) == looked(ego, other, lanes=(lane(1, *points),))
+    once, again = looked(ego, other, lanes=(lane(1, *points),)), looked(ego, other, lanes=(lane(1, *doubled),))
+    assert (again.ego, again.others, again.strips) == (once.ego, once.others, once.strips)
+    assert (again.speed_limit_mps, again.curvature) == (once.speed_limit_mps, once.curvature)
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.3, -0.3, math.pi / 2.0, 2.5])
@@ -332,6 +334,27 @@ def test_what_is_swept_is_where_the_corners_get(
         d += speed * math.sin(heading + slip) * DT
         heading += (yaw_rate(speed, steering) - curvature * speed) * DT
     assert swept(*given_, curvature) == pytest.approx((min(seen), max(seen)), abs=1e-9)
+
+
+@given(given_=spans, curvature=st.floats(-0.05, 0.05))
+def test_what_is_swept_is_to_the_last_bit_what_the_same_lines_give_in_python(
+    given_: tuple[Body, float, tuple[float, float], float, float, float, float], curvature: float
+) -> None:
+    ego, speed, _, steering, centre, _, _ = given_
+    d, heading, bend = ego.d_m, ego.heading_rad, curvature * speed
+    low = high = d
+    for period in range(15):
+        wide = abs(math.sin(heading)) * 2.5 + abs(math.cos(heading)) * 1.0
+        low, high = min(low, d - wide), max(high, d + wide)
+        offset = d - centre
+        if period and abs(heading) < 0.02 and abs(offset) < 0.1:
+            break
+        if period:
+            steering = lane_keeping_steering(speed, heading, offset, bend * SHIELDS.preview_s, SHIELDS)
+        slip = math.atan(0.5 * math.tan(steering))
+        d += speed * math.sin(heading + slip) * DT
+        heading += (speed * math.sin(slip) / 2.5 - bend) * DT
+    assert swept(*given_, curvature) == (low, high)
 
 
 @given(given_=spans)

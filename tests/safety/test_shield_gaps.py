@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from chauffeur.safety.shield.gaps import braking_gap_m, greatest_acceleration, rss_gap_m
+from chauffeur.safety.shield.gaps import braking_gap_m, free_gap_m, greatest_acceleration, rss_gap_m
 
 DT = 0.1
 BRAKING, OTHERS = 8.0, 6.0
@@ -186,3 +186,19 @@ def _state(oracle: Any, speed: float) -> Any:
     lane.distance_to_enter_intersection, lane.distance_to_leave_intersection = unit.Distance(0.0), unit.Distance(1e3)
     lane.has_priority, lane.is_in_correct_lane = False, True
     return state
+
+
+@given(speed=speeds, lead=st.floats(-5.0, 60.0), wanted=st.floats(0.0, 5.0), more=st.floats(1e-6, 150.0), brakes=BRAKES)
+def test_beyond_the_free_gap_no_lead_bounds_an_acceleration(
+    speed: float, lead: float, wanted: float, more: float, brakes: tuple[float, float]
+) -> None:
+    braking, others = brakes
+    free = free_gap_m(speed, wanted, braking, DT)
+    assert greatest_acceleration(speed, free + more, lead, braking, others, DT) >= wanted - 1e-6
+
+
+@given(speed=speeds, wanted=st.floats(0.1, 5.0))
+def test_the_free_gap_is_what_a_lead_that_stands_asks_for(speed: float, wanted: float) -> None:
+    free = free_gap_m(speed, wanted, BRAKING, DT)
+    assume(free > 0.5)
+    assert greatest_acceleration(speed, free - 0.5, 0.0, BRAKING, OTHERS, DT) < wanted

@@ -9,7 +9,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import chauffeur.worlds.highway.gym
-from chauffeur.concept import Command, Scenario, ScenarioError, Wishes
+from chauffeur.concept import Command, DataError, Scenario, ScenarioError, Wishes
 from chauffeur.worlds.base import EGO, Driver, Perception, World
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
@@ -69,6 +69,32 @@ def test_snapshot_agrees_with_perception() -> None:
     assert {v.id for v in snapshot.others} | {o.id for o in snapshot.objects} | {EGO} == set(
         range(len(snapshot.others) + len(snapshot.objects) + 1)
     )
+
+
+def test_an_instant_is_looked_at_once_and_never_after_it_is_gone() -> None:
+    world, elsewhere = HighwayWorld(), HighwayWorld()
+    start = world.reset(BY_ID["overtake"])
+    assert world.snapshot() is start
+    twin = world.copy()
+    world.driver().command(world.driver().settle(Wishes(20.0, turn="left")))
+    assert world.snapshot() is start, "to ask changes nothing"
+    with pytest.raises(ValueError, match="finite"):
+        world.step(Command(math.nan, 0.0))
+    assert world.snapshot() is start
+    world.step(Command(1.0, 0.0))
+    then = world.snapshot()
+    assert then is world.snapshot()
+    assert (then.tick, twin.snapshot()) == (1, start)
+    assert then.others != start.others
+    twin.step(Command(1.0, 0.0))
+    assert twin.snapshot() == then
+    assert elsewhere.reset(BY_ID["overtake"]) == start
+    elsewhere.adopt(world.observation())
+    assert elsewhere.snapshot() == then
+    with pytest.raises(DataError):
+        elsewhere.adopt(b"")
+    assert elsewhere.snapshot() == then
+    assert world.reset(BY_ID["overtake"]) == start
 
 
 def test_lane_edges() -> None:

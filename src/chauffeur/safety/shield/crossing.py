@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from chauffeur.concept import Command, LaneId, LaneView, Snapshot, VehicleState
 from chauffeur.geometry import wrap_to_pi
 from chauffeur.safety.shield import foresight
+from chauffeur.safety.shield.everybody import Everybody
 from chauffeur.safety.shield.frame import CROSSING_RAD
 from chauffeur.safety.shield.table import ShieldParameters
 
@@ -82,9 +83,8 @@ class Mended:
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """A way of the ego: its points, the nearest one, where nobody crosses any more, where a lead may stop."""
+    """What is to be known of a way: the nearest point, where nobody crosses any more, where a lead may stop."""
 
-    points: Array
     at: int
     beyond: int
     hold_m: float
@@ -113,17 +113,18 @@ class Motion:
     def observe(self, snapshot: Snapshot) -> Array:
         """The state now: as foreseen under the last command, or else from the way since the last instant."""
         ego, before = snapshot.ego, self._before
-        state = np.array([ego.x_m, ego.y_m, ego.heading_rad, ego.speed_mps, 0.0, 0.0])
+        sliding = turning = 0.0
         if before is not None and snapshot.tick == self._tick + 1:
-            turned = wrap_to_pi(ego.heading_rad - self._expected[2])
-            if math.hypot(*(self._expected[:2] - state[:2])) < _SAME_M and abs(turned) < _SAME_M:
-                state[4:] = self._expected[4:]
+            x, y, heading, _, slides, turns = self._expected.tolist()
+            turned = wrap_to_pi(ego.heading_rad - heading)
+            if math.hypot(x - ego.x_m, y - ego.y_m) < _SAME_M and abs(turned) < _SAME_M:
+                sliding, turning = slides, turns
             else:
                 middle = before.heading_rad + wrap_to_pi(ego.heading_rad - before.heading_rad) / 2.0
                 dx, dy = ego.x_m - before.x_m, ego.y_m - before.y_m
-                state[4] = (math.cos(middle) * dy - math.sin(middle) * dx) / self._dt_s
-                state[5] = wrap_to_pi(ego.heading_rad - before.heading_rad) / self._dt_s
-        return state
+                sliding = (math.cos(middle) * dy - math.sin(middle) * dx) / self._dt_s
+                turning = wrap_to_pi(ego.heading_rad - before.heading_rad) / self._dt_s
+        return np.array([ego.x_m, ego.y_m, ego.heading_rad, ego.speed_mps, sliding, turning])
 
     def commanded(self, snapshot: Snapshot, state: Array, command: Command) -> None:
         """Remember what the vehicle was told."""
@@ -145,6 +146,9 @@ class Junction:
             self._onward.setdefault(lane.id[0], []).append(lane)
         self._ways: dict[tuple[LaneId, LaneId | None], list[Array]] = {}
         self._straight = {lane.id: line for lane in lanes if (line := _straight(lane)) is not None}
+        self._line_of: dict[LaneId | None, int] = {lane: row for row, lane in enumerate(self._straight)}
+        lines = [(line.x_m, line.y_m, line.heading_rad, line.cos, line.sin) for line in self._straight.values()]
+        self._lines = np.array(lines, dtype=np.float64).reshape(-1, 5)
         self._clear_from: dict[LaneId, Array] = {}
         self._promised: Array | None = None
         self._motion = Motion(dt_s)
@@ -152,6 +156,7 @@ class Junction:
     def mend(
         self,
         snapshot: Snapshot,
+        around: Everybody,
         lane: LaneId,
         aim: LaneId | None,
         command: Command,
@@ -163,31 +168,31 @@ class Junction:
 
         Args:
             snapshot: The instant.
+            around: Everybody at it.
             lane: Where the ego is, or where ways part the lane it steers for: every way on from it counts.
             aim: The lane it steers for: where it follows, the only way on that counts.
             command: As all other rules let it through.
             most_mps2: Hardest acceleration that they would.
             held_up: Whether a lead is so close that it has to brake for it.
         """
-        outlook = self._outlook(snapshot, lane)
-        ways = [outlook.way(points) for points in self._candidates(lane, aim, outlook.state)]
+        outlook = self._outlook(snapshot, around, lane)
+        ways = self._candidates(lane, aim, outlook.state)
         found = None
-        for care in (_KIND, _DUE):
+        followed = foresight.followed(outlook.state, outlook.others)
+        for care in (_KIND, _DUE) if followed else (_DUE,):
             found = found or _mend(outlook, ways, command, most_mps2, care, held_up=held_up)
         if found is not None:
-            mended, way = found
-            self._promised = way.points
+            mended, self._promised = found
         else:
-            promised = ways[0] if self._promised is None else outlook.way(self._promised)
+            promised = ways[0] if self._promised is None else self._promised
             mended = _rescue(outlook, promised, command, most_mps2)
         self._motion.commanded(snapshot, outlook.state, mended.command)
         return mended
 
-    def _outlook(self, snapshot: Snapshot, lane: LaneId) -> _Outlook:
-        ego = snapshot.ego
-        solid = [other for other in (*snapshot.others, *snapshot.objects) if other.kind != "stop_sign"]
-        rows = [row for other in solid if (row := self._row(other, ego)) is not None]
-        others = np.array(rows, dtype=np.float64).reshape(len(rows), 7)
+    def _outlook(self, snapshot: Snapshot, around: Everybody, lane: LaneId) -> _Outlook:
+        ego, line_of = snapshot.ego, self._line_of
+        on = np.array([line_of.get(other.lane, -1) for other in around.solid[1:]], dtype=np.int64)
+        others = foresight.expected(around.numbers, on, self._lines, _ALONG, _FAR_M)
         size = ego.length_m / 2.0, ego.width_m / 2.0
         return _Outlook(self._motion.observe(snapshot), size, others, self._keep_clear(lane), self._table, self._dt_s)
 
@@ -206,24 +211,6 @@ class Junction:
             ]
             self._clear_from[lane] = np.array(rows, dtype=np.float64).reshape(-1, 5)
         return self._clear_from[lane]
-
-    def _row(self, other: VehicleState, ego: VehicleState) -> tuple[float, ...] | None:
-        """Another as `foresight` wants it; None if nothing can be said of where it will go, far away as it is.
-
-        Along a straight lane it goes on as the lane does, and keeps the room between the lane's middle and where it is.
-        """
-        x, y, heading = other.x_m, other.y_m, other.heading_rad
-        long, wide = other.length_m / 2.0, other.width_m / 2.0
-        line = None if other.lane is None else self._straight.get(other.lane)
-        speed = max(other.speed_mps, 0.0)
-        if line is not None and math.cos(heading - line.heading_rad) > _ALONG:
-            c, s = line.cos, line.sin
-            off = -s * (x - line.x_m) + c * (y - line.y_m)
-            wide += abs(off) / 2.0 + abs(math.sin(heading - line.heading_rad)) * long
-            return x + s * off / 2.0, y - c * off / 2.0, c, s, speed, long, wide
-        if math.hypot(x - ego.x_m, y - ego.y_m) > _FAR_M:
-            return None
-        return x, y, math.cos(heading), math.sin(heading), speed, long, wide
 
     def _candidates(self, lane: LaneId, aim: LaneId | None, state: Array) -> list[Array]:
         """The ways a command has to leave open: those from the ego's lane, unless that is another's, driven across."""
@@ -281,6 +268,10 @@ def _along(way: Array, state: Array) -> bool:
     return abs(wrap_to_pi(float(way[at, 2] - state[2]))) < _AWAY_RAD
 
 
+_Asked = tuple[float, float, int, int, int]
+"""Acceleration, steering, and which way, plan and care, all of which outlive an instant."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Outlook:
     """An instant, ready to be rolled on."""
@@ -291,22 +282,34 @@ class _Outlook:
     lanes: Array
     table: ShieldParameters
     dt_s: float
+    _ways: dict[int, _Way] = field(default_factory=dict[int, _Way])
+    _troubles: dict[_Asked, float] = field(default_factory=dict[_Asked, float])
+    """What was found already: many a search comes by the same plan twice."""
 
     def way(self, points: Array) -> _Way:
         """What is to be known of a way before it is driven."""
+        way = self._ways.get(id(points))
+        if way is None:
+            way = self._ways[id(points)] = self._seen(points)
+        return way
+
+    def _seen(self, points: Array) -> _Way:
         at = foresight.nearest(points, self.state[0], self.state[1], -1)
         first, last, hold = foresight.stretch(points, at, self.size, self.others, self.table.others_braking_mps2)
         del first
         beyond = last + math.ceil(self.size[0] / foresight.STEP_M)
-        return _Way(points, at, beyond, hold - self.table.margin_m)
+        return _Way(at, beyond, hold - self.table.margin_m)
 
-    def trouble_s(self, command: Command, way: _Way, plan: _Plan, care: _Care) -> float:
-        """Time until a plan after a command ends badly; infinite if it ends well."""
-        return self.trouble(command, way, plan, care)[0]
+    def trouble_s(self, command: Command, points: Array, plan: _Plan, care: _Care) -> float:
+        """Time until a plan after a command on a way ends badly; infinite if it ends well."""
+        asked = command.acceleration_mps2, command.steering_rad, id(points), id(plan), id(care)
+        found = self._troubles.get(asked)
+        if found is None:
+            found = self._troubles[asked] = self._foreseen(command, points, plan, care)
+        return found
 
-    def trouble(self, command: Command, way: _Way, plan: _Plan, care: _Care) -> tuple[float, int]:
-        """The same, and what it is."""
-        table = self.table
+    def _foreseen(self, command: Command, points: Array, plan: _Plan, care: _Care) -> float:
+        table, way = self.table, self.way(points)
         stops = plan.mps2 < 0.0
         return foresight.foresee(
             self.state,
@@ -314,7 +317,7 @@ class _Outlook:
             plan.mps2,
             _CLEARING_MPS,
             plan.law,
-            way.points,
+            points,
             way.at,
             way.beyond,
             way.hold_m,
@@ -336,22 +339,22 @@ class _Outlook:
             table.braking_mps2,
             self.dt_s,
             round((_STOP_S if stops else _CLEAR_S) / self.dt_s),
-        )
+        )[0]
 
-    def stops(self, command: Command, ways: Sequence[_Way], care: _Care) -> _Way | None:
+    def stops(self, command: Command, ways: Sequence[Array], care: _Care) -> Array | None:
         """The first way on which the car can still stop after a command."""
         return next((way for way in ways if self._ends_well(command, way, _STOPS, care)), None)
 
-    def clears(self, command: Command, ways: Sequence[_Way], care: _Care) -> _Way | None:
+    def clears(self, command: Command, ways: Sequence[Array], care: _Care) -> Array | None:
         """The first way, if on each of them the crossing can be cleared after a command: any may be taken."""
         return ways[0] if all(self._ends_well(command, way, _CLEARS, care) for way in ways) else None
 
-    def _ends_well(self, command: Command, way: _Way, plans: Sequence[_Plan], care: _Care) -> bool:
+    def _ends_well(self, command: Command, way: Array, plans: Sequence[_Plan], care: _Care) -> bool:
         return any(self.trouble_s(command, way, plan, care) == math.inf for plan in plans)
 
-    def wheel_rad(self, law: int, way: _Way, acceleration_mps2: float) -> float:
+    def wheel_rad(self, law: int, points: Array, acceleration_mps2: float) -> float:
         """Steering angle of a law."""
-        return foresight.wheel(law, self.state, way.points, way.at, acceleration_mps2, self.dt_s)
+        return foresight.wheel(law, self.state, points, self.way(points).at, acceleration_mps2, self.dt_s)
 
     def clearing_mps2(self, most_mps2: float) -> tuple[float, ...]:
         """Accelerations that clear the crossing, as far as the other rules let them."""
@@ -377,8 +380,8 @@ _STRAYS: Final = "The car would leave its way, or get into that of somebody who 
 
 
 def _mend(
-    outlook: _Outlook, ways: Sequence[_Way], command: Command, most_mps2: float, care: _Care, *, held_up: bool
-) -> tuple[Mended, _Way] | None:
+    outlook: _Outlook, ways: Sequence[Array], command: Command, most_mps2: float, care: _Care, *, held_up: bool
+) -> tuple[Mended, Array] | None:
     """The command with its acceleration mended, if that is enough, and the way that is then promised."""
     asked, steering = command.acceleration_mps2, command.steering_rad
     way = outlook.stops(command, ways, care)
@@ -391,7 +394,7 @@ def _mend(
     if way is not None:
         for _ in range(_HALVINGS):
             middle = (low + high) / 2.0
-            if outlook.stops(Command(middle, steering), [way], care):
+            if outlook.stops(Command(middle, steering), [way], care) is not None:
                 low = middle
             else:
                 high = middle
@@ -403,7 +406,7 @@ def _mend(
     return None
 
 
-def _rescue(outlook: _Outlook, way: _Way, command: Command, most_mps2: float) -> Mended:
+def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -> Mended:
     """The command with steering and acceleration of the way that was promised; the least bad one if none ends well."""
     asked = command.acceleration_mps2
     least = outlook.least_mps2
@@ -417,7 +420,7 @@ def _rescue(outlook: _Outlook, way: _Way, command: Command, most_mps2: float) ->
             for acceleration in accelerations:
                 for law in range(foresight.LAWS):
                     trial = Command(acceleration, outlook.wheel_rad(law, way, acceleration))
-                    if ends_well(trial, [way], care):
+                    if ends_well(trial, [way], care) is not None:
                         return Mended(trial, "lane", _STRAYS)
     best, latest = Command(least, 0.0), -1.0
     # Each begins with its own plan: to brake now, since it could still be cleared later, ends in the middle of it.
@@ -431,6 +434,6 @@ def _rescue(outlook: _Outlook, way: _Way, command: Command, most_mps2: float) ->
     if latest < math.inf:  # rather stand close by somebody's way than drive into it
         for law in range(foresight.LAWS):
             trial = Command(least, outlook.wheel_rad(law, way, least))
-            if outlook.stops(trial, [way], _BESIDE):
+            if outlook.stops(trial, [way], _BESIDE) is not None:
                 return Mended(trial, "yield", _STRAYS)
     return Mended(best, "yield" if best.acceleration_mps2 <= asked else "clear", _STRAYS)

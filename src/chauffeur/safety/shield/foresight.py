@@ -13,16 +13,14 @@ another is (x, y, cos, sin, speed, half length, half width).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, Final, TypeVar
+from typing import Final
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from chauffeur.safety.shield.compiled import compiled
+
 Array = NDArray[np.float64]
-_F = TypeVar("_F", bound=Callable[..., Any])
-_njit: Any = numba.njit
 
 STEP_M: Final = 0.5
 """Distance between two points of a way."""
@@ -38,6 +36,8 @@ _INERTIA = 1.0 / 12.0 * 29.0
 _GRIP = 15.0
 _TOP_YAW_RATE = 2.0 * math.pi
 _TOP_MPS = 15.0
+_ROLLING_MPS = 1.0
+"""Speed below which the wheel does nothing."""
 
 _LIGHT_RAD = 0.3
 _WHOLE_RAD = math.pi / 4
@@ -68,20 +68,16 @@ _MINDED, _FOLLOWS, _PAST = 1, 2, 0
 _LOOSE_M = 1.5
 
 
-def _compiled(function: _F) -> _F:
-    return _njit(cache=True, error_model="numpy", fastmath=False)(function)
-
-
-@_compiled
+@compiled
 def _wrapped(angle: float) -> float:
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
-@_compiled
+@compiled
 def _rates(
     heading: float, speed: float, lateral: float, yaw: float, steering: float
 ) -> tuple[float, float, float, float, float]:
-    if abs(speed) < 1.0:
+    if abs(speed) < _ROLLING_MPS:
         front = -lateral - _INERTIA / _HALF_LENGTH * yaw
         rear = -lateral + _INERTIA / _HALF_LENGTH * yaw
     else:
@@ -97,7 +93,7 @@ def _rates(
     )
 
 
-@_compiled
+@compiled
 def move(state: Array, acceleration: float, steering: float, dt_s: float) -> None:
     """One control period of the vehicle, in place."""
     state[5] = min(max(state[5], -_TOP_YAW_RATE), _TOP_YAW_RATE)
@@ -119,7 +115,7 @@ def move(state: Array, acceleration: float, steering: float, dt_s: float) -> Non
     state[5] += sixth * (a[4] + 2.0 * b[4] + 2.0 * c[4] + d[4])
 
 
-@_compiled
+@compiled
 def nearest(way: Array, x: float, y: float, guess: int) -> int:
     """The point of a way that is closest, searched downhill from a guess; a guess below 0 looks at all."""
     if guess < 0:
@@ -145,7 +141,7 @@ def nearest(way: Array, x: float, y: float, guess: int) -> int:
     return i
 
 
-@_compiled
+@compiled
 def _local(way: Array, i: int, x: float, y: float) -> tuple[float, float]:
     """(distance along the way, distance across it) of a place whose nearest point is `i`."""
     c, s = math.cos(way[i, 2]), math.sin(way[i, 2])
@@ -153,7 +149,7 @@ def _local(way: Array, i: int, x: float, y: float) -> tuple[float, float]:
     return i * STEP_M + c * dx + s * dy, -s * dx + c * dy
 
 
-@_compiled
+@compiled
 def _keeping(state: Array, way: Array, i: int, across: float, most_rad: float) -> float:
     """Lane keeping (`control.lane_keeping_steering`) towards a way, with the shield's flat approach."""
     speed = state[3] if abs(state[3]) > 1e-2 else 1e-2
@@ -165,11 +161,13 @@ def _keeping(state: Array, way: Array, i: int, across: float, most_rad: float) -
     return min(max(math.atan(2.0 * math.tan(slip)), -most_rad), most_rad)
 
 
-@_compiled
+@compiled
 def _best_wheel(state: Array, way: Array, i: int, acceleration: float, dt_s: float) -> float:
     """The wheel that leaves the car straightest on its way one period on, its turn carried on for a while."""
-    trial = np.empty(6)
     best, least = 0.0, math.inf
+    if abs(state[3]) < _ROLLING_MPS and abs(state[3] + acceleration * dt_s) < _ROLLING_MPS:
+        return best  # no wheel turns it then: the one that costs least is the best
+    trial = np.empty(6)
     for wheel in _WHEELS:
         trial[:] = state
         move(trial, acceleration, wheel, dt_s)
@@ -182,7 +180,7 @@ def _best_wheel(state: Array, way: Array, i: int, acceleration: float, dt_s: flo
     return best
 
 
-@_compiled
+@compiled
 def wheel(law: int, state: Array, way: Array, i: int, acceleration: float, dt_s: float) -> float:
     """Steering angle, rad, of a law (see `LAWS`) that brings the car back to its way."""
     if law == 1:
@@ -192,7 +190,7 @@ def wheel(law: int, state: Array, way: Array, i: int, acceleration: float, dt_s:
     return _keeping(state, way, i, _local(way, i, state[0], state[1])[1], _WHOLE_RAD if law == 3 else _LIGHT_RAD)
 
 
-@_compiled
+@compiled
 def reach_m(speed: float, time_s: float, acceleration: float) -> float:
     """How far another gets at most."""
     top = max(_FASTEST_MPS, speed)
@@ -200,7 +198,7 @@ def reach_m(speed: float, time_s: float, acceleration: float) -> float:
     return (speed + 0.5 * acceleration * gaining) * gaining + top * (time_s - gaining)
 
 
-@_compiled
+@compiled
 def _following_m(speed: float, time_s: float, acceleration: float, response_s: float, braking: float) -> float:
     """How far one who follows gets at most, if it responds in time (RSS)."""
     blind = min(time_s, response_s)
@@ -208,14 +206,14 @@ def _following_m(speed: float, time_s: float, acceleration: float, response_s: f
     return (speed + then) / 2.0 * blind + _least_m(then, time_s - blind, braking)
 
 
-@_compiled
+@compiled
 def _least_m(speed: float, time_s: float, braking: float) -> float:
     """How far another gets at least."""
     braked = min(time_s, speed / braking)
     return (speed - 0.5 * braking * braked) * braked
 
 
-@_compiled
+@compiled
 def stretch(way: Array, at: int, size: tuple[float, float], others: Array, braking: float) -> tuple[int, int, float]:
     """(first, last) point ahead of the body where it may meet anybody who crosses, -1 for none; where a lead may stop.
 
@@ -229,6 +227,9 @@ def stretch(way: Array, at: int, size: tuple[float, float], others: Array, braki
     hold = math.inf
     end = min(len(way), at + round(_AHEAD_M / STEP_M))
     begin = max(0, at - round(2.0 * size[0] / STEP_M))
+    directions = np.empty((end - begin, 2))
+    for i in range(begin, end):
+        directions[i - begin, 0], directions[i - begin, 1] = math.cos(way[i, 2]), math.sin(way[i, 2])
     for j in range(len(others)):
         x, y, c, s = others[j, 0], others[j, 1], others[j, 2], others[j, 3]
         on, closest = -1, _BESIDE_M * _BESIDE_M
@@ -237,7 +238,7 @@ def stretch(way: Array, at: int, size: tuple[float, float], others: Array, braki
             across = abs(-s * dx + c * dy)
             if across > others[j, 6] + size[0] + _LOOSE_M:
                 continue
-            cosine = math.cos(way[i, 2]) * c + math.sin(way[i, 2]) * s
+            cosine = directions[i - begin, 0] * c + directions[i - begin, 1] * s
             if cosine > _ALIGNED:
                 if dx * dx + dy * dy < closest:
                     closest, on = dx * dx + dy * dy, i
@@ -252,13 +253,65 @@ def stretch(way: Array, at: int, size: tuple[float, float], others: Array, braki
     return first, last, hold
 
 
-@_compiled
+@compiled
+def expected(numbers: Array, on: NDArray[np.int64], lines: Array, aligned: float, far_m: float) -> Array:
+    """The others as this file wants them, without those of whom nothing can be said, far away as they are.
+
+    Along a straight lane one goes on as the lane does, and keeps the room between the lane's middle and where it is.
+
+    Args:
+        numbers: `everybody.Everybody.numbers`, the ego first.
+        on: Row of `lines` each of the others is on, -1 for none.
+        lines: Straight lanes: a point, heading, cos, sin.
+        aligned: Cosine of the angle against its lane from which on one crosses it.
+        far_m: Who is on no such lane is not minded farther away than this.
+    """
+    rows = np.empty((len(on), 7))
+    count = 0
+    for j in range(len(on)):
+        x, y, heading = numbers[j + 1, 0], numbers[j + 1, 1], numbers[j + 1, 2]
+        long, wide = numbers[j + 1, 4] / 2.0, numbers[j + 1, 5] / 2.0
+        line = on[j]
+        if line >= 0 and math.cos(heading - lines[line, 2]) > aligned:
+            c, s = lines[line, 3], lines[line, 4]
+            off = -s * (x - lines[line, 0]) + c * (y - lines[line, 1])
+            wide += abs(off) / 2.0 + abs(math.sin(heading - lines[line, 2])) * long
+            x, y = x + s * off / 2.0, y - c * off / 2.0
+        elif math.sqrt((x - numbers[0, 0]) ** 2 + (y - numbers[0, 1]) ** 2) > far_m:
+            continue
+        else:
+            c, s = math.cos(heading), math.sin(heading)
+        rows[count, 0], rows[count, 1], rows[count, 2], rows[count, 3] = x, y, c, s
+        rows[count, 4], rows[count, 5], rows[count, 6] = max(numbers[j + 1, 3], 0.0), long, wide
+        count += 1
+    return rows[:count]
+
+
+@compiled
 def _joined(cosine: float, across: float) -> bool:
     """Whether the ego drives in the stream of another, who then follows and looks after the gap itself."""
     return cosine > _ALIGNED and abs(across) < _IN_STREAM_M
 
 
-@_compiled
+@compiled
+def _followed_by(state: Array, other: Array) -> bool:
+    """Whether another comes from behind in the stream the ego is in."""
+    ch, sh = math.cos(state[2]), math.sin(state[2])
+    c, s = other[2], other[3]
+    dx, dy = state[0] - other[0], state[1] - other[1]
+    return c * dx + s * dy > 0.0 and _joined(c * ch + s * sh, -s * dx + c * dy)
+
+
+@compiled
+def followed(state: Array, others: Array) -> bool:
+    """Whether anybody does."""
+    count = 0
+    for j in range(len(others)):
+        count += _followed_by(state, others[j])
+    return count > 0
+
+
+@compiled
 def _met(
     state: Array,
     size: tuple[float, float],
@@ -303,7 +356,7 @@ def _met(
     return False
 
 
-@_compiled
+@compiled
 def _in_a_lane(state: Array, size: tuple[float, float], lanes: Array, side_m: float) -> bool:
     """Whether the ego's body is in a lane other than its own, or in the way of it: nobody may be there yet."""
     ch, sh = math.cos(state[2]), math.sin(state[2])
@@ -319,13 +372,13 @@ def _in_a_lane(state: Array, size: tuple[float, float], lanes: Array, side_m: fl
     return False
 
 
-@_compiled
+@compiled
 def _beside_m(across: float, turned: float, size: tuple[float, float]) -> float:
     """How far a body reaches to the side of its way."""
     return abs(across) + abs(math.sin(turned)) * size[0] + abs(math.cos(turned)) * size[1]
 
 
-@_compiled
+@compiled
 def foresee(
     start: Array,
     first: tuple[float, float],
@@ -375,11 +428,8 @@ def foresee(
     """
     state = start.copy()
     minded = np.full(len(others), _MINDED)
-    ch, sh = math.cos(state[2]), math.sin(state[2])
     for j in range(len(others)):
-        c, s = others[j, 2], others[j, 3]
-        dx, dy = state[0] - others[j, 0], state[1] - others[j, 1]
-        if c * dx + s * dy > 0.0 and _joined(c * ch + s * sh, -s * dx + c * dy):
+        if _followed_by(state, others[j]):
             minded[j] = _FOLLOWS if followers else _PAST
     i = at
     along, across = _local(way, i, state[0], state[1])

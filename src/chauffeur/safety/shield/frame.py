@@ -11,12 +11,17 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
+import numpy as np
+
 from chauffeur.concept import LaneId, LaneView, Snapshot, VehicleState
 from chauffeur.geometry import wrap_to_pi
+from chauffeur.safety.shield.everybody import ANYWHERE, Array, Everybody, overlapping, placed
 
 CROSSING_RAD: Final = math.radians(40.0)
 """What is turned by less runs along: a lead, a follower, a car that changes lanes. What is turned further crosses."""
 _CROSSING_SINE: Final = math.sin(CROSSING_RAD)
+_LANE_M: Final = 4.0
+"""Who drifts claims so much more to that side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,15 +65,46 @@ class Body:
         return abs(other.s_m) - self.half_length_m - other.half_length_m
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Scene:
     """The ego, the others and the lanes, in the ego lane's frame; its curvature in 1/m grows with headings."""
 
     ego: Body
-    others: tuple[Body, ...]
     strips: tuple[Strip, ...]
     speed_limit_mps: float
-    curvature: float = 0.0
+    curvature: float
+    solid: tuple[VehicleState, ...]
+    """The ego and the others as in the snapshot, and in `rows` their numbers in the frame (`everybody.placed`)."""
+    rows: Array
+
+    @property
+    def others(self) -> tuple[Body, ...]:
+        """Everybody but the ego."""
+        return tuple(_bodies(self.rows[1:], self.solid))
+
+    def within(
+        self,
+        span: tuple[float, float],
+        side_m: float,
+        drift_mps: float,
+        where: int = ANYWHERE,
+        reach_m: float = math.inf,
+    ) -> list[Body]:
+        """Those who are, or are on their way, within a span of the road, up to a clear distance to its side.
+
+        Args:
+            span: (lowest, highest) place across the road, m from the centre of the ego's lane.
+            side_m: That distance.
+            drift_mps: Who moves sideways faster and does not cross claims the width of a lane more.
+            where: Ahead, behind, or anywhere.
+            reach_m: Those farther away along the lane than this, end to end, are left out.
+        """
+        found = overlapping(self.rows, span[0], span[1], side_m, drift_mps, _LANE_M, where, reach_m)
+        return _bodies(found, self.solid)
+
+
+def _bodies(rows: Array, solid: tuple[VehicleState, ...]) -> list[Body]:
+    return [Body(solid[int(i)].id, *numbers) for i, *numbers, _ in rows.tolist()]
 
 
 _EVERY_M: Final = 2.0
@@ -83,14 +119,11 @@ _STRAIGHT: Final = 1e-3
 class _Frame:
     """Origin on the ego's lane, its direction, and the strips of the same road there."""
 
-    x_m: float
-    y_m: float
-    heading_rad: float
-    cos: float
-    sin: float
     strips: tuple[Strip, ...]
     limit_mps: float
     curvature: float
+    numbers: Array
+    """The frame as `everybody.placed` wants it."""
 
 
 class Lens:
@@ -101,8 +134,14 @@ class Lens:
         self._place: tuple[LaneId, int, int] | None = None
         self._frame: _Frame | None = None
 
-    def look(self, snapshot: Snapshot, lane: LaneId | None) -> Scene | None:
-        """The scene in the frame of a lane, mostly the ego's own; None where there is no such lane."""
+    def look(self, snapshot: Snapshot, lane: LaneId | None, around: Everybody | None = None) -> Scene | None:
+        """The scene in the frame of a lane, mostly the ego's own; None where there is no such lane.
+
+        Args:
+            snapshot: The instant.
+            lane: Whose frame.
+            around: Everybody of the snapshot, where that is known already.
+        """
         ego = snapshot.ego
         if lane is None:
             return None
@@ -113,10 +152,11 @@ class Lens:
         frame = self._frame
         if frame is None:
             return None
-        solid = (other for other in (*snapshot.others, *snapshot.objects) if other.kind != "stop_sign")
-        from_m = _place(ego, frame)[0]
-        others = tuple(_body(other, from_m, frame) for other in solid)
-        return Scene(_body(ego, from_m, frame), others, frame.strips, frame.limit_mps, frame.curvature)
+        around = Everybody.of(snapshot) if around is None else around
+        rows = placed(around.numbers, frame.numbers)
+        return Scene(
+            _bodies(rows[:1], around.solid)[0], frame.strips, frame.limit_mps, frame.curvature, around.solid, rows
+        )
 
 
 def _frame_at(lanes: tuple[LaneView, ...], own: LaneId, cell_x: int, cell_y: int) -> _Frame | None:
@@ -135,7 +175,8 @@ def _frame_at(lanes: tuple[LaneView, ...], own: LaneId, cell_x: int, cell_y: int
     curvature = wrap_to_pi(ahead - heading) / _PREVIEW_M
     if abs(curvature) < _STRAIGHT:
         curvature = 0.0
-    return _Frame(x, y, heading, c, s, tuple(strips), beside[own].speed_limit_mps, curvature)
+    numbers = np.array([x, y, heading, c, s, curvature, _CROSSING_SINE])
+    return _Frame(tuple(strips), beside[own].speed_limit_mps, curvature, numbers)
 
 
 def _nearest(lane: LaneView, x: float, y: float) -> tuple[float, float, float]:
@@ -156,33 +197,3 @@ def _nearest(lane: LaneView, x: float, y: float) -> tuple[float, float, float]:
         if distance < best[0]:
             best = (distance, px, py, math.atan2(uy, ux))
     return best[1], best[2], best[3]
-
-
-def _place(vehicle: VehicleState, frame: _Frame) -> tuple[float, float, float]:
-    """(along, across, heading of the lane there) from the frame's origin; the heading is against the frame's."""
-    dx, dy = vehicle.x_m - frame.x_m, vehicle.y_m - frame.y_m
-    along, across = frame.cos * dx + frame.sin * dy, -frame.sin * dx + frame.cos * dy
-    if frame.curvature == 0.0:
-        return along, across, 0.0
-    # The lane is a circle about (0, radius), on the side where headings grow if the radius is positive.
-    radius = 1.0 / frame.curvature
-    side = math.copysign(1.0, radius)
-    turned = side * math.atan2(along, side * (radius - across))
-    return turned * radius, radius - side * math.hypot(along, radius - across), turned
-
-
-def _body(vehicle: VehicleState, from_m: float, frame: _Frame) -> Body:
-    along, across, lane_heading = _place(vehicle, frame)
-    heading = wrap_to_pi(vehicle.heading_rad - frame.heading_rad - lane_heading)
-    c, s = math.cos(heading), math.sin(heading)
-    half_length, half_width = vehicle.length_m / 2.0, vehicle.width_m / 2.0
-    return Body(
-        vehicle.id,
-        along - from_m,
-        across,
-        heading,
-        vehicle.speed_mps * c,
-        vehicle.speed_mps * s,
-        abs(c) * half_length + abs(s) * half_width,
-        abs(s) * half_length + abs(c) * half_width,
-    )

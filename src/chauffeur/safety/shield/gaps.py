@@ -89,3 +89,13 @@ def greatest_acceleration(
         if closing <= stronger * slowed / lead_braking_mps2:
             then = min(then, slowed + closing)
     return max(-braking_mps2, (then - speed_mps) / dt_s)
+
+
+def free_gap_m(speed_mps: float, acceleration_mps2: float, braking_mps2: float, dt_s: float) -> float:
+    """Gap beyond which `greatest_acceleration` is at least `acceleration_mps2`, whatever the lead does.
+
+    It is what a lead that stands asks for, for the speed one period on; one that drives asks for less, as long as it
+    can brake at all.
+    """
+    then = max(speed_mps, 0.0) + max(acceleration_mps2, 0.0) * dt_s
+    return (then + 3.0 * braking_mps2 * dt_s) * then / (2.0 * braking_mps2)

@@ -18,8 +18,9 @@ from dataclasses import dataclass
 
 from chauffeur.concept import Command, Intervention, LaneId, Limits, Snapshot, VehicleState
 from chauffeur.safety.shield.crossing import Junction
+from chauffeur.safety.shield.everybody import AHEAD, BEHIND, Everybody
 from chauffeur.safety.shield.frame import Body, Lens, Scene, Strip
-from chauffeur.safety.shield.gaps import greatest_acceleration, rss_gap_m
+from chauffeur.safety.shield.gaps import free_gap_m, greatest_acceleration, rss_gap_m
 from chauffeur.safety.shield.sweep import recovery_steering, swept, yaw_rate
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
 from chauffeur.safety.words import speed_words
@@ -27,7 +28,6 @@ from chauffeur.safety.words import speed_words
 Span = tuple[float, float]
 """(lowest, highest) place across the road, m from the centre of the ego's lane."""
 
-_LANE_M = 4.0
 _CORNER_M = 0.5
 _CREEP_M = 1e-3
 """What counts as further over a line than the body is: any more, or it could creep there period by period."""
@@ -39,6 +39,8 @@ _TOUCH_M = 0.05
 """How far a body must reach over a line to be in the lane beyond it."""
 _LEVEL_MPS2 = 1e-6
 _LEVEL_RAD = 1e-9
+_SURE_M = 1.0
+"""More than rounding may take from a gap."""
 _SLOWING_MPS2 = 1.0
 """Braking towards the speed limit when a car is above it."""
 
@@ -91,11 +93,12 @@ class Shield:
             command: What the controllers ask; numbers that are none stop the car.
             aim: Lane the controllers steer for. Where ways part, the nearest lane need not be the car's own.
         """
-        scene = self._lens.look(snapshot, snapshot.ego.lane) if _known(snapshot.ego) else None
+        around = Everybody.of(snapshot)
+        scene = self._lens.look(snapshot, snapshot.ego.lane, around) if _known(snapshot.ego) else None
         if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
             safe = self._standing_still(snapshot, scene)
             return Guarded(safe, (Intervention("finite", "A command that is no number was replaced.", command, safe),))
-        if not all(_known(one) for one in (snapshot.ego, *snapshot.others, *snapshot.objects)):
+        if not around.known:
             safe = self._standing_still(snapshot, scene)
             return Guarded(safe, (Intervention("finite", "Where somebody is cannot be told.", command, safe),))
         if scene is None:
@@ -104,13 +107,13 @@ class Shield:
         lane = snapshot.ego.lane
         assert lane is not None
         if aim is not None and _parts_from(lane, aim):
-            aimed = self._aim_lens.look(snapshot, aim)
+            aimed = self._aim_lens.look(snapshot, aim, around)
             if aimed is not None:
                 lane, scene = aim, aimed
         steered = self._across(scene, snapshot.ego, command, crossings)
         self._back = steered.back
         said = list(steered.said)
-        mended = self._along(scene, snapshot, lane, aim, steered, said)
+        mended = self._along(scene, snapshot, around, lane, aim, steered, said)
         return Guarded(mended, tuple(said))
 
     def _standing_still(self, snapshot: Snapshot, scene: Scene | None) -> Command:
@@ -195,11 +198,10 @@ class Shield:
             if strip is own or not further:
                 continue
             touched = _in(strip, (low, high))
-            for other in scene.others:
-                if _overlaps(other, (strip.low_m, strip.high_m), 0.0, self._table.drift_mps):
-                    reason = self._too_close(ego, other, touched)
-                    if reason:
-                        return reason
+            for other in scene.within((strip.low_m, strip.high_m), 0.0, self._table.drift_mps):
+                reason = self._too_close(ego, other, touched)
+                if reason:
+                    return reason
         return ""
 
     def _too_close(self, ego: Body, other: Body, touched: bool) -> str:
@@ -236,6 +238,7 @@ class Shield:
         self,
         scene: Scene,
         snapshot: Snapshot,
+        around: Everybody,
         lane: LaneId,
         aim: LaneId | None,
         steered: _Steered,
@@ -260,7 +263,7 @@ class Shield:
         if crossings:
             most = bound.acceleration_mps2
             held_up = bound.rule == "gap" and most <= 0.0
-            result = self._guard_of(snapshot).mend(snapshot, lane, aim, mended, most, held_up=held_up)
+            result = self._guard_of(snapshot).mend(snapshot, around, lane, aim, mended, most, held_up=held_up)
             if result.rule:
                 mended, rule, reason = result.command, result.rule, result.reason
         faster = mended.acceleration_mps2 - asked
@@ -279,12 +282,9 @@ class Shield:
         towards = (most - speed) / self._dt_s
         allowed = towards if towards >= 0.0 else max(towards, -_SLOWING_MPS2)
         strictest = _Cap(min(allowed, table.acceleration_mps2), "speed", f"No faster than {speed_words(most)} here.")
-        for other in scene.others:
-            if (
-                other.s_m <= 0.0
-                or (crossings and other.crosses)
-                or not _overlaps(other, span, table.side_m, table.drift_mps)
-            ):
+        free = table.margin_m + free_gap_m(speed, table.acceleration_mps2, table.braking_mps2, self._dt_s) + _SURE_M
+        for other in scene.within(span, table.side_m, table.drift_mps, AHEAD, free):
+            if crossings and other.crosses:
                 continue
             gap = ego.gap_m(other)
             cap = self._greatest(speed, gap - table.margin_m, other.along_mps)
@@ -299,9 +299,7 @@ class Shield:
     def _spared(self, scene: Scene, span: Span, wanted: float) -> float:
         """Braking that a car following too closely can still answer; `wanted` where nobody does."""
         table, ego = self._table, scene.ego
-        for other in scene.others:
-            if other.s_m >= 0.0 or not _overlaps(other, span, 0.0, table.drift_mps):
-                continue
+        for other in scene.within(span, 0.0, table.drift_mps, BEHIND):
             gap = ego.gap_m(other) - table.margin_m
             needed = rss_gap_m(
                 other.along_mps, ego.along_mps, table.others_response_s, 0.0, table.others_sure_braking_mps2, -wanted
@@ -335,15 +333,3 @@ def _lanes_wide(scene: Scene, span: Span) -> Span:
     """A span widened to the edges of every lane it is in."""
     lanes = [strip for strip in scene.strips if _in(strip, span)]
     return min([span[0], *(s.low_m for s in lanes)]), max([span[1], *(s.high_m for s in lanes)])
-
-
-def _overlaps(other: Body, span: Span, side_m: float, drift_mps: float) -> bool:
-    """Whether a body is, or is on its way, within a span; one that drifts claims the width of a lane more."""
-    left = other.d_m - other.half_width_m - side_m
-    right = other.d_m + other.half_width_m + side_m
-    drifts = abs(other.across_mps) > drift_mps and not other.crosses
-    if drifts and other.across_mps > 0.0:
-        right += _LANE_M
-    elif drifts:
-        left -= _LANE_M
-    return left < span[1] and right > span[0]

@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 from chauffeur.control import LAMPILOT_STEERING, LaneKeepingParameters, lane_keeping_steering
+from chauffeur.safety.shield.compiled import compiled
 from chauffeur.safety.shield.frame import Body
 
 _PERIODS = 14
@@ -20,6 +21,8 @@ _APPROACH_RAD = 0.2
 """Angle at which the shield comes back to a lane's centre: a slow car turned further would stick out of the lane."""
 _STRAIGHT_RAD = 0.02
 _CENTRED_M = 0.1
+_SLOWEST_MPS = 1e-2
+"""Lane keeping divides by no less."""
 
 
 def recovery_steering(ego: Body, centre_m: float, speed_mps: float, most_rad: float, curvature: float = 0.0) -> float:
@@ -71,21 +74,67 @@ def swept(
         curvature: Of the lane, 1/m.
     """
     parameters = _with_wheel(most_rad)
-    half_length, half_width = size_m[0] / 2.0, size_m[1] / 2.0
-    bend = curvature * speed_mps  # how fast the lane's heading turns under the car, rad/s
-    d, heading = ego.d_m, ego.heading_rad
+    return _swept(
+        (ego.d_m, ego.heading_rad, speed_mps, curvature * speed_mps),
+        (size_m[0] / 2.0, size_m[1] / 2.0),
+        (steering_rad, centre_m, dt_s),
+        (
+            parameters.lateral_gain_per_s,
+            parameters.heading_gain_per_s,
+            parameters.preview_s,
+            parameters.max_approach_rad,
+            parameters.max_steering_rad,
+            parameters.length_m / 2.0,
+        ),
+    )
+
+
+@compiled
+def _clipped(value: float, bound: float) -> float:
+    least = value if value < bound else bound
+    return least if least > -bound else -bound
+
+
+@compiled
+def _keeping(
+    speed: float, heading: float, offset: float, ahead: float, gains: tuple[float, float, float, float, float, float]
+) -> float:
+    """`control.lane_keeping_steering`, to the last bit."""
+    if abs(speed) <= _SLOWEST_MPS:
+        speed = _SLOWEST_MPS if speed >= 0.0 else -_SLOWEST_MPS
+    approach = _clipped(math.asin(_clipped(-gains[0] * offset / speed, 1.0)), gains[3])
+    turn = (ahead + approach - heading + math.pi) % (2.0 * math.pi) - math.pi
+    slip = math.asin(_clipped(gains[5] / speed * (gains[1] * turn), 1.0))
+    return _clipped(math.atan(2.0 * math.tan(slip)), gains[4])
+
+
+@compiled
+def _swept(
+    ego: tuple[float, float, float, float],
+    half: tuple[float, float],
+    asked: tuple[float, float, float],
+    gains: tuple[float, float, float, float, float, float],
+) -> tuple[float, float]:
+    """`swept` in numbers.
+
+    Args:
+        ego: d, heading, speed, and how fast the lane turns under it, rad/s.
+        half: Half length, half width.
+        asked: Steering angle, lane centre, control period.
+        gains: Those of lane keeping, its bounds, and half the length.
+    """
+    d, heading, speed, bend = ego
+    steering, centre, dt_s = asked
     low = high = d
     for period in range(_PERIODS + 1):
-        wide = abs(math.sin(heading)) * half_length + abs(math.cos(heading)) * half_width
-        low, high = min(low, d - wide), max(high, d + wide)
-        offset = d - centre_m
-        if period and abs(heading) < _STRAIGHT_RAD and abs(offset) < _CENTRED_M:
+        wide = abs(math.sin(heading)) * half[0] + abs(math.cos(heading)) * half[1]
+        low = d - wide if d - wide < low else low
+        high = d + wide if d + wide > high else high
+        offset = d - centre
+        if period > 0 and abs(heading) < _STRAIGHT_RAD and abs(offset) < _CENTRED_M:
             break
-        if period:
-            angle = lane_keeping_steering(speed_mps, heading, offset, bend * parameters.preview_s, parameters)
-        else:
-            angle = steering_rad
-        slip = _slip(angle)
-        d += speed_mps * math.sin(heading + slip) * dt_s
-        heading += (_turning(speed_mps, slip) - bend) * dt_s
+        angle = _keeping(speed, heading, offset, bend * gains[2], gains) if period > 0 else steering
+        slip = math.atan(0.5 * math.tan(angle))
+        d += speed * math.sin(heading + slip) * dt_s
+        heading += (speed * math.sin(slip) / _HALF_LENGTH_M - bend) * dt_s
     return low, high

@@ -63,7 +63,15 @@ class HighwayPerception:
     def vehicle(self, vehicle_id: int) -> VehicleState:
         """State of a vehicle or object. Raises KeyError for an unknown id."""
         core, row = self._core, self._row(vehicle_id)
-        numbers, traits = core.floats[row].tolist(), core.ints[row]
+        return self._state(row, core.floats[row].tolist(), core.ints[row].tolist())
+
+    def everybody(self) -> tuple[VehicleState, ...]:
+        """States of all: the ego, the other vehicles, the objects; ids are places in it."""
+        core = self._core
+        rows = zip(core.floats.tolist(), core.ints.tolist(), strict=True)
+        return tuple([self._state(i, numbers, traits) for i, (numbers, traits) in enumerate(rows)])
+
+    def _state(self, vehicle_id: int, numbers: list[float], traits: list[int]) -> VehicleState:
         return VehicleState(
             id=vehicle_id,
             kind=_KINDS[traits[at.KIND]],
@@ -79,7 +87,7 @@ class HighwayPerception:
 
     def others(self) -> tuple[VehicleState, ...]:
         """Every vehicle and object but the ego."""
-        return tuple(self.vehicle(i) for i in range(1, len(self._core.floats)))
+        return self.everybody()[1:]
 
     def has_lane(self, lane: LaneId) -> bool:
         """Whether the road has this lane."""

@@ -55,6 +55,7 @@ class HighwayWorld:
         self._driver: HighwayDriver | None = None
         self._tick = 0
         self._clock_s = 0.0
+        self._seen: Snapshot | None = None
 
     @property
     def dt_s(self) -> float:
@@ -87,6 +88,7 @@ class HighwayWorld:
         self._core = start.core.copy()
         self._clock_s = start.clock_s
         self._tick = 0
+        self._seen = None
         self._perception = HighwayPerception(self._core, start.scene.kind, start.scene.emergency_lanes)
         self._driver = None
         return self.snapshot()
@@ -96,7 +98,7 @@ class HighwayWorld:
         twin = HighwayWorld()
         twin._start = start = self._started()
         twin._core = core = self._road().copy()
-        twin._clock_s, twin._tick = self._clock_s, self._tick
+        twin._clock_s, twin._tick, twin._seen = self._clock_s, self._tick, self._seen
         twin._perception = HighwayPerception(core, start.scene.kind, start.scene.emergency_lanes)
         if self._driver is not None:
             twin._driver = self._driver.copy(core, twin._perception)
@@ -112,31 +114,38 @@ class HighwayWorld:
             raise DataError("An observation ends too early.")
         tick, clock_s = _INSTANT.unpack_from(observation)
         self._road().adopt(observation[_INSTANT.size :])
-        self._tick, self._clock_s = tick, clock_s
+        self._tick, self._clock_s, self._seen = tick, clock_s, None
 
     def step(self, command: Command) -> Command:
         """Advance 0.1 s under `command`; returns what the vehicle really applied."""
         if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
             raise ValueError(f"A command must be finite numbers, not {command}.")
         core = self._road()
+        self._seen = None
         self._clock_s += DT_S
         core.advance(command.acceleration_mps2, command.steering_rad)
         self._tick += 1
         return Command(float(core.out[at.OUT_ACCELERATION]), float(core.out[at.OUT_STEERING]))
 
     def snapshot(self) -> Snapshot:
-        """The present instant as frozen values."""
+        """The present instant as frozen values: taken when first asked for, the same until the world goes on."""
+        if self._seen is None:
+            self._seen = self._snapshot()
+        return self._seen
+
+    def _snapshot(self) -> Snapshot:
         start, core, perception = self._started(), self._road(), self.perception()
         front, gap = int(core.out[at.OUT_FRONT]), float(core.out[at.OUT_GAP])
         lead = None if front < 0 else Lead(front, gap, float(core.floats[front, at.SPEED]))
         sign = perception.stop_sign_ahead(frozenset())
+        everybody = perception.everybody()
         return Snapshot(
             time_s=self._tick * DT_S,
             tick=self._tick,
             kind=start.scene.kind,
-            ego=perception.vehicle(EGO),
-            others=tuple(perception.vehicle(i) for i in range(1, core.vehicles)),
-            objects=tuple(perception.vehicle(i) for i in range(core.vehicles, len(core.floats))),
+            ego=everybody[EGO],
+            others=everybody[1 : core.vehicles],
+            objects=everybody[core.vehicles :],
             lanes=start.lanes,
             front=lead,
             stop_sign_m=None if sign is None else sign[1],
