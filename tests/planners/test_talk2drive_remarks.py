@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from chauffeur.concept import (
+    ConfigError,
     Context,
     History,
     Instruction,
@@ -20,12 +21,18 @@ from chauffeur.concept import (
 )
 from chauffeur.concept.nouns import Lead
 from chauffeur.planners.base import Planner
+from chauffeur.planners.onboard.words import words_file
 from chauffeur.planners.registry import make_planner
 from chauffeur.planners.talk2drive.lanes import complaint_in, eased_mps, fitting_mps
-from chauffeur.planners.talk2drive.lot import wanted_place
+from chauffeur.planners.talk2drive.lot import wanted_pace, wanted_place
 from chauffeur.planners.talk2drive.moods import mood_of, pace_complaint
-from chauffeur.planners.talk2drive.remarks import GIVE_WAY, GO, MOVE_RIGHT, OVERTAKE, taken_for
+from chauffeur.planners.talk2drive.patterns import WORDS, said
+from chauffeur.planners.talk2drive.remarks import GIVE_WAY, GO, MOVE_RIGHT, OVERTAKE, STAY, stands, taken_for
 
+GROUPS = {
+    name: [line[1:-1] for group in words_file(name, WORDS) for line in group if line[0] == "[" and line[-1] == "]"]
+    for name in ("lot.txt", "moods.txt", "road.txt")
+}
 SIGN = 30.0
 BEHIND = Situation("highway", 24.0, SIGN, 3, 1, False, Lead(7, 40.0, 22.0), None)
 LEFT = Situation("highway", 28.0, SIGN, 3, 0, False, None, None)
@@ -62,7 +69,7 @@ def driven(planner: Planner, wish: str, situation: Situation, limits: Limits | N
         ("This van crawls along.", LEFT, None),
         ("This van crawls along.", RIGHT, None),  # nobody is seen ahead
         ("Never mind the slow van.", BEHIND, None),
-        ("Do not overtake that slow van.", BEHIND, None),
+        ("Do not overtake that slow van.", BEHIND, STAY),
         ("You are slow today.", BEHIND, None),
         ("Please slow down behind him.", BEHIND, None),
         ("The one behind us is tailgating.", LEFT, MOVE_RIGHT),
@@ -81,6 +88,11 @@ def driven(planner: Planner, wish: str, situation: Situation, limits: Limits | N
         ("Wait until nobody is coming, then cross slowly.", CROSSING, None),
         ("A lorry comes from the right.", CROSSING, GIVE_WAY),
         ("The street looks packed with cars and busy.", CROSSING, GIVE_WAY),
+        ("There is no need to weave about.", BEHIND, STAY),
+        ("She drives so sensibly, that lady.", BEHIND, STAY),
+        ("Let those two pass first.", CROSSING, GIVE_WAY),
+        ("The bus won't wait for me.", CROSSING, None),
+        ("Stop the car!", CROSSING, None),
         ("I can't see a soul.", LOT, None),
     ],
 )
@@ -89,10 +101,19 @@ def test_a_remark_is_a_wish_where_the_road_fits_it(wish: str, situation: Situati
     assert (None if found is None else found.wish) == meant
 
 
-@pytest.mark.parametrize("wish", [OVERTAKE, MOVE_RIGHT, GO])
-def test_a_wish_is_no_remark(wish: str) -> None:
-    for situation in (BEHIND, LEFT, RIGHT):
-        assert taken_for(wish, situation) is None
+def test_what_a_remark_was_taken_for_is_read_as_it_stands(planner: Planner) -> None:
+    for wish in (OVERTAKE, MOVE_RIGHT, STAY, GO, GIVE_WAY):
+        for situation in (BEHIND, LEFT, CROSSING):
+            plan(planner, wish, situation)  # ends
+    assert driven(planner, STAY, BEHIND).lane == 0
+
+
+def test_a_stop_is_one_where_it_is_asked_for(planner: Planner) -> None:
+    assert stands("Stop the car!")
+    assert stands("please stop here now")
+    assert not stands("There is a stop sign.")
+    assert driven(planner, "Stop the car!", CROSSING).target_speed_mps == 0.0
+    assert driven(planner, "I can see a stop sign.", CROSSING).target_speed_mps == 8.0
 
 
 def test_a_remark_says_what_it_was_taken_for_and_drives_it(planner: Planner) -> None:
@@ -197,6 +218,24 @@ def test_feedback_that_praises_is_no_complaint() -> None:
 
 
 @pytest.mark.parametrize(
+    ("wish", "sign"),
+    [
+        ("A bit faster, we are not parking yet.", 1),
+        ("Could you speed up along here?", 1),
+        ("Don't park, go more slowly.", -1),
+        ("Walking pace, please.", -1),
+        ("Park here, but slowly.", 0),
+        ("Park by the exit.", 0),
+    ],
+)
+def test_a_pace_asked_for_in_a_lot(planner: Planner, wish: str, sign: int) -> None:
+    assert wanted_pace(wish) == sign
+    found = driven(planner, wish, LOT)
+    assert bool(found.route) == (not sign)
+    assert not sign or (found.target_speed_mps - LOT.speed_mps) * sign > 0.0
+
+
+@pytest.mark.parametrize(
     ("wish", "place"),
     [
         ("Look for a bay at the exit gate.", "exit"),
@@ -204,8 +243,18 @@ def test_feedback_that_praises_is_no_complaint() -> None:
         ("Anywhere is fine with me.", "nearest"),
         ("I need some fresh air.", "nearest"),
         ("We would be boxed in back there.", "exit"),
+        ("I twisted my ankle.", "stadium"),
+        ("We are not parking yet.", ""),
         ("Lovely evening.", ""),
     ],
 )
 def test_places_in_a_lot(wish: str, place: str) -> None:
     assert wanted_place(wish) == place
+
+
+def test_every_group_of_words_is_there_and_finds_no_nothing() -> None:
+    for file, groups in GROUPS.items():
+        for name in groups:
+            assert not said(file, name).search("")
+    with pytest.raises(ConfigError, match="no group"):
+        said("road.txt", "clouds")

@@ -6,7 +6,6 @@ control. A wish for something else is declined in words, and so is one that take
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -31,9 +30,9 @@ from chauffeur.planners.talk2drive.lanes import (
     passing_mps,
     unsaid_turn,
 )
-from chauffeur.planners.talk2drive.lot import parks, wanted_place
+from chauffeur.planners.talk2drive.lot import parks, wanted_pace, wanted_place
 from chauffeur.planners.talk2drive.moods import EASE, HURRY, mood_of, pace_complaint
-from chauffeur.planners.talk2drive.remarks import Remark, taken_for
+from chauffeur.planners.talk2drive.remarks import Remark, stands, taken_for
 from chauffeur.planners.talk2drive.style import (
     BRISK_SHARE,
     LOOK_AHEAD,
@@ -50,20 +49,16 @@ _ELSEWHERE: Final[dict[str, str]] = {
     "pull_over": "With these parameters I cannot pull over; I can slow down or stop.",
 }
 """What cannot be said in parameters, by the first part of its intent."""
-_GIVES_WAY: Final = re.compile(
-    r"\b(?:yield|give way|let (?:them|him|her|others?|the \w+|cross\w*)\b.*\b(?:go|pass|by|through|first|cross)"
-    r"|wait for (?:them|the|those|others?|cross\w*))\b",
-    re.IGNORECASE,
-)
 _WHERE_TO: Final = "I am not sure what you want. Shall I turn at the junction, and to which side?"
 _OFF_TOPIC: Final = "I only drive"
 """How the model declines what is no wish about driving."""
 _GIVES_WAY_SHARE: Final = 0.8
 """Of the present speed, as for a careful drive."""
-_OPEN: Final = ("ask", "refuse", "style.", "speed.", "gap.", "lane.keep", "follow")
+_OPEN: Final = ("ask", "refuse", "style.", "speed.increase", "speed.decrease", "gap.", "lane.keep", "follow")
 """Readings of words that may have named nothing to do."""
 _HASTY: Final = ("style.hurry", "style.sporty", "speed.increase", "speed.max")
 _NOT_EASY: Final = ("ask", "refuse", "style.hurry", "style.sporty", "speed.increase", "speed.max", "gap.decrease")
+_AGAINST: Final = {1: "speed.decrease", -1: "speed.increase"}
 _ONE_BY_ONE: Final = "With these parameters I can do one thing at a time. What shall I do first?"
 
 
@@ -103,22 +98,24 @@ class EmbeddedParameters:
         Args:
             request: What is asked for.
             begun: When, for the latency.
-            moody: Whether words that name nothing to do may be read for the mood they show.
+            moody: Whether words may be read as remarks, and for the mood they show.
         """
         wish, situation = request.instruction.text, request.context.situation
         in_lot = situation.world == "parking"
         complaint = pace_complaint(wish, in_lot=in_lot) if moody else 0
+        asked = wanted_pace(wish) if in_lot else 0
+        remark = taken_for(wish, situation) if moody else None
         if not danger(wish):  # which the model's own reading refuses
-            if in_lot and not complaint and (place := wanted_place(wish)):
+            if in_lot and not complaint and not asked and (place := wanted_place(wish)):
                 return self._park(place, request, begun)
-            if situation.world == "intersection" and _GIVES_WAY.search(wish):
-                return self._give_way(request, begun)
+            if situation.world == "intersection" and remark is not None:
+                return self._as_taken(remark, request, begun)
         alike = History(tuple(item for item in request.history.items if item.similarity >= 0.0))
         settled = self._model.settle(replace(request, history=alike), begun)
         intent = settled.intent if isinstance(settled, Plan) else settled.linked.choice.intent
         if isinstance(settled, Plan) and _forbidden(settled):
             return settled
-        if (remark := taken_for(wish, situation)) is not None:
+        if remark is not None:
             return self._as_taken(remark, request, begun)
         if complaint:
             return self._changed(complaint, request, begun)
@@ -127,16 +124,20 @@ class EmbeddedParameters:
         if isinstance(settled, Plan):
             if settled.intent in ("ask", "refuse") and (sign := complaint_in(wish)):
                 return self._changed(sign, request, begun)
+            if asked:
+                return self._changed(asked, request, begun)
             if in_lot and parks(settled.intent):
                 return self._park("nearest", request, begun)
             return settled
         linked, used = settled.linked, settled.used
-        if in_lot and parks(intent):
+        if asked and (not intent.startswith("speed.") or intent.startswith(_AGAINST[asked])):
+            return self._changed(asked, request, begun)
+        if in_lot and (parks(intent) or (intent.startswith("style.") and moody and not mood_of(wish))):
             return self._park("nearest", request, begun)
         if unsaid_turn(wish, intent):
             return declined(self, _WHERE_TO, begun, intent="ask", raw=settled.written.text)
         found = parameters_of(settled, request.limits)
-        if isinstance(found, Declined) and situation.world == "intersection" and intent == "yield":
+        if situation.world == "intersection" and (intent == "yield" or (intent == "stop" and not stands(wish))):
             return self._give_way(request, begun)
         if isinstance(found, Declined):
             return declined(self, found.words, begun, intent=intent, raw=settled.written.text)

@@ -1,57 +1,37 @@
 """What people want in a parking lot: hardly anybody says "park" there, and nearly everybody wants to.
 
-An event nearby is where they go to; leaving soon, or before the crowd, makes the exit worth more than the walk. Where
-the words say nothing of a place and nothing of the speed, the nearest free spot is meant.
+An event nearby is where they go to, the more so the worse they walk; leaving soon, or before the crowd, makes the exit
+worth more than the walk; who is done with driving takes the nearest free spot. A wish for another pace is for the pace.
 """
 
 from __future__ import annotations
 
 import re
-from typing import Final
+from typing import Final, Literal
 
+from chauffeur.planners.talk2drive.patterns import said
 from chauffeur.planners.talk2drive.style import place_of
 
-_PLACES: Final[tuple[tuple[str, re.Pattern[str]], ...]] = (
-    (
-        "exit",
-        re.compile(
-            r"\b(?:exit|way out|trapped|stuck|boxed in|leav(?:e|es|ing)|(?:get|getting|got) out|out of (?:here"
-            r"|this)|jam(?:med)?|crowd"
-            r"|gone before|away before|catch (?:my|the|a) (?:plane|flight|train|bus)|pick(?:ing)? up (?!the pace|speed)"
-            r"|drop(?:ping)? off"
-            r"|right (?:after|afterwards)|off we go|drive on)\b",
-            re.IGNORECASE,
-        ),
-    ),
-    (
-        "stadium",
-        re.compile(
-            r"\b(?:stadium|arena|gate|entrance|game|match|concert|show|event|seats?|tickets?|kick-?off|anthem|team"
-            r"|football|soccer|baseball)\b",
-            re.IGNORECASE,
-        ),
-    ),
-)
-_ARRIVED: Final = re.compile(
-    r"\b(?:restroom|bathroom|toilet|loo|stretch|legs?|fresh air|some air|stuffy|hot in here|coffee|hungry|thirsty"
-    r"|starving|(?:my )?phone|call|smoke|cigarette|dog|puppy|sit(?:ting)? still|(?:get|got|getting|step|out) out"
-    r"|out of (?:the|this) car|stiff|walk(?:ing)? (?:a bit|around|is|will|does|isn't)|(?:don't|do not) mind walking"
-    r"|driv\w+ around|circling|cruising around|search\w*|looking for|be parked|stand(?:ing)? (?:here|there)"
-    r"|(?:does not|doesn't|not) matter|don't care|wherever|anywhere|whichever|any (?:one|of them) will"
-    r"|whole lot|all (?:the )?(?:way )?(?:through|around) (?:the|this) lot)\b",
-    re.IGNORECASE,
-)
-"""Somebody who is done with driving, wherever the car comes to stand."""
-_LOT: Final = re.compile(r"\b(?:parking (?:lot|garage|area)|car park)\b", re.IGNORECASE)
-_OUT_OF_CAR: Final = re.compile(r"\bget(?:ting)? out of (?:the|this) car\b", re.IGNORECASE)
-_ON_FOOT: Final = re.compile(r"\b(?:people|kids|children|pedestrians|someone|somebody)\b", re.IGNORECASE)
-"""Who is around, not what is wanted."""
+_HINTS: Final = ("exit", "stadium", "nearest")
+"""Places that words may point to, the more telling ones first."""
+_LOT: Final = re.compile(r"\b(?:parking (?:lot|garage|area)|car ?parks?|parked cars|parked vans)\b", re.IGNORECASE)
+_ASKS: Final = re.compile(r"\bpark(?! and)\b", re.IGNORECASE)
 
 _PACES: Final = ("speed.", "style.")
 
 
+def wanted_pace(wish: str) -> Literal[-1, 0, 1]:
+    """Whether words in a lot ask for another pace and not for a spot: 1 faster, -1 slower."""
+    if _ASKS.search(wish) and not _shows("no parking", wish):
+        return 0
+    faster, slower = _shows("faster", wish), _shows("slower", wish)
+    return 0 if faster == slower else 1 if faster else -1
+
+
 def wanted_place(wish: str) -> str:
     """Which place of a lot a wish means: as `place_of`, and where it only hints at one."""
+    if _shows("no parking", wish):
+        return ""
     plain = _LOT.sub("here", wish)  # whoever speaks of the lot does not ask to park by that
     named, hinted = place_of(plain), hinted_place(plain)
     return hinted if named in ("", "nearest") and hinted else named
@@ -59,11 +39,13 @@ def wanted_place(wish: str) -> str:
 
 def hinted_place(wish: str) -> str:
     """Which place of a lot a hint points to: `stadium`, `exit`, `nearest`, or none (empty)."""
-    if not _OUT_OF_CAR.search(wish) and (found := next((p for p, words in _PLACES if words.search(wish)), "")):
-        return found
-    return "nearest" if _ARRIVED.search(wish) and not _ON_FOOT.search(wish) else ""
+    return next((place for place in _HINTS if _shows(place, wish)), "")
 
 
 def parks(intent: str) -> bool:
     """Whether a wish in a lot, read as `intent`, is rather one for a spot: it says nothing of how to drive there."""
     return not intent.startswith((*_PACES, "stop"))
+
+
+def _shows(what: str, wish: str) -> bool:
+    return said("lot.txt", what).search(wish) is not None

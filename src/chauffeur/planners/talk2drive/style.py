@@ -46,7 +46,7 @@ DISTANCE_M: Final = (3.0, 60.0)
 RATIO_S: Final = (0.5, 4.0)
 """What a model may choose between."""
 
-_PARKS: Final = re.compile(r"\b(?:park|parking|spots?|spaces?|places?|bays?|stalls?|rows?)\b", re.IGNORECASE)
+_PARKS: Final = re.compile(r"\b(?:park|parking|spots?|spaces?|places?|bays?|stalls?)\b", re.IGNORECASE)
 _SPOT: Final = re.compile(
     r"\b(?:spot|space|bay|stall|place|in|into|at|on)\s+(?:number\s+)?([A-Z])\s?(\d{1,2})\b", re.IGNORECASE
 )

@@ -1,0 +1,1 @@
+"""What passengers say, as regular expressions in English."""
