@@ -27,7 +27,7 @@ from chauffeur.planners.talk2drive.lanes import complaint_in, eased_mps, fitting
 from chauffeur.planners.talk2drive.lot import wanted_pace, wanted_place
 from chauffeur.planners.talk2drive.moods import mood_of, pace_complaint
 from chauffeur.planners.talk2drive.patterns import WORDS, said
-from chauffeur.planners.talk2drive.remarks import GIVE_WAY, GO, MOVE_RIGHT, OVERTAKE, STAY, stands, taken_for
+from chauffeur.planners.talk2drive.remarks import GIVE_WAY, GO, MOVE_RIGHT, OVERTAKE, STAY, misread, stands, taken_for
 
 GROUPS = {
     name: [line[1:-1] for group in words_file(name, WORDS) for line in group if line[0] == "[" and line[-1] == "]"]
@@ -106,6 +106,32 @@ def test_what_a_remark_was_taken_for_is_read_as_it_stands(planner: Planner) -> N
         for situation in (BEHIND, LEFT, CROSSING):
             plan(planner, wish, situation)  # ends
     assert driven(planner, STAY, BEHIND).lane == 0
+
+
+@pytest.mark.parametrize(
+    ("wish", "intent", "situation", "meant"),
+    [
+        ("That hatchback has a funny sticker.", "gap.increase", BEHIND, OVERTAKE),
+        ("Keep more distance to that hatchback.", "gap.increase", BEHIND, None),
+        ("Keep 40 m to that hatchback.", "gap.set", BEHIND, None),
+        ("That hatchback drives so nicely.", "gap.increase", BEHIND, None),
+        ("That hatchback has a funny sticker.", "gap.increase", RIGHT, None),
+        ("Get by that hatchback.", "overtake.right", BEHIND, OVERTAKE),
+        ("Get by that hatchback on the right.", "overtake.right", BEHIND, None),
+        ("Stay with that hatchback.", "overtake.left", BEHIND, STAY),
+        ("Leave that hatchback behind us.", "overtake.left", BEHIND, None),
+        ("The left one is no lane for us.", "lane.left", LEFT, MOVE_RIGHT),
+        ("Move to the left lane.", "lane.left", LEFT, None),
+        ("Pull in on the right.", "pull_over", LEFT, MOVE_RIGHT),
+        ("Pull over right here.", "pull_over", LEFT, None),
+        ("That hatchback has a funny sticker.", "gap.increase", CROSSING, None),
+    ],
+)
+def test_words_that_hold_nothing_of_their_reading(
+    wish: str, intent: str, situation: Situation, meant: str | None
+) -> None:
+    found = misread(wish, intent, situation)
+    assert (None if found is None else found.wish) == meant
 
 
 def test_a_stop_is_one_where_it_is_asked_for(planner: Planner) -> None:

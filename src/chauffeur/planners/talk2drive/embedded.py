@@ -32,7 +32,7 @@ from chauffeur.planners.talk2drive.lanes import (
 )
 from chauffeur.planners.talk2drive.lot import parks, wanted_pace, wanted_place
 from chauffeur.planners.talk2drive.moods import EASE, HURRY, mood_of, pace_complaint
-from chauffeur.planners.talk2drive.remarks import Remark, stands, taken_for
+from chauffeur.planners.talk2drive.remarks import Remark, misread, stands, taken_for
 from chauffeur.planners.talk2drive.style import (
     BRISK_SHARE,
     LOOK_AHEAD,
@@ -115,6 +115,8 @@ class EmbeddedParameters:
         intent = settled.intent if isinstance(settled, Plan) else settled.linked.choice.intent
         if isinstance(settled, Plan) and _forbidden(settled):
             return settled
+        if moody and remark is None and not mood_of(wish):
+            remark = misread(wish, intent, situation)
         if remark is not None:
             return self._as_taken(remark, request, begun)
         if complaint:

@@ -36,10 +36,14 @@ def mood_lane(intent: str, situation: Situation) -> Literal[-1, 0, 1]:
         return 0
     if intent.startswith(_HURRIES) and situation.lane_index > 0 and held_up(situation):
         return -1
-    last = situation.lane_count - (2 if situation.emergency_lane else 1)
-    if intent.startswith(_EASES) and situation.lane_index < last:
+    if intent.startswith(_EASES) and situation.lane_index < last_lane(situation):
         return 1
     return 0
+
+
+def last_lane(situation: Situation) -> int:
+    """The rightmost lane that is driven in."""
+    return situation.lane_count - (2 if situation.emergency_lane else 1)
 
 
 def held_up(situation: Situation) -> bool:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from chauffeur.concept import Situation
+from chauffeur.planners.talk2drive.lanes import held_up, last_lane
 from chauffeur.planners.talk2drive.patterns import said
 
 OVERTAKE: Final = "Overtake the car ahead."
@@ -45,18 +46,44 @@ def taken_for(wish: str, situation: Situation) -> Remark | None:
     return _at_crossing(wish) if situation.world == "intersection" else None
 
 
+def misread(wish: str, intent: str, situation: Situation) -> Remark | None:
+    """What words mean that were read as `intent`, though they hold nothing of it; None where they may stand as read.
+
+    Args:
+        wish: The words.
+        intent: As which they were read.
+        situation: Where the car is, and who is around it.
+    """
+    if situation.world != "highway":
+        return None
+    if situation.lane_index == 0 and situation.lane_index < last_lane(situation):
+        left = intent.startswith("lane.left") and not _asks_for_left(wish)
+        if left or (intent == "pull_over" and not situation.emergency_lane and _is("to the right", wish)):
+            return Remark(MOVE_RIGHT, "I take it that you do not want to be in the left lane.")
+    if situation.front is None:
+        return None
+    if intent.startswith("overtake") and not _is("of passing", wish) and _is("of staying", wish):
+        return Remark(STAY, "I take it that nobody need be passed.")
+    if situation.lane_index == 0 or _is("content", wish):
+        return None
+    if intent.startswith("gap.") and held_up(situation) and not _is("of the gap", wish):
+        return Remark(OVERTAKE, "I take it that the car ahead is too slow for you.")
+    if intent == "overtake.right" and not _is("turns", wish):
+        return Remark(OVERTAKE, "Others are passed on the left.")
+    return None
+
+
 def stands(wish: str) -> bool:
     """Whether words ask for a stop, and for nothing else."""
     return said("road.txt", "stands").fullmatch(wish.strip(" .!")) is not None
 
 
 def _on_highway(wish: str, situation: Situation) -> Remark | None:
-    leftmost = situation.lane_index == 0
-    last = situation.lane_count - (2 if situation.emergency_lane else 1)
+    leftmost, last = situation.lane_index == 0, last_lane(situation)
     no_passing = _is("no passing", wish)
     if leftmost and situation.lane_index < last:
         meant = _is("left lane", wish) or _is("behind us", wish) or _is("right free", wish)
-        if meant and not (_is("asks for left", wish) and not _is("out of", wish)):
+        if meant and not _asks_for_left(wish):
             return Remark(MOVE_RIGHT, "I take it that you do not want to be in the left lane.")
     if situation.lane_index < last and _is("exit", wish) and not _is("not that exit", wish):
         return Remark(MOVE_RIGHT, "Exits are on the right.")
@@ -85,6 +112,10 @@ def _at_crossing(wish: str) -> Remark | None:
     if _is("coming", wish):
         return Remark(GIVE_WAY, "I take it that others are to go first.")
     return None
+
+
+def _asks_for_left(wish: str) -> bool:
+    return _is("asks for left", wish) and not _is("out of", wish)
 
 
 def _is(what: str, wish: str) -> bool:
