@@ -172,7 +172,9 @@ def _measured(count: int, recalls: int, writes: int) -> dict[str, Any]:
         megabytes = sum(path.stat().st_size for path in home.rglob("*") if path.is_file()) / 1e6
         (columns,) = [one.index.columns for one in vault._opened.values()]
         spelled = _spelled(home, SECRET)
-        arrays = [columns._vectors, columns.rows, columns.whens]
+        arrays = [columns._marks._vectors, columns._marks._amounts.values, columns._kinds.values]
+        arrays += [columns.rows, columns.whens, columns.circumstances]
+        distinct = len(columns._marks) - 1
         erased = vault.erase(PERSON)
         return {
             "trips": count,
@@ -183,6 +185,7 @@ def _measured(count: int, recalls: int, writes: int) -> dict[str, Any]:
             "remember_and_recall": after_write,
             "filled_s": filled_s,
             "file_mb": megabytes,
+            "distinct_wishes": distinct,
             "columns_mb": sum(array.nbytes for array in arrays) / 1e6,
             "files_that_spell_a_wish": spelled,
             "erased": erased,
@@ -212,6 +215,7 @@ def main() -> None:
         )
         met = "met" if row["goal_met"] else "missed"
         left, numbers = row["files_left_after_erase"], row["numbers_left_in_memory_after_erase"]
+        print(f"{'':8}{row['distinct_wishes']} of the wishes differ from each other;")
         print(f"{'':8}goal {met}; a wish is spelled in {row['files_that_spell_a_wish'] or 'no file'};")
         print(f"{'':8}after erase: files {', '.join(left)}; {numbers} numbers in memory")
     machine = {"cores": os.cpu_count(), "load": os.getloadavg(), "python": platform.python_version()}

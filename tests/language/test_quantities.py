@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.language import measured, plain, tokens_of
+from chauffeur.language import measured, plain, read_quantities, tokens_of
 
 
 @pytest.mark.parametrize(
@@ -37,3 +37,16 @@ def test_any_text_is_read(text: str) -> None:
 
 def test_contractions_are_written_out() -> None:
     assert plain("Don't; I\u2019m late, can\u2019t wait") == "do not; i am late, can not wait"
+
+
+_PARTS = (
+    "a", "an", "one", "Two", "fourty", "hundred", "half", "of", "couple", "few", "second", "car length", "lane", "mile",
+    "m/s", "30", "2.5", "minus", "point", "and", "drive", "can't", "it's", "'s", "in'", "-", "/", "_", "(", ",",
+)  # fmt: skip
+
+
+@given(st.lists(st.sampled_from(_PARTS), max_size=8), st.sampled_from((" ", "", "-", "/", "'", " 's ", "\n")))
+def test_no_quantity_is_overlooked_where_a_glance_tells_that_there_is_no_number(parts: list[str], between: str) -> None:
+    text = between.join(parts)
+    kinds = ("speed", "distance", "time")
+    assert measured(text) == tuple((q.dimension, q.value) for q in read_quantities(text) if q.dimension in kinds)

@@ -7,7 +7,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from chauffeur.memory import phrases, similarity, words
 from chauffeur.memory.similarity import DIMENSIONS, encode, likeness, mark, tags_of
+
+_SAID = (
+    "turn", "left", "right", "lane", "most", "straight", "go", "across", "through", "overtaking", "pass", "this", "get",
+    "past", "by", "pull", "over", "stop", "parked", "halt", "can't", "cannot", "won't", "isnt", "don't", "i'm", "we're",
+    "it's", "i'd", "gonna", "not", "too", "fast", "slowly", "closer", "hurry", "but", "more", "room", "so", "smooth",
+    "\u2019s", "`", "\u3000", "\t", ",", ".",
+)  # fmt: skip
+SAID = st.lists(st.sampled_from(_SAID), max_size=10).flatmap(
+    lambda parts: st.sampled_from((" ", "  ", "")).map(lambda between: between.join(parts))
+)
 
 
 def like(a: str, b: str) -> float:
@@ -88,3 +99,18 @@ def test_any_text_can_be_encoded(text: str) -> None:
     vector = encode(text)
     assert np.isfinite(vector).all()
     assert np.array_equal(vector, encode(text))
+
+
+@given(SAID)
+def test_patterns_match_only_where_the_letters_are_by_which_they_are_chosen(text: str) -> None:
+    for pattern, _, letters in similarity._MOVES:
+        assert pattern.search(text) is None or any(one in text for one in letters)
+    for letters, pattern, _ in words._EVEN:
+        assert pattern.search(text) is None or letters in text
+
+
+@given(SAID)
+def test_a_look_for_several_phrases_misses_none_of_them(text: str) -> None:
+    assert tuple(one for _, chunk in phrases._CHUNKS for one in chunk) == phrases._PATTERNS
+    for any_of_them, chunk in phrases._CHUNKS:
+        assert (any_of_them.search(text) is not None) == any(one.search(text) is not None for one, *_ in chunk)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from memory_trips import Clock, context, trip
 
@@ -37,6 +38,10 @@ def opened(vault: VaultMemory) -> profile.Profile:
 def columns(vault: VaultMemory) -> Columns:
     (one,) = vault._opened.values()
     return one.index.columns
+
+
+def vectors(columns: Columns) -> npt.NDArray[np.float32]:
+    return columns._marks._vectors[:, columns._kinds.values]
 
 
 def loads(monkeypatch: pytest.MonkeyPatch) -> list[int]:
@@ -90,7 +95,7 @@ def test_what_the_columns_became_is_what_is_read_from_the_file(vault: VaultMemor
     assert np.array_equal(grown.rows[kept], read.rows)
     assert np.array_equal(grown.whens[kept], read.whens)
     assert np.array_equal(grown.judged[kept], read.judged)
-    assert np.array_equal(grown._vectors[:, : len(kept)][:, kept], read._vectors[:, : len(read)])
+    assert np.array_equal(vectors(grown)[:, kept], vectors(read))
     for mine, other in zip(grown.signs, read.signs, strict=True):
         assert np.array_equal(mine[kept], other)
 
@@ -130,7 +135,7 @@ def test_what_another_process_erased_is_never_recalled_and_its_columns_are_overw
     vault.remember(trip("Ben", "drive faster"))
     assert wishes(vault, "Ann") == ["drive faster"]
     read = next(one.index.columns for one in vault._opened.values() if one.profile.person == ANN)
-    numbers = read._vectors, read.rows, read.whens
+    numbers = read._marks._vectors, read.rows, read.whens
     other = VaultMemory(tmp_path / "home", clock=vault._clock)
     assert other.erase(ANN)
     assert wishes(vault, "Ben") == ["drive faster"], "to look at anybody is enough"
@@ -152,7 +157,7 @@ def test_nothing_read_of_a_person_stays_in_the_process(tmp_path: Path, wishes: W
         vault.remember(trip("Ann", f"keep a distance of {number} meters"))
     assert len(wishes(vault, "Ann", "keep a distance of 3 meters")) == 5
     read, held = columns(vault), vault._opened
-    numbers = [read._vectors, read.rows, read.whens, read._amounts.values]
+    numbers = [read._marks._vectors, read.rows, read.whens, read._marks._amounts.values]
     assert all(one.any() for one in numbers)
     if way == "erase":
         assert vault.erase(ANN)
@@ -199,7 +204,7 @@ def test_a_file_cut_or_changed_while_it_is_open_is_said(vault: VaultMemory, tmp_
 def test_a_lost_key_closes_the_file(vault: VaultMemory, tmp_path: Path, wishes: Wishes) -> None:
     vault.remember(trip("Ann", "drive faster"))
     wishes(vault, "Ann")
-    numbers = columns(vault)._vectors
+    numbers = columns(vault)._marks._vectors
     (path,) = (tmp_path / "home").rglob("*.key")
     path.unlink()
     with pytest.raises(ProfileError, match="has no key"):

@@ -6,6 +6,7 @@ without seeing its words.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -72,6 +73,12 @@ _EXTRA = ("more", "extra", "additional", "further", "full", "whole", "less", "fe
 
 _ONE_MEANS_UNIT = ("second", "sec", "car", "carlength", "meter", "metre", "foot", "yard", "mile", "lane", "kilometer")
 
+_COUNTS = re.compile(
+    rf"\d|{'|'.join((*_ONES, *_TENS, *_VAGUE, 'half', 'hundred'))}"
+    rf"|an?(?:[^a-z]+s)*[^a-z]+(?:{'|'.join(_ONE_MEANS_UNIT)})"
+)
+"""Found in every lower-case ASCII text in which there is a number, and in some others."""
+
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
@@ -114,6 +121,8 @@ def read_quantities(text: str) -> tuple[Quantity, ...]:
 
 def measured(text: str) -> tuple[tuple[str, float], ...]:
     """(dimension, SI value) of every speed, distance and time span in a text; other numbers are left out."""
+    if text.isascii() and _COUNTS.search(text.lower()) is None:
+        return ()
     kinds = ("speed", "distance", "time")
     return tuple((q.dimension, q.value) for q in read_quantities(text) if q.dimension in kinds)
 

@@ -1,7 +1,9 @@
 """Remembered wishes as columns of numbers, so that one recall looks at all of them at once.
 
-A column holds one number of every wish. The vectors lie by dimension: a present wish has words in some forty of them,
-and the others need not be looked at. No word of a person is in here, and what is removed is overwritten.
+A column holds one number of every wish. People repeat themselves, so what the words of a wish come to (its mark) is
+kept and compared once for all trips with the same one. The vectors of the marks lie by dimension: a present wish has
+words in some forty of them, and the others need not be looked at. No word of a person is in here, and what is removed
+is overwritten.
 """
 
 from __future__ import annotations
@@ -34,11 +36,23 @@ Places = npt.NDArray[np.intp]
 Signs = tuple[int, int, int]
 """What was said of a trip about speed, gap and comfort, with the signs of `Feedback`."""
 
+Quantities = tuple[tuple[str, float], ...]
+"""As in `Mark`."""
+
+_Mark = tuple[bytes, int, Quantities]
+"""A mark as it is written: vector, tags, quantities."""
+
 GONE: Final = -1
 """Row of a wish that was removed."""
 
+_BLANK: Final = 0
+"""Mark of removed wishes: no words, no meaning, no numbers, so that nothing is like it."""
+
 _ROOM: Final = 64
 _CELL: Final = np.dtype([("dimension", "<u2"), ("value", "<f4")])
+_AT_ONCE: Final = 4096
+"""So many vectors are multiplied in one piece; of more, the pieces would not fit into the processor's cache."""
+_NOTHING: Final[_Mark] = (b"", 0, ())
 _DEAD_SHARE: Final = 0.25
 """Removed wishes take up at most this part of the columns, and `_ROOM`, before the others move together."""
 
@@ -62,7 +76,7 @@ class Entry:
     row: int
     vector: bytes
     tags: int
-    quantities: tuple[tuple[str, float], ...]
+    quantities: Quantities
     world: str
     weather: int
     when: datetime
@@ -81,13 +95,10 @@ class Columns:
     """All wishes of one person, in the order of their rows. One thread at a time."""
 
     def __init__(self) -> None:
-        self._rows, self._whens = _Column(np.int64), _Column(np.float64)
-        self._tags, self._worlds, self._weathers = _Column(np.int32), _Column(np.int32), _Column(np.int32)
+        self._rows, self._whens, self._kinds = _Column(np.int64), _Column(np.float64), _Column(np.intp)
         self._judged, self._signs = _Column(np.bool_), tuple(_Column(np.int8) for _ in range(3))
-        self._owners, self._measures, self._amounts = _Column(np.int64), _Column(np.int32), _Column(np.float64)
-        self._vectors = np.zeros((DIMENSIONS, _ROOM), np.float32)
-        self._tag_sets, self._weather_kinds = _Codes[int](), _Codes[int]()
-        self._world_names, self._measure_names = _Codes[str](), _Codes[str]()
+        self._circumstances, self._circumstance_kinds = _Column(np.intp), _Codes[tuple[str, int]]()
+        self._marks = _Marks()
         self._dead = 0
 
     def __len__(self) -> int:
@@ -113,45 +124,34 @@ class Columns:
         """What the feedback says about speed, gap and comfort."""
         return tuple(column.values for column in self._signs)
 
-    def by_world(self, value: Callable[[str], float], places: Places) -> Floats:
-        """A number for each of some wishes, by its kind of world."""
-        return self._world_names.table(value)[self._worlds.values[places]]
+    @property
+    def circumstances(self) -> Places:
+        """Kind of world and weather, by their place in what `of_circumstances` returns."""
+        return self._circumstances.values
 
-    def by_weather(self, value: Callable[[int], float], places: Places) -> Floats:
-        """A number for each of some wishes, by its weather."""
-        return self._weather_kinds.table(value)[self._weathers.values[places]]
+    def of_circumstances(self, value: Callable[[str, int], float]) -> Floats:
+        """What a function says of each kind of world and weather there is."""
+        return np.array([value(*kind) for kind in self._circumstance_kinds.known()], np.float64)
 
     def same_world(self, place: int, places: Places) -> Bools:
         """Which of some wishes were made in the same kind of world as the one at a place."""
-        return self._worlds.values[places] == self._worlds.values[place]
+        kinds = self._circumstance_kinds.known()
+        world, _ = kinds[self.circumstances[place]]
+        return np.array([name == world for name, _ in kinds])[self.circumstances[places]]
 
     def likeness(self, wish: Mark) -> Floats:
         """0..1 for each wish, 0 for removed ones; what `similarity.likeness` says of them one by one."""
-        against = opposed_to(wish.tags)
-        tags = self._tags.values
-        same = self._tag_sets.table(lambda other: _same(wish.tags, other))
-        text = self._tag_sets.table(lambda other: TEXT_SHARE if wish.tags | other else 1.0)
-        left = self._tag_sets.table(lambda other: CONFLICT if against & other else 1.0)
-        meaning = text[tags] * np.clip(self._cosines(wish.vector), 0.0, 1.0) + same[tags]
-        self._draw_together(meaning, wish.quantities)
-        return meaning * left[tags]
+        return self._marks.likeness(wish).take(self._kinds.values)
 
     def extend(self, entries: Sequence[Entry]) -> None:
         """Add wishes whose rows are larger than all that are there."""
-        start = len(self.rows)
+        self._kinds.extend(self._marks.of([(one.vector, one.tags, one.quantities) for one in entries]))
         self._rows.extend([one.row for one in entries])
         self._whens.extend([one.when.timestamp() for one in entries])
-        self._tags.extend(self._tag_sets.of(one.tags for one in entries))
-        self._worlds.extend(self._world_names.of(one.world for one in entries))
-        self._weathers.extend(self._weather_kinds.of(one.weather for one in entries))
+        self._circumstances.extend(self._circumstance_kinds.of((one.world, one.weather) for one in entries))
         self._judged.extend([one.said is not None for one in entries])
         for topic, column in enumerate(self._signs):
             column.extend([0 if one.said is None else one.said[topic] for one in entries])
-        said = [(start + at, *pair) for at, one in enumerate(entries) for pair in one.quantities]
-        self._owners.extend([owner for owner, _, _ in said])
-        self._measures.extend(self._measure_names.of(measure for _, measure, _ in said))
-        self._amounts.extend([amount for _, _, amount in said])
-        self._place_vectors(start, [one.vector for one in entries])
 
     def judge(self, row: int, signs: Signs) -> None:
         """Feedback was given to a wish: what it says about a topic counts from now on."""
@@ -165,39 +165,131 @@ class Columns:
         if not rows:
             return
         gone = np.isin(self.rows, list(rows))
-        self._keep_quantities(~gone)
-        self._vectors[:, np.flatnonzero(gone)] = 0.0
         self._dead += int(np.count_nonzero(gone))
-        (nothing,) = self._tag_sets.of([0])
         for column, blank in (
-            (self._rows, GONE), (self._whens, 0.0), (self._tags, nothing), (self._judged, False),
+            (self._rows, GONE), (self._whens, 0.0), (self._kinds, _BLANK), (self._circumstances, 0),
+            (self._judged, False),
             *((column, 0) for column in self._signs),
         ):  # fmt: skip
             column.values[gone] = blank
+        self._marks.blank(self._used())
         if self._dead > max(_ROOM, _DEAD_SHARE * len(self.rows)):
-            self._move_together()
+            self._keep(self.rows != GONE)
 
     def wipe(self) -> None:
         """Overwrite everything."""
         self._keep(np.zeros(len(self.rows), np.bool_))
-        for codes in (self._tag_sets, self._weather_kinds, self._world_names, self._measure_names):
-            codes.clear()
+        self._circumstance_kinds.clear()
+
+    def _keep(self, kept: Bools) -> None:
+        for column in (self._rows, self._whens, self._kinds, self._circumstances, self._judged, *self._signs):
+            column.keep(kept)
+        self._kinds.values[:] = self._marks.keep(self._used())[self._kinds.values]
+        self._dead = 0
+
+    def _used(self) -> Bools:
+        """Which marks any wish has."""
+        return np.bincount(self._kinds.values, minlength=len(self._marks)) > 0
+
+
+class _Marks:
+    """Every mark that wishes have, once; the first is `_BLANK`."""
+
+    def __init__(self) -> None:
+        self._vectors = np.zeros((DIMENSIONS, _ROOM), np.float32)
+        self._cells, self._tags = _Column(np.int16), _Column(np.intp)
+        self._owners, self._measures, self._amounts = _Column(np.int64), _Column(np.int32), _Column(np.float64)
+        self._tag_sets, self._measure_names = _Codes[int](), _Codes[str]()
+        self._add([_NOTHING])
+
+    def __len__(self) -> int:
+        return len(self._tags.values)
+
+    def of(self, marks: Sequence[_Mark]) -> list[int]:
+        """Where some marks stand; those that are new are added."""
+        known = dict.fromkeys(marks, _BLANK)
+        if len(self) > 1:
+            known = {mark: self._found(mark) for mark in known}
+        new = [mark for mark, place in known.items() if place == _BLANK and mark != _NOTHING]
+        known.update(zip(new, range(len(self), len(self) + len(new)), strict=True))
+        self._add(new)
+        return [known[mark] for mark in marks]
+
+    def likeness(self, wish: Mark) -> Floats:
+        """0..1 for each mark."""
+        against = opposed_to(wish.tags)
+        shares = [
+            (TEXT_SHARE if wish.tags | other else 1.0, _same(wish.tags, other), CONFLICT if against & other else 1.0)
+            for other in self._tag_sets.known()
+        ]
+        text, same, left = np.array(shares).T.take(self._tags.values, axis=1)
+        meaning = text * np.minimum(np.maximum(self._cosines(wish.vector), 0.0), 1.0) + same
+        self._draw_together(meaning, wish.quantities)
+        return meaning * left
+
+    def blank(self, used: Bools) -> None:
+        """Overwrite the marks that are no longer used; the others stay where they are."""
+        nothing = self._tags.values[_BLANK]
+        unused = np.flatnonzero(~used & ((self._cells.values > 0) | (self._tags.values != nothing)))
+        self._keep_quantities(used)
+        self._vectors[:, unused] = 0.0
+        self._cells.values[unused] = 0
+        self._tags.values[unused] = nothing
+
+    def keep(self, used: Bools) -> Places:
+        """Overwrite the marks that are not used and move the others together; where those stand now."""
+        used[_BLANK] = True
+        self._keep_quantities(used)
+        left = self._vectors[:, np.flatnonzero(used)]
+        self._vectors.fill(0.0)
+        self._vectors[:, : left.shape[1]] = left
+        left.fill(0.0)
+        for column in (self._cells, self._tags):
+            column.keep(used)
+        new_places = np.cumsum(used) - 1
+        self._owners.values[:] = new_places[self._owners.values]
+        if len(self) == 1:
+            self._tag_sets.clear()
+            self._measure_names.clear()
+            self._tags.values[:] = self._tag_sets.of([0])
+        return new_places
+
+    def _found(self, mark: _Mark) -> int:
+        """Where a mark stands; `_BLANK` where it is not there."""
+        vector, tags, quantities = mark
+        cells = np.frombuffer(vector, _CELL)
+        (tag_set,) = self._tag_sets.of([tags])
+        alike = np.flatnonzero((self._tags.values == tag_set) & (self._cells.values == len(cells)))
+        for dimension, value in cells.tolist():
+            alike = alike[self._vectors[dimension, alike] == value]
+        return next((place for place in alike.tolist() if self._numbers(place) == quantities), _BLANK)
+
+    def _numbers(self, place: int) -> tuple[tuple[str, float], ...]:
+        names, own = self._measure_names.known(), self._owners.values == place
+        measures, amounts = self._measures.values[own].tolist(), self._amounts.values[own].tolist()
+        return tuple((names[measure], amount) for measure, amount in zip(measures, amounts, strict=True))
 
     def _cosines(self, vector: Vector) -> Vector:
-        count = len(self.rows)
+        """The dot products. The order of the sum is that of the dimensions either way: the same bits."""
+        count, said = len(self), np.flatnonzero(vector)
+        if count <= _AT_ONCE:
+            parts = self._vectors[said, :count]
+            parts *= vector[said][:, np.newaxis]
+            return np.add.reduce(parts, axis=0)
         total, part = np.zeros(count, np.float32), np.empty(count, np.float32)
-        for dimension in np.flatnonzero(vector).tolist():
+        for dimension in said.tolist():
             np.multiply(self._vectors[dimension, :count], vector[dimension], out=part)
             total += part
         return total
 
-    def _draw_together(self, meaning: Floats, quantities: tuple[tuple[str, float], ...]) -> None:
+    def _draw_together(self, meaning: Floats, quantities: Quantities) -> None:
         """Numbers of the same measure count, where both wishes have some: the nearest two of them."""
         names = self._measure_names.known()
+        quantities = tuple(one for one in quantities if one[0] in names)
+        if not quantities:
+            return
         nearest = np.full(len(meaning), -1.0)
         for measure, amount in quantities:
-            if measure not in names:
-                continue
             chosen = self._measures.values == names.index(measure)
             others = self._amounts.values[chosen]
             larger = np.maximum(np.abs(others), abs(amount))
@@ -206,6 +298,15 @@ class Columns:
         told = nearest >= 0.0
         meaning[told] = (1.0 - NUMBERS_SHARE) * meaning[told] + NUMBERS_SHARE * nearest[told]
 
+    def _add(self, marks: Sequence[_Mark]) -> None:
+        start = len(self)
+        self._tags.extend(self._tag_sets.of(tags for _, tags, _ in marks))
+        said = [(start + at, *pair) for at, (_, _, quantities) in enumerate(marks) for pair in quantities]
+        self._owners.extend([owner for owner, _, _ in said])
+        self._measures.extend(self._measure_names.of(measure for _, measure, _ in said))
+        self._amounts.extend([amount for _, _, amount in said])
+        self._place_vectors(start, [vector for vector, _, _ in marks])
+
     def _place_vectors(self, start: int, vectors: Sequence[bytes]) -> None:
         end = start + len(vectors)
         if end > self._vectors.shape[1]:
@@ -213,24 +314,10 @@ class Columns:
             roomy[:, :start] = self._vectors[:, :start]
             self._vectors.fill(0.0)
             self._vectors = roomy
+        counts = [len(one) // _CELL.itemsize for one in vectors]
         cells = np.frombuffer(b"".join(vectors), _CELL)
-        owners = np.repeat(np.arange(start, end), [len(one) // _CELL.itemsize for one in vectors])
-        self._vectors[cells["dimension"], owners] = cells["value"]
-
-    def _move_together(self) -> None:
-        self._keep(self.rows != GONE)
-
-    def _keep(self, kept: Bools) -> None:
-        self._keep_quantities(kept)
-        left = self._vectors[:, np.flatnonzero(kept)]
-        self._vectors.fill(0.0)
-        self._vectors[:, : left.shape[1]] = left
-        left.fill(0.0)
-        new_places = np.cumsum(kept) - 1
-        self._owners.values[:] = new_places[self._owners.values]
-        for column in (self._rows, self._whens, self._tags, self._worlds, self._weathers, self._judged, *self._signs):
-            column.keep(kept)
-        self._dead = 0
+        self._vectors[cells["dimension"], np.repeat(np.arange(start, end), counts)] = cells["value"]
+        self._cells.extend(counts)
 
     def _keep_quantities(self, kept: Bools) -> None:
         whose = kept[self._owners.values]
@@ -275,7 +362,7 @@ class _Column:
 
 
 class _Codes(Generic[T]):
-    """Small numbers for values of which there are few: worlds, weathers, sets of tags."""
+    """Small numbers for values of which there are few: circumstances, sets of tags."""
 
     __slots__ = ("_codes",)
 
@@ -287,10 +374,6 @@ class _Codes(Generic[T]):
 
     def known(self) -> tuple[T, ...]:
         return tuple(self._codes)
-
-    def table(self, value: Callable[[T], float]) -> Floats:
-        """What a function says of each value, by its code."""
-        return np.array([value(one) for one in self._codes], np.float64)
 
     def clear(self) -> None:
         self._codes.clear()

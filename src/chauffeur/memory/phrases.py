@@ -12,6 +12,15 @@ from chauffeur.memory.words import even, turned
 _PATTERNS: tuple[tuple[re.Pattern[str], Topic, Literal[-1, 1], Manner], ...] = tuple(
     (re.compile(rf"\b(?:{'|'.join(phrases)})\b"), topic, sign, manner) for topic, sign, manner, phrases in PHRASE_BOOK
 )
+_CHUNK = 8
+_CHUNKS = tuple(
+    (
+        re.compile("|".join(pattern.pattern for pattern, *_ in _PATTERNS[start : start + _CHUNK])),
+        _PATTERNS[start : start + _CHUNK],
+    )
+    for start in range(0, len(_PATTERNS), _CHUNK)
+)
+"""Most patterns match nowhere in most clauses: one look tells it of several of them."""
 _NEGATED = re.compile(r"\b(?<!why )(?:not|never|no|nothing|hardly|without|neither|nor)\b(?: [\w']+){0,4} ?$")
 _ORDERED = re.compile(
     r"^(?:(?:please|just|so|next time|okay) )*(?:do not|never|avoid|stop)(?! (?:think|find|feel|believe|mind|know))\b"
@@ -40,16 +49,24 @@ class Want:
 
 def read_wants(text: str) -> tuple[Want, ...]:
     """Everything a text says about speed, gap, comfort and approval, in the order it is said."""
+    return wants_in(even(text))
+
+
+def wants_in(said: str) -> tuple[Want, ...]:
+    """The same, of an evened text."""
     found: list[Want] = []
-    for clause, turn in turned(even(text)):
+    for clause, turn in turned(said):
         left = clause
         here: list[tuple[int, Want]] = []
-        for pattern, topic, sign, manner in _PATTERNS:
-            while (match := pattern.search(left)) is not None:
-                left = left[: match.start()] + "#" * (match.end() - match.start()) + left[match.end() :]
-                want = _negate(Want(topic, sign, manner, clause, turn), clause[: match.start()])
-                if want is not None:
-                    here.append((match.start(), want))
+        for any_of_them, patterns in _CHUNKS:
+            if any_of_them.search(left) is None:
+                continue
+            for pattern, topic, sign, manner in patterns:
+                while (match := pattern.search(left)) is not None:
+                    left = left[: match.start()] + "#" * (match.end() - match.start()) + left[match.end() :]
+                    want = _negate(Want(topic, sign, manner, clause, turn), clause[: match.start()])
+                    if want is not None:
+                        here.append((match.start(), want))
         found += [want for _, want in sorted(here, key=lambda item: item[0])]
     return tuple(found)
 

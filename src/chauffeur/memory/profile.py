@@ -169,18 +169,16 @@ class Profile:
         """Trips, by row and similarity, with their feedback: oldest feedback first."""
         # As one value, for how many there are does not change the statement.
         rows = json.dumps([row for row, _ in found])
-        trips = {
-            row: (trip, at, world, body)
-            for row, trip, at, world, body in self._all(
-                "SELECT id, trip, at, world, body FROM trips WHERE id IN (SELECT value FROM json_each(?))", rows
-            )
-        }
+        trips: dict[int, tuple[str, str, str, str]] = {}
         said: dict[int, tuple[str, ...]] = {}
-        for row, body in self._all(
-            "SELECT trip, body FROM feedback WHERE trip IN (SELECT value FROM json_each(?)) ORDER BY id", rows
+        for row, trip, at, world, body, told in self._all(
+            "SELECT trips.id, trips.trip, trips.at, world, trips.body, feedback.body FROM json_each(?) "
+            "JOIN trips ON trips.id = value LEFT JOIN feedback ON feedback.trip = trips.id ORDER BY feedback.id",
+            rows,
         ):
-            said[row] = (*said.get(row, ()), body)
-        return tuple(item_of(*trips[row], said.get(row, ()), similarity) for row, similarity in found)
+            trips[row] = trip, at, world, body
+            said[row] = (*said.get(row, ()), *(() if told is None else (told,)))
+        return tuple(item_of(*trips[row], said[row], similarity) for row, similarity in found)
 
     def export(self) -> list[dict[str, Any]]:
         """Everything kept, oldest first, as plain values."""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from datetime import datetime
 from typing import Final
 
 import numpy as np
 
-from chauffeur.memory.columns import Columns, Places
+from chauffeur.memory.columns import Columns, Floats, Places
 from chauffeur.memory.similarity import Mark
 from chauffeur.memory.weather import UNKNOWN
 
@@ -23,6 +24,15 @@ UNCOMPARED: Final = -1.0
 """Similarity of what was recalled for another reason."""
 
 _DAY_S: Final = 86_400.0
+_ROUNDING: Final = 1e-9
+"""No sum or product here is wrong by more than this part of it."""
+
+_Similarity = Callable[[Places], Floats]
+"""How similar the wishes at some places are."""
+
+_LANES: Final = 256
+_LOOKED_AT: Final = 1024
+"""So many wishes are looked at first for the newest of a kind, which as a rule is among them."""
 
 
 def nearest(
@@ -53,27 +63,34 @@ def nearest(
     if not len(columns) or k <= 0:
         return []
     likeness = columns.likeness(wish)
-    # Nothing below makes a wish more similar than it is like the present one.
-    places = np.flatnonzero(likeness >= FLOOR)
     if since is not None:
-        places = places[columns.whens[places] >= since.timestamp()]
-    age_days = np.maximum(0.0, (now.timestamp() - columns.whens[places]) / _DAY_S)
-    similarity = columns.by_world(lambda name: LIKENESS + WORLD * (name == world), places)
-    similarity += RECENCY * np.exp2(-age_days / HALF_LIFE_DAYS)
-    if weather != UNKNOWN:
-        similarity -= columns.by_weather(lambda other: _weather_apart(weather, other), places)
-    similarity *= likeness[places]
-    fit = similarity >= FLOOR
-    places, similarity = places[fit], similarity[fit]
+        np.putmask(likeness, columns.whens < since.timestamp(), 0.0)
+    present = now.timestamp()
+    worlds = columns.of_circumstances(lambda name, _: LIKENESS + WORLD * (name == world))
+    weathers = columns.of_circumstances(lambda _, other: _weather_apart(weather, other))
+
+    def similarity(places: Places) -> Floats:
+        circumstances = columns.circumstances[places]
+        age_days = np.maximum(0.0, (present - columns.whens[places]) / _DAY_S)
+        found = RECENCY * np.exp2(age_days / -HALF_LIFE_DAYS)
+        found += worlds[circumstances]
+        found -= weathers[circumstances]
+        found *= likeness[places]
+        return found
+
+    # Nothing above makes a wish more similar than it is like the present one, nor less than this part of it: what is
+    # less like it than that part of the likeness of `k` others is not among the `k` most similar.
+    least_part = (LIKENESS if weather == UNKNOWN else LIKENESS - OTHER_WEATHER) * (1.0 - _ROUNDING)
+    places = np.flatnonzero(likeness >= max(FLOOR, least_part * _reached(likeness, k)))
+    similar = similarity(places)
+    near = np.flatnonzero(similar >= max(FLOOR, _reached(similar, k)))
     # Places are in the order of rows: of equally similar wishes the later one comes first.
-    least = np.partition(similarity, -k)[-k] if len(places) > k else FLOOR
-    best = np.flatnonzero(similarity >= least)
-    best = best[np.lexsort((best, similarity[best]))[::-1]][:k]
-    chosen: list[int] = best.tolist()
-    wanted = _both_sides(columns, places)[:k]
+    best = near[np.lexsort((near, similar[near]))[::-1]][:k]
+    chosen: dict[int, float] = dict(zip(places[best].tolist(), similar[best].tolist(), strict=True))
+    wanted = dict(_both_sides(columns, likeness, similarity)[:k])
     others = [one for one in chosen if one not in wanted][: k - len(wanted)]
-    chosen = [one for one in chosen if one in wanted or one in others] + [one for one in wanted if one not in chosen]
-    return [(int(columns.rows[places[one]]), float(similarity[one])) for one in chosen]
+    found = {one: value for one, value in chosen.items() if one in wanted or one in others} | wanted
+    return [(int(columns.rows[place]), value) for place, value in found.items()]
 
 
 def latest(columns: Columns, world: str, k: int, *, since: datetime | None = None) -> list[int]:
@@ -90,26 +107,57 @@ def latest(columns: Columns, world: str, k: int, *, since: datetime | None = Non
         return []
     if since is not None:
         places = places[columns.whens[places] >= since.timestamp()]
-    places = places[columns.by_world(lambda name: float(name == world), places) > 0.0]
+    places = places[columns.of_circumstances(lambda name, _: name == world)[columns.circumstances[places]] > 0.0]
     return [int(row) for row in columns.rows[places[-k:][::-1]]]
 
 
-def _both_sides(columns: Columns, places: Places) -> list[int]:
-    """Which of some wishes has the newest verdict, and which the newest one before it that says the opposite of it."""
-    judged = np.flatnonzero(columns.judged[places])
-    if not len(judged):
-        return []
-    newest, earlier = int(judged[-1]), judged[:-1]
-    opposite = np.zeros(len(earlier), np.bool_)
-    for column in columns.signs:
-        if column[places[newest]]:
-            opposite |= column[places[earlier]] == -column[places[newest]]
-    opposite &= columns.same_world(places[newest], places[earlier])
-    against = earlier[opposite]
-    return [newest, int(against[-1])] if len(against) else [newest]
+def _reached(values: Floats, k: int) -> float:
+    """What at least `k` of some values reach, and not many more; 0 where there are fewer."""
+    lanes = max(_LANES, k)
+    if len(values) >= 2 * lanes:
+        values = values[: len(values) // lanes * lanes].reshape(-1, lanes).max(axis=0)
+    return float(np.partition(values, -k)[-k]) if len(values) >= k else 0.0
+
+
+def _both_sides(columns: Columns, likeness: Floats, similarity: _Similarity) -> list[tuple[int, float]]:
+    """Of the wishes similar enough: which has the newest verdict, and which the newest one before it that says the
+    opposite of it; each with its similarity.
+    """
+    found: list[tuple[int, float]] = []
+    said, signs = columns.signs, [0, 0, 0]
+    for places, similar in _verdicts(columns, likeness, similarity):
+        if not found:
+            found = [(int(places[-1]), float(similar[-1]))]
+            signs = [int(column[places[-1]]) for column in said]
+            if not any(signs):
+                break
+        opposite = np.zeros(len(places), np.bool_)
+        for column, sign in zip(said, signs, strict=True):
+            if sign:
+                opposite |= column[places] == -sign
+        opposite &= columns.same_world(found[0][0], places)
+        against = np.flatnonzero(opposite)
+        if len(against):
+            return [*found, (int(places[against[-1]]), float(similar[against[-1]]))]
+    return found
+
+
+def _verdicts(columns: Columns, likeness: Floats, similarity: _Similarity) -> Iterator[tuple[Places, Floats]]:
+    """The wishes with a verdict that are similar enough, and how similar: the newest part of them first."""
+    end, length = len(likeness), _LOOKED_AT
+    while end > 0:
+        start = max(0, end - length)
+        places = start + np.flatnonzero(columns.judged[start:end] & (likeness[start:end] >= FLOOR))
+        similar = similarity(places)
+        fit = similar >= FLOOR
+        if fit.any():
+            yield places[fit], similar[fit]
+        end, length = start, 4 * length
 
 
 def _weather_apart(weather: int, other: int) -> float:
+    if weather == UNKNOWN:
+        return 0.0
     if other == UNKNOWN:
         return UNKNOWN_WEATHER
     return 0.0 if weather & other else OTHER_WEATHER

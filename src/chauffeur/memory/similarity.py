@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from chauffeur.language import measured
-from chauffeur.memory.phrases import read_wants
+from chauffeur.memory.phrases import wants_in
 from chauffeur.memory.words import clauses, even
 
 ENCODER = "hashed-ngrams-v1"
@@ -53,16 +53,30 @@ _OPPOSITES = (
 )
 _AGAINST = {tag: sum(_BIT[b if a == tag else a] for a, b in _OPPOSITES if tag in (a, b)) for tag in TAGS}
 
+_SIDES = ("left", "right")
 _PHRASES = (
-    (r"(?:turn|take a|make a|go) (?:\w+ )?(?P<side>left|right)(?! lane)|(?P<side2>left|right) turn", "turn."),
-    (r"(?:go |drive |keep |continue )?straight|(?:go|drive) (?:across|through)", "turn.straight"),
-    (r"(?P<side>left|right)(?: ?hand)?(?: ?most)? lane|lane (?:\w+ ){0,3}(?P<side2>left|right)", "lane."),
-    (r"(?:move|merge|change|switch|shift|get|pull|steer) (?:\w+ ){0,4}(?P<side>left|right)", "lane."),
-    (r"(?P<side>left|right)most", "lane."),
-    (r"overtak\w+|pass (?:the|this|that|him|her|them|it)|get (?:past|ahead of|around|by)", "overtake"),
-    (r"pull over|stop|park|halt", "stop"),
+    (
+        r"(?:turn|take a|make a|go) (?:\w+ )?(?P<side>left|right)(?! lane)|(?P<side2>left|right) turn",
+        "turn.",
+        _SIDES,
+    ),
+    (
+        r"(?:go |drive |keep |continue )?straight|(?:go|drive) (?:across|through)",
+        "turn.straight",
+        ("straight", "across", "through"),
+    ),
+    (r"(?P<side>left|right)(?: ?hand)?(?: ?most)? lane|lane (?:\w+ ){0,3}(?P<side2>left|right)", "lane.", _SIDES),
+    (r"(?:move|merge|change|switch|shift|get|pull|steer) (?:\w+ ){0,4}(?P<side>left|right)", "lane.", _SIDES),
+    (r"(?P<side>left|right)most", "lane.", _SIDES),
+    (
+        r"overtak\w+|pass (?:the|this|that|him|her|them|it)|get (?:past|ahead of|around|by)",
+        "overtake",
+        ("overtak", "pass ", "get "),
+    ),
+    (r"pull over|stop|park|halt", "stop", ("pull over", "stop", "park", "halt")),
 )
-_MOVES = tuple((re.compile(rf"\b(?:{phrase})\b"), tag) for phrase, tag in _PHRASES)
+_MOVES = tuple((re.compile(rf"\b(?:{phrase})\b"), tag, letters) for phrase, tag, letters in _PHRASES)
+"""A pattern, what it means, and letters without any of which it matches nowhere."""
 _NEGATED = re.compile(r"\b(?:not|never|no|without|avoid|instead of)\b(?: \w+){0,4} ?$")
 
 CONFLICT = 0.15
@@ -92,13 +106,18 @@ class Mark:
 
 def mark(text: str) -> Mark:
     """Encode and tag a wish."""
-    return Mark(encode(text), sum(_BIT[tag] for tag in tags_of(text)), measured(text))
+    said = even(text)
+    return Mark(_encoded(said), sum(_BIT[tag] for tag in _tags_in(said)), measured(text))
 
 
 def encode(text: str) -> Vector:
     """Hashed words, word pairs and letter groups as a unit vector; the same text gives the same bits on any machine."""
+    return _encoded(even(text))
+
+
+def _encoded(said: str) -> Vector:
     vector = np.zeros(DIMENSIONS, dtype=np.float32)
-    for feature, weight in _features(even(text)):
+    for feature, weight in _features(said):
         code = zlib.crc32(feature.encode("utf-8", "surrogatepass"))
         vector[code % DIMENSIONS] += weight if code & 0x8000_0000 else -weight
     norm = float(np.linalg.norm(vector))
@@ -107,13 +126,17 @@ def encode(text: str) -> Vector:
 
 def tags_of(text: str) -> frozenset[str]:
     """Tags of what a wish asks for."""
+    return frozenset(_tags_in(even(text)))
+
+
+def _tags_in(said: str) -> set[str]:
     found: set[str] = set()
-    for want in read_wants(text):
+    for want in wants_in(said):
         if want.topic != "approval":
             found.add(f"{want.topic}{'+' if want.sign > 0 else '-'}")
-    for clause in clauses(even(text)):
+    for clause in clauses(said):
         found.update(_moves(clause))
-    return frozenset(found)
+    return found
 
 
 def opposed_to(tags: int) -> int:
@@ -159,8 +182,8 @@ def _features(text: str) -> Iterator[tuple[str, float]]:
 
 def _moves(clause: str) -> Iterator[str]:
     left = clause
-    for pattern, tag in _MOVES:
-        match = pattern.search(left)
+    for pattern, tag, letters in _MOVES:
+        match = pattern.search(left) if any(one in left for one in letters) else None
         if match is None:
             continue
         left = left[: match.start()] + "#" + left[match.end() :]

@@ -53,12 +53,14 @@ class _Opened:
     """A profile that stays open.
 
     Attributes:
+        path: Its file.
         profile: It.
         index: Its columns.
         key: What it was opened with.
         looks: Device, number, size and time of its file when it was last used; None where they tell nothing.
     """
 
+    path: Path
     profile: Profile
     index: Index
     key: bytes
@@ -101,6 +103,7 @@ class VaultMemory:
         """
         root = data_home() if home is None else home
         self._profiles = root / "profiles"
+        self._lock = self._profiles / "lock"
         self._keys = root / "keys" if keys is None else keys
         self._ring = KeyRing(self._keys, os.environ.get("CHAUFFEUR_PASSPHRASE") if passphrase is None else passphrase)
         self._privacy = read_privacy(root) if privacy is None else privacy
@@ -203,10 +206,6 @@ class VaultMemory:
                 _log.warning("profile left out: %s", error)
         return tuple(sorted(found))
 
-    @property
-    def _lock(self) -> Path:
-        return self._profiles / "lock"
-
     def _keep_from(self) -> str:
         since = self._privacy.since(self._clock())
         return "" if since is None else _stamp(since)
@@ -244,14 +243,14 @@ class VaultMemory:
     def _open(self, alias: str, person: str) -> Generator[Profile | None]:
         with self._guard, self._errors(person), locked(self._lock, alone=False):
             self._leave_what_is_gone()
-            path = self._path(alias)
-            if not path.exists():
+            # What is open still was just now seen to be there.
+            if alias not in self._opened and not self._path(alias).exists():
                 yield None
                 return
             try:
                 opened = self._current(alias, person)
                 yield opened.profile
-                opened.looks = _looks(path)
+                opened.looks = _looks(opened.path)
             except BaseException:
                 self._shut(alias)  # which undoes what was half done
                 raise
@@ -268,14 +267,14 @@ class VaultMemory:
 
     def _current(self, alias: str, person: str) -> _Opened:
         """The profile as it is on disk: opened anew unless the file is the one this process used last."""
-        path, key = self._path(alias), self._key(alias, person)
+        key = self._key(alias, person)
         opened = self._opened.pop(alias, None)
-        if opened is None or opened.key != key or opened.looks is None or opened.looks != _looks(path):
-            index = Index() if opened is None else opened.index
+        if opened is None or opened.key != key or opened.looks is None or opened.looks != _looks(opened.path):
+            path, index = self._path(alias), Index() if opened is None else opened.index
             if opened is not None:
                 opened.profile.close()
             try:
-                opened = _Opened(Profile(path, key, index), index, key, None)
+                opened = _Opened(path, Profile(path, key, index), index, key, None)
             except BaseException:
                 index.wipe()
                 raise
@@ -291,7 +290,7 @@ class VaultMemory:
             _inherited.extend(self._opened.values())
             self._opened.clear()
             self._process = os.getpid()
-        for alias in [alias for alias in self._opened if not self._path(alias).exists()]:
+        for alias in [alias for alias, opened in self._opened.items() if not opened.path.exists()]:
             self._shut(alias)
 
     def _shut(self, alias: str) -> None:

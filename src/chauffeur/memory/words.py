@@ -5,19 +5,19 @@ from __future__ import annotations
 import re
 import unicodedata
 
-_EVEN: tuple[tuple[re.Pattern[str], str], ...] = (
-    (re.compile(r"[\u2019\u02bc`]"), "'"),
-    (re.compile(r"\bwon't\b"), "will not"),
-    (re.compile(r"\bcan(?:'t|not)\b"), "can not"),
-    (re.compile(r"n't\b"), " not"),
-    (re.compile(r"\b(do|did|was|is)nt\b"), r"\1 not"),
-    (re.compile(r"'d\b"), " would"),
-    (re.compile(r"'m\b"), " am"),
-    (re.compile(r"'re\b"), " are"),
-    (re.compile(r"\b(it|that|there)'s\b"), r"\1 is"),
-    (re.compile(r"\bgonna\b"), "going to"),
-    (re.compile(r"\s+"), " "),
+_QUOTES = str.maketrans(dict.fromkeys("\u2019\u02bc`", "'"))
+_EVEN: tuple[tuple[str, re.Pattern[str], str], ...] = (
+    ("won't", re.compile(r"\bwon't\b"), "will not"),
+    ("can", re.compile(r"\bcan(?:'t|not)\b"), "can not"),
+    ("n't", re.compile(r"n't\b"), " not"),
+    ("nt", re.compile(r"\b(do|did|was|is)nt\b"), r"\1 not"),
+    ("'d", re.compile(r"'d\b"), " would"),
+    ("'m", re.compile(r"'m\b"), " am"),
+    ("'re", re.compile(r"'re\b"), " are"),
+    ("'s", re.compile(r"\b(it|that|there)'s\b"), r"\1 is"),
+    ("gonna", re.compile(r"\bgonna\b"), "going to"),
 )
+"""Letters without which a pattern matches nowhere, the pattern, and what stands in its place."""
 _TURNS = frozenset({"but", "however", "although", "even though", "though", "yet", "except"})
 """Words after which something else is said than before."""
 _ENDS = frozenset("!?;.\n")
@@ -26,10 +26,11 @@ _BREAK = re.compile(rf"([!?;:\n\u2014]|[.,](?!\d)| - |\b(?:{'|'.join(sorted(_TUR
 
 def even(text: str) -> str:
     """Lower case, compatibility forms folded, contractions spelled out, single spaces."""
-    text = unicodedata.normalize("NFKC", text).casefold()
-    for pattern, replacement in _EVEN:
-        text = pattern.sub(replacement, text)
-    return text.strip()
+    text = unicodedata.normalize("NFKC", text).casefold().translate(_QUOTES)
+    for letters, pattern, replacement in _EVEN:
+        if letters in text:
+            text = pattern.sub(replacement, text)
+    return " ".join(text.split())
 
 
 def clauses(text: str) -> list[str]:
