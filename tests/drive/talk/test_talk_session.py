@@ -54,8 +54,9 @@ class Person:
     def until(self, holds: Callable[[], object], within_s: float = WITHIN_S) -> None:
         end_s = time.monotonic() + within_s
         while not holds():
-            assert time.monotonic() < end_s, [each for each in self.said if each.kind not in ("scene", "road")]
-            assert self.talk.driving, "the drive is over"
+            told = [each for each in self.said if each.kind not in ("scene", "road")]
+            assert time.monotonic() < end_s, told
+            assert self.talk.driving, ("the drive is over", told)
             self.talk.poll()
             time.sleep(0.005)
 
