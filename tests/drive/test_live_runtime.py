@@ -243,6 +243,14 @@ def test_without_its_supervisor_the_car_comes_to_a_stand_and_no_process_is_left(
     assert figures["ticks"] > 10
 
 
+def test_a_planner_that_hangs_when_the_drive_is_over_is_ended() -> None:
+    code = (
+        "import time; from chauffeur.drive.live.__main__ import _end_for_sure; "
+        "_end_for_sure(lambda: True, 0.1); time.sleep(300)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], timeout=60, check=False).returncode == 1
+
+
 def _lives(pid: int) -> bool:
     try:
         state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]

@@ -199,6 +199,13 @@ def test_a_complaint_changes_the_speed_and_nothing_else(planner: Planner) -> Non
     assert driven(planner, "There are kids running around.", LOT).target_speed_mps == pytest.approx(1.4)
 
 
+def test_who_complains_and_says_what_to_do_gets_that(planner: Planner) -> None:
+    assert driven(planner, "You are too slow, change to the left lane.", RIGHT).lane == -1
+    assert driven(planner, "You are too fast, drive at 70 km/h.", LEFT).target_speed_mps == pytest.approx(
+        19.44, abs=0.01
+    )
+
+
 def test_a_complaint_lowers_a_calm_speed_still(planner: Planner) -> None:
     calm = replace(LEFT, speed_mps=22.0)
     assert driven(planner, "You are racing.", calm).target_speed_mps == pytest.approx(19.36)

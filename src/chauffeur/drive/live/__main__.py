@@ -10,6 +10,8 @@ import logging
 import os
 import signal
 import sys
+import threading
+import time
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -20,6 +22,8 @@ from chauffeur.worlds.base import MirroredWorld
 
 FIGURES_FILE = "punctuality.json"
 READY_SUFFIX = ".ready"
+_ENDS_WITHIN_S = 10.0
+"""Time a planner has to end when the drive is over; then it is ended, whatever it hangs in."""
 
 
 def _told_to_end(parent: int) -> Callable[[], bool]:
@@ -38,6 +42,18 @@ def _told_to_end(parent: int) -> Callable[[], bool]:
     signal.signal(signal.SIGTERM, ask)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     return lambda: asked or os.getppid() != parent
+
+
+def _end_for_sure(over: Callable[[], bool], within_s: float = _ENDS_WITHIN_S) -> None:
+    """End this process some time after the drive is over, even if somebody else's code never comes back."""
+
+    def watch() -> None:
+        while not over():
+            time.sleep(0.25)
+        time.sleep(within_s)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="end for sure", daemon=True).start()
 
 
 def _ready(folder: Path, role: str) -> None:
@@ -130,6 +146,7 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     from chauffeur.planners.registry import make_planner
     from chauffeur.planners.talk2drive.recent import fitting
 
+    _end_for_sure(over)
     world = _world(settings)
     mirror = Mirror(world, settings.starts, ring(folder, "observations"))
     rings = PlanningRings(

@@ -58,6 +58,7 @@ _OPEN: Final = ("ask", "refuse", "style.", "speed.increase", "speed.decrease", "
 """Readings of words that may have named nothing to do."""
 _HASTY: Final = ("style.hurry", "style.sporty", "speed.increase", "speed.max")
 _NOT_EASY: Final = ("ask", "refuse", "style.hurry", "style.sporty", "speed.increase", "speed.max", "gap.decrease")
+_DEEDS: Final = ("lane.left", "lane.right", "overtake", "turn.", "pull_over", "speed.set", "speed.cap")
 _AGAINST: Final = {1: "speed.decrease", -1: "speed.increase"}
 _ONE_BY_ONE: Final = "With these parameters I can do one thing at a time. What shall I do first?"
 
@@ -119,7 +120,7 @@ class EmbeddedParameters:
             remark = misread(wish, intent, situation)
         if remark is not None:
             return self._as_taken(remark, request, begun)
-        if complaint:
+        if complaint and not _names_a_deed(intent):
             return self._changed(complaint, request, begun)
         if moody and (mood := _unheard_mood(wish, intent)):
             return self._read(_saying(request, mood), begun, moody=False)
@@ -224,6 +225,11 @@ def _saying(request: PlanRequest, words: str) -> PlanRequest:
 def _parameters(speed_mps: float, manner: Manner, route: str) -> Parameters:
     look = LOOK_AHEAD[manner]
     return Parameters(round(speed_mps, 2), look.distance_m, look.ratio_s, 0, route)
+
+
+def _names_a_deed(intent: str) -> bool:
+    """Whether what was read is something to do, beside whatever is complained of."""
+    return any(part.startswith(_DEEDS) for part in intent.split("+"))
 
 
 def _unheard_mood(wish: str, intent: str) -> str:
