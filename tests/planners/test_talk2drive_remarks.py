@@ -178,6 +178,7 @@ def test_what_is_forbidden_is_no_remark(planner: Planner, wish: str, situation: 
         ("Go faster.", 0),
         ("Slow down.", 0),
         ("Turn left.", 0),
+        ("Drive at the speed limit.", 0),
     ],
 )
 def test_complaints_of_the_pace(wish: str, sign: int) -> None:
@@ -222,6 +223,8 @@ def test_a_complaint_lowers_a_calm_speed_still(planner: Planner) -> None:
         ("My head is sore.", "ease"),
         ("The baby is asleep but we are late.", ""),
         ("The sky is blue.", ""),
+        ("Bring me a coffee.", ""),
+        ("Could you play some calm music?", ""),
     ],
 )
 def test_moods(words: str, mood: str) -> None:

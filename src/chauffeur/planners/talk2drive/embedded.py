@@ -58,7 +58,17 @@ _OPEN: Final = ("ask", "refuse", "style.", "speed.increase", "speed.decrease", "
 """Readings of words that may have named nothing to do."""
 _HASTY: Final = ("style.hurry", "style.sporty", "speed.increase", "speed.max")
 _NOT_EASY: Final = ("ask", "refuse", "style.hurry", "style.sporty", "speed.increase", "speed.max", "gap.decrease")
-_DEEDS: Final = ("lane.left", "lane.right", "overtake", "turn.", "pull_over", "speed.set", "speed.cap")
+_DEEDS: Final = (
+    "lane.left",
+    "lane.right",
+    "overtake",
+    "turn.",
+    "pull_over",
+    "speed.set",
+    "speed.cap",
+    "speed.limit",
+    "speed.max",
+)
 _AGAINST: Final = {1: "speed.decrease", -1: "speed.increase"}
 _ONE_BY_ONE: Final = "With these parameters I can do one thing at a time. What shall I do first?"
 

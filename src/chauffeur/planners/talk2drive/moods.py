@@ -30,6 +30,8 @@ def pace_complaint(wish: str, *, in_lot: bool = False) -> Literal[-1, 0, 1]:
 
 def mood_of(wish: str) -> Mood:
     """What somebody is in who says this."""
+    if _shows("asks for something else", wish):
+        return ""
     relieved = _shows("no haste", wish)
     pressed = not relieved and _shows("haste", wish)
     eased = relieved or _shows("ease", wish)
