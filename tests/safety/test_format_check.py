@@ -134,6 +134,7 @@ def test_the_envelope_watches_apis_that_exist() -> None:
     ("policy", "passes"),
     [
         (Parameters(15.0, 10.0, 2.0, -1), True), (Parameters(15, 10, 2, 1), True),
+        (Parameters(3.0, 4.0, 1.0, 0, "stadium"), True), (Parameters(3.0, 4.0, 1.0, 0, "x" * 10_000), False),
         (Parameters(math.nan, 10.0, 2.0), False),
         (Parameters(15.0, math.inf, 2.0), False), (Parameters(15.0, 10.0, -math.inf), False),
         (Parameters("15", 10.0, 2.0), False), (Parameters(True, 10.0, 2.0), False), (Parameters(BIG, 1.0, 2.0),

@@ -222,6 +222,14 @@ def test_turns_need_an_intersection(snap: Snap, plan: Make, api: str) -> None:
     assert "but there is no intersection ahead." in verdict.reason
 
 
+def test_a_turn_is_for_an_intersection(snap: Snap, plan: Make) -> None:
+    turning = plan(Parameters(8.0, 10.0, 2.0, 0, "left"))
+    found = judge(turning, snap())
+    assert not found.passed
+    assert "no intersection ahead to turn left at" in found.reason
+    assert judge(turning, replace(snap(), kind="intersection")).passed
+
+
 @pytest.mark.parametrize(
     ("parameters", "passes"),
     [

@@ -188,6 +188,7 @@ def episodes() -> ModuleType:
         ("saboteur", 22718),  # left the place it might have stood in, for a lane of its own fork
         ("saboteur", 22771),  # braked in the middle because it could still have cleared the crossing a period later
         ("saboteur", 22903),  # braked for its lead while it promised to be through
+        ("throttle", 22033),  # stands close by somebody's way rather than drive into it
     ],
 )
 def test_what_once_ended_in_a_collision_does_not(episodes: ModuleType, kind: str, seed: int) -> None:
