@@ -31,14 +31,14 @@ from chauffeur.planners.talk2drive.lanes import (
     unsaid_turn,
 )
 from chauffeur.planners.talk2drive.lot import parks, wanted_pace, wanted_place
-from chauffeur.planners.talk2drive.moods import EASE, HURRY, mood_of, pace_complaint
+from chauffeur.planners.talk2drive.moods import EASE, HURRY, Mood, mood_of, pace_complaint
 from chauffeur.planners.talk2drive.remarks import Remark, misread, stands, taken_for
 from chauffeur.planners.talk2drive.style import (
     BRISK_SHARE,
     LOOK_AHEAD,
     LOOK_AHEAD_PARKING,
     PARKING_MPS,
-    Manner,
+    LookAhead,
     manner_of,
 )
 
@@ -126,14 +126,15 @@ class EmbeddedParameters:
         intent = settled.intent if isinstance(settled, Plan) else settled.linked.choice.intent
         if isinstance(settled, Plan) and _forbidden(settled):
             return settled
-        if moody and remark is None and not mood_of(wish):
+        mood = mood_of(wish) if moody else ""
+        if moody and remark is None and not mood:
             remark = misread(wish, intent, situation)
         if remark is not None:
             return self._as_taken(remark, request, begun)
         if complaint and not _names_a_deed(intent):
             return self._changed(complaint, request, begun)
-        if moody and (mood := _unheard_mood(wish, intent)):
-            return self._read(_saying(request, mood), begun, moody=False)
+        if unheard := _unheard(mood, intent):
+            return self._read(_saying(request, unheard), begun, moody=False)
         if isinstance(settled, Plan):
             if settled.intent in ("ask", "refuse") and (sign := complaint_in(wish)):
                 return self._changed(sign, request, begun)
@@ -145,7 +146,7 @@ class EmbeddedParameters:
         linked, used = settled.linked, settled.used
         if asked and (not intent.startswith("speed.") or intent.startswith(_AGAINST[asked])):
             return self._changed(asked, request, begun)
-        if in_lot and (parks(intent) or (intent.startswith("style.") and moody and not mood_of(wish))):
+        if in_lot and (parks(intent) or (intent.startswith("style.") and moody and not mood)):
             return self._park("nearest", request, begun)
         if unsaid_turn(wish, intent):
             return declined(self, _WHERE_TO, begun, intent="ask", raw=settled.written.text)
@@ -176,29 +177,29 @@ class EmbeddedParameters:
         situation = request.context.situation
         sign = situation.speed_limit_mps
         speed = min(BRISK_SHARE * sign, request.limits.most_mps(sign))
-        return self._paced(_parameters(speed, "usual", "straight"), "turn.straight", request, begun)
+        return self._paced(_parameters(speed, LOOK_AHEAD["usual"], "straight"), "turn.straight", request, begun)
 
     def _give_way(self, request: PlanRequest, begun: float) -> Plan:
         """Towards a crossing where others go first: the car gives way by itself, so it is the approach that counts."""
         speed = _GIVES_WAY_SHARE * request.context.situation.speed_mps
         wants = "You want others to go first."
-        return self._paced(_parameters(speed, "gentle", "straight"), "yield", request, begun, wants)
+        return self._paced(_parameters(speed, LOOK_AHEAD["gentle"], "straight"), "yield", request, begun, wants)
 
     def _changed(self, sign: int, request: PlanRequest, begun: float) -> Plan:
         """A complaint on the pace: another speed in the same lane."""
         situation = request.context.situation
         speed = eased_mps(sign, situation, request.limits)
-        route = "straight" if situation.world == "intersection" else ""
-        found = _parameters(speed, "gentle" if sign < 0 else "usual", route)
         if situation.world == "parking":
-            found = Parameters(found.target_speed_mps, LOOK_AHEAD_PARKING.distance_m, LOOK_AHEAD_PARKING.ratio_s)
+            found = _parameters(speed, LOOK_AHEAD_PARKING)
+        else:
+            look = LOOK_AHEAD["gentle" if sign < 0 else "usual"]
+            found = _parameters(speed, look, "straight" if situation.world == "intersection" else "")
         wants = f"You find this too {'fast' if sign < 0 else 'slow'}."
         return self._paced(found, "speed.decrease" if sign < 0 else "speed.increase", request, begun, wants)
 
     def _park(self, place: str, request: PlanRequest, begun: float) -> Plan:
-        look, situation = LOOK_AHEAD_PARKING, request.context.situation
-        speed = round(min(PARKING_MPS, request.limits.most_mps(situation.speed_limit_mps)), 2)
-        found = Parameters(speed, look.distance_m, look.ratio_s, 0, place)
+        speed = min(PARKING_MPS, request.limits.most_mps(request.context.situation.speed_limit_mps))
+        found = _parameters(speed, LOOK_AHEAD_PARKING, place)
         return self._paced(found, "park", request, begun, "You want to park.")
 
     def _paced(self, found: Parameters, intent: str, request: PlanRequest, begun: float, wants: str = "") -> Plan:
@@ -232,8 +233,7 @@ def _saying(request: PlanRequest, words: str) -> PlanRequest:
     return replace(request, instruction=replace(request.instruction, text=words))
 
 
-def _parameters(speed_mps: float, manner: Manner, route: str) -> Parameters:
-    look = LOOK_AHEAD[manner]
+def _parameters(speed_mps: float, look: LookAhead, route: str = "") -> Parameters:
     return Parameters(round(speed_mps, 2), look.distance_m, look.ratio_s, 0, route)
 
 
@@ -242,9 +242,8 @@ def _names_a_deed(intent: str) -> bool:
     return any(part.startswith(_DEEDS) for part in intent.split("+"))
 
 
-def _unheard_mood(wish: str, intent: str) -> str:
-    """The mood that words show and their reading misses, as a wish; empty where it stands as it was read."""
-    mood = mood_of(wish)
+def _unheard(mood: Mood, intent: str) -> str:
+    """A mood that the reading of the words misses, as a wish; empty where it stands as it was read."""
     if not mood or not intent.startswith(_OPEN):
         return ""
     if mood == "hurry":

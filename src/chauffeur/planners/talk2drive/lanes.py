@@ -46,13 +46,21 @@ def last_lane(situation: Situation) -> int:
     return situation.lane_count - (2 if situation.emergency_lane else 1)
 
 
+def follows(situation: Situation) -> bool:
+    """Whether somebody ahead is near enough to be followed."""
+    front = situation.front
+    return front is not None and front.distance_m < max(20.0, _NEAR_S * situation.speed_mps)
+
+
 def held_up(situation: Situation) -> bool:
     """Whether a slower car is right ahead."""
     front = situation.front
-    if front is None:
-        return False
-    near = front.distance_m < max(20.0, _NEAR_S * situation.speed_mps)
-    return near and front.speed_mps < _SLOWER_SHARE * situation.speed_limit_mps
+    return front is not None and follows(situation) and front.speed_mps < _SLOWER_SHARE * situation.speed_limit_mps
+
+
+def cap_mps(situation: Situation, limits: Limits) -> float:
+    """The highest speed to choose where none was named, m/s: that of the sign, within the limits."""
+    return min(situation.speed_limit_mps, limits.most_mps(situation.speed_limit_mps))
 
 
 def passing_mps(situation: Situation, wanted_mps: float, leaning_mps: float = 0.0) -> float:
@@ -84,8 +92,7 @@ def fitting_mps(speed_mps: float, intent: str, situation: Situation, limits: Lim
         limits: No speed beyond them.
         leaning_mps: What the person's history added to the chosen speed.
     """
-    now, sign = situation.speed_mps, situation.speed_limit_mps
-    sign = min(sign, limits.most_mps(sign))
+    now, sign = situation.speed_mps, cap_mps(situation, limits)
     if situation.world == "parking":
         return _in_lot(speed_mps, intent, now, sign)
     if situation.world != "highway" or not speed_mps:
@@ -96,9 +103,9 @@ def fitting_mps(speed_mps: float, intent: str, situation: Situation, limits: Lim
     if intent.startswith("overtake") and situation.front is not None:
         return min(speed_mps, max(brisk, situation.front.speed_mps + _PASSES_BY_MPS))
     if intent.startswith(_EASES):
-        keeps_behind = _follows(situation) and mood_lane(intent, situation) == 0
+        keeps_behind = follows(situation) and mood_lane(intent, situation) == 0
         return calm if keeps_behind or now > CALM_SHARE * sign else min(speed_mps, now)
-    if intent.startswith(_STAYS) and _follows(situation):
+    if intent.startswith(_STAYS) and follows(situation):
         return max(speed_mps, calm)
     return speed_mps
 
@@ -114,12 +121,6 @@ def _in_lot(speed_mps: float, intent: str, now_mps: float, sign_mps: float) -> f
     if intent.startswith("speed.decrease"):
         return max((1.0 - _LOT_MOST) * now_mps, speed_mps)
     return speed_mps
-
-
-def _follows(situation: Situation) -> bool:
-    """Whether somebody ahead is near enough to be followed."""
-    front = situation.front
-    return front is not None and front.distance_m < max(20.0, _NEAR_S * situation.speed_mps)
 
 
 def complaint_in(wish: str) -> Literal[-1, 0, 1]:
@@ -138,8 +139,7 @@ def eased_mps(sign: int, situation: Situation, limits: Limits) -> float:
         situation: The speed now, and the limit.
         limits: No speed beyond them.
     """
-    now, limit = situation.speed_mps, situation.speed_limit_mps
-    cap = min(limit, limits.most_mps(limit))
+    now, limit, cap = situation.speed_mps, situation.speed_limit_mps, cap_mps(situation, limits)
     if situation.world == "parking":
         return _in_lot((1.0 + sign * _LOT_STEP) * now, "speed.increase" if sign > 0 else "speed.decrease", now, cap)
     if sign > 0:
