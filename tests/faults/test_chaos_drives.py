@@ -7,6 +7,7 @@ import pytest
 from chauffeur.bench.chaos.model import ModelServer
 from chauffeur.bench.chaos.runner import ChaosConfig, play_drive
 from chauffeur.bench.chaos.table import failures
+from chauffeur.bench.chaos.witness import Witness
 
 KINDS = ("model-creeps-beyond", "wishes-garbage", "orders-garbage", "worker-killed", "policy-killed", "control-killed")
 
@@ -16,8 +17,8 @@ KINDS = ("model-creeps-beyond", "wishes-garbage", "orders-garbage", "worker-kill
 def test_nothing_unsafe_and_nothing_lost_whatever_breaks() -> None:
     config = ChaosConfig(kinds=KINDS, first=4)
     rows = []
-    with ModelServer() as server:
-        play_drive([config.draw(number) for number in range(len(KINDS))], config, server, rows.append)
+    with ModelServer() as server, Witness() as witness:
+        play_drive([config.draw(number) for number in range(len(KINDS))], config, server, witness, rows.append)
     assert failures(rows) == []
     struck = {row["kind"] for row in rows}
     assert {"wishes-garbage", "orders-garbage", "control-killed"} <= struck
@@ -31,7 +32,7 @@ def test_nothing_unsafe_and_nothing_lost_whatever_breaks() -> None:
 def test_a_dead_supervisor_leaves_every_wish_in_the_audit_log_and_a_car_that_stands() -> None:
     config = ChaosConfig(kinds=("supervisor-killed",), first=2)
     rows = []
-    with ModelServer() as server:
-        play_drive([config.draw(0)], config, server, rows.append)
+    with ModelServer() as server, Witness() as witness:
+        play_drive([config.draw(0)], config, server, witness, rows.append)
     assert len(rows) == 1 and failures(rows) == []
     assert rows[0]["notes"]["orphans"] == []

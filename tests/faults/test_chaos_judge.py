@@ -9,6 +9,7 @@ import pytest
 
 from chauffeur.bench.chaos.judge import judge, recovery
 from chauffeur.bench.chaos.outside import Heard
+from chauffeur.bench.chaos.witness import Stall
 from chauffeur.concept import Command, Wishes
 from chauffeur.drive.actuate import actuate
 from chauffeur.drive.live.messages import Report
@@ -89,7 +90,23 @@ def test_a_report_that_is_not_true_is_seen(trip) -> None:
 def test_silence_is_seen(trip) -> None:
     late = [*trip[:20], *(replace(each, at_ns=each.at_ns + round(5 * PERIOD_S * 1e9)) for each in trip[20:])]
     assert unsafe(late) == ("control was silent",)
-    assert judge(late, START, ("w1",), PERIOD_S, stopped_ns=round(0.5e9)).unsafe() == ()
+
+
+def test_silence_is_excused_only_while_the_machine_itself_stood_still(trip) -> None:
+    period_ns = round(PERIOD_S * 1e9)
+    late = [*trip[:20], *(replace(each, at_ns=each.at_ns + 5 * period_ns) for each in trip[20:])]
+    begun = trip[19].at_ns
+
+    def found(*stalls: tuple[int, float, float]) -> tuple[float, float, tuple[str, ...]]:
+        seen = [Stall(cpu, begun + round(a * period_ns), begun + round(b * period_ns), 0) for cpu, a, b in stalls]
+        deeds = judge(late, START, ("w1",), PERIOD_S, seen)
+        return deeds.longest_silence, deeds.unexplained_silence, deeds.unsafe()
+
+    assert found((0, 0.5, 5.5)) == (6.0, 1.0, ())
+    assert found((0, 0.5, 2.5)) == (6.0, 4.0, ())
+    assert found((0, 0.5, 2.4)) == (6.0, 4.1, ("control was silent",))
+    assert found((0, -9.0, 0.0), (1, 6.0, 20.0)) == (6.0, 6.0, ("control was silent",))  # before it, and after it
+    assert found((0, 1.0, 2.0), (1, 1.0, 2.0), (0, 1.5, 2.0)) == (6.0, 5.0, ("control was silent",))  # counted once
 
 
 def test_an_ego_that_runs_into_its_leader_is_to_blame() -> None:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
+import signal
 import time
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
@@ -13,6 +16,7 @@ from chauffeur.bench.chaos import replies
 from chauffeur.bench.chaos.model import FAULTS, ModelServer, Script
 from chauffeur.bench.chaos.table import failures, figures, headline, table_markdown
 from chauffeur.bench.chaos.vandal import DEEDS, Vandal
+from chauffeur.bench.chaos.witness import Witness, stood_ns
 from chauffeur.concept import Wishes
 from chauffeur.drive.live.messages import MessageError, Observation, Wish
 from chauffeur.drive.live.settings import SIZES, ring
@@ -88,7 +92,8 @@ def test_every_fault_is_another_answer_than_the_good_one(fault: str) -> None:
 def row(**changes):
     plain = {
         "case": 1, "kind": "policy-killed", "family": "process", "stage": "running", "unsafe": [], "lost": [],
-        "left_behind": [], "wishes": [{"words": "a"}], "ticks": 100, "deeds": {"missed": 0}, "worst": "hold",
+        "left_behind": [], "wishes": [{"words": "a"}], "ticks": 100, "worst": "hold",
+        "deeds": {"missed": 0, "longest_silence": 1.1}, "machine_stood_ms": 0,
         "to_follow_s": 0.5, "to_new_plan_s": None,
     }  # fmt: skip
     return plain | changes
@@ -98,11 +103,37 @@ def test_the_table_counts_and_names_what_failed() -> None:
     rows = [
         row(),
         row(case=2, unsafe=["too fast"], worst="stop", to_follow_s=None),
-        row(case=3, lost=["a"], to_follow_s=0.0, deeds={"missed": 4}),
+        row(case=3, lost=["a"], to_follow_s=0.0, deeds={"missed": 4, "longest_silence": 5.0}, machine_stood_ms=80),
+        row(case=4, unsafe=["control was silent"], deeds={"missed": 9, "longest_silence": 9.0}, machine_stood_ms=30),
     ]
     found = figures(rows)["policy-killed"]
-    assert (found["cases"], found["unsafe"], found["lost"], found["missed"]) == ("3", "1", "1", "4")
+    assert (found["cases"], found["unsafe"], found["lost"], found["missed"]) == ("4", "2", "1", "13")
     assert (found["worst rung"], found["back s p50"], found["not back"]) == ("stop", "0.50", "1")
-    assert len(failures(rows)) == 2 and "case 2" in failures(rows)[0]
-    assert "3 cases 1 led to unsafe actuation and 1 of 3 wishes" in headline(rows)
-    assert "| policy-killed | 3 | 1 | 1 |" in table_markdown(rows, "T")
+    assert len(failures(rows)) == 3 and "case 2" in failures(rows)[0]
+    assert "4 cases 2 led to unsafe actuation and 1 of 4 wishes" in headline(rows)
+    assert (
+        "In 1 of the safe cases control was silent while the machine itself stood still, for up to 80 ms."
+        in headline(rows)
+    )
+    assert "stood still" not in headline(rows[:2])
+    assert "| policy-killed | 4 | 2 | 1 |" in table_markdown(rows, "T")
+
+
+def test_a_witness_sees_its_own_cpu_stand_still_and_nothing_else() -> None:
+    with Witness() as witness:
+        if not witness.able:
+            pytest.skip("this machine does not allow real-time scheduling")
+        stopped = witness.processes[0]
+        before = time.monotonic_ns()
+        os.kill(stopped, signal.SIGSTOP)
+        time.sleep(0.12)
+        os.kill(stopped, signal.SIGCONT)
+        time.sleep(0.05)
+        seen = witness.stalls(before, time.monotonic_ns())
+        first = max(
+            (one for one in seen if one.cpu == min(os.sched_getaffinity(0))), key=lambda one: one.to_ns - one.from_ns
+        )
+        assert 0.08 < (first.to_ns - first.from_ns) / 1e9 < 1.0
+        assert stood_ns([first], first.from_ns, first.to_ns) == first.to_ns - first.from_ns
+        assert witness.stalls(0, before - 10**9) == ()
+    assert all(not Path(f"/proc/{process}").exists() for process in witness.processes)

@@ -12,7 +12,7 @@ from chauffeur.concept import Scenario
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
-SUITE_VERSION: Final = "chaos-v1"
+SUITE_VERSION: Final = "chaos-v2"
 
 Family = Literal["model", "process", "memory", "disk", "clock"]
 Stage = Literal["before-plan", "planning", "ordered", "running", "lane-change", "junction", "end"]

@@ -14,6 +14,7 @@ from itertools import pairwise
 from typing import Any, Final
 
 from chauffeur.bench.chaos.outside import Heard
+from chauffeur.bench.chaos.witness import Stall, stood_ns
 from chauffeur.concept import Command, Frame, Limits, Snapshot
 from chauffeur.drive.actuate import actuate
 from chauffeur.drive.live.ladder import RUNGS
@@ -22,8 +23,8 @@ from chauffeur.safety.blame import blame
 from chauffeur.safety.shield import LAMPILOT_SHIELD
 from chauffeur.worlds.highway import HighwayWorld
 
-SILENT_PERIODS: Final = 3.0
-"""Control may be silent for so many periods, and one more that is under way."""
+MOST_SILENT: Final = 4.0
+"""Control may be silent for three periods, and one more that is under way."""
 _TOO_FAST_MPS: Final = 0.1
 _TOO_FAST_TICKS: Final = 10
 _SLACK: Final = 1e-6
@@ -42,6 +43,7 @@ class Deeds:
             second.
         unknown_plans: Names of plans that were followed although no check had passed them.
         longest_silence: Of control, in control periods.
+        unexplained_silence: The same without the time in which a witness saw the machine stand still.
         missed: Control periods never begun.
         faults: Errors inside the control period.
         untrue: Reports that do not agree with the commands they tell of.
@@ -55,6 +57,7 @@ class Deeds:
     too_fast_ticks: int
     unknown_plans: tuple[str, ...]
     longest_silence: float
+    unexplained_silence: float
     missed: int
     faults: int
     untrue: int
@@ -69,7 +72,7 @@ class Deeds:
             "a command no actuator can follow": self.bad_commands > 0,
             "too fast": self.too_fast_ticks > 0,
             f"a plan that no check had passed: {', '.join(unknown)}": bool(unknown),
-            "control was silent": self.longest_silence > SILENT_PERIODS + 1.0,
+            "control was silent": self.unexplained_silence > MOST_SILENT,
             "control's reports are not true": self.untrue > 0,
         }
         return tuple(words for words, holds in found.items() if holds)
@@ -80,7 +83,11 @@ class Deeds:
 
 
 def judge(
-    heard: Sequence[Heard], start: Start, known_plans: Collection[str], period_s: float, stopped_ns: int = 0
+    heard: Sequence[Heard],
+    start: Start,
+    known_plans: Collection[str],
+    period_s: float,
+    stalls: Sequence[Stall] = (),
 ) -> Deeds:
     """Judge a trip.
 
@@ -89,7 +96,7 @@ def judge(
         start: Where it began.
         known_plans: Names of plans whose program was started after it had passed the checks.
         period_s: Control period by the clock.
-        stopped_ns: For how long control was stopped from the outside.
+        stalls: When the machine itself stood still, as a witness saw it.
     """
     world = HighwayWorld()
     snapshot = world.reset(start.scenario, start.seed)
@@ -134,7 +141,8 @@ def judge(
         unknown_plans=tuple(
             sorted({each.report.plan for each in heard if each.report.rung in ("follow", "hold")} - set(known_plans))
         ),
-        longest_silence=round(_longest_silence_s(heard, stopped_ns) / period_s, 2),
+        longest_silence=round(_longest_silence_s(heard, ()) / period_s, 2),
+        unexplained_silence=round(_longest_silence_s(heard, stalls) / period_s, 2),
         missed=missed,
         faults=heard[-1].report.faults - heard[0].report.faults if heard else 0,
         untrue=untrue,
@@ -199,6 +207,8 @@ def _differs(one: Command, other: Command) -> bool:
     )
 
 
-def _longest_silence_s(heard: Sequence[Heard], stopped_ns: int) -> float:
-    gaps = [later.at_ns - earlier.at_ns for earlier, later in pairwise(heard)]
-    return max(0, max(gaps, default=0) - stopped_ns) * 1e-9
+def _longest_silence_s(heard: Sequence[Heard], stalls: Sequence[Stall]) -> float:
+    gaps = (
+        later.at_ns - earlier.at_ns - stood_ns(stalls, earlier.at_ns, later.at_ns) for earlier, later in pairwise(heard)
+    )
+    return max(gaps, default=0) * 1e-9

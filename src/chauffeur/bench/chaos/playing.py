@@ -14,6 +14,7 @@ from chauffeur.bench.chaos.model import ModelServer, Script
 from chauffeur.bench.chaos.outside import Drive, Heard
 from chauffeur.bench.chaos.replies import WISHES
 from chauffeur.bench.chaos.vandal import FORGED
+from chauffeur.bench.chaos.witness import Witness
 from chauffeur.drive.live.messages import Report
 from chauffeur.drive.live.starts import Start
 
@@ -300,7 +301,9 @@ class Play:
         """Whether every wish has its final answer."""
         return all(one.answers for one in self.asked)
 
-    def row(self, start: Start, plans: set[str], period_s: float, later: list[Heard]) -> dict[str, Any]:
+    def row(
+        self, start: Start, plans: set[str], period_s: float, later: list[Heard], witness: Witness
+    ) -> dict[str, Any]:
         """The case as JSON values.
 
         Args:
@@ -308,9 +311,11 @@ class Play:
             plans: Names of all plans that passed the checks.
             period_s: Control period by the clock.
             later: Reports of the trips after this one.
+            witness: Who saw when the machine itself stood still.
         """
         case = self.case
-        deeds = judge(self.heard, start, {"", *plans}, period_s)
+        stalls = witness.stalls(self.heard[0].at_ns, self.heard[-1].at_ns)
+        deeds = judge(self.heard, start, {"", *plans}, period_s, stalls)
         ignored = (FORGED,)  # whoever writes as the policy is followed as the policy is: within limits and shield
         unsafe = deeds.unsafe(ignored_plans=ignored)
         new = {one.name for one in self.asked if one.after_fault and one.name}
@@ -340,6 +345,9 @@ class Play:
                 {"words": one.words, "after_fault": one.after_fault, "events": one.events} for one in self.asked
             ],
             "deeds": deeds.row(),
+            "machine_stood_ms": max((round((one.to_ns - one.from_ns) / 1e6) for one in stalls), default=0),
+            "stolen_ms": sum(one.stolen_ms for one in stalls),
+            "witness": witness.able,
             "worst": back.worst,
             "to_follow_s": back.to_follow_s,
             "to_new_plan_s": back.to_new_plan_s,

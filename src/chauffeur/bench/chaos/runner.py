@@ -14,6 +14,7 @@ from chauffeur.bench.chaos.model import ModelServer, Script
 from chauffeur.bench.chaos.outside import Drive, settings_for
 from chauffeur.bench.chaos.playing import Play, Trace, silent
 from chauffeur.bench.chaos.replies import WISHES
+from chauffeur.bench.chaos.witness import Witness
 from chauffeur.bench.standing import Speedometer, Standing
 from chauffeur.bench.store import Row, RowStore, freeze, sole_writer
 from chauffeur.concept import ConfigError, SandboxError
@@ -100,10 +101,10 @@ class ChaosRun:
         """Play what has not been played; what was played stays when this is broken off."""
         with sole_writer(self.folder):
             try:
-                with ModelServer() as server:
+                with ModelServer() as server, Witness() as witness:
                     while left := self.left:
                         numbers = compose(left, self._kinds)
-                        self._play([self.config.draw(number) for number in numbers], server, watch, trace)
+                        self._play([self.config.draw(number) for number in numbers], server, witness, watch, trace)
             finally:
                 self._store.close()
             return self.rows()
@@ -117,7 +118,7 @@ class ChaosRun:
         content = (json.dumps({**asdict(self.config), "suite": SUITE_VERSION}, indent=1) + "\n").encode()
         freeze(self.folder / "config.json", content, same=lambda stored: _but_cases(stored) == _but_cases(content))
 
-    def _play(self, cases: Sequence[Case], server: ModelServer, watch: Watch, trace: Trace) -> None:
+    def _play(self, cases: Sequence[Case], server: ModelServer, witness: Witness, watch: Watch, trace: Trace) -> None:
         for case in cases:
             self._tries[case.number] = self._tries.get(case.number, 0) + 1
 
@@ -127,7 +128,7 @@ class ChaosRun:
             watch(self._standing())
 
         try:
-            play_drive(cases, self.config, server, keep, trace)
+            play_drive(cases, self.config, server, witness, keep, trace)
         except SandboxError as error:
             self._failures += 1
             trace(str(error))
@@ -174,6 +175,7 @@ def play_drive(
     cases: Sequence[Case],
     config: ChaosConfig,
     server: ModelServer,
+    witness: Witness,
     keep: Callable[[Row], None],
     trace: Trace = silent,
 ) -> None:
@@ -194,7 +196,7 @@ def play_drive(
         realtime=config.realtime,
     )
     with Drive(settings_for(settings, surroundings), surroundings) as drive:
-        _Stage(cases, starts, drive, server, _DT_S / config.speed, trace).play(keep)
+        _Stage(cases, starts, drive, server, witness, _DT_S / config.speed, trace).play(keep)
 
 
 class _Stage:
@@ -206,6 +208,7 @@ class _Stage:
         starts: Sequence[Start],
         drive: Drive,
         server: ModelServer,
+        witness: Witness,
         period_s: float,
         trace: Trace,
     ) -> None:
@@ -214,6 +217,7 @@ class _Stage:
         self._plays = [Play(case, trip, drive, server, trace) for trip, case in enumerate(cases, start=2)]
         self._warmed = False
         self._server = server
+        self._witness = witness
         self._plans: set[str] = set()
         self._done: set[int] = set()
         self._present: Play | None = None
@@ -349,7 +353,7 @@ class _Stage:
                 self._trace(f"case {play.case.number} was not played whole; it is tried again")
                 continue
             later = [heard for other in self._plays[place + 1 :] for heard in other.heard]
-            keep(play.row(self._starts[place], self._plans, self._period_s, later))
+            keep(play.row(self._starts[place], self._plans, self._period_s, later, self._witness))
 
     def _recovered(self, place: int) -> bool:
         """Whether fresh wishes are followed again, or many more trips have passed."""
@@ -362,9 +366,9 @@ class _Stage:
 def replay(config: ChaosConfig, number: int, trace: Trace) -> Row | None:
     """Play one case alone, with a trace; its row, or None where its fault could not strike."""
     rows: list[Row] = []
-    with ModelServer() as server:
+    with ModelServer() as server, Witness() as witness:
         case = config.draw(number)
-        play_drive([case], replace(config), server, rows.append, trace)
+        play_drive([case], replace(config), server, witness, rows.append, trace)
     return rows[0] if rows else None
 
 

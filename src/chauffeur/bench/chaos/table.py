@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from chauffeur.bench.chaos.cases import KINDS
+from chauffeur.bench.chaos.judge import MOST_SILENT
 from chauffeur.drive.live.ladder import RUNGS
 
 Rows = Sequence[Mapping[str, Any]]
@@ -48,10 +49,22 @@ def headline(rows: Rows) -> str:
     unsafe, lost = sum(bool(row["unsafe"]) for row in rows), sum(len(row["lost"]) for row in rows)
     wishes = sum(len(row["wishes"]) for row in rows)
     periods, missed = sum(row["ticks"] for row in rows), sum(row["deeds"]["missed"] for row in rows)
+    stood = [row["machine_stood_ms"] for row in rows if _excused(row)]
+    machine = (
+        f" In {len(stood)} of the safe cases control was silent while the machine itself stood still, "
+        f"for up to {max(stood)} ms."
+        if stood
+        else ""
+    )
     return (
         f"In {len(rows):,} cases {unsafe} led to unsafe actuation and {lost} of {wishes:,} wishes went without an "
-        f"answer; control missed {missed:,} of {periods + missed:,} periods."
+        f"answer; control missed {missed:,} of {periods + missed:,} periods.{machine}"
     )
+
+
+def _excused(row: Mapping[str, Any]) -> bool:
+    """Whether only the machine's standing still explains how long control was silent."""
+    return row["deeds"]["longest_silence"] > MOST_SILENT and not row["unsafe"]
 
 
 def table_markdown(rows: Rows, title: str) -> str:

@@ -27,7 +27,7 @@ from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.wheel import Wheel, pressed
 from chauffeur.drive.parameters import LotShield, ParametersDriver, shield_for
 from chauffeur.safety.bounds import bounded
-from chauffeur.safety.shield import Shield
+from chauffeur.safety.shield import Shield, foresight
 from chauffeur.worlds.base import Driver, MirroredWorld
 
 AHEAD_NS: Final = 50_000_000
@@ -111,7 +111,9 @@ class Control:
 
     def warm_up(self) -> None:
         """Drive the first start for a moment in a world of its own kind, so that no code is met for the first time
-        while driving; then forget it."""
+        while driving; then forget it. What only an emergency at a crossing would call is loaded as well."""
+        if any(self._world.reset(one.scenario, one.seed).kind == "intersection" for one in self._starts):
+            foresight.warm_up()
         start = self._starts[0]
         self._world.reset(start.scenario, start.seed)
         driver, shield = self._world.driver(), shield_for(self._world, start.limits)

@@ -57,7 +57,7 @@ def become_realtime(wanted: bool = True) -> Realtime:
     except (OSError, AttributeError):
         if become_favoured(NICENESS):
             scheduling = "nice"
-    return Realtime(scheduling, memory_locked=_lock_memory())
+    return Realtime(scheduling, memory_locked=lock_memory())
 
 
 def become_favoured(niceness: int = POLICY_NICENESS) -> bool:
@@ -75,7 +75,8 @@ def become_favoured(niceness: int = POLICY_NICENESS) -> bool:
     return True
 
 
-def _lock_memory() -> bool:
+def lock_memory() -> bool:
+    """Keep every page of this process in memory, now and later; whether that was allowed."""
     try:
         return ctypes.CDLL(None).mlockall(_LOCK_NOW_AND_LATER) == 0
     except (OSError, AttributeError):

@@ -1,0 +1,55 @@
+"""No control period waits for machine code: what an emergency needs is loaded before anything moves."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PROGRAM = """
+import sys, tempfile
+from pathlib import Path
+from live_bench import OVERTAKE, Bench
+from chauffeur.concept import Command, Limits, Scenario
+from chauffeur.drive.actuate import actuate
+from chauffeur.drive.live.starts import Start
+from chauffeur.drive.parameters import shield_for
+from chauffeur.safety.shield import foresight
+from chauffeur.worlds.highway import HighwayWorld
+
+def loaded():
+    return {name: len(one.signatures) for name, one in vars(foresight).items() if hasattr(one, "signatures")}
+
+road = {"type": "dt-intersection-v0", "num_vehicles_left": 3, "num_vehicles_right": 3}
+crossing = Scenario("crossing", "highway", road, 4000)
+bench = Bench(Path(tempfile.mkdtemp()), (OVERTAKE, Start(crossing, 4000)))
+bench.control.warm_up()
+before, rules = loaded(), set()
+world = HighwayWorld()
+world.reset(crossing, 4000)
+driver, shield = world.driver(), shield_for(world, Limits())
+wishes = driver.initial_wishes()
+for _ in range(120):
+    if world.ended:
+        break
+    snapshot = world.snapshot()
+    settled = driver.settle(wishes)
+    steered = driver.command(settled)
+    command = Command(5.0, steered.steering_rad + 0.1)  # full throttle, and off its way
+    done = actuate(world, snapshot, command, settled.target_lane, shield)
+    rules |= {change.rule for change in done.interventions if change.after.steering_rad != change.before.steering_rad}
+assert rules, "nobody had to steer back: this tests nothing"
+assert loaded() == before, {name: count for name, count in loaded().items() if count != before[name]}
+assert sum(before.values()) >= 7
+"""
+
+
+@pytest.mark.slow
+def test_the_first_rescue_at_a_crossing_loads_nothing(tmp_path: Path) -> None:
+    here = Path(__file__).parent
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], cwd=here, capture_output=True, text=True, check=False, timeout=300
+    )
+    assert done.returncode == 0, done.stderr[-1500:]
