@@ -24,7 +24,10 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from chauffeur.concept import LAMPILOT_LIMITS, ProgramError, Scenario
+from chauffeur.concept import LAMPILOT_LIMITS, Plan, Program, ProgramError, Scenario, Situation, Snapshot, Thoughts
+from chauffeur.describe import describe
+from chauffeur.drive.scenarios import find
+from chauffeur.drive.session import check_drive
 from chauffeur.models.onboard.cases import Case, case_of
 from chauffeur.models.onboard.examples import Example
 from chauffeur.models.onboard.judging import judge
@@ -94,6 +97,24 @@ def driven(job: tuple[Case, Example, Reply]) -> bool:
     return judge(world, Scenario(**case.scenario), wanted.steps, reply.source, linked, sandbox).done
 
 
+@cache
+def _road() -> tuple[Snapshot, Situation]:
+    """An ordinary road with somebody ahead, for wishes that have no scene of their own."""
+    scenario = find("overtake")
+    snapshot = HighwayWorld().reset(scenario, scenario.seed)
+    return snapshot, describe(snapshot).situation
+
+
+def refused_after_all(reply: Reply) -> bool:
+    """Whether a program goes nowhere: not the model is to refuse 300 km/h, but linking or the checks before a drive."""
+    snapshot, situation = _road()
+    linked = link(reply.steps, situation, LAMPILOT_LIMITS, lambda _: Leaning())
+    if isinstance(linked, Declined):
+        return True
+    plan = Plan(Thoughts(""), Program(reply.source, library=linked.library))
+    return any(verdict.stops for verdict in check_drive(plan, snapshot, LAMPILOT_LIMITS))
+
+
 def outcomes(
     engine: Engine, examples: list[Example], cases: dict[int, Case], way: Way
 ) -> tuple[Counter[str], list[Any]]:
@@ -112,7 +133,7 @@ def outcomes(
             same = bool(reply.question) == bool(wanted.question) if not wanted.steps else False
             counts["right answer" if same else "asked" if reply.question and wanted.steps else "else"] += 1
         elif example.case < 0:
-            counts["else"] += 1
+            counts["right answer" if wanted.refusal and refused_after_all(reply) else "else"] += 1
         else:
             open_.append((cases[example.case], example, reply))
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:

@@ -153,6 +153,10 @@ def test_what_the_road_does_not_allow_is_declined_in_words() -> None:
         ("please go faster", Step("faster"), True),
         ("please go faster", Step("slower"), False),
         ("half our speed", Step("speed_times", Number(0.5)), True),
+        ("You rush about, and we have all the time in the world.", Step("relax"), True),  # a mood against a mood
+        ("hurry up", Step("relax"), False),
+        ("Faster, I feel sick.", Step("relax"), False),  # what is asked for outright stands
+        ("This is too fast.", Step("hurry"), False),
     ],
 )
 def test_the_guard_asks_where_words_and_program_differ(wish: str, step: Step, trusted: bool) -> None:

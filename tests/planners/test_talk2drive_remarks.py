@@ -21,17 +21,20 @@ from chauffeur.concept import (
 )
 from chauffeur.concept.nouns import Lead
 from chauffeur.planners.base import Planner
-from chauffeur.planners.onboard.words import words_file
+from chauffeur.planners.onboard.moods import mood_of, pace_complaint
+from chauffeur.planners.onboard.patterns import said
+from chauffeur.planners.onboard.words.files import ONBOARD, words_file
 from chauffeur.planners.registry import make_planner
 from chauffeur.planners.talk2drive.lanes import complaint_in, eased_mps, fitting_mps
 from chauffeur.planners.talk2drive.lot import wanted_pace, wanted_place
-from chauffeur.planners.talk2drive.moods import mood_of, pace_complaint
-from chauffeur.planners.talk2drive.patterns import WORDS, said
 from chauffeur.planners.talk2drive.remarks import GIVE_WAY, GO, MOVE_RIGHT, OVERTAKE, STAY, misread, stands, taken_for
+from chauffeur.planners.talk2drive.words import WORDS
 
 GROUPS = {
-    name: [line[1:-1] for group in words_file(name, WORDS) for line in group if line[0] == "[" and line[-1] == "]"]
-    for name in ("lot.txt", "moods.txt", "road.txt")
+    (name, package): [
+        line[1:-1] for group in words_file(name, package) for line in group if line[0] == "[" and line[-1] == "]"
+    ]
+    for name, package in (("lot.txt", WORDS), ("moods.txt", ONBOARD), ("road.txt", WORDS))
 }
 SIGN = 30.0
 BEHIND = Situation("highway", 24.0, SIGN, 3, 1, False, Lead(7, 40.0, 22.0), None)
@@ -289,8 +292,8 @@ def test_places_in_a_lot(wish: str, place: str) -> None:
 
 
 def test_every_group_of_words_is_there_and_finds_no_nothing() -> None:
-    for file, groups in GROUPS.items():
+    for (file, package), groups in GROUPS.items():
         for name in groups:
-            assert not said(file, name).search("")
+            assert not said(file, name, package).search("")
     with pytest.raises(ConfigError, match="no group"):
-        said("road.txt", "clouds")
+        said("road.txt", "clouds", WORDS)

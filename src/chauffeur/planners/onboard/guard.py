@@ -14,6 +14,7 @@ from typing import Final
 from chauffeur.language.quantities import read_quantities
 from chauffeur.planners.onboard.dialect import SKILLS, UNITS, Number, Step, plain
 from chauffeur.planners.onboard.meaning import Meaning, NotUnderstood, Reading
+from chauffeur.planners.onboard.moods import mood_of, pace_complaint
 from chauffeur.planners.onboard.understand import understand
 
 _DIGITS: Final = re.compile(r"\d+(?:\.\d+)?")
@@ -47,7 +48,7 @@ def doubt(wish: str, history: Sequence[str], steps: Sequence[Step]) -> str:
         both = set(_SIDES) <= set(re.findall(r"[a-z]+", wish.lower()))
         sided = any(step.meaning.direction in _SIDES for step in steps)
         return _WHICH_SIDE if reading.why == "ambiguous" and both and sided else ""
-    return _contradiction(reading, steps)
+    return _contradiction(wish, reading, steps)
 
 
 def unnamed(wish: str, history: Sequence[str], steps: Sequence[Step]) -> Number | None:
@@ -104,15 +105,26 @@ def _pace(meaning: Meaning) -> int:
     return meaning.change if meaning.manoeuvre == "speed" else 0
 
 
-def _contradiction(reading: Reading, steps: Sequence[Step]) -> str:
-    """Where both read the same manoeuvres, whether one of them says left for right or more for less."""
+def _outvoted(wish: str, ruled: Meaning, pace: int) -> bool:
+    """Whether complaints ("a bit fast") or, where the rules saw a mood as well, moods ("others race, we have time") speak
+    for a program's pace and against the rules' reading. A speed that is asked for outright stands against any mood."""
+    mood = {"hurry": 1, "ease": -1, "": 0}[mood_of(wish)] if ruled.manoeuvre == "style" else 0
+    complaint = pace_complaint(wish)
+    return complaint * pace > 0 or (not complaint and mood * pace > 0)
+
+
+def _contradiction(wish: str, reading: Reading, steps: Sequence[Step]) -> str:
+    """Where both read the same manoeuvres, whether one of them says left for right or more for less.
+
+    On the pace a third reader may side with the program, see `_outvoted`.
+    """
     if len(reading.steps) != len(steps):
         return ""
     for ruled, step in zip(reading.steps, steps, strict=True):
         written = step.meaning
         if step.number is not None and step.number.factor != 1.0:
             continue  # "a bit slower than last time" may still be faster than now
-        if _pace(ruled) * _pace(written) < 0:
+        if _pace(ruled) * _pace(written) < 0 and not _outvoted(wish, ruled, _pace(written)):
             return "Shall I drive faster or slower?"
         if ruled.manoeuvre != written.manoeuvre:
             continue

@@ -17,6 +17,7 @@ from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.language_model import LanguageModelPlanner, Settled, usage_of
+from chauffeur.planners.onboard.moods import EASE, HURRY, Mood, mood_of, pace_complaint
 from chauffeur.planners.onboard.options import Chosen, Declined, speed_words
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.thoughts import thoughts_of
@@ -31,7 +32,6 @@ from chauffeur.planners.talk2drive.lanes import (
     unsaid_turn,
 )
 from chauffeur.planners.talk2drive.lot import parks, wanted_pace, wanted_place
-from chauffeur.planners.talk2drive.moods import EASE, HURRY, Mood, mood_of, pace_complaint
 from chauffeur.planners.talk2drive.remarks import Remark, misread, stands, taken_for
 from chauffeur.planners.talk2drive.style import (
     BRISK_SHARE,

@@ -9,8 +9,9 @@ from __future__ import annotations
 import re
 from typing import Final, Literal
 
-from chauffeur.planners.talk2drive.patterns import said
+from chauffeur.planners.onboard.patterns import said
 from chauffeur.planners.talk2drive.style import place_of
+from chauffeur.planners.talk2drive.words import WORDS
 
 _HINTS: Final = ("exit", "stadium", "nearest")
 """Places that words may point to, the more telling ones first."""
@@ -48,4 +49,4 @@ def parks(intent: str) -> bool:
 
 
 def _shows(what: str, wish: str) -> bool:
-    return said("lot.txt", what).search(wish) is not None
+    return said("lot.txt", what, WORDS).search(wish) is not None

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from chauffeur.concept import Situation
+from chauffeur.planners.onboard.patterns import said
 from chauffeur.planners.talk2drive.lanes import held_up, last_lane
-from chauffeur.planners.talk2drive.patterns import said
+from chauffeur.planners.talk2drive.words import WORDS
 
 OVERTAKE: Final = "Overtake the car ahead."
 STAY: Final = "Stay behind the car ahead."
@@ -75,7 +76,7 @@ def misread(wish: str, intent: str, situation: Situation) -> Remark | None:
 
 def stands(wish: str) -> bool:
     """Whether words ask for a stop, and for nothing else."""
-    return said("road.txt", "stands").fullmatch(wish.strip(" .!")) is not None
+    return said("road.txt", "stands", WORDS).fullmatch(wish.strip(" .!")) is not None
 
 
 def _on_highway(wish: str, situation: Situation) -> Remark | None:
@@ -94,7 +95,7 @@ def _on_highway(wish: str, situation: Situation) -> Remark | None:
         return Remark(STAY, "I take it that nobody need be passed.")
     if leftmost or _is("content", wish):
         return None
-    slow = _is("slow others", wish) and not _is("about us", said("road.txt", "in front of us").sub("", wish))
+    slow = _is("slow others", wish) and not _is("about us", said("road.txt", "in front of us", WORDS).sub("", wish))
     if slow or unwilling or _is("detained", wish) or _is("left free", wish):
         return Remark(OVERTAKE, "I take it that the car ahead is too slow for you.")
     return None
@@ -119,4 +120,4 @@ def _asks_for_left(wish: str) -> bool:
 
 
 def _is(what: str, wish: str) -> bool:
-    return said("road.txt", what).search(wish) is not None
+    return said("road.txt", what, WORDS).search(wish) is not None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-from chauffeur.planners.talk2drive.patterns import said
+from chauffeur.planners.onboard.patterns import said
 
 Mood = Literal["hurry", "ease", ""]
 HURRY: Final = "I'm in a hurry."

@@ -1,15 +1,12 @@
-"""Regular expressions over what people say, from the files in `words`."""
+"""Regular expressions over what people say, from the files of a folder of words."""
 
 from __future__ import annotations
 
 import re
 from functools import cache
-from typing import Final
 
 from chauffeur.concept import ConfigError
-from chauffeur.planners.onboard.words import words_file
-
-WORDS: Final = "chauffeur.planners.talk2drive.words"
+from chauffeur.planners.onboard.words.files import ONBOARD, words_file
 
 
 def any_of(*patterns: str) -> re.Pattern[str]:
@@ -18,17 +15,18 @@ def any_of(*patterns: str) -> re.Pattern[str]:
 
 
 @cache
-def said(file: str, name: str) -> re.Pattern[str]:
+def said(file: str, name: str, package: str = ONBOARD) -> re.Pattern[str]:
     """The patterns of a group of a file, as one.
 
     Args:
-        file: In the folder `words`, e.g. `moods.txt`.
+        file: In the folder, e.g. `moods.txt`.
         name: What heads the group in brackets.
+        package: The folder.
 
     Raises:
         ConfigError: There is no such group.
     """
-    lines = [line for group in words_file(file, WORDS) for line in group]
+    lines = [line for group in words_file(file, package) for line in group]
     head = f"[{name}]"
     if head not in lines:
         raise ConfigError(f"There is no group {head} in {file}.")
