@@ -284,7 +284,21 @@ def test_what_a_killed_supervisor_left_in_memory_is_removed_when_it_is_old(
         (folder / "supervisor").write_text(str(owner))
         if folder is not young:
             os.utime(folder / "supervisor", (0, 0))
+    idle = [sys.executable, "-c", "import time; time.sleep(60)", "chauffeur.drive.live"]
+    stopped, control, of_living = (
+        subprocess.Popen([*idle, role, str(folder), "1"])
+        for role, folder in (("planner", old), ("control", old), ("planner", living))
+    )
+    stopped.send_signal(signal.SIGSTOP)
+    for one in (stopped, control, of_living):  # its command can be read once it runs
+        while b"chauffeur.drive.live" not in Path(f"/proc/{one.pid}/cmdline").read_bytes():
+            time.sleep(0.01)
     made = supervisor._new_folder()  # pyright: ignore[reportPrivateUsage]
+    assert stopped.wait(10.0) == -signal.SIGKILL
+    assert control.poll() is None and of_living.poll() is None
+    for one in (control, of_living):
+        one.kill()
+        one.wait()
     assert (made / "supervisor").read_text() == str(os.getpid())
     assert not old.exists()
     assert young.exists()

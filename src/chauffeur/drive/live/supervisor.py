@@ -61,6 +61,7 @@ SPARE_PAUSE_S: Final = 1.0
 STOP_WITHIN_S: Final = 30.0
 FOLDER_PREFIX: Final = "chauffeur-"
 OWNER_FILE: Final = "supervisor"
+_MODULE: Final = b"chauffeur.drive.live"
 LEFT_FOR_S: Final = 120.0
 """A folder whose supervisor is gone, and which nobody has written to for so long, is removed."""
 
@@ -523,10 +524,23 @@ def _new_folder() -> Path:
             owner = int((left / OWNER_FILE).read_text())
             idle_s = time.time() - max(file.stat().st_mtime for file in left.iterdir())
             if not Path(f"/proc/{owner}").exists() and idle_s > LEFT_FOR_S:
+                _end_what_serves(left)
                 shutil.rmtree(left)
     folder = Path(tempfile.mkdtemp(prefix=FOLDER_PREFIX, dir=place))
     (folder / OWNER_FILE).write_text(str(os.getpid()))
     return folder
+
+
+def _end_what_serves(folder: Path) -> None:
+    """End processes of a drive whose supervisor is long dead: one that was stopped then cannot end itself.
+
+    All but control, which alone may say when a car is not driven any more.
+    """
+    for command in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):  # gone meanwhile, or not of this user
+            words = command.read_bytes().split(b"\0")
+            if os.fsencode(folder) in words and _MODULE in words and b"control" not in words:
+                os.kill(int(command.parent.name), signal.SIGKILL)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
