@@ -123,6 +123,9 @@ def test_what_a_remark_was_taken_for_is_read_as_it_stands(planner: Planner) -> N
         ("Get by that hatchback on the right.", "overtake.right", BEHIND, None),
         ("Stay with that hatchback.", "overtake.left", BEHIND, STAY),
         ("Leave that hatchback behind us.", "overtake.left", BEHIND, None),
+        ("Take the left lane and get past that hatchback.", "lane.left", BEHIND, OVERTAKE),
+        ("Take the left lane and let them go past.", "lane.left", BEHIND, None),
+        ("Take the left lane, but do not overtake.", "lane.left", BEHIND, None),
         ("The left one is no lane for us.", "lane.left", LEFT, MOVE_RIGHT),
         ("Move to the left lane.", "lane.left", LEFT, None),
         ("Pull in on the right.", "pull_over", LEFT, MOVE_RIGHT),
@@ -151,7 +154,7 @@ def test_a_remark_says_what_it_was_taken_for_and_drives_it(planner: Planner) -> 
     assert isinstance(found.policy, Parameters)
     assert found.policy.lane == -1
     assert driven(planner, "The one behind us is tailgating.", LEFT).lane == 1
-    assert driven(planner, "I can't see a soul.", CROSSING) == Parameters(9.5, 12.0, 2.0, 0, "straight")
+    assert driven(planner, "I can't see a soul.", CROSSING) == Parameters(9.8, 12.0, 2.0, 0, "straight")
     assert driven(planner, "A lorry comes from the right.", CROSSING).target_speed_mps == 8.0
 
 
@@ -242,7 +245,7 @@ def test_a_mood_speaks_where_nothing_else_was_understood(planner: Planner) -> No
 
 def test_speeds_that_words_leave_open() -> None:
     assert fitting_mps(26.0, "overtake.left", BEHIND, Limits()) == 26.0
-    assert fitting_mps(30.0, "overtake.left", BEHIND, Limits()) == pytest.approx(28.5)
+    assert fitting_mps(30.0, "overtake.left", BEHIND, Limits()) == pytest.approx(29.4)
     assert fitting_mps(30.0, "overtake.left", LEFT, Limits()) == 30.0
     assert fitting_mps(22.0, "follow", BEHIND, Limits()) == pytest.approx(24.0)
     assert fitting_mps(22.0, "follow", LEFT, Limits()) == 22.0

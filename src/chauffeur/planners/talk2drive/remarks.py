@@ -69,6 +69,8 @@ def misread(wish: str, intent: str, situation: Situation) -> Remark | None:
         return None
     if intent.startswith("gap.") and held_up(situation) and not _is("of the gap", wish):
         return Remark(OVERTAKE, "I take it that the car ahead is too slow for you.")
+    if intent == "lane.left" and _is("goes past", wish) and not _is("no passing", wish):
+        return Remark(OVERTAKE, "Who goes to the left to get past overtakes.")
     if intent == "overtake.right" and not _is("turns", wish):
         return Remark(OVERTAKE, "Others are passed on the left.")
     return None

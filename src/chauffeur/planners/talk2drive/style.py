@@ -33,7 +33,7 @@ LOOK_AHEAD: Final[dict[Manner, LookAhead]] = {
 }
 
 LOOK_AHEAD_PARKING: Final = LookAhead(4.0, 1.0)
-BRISK_SHARE: Final = 0.95
+BRISK_SHARE: Final = 0.98
 CALM_SHARE: Final = 0.8
 LOT_SHARE: Final = 0.75
 """Speeds as shares of the limit where words name none: in a hurry, at ease, and in a lot. Chosen by trips of simulated
