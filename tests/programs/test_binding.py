@@ -186,6 +186,9 @@ def test_say_keeps_words_short_and_printable(call: Caller) -> None:
         call("say", "x" * 501)
     with pytest.raises(BadArgumentTypeError, match="must be a text, not a list"):
         call("say", ["x"])
+    with pytest.raises(BadArgumentValueError, match="calls itself too deeply"):
+        call("say", "<deeply nested>")  # not what the program said, but what the sandbox makes of it
+    assert len(call.apis.said) == 4
 
 
 def test_vehicle_gone(call: Caller) -> None:

@@ -342,3 +342,13 @@ def test_a_failing_world_is_not_hidden(sandbox: Sandbox) -> None:
             executor.tick()
         world.broken = False
         assert executor.start("def main():\n    yield\n", world) == "running"
+
+
+def test_what_the_sandbox_makes_of_values_in_a_deep_recursion_reaches_no_api(
+    executor: ProgramExecutor, road: StraightRoad
+) -> None:
+    source = "def f(n):\n    say('never')\n    return f(n + 1)\n\ndef main():\n    f(0)\n    yield autopilot()\n"
+    executor.start(source, road)
+    result = executor.tick()
+    assert result.state == "failed"
+    assert set(result.said) == {"never"}

@@ -240,6 +240,8 @@ def test_a_program_too_intricate_says_nothing() -> None:
 
 
 def test_what_is_no_program_raises() -> None:
-    for text in ("def main(:", "x = 1", "def main():\n    return 1\n"):
+    for text in ("def main(:", "x = 1", "def main():\n    return 1\n", "continue\ndef main():\n    yield\n"):
         with pytest.raises(ProgramSyntaxError):
             verify(text)
+    with pytest.raises(ProgramSyntaxError, match="outside a loop"):
+        verify("def main():\n    yield autopilot()\n    break\n")

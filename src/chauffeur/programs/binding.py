@@ -31,6 +31,10 @@ def starting_wishes(perception: Perception, time_headway_s: float = 1.5) -> Wish
     )
 
 
+_TOO_DEEP: Final = "<deeply nested>"
+"""What the sandbox hands over in place of a value, whatever it was, where a program has called itself too often."""
+
+
 @dataclass(frozen=True, slots=True)
 class MadeCall:
     """A call as it was made. Putting it into words takes longer than making it, so that waits until somebody asks.
@@ -210,6 +214,8 @@ class DrivingApis:
         values: list[Any] = []
         for index, param in enumerate(api.params):
             given = arguments[index] if index < len(arguments) else keywords.get(param.name, param.default)
+            if given == _TOO_DEEP:
+                raise BadArgumentValueError(f"{api.name}({param.name}): the program calls itself too deeply")
             values.append(self._decode(api, param, given))
             if index < len(arguments) or param.name in keywords:
                 used.append(given)

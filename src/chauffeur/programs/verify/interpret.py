@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final
 
+from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.nodes import all_nodes
 from chauffeur.programs.verify import arithmetic
 from chauffeur.programs.verify.calls import Calls
@@ -88,6 +89,7 @@ class Interpreter(Calls):
 
         Raises:
             TooIntricateError: The analysis gives up.
+            ProgramSyntaxError: A `break` or `continue` stands outside a loop.
         """
         for text in self._texts:
             self._block(text.body)
@@ -320,14 +322,18 @@ class Interpreter(Calls):
         self._alive = False
 
     def _break(self, _: ast.Break) -> None:
-        assert self._loop is not None
-        self._loop.breaks.append(self.state)
+        self._the_loop().breaks.append(self.state)
         self._alive = False
 
     def _continue(self, _: ast.Continue) -> None:
-        assert self._loop is not None
-        self._loop.continues.append(self.state)
+        self._the_loop().continues.append(self.state)
         self._alive = False
+
+    def _the_loop(self) -> Loop:
+        """The loop a statement stands in, which only the static gate makes sure of."""
+        if self._loop is None:
+            raise ProgramSyntaxError("A `break` or `continue` stands outside a loop.")
+        return self._loop
 
     def _raise(self, node: ast.Raise) -> None:
         if node.exc is not None:
