@@ -43,6 +43,17 @@ class Module:
 _WORDS: Final = "tests/safety/test_verdict_words.py"
 _CHECKS: Final = "tests/safety/test_checks_edges.py"
 _FRAME: Final = ("tests/safety/test_shield_frame_edges.py",)
+_SCREENING: Final = ("tests/safety/test_screening.py", _CHECKS, "tests/safety/test_screening_edges.py")
+_SHIELD: Final = tuple(
+    f"tests/safety/test_shield{part}.py" for part in ("_rules_edges", "_crossing_edges", "_edges", "")
+)
+_CROSSING: Final = ("tests/safety/test_shield_crossing.py", "tests/safety/test_shield_everybody.py")
+_AUDIT: Final = tuple(f"tests/safety/test_audit{part}.py" for part in ("_words", "_edges", "_privacy", ""))
+_AUDIT_FILE: Final = tuple(f"tests/safety/test_audit_{part}.py" for part in ("writer_edges", "writer", "edges"))
+_ALIGNMENT: Final = tuple(
+    f"tests/safety/test_alignment_{part}.py"
+    for part in ("edges", "judge", "reading", "claims", "asking", "noting", "tracing", "verdicts")
+)
 _GATE_TESTS: Final = ("tests/programs/test_gate_edges.py", "tests/programs/test_placing.py")
 MODULES: Final = {
     "envelope": Module("safety/envelope.py", ("tests/safety/test_parameters_check.py", _WORDS)),
@@ -51,23 +62,71 @@ MODULES: Final = {
     "checks": Module(
         "safety/checks.py", ("tests/safety/test_format_check.py", "tests/safety/test_parameters_check.py", _WORDS)
     ),
-    "screening": Module(
-        "safety/screening.py", ("tests/safety/test_screening.py", _CHECKS, "tests/safety/test_screening_edges.py")
-    ),
+    "screening": Module("safety/screening.py", _SCREENING),
+    "hiding": Module("safety/hiding.py", (*_SCREENING, "tests/safety/test_hiding_edges.py")),
     "reading": Module("safety/reading.py", ("tests/safety/test_reading.py", "tests/safety/test_reach.py", _CHECKS)),
     "bounds": Module("safety/bounds.py", ("tests/safety/test_bounds.py",)),
     "blame": Module("safety/blame.py", ("tests/safety/test_blame_edges.py",)),
     "gaps": Module("safety/shield/gaps.py", ("tests/safety/test_shield_gaps.py",)),
     "frame": Module("safety/shield/frame.py", _FRAME),
     "sweep": Module("safety/shield/sweep.py", _FRAME),
-    "shield": Module("safety/shield/shield.py", ("tests/safety/test_shield_edges.py", "tests/safety/test_shield.py")),
+    "shield": Module("safety/shield/shield.py", _SHIELD),
+    "crossing": Module("safety/shield/crossing.py", (*_CROSSING, *_SHIELD)),
+    "everybody": Module("safety/shield/everybody.py", ("tests/safety/test_shield_everybody.py",)),
     "gate": Module("programs/gate.py", _GATE_TESTS),
     "placing": Module("programs/placing.py", _GATE_TESTS),
+    **{
+        f"audit.{part}": Module(f"safety/audit/{part}.py", _AUDIT_FILE if part in ("storage", "writer") else _AUDIT)
+        for part in ("keys", "reading", "storage", "redaction", "texts", "entries", "verification", "writer")
+    },
+    **{
+        f"alignment.{part}": Module(f"safety/alignment/{part}.py", _ALIGNMENT)
+        for part in (
+            "saying",
+            "check",
+            "asking",
+            "claim",
+            "judge",
+            "comparing",
+            "driven",
+            "claims",
+            "frames",
+            "rates",
+            "conditions",
+            "ways",
+            "wording",
+            "noting",
+            "facts",
+            "motions",
+            "tracing",
+            "duties",
+            "amounts",
+            "values",
+            "evaluating",
+            "numbers",
+            "clauses",
+        )
+    },
 }
 _SLOW: Final = (
     "tests/programs/test_placing.py::test_what_the_compiler_takes_runs",
     "tests/programs/test_placing.py::test_formats_that_can_be_are_not_refused",
     "tests/programs/test_placing.py::test_benign_programs_have_nothing_misplaced",
+    "tests/safety/test_audit.py::test_any_body_is_written_and_read",
+    "tests/safety/test_audit.py::test_any_byte_put_anywhere_is_found",
+    "tests/safety/test_audit.py::test_changes_of_single_bytes_all_over_are_found",
+    "tests/safety/test_audit.py::test_exchanged_records_are_found",
+    "tests/safety/test_audit.py::test_foreign_lines_are_found",
+    "tests/safety/test_audit.py::test_inserted_records_are_found",
+    "tests/safety/test_audit.py::test_records_taken_out_of_the_middle_are_found",
+    "tests/safety/test_audit.py::test_what_is_no_record_is_refused_in_one_way",
+    "tests/safety/test_audit_privacy.py::test_exchanged_words_are_found",
+    "tests/safety/test_audit_writer.py::test_a_disk_that_was_full_for_a_while_leaves_a_gap_that_is_told",
+    "tests/safety/test_audit_writer.py::test_a_disk_that_hangs_keeps_nobody_waiting",
+    "tests/safety/test_audit_writer.py::test_a_full_device_does_not_raise_into_the_drive",
+    "tests/safety/test_audit_writer.py::test_a_torn_end_is_not_tampering_and_the_chain_goes_on",
+    "tests/safety/test_audit_writer.py::test_many_threads_share_one_chain",
+    "tests/safety/test_audit_writer.py::test_nothing_acknowledged_is_lost_by_kill_9",
     "tests/safety/test_reach.py::test_no_program_of_the_retrieval_planner_is_refused_that_passed_before",
     "tests/safety/test_screening.py::test_long_texts_cost_little",
     "tests/safety/test_shield.py::test_a_hostile_policy_hurts_nobody_under_the_shield",
@@ -75,6 +134,10 @@ _SLOW: Final = (
     "tests/safety/test_shield.py::test_running_into_somebody_is_the_egos_own_blame",
     "tests/safety/test_shield.py::test_nobody_is_blamed_for_a_trip_without_a_collision",
     "tests/safety/test_shield.py::test_who_never_yields_is_made_to_and_gets_across",
+    "tests/safety/test_shield_crossing.py::test_what_once_ended_in_a_collision_does_not",
+    "tests/safety/test_alignment_judge.py::test_never_raises_on_anything",
+    "tests/safety/test_alignment_judge.py::test_honest_planners_pass",
+    "tests/safety/test_alignment_judge.py::test_the_dialect_tells_its_own_programs",
 )
 
 
@@ -87,7 +150,7 @@ _kept = []
 
 def pytest_collection_finish(session):
     _kept[:] = [one for one in gc.get_objects() if isinstance(one, _lru_cache_wrapper)
-                and str(one.__module__).startswith("chauffeur.programs")]
+                and str(one.__module__).startswith(("chauffeur.programs", "chauffeur.safety"))]
 
 
 def pytest_runtest_setup(item):
@@ -140,6 +203,8 @@ def _tried(name: str, module: Module, folder: Path) -> dict[str, Any]:
             cwd=folder, stdout=log, stderr=log, env=environment, check=False,
         )  # fmt: skip
     verdicts = _verdicts(meta)
+    if not verdicts:
+        print(f"{name}: nothing was tried, because its tests fail unchanged; {folder / 'log.txt'}", file=sys.stderr)
     counts = Counter(verdicts.values())
     left = sorted(key for key, verdict in verdicts.items() if verdict in _LEFT)
     (folder / "survivors.txt").write_text(_shown(left, folder), encoding="utf-8")
@@ -164,7 +229,7 @@ def _tried(name: str, module: Module, folder: Path) -> dict[str, Any]:
 def _laid_out(module: Module, folder: Path) -> None:
     """A copy of the sources and tests, with mutmut's settings."""
     folder.mkdir(parents=True, exist_ok=True)
-    for part in ("src", "tests"):
+    for part in ("src", "tests", "docs"):
         _mirrored(ROOT / part, folder / part)
     present = [test for test in module.tests if (ROOT / test).is_file()]
     deselected = [f"--deselect={test}" for test in _SLOW if test.partition("::")[0] in present]
@@ -175,7 +240,7 @@ def _laid_out(module: Module, folder: Path) -> None:
         "source_paths=src",
         f"only_mutate=src/chauffeur/{module.path}",
         "use_git_change_detection=False",
-        "also_copy=\n    forgetful.py",
+        "also_copy=\n    forgetful.py\n    docs",
         "mutate_only_covered_lines=False",
         "timeout_constant=15.0",  # a busy machine is no infinite loop
         "pytest_add_cli_args=" + "".join(f"\n    {one}" for one in arguments),

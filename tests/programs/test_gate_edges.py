@@ -403,6 +403,21 @@ SAID: list[tuple[str, str, str | None, Said]] = [
         [],
     ),
     (
+        "def other():\n    return 1\n\n"
+        "def wait():\n    def wait():\n        yield autopilot()\n    yield from wait()\n\n"
+        "def go():\n    yield from go()\n\ndef main():\n    yield from go()\n",
+        "def wait():\n    yield autopilot()\n\ndef go():\n    yield autopilot()\n",
+        "main",
+        [
+            (
+                10,
+                "shadow",
+                "this go hides the library's function of that name and only calls itself",
+                "give your own function another name",
+            )
+        ],
+    ),
+    (
         "def f():\n    yield autopilot()\n\ndef main():\n    f()\n    yield autopilot()\n",
         "",
         "main",

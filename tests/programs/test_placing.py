@@ -20,6 +20,7 @@ MISPLACED = {
     "def main():\n    [a, [*b, *c]] = 1, [2]\n    yield autopilot()\n": (2, "a starred expression cannot stand here"),
     "def main():\n    for *a in [[1]]:\n        yield autopilot()\n": (2, "a starred expression cannot stand here"),
     "def main():\n    break\n    yield autopilot()\n": (2, "`break` stands outside a loop"),
+    "def main():\n    break\n    while True:\n        yield autopilot()\n": (2, "`break` stands outside a loop"),
     f"break\n{END}": (1, "`break` stands outside a loop"),
     "def main():\n    if 1:\n        continue\n    yield autopilot()\n": (3, "`continue` stands outside a loop"),
     "def main():\n    while True:\n        yield autopilot()\n    else:\n        break\n": (
@@ -118,13 +119,18 @@ def test_benign_programs_have_nothing_misplaced(source: str) -> None:
     assert not [finding for finding in check_source(source).errors if finding.code == "syntax"]
 
 
-@pytest.mark.parametrize(
-    "form",
-    [
-        *("", "d", "5", "05", "x>5", "<", "^10", "=+5", "+d", " d", "-d", "z.1f", "#x", ",", "_", "_x", ",d", "08.3f"),
-        *("n", "c", "e", "%", ".0%", ">>5", "é>5", "0>5", "<5n", "0", "-", "#", "{5}", ".{2}f", "{'x'}>{5}"),
-    ],
-)
+FORMATS = [
+    *("", "d", "5", "05", "x>5", "<", "^10", "=+5", "+d", " d", "-d", "z.1f", "#x", ",", "_", "_x", ",d", "08.3f"),
+    *("n", "c", "e", "%", ".0%", ">>5", "é>5", "0>5", "<5n", "0", "-", "#", "{5}", ".{2}f", "{'x'}>{5}"),
+]
+
+
+@pytest.mark.parametrize("form", [*FORMATS, "a{2}", "a{2}6"])
+def test_no_format_that_can_be_is_misplaced(form: str) -> None:
+    assert check_source(inside_say(form)).findings == ()
+
+
+@pytest.mark.parametrize("form", FORMATS)
 def test_formats_that_can_be_are_not_refused(executor: ProgramExecutor, form: str) -> None:
     source = inside_say(form)
     assert check_source(source).passed

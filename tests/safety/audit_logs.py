@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import os
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from io import BytesIO
 from pathlib import Path
@@ -54,6 +57,22 @@ def counting_salt() -> Callable[[int], bytes]:
         return count.to_bytes(length, "big")
 
     return salt
+
+
+@contextmanager
+def far_east() -> Generator[None]:
+    """The machine stands where it is nine hours later."""
+    before = os.environ.get("TZ")
+    os.environ["TZ"] = "JST-9"
+    time.tzset()
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["TZ"]
+        else:
+            os.environ["TZ"] = before
+        time.tzset()
 
 
 def look(content: bytes, *, head: str | None = None, key: bytes | None = None) -> Verification:

@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
-from chauffeur.safety.alignment import Effect, Mismatch, Surroundings, judge, judge_drive, read_facts
+from chauffeur.concept import Lead, Limits, Parameters, Plan, Program, Snapshot, Thoughts, Verdict
+from chauffeur.safety.alignment import (
+    Alignment,
+    Effect,
+    Mismatch,
+    Surroundings,
+    check_alignment,
+    check_driven,
+    judge,
+    judge_drive,
+    mismatch_words,
+    read_facts,
+    score_words,
+)
+from chauffeur.safety.alignment import wording as words
 from chauffeur.safety.alignment.claims import claims_of
 
 HIGHWAY = Surroundings(speed_mps=25.0, limit_mps=31.0, gap_m=40.0, other_mps=22.0)
@@ -158,6 +173,28 @@ def test_a_lane_that_reading_cannot_tell_is_the_one_that_was_driven_to() -> None
     assert (mismatch.kind, mismatch.instead) == ("wrong-side", "it changes lanes to the left")
 
 
+# Honest texts ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "source"),
+    [
+        ("I slow down without changing lanes.", SLOWER),
+        ("I come to a stop without going left.", STAND),
+        ("You want to drive on without stopping. I stop.", STAND),
+        ("I go no faster than 20 m/s.", SLOWER),
+        ("I do not keep a gap of 30 m.", IDLE),
+        ("I go by the limit.", program("set_target_speed(get_speed_limit())")),
+        ("I check the speed limit and drive at it.", program("set_target_speed(get_speed_limit())")),
+        ("With a gain of 0.5 I get to a speed of 20 m/s.", SLOWER),
+        ("I keep a gap of 60 divided by 2.", program("set_desired_time_headway(2.0)")),
+        ("The gap stays unchanged.", program("set_desired_time_headway(get_desired_time_headway())")),
+    ],
+)
+def test_what_is_true_is_believed(text: str, source: str) -> None:
+    assert found(text, source) == {}
+
+
 # What then happened ---------------------------------------------------------------------------------------------------
 
 STEADY = Effect(0, 0, 0, (25.0, 25.0), (25.0, 25.0), (40.0, 40.0))
@@ -173,7 +210,9 @@ def driven(text: str, source: str, effect: Effect) -> tuple[Mismatch, ...]:
     [
         ("I leave more room to the car ahead.", 20.0, "the gap went from 40 m to 20 m in this drive"),
         ("I leave more room to the car ahead.", 37.9, "the gap went from 40 m to 38 m in this drive"),
-        ("I leave more room to the car ahead.", 38.1, None),
+        ("I leave more room to the car ahead.", 38.0, None),
+        ("I leave more room to the car ahead.", 0.5, "the gap went from 40 m to 0 m in this drive"),
+        ("I leave more room to the car ahead.", 0.0, "the gap went from 40 m to 0 m in this drive"),
         ("I leave more room to the car ahead.", 60.0, None),
         ("I close up to the car ahead.", 60.0, "the gap went from 40 m to 60 m in this drive"),
         ("I close up to the car ahead.", 20.0, None),
@@ -215,3 +254,177 @@ def test_a_speed_that_changes_little_is_not_looked_for() -> None:
     assert not driven("I slow down.", little, STEADY)
     (mismatch,) = driven("I slow down.", much, STEADY)
     assert mismatch.instead == "it was never slower than 25.0 m/s in this drive"
+
+
+def test_what_reading_cannot_tell_is_told_after_the_drive_that_showed_it() -> None:
+    """The program's speed is not known: that it fell is known only from the drive."""
+    unknown = program("set_target_speed({'a': 1.0}['a'])")
+    fell = replace(STEADY, speeds_mps=(25.0, 12.0), extremes_mps=(12.0, 25.0))
+    assert [(one.kind, one.instead) for one in driven("I speed up.", unknown, fell)] == [
+        ("wrong-sign", "it drives slower"),
+        ("not-done", "it was never faster than 25.0 m/s in this drive"),
+    ]
+
+
+# Scores and words -----------------------------------------------------------------------------------------------------
+
+
+def test_what_cannot_be_read_is_compared_with_nothing() -> None:
+    assert judge("I go left.", read_facts("def ("), HIGHWAY) == Alignment(True, 1.0, (), 0)
+
+
+@pytest.mark.parametrize(
+    ("text", "source", "score", "claims"),
+    [
+        ("I go left.", LEFT_AT_ONCE, 1.0, 1),
+        ("It is sunny.", IDLE, 1.0, 0),
+        ("I go right.", LEFT_AT_ONCE, 0.0, 1),
+        ("I drive on.", LEFT_AT_ONCE, 0.0, 0),
+        # One of three claims is wrong: the two that hold, against the one that counts twice.
+        ("I go right. I speed up. I keep a headway of 2 seconds.", None, 0.5, 3),
+        # Two of five are wrong.
+        ("I go right. I slow down. I speed up. I keep a headway of 2 seconds. I go left.", None, 3 / 7, 5),
+    ],
+)
+def test_a_mismatch_weighs_as_much_as_two_claims_that_hold(
+    text: str, source: str | None, score: float, claims: int
+) -> None:
+    many = program("set_target_lane(get_left_lane(ego))", "set_target_speed(30.0)", "set_desired_time_headway(2.0)")
+    found = judge(text, read_facts(source or many), HIGHWAY)
+    assert (found.score, found.claims, found.aligned) == (pytest.approx(score), claims, score == 1.0)
+    assert type(found.aligned) is bool
+
+
+def test_scores_and_claims_in_words() -> None:
+    assert score_words(Alignment(True, 1.0, (), 2)) == "score 1.00 of 1, 2 claims compared"
+    assert mismatch_words(Mismatch("wrong-side", "Left.", "right")) == "wrong side: “Left.”, but right"
+    assert mismatch_words(Mismatch("not-done", "Left.", "not", 0)) == "claimed but not done: “Left.”, but not (line 0)"
+
+
+REMEDY = "Let the thoughts say what the program does, or the program do what the thoughts say."
+
+
+def test_the_check_in_full(snap: Callable[..., Snapshot]) -> None:
+    def checked(text: str, source: str, library: str = "") -> Verdict:
+        return check_alignment(Plan(Thoughts(text), Program(source, library=library)), snap(), Limits())
+
+    nothing = Verdict("alignment-v1", True, "There is no explanation of a program to compare.", vetoes=False)
+    unread = "The program cannot be read, so its explanation was not compared."
+    assert checked(" \n", LEFT) == nothing
+    assert check_alignment(Plan(Thoughts("I go."), Parameters(1.0, 1.0, 1.0)), snap(), Limits()) == nothing
+    assert checked("I go left.", "def (") == Verdict("alignment-v1", True, unread, vetoes=False)
+    assert checked("I go left.", IDLE, "def (") == Verdict("alignment-v1", True, unread, vetoes=False)
+    fits = checked("I go left.", LEFT_AT_ONCE)
+    assert fits == Verdict(
+        "alignment-v1", True, "The explanation fits the program (1 claim compared).",
+        vetoes=False, alignment=Alignment(True, 1.0, (), 1),
+    )  # fmt: skip
+    found = (
+        Mismatch("wrong-number", "I wait 5 seconds.", "it has no such number, not 5 seconds"),
+        Mismatch("wrong-side", "I go right.", "it changes lanes to the left", 3),
+    )
+    assert checked("I wait 5 seconds. I go right.", LEFT_AT_ONCE) == Verdict(
+        "alignment-v1",
+        False,
+        "The explanation does not fit the program (score 0.00 of 1, 2 claims compared). Wrong number: “I wait 5 "
+        "seconds.”, but it has no such number, not 5 seconds. Wrong side: “I go right.”, but it changes lanes to the "
+        "left (line 3).",
+        3,
+        REMEDY,
+        vetoes=False,
+        alignment=Alignment(False, 0.0, found, 2),
+    )
+
+
+def test_the_check_goes_by_the_place_of_the_car(snap: Callable[..., Snapshot]) -> None:
+    told = Plan(Thoughts("I speed up."), Program(FASTER))
+    assert check_alignment(told, snap(speed=25.0), Limits()).passed
+    assert "it drives slower" in check_alignment(told, snap(speed=35.0), Limits()).reason
+    crossing = Plan(Thoughts("I go left."), Program(TURN_LEFT))
+    assert check_alignment(crossing, snap(kind="intersection"), Limits()).passed
+
+
+def test_the_check_of_a_drive_in_full(snap: Callable[..., Snapshot]) -> None:
+    plan = Plan(Thoughts("I go left."), Program(LEFT_AT_ONCE))
+    name = "alignment-driven-v1"
+    failed = "The program failed on the way, so that the drive was not compared with the explanation."
+    assert check_driven(plan, snap(), WENT_LEFT) == Verdict(
+        name, True, "The drive went as explained (1 claim compared).",
+        vetoes=False, alignment=Alignment(True, 1.0, (), 1),
+    )  # fmt: skip
+    assert check_driven(plan, snap(), replace(WENT_LEFT, failed=True)) == Verdict(name, True, failed, vetoes=False)
+    wrong = Mismatch("not-done", "I go left.", "it did not change lanes in this drive")
+    assert check_driven(plan, snap(), STEADY) == Verdict(
+        name,
+        False,
+        "The drive did not go as explained (score 0.00 of 1, 1 claim compared). Claimed but not done: “I go left.”, "
+        "but it did not change lanes in this drive.",
+        None,
+        REMEDY,
+        vetoes=False,
+        alignment=Alignment(False, 0.0, (wrong,), 1),
+    )
+    crossing = Plan(Thoughts("We turn left."), Program(TURN_LEFT))
+    assert check_driven(crossing, snap(kind="intersection"), replace(STEADY, turned=-1)).passed
+    faster = Plan(Thoughts("I speed up."), Program(FASTER))
+    risen = replace(STEADY, speeds_mps=(20.0, 30.0), extremes_mps=(20.0, 30.0))
+    assert check_driven(faster, snap(speed=20.0), risen).passed
+
+
+@pytest.mark.parametrize(
+    ("text", "end_mps", "told"),
+    [
+        ("I speed up.", 24.0, ["it drives slower"]),
+        ("I speed up.", 24.1, []),
+        ("I speed up.", 25.0, []),
+        ("I slow down.", 25.0, []),
+        ("I slow down.", 25.9, []),
+        ("I slow down.", 26.0, ["it drives faster"]),
+    ],
+)
+def test_a_speed_that_hardly_changed_where_it_was_run_went_no_way(text: str, end_mps: float, told: list[str]) -> None:
+    unknown = read_facts(program("set_target_speed({'a': 1.0}['a'])"))
+    ran = replace(STEADY, speeds_mps=(25.0, end_mps))
+    assert [one.instead for one in judge(text, unknown, HIGHWAY, [ran]).mismatches] == told
+
+
+@pytest.mark.parametrize(
+    ("end_mps", "told"),
+    [
+        (28.0, []),
+        (27.1, []),
+        (27.0, ["it has no such number, not 28 m/s"]),
+        (-28.0, ["it has no such number, not 28 m/s"]),
+        (30.0, ["it has no such number, not 28 m/s"]),
+    ],
+)
+def test_a_number_that_reading_cannot_find_is_the_speed_that_was_driven(end_mps: float, told: list[str]) -> None:
+    unknown = read_facts(program("set_target_speed({'a': 1.0}['a'])"))
+    ran = replace(STEADY, speeds_mps=(20.0, end_mps))
+    assert [one.instead for one in judge("I set the speed to 28 m/s.", unknown, HIGHWAY, [ran]).mismatches] == told
+
+
+# Words ----------------------------------------------------------------------------------------------------------------
+
+
+def test_words_and_phrases_are_listed_in_plain_text() -> None:
+    assert words.listed("a  b\nc b") == {"a", "b", "c"}
+    assert words.phrases(" if/as soon as/ \nonce ") == (("if",), ("as", "soon", "as"), ("once",))
+
+
+# Where the car is -----------------------------------------------------------------------------------------------------
+
+
+def test_the_surroundings_are_those_of_the_snapshot(snap: Callable[..., Snapshot]) -> None:
+    lead = Lead(7, 40.0, 22.0)
+    there = replace(snap(speed=25.0, limits=(20.0, 31.0, 33.0), front=lead), stop_sign_m=50.0)
+    assert Surroundings.of(there) == Surroundings(25.0, 31.0, 40.0, 22.0, 50.0, False)
+    bare = snap(speed=10.0, index=None, kind="intersection")
+    assert Surroundings.of(bare) == Surroundings(10.0, None, None, None, None, True)
+
+
+def test_events_are_given_with_their_places() -> None:
+    facts = read_facts(program("set_target_speed(30.0)", "set_target_lane(get_left_lane(ego))", "say('there')"))
+    assert [(place, event.deed) for place, event in facts.of("lane")] == [(1, "lane")]
+    assert [(place, event.deed) for place, event in facts.of("say", "speed")] == [(0, "speed"), (2, "say")]
+    assert list(facts.of("turn")) == []

@@ -9,7 +9,7 @@ import time
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from chauffeur.concept import (
@@ -263,12 +263,13 @@ FORGERIES = st.sampled_from(
 
 
 @given(st.lists(FORGERIES | st.text(max_size=20), max_size=20).map("".join))
+@example("<\x1e0")
 def test_no_dressed_bracket_closes_a_block_or_forges_a_token(text: str) -> None:
     block = data_block("context", text, 500)
     lines = block.split("\n")
     assert lines[-1] == "</data>" and all(line.startswith("|") for line in lines[1:-1])
-    body = "\n".join(lines[1:-1])
-    assert not re.search(r"<\s*/?\s*data\b|<\s*\||\|>|\[INST\]|[＜＞❬❭⟨⟩]", body)
+    for line in lines[1:-1]:  # one by one: behind a `<` that ends a line stands the mark of the next, which is ours
+        assert not re.search(r"<\s*/?\s*data\b|<\s*\||\|>|\[INST\]|[＜＞❬❭⟨⟩]", line)
 
 
 def test_words_of_a_trip_cannot_pass_for_its_program() -> None:

@@ -68,7 +68,7 @@ def _at(node: ast.AST, *, in_function: bool, in_loop: bool) -> Iterator[Finding]
                 if handler.type is None:
                     yield Finding(handler.lineno, "syntax", "`except:` stands before another `except`", "put it last")
         case ast.FormattedValue(format_spec=ast.JoinedStr(values=parts)):
-            texts = [part.value for part in parts if isinstance(part, ast.Constant) and isinstance(part.value, str)]
+            texts = [str(part.value) for part in parts if isinstance(part, ast.Constant)]
             form = "".join(texts)
             if len(texts) == len(parts) and _FORMAT.fullmatch(form) is None:
                 yield Finding(node.lineno, "syntax", f"{form[:40]!r} is no format", "write e.g. f'{speed:.1f}'")

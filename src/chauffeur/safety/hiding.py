@@ -135,8 +135,8 @@ def _characters(text: str) -> Iterator[Found]:
         yield "control", (hidden[0], hidden[-1] + 1), words[:_SHOWN]
     plain = [place for place, char in enumerate(text) if dressed(char)]
     if plain:
-        bare = "".join(skeleton(text[plain[0] : plain[-1] + 1])[0])
-        yield "lookalike", (plain[0], plain[-1] + 1), bare[:_SHOWN]
+        start, end = plain[0], plain[-1] + 1
+        yield "lookalike", (start, end), skeleton(text[start:end])[0][:_SHOWN]
     for start, end in words_that_mix(text):
         yield "lookalike", (start, end), skeleton(text[start:end])[0][:_SHOWN]
 
@@ -176,7 +176,7 @@ def _decoded(text: str, bare: str, places: list[int]) -> Iterator[tuple[tuple[in
         for table in _LEET:
             if _INSTRUCTS.search(plain := bare.translate(table)):
                 yield whole, plain.replace("\n", " ")
-                break
+                return
 
 
 def _tried(span: tuple[int, int], coded: str, decode: Decoder) -> Iterator[tuple[tuple[int, int], str]]:
@@ -185,12 +185,13 @@ def _tried(span: tuple[int, int], coded: str, decode: Decoder) -> Iterator[tuple
     except (ValueError, binascii.Error, UnicodeError, OverflowError):
         return
     if decoded != coded:
-        yield span, decoded.strip("\0\r\n\t ")
+        # An instruction of several lines is one all the same.
+        yield span, "".join(" " if char.isspace() else char for char in decoded).strip("\0 ")
 
 
 def _base64(coded: str) -> str:
-    plain = coded.replace("-", "+").replace("_", "/").strip("=")
-    return base64.b64decode(plain + "=" * (-len(plain) % 4)).decode("utf-8")
+    # Of the signs that fill it up, too many are passed over, and too few are not.
+    return base64.b64decode(coded.replace("-", "+").replace("_", "/") + "==").decode()
 
 
 def _base64_reversed(coded: str) -> str:
@@ -199,22 +200,23 @@ def _base64_reversed(coded: str) -> str:
 
 def _base32(coded: str) -> str:
     plain = coded.rstrip("=")
-    return base64.b32decode(plain + "=" * (-len(plain) % 8)).decode("utf-8")
+    return base64.b32decode(plain + "=" * (-len(plain) % 8)).decode()
 
 
 def _hex(coded: str) -> str:
-    return bytes.fromhex(re.sub(r"0x|[\s:]", "", coded.lower())).decode("utf-8")
+    return bytes.fromhex(coded.removeprefix("0x").replace(":", "")).decode()
 
 
 def _binary(coded: str) -> str:
-    return bytes(int(byte, 2) for byte in re.findall(r"[01]{8}", coded)).decode("utf-8")
+    return bytes(int(byte, 2) for byte in re.findall(r"[01]{8}", coded)).decode()
 
 
-def _codes(base: int) -> Decoder:
-    def decode(coded: str) -> str:
-        return bytes(int(number, base) for number in re.findall(r"\d+", coded)).decode("utf-8")
+def _decimal(coded: str) -> str:
+    return bytes(map(int, re.findall(r"\d+", coded))).decode()
 
-    return decode
+
+def _octal(coded: str) -> str:
+    return bytes(int(number, 8) for number in re.findall(r"\d+", coded)).decode()
 
 
 def _escapes(coded: str) -> str:
@@ -222,7 +224,7 @@ def _escapes(coded: str) -> str:
 
 
 def _quoted_printable(coded: str) -> str:
-    return quopri.decodestring(coded.encode("ascii")).decode("utf-8")
+    return quopri.decodestring(coded.encode()).decode()
 
 
 _CODES: Final[tuple[tuple[re.Pattern[str], Decoder], ...]] = (
@@ -231,8 +233,8 @@ _CODES: Final[tuple[tuple[re.Pattern[str], Decoder], ...]] = (
     (re.compile(r"\b[A-Z2-7]{16,4096}={0,6}"), _base32),
     (re.compile(r"(?:0x)?(?:[0-9a-fA-F]{2}[ :]?){5,2048}"), _hex),
     (re.compile(r"(?:[01]{8}\s?){3,512}"), _binary),
-    (re.compile(r"\b(?:\d{2,3}[ ,]+){3,512}\d{2,3}\b"), _codes(10)),
-    (re.compile(r"\b(?:[0-7]{2,3}[ ,]+){3,512}[0-7]{2,3}\b"), _codes(8)),
+    (re.compile(r"\b(?:\d{2,3}[ ,]+){3,512}\d{2,3}\b"), _decimal),
+    (re.compile(r"\b(?:[0-7]{2,3}[ ,]+){3,512}[0-7]{2,3}\b"), _octal),
     (re.compile(r"(?:%[0-9a-fA-F]{2}[^\s%]{0,40}){2,512}"), unquote),
     (re.compile(r"(?:&#x?[0-9a-fA-F]{1,6};\s?){3,512}"), html.unescape),
     (re.compile(r"(?:\\[ux][0-9a-fA-F]{2,4}){3,512}"), _escapes),

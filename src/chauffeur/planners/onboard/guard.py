@@ -106,8 +106,10 @@ def _pace(meaning: Meaning) -> int:
 
 
 def _outvoted(wish: str, ruled: Meaning, pace: int) -> bool:
-    """Whether complaints ("a bit fast") or, where the rules saw a mood as well, moods ("others race, we have time") speak
-    for a program's pace and against the rules' reading. A speed that is asked for outright stands against any mood."""
+    """Whether complaints ("a bit fast") speak for a program's pace and against the rules' reading.
+
+    Moods ("others race, we have time") do so where the rules saw a mood as well: what is asked for outright stands.
+    """
     mood = {"hurry": 1, "ease": -1, "": 0}[mood_of(wish)] if ruled.manoeuvre == "style" else 0
     complaint = pace_complaint(wish)
     return complaint * pace > 0 or (not complaint and mood * pace > 0)

@@ -12,35 +12,49 @@ from chauffeur.safety.alignment import wording as words
 from chauffeur.safety.alignment.claim import Claim, clause_quantities
 from chauffeur.safety.alignment.clauses import Clause
 
+_AT_LIMIT: Final = words.listed("drive match use exactly at go copy set")
+_ALLOWED: Final = words.listed("limit permitted allowed")
+_OVER: Final = words.listed("above over")
+_UNDER: Final = words.listed("below under")
+_NO_SPEED: Final = words.KEEPS | words.UNCHANGED | {"limit", "nothing"}
+_AT_MOST: Final = ("faster than", "above", "exceed", "over", "more than")
+_NO_FASTER: Final = ("no faster than", "not faster than")
+
 
 def speeds(clause: Clause, base: Claim) -> Iterator[Claim]:
     """What a clause claims of the speed."""
     numbers = tuple(q for q in clause_quantities(clause, "speed") if q.dimension == "speed")
     shares = tuple(q for q in clause_quantities(clause) if q.dimension == "share")
     sign = _speed_sign(clause)
-    said = set(clause.words)
-    if not numbers and "limit" in said and said & _AT_LIMIT and not _relative(clause) and not clause.negated:
+    limit = "limit" in clause.words
+    if not numbers and limit and clause.has(_AT_LIMIT) and not _relative(clause) and not clause.negated:
         yield replace(base, matter="speed", at_limit=True)
         return
-    if numbers and said & {"limit", "permitted", "allowed"} and said & {"above", "over", "below", "under"}:
-        way = 1 if said & {"above", "over"} else -1
-        yield replace(base, matter="speed", at_limit=True, sign=way, quantities=numbers)
+    if numbers and clause.has(_ALLOWED, _OVER | _UNDER):
+        yield replace(base, matter="speed", at_limit=True, sign=1 if clause.has(_OVER) else -1, quantities=numbers)
         return
-    if not numbers and not sign and "plus" in said and any(q.dimension == "bare" for q in clause_quantities(clause)):
+    if (
+        not numbers
+        and not sign
+        and "plus" in clause.words
+        and any(q.dimension == "bare" for q in clause_quantities(clause))
+    ):
         yield replace(base, matter="speed", aside=True)
         return
-    if "divided" in said:
+    if "divided" in clause.words:
         return
     if not numbers and not sign:
-        if said & words.SPEEDS and not said & (words.KEEPS | words.UNCHANGED | {"limit", "nothing"}):
+        if clause.has(words.SPEEDS) and not clause.has(_NO_SPEED):
             yield replace(base, matter="speed", quantities=shares)
         return
     exact = bool(numbers) and _led_to(clause.words) and not _relative(clause) and all(q.value >= 0.0 for q in numbers)
-    if "limit" in said and _relative(clause):
+    if limit and _relative(clause):
         sign = 0
-    if numbers and clause.negated and clause.says("faster than", "above", "exceed", "over", "more than"):
+    if numbers and clause.negated and clause.says(*_AT_MOST):
         base, sign = replace(base, denied=False), 0
-    yield replace(base, matter="speed", sign=0 if clause.negated else sign, quantities=numbers + shares, exact=exact)
+    if clause.negated or clause.says(*_NO_FASTER):
+        sign = 0
+    yield replace(base, matter="speed", sign=sign, quantities=numbers + shares, exact=exact)
 
 
 _LEADS: Final = frozenset({"to", "at", "exactly", "becomes", "speed", "target", "be", "is"})
@@ -50,46 +64,44 @@ _STEPS: Final = tuple((word,) for word in ("higher", "lower", "more", "less", "f
 """What after a number makes it a step: `the target is 5 m/s higher`."""
 
 
+_ABOUT: Final = words.listed("about around roughly only some")
+_SPEED_OR_TARGET: Final = words.SPEEDS | {"target"}
+
+
 def _led_to(said: tuple[str, ...]) -> bool:
     """Whether a number is where a speed is to get (`to 20`, `at 20`, `a speed of 20`), and no step on the way."""
     for index, word in enumerate(said):
         if word.startswith("#"):
-            before = [one for one in said[:index] if one not in ("about", "around", "roughly", "only", "some")][-2:]
+            before = [one for one in said[:index] if one not in _ABOUT][-2:]
             if said[index + 1 : index + 2] in _STEPS:
                 continue
-            if before and (before[-1] in _LEADS or (before[-1] == "of" and before[0] in words.SPEEDS | {"target"})):
+            if before and (before[-1] in _LEADS or (before[-1] == "of" and before[0] in _SPEED_OR_TARGET)):
                 return True
     return False
 
 
-_AT_LIMIT: Final = frozenset({"drive", "match", "use", "exactly", "at", "go", "copy", "set"})
+_BESIDE: Final = words.listed(
+    "by plus minus subtract add than above below under over off faster slower relative difference"
+)
+_ONTO: Final = ("down to", "up to")
 
 
 def _relative(clause: Clause) -> bool:
-    said = set(clause.words)
-    return bool(
-        said
-        & {
-            "by",
-            "plus",
-            "minus",
-            "subtract",
-            "add",
-            "than",
-            "above",
-            "below",
-            "under",
-            "over",
-            "off",
-            "faster",
-            "slower",
-            "relative",
-            "difference",
-        }
-    ) and not clause.says("down to", "up to")
+    return clause.has(_BESIDE) and not clause.says(*_ONTO)
 
 
-_NOT_OURS: Final = words.VEHICLES | words.listed("lane lanes traffic sign side down road roads limit distance hard")
+_NOT_OURS: Final = (words.VEHICLES - {"driver"}) | words.listed(
+    "lane lanes traffic sign side road roads limit distance hard"
+)
+
+
+_FASTER_OR_SLOWER: Final = words.UP | words.DOWN
+_HOW_HARD: Final = words.listed("braking acceleration deceleration")
+_COMPARED: Final = words.VEHICLES | words.listed("it him them others")
+_SPEEDING_UP: Final = ("speed up", "speeds up", "speeding up", "pick up", "picks up", "catch up")
+_SLOWING_DOWN: Final = ("ease off", "come down", "comes down", "less speed")
+_BETWEEN: Final = words.GAPS - {"following"}
+_TAKEN_OFF: Final = re.compile(r"\b(?:take|takes|taking|knock|shave) #\d+ off")
 
 
 def _speed_sign(clause: Clause) -> int:
@@ -98,82 +110,91 @@ def _speed_sign(clause: Clause) -> int:
     votes = 0
     for index, word in enumerate(said):
         after = said[index + 1] if index + 1 < len(said) else ""
-        if word not in words.UP | words.DOWN or after in _NOT_OURS - {"down", "driver"}:
+        if word not in _FASTER_OR_SLOWER or after in _NOT_OURS:
             continue
         rest = said[index + 1 : index + 4]
-        if word in ("braking", "acceleration", "deceleration") and after == "of":
+        if word in _HOW_HARD and after == "of":
             continue  # how hard others or we would brake
-        if "than" in rest and set(said[index + 1 : index + 8]) & (words.VEHICLES | {"it", "him", "them", "others"}):
+        if "than" in rest and not _COMPARED.isdisjoint(said[index + 1 : index + 8]):
             continue
         votes += 1 if word in words.UP else -1
     if not votes:
-        if clause.says("speed up", "speeds up", "speeding up", "pick up", "picks up", "catch up"):
+        if clause.says(*_SPEEDING_UP):
             return 1
-        if clause.has(words.SPEEDS) and not clause.has(words.GAPS - {"following"}):
-            votes += clause.has(words.RAISE) - clause.has(words.LOWER)
-        text = " ".join(said)
-        if re.search(r"\b(?:take|takes|taking|knock|shave) #\d+ off", text):
-            votes = -1
-        if clause.says("ease off", "come down", "comes down", "less speed"):
+        if clause.has(words.SPEEDS) and not clause.has(_BETWEEN):
+            # The gain of a controller raises nothing.
+            raising = words.RAISE - {"gain"} if clause.says("gain of") else words.RAISE
+            votes += clause.has(raising) - clause.has(words.LOWER)
+        if _TAKEN_OFF.search(" ".join(said)) or clause.says(*_SLOWING_DOWN):
             votes = -1
     return (votes > 0) - (votes < 0)
 
 
+_BEHIND_IT: Final = ("following distance", "behind the car", "behind the vehicle")
+_HOLDS: Final = words.listed("keep keeps keeping hold holds")
+_IN_SECONDS: Final = ("time gap", "second rule", "s behind")
+_RULED: Final = words.listed("minimum allowed")
+_BY_THEN: Final = ("in #0", "after #0", "within #0", "for #0")
+_NO_GAP: Final = words.listed("wait waits after ahead")
+_TICKS: Final = words.listed("tick ticks period")
+_USUAL: Final = words.listed("default usual")
+
+
 def gaps(clause: Clause, base: Claim) -> Iterator[Claim]:
     """What it claims of the gap to the vehicle ahead, or the headway."""
-    said = set(clause.words)
-    about = bool(said & (words.GAPS - {"following"})) or clause.says(
-        "following distance", "behind the car", "behind the vehicle"
-    )
-    about = about or (bool(said & words.KEEPS & words.listed("keep keeps keeping hold holds")) and "ahead" in said)
-    headway = bool(said & {"headway"}) or clause.says("time gap", "second rule", "s behind")
+    about = clause.has(_BETWEEN) or clause.says(*_BEHIND_IT) or (clause.has(_HOLDS) and "ahead" in clause.words)
+    headway = "headway" in clause.words or clause.says(*_IN_SECONDS)
     sign = _gap_sign(clause)
-    if said & {"minimum", "allowed"}:
+    if clause.has(_RULED):
         return
     unit = "time" if headway else "distance"
     bare = unit if about or headway else ""
     numbers = tuple(q for q in clause_quantities(clause, bare) if q.dimension in ("distance", "time"))
-    if not headway and clause.says("in #0", "after #0", "within #0", "for #0"):
+    if not headway and clause.says(*_BY_THEN):
         numbers = tuple(q for q in numbers if q.dimension == "distance")  # when, or how long; not how far apart
-    if clause.says("at a distance of") and said & words.MOVES:
+    if clause.says("at a distance of") and clause.has(words.MOVES):
         yield replace(base, matter="other gap", quantities=numbers)
         return
     if not about and not headway and not sign:
         numbers = tuple(q for q in numbers if q.dimension == "distance")
-        if numbers and not said & {"wait", "waits", "after", "ahead"}:
+        if numbers and not clause.has(_NO_GAP):
             yield replace(base, matter="gap", quantities=numbers, firm=False)
         return
     if not numbers and not sign:
         return
-    if said & {"tick", "ticks", "period"} or (said & words.KEEPS and said & {"default", "usual"}):
+    if clause.has(_TICKS) or clause.has(words.KEEPS, _USUAL):
         return
     yield replace(base, matter="gap", sign=0 if clause.negated else sign, quantities=numbers)
 
 
+_WIDENING: Final = (
+    "drop back", "fall back", "falling back", "back off", "hang back", "drops back", "falls back", "dropping back",
+    "leave more", "more room", "more space", "more distance", "farther behind", "further behind",
+)  # fmt: skip
+_CLOSING: Final = (
+    "close up", "tighten up", "catch up", "closing in", "close in", "more closely", "get closer", "drive closer",
+    "move closer",
+)  # fmt: skip
+_WIDER: Final = words.WIDER - words.listed("more extra open opens")
+_OPENED: Final = ("open the gap", "opens the gap", "open up the gap")
+
+
 def _gap_sign(clause: Clause) -> int:
-    said = set(clause.words)
-    if clause.says("drop back", "fall back", "falling back", "back off", "hang back", "drops back", "falls back",
-                   "dropping back", "leave more", "more room", "more space", "more distance", "farther behind",
-                   "further behind", "fall back further"):  # fmt: skip
+    if clause.says(*_WIDENING):
         return 1
-    if clause.says("close up", "tighten up", "catch up", "closing in", "close in", "more closely", "get closer",
-                   "drive closer", "move closer"):  # fmt: skip
+    if clause.says(*_CLOSING):
         return -1
-    if not said & words.GAPS:
+    if not clause.has(words.GAPS):
         return 0
-    up = bool(said & (words.WIDER - {"more", "extra", "open", "opens"})) or clause.says(
-        "open the gap", "opens the gap", "open up the gap"
-    )
-    down = bool(said & words.CLOSER)
-    return up - down
+    return (clause.has(_WIDER) or clause.says(*_OPENED)) - clause.has(words.CLOSER)
+
+
+_NO_WAITS: Final = words.listed("headway gap distance tick ticks behind every minimum allowed")
 
 
 def waits(clause: Clause, base: Claim) -> Iterator[Claim]:
     """What it claims of time that passes."""
-    said = set(clause.words)
-    if said & {"headway", "gap", "distance", "tick", "ticks", "behind", "every", "minimum", "allowed"} or clause.says(
-        "time gap"
-    ):
+    if clause.has(_NO_WAITS):
         return
     numbers = tuple(_time(q) for q in clause_quantities(clause) if q.dimension == "time" or _is_minutes(q))
     if numbers:

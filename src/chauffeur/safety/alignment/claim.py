@@ -27,7 +27,8 @@ class Claim:
         order: Its place among the claims in time, as the text tells it.
         firm: Whether the text says that it is done.
         denied: Whether the text says that it is not done.
-        sides: -1 left, 0 straight, +1 right; empty where none is named.
+        sides: -1 left, 0 straight, +1 right; empty where none is named. Of `stay` and `nothing`: what is left alone,
+            1 the lane, 2 the speed, 3 the gap; empty for everything.
         sign: Of a speed or a gap: -1 less, +1 more, 0 not said.
         quantities: Numbers said with it.
         count: Lanes to cross; 0 where it is not said.
@@ -61,13 +62,13 @@ def clause_quantities(clause: Clause, bare: Literal["", "speed", "distance", "ti
     """Numbers said in a clause; one without a unit counts as what the clause is about."""
     found: list[Quantity] = []
     for index, word in enumerate(clause.words):
-        if word.startswith("#") and word[1:].isdigit():
+        if word.startswith("#"):
             quantity = clause.quantities[int(word[1:])]
-            before = clause.words[index - 1] if index else ""
-            if (before in ("from", "than") and clause.says("to")) or _VAGUE.intersection(quantity.said.split()):
+            before = clause.words[max(0, index - 1) : index]
+            if (before in (("from",), ("than",)) and clause.says("to")) or _VAGUE.intersection(quantity.said.split()):
                 continue
             measured = _FACTORS.isdisjoint(clause.words[max(0, index - 2) : index])
-            if quantity.dimension == "bare" and (not measured or clause.words[index + 1 : index + 2] == ("divided",)):
+            if quantity.dimension == "bare" and (not measured or "divided" in clause.words):
                 continue
             if quantity.dimension == "bare" and bare:
                 fits = bare != "speed" or clause.has(words.SPEEDS)

@@ -34,7 +34,7 @@ def claims_of(text: str, *, crossing: bool = False) -> tuple[Claim, ...]:
         beside = [
             one for one in clauses[max(0, index - 1) : index + 2] if one is not clause and one.place == clause.place
         ]
-        conditional = clause.opener in ("otherwise", "else", "or else") or clause.says("in which case")
+        conditional = clause.opener in ("else", "or else") or clause.says("in which case")
         conditional = conditional or any(one.mood == "condition" and one.opener in _LASTING for one in beside)
         for claim in _claims(clause, crossing=crossing):
             if not (conditional and claim.matter in ("stay", "nothing")):
@@ -49,7 +49,7 @@ _LASTING: Final = frozenset({"as long as", "so long as", "until", "till", "unles
 def describes(text: str) -> bool:
     """Whether a text tells what is done, by whom or as a list of deeds; a mere label (`rule: lane.left`) does not."""
     deeds = words.MOVES | words.UP | words.DOWN | words.RAISE | words.LOWER | words.STOPS | words.KEEPS | words.LOOKS
-    deeds |= words.OVERTAKES | words.PASSES | {"wait", "let", "adapt", "match", "follow"}
+    deeds |= words.OVERTAKES | words.PASSES | {"wait", "adapt", "match", "follow"}
     ours = words.OURSELVES - {"it"}
     return any(clause.mood == "plan" and (clause.has(ours) or clause.words[0] in deeds) for clause in clauses_of(text))
 
@@ -57,28 +57,20 @@ def describes(text: str) -> bool:
 def _ordered(claim: Claim, clause: Clause, clauses: Sequence[Clause], index: int) -> Claim:
     """A claim with its place in time: what comes `after` a thing is told later than it, wherever it stands."""
     order = float(index)
-    told = clause.opener in words.LATER | words.FIRST | {
-        "and then",
-        "after that",
-        "after this",
-        "after",
-        "once",
-        "before",
-        "after which",
-    }
+    told = clause.opener in words.LATER | words.FIRST | {"once", "and then", "after that", "after this", "after which"}
     told = told or clause.has(words.LATER) or clause.has(words.FIRST)
     previous = clauses[index - 1] if index and clauses[index - 1].place == clause.place else None
-    following = clauses[index + 1] if index + 1 < len(clauses) and clauses[index + 1].place == clause.place else None
-    if clause.opener in ("after", "once") and following is not None:
-        told = False  # its place is told for what follows, not for what stands before
+    followed = index + 1 < len(clauses) and clauses[index + 1].place == clause.place
+    # Where something follows, `after` tells the place of that, not of what stands before.
+    told = told and not (followed and clause.opener in ("after", "once"))
     if previous is not None and previous.opener in ("after", "once"):
         told = True
-    if clause.opener in ("after", "once", "when", "as soon as", "until") and following is None and previous is not None:
+    if clause.opener in ("after", "once", "when", "as soon as", "until") and not followed and previous is not None:
         order -= 1.5  # "B after A"
         told = True
     if clause.opener == "before":
         # "A before B" is in order as it stands; "before B, A" is not.
-        order += 1.5 if following is not None and previous is None else 0.0
+        order += 1.5 if followed and previous is None else 0.0
         told = True
     return replace(claim, order=order, told=told)
 
@@ -89,7 +81,7 @@ def _claims(clause: Clause, *, crossing: bool) -> Iterator[Claim]:
     base = Claim("nothing", clause.sentence, 0.0, firm=clause.mood != "wish", denied=clause.negated)
     if clause.mood == "reason":
         mentioned = replace(base, firm=False, aside=True)
-        yield from motions(clause, mentioned, sides_of(clause), crossing=crossing, checking=False)
+        yield from motions(clause, mentioned, sides_of(clause), crossing=crossing)
         yield from speeds(clause, mentioned)
         yield from gaps(clause, mentioned)
         return

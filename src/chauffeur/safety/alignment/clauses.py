@@ -130,6 +130,9 @@ def _split(tokens: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
             if _main_clause_begins(opener, part, token):
                 yield opener, part
                 opener, part = "", []
+            elif part and _leaves_out(tokens, index):
+                yield opener, part
+                opener, part = "and", []  # "we brake | without changing lanes": what is not done, of the same kind
             part.append(token)
             index += 1
             continue
@@ -159,6 +162,11 @@ def _main_clause_begins(opener: str, part: Sequence[str], token: str) -> bool:
     if len(part) < 3:
         return False
     return part[-1] not in _LINKS and not {"is", "are", "has", "have", "gets"}.isdisjoint(part)
+
+
+def _leaves_out(tokens: Sequence[str], index: int) -> bool:
+    """Whether what is not done begins at a place: `without changing lanes`."""
+    return tokens[index] == "without" and any(word.endswith("ing") for word in tokens[index + 1 : index + 2])
 
 
 _LINKS: Final = words.listed("that says say said than where which what as way moment speed lane how and")

@@ -98,7 +98,7 @@ def turning(sides: frozenset[int]) -> str:
 
 def sign_of(off_mps: float) -> int:
     """Whether a speed rose (+1) or fell (-1) by more than a little."""
-    return 0 if abs(off_mps) < DRIVEN_SPEED_MPS else 1 if off_mps > 0 else -1
+    return (off_mps >= DRIVEN_SPEED_MPS) - (off_mps <= -DRIVEN_SPEED_MPS)
 
 
 def faster(signs: set[int]) -> str:

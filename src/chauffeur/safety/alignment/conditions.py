@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Final
 
 from chauffeur.safety.alignment import wording as words
 from chauffeur.safety.alignment.amounts import speeds, waits
@@ -11,107 +12,117 @@ from chauffeur.safety.alignment.claim import Claim, clause_quantities
 from chauffeur.safety.alignment.clauses import Clause
 from chauffeur.safety.alignment.motions import motions, sides_of
 
+_SKIPPED: Final = words.listed("skip skips skipping omit")
+_WAITED: Final = words.listed("wait let lets allow")
+_EVERYBODY: Final = words.listed("traffic everyone everybody others")
+_YIELDING: Final = (
+    "is safe enter", "give way", "gives way", "yield to", "yields to", "yielding to", "safe gap", "safe opening",
+    "safe moment", "when safe", "if safe", "until safe", "safe to enter", "way is clear",
+)  # fmt: skip
+"""What only somebody says who looks whether a way is free."""
+_LOOKED_AT: Final = words.listed(
+    "lane lanes traffic gap crossing cross vehicles cars rear car check it them directions ways side"
+)
+_STRONG: Final = words.LOOKS - words.listed("make ensure ensures ask asks look looks looking")
+"""Words that are looks by themselves."""
+_LOOKING: Final = ("look both ways", "look for a", "sufficient gap")
+
 
 def looks(clause: Clause) -> bool:
     """Whether a clause speaks of looking if a way is free."""
-    said = set(clause.words)
-    if said & {"skip", "skips", "skipping", "omit"}:
+    if clause.has(_SKIPPED):
         return False
-    if said & {"wait", "let", "lets", "allow"} and said & {"traffic", "everyone", "everybody", "others"}:
+    if clause.has(_WAITED, _EVERYBODY) or clause.says(*_YIELDING):
         return True
-    if clause.says("is safe enter", "give way", "gives way", "yield to", "yields to", "yielding to"):
-        return True
-    if clause.says(
-        "safe gap", "safe opening", "safe moment", "when safe", "if safe", "until safe", "safe to enter", "way is clear"
-    ):
-        return True
-    ways = {"lane", "lanes", "traffic", "gap", "crossing", "cross", "vehicles", "cars", "rear", "car", "check", "it",
-            "them", "directions", "ways", "side"}  # fmt: skip
-    if said & words.LOOKS and said & words.SAFE and not said & {"limit"}:
-        return True
-    strong = words.LOOKS - {"make", "ensure", "ensures", "ask", "asks", "look", "looks", "looking"}
-    return (bool(said & strong) and bool(said & ways)) or clause.says("look both ways", "look for a", "sufficient gap")
+    if "limit" in clause.words:
+        return False
+    return clause.has(words.LOOKS, words.SAFE) or clause.has(_STRONG, _LOOKED_AT) or clause.says(*_LOOKING)
+
+
+_FREE: Final = words.listed("safe clear clears free vacant safely")
+_WAYS: Final = words.listed(
+    "lane it way gap nobody that both traffic them room junction they all crossing lanes road one opening moment clear "
+    "safe side"
+)
+_NOBODY: Final = (
+    "nobody", "no one", "no traffic", "none comes", "gap is available", "gap opens", "opens up", "room", "gap in",
+    "sufficient gap", "safe gap", "traffic has gone",
+)  # fmt: skip
+_AHEAD: Final = words.listed("front ahead")
+_BESIDE: Final = words.listed("lane side left right")
+_ROOM: Final = words.listed("space room")
+_LOOKED_FOR: Final = words.listed("safety safe clear free traffic lane")
+_NOT_FREE: Final = ("not safe", "is not free", "not clear")
+_OTHERS: Final = words.VEHICLES | {"it"}
+_OURS: Final = words.listed("we i our us")
+_THAN: Final = words.listed("slower faster below above exceeds under")
+_LESS_MORE: Final = words.listed("less more")
+_BEHIND: Final = words.listed("behind rear")
+_NEARER: Final = words.listed("closer nearer farther further")
+_DONE_FIRST: Final = frozenset({"after", "once", "when", "as soon as", "until", "while"})
+"""Openers of what is itself done."""
 
 
 def conditions(clause: Clause, base: Claim, *, crossing: bool) -> Iterator[Claim]:
     """What a clause claims that something waits for or depends on."""
-    said = set(clause.words)
     sides = sides_of(clause)
-    denied = clause.negated
-    ways = {"lane", "it", "way", "gap", "nobody", "that", "both", "traffic", "them", "room", "junction", "they", "all",
-            "crossing", "lanes", "road", "one", "opening", "moment", "clear", "safe", "side"}  # fmt: skip
-    safe = said & {"safe", "clear", "clears", "free", "vacant", "safely"} and (said & ways)
-    nobody = clause.says("nobody", "no one", "no traffic", "none comes", "gap is available", "gap opens", "opens up",
-                         "room", "gap in", "sufficient gap", "safe gap", "traffic has gone")  # fmt: skip
-    nobody = nobody and not (said & {"front", "ahead"} and not said & {"lane", "side", "left", "right"})
-    roomy = "enough" in said and said & {"space", "room"}
-    looked = said & words.LOOKS and said & {"safety", "safe", "clear", "free", "traffic", "lane"}
-    if (safe or nobody or roomy or looked) and not clause.says("not safe", "is not free", "not clear"):
+    free = clause.has(_FREE, _WAYS) or clause.has(words.LOOKS, _LOOKED_FOR)
+    nobody = clause.says(*_NOBODY) and (clause.has(_BESIDE) or not clause.has(_AHEAD))
+    roomy = "enough" in clause.words and clause.has(_ROOM)
+    if (free or nobody or roomy) and not clause.says(*_NOT_FREE):
         yield replace(base, matter="check", sides=sides, denied=False)
-    numbers = clause_quantities(clause)
-    other = bool(said & (words.VEHICLES | {"it", "lead's"}))
-    ours = bool(said & {"we", "i", "our", "us"})
+    distances = tuple(q for q in clause_quantities(clause) if q.dimension == "distance")
+    ours = clause.has(_OURS)
+    others = clause.has(_OTHERS) and not ours
     said_speeds = tuple(q for q in clause_quantities(clause, "speed") if q.dimension == "speed")
-    than = said & {"slower", "faster", "below", "above", "exceeds", "under"} or (
-        said & {"less", "more"} and said_speeds
-    )
-    if other and not ours and than:
-        yield replace(base, matter="other speed", quantities=said_speeds, denied=denied)
-    elif not ours and said & {"behind", "rear"} and any(q.dimension == "distance" for q in numbers):
-        yield replace(
-            base, matter="behind", quantities=tuple(q for q in numbers if q.dimension == "distance"), denied=denied
-        )
-    elif any(q.dimension == "distance" for q in numbers):
-        yield replace(
-            base, matter="other gap", quantities=tuple(q for q in numbers if q.dimension == "distance"), denied=denied
-        )
-    elif other and not ours and said & {"closer", "nearer", "farther", "further"}:
-        yield replace(base, matter="other gap", denied=denied)
+    if others and (clause.has(_THAN) or (said_speeds and clause.has(_LESS_MORE))):
+        yield replace(base, matter="other speed", quantities=said_speeds)
+    elif distances:
+        behind = clause.has(_BEHIND) and not ours
+        yield replace(base, matter="behind" if behind else "other gap", quantities=distances)
+    elif others and clause.has(_NEARER):
+        yield replace(base, matter="other gap")
     yield from waits(clause, base)
-    done = clause.opener in ("after", "once", "when", "as soon as", "before", "until", "while")
-    if done and not denied:
+    if clause.opener in _DONE_FIRST and not clause.negated:
         yield from (
-            replace(claim, firm=clause.opener in ("after", "before", "once"))
-            for claim in motions(clause, base, sides, crossing=crossing, checking=False)
+            replace(claim, firm=clause.opener in ("after", "once"))
+            for claim in motions(clause, base, sides, crossing=crossing)
             if claim.matter != "lane" or sides
         )
-        if not other or ours:
+        if not others:
             yield from (replace(claim, firm=clause.opener == "after") for claim in speeds(clause, base))
+
+
+_AS_OTHERS: Final = ("same speed as", "same lane as")
+_KEEPING: Final = words.KEEPS | words.UNCHANGED
+_THERE: Final = ("stay behind", "remain behind", "remains behind", "stays behind", "where we are")
+_PRESENT: Final = words.listed("present current our same")
+_USUAL: Final = words.listed("default usual same")
+_NOTHING: Final = (
+    "nothing", "no action", "no change", "no manoeuvre", "no lane change", "no lane changes", "as it is",
+    "the way it is", "unchanged", "untouched", "same speed", "same lane", "not change", "no speed change",
+    "left alone", "leave the target speed",
+)  # fmt: skip
+_LANES: Final = words.listed("lane lanes")
+_HEADWAYS: Final = words.listed("headway gap distance")
 
 
 def stays(clause: Clause, base: Claim) -> Iterator[Claim]:
     """What is said to be left as it is."""
-    said = set(clause.words)
-    if clause.mood != "plan":
+    if clause.mood != "plan" or clause.says(*_AS_OTHERS):
         return
-    if clause.says("same speed as", "same lane as"):
-        return
-    keeps = said & (words.KEEPS | words.UNCHANGED)
-    if keeps and (
-        "lane" in said or clause.says("stay behind", "remain behind", "remains behind", "stays behind", "where we are")
-    ):
-        yield replace(base, matter="stay", sides=frozenset({-1, 1}), denied=False)
-    if keeps and said & words.SPEEDS and said & {"present", "current", "our", "same"} and not clause_quantities(clause):
-        yield replace(base, matter="nothing", denied=False, sides=frozenset({2}))
-    nothing = clause.says(
-        "nothing", "do nothing", "no action", "no change", "no manoeuvre", "no lane change", "no lane changes",
-        "as it is", "the way it is", "unchanged", "untouched", "same speed", "same lane", "not change",
-        "nothing has to change",         "no speed change", "left alone", "leave the target speed",
-    )  # fmt: skip
-    if said & words.KEEPS and said & words.GAPS and said & {"default", "usual", "same"}:
-        yield replace(base, matter="nothing", denied=False, quantities=(), sides=frozenset({3}))
-        return
-    if nothing and not any(q.dimension == "time" for q in clause_quantities(clause)):
-        yield replace(base, matter="nothing", denied=False, quantities=(), sides=_about(said))
+    base = replace(base, denied=False)
+    if clause.has(_KEEPING) and ("lane" in clause.words or clause.says(*_THERE)):
+        yield replace(base, matter="stay", sides=frozenset({1}))
+    if clause.has(_KEEPING, words.SPEEDS, _PRESENT) and not clause_quantities(clause):
+        yield replace(base, sides=frozenset({2}))
+    if clause.has(words.KEEPS, words.GAPS, _USUAL):
+        yield replace(base, sides=frozenset({3}))
+    elif clause.says(*_NOTHING) and not any(q.dimension == "time" for q in clause_quantities(clause)):
+        yield replace(base, sides=_about(clause))
 
 
-def _about(said: set[str]) -> frozenset[int]:
+def _about(clause: Clause) -> frozenset[int]:
     """What is said to stay: 1 the lane, 2 the speed, 3 the gap; nothing for all of it."""
-    found: set[int] = set()
-    if said & {"lane", "lanes"}:
-        found.add(1)
-    if said & words.SPEEDS:
-        found.add(2)
-    if said & {"headway", "gap", "distance"}:
-        found.add(3)
-    return frozenset(found)
+    named = ((1, _LANES), (2, words.SPEEDS), (3, _HEADWAYS))
+    return frozenset(matter for matter, said in named if clause.has(said))

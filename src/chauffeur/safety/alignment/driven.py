@@ -47,7 +47,7 @@ class Driven(Comparison):
         gone = self.driven_sides()
         told = [claim for claim in claims if claim.matter in _LANES and not claim.denied]
         if not told:
-            denied = [c for c in claims if c.matter == "stay" or (c.matter in _LANES and c.denied)]
+            denied = [claim for claim in claims if claim.matter == "stay" or claim.matter in _LANES]
             if gone and self.describes and (denied or not self.told & _LANES):
                 yield Mismatch("not-claimed", denied[0].sentence if denied else "", f"it {_changed(gone)}")
             return
@@ -89,9 +89,10 @@ class Driven(Comparison):
         if wanted and all(abs(speed - start) < _WORTH_MPS for speed in wanted):
             return
         low, high = effect.extremes_mps
-        if claim.sign > 0 and high < start + DRIVEN_SPEED_MPS:
-            yield Mismatch("not-done", claim.sentence, f"it was never faster than {high:.1f} m/s in this drive")
-        elif claim.sign < 0 and low > start - DRIVEN_SPEED_MPS:
+        if claim.sign == 1:
+            if high < start + DRIVEN_SPEED_MPS:
+                yield Mismatch("not-done", claim.sentence, f"it was never faster than {high:.1f} m/s in this drive")
+        elif low > start - DRIVEN_SPEED_MPS:
             yield Mismatch("not-done", claim.sentence, f"it was never slower than {low:.1f} m/s in this drive")
 
     def _followed(self, claim: Claim, effect: Effect) -> Iterator[Mismatch]:

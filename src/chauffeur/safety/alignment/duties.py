@@ -13,9 +13,13 @@ from chauffeur.safety.alignment.comparing import (
     moving,
     turning,
 )
+from chauffeur.safety.alignment.facts import Event
 from chauffeur.safety.alignment.numbers import USUAL_HEADWAY_S
+from chauffeur.safety.alignment.values import Term
 
 _SAME_S: Final = 0.01
+_KEPT: Final = Term("headway", 1.0, 0.0)
+"""The headway that is set already."""
 
 
 class Duties(Comparison):
@@ -60,14 +64,14 @@ class Duties(Comparison):
             yield Mismatch("missing-condition", claim.sentence, f"nothing in it depends on {thing[claim.matter]}")
             return
         for quantity in claim.quantities:
-            if not self.numbers.supports(quantity, exact=False, others=True):
+            if not self.numbers.supports(quantity):
                 yield self.wrong_number(claim, quantity, None)
                 return
 
     def stay(self, claim: Claim) -> Iterator[Mismatch]:
         """A claim that something is left as it is."""
         lanes = {"lane", "overtake", "back", "pull over", "turn"}
-        about = claim.sides if claim.matter == "nothing" else frozenset({1})
+        about = claim.sides  # 1 the lane, 2 the speed, 3 the gap
         everything = not about
         if (everything or 1 in about) and self.moves and not lanes & self.firm:
             yield Mismatch("not-claimed", claim.sentence, f"it {moving(self.moves[0][1].sides)}", self.moves[0][1].line)
@@ -75,9 +79,7 @@ class Duties(Comparison):
             signs = self.numbers.signs()
             if signs and 0 not in signs and not self.numbers.follows:
                 yield Mismatch("not-claimed", claim.sentence, "it drives " + faster(signs), self.speeds[0][1].line)
-        headways = [(event, term) for _, event in self.facts.of("headway") for term in event.terms]
-        changed = [event for event, term in headways if term.factor or abs(term.offset - USUAL_HEADWAY_S) > _SAME_S]
-        if 3 in about and changed and "gap" not in self.firm:
+        if 3 in about and "gap" not in self.firm and (changed := self._headways_changed()):
             yield Mismatch("not-claimed", claim.sentence, "it sets another headway", changed[0].line)
         if everything and self.turns and not lanes & self.firm:
             yield Mismatch(
@@ -97,7 +99,7 @@ class Duties(Comparison):
             yield Mismatch("not-claimed", "", f"it {turning(self.turns[0][1].sides)}", self.turns[0][1].line)
         backs = [event for _, event in self.moves if event.back]
         stays_there = "back" not in told and len(self._sides_told()) < 2 and told & {"stay", "lane", "overtake"}
-        if backs and len(backs) < len(self.moves) and stays_there:
+        if backs and stays_there:
             yield Mismatch("not-claimed", "", "it goes back to its lane afterwards", backs[0].line)
         stops = [event for _, event in self.speeds if self.is_stop(event)]
         if stops and not self.crossing and not told & {"stop", "pull over"} and not self._says_zero():
@@ -112,11 +114,16 @@ class Duties(Comparison):
         quiet = quiet and not (self.moves and self.says_passing) and not (self.numbers.of_others and self.says_speed)
         if signs and 0 not in signs and quiet and not self.numbers.follows:
             yield Mismatch("not-claimed", "", "it drives " + faster(signs), self.speeds[0][1].line)
-
-        headways = [(event, term) for _, event in self.facts.of("headway") for term in event.terms]
-        changed = [event for event, term in headways if term.factor or abs(term.offset - USUAL_HEADWAY_S) > _SAME_S]
-        if self.alone and changed and "gap" not in told:
+        if self.alone and "gap" not in told and (changed := self._headways_changed()):
             yield Mismatch("not-claimed", "", "it sets another headway", changed[0].line)
+
+    def _headways_changed(self) -> list[Event]:
+        """Where the program sets another headway than the one that is kept without it."""
+        return [
+            event
+            for _, event in self.facts.of("headway")
+            if any(t != _KEPT and (t.factor or abs(t.offset - USUAL_HEADWAY_S) > _SAME_S) for t in event.terms)
+        ]
 
     def _sides_told(self) -> frozenset[int]:
         return frozenset(s for c in self.claims if c.matter in ("lane", "overtake", "back") for s in c.sides)
@@ -148,8 +155,6 @@ class Duties(Comparison):
                 return [p for p, e in self.moves if not e.back]
             case "back":
                 return [p for p, e in self.moves if e.back]
-            case "turn":
-                return []
             case "stop":
                 return [p for p, e in self.speeds if self.is_stop(e)]
             case "speed":

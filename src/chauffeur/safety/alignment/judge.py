@@ -90,5 +90,5 @@ class _Case(Ways, Rates, Duties):
     def _outweighed(self, claim: Claim) -> bool:
         """Whether something firm is said of the matter of a loose claim, or nothing is to be done at all."""
         lanes = {"lane", "overtake", "back", "pull over", "stay"}
-        matters = lanes if claim.matter in lanes else {claim.matter, "nothing"}
-        return bool(matters & self.firm) or "nothing" in self.firm
+        matters = lanes if claim.matter in lanes else {claim.matter}
+        return bool((matters | {"nothing"}) & self.firm)

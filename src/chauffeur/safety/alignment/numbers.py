@@ -124,7 +124,7 @@ class Numbers:
 
     # Numbers ---------------------------------------------------------------------------------------------------
 
-    def supports(self, quantity: Quantity, *, exact: bool, others: bool = False) -> bool:
+    def supports(self, quantity: Quantity, *, exact: bool = False) -> bool:
         """Whether a number of the text is one of the program's, or one of the situation."""
         value = abs(quantity.value)
         match quantity.dimension:
@@ -135,7 +135,7 @@ class Numbers:
                     known += self._facts.literals
                 if all(term.factor for term in self._wanted()):
                     known += [mark.value for mark in self._facts.marks if mark.base == "ego" and mark.compared]
-                if others or not exact:
+                if not exact:
                     known += [mark.value for mark in self._facts.marks if mark.base in ("other", "ego")]
                     known += [
                         one for one in (self._where.speed_mps, self._where.limit_mps, self._where.other_mps) if one

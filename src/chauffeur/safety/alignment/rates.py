@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept import Mismatch
@@ -34,14 +33,13 @@ class Rates(Comparison):
         if claim.at_limit and (beside := self.numbers.beside_limit()) is not None:
             yield from self._beside_limit(claim, beside, speeds[0].line)
             return
-        if claim.at_limit:
-            claim = replace(claim, sign=0)
+        sign = 0 if claim.at_limit else claim.sign
         signs = self.numbers.signs() or self._driven_signs()
         line = next((event.line for event in speeds if event.terms), speeds[0].line)
-        if claim.sign and signs and claim.sign not in signs and 0 not in signs:
+        if sign and signs and sign not in signs and 0 not in signs:
             yield Mismatch("wrong-sign", claim.sentence, "it drives " + faster(signs), line)
             return
-        if claim.sign and signs == {0} and not self.numbers.unknown_speed:
+        if sign and signs == {0} and not self.numbers.unknown_speed:
             said = [q for one in self.claims if one.matter == "speed" and one.firm for q in one.quantities]
             if not any(self.numbers.supports(q, exact=True) for q in said if q.dimension == "speed"):
                 yield Mismatch("not-done", claim.sentence, "it keeps its speed", line)
@@ -57,7 +55,7 @@ class Rates(Comparison):
         """Whether a claim cannot hold in a program that sets no speed; the autopilot brakes for a sign by itself."""
         if self.crossing:
             return bool(claim.sign) and (claim.exact or not self.turns)
-        foreign = any(not self.numbers.supports(one, exact=False) for one in claim.quantities)
+        foreign = any(not self.numbers.supports(one) for one in claim.quantities)
         return (not self.numbers.follows and bool(claim.sign or foreign)) or bool(claim.sign and claim.exact)
 
     def _beside_limit(self, claim: Claim, beside_mps: float, line: int | None) -> Iterator[Mismatch]:
@@ -68,9 +66,8 @@ class Rates(Comparison):
             yield Mismatch(kind, claim.sentence, f"it drives at the limit {beside_mps:+.4g} m/s", line)
 
     def _driven_signs(self) -> set[int]:
-        """Which way the speed changed where the program was run, if it did so the same way in every run."""
-        found = {sign_of(effect.speeds_mps[1] - effect.speeds_mps[0]) for effect in self.effects}
-        return found if len(found) == 1 else set()
+        """Which way the speed changed where the program was run."""
+        return {sign_of(effect.speeds_mps[1] - effect.speeds_mps[0]) for effect in self.effects}
 
     def _driven_at(self, quantity: Quantity) -> bool:
         """Whether the runs of a program whose numbers cannot be read ended at a speed that is told."""
@@ -82,12 +79,14 @@ class Rates(Comparison):
 
     def gap(self, claim: Claim) -> Iterator[Mismatch]:
         """A claim about the gap or the headway."""
+        if claim.denied:
+            return
         headways = [event for _, event in self.facts.of("headway")]
         about = bool(headways) or self.numbers.follows
         line = headways[0].line if headways else self.numbers.gap_line
         if not about:
-            slower = -1 in self.numbers.signs() if claim.sign > 0 else 1 in self.numbers.signs()
-            if claim.firm and (claim.quantities or (claim.sign and not slower)):
+            # Who gets slower leaves more room, and who gets faster closes up.
+            if claim.firm and (claim.quantities or (claim.sign and -claim.sign not in self.numbers.signs())):
                 yield Mismatch("not-done", claim.sentence, "it does nothing about the gap")
             return
         signs = self.numbers.gap_signs()
@@ -96,7 +95,7 @@ class Rates(Comparison):
             yield Mismatch("wrong-sign", claim.sentence, f"it wants {way} gap", line)
             return
         for quantity in claim.quantities:
-            if not self.numbers.supports(quantity, exact=False):
+            if not self.numbers.supports(quantity):
                 yield self.wrong_number(claim, quantity, line)
                 return
 
@@ -105,6 +104,6 @@ class Rates(Comparison):
         if claim.denied or not claim.firm:
             return
         for quantity in claim.quantities:
-            if not self.numbers.supports(quantity, exact=False):
+            if not self.numbers.supports(quantity):
                 yield self.wrong_number(claim, quantity, None)
                 return

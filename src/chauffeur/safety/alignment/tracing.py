@@ -134,7 +134,6 @@ class _Tracer(Evaluating):
 
     def _while(self, node: ast.While, frame: Frame) -> None:
         test = self._value(node.test, frame)
-        endless = isinstance(node.test, ast.Constant) and bool(node.test.value)
         times = count_of(node.test, lambda one: self._constants(one, frame))
         before, at = dict(frame.names), self._at
         self._repeats.append(0 if times is None else times)
@@ -145,10 +144,8 @@ class _Tracer(Evaluating):
         self._repeats.pop()
         frame.names = joined([before, frame.names])
         self._at = self._at | at
-        if not endless:
-            again = self._value(node.test, frame)
-            frame.gates |= test.tags | again.tags
-        frame.gates |= ways
+        again = self._value(node.test, frame)
+        frame.gates |= test.tags | again.tags | ways
         self._block(node.orelse, frame)
 
     def _for(self, node: ast.For, frame: Frame) -> None:

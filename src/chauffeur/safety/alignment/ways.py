@@ -63,7 +63,7 @@ class Ways(Comparison):
         most = sum(event.times for event in moves)
         if claim.count == 99:
             return
-        if most != claim.count and not (most > 1 and claim.count == 1):
+        if claim.count not in (1, most):
             lanes = "1 lane" if most == 1 else f"{most} lanes"
             yield Mismatch("wrong-number", claim.sentence, f"it crosses {lanes} at most", moves[0].line)
 

@@ -13,7 +13,8 @@ def listed(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-def _phrases(text: str) -> tuple[tuple[str, ...], ...]:
+def phrases(text: str) -> tuple[tuple[str, ...], ...]:
+    """Phrases that a slash parts, each as its words."""
     return tuple(tuple(line.split()) for line in text.strip().split("/"))
 
 
@@ -40,19 +41,19 @@ COULD: Final = listed("could would might")
 
 NEGATIONS: Final = listed("not no never without neither nor none nobody nothing avoid avoids avoiding refrain cannot")
 
-CONDITIONS: Final = _phrases(
+CONDITIONS: Final = phrases(
     "if/when/whenever/once/as soon as/until/till/unless/provided that/provided/as long as/only when/only if/only while/"
     "in case/so long as/the moment/upon/should it/should the/after/while"
 )
 """What begins a clause that something depends on."""
 
-REASONS: Final = _phrases(
+REASONS: Final = phrases(
     "because/since/although/though/even if/even though/so that/otherwise we/in order to/as the/as it/as this/as we/"
     "rather than/instead of/which/such that/due to/to be sure/as there/as right hand/as safety"
 )
 """What begins a clause that gives a reason, or something that is not done."""
 
-BREAKS: Final = _phrases(
+BREAKS: Final = phrases(
     "after that/after this/and then/then/and/but/so/thus/hence/therefore/afterwards/before/or else/or/else/"
     "subsequently/finally/after which/next/later/first/firstly/secondly/where"
 )

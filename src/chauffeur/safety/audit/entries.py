@@ -12,9 +12,9 @@ import hashlib
 import hmac
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Literal, cast, get_args
+from typing import Any, Final, Literal, get_args
 
 FORMAT: Final = 1
 """Version of the line layout; a reader refuses newer ones."""
@@ -85,17 +85,19 @@ class NotARecordError(ValueError):
 
 def canonical(value: Any) -> bytes:
     """The one written form of a JSON value. Raises TypeError or ValueError for what is none."""
-    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False).encode("ascii")
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
 
 
 def storable(value: Any) -> Any:
     """A value with every key as text, and NaN and infinity, which JSON lacks, as text too."""
     if isinstance(value, float) and not math.isfinite(value):
-        return "NaN" if math.isnan(value) else ("Infinity" if value > 0 else "-Infinity")
+        return json.dumps(value)  # NaN, Infinity or -Infinity
     if isinstance(value, Mapping):
-        return {str(key): storable(item) for key, item in cast("Mapping[Any, Any]", value).items()}
+        mapping: Mapping[Any, Any] = value
+        return {str(key): storable(item) for key, item in mapping.items()}
     if isinstance(value, list | tuple):
-        return [storable(item) for item in cast("list[Any]", value)]
+        items: Iterable[Any] = value
+        return list(map(storable, items))
     return value
 
 
@@ -134,7 +136,7 @@ def parse(line: bytes) -> Record:
         raise NotARecordError("it is not a record in JSON") from error
     if not isinstance(value, dict):
         raise NotARecordError("it is not a record in JSON")
-    fields = cast("dict[str, Any]", value)
+    fields: dict[str, Any] = value
     keys = set(fields)
     if not _KEYS <= keys <= _KEYS | _OPTIONAL_KEYS:
         raise NotARecordError("it has not the fields of a record")
@@ -144,7 +146,7 @@ def parse(line: bytes) -> Record:
         same = False
     if not same:
         raise NotARecordError("it is not written the way Chauffeur writes a record")
-    texts = fields.setdefault("texts", {})
+    texts: dict[str, Any] | None = fields.setdefault("texts", {})
     fields.setdefault("mac", "")
     if not (
         type(fields["seq"]) is int
@@ -152,7 +154,7 @@ def parse(line: bytes) -> Record:
         and fields["kind"] in KINDS
         and isinstance(fields["body"], dict)
         and isinstance(texts, dict)
-        and all(isinstance(text, dict) for text in cast("dict[str, Any]", texts).values())
+        and all(isinstance(text, dict) for text in texts.values())
         and all(isinstance(fields[name], str) for name in ("time", "prev", "hash", "mac"))
     ):
         raise NotARecordError("its fields are not of the kinds a record has")

@@ -83,9 +83,9 @@ def _redact(path: Path, person: PersonId, key: bytes | None, clock: Callable[[],
     torn = b""
     with opened(path) as file:
         for line in lines(file):
-            if not line.whole:
-                torn += line.content
-                continue
+            if not line.whole:  # it is the last one
+                torn = line.content
+                break
             record = _parse(path, line.content)
             if says(record, PERSON, person, key):
                 numbers.append(record.seq)

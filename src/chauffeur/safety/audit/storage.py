@@ -41,7 +41,7 @@ class LogFile:
         self.is_regular: Final = stat.S_ISREG(os.fstat(self._descriptor).st_mode)
         self._end = os.fstat(self._descriptor).st_size if self.is_regular else 0
         self._dirty = False
-        self._new_in: Path | None = path.parent if self.is_regular and self._end == 0 else None
+        self._new_in: Path | None = None if self._end else path.parent
 
     @property
     def size(self) -> int:
@@ -101,7 +101,7 @@ def replace_whole(path: Path, content: bytes) -> None:
     """Put content at a path in one step, for its owner alone. Raises OSError; the old content then stands."""
     draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
     try:
-        descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, PRIVATE_FILE)
+        descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, PRIVATE_FILE)
         with os.fdopen(descriptor, "wb") as file:
             file.write(content)
             file.flush()
@@ -109,7 +109,7 @@ def replace_whole(path: Path, content: bytes) -> None:
         draft.replace(path)
     except OSError:
         with contextlib.suppress(OSError):
-            draft.unlink(missing_ok=True)
+            draft.unlink()
         raise
     sync_directory(path.parent)
 
@@ -117,7 +117,7 @@ def replace_whole(path: Path, content: bytes) -> None:
 def _open_locked(path: Path) -> int:
     """The descriptor, locked; once more if the file was replaced between opening and locking."""
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, PRIVATE_FILE)
+        descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, PRIVATE_FILE)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if os.path.samestat(os.fstat(descriptor), path.stat()):

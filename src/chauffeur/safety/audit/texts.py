@@ -12,7 +12,7 @@ import hashlib
 import hmac
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Literal, cast
+from typing import Any, Final, Literal
 
 from chauffeur.safety.audit.entries import Record
 
@@ -70,8 +70,7 @@ def hide(
 
 def states(record: Record) -> Iterator[TextState]:
     """How each personal text of a record stands, and what is wrong with it, if anything."""
-    listed: Any = record.body.get(REFERENCES, {})
-    references = cast("dict[str, Any]", listed) if isinstance(listed, dict) else {}
+    references = _references(record)
     for name in record.texts:
         if name not in references:
             yield TextState(name, "wrong", f"its text {name!r} was added")
@@ -93,7 +92,7 @@ def words_of(record: Record) -> dict[str, str]:
 def says(record: Record, name: str, text: str, key: bytes | None = None) -> bool | None:
     """Whether a record's text was this one; None where that cannot be known (redacted, withheld, no key given)."""
     value = record.texts.get(name)
-    if value is None or _is_erased(value) or _state(name, _reference(record, name), value).state == "wrong":
+    if value is None or _is_erased(value) or _state(name, _references(record).get(name), value).state == "wrong":
         return None
     if "text" in value:
         return value["text"] == text
@@ -130,14 +129,15 @@ def _is_erased(value: Mapping[str, Any]) -> bool:
     return len(value) == 1 and value.get("redacted") is True  # by identity: to Python, 1 equals true
 
 
-def _reference(record: Record, name: str) -> Any:
-    listed: Any = record.body.get(REFERENCES, {})
-    return cast("dict[str, Any]", listed).get(name) if isinstance(listed, dict) else None
+def _references(record: Record) -> dict[str, Any]:
+    # Anything may stand there in a log that somebody has rewritten.
+    listed: dict[str, Any] | None = record.body.get(REFERENCES)
+    return listed if isinstance(listed, dict) else {}
 
 
 def _digest(salt: bytes, form: Form, value: str) -> str:
-    return hashlib.sha256(salt + form.encode() + b"\0" + value.encode("utf-8", "surrogatepass")).hexdigest()
+    return hashlib.sha256(salt + form.encode() + b"\0" + value.encode(errors="surrogatepass")).hexdigest()
 
 
 def _text_mac(key: bytes, salt: bytes, text: str) -> str:
-    return hmac.new(key, _HMAC_PURPOSE + salt + text.encode("utf-8", "surrogatepass"), hashlib.sha256).hexdigest()
+    return hmac.new(key, _HMAC_PURPOSE + salt + text.encode(errors="surrogatepass"), hashlib.sha256).hexdigest()

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO, Final, Literal, cast
+from typing import Any, BinaryIO, Final, Literal
 
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.safety.audit.entries import (
@@ -160,7 +160,7 @@ class _Examination:
 
     def look_at(self, line: Line) -> None:
         if not line.whole:
-            self.torn_bytes += len(line.content)
+            self.torn_bytes = len(line.content)  # it is the last one
             return
         try:
             record = parse(line.content)
@@ -221,7 +221,7 @@ class _Examination:
                 f"{self.name} has audit format {version}; this Chauffeur reads up to {FORMAT}.",
                 hint="Upgrade: pip install -U chauffeur",
             )
-        name = record.body.get("key", "") if record.kind == "opened" else record.mac
+        name = record.body.get("key") if record.kind == "opened" else record.mac
         self.keyed = bool(name)
         if self.key is None:
             return
@@ -278,15 +278,15 @@ class _Examination:
         self.kinds[record.kind] += 1
         if record.kind != "redaction":
             self.closed = record.kind == "closed"
-        if sound and self.anchor is not None and record.hash == self.anchor:
+        if sound and record.hash == self.anchor:
             self.anchor_at = sum(self.kinds.values())
         if record.kind == "gap":
-            lost: Any = record.body.get("lost", {})
-            counts = cast("dict[str, Any]", lost).values() if isinstance(lost, dict) else ()
+            lost: dict[str, Any] | None = record.body.get("lost")  # or anything, in a log written anew
+            counts = lost.values() if isinstance(lost, dict) else ()
             self.lost += sum(count for count in counts if isinstance(count, int))
         if record.kind == "redaction":
-            named: Any = record.body.get("records", [])
-            listed = cast("list[Any]", named) if isinstance(named, list) else []
+            named: list[Any] | None = record.body.get("records")
+            listed = named if isinstance(named, list) else ()
             self.announced.update(seq for seq in listed if isinstance(seq, int))
 
     def _say(self, line: int | None, what: str) -> None:

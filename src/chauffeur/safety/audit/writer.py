@@ -255,7 +255,7 @@ class AuditLog:
         if not self._file.is_regular or not self._file.size:
             return 0, NO_RECORD, {}
         found = verify(self._path, key=self._key)
-        _must_go_on(self._path, found, self._key)
+        _must_go_on(self._path, found)
         if not found.torn_bytes:
             return found.records, found.head, {}
         whole = self._file.size - found.torn_bytes
@@ -288,7 +288,7 @@ class AuditLog:
             closing, sync_wanted, self._sync_wanted = self._closing, self._sync_wanted, False
         try:
             urgent = self._write()
-            if self._unsynced and (urgent or sync_wanted or closing or self._overdue()):
+            if self._unsynced and (urgent or sync_wanted or self._overdue()):
                 self._sync()
         except OSError as error:
             self._give_up_for_now(error)
@@ -385,8 +385,7 @@ class AuditLog:
         with self._lock:
             self._note_failure(trouble)
             self._sync_due_s = None if not self._unsynced else time.monotonic() + RETRY_S
-            if not self._closing and not self._sync_wanted:
-                self._work_there.wait_for(lambda: self._closing or self._sync_wanted, RETRY_S)
+            self._work_there.wait_for(lambda: self._closing or self._sync_wanted, RETRY_S)
             self._sync_wanted = self._sync_wanted or bool(self._unwritten)
 
     def _note_failure(self, trouble: str) -> None:
@@ -405,14 +404,14 @@ class AuditLog:
                 self._trouble = f"The head file could not be written: {error.strerror or error}."
 
 
-def _must_go_on(path: Path, found: Verification, key: bytes | None) -> None:
+def _must_go_on(path: Path, found: Verification) -> None:
     """Raises DataError where a log must not be continued."""
     if not found.ok and found.records:
         raise DataError(
             f"The audit log {path} is not as it was written ({found.findings[0]}), so it is not continued.",
             hint=f"Look at it with: chauffeur audit verify {path}; and name another file for this drive.",
         )
-    if found.key == "unchecked" and key is None:
+    if found.key == "unchecked":
         raise DataError(
             f"The audit log {path} is written under a key, so it is not continued without it.",
             hint="Give the key file, or name another file.",

@@ -148,7 +148,8 @@ class Junction:
         self._straight = {lane.id: line for lane in lanes if (line := _straight(lane)) is not None}
         self._line_of: dict[LaneId | None, int] = {lane: row for row, lane in enumerate(self._straight)}
         lines = [(line.x_m, line.y_m, line.heading_rad, line.cos, line.sin) for line in self._straight.values()]
-        self._lines = np.array(lines, dtype=np.float64).reshape(-1, 5)
+        # Numbers of this kind whatever the map holds: for others, machine code would be made in the middle of a drive.
+        self._lines = np.array(lines, dtype=np.float64).reshape(len(lines), 5)
         self._clear_from: dict[LaneId, Array] = {}
         self._promised: Array | None = None
         self._motion = Motion(dt_s)
@@ -162,7 +163,7 @@ class Junction:
         command: Command,
         most_mps2: float,
         *,
-        held_up: bool = False,
+        held_up: bool,
     ) -> Mended:
         """The command, changed as little as is needed.
 
@@ -177,10 +178,10 @@ class Junction:
         """
         outlook = self._outlook(snapshot, around, lane)
         ways = self._candidates(lane, aim, outlook.state)
-        found = None
         followed = foresight.followed(outlook.state, outlook.others)
-        for care in (_KIND, _DUE) if followed else (_DUE,):
-            found = found or _mend(outlook, ways, command, most_mps2, care, held_up=held_up)
+        cares = (_KIND, _DUE) if followed else (_DUE,)
+        tries = (_mend(outlook, ways, command, most_mps2, care, held_up=held_up) for care in cares)
+        found = next((one for one in tries if one is not None), None)
         if found is not None:
             mended, self._promised = found
         else:
@@ -209,7 +210,7 @@ class Junction:
                 if math.dist((line.x_m, line.y_m), fork) >= _JOINT_M
                 and math.dist(self._named[one].centre_m[-1], fork) >= _JOINT_M
             ]
-            self._clear_from[lane] = np.array(rows, dtype=np.float64).reshape(-1, 5)
+            self._clear_from[lane] = np.array(rows, dtype=np.float64).reshape(len(rows), 5)
         return self._clear_from[lane]
 
     def _candidates(self, lane: LaneId, aim: LaneId | None, state: Array) -> list[Array]:
@@ -247,7 +248,7 @@ def _sampled(lanes: Sequence[LaneView]) -> Array:
     at = np.arange(0.0, lengths[-1], foresight.STEP_M)
     x, y = np.interp(at, lengths, line[:, 0]), np.interp(at, lengths, line[:, 1])
     heading = np.arctan2(np.gradient(y), np.gradient(x))
-    return np.ascontiguousarray(np.stack([x, y, heading], axis=1), dtype=np.float64)
+    return np.ascontiguousarray(np.stack([x, y, heading], axis=1))
 
 
 def _straight(lane: LaneView) -> _Line | None:
@@ -422,15 +423,16 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
                     trial = Command(acceleration, outlook.wheel_rad(law, way, acceleration))
                     if ends_well(trial, [way], care) is not None:
                         return Mended(trial, "lane", _STRAYS)
-    best, latest = Command(least, 0.0), -1.0
     # Each begins with its own plan: to brake now, since it could still be cleared later, ends in the middle of it.
-    for acceleration, plans in ((least, _STOPS), *((mps2, _CLEARS) for mps2 in clearing)):
-        for law in range(foresight.LAWS):
-            trial = Command(acceleration, outlook.wheel_rad(law, way, acceleration))
-            for plan in plans:
-                trouble = outlook.trouble_s(trial, way, plan, _LAST)
-                if trouble > latest:
-                    best, latest = trial, trouble
+    begun = [
+        (Command(acceleration, outlook.wheel_rad(law, way, acceleration)), plans)
+        for acceleration, plans in ((least, _STOPS), *((mps2, _CLEARS) for mps2 in clearing))
+        for law in range(foresight.LAWS)
+    ]
+    trials = [(trial, plan) for trial, plans in begun for plan in plans]
+    troubles = [outlook.trouble_s(trial, way, plan, _LAST) for trial, plan in trials]
+    latest = max(troubles)
+    best, _ = trials[troubles.index(latest)]
     if latest < math.inf:  # rather stand close by somebody's way than drive into it
         for law in range(foresight.LAWS):
             trial = Command(least, outlook.wheel_rad(law, way, least))

@@ -56,7 +56,7 @@ class Everybody:
 def _rows(vehicles: Sequence[VehicleState]) -> Array:
     count = len(vehicles) * len(_NUMBERS)
     flat = np.fromiter(chain.from_iterable(map(_read, vehicles)), np.float64, count)
-    return flat.reshape(-1, len(_NUMBERS))
+    return flat.reshape(len(vehicles), len(_NUMBERS))
 
 
 def placed(numbers: Array, frame: Array) -> Array:

@@ -145,7 +145,7 @@ class Shield:
             return _Steered(command, _lanes_wide(scene, self._swept(scene, ego, steering, own)), own.lane)
         back = next((strip for strip in scene.strips if strip.lane == self._back), own)
         why = ""
-        for lane in (own, back) if back is not own else (own,):
+        for lane in (own, back):
             span = self._swept(scene, ego, command.steering_rad, lane)
             reason = self._why_not(scene, own, span)
             if not reason and self._too_sharp(scene, ego.speed_mps, command.steering_rad):
@@ -210,7 +210,7 @@ class Shield:
         A car behind has seen it (`touched`) once it is over the line, and needs no time to respond any more.
         """
         table = self._table
-        is_m = max(ego.gap_m(other), 0.0)
+        is_m = ego.gap_m(other)
         if is_m < table.margin_m:
             return "The lane is not free: a car is beside."
         if other.s_m >= 0.0:
@@ -277,10 +277,9 @@ class Shield:
     def _bound(self, scene: Scene, span: Span, crossings: bool) -> _Cap:
         """The strictest bound of the acceleration; where roads cross, those who do are minded elsewhere."""
         table, ego = self._table, scene.ego
-        speed = max(math.hypot(ego.along_mps, ego.across_mps), 0.0)
+        speed = math.hypot(ego.along_mps, ego.across_mps)
         most = max(0.0, self._limits.most_mps(scene.speed_limit_mps))  # no number: no bound could be compared with it
-        towards = (most - speed) / self._dt_s
-        allowed = towards if towards >= 0.0 else max(towards, -_SLOWING_MPS2)
+        allowed = max((most - speed) / self._dt_s, -_SLOWING_MPS2)
         strictest = _Cap(min(allowed, table.acceleration_mps2), "speed", f"No faster than {speed_words(most)} here.")
         free = table.margin_m + free_gap_m(speed, table.acceleration_mps2, table.braking_mps2, self._dt_s) + _SURE_M
         for other in scene.within(span, table.side_m, table.drift_mps, AHEAD, free):

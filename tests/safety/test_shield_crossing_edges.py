@@ -1,0 +1,423 @@
+"""The ways over a crossing, what is to be known of them, and what the shield does where no plan is left as it was."""
+
+# pyright: reportPrivateUsage=false
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from chauffeur.concept import Command, LaneId, LaneView, Scenario, Snapshot, VehicleState
+from chauffeur.safety.shield import LAMPILOT_SHIELD, Guarded, Shield, foresight
+from chauffeur.safety.shield.crossing import (
+    _CLEARS,
+    _DUE,
+    _KIND,
+    _LAST,
+    _STOPS,
+    Array,
+    Junction,
+    Motion,
+    _along,
+    _Outlook,
+    _Plan,
+)
+from chauffeur.safety.shield.everybody import Everybody
+from chauffeur.worlds.base import EGO
+from chauffeur.worlds.highway import HighwayWorld
+
+DT = 0.1
+COAST, GAS, BRAKE = Command(0.0, 0.0), Command(5.0, 0.0), Command(-5.0, 0.0)
+Points = tuple[tuple[float, float], ...]
+
+IN: LaneId = ("south", "middle", 0)
+ON: LaneId = ("middle", "north", 0)
+LEFT: LaneId = ("middle", "west", 0)
+OUT: LaneId = ("north", "far", 0)
+ACROSS: LaneId = ("one side", "other side", 0)
+SLANTED: LaneId = ("corner", "north", 0)
+UPWARDS = math.pi / 2.0
+
+
+def lane(name: LaneId, *points: tuple[float, float]) -> LaneView:
+    length = sum(math.dist(a, b) for a, b in pairwise(points))
+    return LaneView(name, 4.0, length, 15.0, False, False, points)
+
+
+BEND: Points = tuple(
+    (-10.0 + 10.0 * math.cos(at), 10.0 * math.sin(at)) for at in (math.radians(3.0 * n) for n in range(31))
+)  # fmt: skip
+NETWORK = (
+    lane(LEFT, *BEND),
+    lane(IN, (0.0, -60.0), (0.0, -30.0), (0.0, 0.0)),
+    lane(ON, (0.0, 0.0), (0.0, 40.0)),
+    lane(("middle", "north", 1), (4.0, 0.0), (4.0, 40.0)),
+    lane(OUT, (0.0, 40.0), (0.0, 60.0), (0.0, 80.0)),
+    lane(ACROSS, (-50.0, 20.0), (50.0, 20.0)),
+    lane(SLANTED, (-50.0, -50.0), (-10.0, -20.0), (30.0, 10.0)),
+    lane(("bent", "much", 0), (-100.0, 0.0), (-110.0, 0.11), (-120.0, 0.0)),
+    lane(("bent", "little", 0), (-100.0, 9.0), (-110.0, 9.09), (-120.0, 9.0)),
+)
+"""From the south a lane leads on to the north and one bends to the west; another crosses, and some have no part."""
+
+
+def car(number: int, x: float, y: float, heading: float, speed: float, on: LaneId | None = None) -> VehicleState:
+    return VehicleState(number, "car", x, y, heading, speed, 5.0, 2.0, on)
+
+
+def instant(ego: VehicleState, *others: VehicleState, lanes: tuple[LaneView, ...] = NETWORK) -> Snapshot:
+    return Snapshot(0.0, 0, "intersection", ego, others, (), lanes, None, None, False, False)
+
+
+def looked(ego: VehicleState, *others: VehicleState) -> _Outlook:
+    snapshot = instant(ego, *others)
+    assert ego.lane is not None
+    return Junction(NETWORK, LAMPILOT_SHIELD, DT)._outlook(snapshot, Everybody.of(snapshot), ego.lane)
+
+
+def ways(start: LaneId, onto: LaneId | None = None) -> list[Array]:
+    return Junction(NETWORK, LAMPILOT_SHIELD, DT)._ways_from(start, onto)
+
+
+# Ways -----------------------------------------------------------------------------------------------------------------
+
+
+def test_ways_lead_over_all_that_follows_and_the_straightest_is_first() -> None:
+    on, left = ways(IN)
+    assert on[:, 0] == pytest.approx(np.zeros(280))
+    assert on[:, 1] == pytest.approx(np.arange(-60.0, 80.0, 0.5)), "a point every half metre, to the very end"
+    assert on[:, 2] == pytest.approx(np.full(280, UPWARDS))
+    assert left[:120] == pytest.approx(on[:120], abs=1e-2)
+    bent = left[121:]
+    assert np.hypot(bent[:, 0] + 10.0, bent[:, 1]) == pytest.approx(np.full(len(bent), 10.0), abs=0.02)
+    assert bent[-1] == pytest.approx([-10.0, 10.0, math.pi], abs=0.4)
+    assert [way.tolist() for way in ways(IN, LEFT)] == [left.tolist()]
+
+
+def test_a_way_ends_where_nothing_follows() -> None:
+    (out,) = ways(OUT)
+    assert out[:, 1] == pytest.approx(np.arange(40.0, 80.0, 0.5))
+    (on,) = ways(ON)
+    assert on[-1] == pytest.approx([0.0, 79.5, UPWARDS])
+
+
+def test_the_lane_that_is_steered_for_is_the_only_way_where_it_follows() -> None:
+    junction = Junction(NETWORK, LAMPILOT_SHIELD, DT)
+    state = np.array([0.0, -30.0, UPWARDS, 5.0, 0.0, 0.0])
+    count = {aim: len(junction._candidates(IN, aim, state)) for aim in (ON, LEFT, None, IN, OUT, ("middle", "no", 0))}
+    assert count == {ON: 1, LEFT: 1, None: 2, IN: 2, OUT: 2, ("middle", "no", 0): 2}
+
+
+def test_nobody_may_stand_in_straight_lanes_but_the_own_and_those_of_its_fork() -> None:
+    straight = {
+        IN: (0.0, -60.0, 0.0, 1.0, 60.0),
+        ON: (0.0, 0.0, 0.0, 1.0, 40.0),
+        ("middle", "north", 1): (4.0, 0.0, 0.0, 1.0, 40.0),
+        OUT: (0.0, 40.0, 0.0, 1.0, 40.0),
+        ACROSS: (-50.0, 20.0, 1.0, 0.0, 100.0),
+        SLANTED: (-50.0, -50.0, 0.8, 0.6, 100.0),
+        ("bent", "little", 0): (-100.0, 9.0, -1.0, 0.0, 20.0),
+    }
+    junction = Junction(NETWORK, LAMPILOT_SHIELD, DT)
+    for own, free in ((IN, {IN}), (ON, {IN, ON}), (LEFT, {IN, ON}), (OUT, {ON, OUT}), (ACROSS, {ACROSS})):
+        for _ in range(2):
+            rows = junction._keep_clear(own)
+            wanted = [row for name, row in straight.items() if name not in free]
+            assert rows == pytest.approx(np.array(wanted), abs=1e-3), own
+
+
+def test_a_car_drives_along_a_way_whose_direction_it_has_where_it_is() -> None:
+    (way,) = ways(IN, LEFT)
+
+    def along(x: float, y: float, degrees: float) -> bool:
+        return _along(way, np.array([x, y, math.radians(degrees), 1.5, 0.0, 0.0]))
+
+    assert along(0.5, -40.0, 90.0)
+    assert along(0.5, -40.0, 31.0)
+    assert not along(0.5, -40.0, 29.0)
+    assert not along(0.5, -40.0, 180.0)
+    assert along(-9.5, 9.5, 180.0)
+    assert not along(-9.5, 9.5, 90.0)
+    assert not along(-9.5, 9.5, 0.0)
+
+
+def test_where_a_way_comes_back_beside_itself_the_nearest_part_counts() -> None:
+    up = [(0.0, n * 0.5, UPWARDS) for n in range(40)]
+    down = [(8.0, 20.0 - n * 0.5, -UPWARDS) for n in range(40)]
+    way = np.array([*up, *down])
+    assert _along(way, np.array([7.5, 5.0, -UPWARDS, 5.0, 0.0, 0.0]))
+    assert not _along(way, np.array([7.5, 5.0, UPWARDS, 5.0, 0.0, 0.0]))
+    assert looked(car(EGO, 7.5, 5.0, -UPWARDS, 5.0, ON)).way(way).at == 70
+
+
+# What is to be known of a way -----------------------------------------------------------------------------------------
+
+
+def test_a_way_is_cleared_half_a_length_beyond_the_last_place_where_somebody_may_be_met() -> None:
+    (on,) = ways(IN, ON)
+    way = looked(car(EGO, 0.0, -10.0, UPWARDS, 5.0, IN), car(1, -30.0, 20.0, 0.0, 8.0, ACROSS)).way(on)
+    assert way.at == 100
+    assert way.beyond * 0.5 - 60.0 == pytest.approx(24.5 + 2.5), "5 m beside the middle of it, and half of the car"
+    assert way.hold_m == math.inf
+
+
+@pytest.mark.parametrize("speed", [0.0, 6.0])
+def test_behind_a_lead_the_margin_is_left_to_where_it_may_stop(speed: float) -> None:
+    (on,) = ways(IN, ON)
+    way = looked(car(EGO, 0.0, -10.0, UPWARDS, 5.0, IN), car(1, 0.0, 5.0, UPWARDS, speed, ON)).way(on)
+    assert way.hold_m == pytest.approx(65.0 - 2.5 + speed**2 / 12.0 - LAMPILOT_SHIELD.margin_m)
+
+
+def test_who_is_on_no_lane_goes_on_as_it_is_turned() -> None:
+    for heading in (0.0, UPWARDS, math.pi, -UPWARDS, math.atan2(0.6, 0.8)):
+        others = looked(car(EGO, 0.0, -10.0, UPWARDS, 5.0, IN), car(1, 3.0, 5.0, heading, 4.0)).others
+        assert others.tolist() == [[3.0, 5.0, math.cos(heading), math.sin(heading), 4.0, 2.5, 1.0]]
+
+
+# Plans ----------------------------------------------------------------------------------------------------------------
+
+
+def test_each_way_plan_and_care_is_judged_by_itself() -> None:
+    """Who comes along the crossing road meets the way on, not the bend; who follows counts for the kinder care."""
+    ego = car(EGO, 0.0, -1.0, UPWARDS, 8.0, IN)
+    others = car(1, -14.0, 20.0, 0.0, 8.0, ACROSS), car(2, 0.0, -9.0, UPWARDS, 12.0, IN)
+    on, left = ways(IN)
+    together = looked(ego, *others)
+    for way in (on, left):
+        for plan in (*_STOPS, *_CLEARS):
+            for care in (_KIND, _DUE, _LAST):
+                trouble = together.trouble_s(GAS, way, plan, care)
+                assert trouble == looked(ego, *others).trouble_s(GAS, way, plan, care)
+    clear = _Plan(5.0, 3)
+    assert together.trouble_s(GAS, on, clear, _DUE) < math.inf
+    assert together.trouble_s(GAS, left, clear, _DUE) == math.inf
+    stop = _Plan(-8.0, 0)
+    assert together.trouble_s(COAST, left, stop, _KIND) < together.trouble_s(COAST, left, stop, _DUE)
+
+
+def test_the_crossing_may_take_longer_to_clear_than_a_stop_takes() -> None:
+    (on,) = ways(IN, ON)
+    outlook = looked(car(EGO, 0.0, 0.0, UPWARDS, 0.0, ON), car(1, -49.0, 20.0, 0.0, 2.0, ACROSS))
+    assert outlook.trouble_s(COAST, on, _Plan(5.0, 0), _DUE) == math.inf
+
+
+def test_each_law_has_its_wheel() -> None:
+    (on,) = ways(IN, ON)
+    outlook = looked(car(EGO, 1.0, -20.0, UPWARDS - 0.2, 5.0, IN))
+    light, straight, best, whole = (outlook.wheel_rad(law, on, 0.0) for law in range(foresight.LAWS))
+    assert straight == 0.0
+    assert light == pytest.approx(0.3)
+    assert whole > 0.5
+    assert best in (0.2, 0.4, 0.6, 0.78)
+
+
+def test_a_tight_turn_needs_the_whole_wheel() -> None:
+    (left,) = ways(IN, LEFT)
+    outlook = looked(car(EGO, 0.0, 0.0, UPWARDS, 6.0, LEFT))
+    assert outlook.trouble_s(COAST, left, _Plan(2.0, 3), _DUE) != outlook.trouble_s(COAST, left, _Plan(2.0, 0), _DUE)
+
+
+# How the vehicle moves ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "heading"),
+    [(0.2, 0.5, UPWARDS), (0.0, 0.9, UPWARDS), (0.0, 0.5, UPWARDS + 0.1), (-0.3, 0.2, UPWARDS - 0.2)],
+)
+def test_what_was_not_foreseen_is_read_from_the_way_covered(x: float, y: float, heading: float) -> None:
+    """Sideways against the heading half way, and how far it has turned, both in a period of 0.1 s."""
+
+    def seen(motion: Motion, x: float, y: float, heading: float, tick: int) -> list[float]:
+        snapshot = replace(instant(car(EGO, 3.0 + x, -10.0 + y, heading, 5.0, IN)), tick=tick)
+        state = motion.observe(snapshot)
+        motion.commanded(snapshot, state, COAST)
+        return state.tolist()
+
+    motion = Motion(DT)
+    assert seen(motion, 0.0, 0.0, UPWARDS, 0) == [3.0, -10.0, UPWARDS, 5.0, 0.0, 0.0]
+    half = (UPWARDS + heading) / 2.0
+    sliding, turning = (math.cos(half) * y - math.sin(half) * x) / DT, (heading - UPWARDS) / DT
+    assert seen(motion, x, y, heading, 1)[4:] == pytest.approx([sliding, turning])
+    assert seen(motion, x + 1.0, y + 1.0, heading + 0.1, 3)[4:] == [0.0, 0.0], "nothing is known after a gap"
+    motion = Motion(DT)
+    seen(motion, 0.0, 0.0, UPWARDS, 0)
+    assert seen(motion, 0.0, 0.5, UPWARDS, 1)[4:] == pytest.approx([0.0, 0.0], abs=1e-9), "as it was foreseen"
+    motion = Motion(DT)
+    seen(motion, 0.0, 0.0, 0.0, 0)
+    assert seen(motion, 0.5, 0.3, 0.0, 1)[4:] == pytest.approx([3.0, 0.0]), "across it only"
+
+
+# Commands -------------------------------------------------------------------------------------------------------------
+
+APPROACH: LaneId = ("o0", "ir0", 0)
+STRAIGHT_ON: LaneId = ("ir0", "il2", 0)
+TO_LEFT: LaneId = ("ir0", "il1", 0)
+TO_RIGHT: LaneId = ("ir0", "il3", 0)
+STRAYS = "The car would leave its way, or get into that of somebody who crosses."
+YIELDS = "Somebody crosses ahead, and goes first."
+Told = tuple[float, float, str, str]
+Judged = Callable[..., Told]
+
+
+@pytest.fixture(scope="module")
+def judged() -> Judged:
+    """What a command becomes on the simulated crossing: acceleration, steering, and the rule and reason of the last
+    change, if any."""
+    config = {"type": "dt-intersection-v0", "num_vehicles_left": 4, "num_vehicles_right": 4}
+    lanes = HighwayWorld().reset(Scenario("crossing", "highway", config, 3)).lanes
+
+    def judge(
+        ego: VehicleState, *others: VehicleState, asks: Command, aim: LaneId | None, shield: Shield | None = None
+    ) -> Told:
+        found: Guarded = (shield or Shield(DT)).guard(instant(ego, *others, lanes=lanes), asks, aim)
+        last = found.interventions[-1] if found.interventions else None
+        rule, reason = ("", "") if last is None else (last.rule, last.reason)
+        return found.command.acceleration_mps2, found.command.steering_rad, rule, reason
+
+    return judge
+
+
+def me(x: float, y: float, heading: float, speed: float, on: LaneId) -> VehicleState:
+    return car(EGO, x, y, heading, speed, on)
+
+
+Scene = tuple[VehicleState, tuple[VehicleState, ...], Command, LaneId | None, Told]
+SCENES: dict[str, Scene] = {
+    "who can still stop need not be able to be through": (
+        me(2.0, 17.0, -1.571, 8.0, APPROACH),
+        (car(1, -2.0, -108.0, 1.571, 0.0, ("o2", "ir2", 0)), car(2, -4.18, -2.0, 3.142, 8.0, ("ir3", "il1", 0))),
+        GAS, TO_LEFT, (5.0, 0.0, "", ""),
+    ),
+    "where braking ends in the middle the crossing is cleared": (
+        me(-0.52, 3.39, -2.182, 8.0, TO_LEFT),
+        (car(1, 1.89, 9.78, -1.658, 2.0, TO_LEFT),),
+        Command(-5.0, 0.2), TO_LEFT, (2.0, -0.233, "clear", STRAYS),
+    ),
+    "off the way behind a lead it brakes with all it has": (
+        me(0.5, -6.6, -1.371, 6.0, STRAIGHT_ON),
+        (car(1, -5.4, 4.01, 0.687, 0.0, ("ir1", "il0", 0)), car(2, 2.0, -4.4, -1.571, 8.0, STRAIGHT_ON)),
+        BRAKE, STRAIGHT_ON, (-8.0, 0.001, "yield", STRAYS),
+    ),
+    "off the way with room to stop it is steered back as it brakes": (
+        me(4.9, 6.68, -0.384, 8.0, TO_RIGHT),
+        (car(1, 5.18, -4.19, -2.454, 0.0, ("ir3", "il2", 0)), car(2, 106.0, 2.0, 0.0, 8.0, ("il3", "o3", 0))),
+        BRAKE, TO_RIGHT, (-5.0, -0.3, "lane", STRAYS),
+    ),
+    "who stands off the way stands on": (
+        me(0.5, 17.0, -1.571, 0.0, APPROACH),
+        (car(1, -8.14, 2.0, 0.0, 0.0, ("ir1", "il3", 0)), car(2, 7.26, -2.0, 3.142, 0.0, ("ir3", "il1", 0))),
+        BRAKE, TO_RIGHT, (0.0, 0.3, "yield", STRAYS),
+    ),
+    "who is in the middle goes on rather than brake there": (
+        me(2.0, 5.5, -1.571, 10.0, STRAIGHT_ON),
+        (car(1, -0.19, -8.94, -1.484, 8.0, ("ir1", "il2", 0)), car(2, 2.0, -81.0, -1.571, 2.0, ("il2", "o2", 0))),
+        Command(0.0, 0.2), ("il2", "o2", 0), (2.0, 0.001, "clear", STRAYS),
+    ),
+    "nobody promises to be through behind a lead that stands": (
+        me(1.2, 10.92, -1.473, 10.0, TO_RIGHT),
+        (car(1, 11.0, 2.0, -0.098, 0.0, TO_RIGHT), car(2, -2.0, -76.0, 1.571, 8.0, ("o2", "ir2", 0))),
+        Command(-2.0, -0.2), ("il3", "o3", 0), (-8.0, 0.3, "lane", STRAYS),
+    ),
+    "who follows closely is spared a stop in front of it": (
+        me(2.0, 8.8, -1.571, 1.0, STRAIGHT_ON),
+        (car(1, 2.0, 16.0, -1.571, 8.0, APPROACH),),
+        COAST, ("il2", "o2", 0), (-2.0, 0.0, "yield", YIELDS),
+    ),
+    "a plan that ends well is better than to stand beside somebody's way": (
+        me(1.03, 9.04, -1.858, 6.0, TO_LEFT),
+        (car(1, -2.88, 7.18, 1.08, 8.0, ("ir1", "il0", 0)), car(2, -31.0, 2.0, 0.0, 0.0, ("o1", "ir1", 0))),
+        GAS, ("il1", "o1", 0), (-8.0, 0.0, "yield", STRAYS),
+    ),
+    "to stand beside somebody's way is better than to drive into it": (
+        me(1.2, 10.92, -0.973, 2.0, TO_RIGHT),
+        (car(1, 2.08, 10.16, -1.473, 4.0, TO_RIGHT),),
+        GAS, ("il3", "o3", 0), (-8.0, -0.3, "yield", STRAYS),
+    ),
+    "to stand beside somebody's way the wheel that fits is taken": (
+        me(0.5, 17.0, -1.371, 2.0, APPROACH),
+        (car(1, -3.74, 4.0, 0.0, 8.0, ("ir1", "il3", 0)), car(2, 2.0, -11.0, -1.571, 4.0, STRAIGHT_ON)),
+        GAS, STRAIGHT_ON, (-8.0, 0.0, "yield", STRAYS),
+    ),
+    "far off its way it is steered back with the wheel that fits": (
+        me(0.5, 8.8, -1.771, 6.0, STRAIGHT_ON),
+        (car(1, -1.0, 41.0, -1.571, 4.0, APPROACH),),
+        BRAKE, ("il2", "o2", 0), (-5.0, 0.78, "lane", STRAYS),
+    ),
+    "inside, with somebody coming, the crossing is cleared": (
+        me(2.0, 2.0, -1.571, 1.0, STRAIGHT_ON),
+        (car(1, -25.0, 2.0, 0.0, 8.0, ("o1", "ir1", 0)),),
+        BRAKE, STRAIGHT_ON, (2.0, 0.0, "clear", "Somebody is coming: the crossing has to be cleared."),
+    ),
+    "only the way that is steered for has to be open": (
+        me(0.5, 21.0, -1.071, 2.0, APPROACH),
+        (car(1, -2.0, -4.4, 1.571, 2.0, ("ir2", "il0", 0)),),
+        Command(-2.0, 0.0), TO_RIGHT, (-2.0, 0.0, "", ""),
+    ),
+    "off the approach it is steered onto the way that is steered for": (
+        me(2.0, 11.0, -1.571, 8.0, APPROACH),
+        (car(1, 2.32, 8.77, -1.276, 8.0, TO_RIGHT),),
+        GAS, TO_RIGHT, (-8.0, 0.3, "yield", STRAYS),
+    ),
+    "a lane further on is looked at in its turn": (
+        me(2.0, 19.0, -1.571, 4.0, APPROACH),
+        (car(1, -1.44, -7.4, 1.309, 8.0, ("ir2", "il3", 0)),),
+        COAST, TO_RIGHT, (-4.25, 0.0, "yield", YIELDS),
+    ),
+    "whoever crosses right ahead is no lead": (
+        me(2.0, 10.58, -1.571, 2.0, STRAIGHT_ON),
+        (car(1, 1.64, 5.84, -3.06, 0.0, TO_LEFT),),
+        Command(1.0, 0.0), TO_RIGHT, (1.0, 0.0, "", ""),
+    ),
+    "a lead is minded on the approach": (
+        me(2.0, 40.0, -1.571, 8.0, APPROACH),
+        (car(1, 2.0, 31.0, -1.571, 0.0, APPROACH),),
+        COAST, STRAIGHT_ON, (-8.0, 0.0, "gap", "Too close to the car 4 m ahead to ask for more."),
+    ),
+    "a lead is minded behind somebody who crosses": (
+        me(1.71, 10.16, -1.571, 4.0, STRAIGHT_ON),
+        (
+            car(1, 2.16, 2.0, 0.0, 8.0, ("ir1", "il3", 0)), car(2, 3.26, -1.97, -1.571, 8.0, STRAIGHT_ON),
+            car(3, 3.02, 7.68, -1.08, 8.0, TO_RIGHT),
+        ),
+        Command(-2.0, 0.0), TO_RIGHT, (-8.0, 0.0, "gap", "Too close to the car 0 m ahead to ask for more."),
+    ),
+    "behind a lead it is close to, it stays behind": (
+        me(5.73, 3.74, -0.687, 2.0, TO_RIGHT),
+        (car(1, 9.6, 2.14, -0.098, 8.0, TO_RIGHT),),
+        GAS, ("il3", "o3", 0), (-8.0, 0.3, "lane", STRAYS),
+    ),
+    "a car too fast may still promise to be through": (
+        me(2.0, 11.0, -1.571, 13.0, STRAIGHT_ON),
+        (car(1, -11.0, -2.0, 3.142, 4.0, ("ir3", "il1", 0)),),
+        COAST, STRAIGHT_ON, (-1.0, 0.0, "speed", "No faster than 11 m/s (40 km/h) here."),
+    ),
+    "whom the body sweeps over on its way back is a lead": (
+        me(2.0, -1.28, -1.571, 8.0, STRAIGHT_ON),
+        (car(1, -6.79, -0.31, -2.705, 0.0, TO_LEFT), car(2, 31.99, 1.94, 0.342, 0.0, ("il3", "o3", 0))),
+        Command(0.0, -0.137), TO_LEFT, (-8.0, -0.3, "yield", STRAYS),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_on_the_crossing(judged: Judged, name: str) -> None:
+    ego, others, asks, aim, told = SCENES[name]
+    found = judged(ego, *others, asks=asks, aim=aim)
+    assert found[:2] == pytest.approx(told[:2], abs=2e-3)
+    assert found[2:] == told[2:]
+
+
+def test_off_its_way_a_car_is_steered_back_to_the_way_that_was_promised(judged: Judged) -> None:
+    """Nearest to the lane straight on, with none steered for any more."""
+    shield = Shield(DT)
+    begun = me(1.9, 10.5, -1.6, 6.0, TO_LEFT)
+    assert judged(begun, asks=COAST, aim=TO_LEFT, shield=shield)[2] == ""
+    over, wild = me(1.1, 6.9, -1.8, 6.0, STRAIGHT_ON), Command(0.0, -0.7)
+    _, promised, *_ = judged(over, asks=wild, aim=None, shield=shield)
+    _, nearest, *_ = judged(over, asks=wild, aim=None)
+    assert promised < 0.0 < nearest
