@@ -10,7 +10,7 @@ from typing import Final, Literal
 
 from chauffeur.concept import Limits, Situation
 from chauffeur.memory.feedback import interpret_feedback
-from chauffeur.planners.talk2drive.style import BRISK_SHARE, CALM_SHARE, LOT_SHARE
+from chauffeur.planners.talk2drive.style import BRISK_SHARE, CALM_SHARE, LOT_SHARE, RIGHT_SHARE
 
 _HURRIES: Final = ("style.hurry", "style.sporty")
 _EASES: Final = ("style.relax", "style.comfort", "style.careful", "style.eco")
@@ -81,9 +81,9 @@ def passing_mps(situation: Situation, wanted_mps: float, leaning_mps: float = 0.
 def fitting_mps(speed_mps: float, intent: str, situation: Situation, limits: Limits, leaning_mps: float = 0.0) -> float:
     """A speed that was chosen for a highway, made fit for where we are, m/s.
 
-    Who is in a hurry drives close to the limit. At ease, four fifths of it are enough; behind somebody, whom the cruise
-    control follows in any case, that is what the car goes up to when they go on. In a lot speeds are small, and so are
-    the steps between them.
+    Who is in a hurry drives close to the limit, who leaves for the right lane a little below it. At ease, four fifths of
+    it are enough; behind somebody, whom the cruise control follows in any case, that is what the car goes up to when
+    they go on. In a lot speeds are small, and so are the steps between them.
 
     Args:
         speed_mps: As it was chosen.
@@ -107,6 +107,8 @@ def fitting_mps(speed_mps: float, intent: str, situation: Situation, limits: Lim
         return calm if keeps_behind or now > CALM_SHARE * sign else min(speed_mps, now)
     if intent.startswith(_STAYS) and follows(situation):
         return max(speed_mps, calm)
+    if intent == "lane.right":
+        return min(speed_mps, max(RIGHT_SHARE * sign + leaning_mps, 0.0))
     return speed_mps
 
 
