@@ -81,8 +81,8 @@ def passing_mps(situation: Situation, wanted_mps: float, leaning_mps: float = 0.
 def fitting_mps(speed_mps: float, intent: str, situation: Situation, limits: Limits, leaning_mps: float = 0.0) -> float:
     """A speed that was chosen for a highway, made fit for where we are, m/s.
 
-    Who is in a hurry drives close to the limit, who leaves for the right lane a little below it. At ease, four fifths of
-    it are enough; behind somebody, whom the cruise control follows in any case, that is what the car goes up to when
+    Who is in a hurry drives close to the limit, who leaves for the right lane a little below it. At ease, four fifths
+    of it are enough; behind somebody, whom the cruise control follows in any case, that is what the car goes up to when
     they go on. In a lot speeds are small, and so are the steps between them.
 
     Args:

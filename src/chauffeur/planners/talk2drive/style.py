@@ -38,7 +38,8 @@ CALM_SHARE: Final = 0.8
 RIGHT_SHARE: Final = 0.85
 LOT_SHARE: Final = 0.75
 """Speeds as shares of the limit where words name none: in a hurry, at ease, at most in the right lane, and in a lot.
-Chosen by trips of simulated passengers (`bench personalization --words tuning`, `benchmarks/personalization_floor.py`)."""
+Chosen by trips of simulated passengers (`bench personalization --words tuning`, `benchmarks/personalization_floor.py`).
+"""
 
 PARKING_MPS: Final = 3.0
 """In a parking lot, where ways are narrow."""
