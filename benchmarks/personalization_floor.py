@@ -21,11 +21,11 @@ from typing import Final, Literal
 import numpy as np
 
 from chauffeur.bench.personalization.population import draw_passengers
-from chauffeur.bench.personalization.riding import ride_policy
+from chauffeur.bench.personalization.riding import ride_policy, usual
 from chauffeur.bench.personalization.sayings import LEVELS, Aim, Level
-from chauffeur.bench.personalization.scenes import AIMS, GROUND_OF, Ground, Task, scenes_of
+from chauffeur.bench.personalization.scenes import AIMS, GROUND_OF, Task, scenes_of
 from chauffeur.bench.personalization.takeover import Mood, judge
-from chauffeur.concept import Limits, Parameters
+from chauffeur.concept import Limits
 from chauffeur.describe import describe
 from chauffeur.drive.session import make_world
 
@@ -54,11 +54,12 @@ def least(job: tuple[Task, int, Aim, int, int]) -> list[Best]:
     people = draw_passengers(count, seed)
     world = make_world(scene)
     limit = describe(world.reset(scene)).situation.speed_limit_mps
-    lanes = sorted({_LANE.get(task, 0), 0})
+    lanes: list[Literal[-1, 0, 1]] = sorted({_LANE.get(task, 0), 0})
+    place = aim.partition(".")[2]
     found: dict[Level, Best] = {}
     for lane in lanes:
         for share in SHARES:
-            trace = ride_policy(_parameters(task, aim, share * limit, lane), task, scene, Limits())
+            trace = ride_policy(usual(task, round(share * limit, 2), lane, place), task, scene, Limits())
             for level in LEVELS:
                 if level != "III" and lane != _LANE.get(task, 0):
                     continue
@@ -70,14 +71,6 @@ def least(job: tuple[Task, int, Aim, int, int]) -> list[Best]:
                 if level not in found or takes < found[level].takeovers:
                     found[level] = Best(task, level, takes, share, lane)
     return list(found.values())
-
-
-def _parameters(task: Task, aim: Aim, speed_mps: float, lane: int) -> Parameters:
-    ground: Ground = GROUND_OF[task]
-    route = {"highway": "", "intersection": "straight", "parking": aim.partition(".")[2]}[ground]
-    look = (4.0, 1.0) if ground == "parking" else (12.0, 2.0)
-    side: Literal[-1, 0, 1] = -1 if lane < 0 else 1 if lane > 0 else 0
-    return Parameters(round(speed_mps, 2), *look, side, route)
 
 
 def main() -> None:

@@ -6,7 +6,7 @@ import math
 from collections import OrderedDict
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final
+from typing import Final, Literal
 
 from chauffeur.bench.personalization.scenes import DRIVE_S, GROUND_OF, Task
 from chauffeur.bench.personalization.traces import Trace, trace_of
@@ -120,10 +120,14 @@ def ride_policy(policy: Policy, task: Task, scene: Scenario, limits: Limits) -> 
 
 def as_it_was(world: World, task: Task) -> Parameters:
     """What drives on where a wish is declined: the present speed, the present lane."""
-    speed = world.snapshot().ego.speed_mps
+    return usual(task, world.snapshot().ego.speed_mps)
+
+
+def usual(task: Task, speed_mps: float, lane: Literal[-1, 0, 1] = 0, place: str = "") -> Parameters:
+    """A speed, and a lane or a place to park, with the usual look-ahead; over a crossing straight on."""
     ground = GROUND_OF[task]
     look = _USUAL_LOOK_LOT if ground == "parking" else _USUAL_LOOK
-    return Parameters(speed, *look, 0, "straight" if ground == "intersection" else "")
+    return Parameters(speed_mps, *look, lane, "straight" if ground == "intersection" else place)
 
 
 def _drive(world: World, scene: Scenario, policy: Policy, task: Task, limits: Limits) -> tuple[Episode, Trace]:

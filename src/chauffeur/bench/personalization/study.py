@@ -19,7 +19,7 @@ import numpy as np
 
 from chauffeur.bench.personalization.baseline import KeywordParameters
 from chauffeur.bench.personalization.population import POPULATION_VERSION, draw_passengers
-from chauffeur.bench.personalization.riding import RIDE_VERSION, ReadOnly, Ride, ride, ride_policy
+from chauffeur.bench.personalization.riding import RIDE_VERSION, ReadOnly, Ride, ride, ride_policy, usual
 from chauffeur.bench.personalization.sayings import LEVELS, PLACE_WORDS, Half, Level, feedback_of, wishes_of
 from chauffeur.bench.personalization.scenes import GROUND_OF, TASKS, Task, scenes_of
 from chauffeur.bench.personalization.takeover import (
@@ -171,17 +171,14 @@ class _Sitting:
         ground = GROUND_OF[mood.task]
         step = 0.5 if ground == "highway" else 0.25  # as exactly as anybody sets a speed
         speed = min(step * round(wanted_mps(self._passenger, mood, limit) / step), limit)
-        look = (4.0, 1.0) if ground == "parking" else (12.0, 2.0)
         shy = mood.level == "III" and self._passenger.lane_habit == "stays"
         lane: Literal[-1, 0, 1] = 0
         if mood.task == "overtake" and not shy:
             lane = -1
         elif mood.task == "right_lane" and not shy:
             lane = 1
-        route = "straight" if ground == "intersection" else ""
-        if mood.task == "park":
-            route = mood.aim.partition(".")[2]
-        return Parameters(round(speed, 2), *look, lane, route)
+        place = mood.aim.partition(".")[2] if mood.task == "park" else ""
+        return usual(mood.task, round(speed, 2), lane, place)
 
     def _say(self, found: Judgement, mood: Mood) -> str:
         """Feedback after a drive, in words of their own; empty where they say nothing."""

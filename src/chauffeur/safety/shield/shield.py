@@ -145,7 +145,7 @@ class Shield:
             return _Steered(command, _lanes_wide(scene, self._swept(scene, ego, steering, own)), own.lane)
         back = next((strip for strip in scene.strips if strip.lane == self._back), own)
         why = ""
-        for lane in (own, back):
+        for lane in (own, back) if back is not own else (own,):
             span = self._swept(scene, ego, command.steering_rad, lane)
             reason = self._why_not(scene, own, span)
             if not reason and self._too_sharp(scene, ego.speed_mps, command.steering_rad):
