@@ -24,7 +24,17 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from chauffeur.concept import LAMPILOT_LIMITS, Plan, Program, ProgramError, Scenario, Situation, Snapshot, Thoughts
+from chauffeur.concept import (
+    LAMPILOT_LIMITS,
+    Limits,
+    Plan,
+    Program,
+    ProgramError,
+    Scenario,
+    Situation,
+    Snapshot,
+    Thoughts,
+)
 from chauffeur.describe import describe
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import check_drive
@@ -106,13 +116,19 @@ def _road() -> tuple[Snapshot, Situation]:
 
 
 def refused_after_all(reply: Reply) -> bool:
-    """Whether a program goes nowhere: not the model is to refuse 300 km/h, but linking or the checks before a drive."""
+    """Whether a program goes nowhere: not the model is to refuse 3 m or 300 km/h, but linking or the checks of a drive.
+
+    They are asked with what the planner says of the program and under the limits that hold for anybody.
+    """
     snapshot, situation = _road()
-    linked = link(reply.steps, situation, LAMPILOT_LIMITS, lambda _: Leaning())
+    limits, leaning = Limits(), Leaning()
+    linked = link(reply.steps, situation, limits, lambda _: leaning)
     if isinstance(linked, Declined):
         return True
-    plan = Plan(Thoughts(""), Program(reply.source, library=linked.library))
-    return any(verdict.stops for verdict in check_drive(plan, snapshot, LAMPILOT_LIMITS))
+    settings = linked.choice.settings([leaning] * len(reply.steps))
+    program = Program(reply.source, library=linked.library)
+    plan = Plan(Thoughts(""), program, intent=linked.choice.intent, settings=settings)
+    return any(verdict.stops for verdict in check_drive(plan, snapshot, limits))
 
 
 def outcomes(

@@ -18,12 +18,13 @@ pytest.importorskip("onnxscript", reason="onnxscript is not installed (extra: mo
 
 import torch
 
-from chauffeur.concept import ConfigError, Instruction, PlanRequest, Program, Snapshot, SystemMessage
+from chauffeur.concept import ConfigError, DataError, Instruction, PlanRequest, Program, Snapshot, SystemMessage
 from chauffeur.describe import describe
 from chauffeur.models.onboard.examples import questions, reasons
 from chauffeur.models.onboard.export import Stepped, export, export_transformers
 from chauffeur.models.onboard.packed import Packed
 from chauffeur.models.onboard.pipeline import model_card
+from chauffeur.models.onboard.shipped import shipped_weights
 from chauffeur.models.onboard.tokens import blanks_of, train_tokenizer
 from chauffeur.models.onboard.training import (
     SIZES,
@@ -175,6 +176,25 @@ def test_a_card_names_the_version_a_network_was_trained_on_from() -> None:
     assert "**Trained on from** `v1` (100 steps on data `aaaaaaaaaaaaaaaa`)" in card
     assert "--base BASE --size small\n  --steps 50" in card
     assert "--steps 70 --more 30" in card
+    card = model_card({**second, "base": {**first, "plan": None}}, facts, 3_000_000)
+    assert "`BASE` is the folder of its weights, as that version\n  of the package shipped them." in card
+
+
+def test_what_ships_can_be_trained_on(model: Any, exported: Path, tokenizer: Any) -> None:
+    again = network(SIZES["tiny"], tokenizer.get_vocab_size(), 0)
+    weights = shipped_weights(exported)
+    again.load_state_dict(weights)  # all names, all shapes
+    for name, value in model.state_dict().items():
+        step = value.abs().max() / 127.0 if "proj" in name else 0.0
+        assert torch.allclose(weights[name], value.float(), atol=float(step) * 0.51 + 1e-7), name
+
+
+def test_what_is_no_model_of_ours_is_not_trained_on(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="cannot be read"):
+        shipped_weights(tmp_path)
+    (tmp_path / "model.onnx").write_bytes(b"")  # an empty graph, to the library
+    with pytest.raises(DataError, match="no int8 model"):
+        shipped_weights(tmp_path)
 
 
 def test_a_folder_of_another_recipe_is_refused(data: Packed, tokenizer: Any, tmp_path: Path) -> None:

@@ -146,6 +146,10 @@ def _engine_named(spec: str, *, wanted: bool) -> Engine | None:
 
 
 def _cabin() -> Cabin:
-    from chauffeur.hmi.cabin import Cabin
+    import os
 
-    return Cabin()
+    from chauffeur.hmi.cabin import Cabin
+    from chauffeur.hmi.cabin.address import address_of
+
+    at = address_of(os.environ)
+    return Cabin(host=at.host, port=at.port, certificate=at.certificate)

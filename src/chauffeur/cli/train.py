@@ -47,7 +47,8 @@ def onboard(
         int, typer.Option(min=0, help="Steps of a second round, its rate half as high; also for a finished run.")
     ] = 0,
     base: Annotated[
-        Path | None, typer.Option(help="Folder of a finished run whose network is trained on, at half the rate.")
+        Path | None,
+        typer.Option(help="Finished run, or model that ships, whose network is trained on, at half the rate."),
     ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes that make data; default one per core.")] = None,
     threads: Annotated[int, typer.Option(min=0, help="Threads that train; 0 leaves it to PyTorch.")] = 0,

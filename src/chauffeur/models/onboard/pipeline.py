@@ -39,7 +39,7 @@ from chauffeur.models.onboard.examples import Example, checked_reasons, question
 from chauffeur.models.onboard.packed import Packed
 from chauffeur.planners.onboard.prompt import END
 
-MODEL_VERSION: Final = "onboard-lm-v5"
+MODEL_VERSION: Final = "onboard-lm-v6"
 _SPLITS: Final = ("train", "seen", "unseen")
 _TOKENIZER_EXAMPLES: Final = 60_000
 
@@ -58,8 +58,8 @@ class Plan:
         size: Network's size, see `training.SIZES`.
         steps: Optimiser steps.
         more: Steps of a second round after them.
-        base: Folder of a finished run whose network is trained on, with its tokenizer, on this plan's data; None to
-            begin from nothing. Rate and blanking are then those of a second round.
+        base: Folder of a finished run, or of a model that ships, whose network is trained on, with its tokenizer, on
+            this plan's data; None to begin from nothing. Rate and blanking are then those of a second round.
     """
 
     seed: int = 0
@@ -73,7 +73,7 @@ class Plan:
     @property
     def of_data(self) -> dict[str, Any]:
         """What decides the data, as `data.json` holds it."""
-        base = {} if self.base is None else {"tokenizer": _sha256(self.base / "data" / "tokenizer.json")}
+        base = {} if self.base is None else {"tokenizer": _sha256(_words_of(self.base) / "tokenizer.json")}
         return {"seed": self.seed, "draws": self.draws, "per_case": self.per_case} | base
 
 
@@ -113,7 +113,7 @@ def _pack(splits: Splits, data: Path, plan: Plan, told: Told) -> None:
         some = [splits.train[i] for i in sorted(rng.choice(len(splits.train), count, replace=False))]
         tokenizer = train_tokenizer(text for example in some for text in (example.prompt, example.reply))
     else:
-        tokenizer = load_tokenizer(plan.base / "data")
+        tokenizer = load_tokenizer(_words_of(plan.base))
     tokenizer.save(str(data / "tokenizer.json"))
     end = tokenizer.token_to_id(END)
     for place, (name, examples) in enumerate(zip(_SPLITS, (splits.train, splits.seen, splits.unseen), strict=True)):
@@ -123,12 +123,23 @@ def _pack(splits: Splits, data: Path, plan: Plan, told: Told) -> None:
         publish(data / f"{name}.jsonl", lines.encode(), "examples")
 
 
+def _ships(base: Path) -> bool:
+    """Whether a base is a model as it ships, not the run that made one."""
+    return (base / "model.onnx").exists()
+
+
+def _words_of(base: Path) -> Path:
+    """Folder of a base's tokenizer."""
+    return base if _ships(base) else base / "data"
+
+
 def _sha256(file: Path) -> str:
     try:
         return hashlib.sha256(file.read_bytes()).hexdigest()
     except OSError as error:
         raise DataError(
-            f"{file} cannot be read.", hint="--base is the folder of a finished run of `chauffeur train onboard`."
+            f"{file} cannot be read.",
+            hint="--base is the folder of a finished run of `chauffeur train onboard`, or of a model that ships.",
         ) from error
 
 
@@ -201,7 +212,7 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
 
     from chauffeur.models.onboard.export import export, export_transformers
     from chauffeur.models.onboard.tokens import blanks_of, load_tokenizer
-    from chauffeur.models.onboard.training import Recipe, finished, train
+    from chauffeur.models.onboard.training import Recipe, train
 
     data = folder / "data"
     if not (data / "data.json").exists():
@@ -216,14 +227,9 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
     recipe, begin = Recipe(size=plan.size, steps=plan.steps, seed=plan.seed, more=plan.more), None
     lineage: dict[str, Any] = {}
     if plan.base is not None:
-        before, begin = finished(plan.base / "training")
-        if plan.more or before.size != plan.size:
+        size, begin, lineage = _begun_with(plan.base)
+        if plan.more or size != plan.size:
             raise ConfigError("A network is trained on in its own size, in one round.", hint="Leave out --more.")
-        lineage = json.loads((plan.base / "model" / "model.json").read_text(encoding="utf-8"))
-        lineage = {name: lineage[name] for name in ("version", "recipe", "data")} | {
-            "base": lineage.get("base"),
-            "plan": json.loads((plan.base / "data" / "data.json").read_text())["plan"],
-        }
         recipe = Recipe.onwards(f"{lineage['version']}/{lineage['data'][:16]}", plan.size, plan.steps, plan.seed)
     model = train(
         Packed.load(data / "train.npz"),
@@ -257,6 +263,22 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
     return folder / "model"
 
 
+def _begun_with(base: Path) -> tuple[str, Any, dict[str, Any]]:
+    """(size, weights, what is remembered of it) of the network that a run begins with."""
+    from chauffeur.models.onboard.shipped import shipped_weights
+    from chauffeur.models.onboard.training import finished
+
+    if _ships(base):
+        about: dict[str, Any] = json.loads((base / "model.json").read_text(encoding="utf-8"))
+        begin, plan = shipped_weights(base), None
+    else:
+        _, begin = finished(base / "training")
+        about = json.loads((base / "model" / "model.json").read_text(encoding="utf-8"))
+        plan = json.loads((base / "data" / "data.json").read_text(encoding="utf-8"))["plan"]
+    kept = {name: about[name] for name in ("version", "recipe", "data")}
+    return about["recipe"]["size"], begin, {**kept, "base": about.get("base"), "plan": plan}
+
+
 def model_card(about: dict[str, Any], facts: dict[str, Any], parameters: int) -> str:
     """The model card of a trained model.
 
@@ -285,12 +307,10 @@ def model_card(about: dict[str, Any], facts: dict[str, Any], parameters: int) ->
             f"chauffeur train onboard --out DIR --base BASE --size {recipe['size']}\n"
             f"  --steps {recipe['steps']} --seed {recipe['seed']} {made}"
         )
+        made_by = _made_by(base)
         lineage = f"""
 - **Trained on from** `{base["version"]}` ({earlier["steps"] + earlier["more"]:,} steps on data `{base["data"][:16]}`),
-  whose tokenizer it keeps: the numbers above are of the training since. `BASE` is that version's folder, made by the
-  version of this repository that shipped it: `chauffeur train onboard --out BASE --size {earlier["size"]}
-  --steps {earlier["steps"]} --more {earlier["more"]} --seed {earlier["seed"]}
-  --draws {base["plan"]["draws"]} --per-case {base["plan"]["per_case"]}`."""
+  whose tokenizer it keeps: the numbers above are of the training since. `BASE` is {made_by}."""
     return f"""# Model card: {about["version"]}
 
 Writes driving programs for passengers' wishes, on board, offline. {parameters / 1e6:.1f} million parameters, Llama
@@ -312,6 +332,18 @@ architecture (`{recipe["size"]}`), int8 weights for ONNX Runtime, trained from n
   seen in training, ablations, latency.
 - **Licence** and data: those of the repository; no third-party text, no personal data.
 """
+
+
+def _made_by(base: dict[str, Any]) -> str:
+    earlier, plan = base["recipe"], base["plan"]
+    if plan is None:
+        return "the folder of its weights, as that version\n  of the package shipped them"
+    return (
+        "that version's folder, made by the\n"
+        f"  version of this repository that shipped it: `chauffeur train onboard --out BASE --size {earlier['size']}\n"
+        f"  --steps {earlier['steps']} --more {earlier['more']} --seed {earlier['seed']}\n"
+        f"  --draws {plan['draws']} --per-case {plan['per_case']}`"
+    )
 
 
 def examples_of(path: Path) -> list[Example]:

@@ -84,7 +84,8 @@ _TRIES = 12
 MAX_CHARS = 200
 """A sentence of several wishes that comes out longer is said another way, if there is one."""
 MOST_FORMS = 8
-"""In training a template is drawn as often as there are ways of saying it, but no more than so many times as often."""
+"""A template is drawn as often as there are ways of saying it, but no more than so many times as often: one rule for
+training and tests, or phrasings of one way of saying would weigh more among those never seen."""
 
 _BESIDE = (
     "{c}. {w}", "{c}. {w}", "{c}, {w}", "{c}, anyway, {w}", "{c}, so, {w}", "{c}. Anyway, {w}", "{c}. Right, {w}",
@@ -378,8 +379,7 @@ def _lot(section: str, held: bool | None, bare: bool) -> tuple[Sequence[Template
     """Templates of a section, and the shares they are drawn with, summed up."""
     grammar = wordings()
     found = [t for t in grammar.templates(section, held=held) if not (bare and t.sentence)]
-    most = MOST_FORMS if held is False else 1
-    return found, np.cumsum([min(most, grammar.forms(t)) for t in found])
+    return found, np.cumsum([min(MOST_FORMS, grammar.forms(t)) for t in found])
 
 
 def _drawn(section: str, held: bool | None, bare: bool, rng: np.random.Generator) -> Template:

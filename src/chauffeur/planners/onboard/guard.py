@@ -1,8 +1,8 @@
 """A second look at what the model wrote, by rules that know words: what contradicts the wish is asked about.
 
 A small network may copy a number wrongly or mix up two sides. So every number of a program must be one that the person
-named or history holds, and where the rule-based reading of the same words is sure of a side or a direction, the program
-must not say the opposite.
+named or history holds (see `copying`), and where the rule-based reading of the same words is sure of a side or a
+direction, the program must not say the opposite.
 """
 
 from __future__ import annotations
@@ -11,15 +11,12 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
-from chauffeur.language.quantities import read_quantities
-from chauffeur.planners.onboard.dialect import SKILLS, UNITS, Number, Step, plain
+from chauffeur.planners.onboard.copying import unnamed
+from chauffeur.planners.onboard.dialect import Step
 from chauffeur.planners.onboard.meaning import Meaning, NotUnderstood, Reading
 from chauffeur.planners.onboard.moods import mood_of, pace_complaint
 from chauffeur.planners.onboard.understand import understand
 
-_DIGITS: Final = re.compile(r"\d+(?:\.\d+)?")
-_CLOSE: Final = 0.011
-_ROUND: Final = 0.01
 _SIDES: Final = ("left", "right")
 _SERVICE: Final = re.compile(
     r"(?:please|hey|ok|okay|can you|could you|would you|will you|just|now|\W)*"
@@ -49,50 +46,6 @@ def doubt(wish: str, history: Sequence[str], steps: Sequence[Step]) -> str:
         sided = any(step.meaning.direction in _SIDES for step in steps)
         return _WHICH_SIDE if reading.why == "ambiguous" and both and sided else ""
     return _contradiction(wish, reading, steps)
-
-
-def unnamed(wish: str, history: Sequence[str], steps: Sequence[Step]) -> Number | None:
-    """The first number of a program that neither the wish nor history names."""
-    digits = {float(number) for number in _digits(wish, history)}
-    quantities = read_quantities(wish)
-    digits |= {quantity.value for quantity in quantities if quantity.dimension == "bare"}
-    for number in _numbers_of(steps):
-        measured = number.si / number.factor
-        if any(_close(number.value, one) for one in digits):
-            continue
-        if not any(_close(measured, quantity.value) for quantity in quantities):
-            return number
-    return None
-
-
-def named(wish: str, history: Sequence[str]) -> tuple[str, ...]:
-    """Every number that a program may take over from the words, in any unit in which it is a round one."""
-    found = _digits(wish, history)
-    for quantity in read_quantities(wish):
-        values = [
-            quantity.value,
-            *(quantity.value / si for kind, si, _ in UNITS.values() if kind == quantity.dimension),
-        ]
-        found |= {plain(round(value, 2)) for value in values if abs(2 * value - round(2 * value)) < _ROUND}
-    return tuple(sorted(found))
-
-
-def _digits(wish: str, history: Sequence[str]) -> set[str]:
-    return {number for text in (wish, *history) for number in _DIGITS.findall(text)}
-
-
-def _close(value: float, other: float) -> bool:
-    return abs(value - other) <= _CLOSE * max(1.0, abs(other))
-
-
-def _numbers_of(steps: Sequence[Step]) -> list[Number]:
-    """Numbers that are measures; factors and counts are said in too many ways."""
-    found: list[Number] = []
-    for step in steps:
-        own = step.number if SKILLS[step.skill].takes in ("speed", "distance", "time") else None
-        condition = step.condition.number if step.condition is not None else None
-        found += [number for number in (own, step.wait_s, condition) if number is not None]
-    return found
 
 
 _PACES: Final = {"hurry": 1, "sporty": 1, "relax": -1, "careful": -1, "comfort": -1, "eco": -1}

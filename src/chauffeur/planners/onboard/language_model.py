@@ -15,10 +15,12 @@ from typing import Any, Final
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Situation, Usage
 from chauffeur.planners.base import OnText, Planner, declined
+from chauffeur.planners.onboard.copying import named, taken_over, unnamed
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import Step, tell
+from chauffeur.planners.onboard.dialect import write as program_of
 from chauffeur.planners.onboard.engine import Engine, Written
-from chauffeur.planners.onboard.guard import doubt, named, unnamed
+from chauffeur.planners.onboard.guard import doubt
 from chauffeur.planners.onboard.link import Linked, link
 from chauffeur.planners.onboard.options import Declined
 from chauffeur.planners.onboard.personal import Leaning, corrections_of, leaning_of
@@ -79,14 +81,21 @@ def answer(
         reply, written = write(text, only_program=True)
     if not guarded or not reply.steps:
         return reply, written
+    reply = _with_said_numbers(reply, wish, history)
     if unnamed(wish, history, reply.steps) and (numbers := named(wish, history)):
         # Once more with the numbers that were said, and no others.
         reply, written = write(text, only_program=True, measures=numbers)
+        reply = _with_said_numbers(reply, wish, history)
     question = doubt(wish, history, reply.steps)
     if not question and written.sure < UNSURE:
         guess = tell(reply.steps).removeprefix("I ").removesuffix(".").replace(", then I ", ", then ")
         question = f"I am not sure what you want. Shall I {guess}?"
     return (Reply(question=question), written) if question else (reply, written)
+
+
+def _with_said_numbers(reply: Reply, wish: str, history: Sequence[str]) -> Reply:
+    steps = taken_over(wish, history, reply.steps)
+    return reply if steps == reply.steps else Reply(steps=steps, source=program_of(steps))
 
 
 def _told(on_text: OnText, attempt: int, piece: str) -> None:
