@@ -52,7 +52,10 @@ _AUDIT: Final = tuple(f"tests/safety/test_audit{part}.py" for part in ("_words",
 _AUDIT_FILE: Final = tuple(f"tests/safety/test_audit_{part}.py" for part in ("writer_edges", "writer", "edges"))
 _ALIGNMENT: Final = tuple(
     f"tests/safety/test_alignment_{part}.py"
-    for part in ("edges", "judge", "reading", "claims", "asking", "noting", "tracing", "verdicts")
+    for part in (
+        *("amounts_edges", "values_edges", "numbers_edges", "evaluating_edges"),
+        *("clauses_edges", "edges", "judge", "reading", "claims", "asking", "noting", "tracing", "verdicts"),
+    )
 )
 _GATE_TESTS: Final = ("tests/programs/test_gate_edges.py", "tests/programs/test_placing.py")
 MODULES: Final = {

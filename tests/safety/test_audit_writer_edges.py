@@ -21,6 +21,7 @@ from chauffeur.concept import DataError
 from chauffeur.safety.audit import AuditLog, Closing, head_path, read_records, storage, verify, writer
 from chauffeur.safety.audit.keys import key_name
 from chauffeur.safety.audit.storage import LogFile, replace_whole, sync_directory
+from chauffeur.safety.audit.texts import states
 from chauffeur.safety.audit.writer import utc_now
 
 WAIT_S = 20.0
@@ -447,6 +448,25 @@ def test_a_gap_at_the_end_is_told_before_the_closing(tmp_path: Path, disk: Disk)
     assert verify(log.path).lost == 1
 
 
+def test_a_gap_is_told_though_nothing_comes_after_it(tmp_path: Path, disk: Disk) -> None:
+    disk.hold()
+    log = AuditLog(tmp_path / "log", about={}, capacity=1)
+    assert disk.asked.wait(WAIT_S)
+    assert not log.append("wish", {})
+    disk.go.set()
+    until(lambda: log.on_disk == 2)
+    assert bodies(log.path, "gap") == [{"lost": {"wish": 1}, "why": NO_ROOM}]
+    assert log.close().lost == 1
+
+
+def test_what_comes_after_the_closing_is_counted(tmp_path: Path) -> None:
+    log = AuditLog(tmp_path / "log", about={})
+    assert log.close().complete
+    assert [log.append("wish", {}) for _ in range(3)] == [False] * 3
+    assert log.lost == log.close().lost == 3
+    assert log.close().records == 2
+
+
 @pytest.mark.parametrize(
     ("error", "why"), [(OSError(errno.EIO, "broken"), "broken"), (OSError("no medium"), "no medium")]
 )
@@ -483,6 +503,27 @@ def test_texts_go_beside_a_body_that_stays_as_it_was(tmp_path: Path) -> None:
     assert list(first["body"]) == ["n", "texts"]
     assert second["body"] == {"n": 1}
     assert "texts" not in second
+
+
+@pytest.mark.parametrize(
+    ("key", "private", "kept"),
+    [(None, False, "stored"), (KEY, False, "stored"), (None, True, "withheld"), (KEY, True, "digest")],
+)
+def test_what_is_kept_of_a_text(tmp_path: Path, key: bytes | None, private: bool, kept: str) -> None:
+    path = tmp_path / "log"
+    with AuditLog(path, about={}, key=key, private=private) as log:
+        log.append("wish", {}, {"wish": "to the clinic"})
+    (wish,) = (record for _, record in read_records(path) if record.kind == "wish")
+    assert [state.state for state in states(wish)] == [kept]
+    assert (b"clinic" in path.read_bytes()) == (not private)
+
+
+def test_what_could_not_be_written_is_told_under_the_key(tmp_path: Path) -> None:
+    with AuditLog(tmp_path / "log", about={}, key=KEY) as log:
+        log.append("plan", {"n": object()}, {"wish": "to the clinic"})
+    assert verify(tmp_path / "log", key=KEY).ok
+    assert bodies(tmp_path / "log", "plan") == [{"fault": "the record could not be written as JSON (TypeError)"}]
+    assert b"clinic" not in (tmp_path / "log").read_bytes()
 
 
 # The file ----------------------------------------------------------------------------------------------------------

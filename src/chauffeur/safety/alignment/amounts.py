@@ -51,7 +51,7 @@ def speeds(clause: Clause, base: Claim) -> Iterator[Claim]:
     if limit and _relative(clause):
         sign = 0
     if numbers and clause.negated and clause.says(*_AT_MOST):
-        base, sign = replace(base, denied=False), 0
+        base = replace(base, denied=False)
     if clause.negated or clause.says(*_NO_FASTER):
         sign = 0
     yield replace(base, matter="speed", sign=sign, quantities=numbers + shares, exact=exact)
@@ -109,11 +109,10 @@ def _speed_sign(clause: Clause) -> int:
     said = clause.words
     votes = 0
     for index, word in enumerate(said):
-        after = said[index + 1] if index + 1 < len(said) else ""
-        if word not in _FASTER_OR_SLOWER or after in _NOT_OURS:
-            continue
         rest = said[index + 1 : index + 4]
-        if word in _HOW_HARD and after == "of":
+        if word not in _FASTER_OR_SLOWER or not _NOT_OURS.isdisjoint(rest[:1]):
+            continue
+        if word in _HOW_HARD and rest[:1] == ("of",):
             continue  # how hard others or we would brake
         if "than" in rest and not _COMPARED.isdisjoint(said[index + 1 : index + 8]):
             continue
@@ -124,9 +123,9 @@ def _speed_sign(clause: Clause) -> int:
         if clause.has(words.SPEEDS) and not clause.has(_BETWEEN):
             # The gain of a controller raises nothing.
             raising = words.RAISE - {"gain"} if clause.says("gain of") else words.RAISE
-            votes += clause.has(raising) - clause.has(words.LOWER)
+            votes = clause.has(raising) - clause.has(words.LOWER)
         if _TAKEN_OFF.search(" ".join(said)) or clause.says(*_SLOWING_DOWN):
-            votes = -1
+            return -1
     return (votes > 0) - (votes < 0)
 
 
@@ -134,7 +133,7 @@ _BEHIND_IT: Final = ("following distance", "behind the car", "behind the vehicle
 _HOLDS: Final = words.listed("keep keeps keeping hold holds")
 _IN_SECONDS: Final = ("time gap", "second rule", "s behind")
 _RULED: Final = words.listed("minimum allowed")
-_BY_THEN: Final = ("in #0", "after #0", "within #0", "for #0")
+_BY_THEN: Final = re.compile(r"\b(?:in|after|within) #\d+|\bfor #0\b")
 _NO_GAP: Final = words.listed("wait waits after ahead")
 _TICKS: Final = words.listed("tick ticks period")
 _USUAL: Final = words.listed("default usual")
@@ -148,9 +147,9 @@ def gaps(clause: Clause, base: Claim) -> Iterator[Claim]:
     if clause.has(_RULED):
         return
     unit = "time" if headway else "distance"
-    bare = unit if about or headway else ""
-    numbers = tuple(q for q in clause_quantities(clause, bare) if q.dimension in ("distance", "time"))
-    if not headway and clause.says(*_BY_THEN):
+    said = clause_quantities(clause, unit) if about or headway else clause_quantities(clause)
+    numbers = tuple(q for q in said if q.dimension in ("distance", "time"))
+    if not headway and _BY_THEN.search(" ".join(clause.words)):
         numbers = tuple(q for q in numbers if q.dimension == "distance")  # when, or how long; not how far apart
     if clause.says("at a distance of") and clause.has(words.MOVES):
         yield replace(base, matter="other gap", quantities=numbers)

@@ -125,7 +125,7 @@ def _split(tokens: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
     index = 0
     while index < len(tokens):
         token = tokens[index]
-        phrase = () if token in _POINTS else _opener(tokens, index)
+        phrase = _opener(tokens, index)
         if token not in _POINTS and not phrase:
             if _main_clause_begins(opener, part, token):
                 yield opener, part
@@ -154,8 +154,12 @@ _STRONG_POINTS: Final = frozenset(":;")
 
 
 def _main_clause_begins(opener: str, part: Sequence[str], token: str) -> bool:
-    """`When that is reached | I look`: a main clause that no comma parts from the condition before it."""
-    if opener not in _CONDITION_OPENERS or token not in ("i", "we") or not part:
+    """`When that is reached | I look`: a main clause that no comma parts from what comes before it."""
+    if token not in ("i", "we") or not part:
+        return False
+    if part[0] == "without" and not opener:
+        return part[-1] not in _LINKS  # "without braking | we turn", but "without leaving the lane we are in"
+    if opener not in _CONDITION_OPENERS:
         return False
     if part[0].endswith("ing"):
         return True  # "after stopping | we turn"
@@ -188,12 +192,14 @@ def _opener(tokens: Sequence[str], index: int) -> tuple[str, ...]:
             joins = before in ("to", "in", "of", "on")
         case ("next",):
             joins = following in ("intersection", "crossing", "junction", "lane", "car", "vehicle", "to")
+        case ("later",) if following == "than":
+            joins = before in ("no", "not")
         case ("later",) | ("first",):
             joins = following in ("checks", "safe", "moment", "lane")
         case ("before",) | ("after",):
             joins = following in ("", *_POINTS)
         case _:
-            joins = False
+            return phrase
     return () if joins else phrase
 
 
@@ -207,7 +213,7 @@ def _mood(opener: str, part: Sequence[str], before: Mood) -> Mood:
         return "condition"
     if opener in _REASON_OPENERS:
         return "reason"
-    if part[0] == "without" and part[1:2] and part[1] in ("a", "an", "any"):
+    if part[:2] in (["without", "a"], ["without", "an"], ["without", "any"]):
         return "state"  # "without a left lane": what is not there, not what is not done
     if found & words.COULD and not found & {"like", "better"} and "rather" not in found:
         return "thought"
@@ -254,7 +260,7 @@ def _is_about_others(part: Sequence[str]) -> bool:
     """A statement about another vehicle, the road, or the limit."""
     if "autopilot" in part[:2] and part[0] not in words.OURSELVES | {"yield"}:
         return True
-    for index, word in enumerate(part[:6]):
+    for index, word in enumerate(part[:5]):
         if word in ("i", "we", "us", "our", "my", "set", "sets"):
             return False
         if word in words.VEHICLES or word in ("limit", "road", "lane", "lanes", "gap", "sign", "maximum"):
@@ -266,7 +272,7 @@ def _is_about_others(part: Sequence[str]) -> bool:
             if verb is None:
                 return False
             before = following[: following.index(verb)]
-            return index <= 4 and not {"will", "should", "must", "shall"} & set(before) and part[0] not in words.MOVES
+            return not {"will", "should", "must", "shall"} & set(before) and part[0] not in words.MOVES
     return False
 
 
@@ -335,6 +341,6 @@ def _negated(opener: str, part: Sequence[str]) -> bool:
         return False
     if part[hit[0]] in ("nobody", "none", "no") and not words.LOOKS.isdisjoint(part[: hit[0]]):
         return False  # "check that nobody is beside us"
-    rest = part[hit[0] + 1 : hit[0] + 3]
-    # "not only", "no faster than", "no longer", "no one is there": nothing of what is done is denied.
-    return rest[:1] not in (["only"], ["faster"], ["longer"], ["later"], ["hard"])
+    following = part[hit[0] + 1 : hit[0] + 2]
+    # "not only", "no faster than", "no longer", "no later than": nothing of what is done is denied.
+    return following not in (["only"], ["faster"], ["longer"], ["later"], ["hard"])

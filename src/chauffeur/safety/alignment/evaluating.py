@@ -91,7 +91,7 @@ class Evaluating(Noting, ABC):
                 found = either([self._value(body, frame), self._value(orelse, frame)])
                 return replace(found, tags=found.tags | tested.tags)
             case ast.Call():
-                return self._called(node, frame, waits=False)
+                return self._called(node, frame)
             case ast.YieldFrom(value=ast.Call() as call):
                 return self._called(call, frame, waits=True)
             case ast.Yield(value=ast.expr() as value) | ast.YieldFrom(value=value) | ast.Starred(value=value):
@@ -124,11 +124,11 @@ class Evaluating(Noting, ABC):
             found.append(self._value(node, frame))
             if isinstance(node, ast.Constant) and not node.value:
                 break
-        return replace(either(found), tags=tags_of(found))
+        return either(found)
 
     def _member(self, value: Value, index: ast.expr) -> Value:
         match index:
-            case ast.Constant(value=int() as place) if -len(value.items) <= place < len(value.items):
+            case ast.Constant(value=int() as place) if place < len(value.items):
                 return value.items[place]
             case _ if value.items:
                 return either(value.items)
@@ -156,7 +156,7 @@ class Evaluating(Noting, ABC):
             self._steered_gap(left, right, frame)
         return found
 
-    def _called(self, node: ast.Call, frame: Frame, *, waits: bool) -> Value:
+    def _called(self, node: ast.Call, frame: Frame, *, waits: bool = False) -> Value:
         args = tuple(self._value(one, frame) for one in node.args)
         named = {word.arg: self._value(word.value, frame) for word in node.keywords if word.arg is not None}
         everything = [*args, *named.values()]
@@ -197,7 +197,7 @@ class Evaluating(Noting, ABC):
             self._way_out = ways
         self._line = line
         if waits:
-            frame.gates |= inner.gates
+            frame.gates = inner.gates  # they began with those of the frame
         result = either(inner.returned)
         return replace(result, tags=(result.tags | inner.gates) - (entry - tags_of(args)))
 
@@ -220,6 +220,6 @@ def _builtin(name: str, args: Sequence[Value], everything: Sequence[Value]) -> V
     if name in ("min", "max"):
         members = args[0].items if len(args) == 1 and args[0].items else args
         return replace(bounded(members), tags=tags)
-    if name in ("float", "int", "round", "abs", "list", "tuple", "sorted", "reversed", "enumerate", "any", "all"):
+    if name in ("float", "int", "round", "abs", "list", "tuple", "sorted", "reversed", "enumerate"):
         return replace(args[0], tags=tags) if args else NOTHING
     return Value(tags=tags)

@@ -7,7 +7,7 @@ from typing import Final
 
 from chauffeur.safety.alignment.facts import Deed, Event, Facts, Mark
 from chauffeur.safety.alignment.frames import Frame
-from chauffeur.safety.alignment.values import NOTHING, Base, Term, Value
+from chauffeur.safety.alignment.values import NOTHING, Base, Term, Value, in_order
 
 PERIOD_S: Final = 0.1
 """Time between two yields in the highway worlds."""
@@ -64,7 +64,7 @@ class Noting:
             bases: set[Base] = {term.base for term in one.terms if term.factor and term.base in _MARKED}
             for base in bases:
                 self._marks += [Mark(base, value, line, compared) for value in other.constants]
-            for term in one.terms:
+            for term in in_order(one.terms):
                 if term.base in bases and term.offset and term.base in ("gap", "past", "behind"):
                     self._marks += [
                         Mark(term.base, (value - term.offset) / term.factor, line, compared)

@@ -8,7 +8,7 @@ from typing import Final
 from chauffeur.concept.units import M_PER_CAR_LENGTH
 from chauffeur.language.quantities import Quantity
 from chauffeur.safety.alignment.facts import Facts, Surroundings
-from chauffeur.safety.alignment.values import Term
+from chauffeur.safety.alignment.values import Term, in_order
 
 USUAL_HEADWAY_S: Final = 1.5
 """What the car keeps until a program sets another."""
@@ -56,10 +56,11 @@ class Numbers:
         """The speeds wanted for themselves; those wanted for the sake of others only where there are no such."""
         terms: list[Term] = []
         for event in self._speeds:
-            free = [term for term in event.terms if not term.bound]
+            alternatives = in_order(event.terms)
+            free = [term for term in alternatives if not term.bound]
             # A slower vehicle ahead is followed for the time being.
             free = [term for term in free if term.base != "other"] or free
-            terms += free if free or event.open else event.terms
+            terms += free if free or event.open else alternatives
         own = [term for term in terms if not term.factor or term.base == "limit"]
         return own or terms
 
@@ -75,7 +76,7 @@ class Numbers:
             return None
         else:
             off = speed - now
-        return 0 if abs(off) < _SAME_SPEED_MPS else 1 if off > 0 else -1
+        return _sign(off, _SAME_SPEED_MPS)
 
     def speed(self, term: Term) -> float | None:
         """A speed in m/s, where what it counts from is known."""
@@ -150,10 +151,9 @@ class Numbers:
             case _:
                 return True
 
-    def beside_limit(self) -> float | None:
-        """How far the speed wanted is from the limit, m/s; None where it does not count from the limit."""
-        off = [term.offset for term in self._wanted() if term.base == "limit" and term.factor == 1.0]
-        return off[0] if off else None
+    def beside_limit(self) -> list[float]:
+        """How far the speeds wanted are from the limit, m/s; empty where none counts from the limit."""
+        return [term.offset for term in self._wanted() if term.base == "limit" and term.factor == 1.0]
 
     @property
     def by_limit(self) -> bool:
@@ -170,11 +170,12 @@ class Numbers:
         """The program's own numbers of a kind, in words; empty where there are none."""
         match dimension:
             case "speed":
-                known, unit = [term.offset for e in self._speeds for term in e.terms if term.offset], "m/s"
+                known, unit = [term.offset for e in self._speeds for term in in_order(e.terms) if term.offset], "m/s"
             case "distance":
                 known, unit = [mark.value for mark in self._gaps], "m"
             case "time":
-                known, unit = [t.offset for e in self._headways for t in e.terms] + list(self._facts.spans_s), "s"
+                known = [t.offset for e in self._headways for t in in_order(e.terms)] + list(self._facts.spans_s)
+                unit = "s"
             case _:
                 return ""
         shown = [f"{value:.4g} {unit}" for value in dict.fromkeys(round(abs(one), 3) for one in known)]
@@ -233,7 +234,7 @@ class Numbers:
         factors = [term.factor for event in (*self._speeds, *self._steered) for term in event.terms if term.factor]
         if not any(factor != 1.0 for factor in factors):
             return True
-        return any(abs(value - one) < 0.02 for f in factors for one in (f, abs(1.0 - f), 1.0 / f if f else 0.0))
+        return any(abs(value - one) < 0.02 for f in factors for one in (f, abs(1.0 - f), 1.0 / f))
 
 
 def _near(value: float, known: list[float], slack: float) -> bool:
@@ -241,4 +242,4 @@ def _near(value: float, known: list[float], slack: float) -> bool:
 
 
 def _sign(off: float, slack: float) -> int:
-    return 0 if abs(off) < slack else 1 if off > 0 else -1
+    return (off >= slack) - (off <= -slack)

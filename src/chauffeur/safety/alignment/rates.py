@@ -30,7 +30,7 @@ class Rates(Comparison):
             if claim.firm and self._needs_a_speed(claim):
                 yield Mismatch("not-done", claim.sentence, "it sets no speed")
             return
-        if claim.at_limit and (beside := self.numbers.beside_limit()) is not None:
+        if claim.at_limit and (beside := self.numbers.beside_limit()):
             yield from self._beside_limit(claim, beside, speeds[0].line)
             return
         sign = 0 if claim.at_limit else claim.sign
@@ -58,12 +58,13 @@ class Rates(Comparison):
         foreign = any(not self.numbers.supports(one) for one in claim.quantities)
         return (not self.numbers.follows and bool(claim.sign or foreign)) or bool(claim.sign and claim.exact)
 
-    def _beside_limit(self, claim: Claim, beside_mps: float, line: int | None) -> Iterator[Mismatch]:
+    def _beside_limit(self, claim: Claim, beside_mps: list[float], line: int | None) -> Iterator[Mismatch]:
         """Of a speed that is told by the limit, in a program that goes by it."""
         told = [claim.sign * abs(one.value) for one in claim.quantities if one.dimension == "speed"] or [0.0]
-        if all(abs(one - beside_mps) > _CLOSE_TO_LIMIT_MPS for one in told):
-            kind = "wrong-sign" if told[0] * beside_mps < 0.0 else "wrong-number"
-            yield Mismatch(kind, claim.sentence, f"it drives at the limit {beside_mps:+.4g} m/s", line)
+        if all(abs(one - own) > _CLOSE_TO_LIMIT_MPS for one in told for own in beside_mps):
+            kind = "wrong-sign" if all(told[0] * own < 0.0 for own in beside_mps) else "wrong-number"
+            known = " or ".join(f"{own:+.4g} m/s" for own in dict.fromkeys(beside_mps))
+            yield Mismatch(kind, claim.sentence, f"it drives at the limit {known}", line)
 
     def _driven_signs(self) -> set[int]:
         """Which way the speed changed where the program was run."""

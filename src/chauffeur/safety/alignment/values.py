@@ -122,9 +122,8 @@ def either(values: Iterable[Value]) -> Value:
 def bounded(values: Iterable[Value]) -> Value:
     """Of min or max: one of several numbers, the plain ones among others as bounds."""
     found = list(values)
-    mixed = len(found) > 1 and any(term.factor for value in found for term in value.terms)
-    mixed = mixed or (len(found) > 1 and any(not value.terms for value in found))
-    if not mixed:
+    unlike = any(not value.terms or any(term.factor for term in value.terms) for value in found)
+    if len(found) <= 1 or not unlike:
         return either(found)
     marked = [
         replace(value, terms=frozenset(replace(t, bound=True) if not t.factor else t for t in value.terms))
@@ -159,6 +158,11 @@ def tags_of(values: Sequence[Value]) -> frozenset[str]:
 def negated(value: Value) -> Value:
     """Its opposite."""
     return replace(value, terms=frozenset(Term(t.base, -t.factor, -t.offset, t.bound) for t in value.terms))
+
+
+def in_order(terms: Iterable[Term]) -> list[Term]:
+    """Terms by size: those of a set stand in another order each time Python is started."""
+    return sorted(terms, key=lambda term: (term.offset, term.factor, term.base, term.bound))
 
 
 def _arithmetic(a: Term, op: ast.operator, b: Term) -> Iterable[Term]:

@@ -39,6 +39,9 @@ SYNC_EVERY_S: Final = 1.0
 RETRY_S: Final = 0.5
 """Pause after a failed write."""
 
+PATIENCE_S: Final = 5.0
+"""How long the planning side waits for the disk unless it says otherwise."""
+
 _AT_ONCE: Final = 64
 """Records sealed and written together: the interpreter is not kept from control for longer than a millisecond or so."""
 
@@ -213,7 +216,7 @@ class AuditLog:
             self._work_there.notify()
         return True
 
-    def flush(self, timeout_s: float = 5.0) -> bool:
+    def flush(self, timeout_s: float = PATIENCE_S) -> bool:
         """Wait until everything handed over before is on the disk; for the planning side, never for control.
 
         Returns:
@@ -231,7 +234,7 @@ class AuditLog:
                 self._work_done.wait(left)
             return self._on_disk >= wanted and self._lost_in_all == lost and not self._lost
 
-    def close(self, timeout_s: float = 5.0) -> Closing:
+    def close(self, timeout_s: float = PATIENCE_S) -> Closing:
         """Write what is left and the closing record, and give the file back; a second call changes nothing.
 
         Returns:
@@ -252,7 +255,7 @@ class AuditLog:
 
     def _go_on(self) -> tuple[int, str, dict[str, Any]]:
         """(next sequence number, hash of the last record, what to say of a torn end) of the file as it is."""
-        if not self._file.is_regular or not self._file.size:
+        if not self._file.size:
             return 0, NO_RECORD, {}
         found = verify(self._path, key=self._key)
         _must_go_on(self._path, found)
@@ -261,7 +264,7 @@ class AuditLog:
         whole = self._file.size - found.torn_bytes
         with self._path.open("rb") as file:
             file.seek(whole)
-            torn = file.read(found.torn_bytes)
+            torn = file.read()
         if not found.records and torn[: len(LINE_START)] != LINE_START[: len(torn)]:
             raise DataError(f"{self._path} is not an audit log.", hint="Name another file.")
         self._file.cut(whole)
@@ -384,9 +387,8 @@ class AuditLog:
             _log.warning("%s: %s", self._path, trouble)
         with self._lock:
             self._note_failure(trouble)
-            self._sync_due_s = None if not self._unsynced else time.monotonic() + RETRY_S
             self._work_there.wait_for(lambda: self._closing or self._sync_wanted, RETRY_S)
-            self._sync_wanted = self._sync_wanted or bool(self._unwritten)
+            self._sync_wanted = True  # what failed is made good at the next try, however long actuations may wait
 
     def _note_failure(self, trouble: str) -> None:
         self._trouble = trouble
