@@ -53,6 +53,12 @@ FILES = (
     "voices_lanes",
     "voices_answers",
     "voices_joins",
+    "small_talk",
+    "never",
+    "measured",
+    "unclear",
+    "manners",
+    "ways",
     "chatter",
 )
 
