@@ -192,7 +192,7 @@ _ALIKE: tuple[tuple[str, str], ...] = (
      "|a good deal "),
     (rf"(?<!so )(?<!too )(?<!not )(?<!how )(?<!very )(?<!that )(?<!this )(?<!it )(?:much|way|far) {_MORE}", "much |way "
      "|far |hugely "
-     "|vastly |an awful lot |no end |oceans "),
+     "|vastly |an awful lot |massively |oceans "),
     (r"(?:faster|quicker)(?= *[,.?!]|$| please| than)", "faster|quicker|speedier|more quickly|more rapidly|swifter"
      "|at more speed"),
     (r"slower(?= *[,.?!]|$| please| than)", "slower|more slowly|less fast|less quickly|at less speed|slowlier"),
