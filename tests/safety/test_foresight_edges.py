@@ -624,3 +624,10 @@ def test_whoever_crosses_does_not_touch_a_car_whose_plan_ends_well(
         their_speed = faster
         place = row[0] + gone * c, row[1] + gone * s, angle
         assert not overlap((ego[0], ego[1], ego[2]), place), (period, ego[0], place)
+
+
+def test_warming_up_loads_all_that_is_called_from_outside() -> None:
+    foresight.warm_up()
+    names = ("nearest", "stretch", "expected", "followed", "wheel", "foresee", "move")
+    forms = {name: getattr(getattr(foresight, name), "signatures", ["as it is, uncompiled"]) for name in names}
+    assert all(forms.values()), forms
