@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from chauffeur.safety.shield.crossing import (
     _Plan,
 )
 from chauffeur.safety.shield.everybody import Everybody
+from chauffeur.safety.shield.sweep import recovery_steering
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import HighwayWorld
 
@@ -421,3 +423,37 @@ def test_off_its_way_a_car_is_steered_back_to_the_way_that_was_promised(judged: 
     _, promised, *_ = judged(over, asks=wild, aim=None, shield=shield)
     _, nearest, *_ = judged(over, asks=wild, aim=None)
     assert promised < 0.0 < nearest
+
+
+# What the shield tells the guard of the crossing ----------------------------------------------------------------------
+
+
+def test_only_who_has_to_brake_for_a_lead_is_held_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[tuple[float, bool]] = []
+    mend = Junction.mend
+
+    def listened(self: Junction, *what: Any, held_up: bool) -> Any:
+        told.append((what[-1], held_up))
+        return mend(self, *what, held_up=held_up)
+
+    monkeypatch.setattr(Junction, "mend", listened)
+    ego = me(0.0, -50.0, UPWARDS, 8.0, IN)
+    for ahead in np.arange(6.4, 6.9, 0.01):
+        Shield(DT).guard(instant(ego, car(1, 0.0, -50.0 + ahead, UPWARDS, 8.0, IN)), GAS, None)
+    assert {held for most, held in told if most < 0.0} == {True}
+    assert {held for most, held in told if 0.0 < most <= 1.0} == {False}
+    assert {held for most, held in told if most > 1.0} == {False}
+
+
+def test_where_a_lane_bends_the_way_back_to_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[float] = []
+
+    def listened(ego: Any, centre_m: float, speed: float, most_rad: float, curvature: float = 0.0) -> float:
+        told.append(curvature)
+        return recovery_steering(ego, centre_m, speed, most_rad, curvature)
+
+    monkeypatch.setattr("chauffeur.safety.shield.shield.recovery_steering", listened)
+    at = math.radians(45.0)
+    ego = me(-10.0 + 10.0 * math.cos(at), 10.0 * math.sin(at), at + UPWARDS, 5.0, LEFT)
+    Shield(DT).guard(instant(ego), COAST, LEFT)
+    assert [abs(bend) for bend in told] == [pytest.approx(0.1, rel=0.05)], "a circle of 10 m, looked at once"
