@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from alignment_programs import HIGHWAY
 
 from chauffeur.language.quantities import Quantity
-from chauffeur.safety.alignment import Surroundings, judge, read_facts
+from chauffeur.safety.alignment import judge, read_facts
 from chauffeur.safety.alignment.claim import Claim
 from chauffeur.safety.alignment.claims import claims_of
 
-HIGHWAY = Surroundings(speed_mps=25.0, limit_mps=31.0, gap_m=40.0, other_mps=22.0)
 KEEPS_30_M = """
 def drive():
     ego = get_ego_vehicle()

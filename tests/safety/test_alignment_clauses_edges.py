@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from alignment_programs import HIGHWAY
 
 from chauffeur.language.quantities import Quantity
-from chauffeur.safety.alignment import Surroundings, judge, read_facts
+from chauffeur.safety.alignment import judge, read_facts
 from chauffeur.safety.alignment.clauses import Clause, clauses_of
-
-HIGHWAY = Surroundings(speed_mps=25.0, limit_mps=31.0, gap_m=40.0, other_mps=22.0)
 
 
 def short(clause: Clause) -> str:

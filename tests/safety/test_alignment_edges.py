@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from alignment_programs import HIGHWAY
 
 from chauffeur.concept import Lead, Limits, Parameters, Plan, Program, Snapshot, Thoughts, Verdict
 from chauffeur.safety.alignment import (
@@ -24,7 +25,6 @@ from chauffeur.safety.alignment import (
 from chauffeur.safety.alignment import wording as words
 from chauffeur.safety.alignment.claims import claims_of
 
-HIGHWAY = Surroundings(speed_mps=25.0, limit_mps=31.0, gap_m=40.0, other_mps=22.0)
 CROSSING = Surroundings(speed_mps=10.0, limit_mps=10.0, sign_m=50.0, crossing=True)
 
 

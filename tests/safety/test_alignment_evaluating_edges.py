@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import alignment_programs
 import pytest
 
-from chauffeur.safety.alignment import Facts, read_facts
+from chauffeur.safety.alignment import Facts
 from chauffeur.safety.alignment.facts import Event
 
 EGO = "get_ego_vehicle()"
@@ -15,9 +16,7 @@ CROSSING = "get_left_to_right_cross_traffic_lanes()"
 
 
 def facts(body: str, before: str = "") -> Facts:
-    """Facts of a program whose lines begin at line 3, or that many later as there are `before`."""
-    lines = "".join(f"    {line}\n" for line in body.splitlines())
-    found = read_facts(f"{before}def drive():\n    ego = get_ego_vehicle()\n{lines}    yield autopilot()\n")
+    found = alignment_programs.facts(body, before)
     assert found.readable
     return found
 

@@ -10,6 +10,7 @@ from importlib import resources
 from typing import get_args
 
 import pytest
+from alignment_programs import HIGHWAY
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -50,7 +51,6 @@ from chauffeur.safety.checks import run_checks
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
-HIGHWAY = Surroundings(speed_mps=25.0, limit_mps=31.0, gap_m=40.0, other_mps=22.0)
 CROSSING = Surroundings(speed_mps=10.0, limit_mps=10.0, sign_m=50.0, crossing=True)
 
 LEFT = """def drive():

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import pytest
+from alignment_programs import facts
 
-from chauffeur.safety.alignment import Facts, noting, read_facts
+from chauffeur.safety.alignment import noting
 from chauffeur.safety.alignment.facts import Event
 from chauffeur.safety.alignment.values import Term
 
 GAP = "front = detect_front_vehicle_in(get_lane_of(ego))\ngap = get_distance_between_vehicles(front, ego)\n"
 PAST = "past = get_distance_between_vehicles(ego, detect_front_vehicle_in(get_lane_of(ego)))\n"
 REAR = "rear = get_distance_between_vehicles(ego, detect_rear_vehicle_in(get_lane_of(ego)))\n"
-
-
-def facts(body: str, library: str = "") -> Facts:
-    lines = "".join(f"    {line}\n" for line in body.splitlines())
-    return read_facts(f"def drive():\n    ego = get_ego_vehicle()\n{lines}    yield autopilot()\n", library)
 
 
 def events(body: str, deed: str) -> list[Event]:
@@ -28,7 +24,7 @@ def test_an_event_in_full() -> None:
 
 
 def test_what_a_library_does_by_itself_stands_in_no_line() -> None:
-    assert [event.line for event in facts("set_target_speed(30)", "set_target_speed(20)\n").events] == [None, 3]
+    assert [event.line for event in facts("set_target_speed(30)", library="set_target_speed(20)\n").events] == [None, 3]
 
 
 def test_how_much_is_read_at_most(monkeypatch: pytest.MonkeyPatch) -> None:

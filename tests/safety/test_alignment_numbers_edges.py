@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from alignment_programs import HIGHWAY
 
 from chauffeur.concept.units import M_PER_CAR_LENGTH
 from chauffeur.language.quantities import Quantity
@@ -11,7 +12,6 @@ from chauffeur.safety.alignment.facts import Deed, Event, Mark
 from chauffeur.safety.alignment.numbers import Numbers
 from chauffeur.safety.alignment.values import Base, Term
 
-HIGHWAY = Surroundings(speed_mps=25.0, limit_mps=31.0, gap_m=40.0, other_mps=22.0)
 NOWHERE = Surroundings()
 
 

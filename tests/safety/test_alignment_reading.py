@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import pytest
+from alignment_programs import HIGHWAY, facts
 
 from chauffeur.language.quantities import Quantity
 from chauffeur.programs import APIS
-from chauffeur.safety.alignment import Facts, Surroundings, read_facts
+from chauffeur.safety.alignment import Surroundings, read_facts
 from chauffeur.safety.alignment.claims import claims_of
 from chauffeur.safety.alignment.facts import Event
 from chauffeur.safety.alignment.numbers import Numbers
 from chauffeur.safety.alignment.values import Term
-
-
-def facts(body: str, before: str = "", library: str = "") -> Facts:
-    lines = "".join(f"    {line}\n" for line in body.splitlines())
-    return read_facts(f"{before}def drive():\n    ego = get_ego_vehicle()\n{lines}    yield autopilot()\n", library)
 
 
 def events(body: str, *deeds: str, before: str = "", library: str = "") -> list[Event]:
@@ -304,7 +300,6 @@ def test_a_lane_that_only_the_name_is_known_of() -> None:
     assert events(f"{GAP}say(gap - get_speed_limit())", "gap") == []
 
 
-HIGHWAY = Surroundings(speed_mps=25.0, limit_mps=31.0, gap_m=40.0, other_mps=22.0, sign_m=None)
 NOWHERE = Surroundings()
 
 

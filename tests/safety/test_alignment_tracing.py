@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import pytest
+from alignment_programs import facts
 
 from chauffeur.safety.alignment import Facts, read_facts
 
 LEFT, RIGHT = "set_target_lane(get_left_lane(ego))", "set_target_lane(get_right_lane(ego))"
 NEAR_SIGN, ALLOWED = "detect_stop_sign_ahead() < 5", "get_speed_limit() > 3"
 FAST, WIDE = "get_speed_of(ego) > 9", "get_desired_time_headway() > 2"
-
-
-def facts(body: str, before: str = "") -> Facts:
-    lines = "".join(f"    {line}\n" for line in body.splitlines())
-    return read_facts(f"{before}def drive():\n    ego = get_ego_vehicle()\n{lines}    yield autopilot()\n")
 
 
 def depends(body: str, before: str = "") -> set[str]:

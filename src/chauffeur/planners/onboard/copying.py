@@ -30,8 +30,11 @@ def unnamed(wish: str, history: Sequence[str], steps: Sequence[Step]) -> Number 
         history: Remembered trips as the model read them.
         steps: What the program does.
     """
+    measures = _measures(steps)
+    if not measures:
+        return None
     said = _Said.of(wish, history)
-    return next((number for kind, number in _measures(steps) if not said.holds(number, kind)), None)
+    return next((number for kind, number in measures if not said.holds(number, kind)), None)
 
 
 def named(wish: str, history: Sequence[str]) -> tuple[str, ...]:
@@ -39,14 +42,16 @@ def named(wish: str, history: Sequence[str]) -> tuple[str, ...]:
     found = {number for text in (wish, *history) for number in _DIGITS.findall(text)}
     for quantity in read_quantities(wish):
         units = [si for kind, si, _ in UNITS.values() if kind == quantity.dimension]
-        found |= {_rounded(quantity.value / si) for si in (1.0, *units) if _round(quantity.value / si)}
+        found |= {plain(round(value, 2)) for si in (1.0, *units) if _round(value := quantity.value / si)}
     return tuple(sorted(found))
 
 
 def taken_over(wish: str, history: Sequence[str], steps: Sequence[Step]) -> tuple[Step, ...]:
     """The steps, with what was said instead of a wrong number where it is plain which one that is."""
-    said = _Said.of(wish, history)
     measures = _measures(steps)
+    if not measures:
+        return tuple(steps)
+    said = _Said.of(wish, history)
     right: dict[Number, Number] = {}
     for kind in _MEASURES:
         wrong = {number for k, number in measures if k == kind and not said.holds(number, kind)}
@@ -55,8 +60,6 @@ def taken_over(wish: str, history: Sequence[str], steps: Sequence[Step]) -> tupl
         if len(wrong) == len(left) == 1:
             (number,) = wrong
             right[number] = _as_said(left[0], number.unit)
-    if not right:
-        return tuple(steps)
     return tuple(_with(step, right) for step in steps)
 
 
@@ -112,8 +115,8 @@ def _as_said(quantity: Quantity, unit: str) -> Number:
     for name in units:
         value = quantity.value / (UNITS[name][1] if name else 1.0)
         if _round(value):
-            return Number(float(_rounded(value)), name)
-    return Number(float(_rounded(quantity.value)))
+            return Number(round(value, 2), name)
+    return Number(round(quantity.value, 2))
 
 
 def _close(value: float, other: float) -> bool:
@@ -122,7 +125,3 @@ def _close(value: float, other: float) -> bool:
 
 def _round(value: float) -> bool:
     return abs(2 * value - round(2 * value)) < _ROUND
-
-
-def _rounded(value: float) -> str:
-    return plain(round(value, 2))

@@ -71,7 +71,8 @@ def answer(
         attempt = next(attempts)
         told = None if on_text is None else partial(_told, on_text, attempt)
         written = engine.write(asked, told=told, **how)
-        return read_reply(written.text), written
+        reply = read_reply(written.text)
+        return (_with_said_numbers(reply, wish, history) if guarded else reply), written
 
     reply, written = write(constrained=constrained)
     if reply.refusal in engine.about.get("checked", ()):
@@ -81,11 +82,9 @@ def answer(
         reply, written = write(text, only_program=True)
     if not guarded or not reply.steps:
         return reply, written
-    reply = _with_said_numbers(reply, wish, history)
     if unnamed(wish, history, reply.steps) and (numbers := named(wish, history)):
         # Once more with the numbers that were said, and no others.
         reply, written = write(text, only_program=True, measures=numbers)
-        reply = _with_said_numbers(reply, wish, history)
     question = doubt(wish, history, reply.steps)
     if not question and written.sure < UNSURE:
         guess = tell(reply.steps).removeprefix("I ").removesuffix(".").replace(", then I ", ", then ")
