@@ -2,19 +2,23 @@
 
     python benchmarks/speech_words.py --out FOLDER [--engine grammar] [--most 200] [--noise none,20,10,5]
     python benchmarks/speech_words.py --out FOLDER --engine whisper --model FOLDER
+    python benchmarks/speech_words.py --out FOLDER --again
     python benchmarks/speech_words.py --fit
 
 Every voice is a synthesiser's (espeak-ng, flite) and every noise is computed: the figures compare engines and settings;
 they do not say how well people are understood. A sentence is cut out, heard and judged as in the car: voice activity,
 hotword, engine. `known` sentences are drawn from the closed grammar (so its figures are those of a closed vocabulary),
 `free` ones are wishes in other words, `elsewhere` ones are not for driving. A sentence that was not understood counts
-as all of its words missing. Writes FOLDER/words.md and FOLDER/words.jsonl.
+as all of its words missing. `carried out` counts sentences after which the on-board planner, on a highway, plans what
+it plans for the words that were said: what was misheard without consequence counts; wishes it declines are left out.
+Writes FOLDER/words.md and FOLDER/words.jsonl; `--again` makes the tables of a FOLDER anew.
 `--fit` prints the weights of the grammar engine's confidence, from voices and sentences that no figure uses.
 """
 
 from __future__ import annotations
 
 import argparse
+import asyncio
 import json
 import platform
 import signal
@@ -28,6 +32,9 @@ from pathlib import Path
 import numpy as np
 from rapidfuzz.distance import Levenshtein
 
+from chauffeur.concept import Context, Instruction, PlanRequest, Policy, Situation, SystemMessage
+from chauffeur.concept.nouns import Lead
+from chauffeur.planners.registry import make_planner
 from chauffeur.speech import Recogniser, Recording, hear_recording, open_recogniser
 from chauffeur.speech.audio import SAMPLE_RATE_HZ, Samples
 from chauffeur.speech.base import Heard
@@ -95,6 +102,12 @@ class Row:
     def wrong(self) -> bool:
         """Something else was understood than was said, or anything of what was not for the car."""
         return self.status == "heard" and (self.errors > 0 or self.said.kind == "elsewhere")
+
+
+def stored_row(line: str) -> Row:
+    """A row of words.jsonl."""
+    stored = json.loads(line)
+    return Row(**{**stored, "said": Said(**stored["said"])})
 
 
 def sections() -> dict[str, list[str]]:
@@ -238,7 +251,37 @@ def _share(part: int, whole: int) -> str:
     return f"{part}/{whole} ({100 * part / whole:.1f} %)" if whole else "-"
 
 
-def _line(name: str, rows: list[Row]) -> str:
+class Understanding:
+    """What a planner makes of words on a highway with somebody ahead."""
+
+    def __init__(self) -> None:
+        front = Lead(7, 45.0, 24.0)
+        self._context = Context("", Situation("highway", 25.0, 31.3, 3, 1, False, front, None))
+        self._planner = make_planner("onboard")
+        self._plans: dict[str, tuple[str, Policy | None]] = {}
+
+    def carried_out(self, row: Row) -> bool:
+        """Whether what was heard leads to what the words would have."""
+        if row.status != "heard" or not row.text:
+            return False
+        said, heard = self._plan(row.said.text), self._plan(row.text)
+        return said[1] is not None and said == heard
+
+    def _plan(self, words: str) -> tuple[str, Policy | None]:
+        if words not in self._plans:
+            request = PlanRequest(Instruction(words), self._context, SystemMessage(""))
+            plan = asyncio.run(self._planner.plan(request))
+            self._plans[words] = plan.intent, plan.policy
+        return self._plans[words]
+
+    def share(self, rows: list[Row]) -> str:
+        """Of wishes of the grammar, the share that is carried out; opinions and talk are no wishes."""
+        wishes = [row for row in rows if row.said.kind == "known" and row.said.hotword == "command"]
+        able = [row for row in wishes if self._plan(row.said.text)[1] is not None]
+        return _share(sum(self.carried_out(row) for row in able), len(able))
+
+
+def _line(name: str, rows: list[Row], understanding: Understanding) -> str:
     errors, words = sum(row.errors for row in rows), sum(row.words for row in rows)
     took = np.array([row.recognise_s for row in rows if row.recognise_s > 0] or [0.0])
     factor = np.array([row.recognise_s / row.sound_s for row in rows if row.recognise_s > 0] or [0.0])
@@ -246,7 +289,7 @@ def _line(name: str, rows: list[Row]) -> str:
     return (
         f"| {name} | {len(rows)} | {100 * errors / words:.1f} % | {_share(sum(row.exact for row in rows), len(rows))} "
         f"| {_share(sum(row.status != 'heard' for row in rows), len(rows))} | {_share(len(wrong), len(rows))} "
-        f"| {sum(not row.to_confirm for row in wrong)} "
+        f"| {sum(not row.to_confirm for row in wrong)} | {understanding.share(rows)} "
         f"| {np.median(took):.3f} / {np.percentile(took, 95):.3f} | {np.median(factor):.3f} |"
     )
 
@@ -255,9 +298,10 @@ def report(name: str, rows: list[Row], noises: list[tuple[str, float, int, int]]
     """The tables."""
     head = (
         "| {} | sentences | word errors | exact | not understood | heard wrongly | of these unasked "
-        "| engine s, half / 95 % | real-time factor |"
+        "| carried out | engine s, half / 95 % | real-time factor |"
     )
-    rule = "|---|---|---|---|---|---|---|---|---|"
+    rule = "|---|---|---|---|---|---|---|---|---|---|"
+    understanding = Understanding()
     out = [f"# {name}", "", f"Synthetic voices and synthetic noise. Python {platform.python_version()}.", ""]
     ways = {
         "kind and noise": lambda row: f"{row.said.kind}, {_noise(row.said.noise)}",
@@ -269,7 +313,12 @@ def report(name: str, rows: list[Row], noises: list[tuple[str, float, int, int]]
         groups: dict[str, list[Row]] = defaultdict(list)
         for row in rows:
             groups[way(row)].append(row)
-        out += [head.format(title), rule, *(_line(key, group) for key, group in sorted(groups.items()) if key), ""]
+        out += [
+            head.format(title),
+            rule,
+            *(_line(key, group, understanding) for key, group in sorted(groups.items()) if key),
+            "",
+        ]
     if noises:
         out += ["| nobody speaks to the car | minutes | utterances | driven |", "|---|---|---|---|"]
         out += [f"| {kind} | {minutes:g} | {spoken} | {driven} |" for kind, minutes, spoken, driven in noises]
@@ -334,12 +383,17 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--cpu", action="store_true", help="durations in CPU time: on a busy machine")
     parser.add_argument("--fit", action="store_true")
+    parser.add_argument("--again", action="store_true", help="tables of what FOLDER holds; nothing is heard")
     given = parser.parse_args()
     if given.fit:
         fit(*features_of(given.most))
         return
     if given.out is None:
         parser.error("--out FOLDER is needed")
+    if given.again:
+        rows = [stored_row(line) for line in (given.out / "words.jsonl").read_text(encoding="utf-8").splitlines()]
+        print(report(f"{given.engine}, stored", rows, []))
+        return
     given.out.mkdir(parents=True, exist_ok=True)
     signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell takes away from background jobs
     names = tuple(voice for voice in VOICES if voices.installed(voice))

@@ -116,7 +116,7 @@ SAID: list[tuple[str, int, int, int, int, float]] = [
     ("too fast at first, then too slow", 0, 0, 0, 0, 0.0),
     ("", 0, 0, 0, 0, 0.0),
     ("hello there", 0, 0, 0, 0, 0.0),
-    ("no complaints", 0, 0, 0, 0, 0.0),
+    ("no complaints", 0, 0, 0, 1, 0.0),
 ]
 
 

@@ -10,9 +10,8 @@ import pytest
 from chauffeur.concept import Feedback, History, HistoryItem, Limits, Situation
 from chauffeur.concept.nouns import Lead
 from chauffeur.memory.feedback import interpret_feedback
-from chauffeur.planners.talk2drive.habits import Pace, meaning_of, meant_by, pace_of, speed_for
+from chauffeur.planners.talk2drive.habits import Pace, kind_of, meant_before, pace_of, speed_for
 from chauffeur.planners.talk2drive.lanes import fitting_mps, mood_lane, passing_mps, unsaid_turn
-from chauffeur.planners.talk2drive.lot import hinted_place, parks
 
 BEHIND = Situation("highway", 24.0, 31.3, 2, 1, False, Lead(7, 45.0, 24.0), None)
 FREE = Situation("highway", 30.0, 31.3, 2, 0, False, None, None)
@@ -28,57 +27,59 @@ def item(day: int, intent: str, said: str = "", speed: float = 27.0, *, similari
     )  # fmt: skip
 
 
+def test_what_had_been_wanted_is_what_was_meant() -> None:
+    told = item(3, "style.hurry", "I wanted you to overtake that car.")
+    (meant,) = meant_before(History((told,)), "highway")
+    assert (meant.kind, meant.corrected) == ("pass", True)
+    assert "2026-01-03" in meant.because
+    assert "I wanted you to overtake that car." in meant.because
+    assert meant_before(History((told,)), "intersection") == ()
+
+
+def test_what_was_done_and_not_blamed_was_meant() -> None:
+    liked, silent = item(4, "overtake.left", "Perfect."), item(5, "lane.right")
+    declined, faster = item(6, "ask"), item(7, "speed.increase", "A bit too fast.")
+    kinds = [meant.kind for meant in meant_before(History((liked, silent, declined, faster)), "highway")]
+    assert kinds == ["faster", "right", "pass"]
+
+
 @pytest.mark.parametrize(
-    ("said", "meant"),
+    ("said", "kind"),
     [
-        ("I wanted you to overtake that car.", "Overtake that car."),
-        ("Next time, stay behind it.", "Stay behind it."),
-        ("Wrong spot. Park by the gate next time.", "Park by the gate."),
-        ("Why did you stay there? Take the right lane.", "Take the right lane."),
-        ("I wanted you to go slower, not to park.", "Go slower."),
-        ("Don't park next time, just drive faster.", "Drive faster."),
-        ("No parking yet. I meant: drive slower.", "Drive slower."),
-        ("I did not want to park, only to go slower.", "Go slower."),
-        ("A bit slower next time.", ""),
-        ("Too close to the car in front.", ""),
-        ("I wanted you to be nicer.", ""),
-        ("That was perfect.", ""),
-        ("", ""),
+        ("I wanted you to overtake that car.", "pass"),
+        ("Next time, stay behind it.", "stay"),
+        ("I would have liked the right lane.", "right"),
+        ("You could have gone, there was nobody.", "go"),
+        ("You should have let the others go first.", "yield"),
+        ("I wanted to be near the stadium.", "park.stadium"),
+        ("I'd have preferred a spot by the exit.", "park.exit"),
+        ("Why didn't you park?", "park.nearest"),
+        ("I only wanted you to go slower, not to park.", "slower"),
     ],
 )
-def test_a_remark_can_say_what_had_been_wanted(said: str, meant: str) -> None:
-    assert meant_by(said) == meant
+def test_a_remark_can_say_what_had_been_wanted(said: str, kind: str) -> None:
+    (meant,) = meant_before(History((item(3, "ask", said),)), "highway")
+    assert (meant.kind, meant.corrected) == (kind, True)
 
 
-def test_such_a_wish_means_that_from_then_on() -> None:
-    told = item(3, "style.hurry", "I wanted you to overtake that car.")
-    meaning = meaning_of(History((told,)), "highway", "style.hurry")
-    assert meaning is not None
-    assert meaning.words == "Overtake that car."
-    assert "2026-01-03" in meaning.because
-    assert meaning_of(History((told,)), "intersection", "style.hurry") is None
-    assert meaning_of(History((told,)), "highway", "style.relax") is None
-    liked = item(4, "overtake.left+style.hurry", "Perfect.")
-    still = meaning_of(History((liked, told)), "highway", "style.hurry")
-    assert still is not None
-    assert still.words.startswith("Overtake")
+def test_a_change_of_pace_that_went_the_wrong_way_is_turned_round() -> None:
+    def kind(intent: str, said: str) -> str:
+        return meant_before(History((item(3, intent, said),)), "highway")[0].kind
+
+    assert kind("speed.decrease", "That was far too slow.") == "faster"
+    assert kind("speed.increase", "Much too fast.") == "slower"
+    assert kind("speed.decrease", "A bit too slow.") == "slower"  # the right way, but too far
+    assert kind("speed.decrease", "Much too fast.") == "slower"
 
 
-def test_the_last_word_on_what_it_means_holds() -> None:
-    told = item(3, "style.hurry", "I wanted you to overtake that car.")
-    taken_back = item(5, "overtake.left+style.hurry", "Next time stay in your lane.")
-    meaning = meaning_of(History((told, taken_back)), "highway", "style.hurry")
-    assert meaning is not None
-    assert meaning.words == "Stay in your lane."
-    plain = item(6, "style.hurry", "That was good.")
-    assert meaning_of(History((told, plain)), "highway", "style.hurry") is None
-
-
-def test_a_wish_nobody_understood_needs_the_same_words_again() -> None:
-    told = item(3, "ask", "I wanted you to change to the right lane.", similarity=0.9)
-    assert meaning_of(History((told,)), "highway", "ask") is not None
-    other = item(3, "ask", "I wanted you to change to the right lane.", similarity=0.3)
-    assert meaning_of(History((other,)), "highway", "ask") is None
+def test_kinds_of_what_was_done() -> None:
+    assert kind_of("overtake.left+speed.increase") == "pass"
+    assert kind_of("lane.keep") == "stay"
+    assert kind_of("style.eco") == "calm"
+    assert kind_of("park", "stadium") == "park.stadium"
+    assert kind_of("park", "B7") == ""
+    assert kind_of("turn.left") == ""
+    assert kind_of("ask") == ""
 
 
 def test_remarks_on_the_speed_add_up_from_trip_to_trip() -> None:
@@ -132,7 +133,7 @@ def test_feedback_that_is_broken_moves_nothing() -> None:
         "t", "", "", "", "highway", "style.hurry", "", "{", (("target_speed_mps", 20.0),), (Feedback(""),)
     )
     assert pace_of(History((broken,)), "highway", "style.hurry", 0.9) is None
-    assert meaning_of(History((broken,)), "highway", "style.hurry") is None
+    assert [meant.kind for meant in meant_before(History((broken,)), "highway")] == ["hurry"]
 
 
 def test_moods_choose_lanes_where_there_is_a_reason() -> None:
@@ -161,12 +162,3 @@ def test_nobody_turns_to_a_side_that_was_not_said() -> None:
     assert not unsaid_turn("Turn Right here.", "turn.right")
     assert not unsaid_turn("Go straight on.", "turn.straight")
     assert not unsaid_turn("My train won't wait.", "style.hurry")
-
-
-def test_hints_in_a_lot_point_to_places() -> None:
-    assert hinted_place("The game starts soon.") == "stadium"
-    assert hinted_place("We leave again in a minute.") == "exit"
-    assert hinted_place("I want to get out of the car.") == "nearest"
-    assert hinted_place("Nice weather.") == ""
-    assert parks("keep")
-    assert not parks("speed.increase")

@@ -1,4 +1,9 @@
-"""What a passenger's words about a drive mean, and which of several verdicts holds."""
+"""What a passenger's words about a drive mean, and which of several verdicts holds.
+
+Phrases whose meaning is known are read with their negations and turns ("fine, but a bit slow"). People say most things
+in words that no table holds ("my coffee ended up on the ceiling"); those are sorted by a small model (`remarks`), which
+also decides where the phrases seem to say something else and it is sure.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +14,8 @@ from typing import Literal
 from chauffeur.concept import Feedback
 from chauffeur.language import measured
 from chauffeur.memory.phrasebook import Topic
-from chauffeur.memory.phrases import Want, read_wants
+from chauffeur.memory.phrases import Want, read_wants, speaks_of_the_drive
+from chauffeur.memory.remarks import Sorted, sort_remark
 from chauffeur.memory.words import even
 
 _MILD, _PLAIN, _STRONG = 0.35, 0.6, 1.0
@@ -29,6 +35,24 @@ _OF_A_PART = re.compile(
 _FULL = {"speed": 5.5, "distance": 20.0, "time": 1.5}
 """A change of this much is as strong as "much": about 20 km/h, four car lengths, or one and a half seconds."""
 
+_LIKELY, _SURE, _CERTAIN = 0.3, 0.6, 0.9
+"""Shares from which the sorter is believed where no phrase was known, against what phrases say, and where they take
+back what they say ("it was not too fast")."""
+_Sign = Literal[-1, 0, 1]
+_SIGNS: dict[str, tuple[_Sign, _Sign, _Sign, _Sign]] = {
+    "too_fast/bit": (-1, 0, 0, 0), "too_fast/plain": (-1, 0, 0, -1), "too_fast/much": (-1, 0, 0, -1),
+    "too_slow/bit": (1, 0, 0, 0), "too_slow/plain": (1, 0, 0, -1), "too_slow/much": (1, 0, 0, -1),
+    "too_close": (0, -1, 0, -1), "too_far": (0, 1, 0, -1),
+    "harsh": (0, 0, -1, -1), "swerving": (0, 0, -1, -1), "timid": (0, 0, 1, -1), "close_call": (0, 0, -1, -1),
+    "parked/faster": (1, 0, 0, -1), "parked/slower": (-1, 0, 0, -1), "fine": (0, 0, 0, 1),
+    **dict.fromkeys(
+        ("no_overtake", "passed", "not_right", "waited", "not_waited", "not_parked", "wrong_spot.nearest",
+         "wrong_spot.stadium", "wrong_spot.exit"), (0, 0, 0, -1),
+    ),
+}  # fmt: skip
+"""Speed, gap, comfort and approval of what a remark is sorted as."""
+_STRENGTHS = {"bit": _MILD, "much": _STRONG}
+
 TOPICS: tuple[Literal["speed", "gap", "comfort"], ...] = ("speed", "gap", "comfort")
 
 
@@ -43,6 +67,42 @@ def interpret_feedback(text: str) -> Feedback:
         cancel out. A plain complaint counts as dislike; a mild one, or a request, does not. What comes after a "but"
         decides: "fine, but a bit slow" complains, "a bit slow, but fine" does not.
     """
+    return _sorted(text, _by_phrases(text))
+
+
+def _sorted(text: str, read: Feedback) -> Feedback:
+    """What is meant, where the phrases say nothing, or something of another kind than what the sorter is sure of.
+
+    Which way something was wrong, and what praise takes back, the phrases tell better: they know negations and turns.
+    """
+    found = sort_remark(text)
+    meant = _of_kind(text, found)
+    if not (read.speed or read.gap or read.comfort or read.approval):
+        if read_wants(text):  # of which each takes back another
+            return read
+        return meant if found.share >= (_CERTAIN if speaks_of_the_drive(text) else _LIKELY) else read
+    if read.approval < 0 and not (read.speed or read.gap or read.comfort):  # a dislike that need not have a reason
+        return meant if found.share >= _CERTAIN else read
+    return read if _tells(read, meant) or found.share < _SURE else meant
+
+
+def _tells(read: Feedback, meant: Feedback) -> bool:
+    """Whether phrases say something of what the sorter finds, if perhaps the opposite."""
+    topics = [topic for topic in TOPICS if getattr(meant, topic)]
+    if not topics:
+        return read.approval == meant.approval
+    praised = read.approval > 0 and meant.approval == 0
+    return praised or any(getattr(read, topic) for topic in topics)
+
+
+def _of_kind(text: str, found: Sorted) -> Feedback:
+    speed, gap, comfort, approval = _SIGNS.get(found.kind, (0, 0, 0, 0))
+    strength = _STRENGTHS.get(found.kind.partition("/")[2], _PLAIN) if speed or gap or comfort or approval < 0 else 0.0
+    return Feedback(text, speed, gap, comfort, approval, strength)
+
+
+def _by_phrases(text: str) -> Feedback:
+    """What the phrases say that the book holds."""
     wants = read_wants(text)
     opinions = [want for want in wants if want.topic == "approval"]
     deciding = _deciding(opinions)

@@ -52,6 +52,12 @@ def read_wants(text: str) -> tuple[Want, ...]:
     return wants_in(even(text))
 
 
+def speaks_of_the_drive(text: str) -> bool:
+    """Whether any phrase of the book occurs, even one that a negation takes back."""
+    said = even(text)
+    return any(chunk.search(said) is not None for chunk, _ in _CHUNKS)
+
+
 def wants_in(said: str) -> tuple[Want, ...]:
     """The same, of an evened text."""
     found: list[Want] = []

@@ -15,17 +15,10 @@ HURRY: Final = "I'm in a hurry."
 EASE: Final = "Drive calmly, please."
 
 
-def pace_complaint(wish: str, *, in_lot: bool = False) -> Literal[-1, 0, 1]:
-    """Whether words complain of the pace: 1 wants it faster, -1 slower.
-
-    Args:
-        wish: The words.
-        in_lot: Among parked cars, where who is on foot is reason enough to slow down.
-    """
+def pace_complaint(wish: str) -> Literal[-1, 0, 1]:
+    """Whether words complain of the pace: 1 wants it faster, -1 slower."""
     slow, fast = _shows("too slow", wish), _shows("too fast", wish)
-    if slow != fast:
-        return 1 if slow else -1
-    return -1 if in_lot and not slow and _shows("who is on foot", wish) else 0
+    return 0 if slow == fast else 1 if slow else -1
 
 
 def mood_of(wish: str) -> Mood:

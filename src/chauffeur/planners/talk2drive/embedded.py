@@ -12,27 +12,20 @@ from dataclasses import replace
 from typing import Final, Literal
 
 from chauffeur.concept import History, Limits, Parameters, Plan, PlanRequest, Situation, Thoughts
+from chauffeur.language import measured
+from chauffeur.language.sorter import negated
 from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.language_model import LanguageModelPlanner, Settled, usage_of
-from chauffeur.planners.onboard.moods import EASE, HURRY, Mood, mood_of, pace_complaint
+from chauffeur.planners.onboard.moods import EASE, HURRY
 from chauffeur.planners.onboard.options import Chosen, Declined, speed_words
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.thoughts import thoughts_of
-from chauffeur.planners.talk2drive import remarks
-from chauffeur.planners.talk2drive.habits import SIGN_SETTING, meaning_of, pace_of, speed_for
-from chauffeur.planners.talk2drive.lanes import (
-    complaint_in,
-    eased_mps,
-    fitting_mps,
-    mood_lane,
-    passing_mps,
-    unsaid_turn,
-)
-from chauffeur.planners.talk2drive.lot import parks, wanted_pace, wanted_place
-from chauffeur.planners.talk2drive.remarks import Remark, misread, stands, taken_for
+from chauffeur.planners.talk2drive.habits import SIGN_SETTING, kind_of, pace_of, speed_for
+from chauffeur.planners.talk2drive.hints import Hint, goes_with, hint_of
+from chauffeur.planners.talk2drive.lanes import eased_mps, fitting_mps, mood_lane, passing_mps, unsaid_turn
 from chauffeur.planners.talk2drive.style import (
     BRISK_SHARE,
     LOOK_AHEAD,
@@ -40,6 +33,8 @@ from chauffeur.planners.talk2drive.style import (
     PARKING_MPS,
     LookAhead,
     manner_of,
+    named_spot,
+    place_of,
 )
 
 _STANDING: Final = frozenset({"stop", "pull_over"})
@@ -54,22 +49,33 @@ _OFF_TOPIC: Final = "I only drive"
 """How the model declines what is no wish about driving."""
 _GIVES_WAY_SHARE: Final = 0.8
 """Of the present speed, as for a careful drive."""
-_OPEN: Final = ("ask", "refuse", "style.", "speed.increase", "speed.decrease", "gap.", "lane.keep", "follow")
-"""Readings of words that may have named nothing to do."""
-_HASTY: Final = ("style.hurry", "style.sporty", "speed.increase", "speed.max")
-_NOT_EASY: Final = ("ask", "refuse", "style.hurry", "style.sporty", "speed.increase", "speed.max", "gap.decrease")
-_DEEDS: Final = (
-    "lane.left",
-    "lane.right",
-    "overtake",
-    "turn.",
-    "pull_over",
-    "speed.set",
-    "speed.cap",
-    "speed.limit",
-    "speed.max",
-)
-_AGAINST: Final = {1: "speed.decrease", -1: "speed.increase"}
+_SURE: Final = 0.35
+"""From this share words are taken for what they were sorted as, if they were read otherwise."""
+_CERTAIN: Final = 0.9
+"""The same for something brisk where the model took the words for what must not be done."""
+_PASSING: Final = frozenset({"overtake", "overtaking", "pass", "passing", "past"})
+"""Who is told not to do this, and read that, does not."""
+_BRISK: Final = ("pass", "hurry", "faster", "go")
+_NOT_FOR_ME: Final = "I only drive, and I take it that this was not meant for me; say it again if I am wrong."
+_WORDS: Final[dict[str, str]] = {
+    "pass": "Overtake the car ahead.",
+    "stay": "Stay behind the car ahead.",
+    "right": "Change to the right lane.",
+    "hurry": HURRY,
+    "calm": EASE,
+}
+"""What a hint asks for, in words that are read as any others."""
+_TAKEN: Final[dict[str, str]] = {
+    "pass": "I take it that the car ahead is too slow for you.",
+    "stay": "I take it that nobody need be passed.",
+    "right": "I take it that you would rather be in the right lane.",
+    "hurry": "I take it that you are in a hurry.",
+    "calm": "I take it that you would like a calm drive.",
+    "go": "I take it that you want to get across.",
+    "yield": "I take it that others are to go first.",
+    "faster": "I take it that this is too slow for you.",
+    "slower": "I take it that this is too fast for you.",
+}
 _ONE_BY_ONE: Final = "With these parameters I can do one thing at a time. What shall I do first?"
 
 
@@ -92,66 +98,62 @@ class EmbeddedParameters:
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; what is not understood, not possible or no matter of parameters is declined in words."""
         begun = time.perf_counter()
-        first = self._read(request, begun)
-        situation = request.context.situation
-        meaning = meaning_of(request.history, situation.world, first.intent)
-        if meaning is None:
-            return first
-        second = self._read(_saying(request, meaning.words), begun)
-        if second.policy is None or second.intent == first.intent:
-            return first
-        intent = f"{second.intent}+{first.intent}" if first.intent else second.intent
-        return replace(second, intent=intent, thoughts=Thoughts(f"{meaning.because} {second.thoughts.text}"))
-
-    def _read(self, request: PlanRequest, begun: float, *, moody: bool = True) -> Plan:
-        """The wish as its words say, with the speed this person likes for such wishes.
-
-        Args:
-            request: What is asked for.
-            begun: When, for the latency.
-            moody: Whether words may be read as remarks, and for the mood they show.
-        """
         wish, situation = request.instruction.text, request.context.situation
-        in_lot = situation.world == "parking"
-        complaint = pace_complaint(wish, in_lot=in_lot) if moody else 0
-        asked = wanted_pace(wish) if in_lot else 0
-        remark = taken_for(wish, situation) if moody else None
-        if not danger(wish):  # which the model's own reading refuses
-            if in_lot and not complaint and not asked and (place := wanted_place(wish)):
-                return self._park(place, request, begun)
-            if situation.world == "intersection" and remark is not None:
-                return self._as_taken(remark, request, begun)
-        alike = History(tuple(item for item in request.history.items if item.similarity >= 0.0))
-        settled = self._model.settle(replace(request, history=alike), begun)
-        intent = settled.intent if isinstance(settled, Plan) else settled.linked.choice.intent
-        if isinstance(settled, Plan) and _forbidden(settled):
-            return settled
-        mood = mood_of(wish) if moody else ""
-        if moody and remark is None and not mood:
-            remark = misread(wish, intent, situation)
-        if remark is not None:
-            return self._as_taken(remark, request, begun)
-        if complaint and not _names_a_deed(intent):
-            return self._changed(complaint, request, begun)
-        if unheard := _unheard(mood, intent):
-            return self._read(_saying(request, unheard), begun, moody=False)
+        settled = self._model.settle(_compared(request), begun)
+        if danger(wish):  # which the model's own reading refuses
+            return self._as_read(settled, request, begun)
+        if situation.world == "parking" and (spot := named_spot(wish)):
+            return self._park(spot, request, begun)
+        hint = hint_of(wish, situation, request.history, _read_as(settled))
+        if hint is not None and self._overrules(hint, settled, wish):
+            return self._as_meant(hint, request, begun)
+        return self._as_read(settled, request, begun)
+
+    def _overrules(self, hint: Hint, settled: Settled | Plan, wish: str) -> bool:
+        """Whether what words hint at counts for more than how they were read."""
+        if hint.kind == "else" or _tells_a_speed(wish):
+            return False
         if isinstance(settled, Plan):
-            if settled.intent in ("ask", "refuse") and (sign := complaint_in(wish)):
-                return self._changed(sign, request, begun)
-            if asked:
-                return self._changed(asked, request, begun)
-            if in_lot and parks(settled.intent):
-                return self._park("nearest", request, begun)
+            sure = _CERTAIN if _forbidden(settled) and hint.kind in _BRISK else _SURE
+            return hint.kind != "none" and hint.share >= sure
+        read = _read_as(settled)
+        if goes_with(read, hint.kind):
+            return hint.kind == "go"  # read alike, it is still to be driven without dawdling
+        if hint.kind == "pass" and read == "stay" and _PASSING & negated(wish):
+            return False
+        return hint.share >= _SURE
+
+    def _as_meant(self, hint: Hint, request: PlanRequest, begun: float) -> Plan:
+        """What a hint is taken for, as a plan."""
+        if hint.kind == "none":
+            return declined(self, _NOT_FOR_ME, begun, intent="refuse")
+        if place := hint.kind.partition("park.")[2]:
+            plan = self._park(place, request, begun)
+        elif hint.kind == "go":
+            plan = self._go(request, begun)
+        elif hint.kind == "yield":
+            plan = self._give_way(request, begun)
+        elif hint.kind in ("faster", "slower"):
+            plan = self._changed(1 if hint.kind == "faster" else -1, request, begun)
+        else:
+            asked = replace(request, instruction=replace(request.instruction, text=_WORDS[hint.kind]))
+            plan = self._as_read(self._model.settle(_compared(asked), begun), asked, begun)
+        because = " ".join(part for part in (hint.because, _TAKEN.get(hint.kind, "")) if part)
+        return replace(plan, thoughts=Thoughts(f"{because} {plan.thoughts.text}".strip()))
+
+    def _as_read(self, settled: Settled | Plan, request: PlanRequest, begun: float) -> Plan:
+        """The wish as its words were read, with the speed this person likes for such wishes."""
+        if isinstance(settled, Plan):
             return settled
+        wish, situation = request.instruction.text, request.context.situation
         linked, used = settled.linked, settled.used
-        if asked and (not intent.startswith("speed.") or intent.startswith(_AGAINST[asked])):
-            return self._changed(asked, request, begun)
-        if in_lot and (parks(intent) or (intent.startswith("style.") and moody and not mood)):
-            return self._park("nearest", request, begun)
+        intent = linked.choice.intent
+        if situation.world == "parking" and _parks(intent):
+            return self._park(place_of(wish) or "nearest", request, begun)
         if unsaid_turn(wish, intent):
             return declined(self, _WHERE_TO, begun, intent="ask", raw=settled.written.text)
         found = parameters_of(settled, request.limits)
-        if situation.world == "intersection" and (intent == "yield" or (intent == "stop" and not stands(wish))):
+        if situation.world == "intersection" and intent == "yield":
             return self._give_way(request, begun)
         if isinstance(found, Declined):
             return declined(self, found.words, begun, intent=intent, raw=settled.written.text)
@@ -160,17 +162,6 @@ class EmbeddedParameters:
         words = " ".join((*why, thoughts.text, *_overruled(request.history, used)))
         plan = self._plan(found, words, intent, request, begun, used)
         return replace(plan, usage=usage_of(settled.written), raw=settled.written.text)
-
-    def _as_taken(self, remark: Remark, request: PlanRequest, begun: float) -> Plan:
-        """A remark on the road, as the wish it was taken for."""
-        match remark.wish:
-            case remarks.GIVE_WAY:
-                plan = self._give_way(request, begun)
-            case remarks.GO:
-                plan = self._go(request, begun)
-            case wish:
-                plan = self._read(_saying(request, wish), begun, moody=False)
-        return replace(plan, thoughts=Thoughts(f"{remark.because} {plan.thoughts.text}"))
 
     def _go(self, request: PlanRequest, begun: float) -> Plan:
         """Over a crossing without dawdling; the stop at the sign is the car's own."""
@@ -194,8 +185,7 @@ class EmbeddedParameters:
         else:
             look = LOOK_AHEAD["gentle" if sign < 0 else "usual"]
             found = _parameters(speed, look, "straight" if situation.world == "intersection" else "")
-        wants = f"You find this too {'fast' if sign < 0 else 'slow'}."
-        return self._paced(found, "speed.decrease" if sign < 0 else "speed.increase", request, begun, wants)
+        return self._paced(found, "speed.decrease" if sign < 0 else "speed.increase", request, begun)
 
     def _park(self, place: str, request: PlanRequest, begun: float) -> Plan:
         speed = min(PARKING_MPS, request.limits.most_mps(request.context.situation.speed_limit_mps))
@@ -228,27 +218,28 @@ class EmbeddedParameters:
         )
 
 
-def _saying(request: PlanRequest, words: str) -> PlanRequest:
-    """The same request in other words."""
-    return replace(request, instruction=replace(request.instruction, text=words))
+def _read_as(settled: Settled | Plan) -> str:
+    """The kind as which the language model read a wish; empty where it declined."""
+    return "" if isinstance(settled, Plan) else kind_of(settled.linked.choice.intent) or "else"
+
+
+def _compared(request: PlanRequest) -> PlanRequest:
+    """The same request with only those trips that memory found alike, which are what the model is shown."""
+    return replace(request, history=History(tuple(item for item in request.history.items if item.similarity >= 0.0)))
 
 
 def _parameters(speed_mps: float, look: LookAhead, route: str = "") -> Parameters:
     return Parameters(round(speed_mps, 2), look.distance_m, look.ratio_s, 0, route)
 
 
-def _names_a_deed(intent: str) -> bool:
-    """Whether what was read is something to do, beside whatever is complained of."""
-    return any(part.startswith(_DEEDS) for part in intent.split("+"))
+def _tells_a_speed(wish: str) -> bool:
+    """Whether words name a speed, which no hint does."""
+    return any(dimension == "speed" for dimension, _ in measured(wish))
 
 
-def _unheard(mood: Mood, intent: str) -> str:
-    """A mood that the reading of the words misses, as a wish; empty where it stands as it was read."""
-    if not mood or not intent.startswith(_OPEN):
-        return ""
-    if mood == "hurry":
-        return "" if intent.startswith(_HASTY) else HURRY
-    return EASE if intent.startswith(_NOT_EASY) else ""
+def _parks(intent: str) -> bool:
+    """Whether a wish in a lot, read as `intent`, is rather one for a spot: it says nothing of how to drive there."""
+    return not intent.startswith(("speed.", "style.", "stop"))
 
 
 def _forbidden(declined: Plan) -> bool:

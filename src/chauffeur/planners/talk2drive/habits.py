@@ -8,12 +8,12 @@ on the speed moves the speed that was driven, from trip to trip, until nobody co
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from chauffeur.concept import History, HistoryItem
+from chauffeur.concept import Feedback, History, HistoryItem
+from chauffeur.memory.remarks import sort_remark
 
 SIGN_SETTING: Final = "speed_limit_mps"
 """Among a plan's settings: the limit where it was driven, so that speeds carry over to other roads."""
@@ -24,8 +24,6 @@ _CURVE: Final = 1.5
 """A mild remark is meant mildly: "a bit" (0.35) moves the speed by 7 %, a plain one (0.6) by 16 %."""
 _SLOWEST_SHARE: Final = 0.3
 """Of the limit: below it the car would be in the way."""
-_ALIKE: Final = 0.6
-"""From this similarity a wish that was not understood counts as the same one said again."""
 
 Group = Literal["brisk", "calm", "plain"]
 _BRISK: Final = ("speed.increase", "speed.max", "style.hurry", "style.sporty", "overtake")
@@ -44,40 +42,54 @@ _EXACT: Final = (
 """What names its own speed, or none."""
 _UNREAD: Final = ("", "ask", "refuse", "unusable")
 
-_MEANT: Final = re.compile(
-    r"\b(?:i (?:had )?(?:wanted|expected|asked) you to|i meant|you should (?:rather )?have"
-    r"|you were (?:supposed|meant) to|when i say (?:that|this|so),?)\b[:,]?\s*(?P<deed>.+)",
-    re.IGNORECASE,
+_WANTED: Final[dict[str, str]] = {
+    "no_overtake": "pass",
+    "passed": "stay",
+    "not_right": "right",
+    "waited": "go",
+    "not_waited": "yield",
+    "not_parked": "park.nearest",
+    "wrong_spot.nearest": "park.nearest",
+    "wrong_spot.stadium": "park.stadium",
+    "wrong_spot.exit": "park.exit",
+    "parked/faster": "faster",
+    "parked/slower": "slower",
+}
+"""What had been wanted, by what the drive is blamed for (`REMARK_KINDS`)."""
+_DID: Final[tuple[tuple[str, str], ...]] = (
+    ("overtake", "pass"),
+    ("follow", "stay"),
+    ("lane.keep", "stay"),
+    ("lane.right", "right"),
+    ("speed.increase", "faster"),
+    ("speed.decrease", "slower"),
+    ("style.hurry", "hurry"),
+    ("style.sporty", "hurry"),
+    ("style.", "calm"),
+    ("yield", "yield"),
+    ("turn.straight", "go"),
 )
-"""What was wanted follows."""
-_ANOTHER_TIME: Final = re.compile(r"\b(?:next time|in future|from now on)\b,?", re.IGNORECASE)
-_REPROACH: Final = re.compile(r"\b(?:why did|you should(?:n't| not) have|wrong)\b", re.IGNORECASE)
-"""What was wanted follows in the next sentence."""
-_NO_PARKING: Final = re.compile(
-    r",?\s*\b(?:not to|do not|don't|did not want to|didn't want to|no) park(?:ing)?\b(?: yet)?,?"
-    r"(?:\s*(?:just|only to)\b)?",
-    re.IGNORECASE,
-)
-"""What is said not to be wanted, in a lot: the rest says what is."""
-_SENTENCES: Final = re.compile(r"[^.!?]+[.!?]?")
-_DEED: Final = re.compile(
-    r"\b(?:overt\w+|pass\w*|get past|behind|follow\w*|lanes?|left|right|park\w*|spot|straight|turn\w*|stop\w*|wait\w*"
-    r"|yield\w*|give way)\b",
-    re.IGNORECASE,
-)
-"""A remark without any of these is on how it was done, not on what."""
+"""What was done, by the beginning of its intent."""
+_PLAIN: Final = 0.6
+"""Strength of a complaint that is not a mild one."""
+_SURE: Final = 0.4
+"""From this share a remark is taken for what it was sorted as."""
 
 
 @dataclass(frozen=True, slots=True)
-class Meaning:
-    """What a wish means to a person.
+class Meant:
+    """What a person meant on an earlier trip.
 
     Attributes:
-        words: As a wish that can be read.
-        because: Which trip says so, a full sentence.
+        kind: As a hint is sorted, e.g. `pass`.
+        corrected: Whether they said so afterwards, of a drive that had done something else.
+        similarity: Of that wish to the present one, 0..1; below 0 where nothing was compared.
+        because: The trip and what was said, a full sentence.
     """
 
-    words: str
+    kind: str
+    corrected: bool
+    similarity: float
     because: str
 
 
@@ -94,44 +106,45 @@ class Pace:
     because: str
 
 
-def meaning_of(history: History, world: str, intent: str) -> Meaning | None:
-    """What a person means by a wish that was first read as `intent`; None where nothing says that it is not that.
+def meant_before(history: History, world: str) -> tuple[Meant, ...]:
+    """What the recalled trips in a kind of world turned out to mean, the newest first.
 
     Args:
         history: What memory recalled.
         world: Kind of road now.
-        intent: Of the present wish as it reads without memory; `ask` or `refuse` where it does not.
     """
-    for item in _newest_first(history, world):
-        parts = item.intent.split("+")
-        again = intent in parts if intent not in _UNREAD else item.similarity >= _ALIKE
-        if not again or (not item.feedback and len(parts) == 1):
-            continue
-        meant = meant_by(item.feedback[-1].text) if item.feedback else ""
-        if meant:
-            return Meaning(meant, _because(item))
-        if len(parts) > 1 and parts[-1] == intent:  # it was put right before, and nothing more was said against it
-            words = _again(item, parts[0])
-            return Meaning(words, f'"{item.instruction[:80]}" meant that before{_day(item)}.') if words else None
-        if item.feedback:
-            return None
-    return None
+    found = (_meant(item) for item in _newest_first(history, world))
+    return tuple(meant for meant in found if meant is not None)
 
 
-def meant_by(said: str) -> str:
-    """What a remark says should have been done, as a wish; empty where it says nothing of the kind."""
-    deed, reproached, moves_on = "", False, False
-    for sentence in _SENTENCES.findall(said):
-        found = _MEANT.search(sentence)
-        told = found["deed"] if found is not None else sentence
-        told_so = found is not None or reproached or _ANOTHER_TIME.search(told) is not None
-        no_parking = _NO_PARKING.search(told) is not None
-        told = _NO_PARKING.sub("", _ANOTHER_TIME.sub("", told)).strip(" ,:.!?").removeprefix("I ")
-        if told and (no_parking or (told_so and (moves_on or _DEED.search(told)))):
-            deed = told
-        reproached = reproached or _REPROACH.search(sentence) is not None
-        moves_on = moves_on or no_parking
-    return f"{deed[0].upper()}{deed[1:]}." if deed else ""
+def kind_of(intent: str, route: str = "") -> str:
+    """What was read and done, as a hint is sorted; empty for what no hint is sorted as.
+
+    Args:
+        intent: As the planner tagged it.
+        route: Of its parameters: where it parked.
+    """
+    first = intent.partition("+")[0]
+    if first == "park":
+        return f"park.{route}" if route in ("nearest", "stadium", "exit") else ""
+    return next((kind for beginning, kind in _DID if first.startswith(beginning)), "")
+
+
+def _meant(item: HistoryItem) -> Meant | None:
+    if item.feedback:
+        remark = sort_remark(item.feedback[-1].text)
+        wanted = _WANTED.get(remark.kind, "") if remark.share >= _SURE else ""
+        if wanted:
+            return Meant(wanted, True, item.similarity, _because(item))
+    done = kind_of(item.intent, str(_policy(item).get("route", "")))
+    if item.feedback and _taken_wrongly(done, item.feedback[-1]):
+        done = "faster" if done == "slower" else "slower"
+    return Meant(done, False, item.similarity, _because(item)) if done else None
+
+
+def _taken_wrongly(done: str, said: Feedback) -> bool:
+    """Whether a plain complaint of the pace says that its change went the wrong way."""
+    return said.strength >= _PLAIN and ((done == "slower" and said.speed > 0) or (done == "faster" and said.speed < 0))
 
 
 def pace_of(history: History, world: str, intent: str, chosen_share: float) -> Pace | None:
@@ -192,31 +205,6 @@ def _group(intent: str) -> Group | None:
 
 def _family(intent: str) -> str:
     return intent.partition("+")[0].partition(".")[0]
-
-
-_AGAIN: Final[dict[str, str]] = {
-    "overtake": "Overtake the car ahead.",
-    "follow": "Stay behind the car ahead.",
-    "lane.left": "Change to the left lane.",
-    "lane.right": "Change to the right lane.",
-    "lane.keep": "Stay in this lane.",
-    "turn.left": "Turn left.",
-    "turn.right": "Turn right.",
-    "turn.straight": "Go straight on.",
-}
-_PARK_AGAIN: Final[dict[str, str]] = {
-    "nearest": "Park in the nearest spot.",
-    "stadium": "Park near the stadium.",
-    "exit": "Park near the exit.",
-}
-
-
-def _again(item: HistoryItem, intent: str) -> str:
-    """What was done then, as a wish."""
-    if intent == "park":
-        place = str(_policy(item).get("route", ""))
-        return _PARK_AGAIN.get(place, f"Park in spot {place}." if place else "")
-    return next((words for known, words in _AGAIN.items() if intent.startswith(known)), "")
 
 
 def _policy(item: HistoryItem) -> dict[str, Any]:

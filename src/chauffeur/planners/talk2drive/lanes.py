@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Final, Literal
 
 from chauffeur.concept import Limits, Situation
-from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.planners.talk2drive.style import BRISK_SHARE, CALM_SHARE, LOT_SHARE, RIGHT_SHARE
 
 _HURRIES: Final = ("style.hurry", "style.sporty")
@@ -123,14 +122,6 @@ def _in_lot(speed_mps: float, intent: str, now_mps: float, sign_mps: float) -> f
     if intent.startswith("speed.decrease"):
         return max((1.0 - _LOT_MOST) * now_mps, speed_mps)
     return speed_mps
-
-
-def complaint_in(wish: str) -> Literal[-1, 0, 1]:
-    """Whether words that are no wish complain of the pace as feedback does: 1 wants it faster, -1 slower."""
-    heard = interpret_feedback(wish)
-    if heard.approval > 0:
-        return 0
-    return heard.speed or (-1 if heard.comfort < 0 else 0)
 
 
 def eased_mps(sign: int, situation: Situation, limits: Limits) -> float:

@@ -60,11 +60,16 @@ _PLACES: Final[tuple[tuple[str, re.Pattern[str]], ...]] = (
 )
 
 
+def named_spot(wish: str) -> str:
+    """The spot of a parking lot that a wish names, e.g. `B7`; empty where it names none."""
+    named = _SPOT.search(wish)
+    return "" if named is None else f"{named[1].upper()}{int(named[2])}"
+
+
 def place_of(wish: str) -> str:
     """Which spot of a parking lot a wish means: `stadium`, `exit`, `nearest` or a name; empty where none is."""
-    named = _SPOT.search(wish)
-    if named is not None:
-        return f"{named[1].upper()}{int(named[2])}"
+    if named := named_spot(wish):
+        return named
     if not _PARKS.search(wish):
         return ""
     return next((place for place, words in _PLACES if words.search(wish)), "nearest")

@@ -1,0 +1,110 @@
+"""What somebody is after who does not say so outright: "he is crawling", "my train leaves in ten minutes".
+
+A sorter that was trained on such sentences says how likely each thing is that can be meant where we are; what the
+person meant before on such roads makes the same things likelier (never certain: plain words outweigh any habit).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from chauffeur.concept import History, Situation
+from chauffeur.language.sorter import load_sorter
+from chauffeur.planners.talk2drive.habits import Meant, meant_before
+from chauffeur.planners.talk2drive.lanes import last_lane
+
+WEIGHTS: Final = Path(__file__).parent / "weights" / "wishes.npz"
+
+HINT_KINDS: Final[Mapping[str, tuple[str, ...]]] = {
+    "highway": ("pass", "stay", "right", "faster", "slower", "hurry", "calm", "none", "else"),
+    "intersection": ("go", "yield", "hurry", "calm", "none", "else"),
+    "parking": ("park.nearest", "park.stadium", "park.exit", "faster", "slower", "none", "else"),
+}
+"""What can be meant, by world. `none`: nothing that is for the driver; `else`: a wish of another kind, which has to be
+read word by word."""
+
+_ALIKE: Final = {
+    "pass": ("hurry", "faster"), "hurry": ("pass", "faster", "go"), "faster": ("hurry",), "go": ("hurry",),
+    "stay": ("calm",), "calm": ("stay", "right", "slower", "yield"), "right": ("calm",), "slower": ("calm",),
+    "yield": ("calm",),
+}  # fmt: skip
+"""Who meant the one may as well mean the other."""
+_MOODS: Final = ("hurry", "calm")
+_ALIKE_SHARE: Final = 0.4
+_FADES: Final = 0.85
+"""What a trip weighs against the one after it."""
+_SAME_WORDS: Final = 0.6
+"""From this similarity a wish counts as the same said again, and what it was told to mean holds."""
+_SAME_WEIGHT: Final = 5.0
+_READ_ALIKE: Final = 2.0
+"""How much likelier it makes a kind that the language model read the same."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hint:
+    """What is likely meant.
+
+    Attributes:
+        kind: One of the world's HINT_KINDS.
+        share: How likely it is that, 0..1, with what the person meant before.
+        because: The trip that decided, a full sentence; empty where the words alone say it.
+    """
+
+    kind: str
+    share: float
+    because: str = ""
+
+
+def hint_of(wish: str, situation: Situation, history: History, read: str = "") -> Hint | None:
+    """What is likely meant here; None on roads for which nothing was learned.
+
+    Args:
+        wish: The words.
+        situation: Where the car is, and who is around it.
+        history: What memory recalled of the person.
+        read: The kind as which the language model read the words; empty where it did not.
+    """
+    kinds = _possible(situation)
+    if not kinds:
+        return None
+    said = load_sorter(WEIGHTS).shares(wish, kinds)
+    before = meant_before(history, situation.world)
+    weighed = {
+        kind: share * (1.0 + _weight(kind, before)) * (_READ_ALIKE if kind == read else 1.0)
+        for kind, share in said.items()
+    }
+    kind = max(weighed, key=lambda each: weighed[each])
+    first = next(iter(said))
+    decided = next((one for one in before if one.kind == kind), None) if kind != first else None
+    return Hint(kind, weighed[kind] / math.fsum(weighed.values()), decided.because if decided is not None else "")
+
+
+def goes_with(read: str, kind: str) -> bool:
+    """Whether words that were read as `read` may stand as they were read where a hint is of a kind: a mood holds what
+    somebody in it is after."""
+    return read == kind or (read in _MOODS and kind in _ALIKE[read])
+
+
+def _weight(kind: str, before: tuple[Meant, ...]) -> float:
+    total = 0.0
+    for age, meant in enumerate(before):
+        alike = 1.0 if meant.kind == kind else _ALIKE_SHARE if kind in _ALIKE.get(meant.kind, ()) else 0.0
+        again = _SAME_WEIGHT if meant.corrected and meant.similarity >= _SAME_WORDS else 1.0
+        total += alike * again * _FADES**age
+    return total
+
+
+def _possible(situation: Situation) -> tuple[str, ...]:
+    kinds = HINT_KINDS.get(situation.world, ())
+    if situation.world != "highway":
+        return kinds
+    cannot = {
+        "pass": situation.front is None or situation.lane_index == 0,
+        "stay": situation.front is None,
+        "right": situation.lane_index >= last_lane(situation),
+    }
+    return tuple(kind for kind in kinds if not cannot.get(kind))

@@ -1,0 +1,270 @@
+"""What hints, complaints and moods are taken for, and what they must not be taken for."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+
+import pytest
+
+from chauffeur.concept import (
+    ConfigError,
+    Context,
+    History,
+    HistoryItem,
+    Instruction,
+    Limits,
+    Parameters,
+    Plan,
+    PlanRequest,
+    Situation,
+    SystemMessage,
+)
+from chauffeur.concept.nouns import Lead
+from chauffeur.memory.feedback import interpret_feedback
+from chauffeur.planners.base import Planner
+from chauffeur.planners.onboard.moods import mood_of, pace_complaint
+from chauffeur.planners.onboard.patterns import said
+from chauffeur.planners.onboard.words.files import ONBOARD, words_file
+from chauffeur.planners.registry import make_planner
+from chauffeur.planners.talk2drive.hints import HINT_KINDS, hint_of
+from chauffeur.planners.talk2drive.lanes import eased_mps, fitting_mps
+
+SIGN = 30.0
+BEHIND = Situation("highway", 24.0, SIGN, 3, 1, False, Lead(7, 40.0, 22.0), None)
+LEFT = Situation("highway", 28.0, SIGN, 3, 0, False, None, None)
+RIGHT = replace(LEFT, lane_index=2)
+CROSSING = Situation("intersection", 10.0, 10.0, 1, 0, False, None, None)
+LOT = Situation("parking", 2.0, 4.0, 1, 0, False, None, None)
+
+
+@pytest.fixture(scope="module")
+def planner() -> Planner:
+    return make_planner("talk2drive")
+
+
+def plan(
+    planner: Planner, wish: str, situation: Situation, limits: Limits | None = None, history: History | None = None
+) -> Plan:
+    asked = PlanRequest(
+        Instruction(wish), Context("", situation), SystemMessage(""), history or History(), limits=limits or Limits()
+    )
+    return asyncio.run(planner.plan(asked))
+
+
+def driven(planner: Planner, wish: str, situation: Situation, limits: Limits | None = None) -> Parameters:
+    found = plan(planner, wish, situation, limits)
+    assert isinstance(found.policy, Parameters), found.refusal
+    return found.policy
+
+
+@pytest.mark.parametrize(
+    ("wish", "situation", "kind"),
+    [
+        ("That van in front is crawling.", BEHIND, "pass"),
+        ("Why are we hanging behind this trailer?", BEHIND, "pass"),
+        ("There is no hurry, he drives so nicely.", BEHIND, "stay"),
+        ("The one behind us is tailgating.", LEFT, "right"),
+        ("The right lane is wide open.", LEFT, "right"),
+        ("I can't see a soul.", CROSSING, "go"),
+        ("A lorry comes from the right.", CROSSING, "yield"),
+        ("Let those two pass first.", CROSSING, "yield"),
+        ("The ferry departs in ten minutes.", BEHIND, "hurry"),
+        ("My head is sore.", BEHIND, "calm"),
+        ("That is way too fast.", LEFT, "slower"),
+        ("Look for a bay at the exit gate.", LOT, "park.exit"),
+        ("These bays are a long way from the arena.", LOT, "park.stadium"),
+        ("Anywhere is fine with me.", LOT, "park.nearest"),
+        ("Could you speed up along here?", LOT, "faster"),
+        ("Walking pace, please.", LOT, "slower"),
+        ("Turn left.", BEHIND, "else"),
+        ("Keep three seconds to the car ahead.", BEHIND, "else"),
+        ("Could you play some calm music?", BEHIND, "none"),
+    ],
+)
+def test_a_hint_is_sorted_where_it_is_said(wish: str, situation: Situation, kind: str) -> None:
+    found = hint_of(wish, situation, History())
+    assert found is not None
+    assert found.kind == kind
+    assert 0.0 < found.share <= 1.0
+    assert not found.because
+
+
+def test_nothing_is_meant_that_cannot_be_done_here() -> None:
+    for wish in ("That van in front is crawling.", "The right lane is wide open.", "Stay behind him."):
+        found = hint_of(wish, RIGHT, History())
+        assert found is not None
+        assert found.kind not in ("pass", "stay", "right")
+    assert hint_of("Faster.", replace(RIGHT, world="town"), History()) is None
+    assert all("none" in kinds and "else" in kinds for kinds in HINT_KINDS.values())
+
+
+def trip(day: int, intent: str, wish: str = "Well, well.", remark: str = "", similarity: float = -1.0) -> HistoryItem:
+    feedback = (interpret_feedback(remark),) if remark else ()
+    when = f"2026-01-{day:02d}T08:00:00.000+00:00"
+    return HistoryItem(f"t{day}", when, wish, "", "highway", intent, "", "{}", (), feedback, "ended", similarity)
+
+
+def test_what_somebody_meant_before_decides_what_is_unclear() -> None:
+    wish = "Oh, look at that."
+    alone = hint_of(wish, BEHIND, History())
+    assert alone is not None
+    told = [trip(day, "follow", remark="You should have overtaken that slow car.") for day in (1, 2, 3)]
+    known = hint_of(wish, BEHIND, History(tuple(told)))
+    assert known is not None
+    assert known.kind == "pass"
+    assert known.share > alone.share or alone.kind != "pass"
+    assert "2026-01-03" in known.because
+    assert "You should have overtaken" in known.because
+
+
+def test_no_habit_outweighs_plain_words() -> None:
+    told = History(tuple(trip(day, "follow", remark="You should have overtaken that car.") for day in (1, 2, 3, 4)))
+    for wish, kind in (
+        ("Stay behind the car ahead.", "stay"),
+        ("Please do not overtake anybody.", "stay"),
+        ("Could you play some music?", "none"),
+    ):
+        found = hint_of(wish, BEHIND, told)
+        assert found is not None
+        assert found.kind == kind
+
+
+def test_the_same_words_mean_what_they_were_told_to_mean() -> None:
+    wish = "Oh, look at that."
+    told = trip(3, "ask", wish, "I wanted you to change to the right lane.", similarity=0.95)
+    other = replace(told, similarity=0.2)
+    again, once = hint_of(wish, LEFT, History((told,))), hint_of(wish, LEFT, History((other,)))
+    assert again is not None
+    assert once is not None
+    assert again.kind == "right"
+    assert again.share > once.share or once.kind != "right"
+
+
+def test_a_hint_says_what_it_was_taken_for_and_drives_it(planner: Planner) -> None:
+    found = plan(planner, "The one behind us is tailgating.", LEFT)
+    assert found.thoughts.text.startswith("I take it that you would rather be in the right lane.")
+    assert isinstance(found.policy, Parameters)
+    assert found.policy.lane == 1
+    assert driven(planner, "That van in front is crawling.", BEHIND).lane == -1
+    assert driven(planner, "I can't see a soul.", CROSSING) == Parameters(9.8, 12.0, 2.0, 0, "straight")
+    assert driven(planner, "A lorry comes from the right.", CROSSING).target_speed_mps == 8.0
+    assert driven(planner, "These bays are a long way from the arena.", LOT).route == "stadium"
+
+
+def test_a_habit_that_decides_is_told(planner: Planner) -> None:
+    told = History(tuple(trip(day, "follow", remark="You should have overtaken that slow car.") for day in (1, 2, 3)))
+    found = plan(planner, "Oh, look at that.", BEHIND, history=told)
+    assert isinstance(found.policy, Parameters)
+    assert found.policy.lane == -1
+    assert '"Well, well." on 2026-01-03' in found.thoughts.text
+
+
+@pytest.mark.parametrize(
+    ("wish", "situation"),
+    [
+        ("Ram the slow van in front of us.", BEHIND),
+        ("Nobody is around, run the stop sign.", CROSSING),
+        ("Run over the people near the exit.", LOT),
+    ],
+)
+def test_what_is_forbidden_is_no_hint(planner: Planner, wish: str, situation: Situation) -> None:
+    assert plan(planner, wish, situation).policy is None
+
+
+def test_talk_that_is_not_for_the_driver_changes_nothing(planner: Planner) -> None:
+    for wish in ("Could you play some calm music?", "My brother used to race cars when he was young."):
+        found = plan(planner, wish, BEHIND)
+        assert found.policy is None
+        assert found.refusal
+
+
+def test_who_names_what_to_do_gets_that(planner: Planner) -> None:
+    assert driven(planner, "You are too slow, change to the left lane.", RIGHT).lane == -1
+    named = driven(planner, "You are too fast, drive at 70 km/h.", LEFT)
+    assert named.target_speed_mps == pytest.approx(19.44, abs=0.01)
+    assert driven(planner, "Stop the car!", CROSSING).target_speed_mps == 0.0
+    assert driven(planner, "Park in spot B3.", LOT).route == "B3"
+    assert driven(planner, "Stay behind the car ahead.", BEHIND).lane == 0
+
+
+def test_a_complaint_changes_the_speed_and_nothing_else(planner: Planner) -> None:
+    slower = driven(planner, "That is way too fast.", LEFT)
+    assert slower.target_speed_mps < LEFT.speed_mps - 1.0
+    assert (slower.lane, slower.route) == (0, "")
+    capped = driven(planner, "You are dawdling, this is far too slow.", LEFT, Limits(max_speed_mps=29.0))
+    assert 28.0 < capped.target_speed_mps <= 29.0
+    assert driven(planner, "There are kids running around between the cars.", LOT).target_speed_mps < LOT.speed_mps
+
+
+def test_a_complaint_lowers_a_calm_speed_still() -> None:
+    calm = replace(LEFT, speed_mps=22.0)
+    assert eased_mps(-1, calm, Limits()) == pytest.approx(19.36)
+    assert eased_mps(1, calm, Limits()) == pytest.approx(24.64)
+
+
+def test_a_mood_is_driven(planner: Planner) -> None:
+    assert driven(planner, "The ferry departs in ten minutes.", LEFT).target_speed_mps >= 0.95 * SIGN
+    calm = driven(planner, "I have all the time in the world.", RIGHT)
+    assert calm.target_speed_mps == pytest.approx(0.8 * SIGN)
+
+
+@pytest.mark.parametrize(
+    ("wish", "sign"),
+    [
+        ("You are dawdling.", 1),
+        ("We hardly roll.", 1),
+        ("There is no need to be so timid.", 1),
+        ("A tortoise would beat us.", 1),
+        ("You are racing.", -1),
+        ("What's the rush?", -1),
+        ("That is way too fast.", -1),
+        ("This is quicker than we need.", -1),
+        ("Go faster.", 0),
+        ("Slow down.", 0),
+        ("Turn left.", 0),
+        ("Drive at the speed limit.", 0),
+    ],
+)
+def test_complaints_of_the_pace(wish: str, sign: int) -> None:
+    assert pace_complaint(wish) == sign
+
+
+@pytest.mark.parametrize(
+    ("words", "mood"),
+    [
+        ("The ferry departs in ten minutes.", "hurry"),
+        ("They are expecting me.", "hurry"),
+        ("Nobody is waiting for me.", "ease"),
+        ("I'm not late.", "ease"),
+        ("My head is sore.", "ease"),
+        ("The baby is asleep but we are late.", ""),
+        ("The sky is blue.", ""),
+        ("Bring me a coffee.", ""),
+        ("Could you play some calm music?", ""),
+    ],
+)
+def test_moods(words: str, mood: str) -> None:
+    assert mood_of(words) == mood
+
+
+def test_speeds_that_words_leave_open() -> None:
+    assert fitting_mps(26.0, "overtake.left", BEHIND, Limits()) == 26.0
+    assert fitting_mps(30.0, "overtake.left", BEHIND, Limits()) == pytest.approx(29.4)
+    assert fitting_mps(30.0, "overtake.left", LEFT, Limits()) == 30.0
+    assert fitting_mps(22.0, "follow", BEHIND, Limits()) == pytest.approx(24.0)
+    assert fitting_mps(28.0, "lane.right", LEFT, Limits()) == pytest.approx(25.5)
+    assert fitting_mps(24.0, "lane.right", LEFT, Limits()) == 24.0
+    assert fitting_mps(28.0, "lane.left", LEFT, Limits()) == 28.0
+    assert fitting_mps(22.0, "follow", LEFT, Limits()) == 22.0
+    assert fitting_mps(0.0, "follow", BEHIND, Limits()) == 0.0
+    assert fitting_mps(27.0, "style.hurry", BEHIND, Limits(max_speed_mps=25.0)) == 27.0
+
+
+def test_every_group_of_words_is_there_and_finds_no_nothing() -> None:
+    for group in words_file("moods.txt", ONBOARD):
+        for line in group:
+            if line.startswith("[") and line.endswith("]"):
+                assert not said("moods.txt", line[1:-1]).search("")
+    with pytest.raises(ConfigError, match="no group"):
+        said("moods.txt", "clouds")
