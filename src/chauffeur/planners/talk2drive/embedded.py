@@ -51,8 +51,10 @@ _GIVES_WAY_SHARE: Final = 0.8
 """Of the present speed, as for a careful drive."""
 _SURE: Final = 0.35
 """From this share words are taken for what they were sorted as, if they were read otherwise."""
-_CERTAIN: Final = 0.9
-"""The same for something brisk where the model took the words for what must not be done."""
+_PLAINLY: Final = 0.98
+_SURER: Final = 0.6
+"""The same where the model surely (from 0.98) read something that no hint is sorted as, and for something brisk where
+it took the words for what must not be done."""
 _PASSING: Final = frozenset({"overtake", "overtaking", "pass", "passing", "past"})
 """Who is told not to do this, and read that, does not."""
 _BRISK: Final = ("pass", "hurry", "faster", "go")
@@ -104,24 +106,25 @@ class EmbeddedParameters:
             return self._as_read(settled, request, begun)
         if situation.world == "parking" and (spot := named_spot(wish)):
             return self._park(spot, request, begun)
-        hint = hint_of(wish, situation, request.history, _read_as(settled))
+        hint = hint_of(wish, situation, request.history)
         if hint is not None and self._overrules(hint, settled, wish):
             return self._as_meant(hint, request, begun)
         return self._as_read(settled, request, begun)
 
     def _overrules(self, hint: Hint, settled: Settled | Plan, wish: str) -> bool:
         """Whether what words hint at counts for more than how they were read."""
-        if hint.kind == "else" or _tells_a_speed(wish):
+        if hint.kind == "else" or _tells_an_amount(wish):
             return False
         if isinstance(settled, Plan):
-            sure = _CERTAIN if _forbidden(settled) and hint.kind in _BRISK else _SURE
+            sure = _SURER if _forbidden(settled) and hint.kind in _BRISK else _SURE
             return hint.kind != "none" and hint.share >= sure
-        read = _read_as(settled)
+        read = kind_of(settled.linked.choice.intent)
         if goes_with(read, hint.kind):
             return hint.kind == "go"  # read alike, it is still to be driven without dawdling
         if hint.kind == "pass" and read == "stay" and _PASSING & negated(wish):
             return False
-        return hint.share >= _SURE
+        plainly = not read and settled.written.sure >= _PLAINLY  # a turn, a stop, the left lane
+        return hint.share >= (_SURER if plainly else _SURE)
 
     def _as_meant(self, hint: Hint, request: PlanRequest, begun: float) -> Plan:
         """What a hint is taken for, as a plan."""
@@ -218,11 +221,6 @@ class EmbeddedParameters:
         )
 
 
-def _read_as(settled: Settled | Plan) -> str:
-    """The kind as which the language model read a wish; empty where it declined."""
-    return "" if isinstance(settled, Plan) else kind_of(settled.linked.choice.intent) or "else"
-
-
 def _compared(request: PlanRequest) -> PlanRequest:
     """The same request with only those trips that memory found alike, which are what the model is shown."""
     return replace(request, history=History(tuple(item for item in request.history.items if item.similarity >= 0.0)))
@@ -232,9 +230,9 @@ def _parameters(speed_mps: float, look: LookAhead, route: str = "") -> Parameter
     return Parameters(round(speed_mps, 2), look.distance_m, look.ratio_s, 0, route)
 
 
-def _tells_a_speed(wish: str) -> bool:
-    """Whether words name a speed, which no hint does."""
-    return any(dimension == "speed" for dimension, _ in measured(wish))
+def _tells_an_amount(wish: str) -> bool:
+    """Whether words name a speed or a distance, which no hint does."""
+    return any(dimension in ("speed", "distance") for dimension, _ in measured(wish))
 
 
 def _parks(intent: str) -> bool:

@@ -40,8 +40,8 @@ _FADES: Final = 0.85
 _SAME_WORDS: Final = 0.6
 """From this similarity a wish counts as the same said again, and what it was told to mean holds."""
 _SAME_WEIGHT: Final = 5.0
-_READ_ALIKE: Final = 2.0
-"""How much likelier it makes a kind that the language model read the same."""
+_COUNTS: Final = 2.0
+"""What a trip adds to a kind's prior, of which nobody's history holds 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,24 +59,20 @@ class Hint:
     because: str = ""
 
 
-def hint_of(wish: str, situation: Situation, history: History, read: str = "") -> Hint | None:
+def hint_of(wish: str, situation: Situation, history: History) -> Hint | None:
     """What is likely meant here; None on roads for which nothing was learned.
 
     Args:
         wish: The words.
         situation: Where the car is, and who is around it.
         history: What memory recalled of the person.
-        read: The kind as which the language model read the words; empty where it did not.
     """
     kinds = _possible(situation)
     if not kinds:
         return None
     said = load_sorter(WEIGHTS).shares(wish, kinds)
     before = meant_before(history, situation.world)
-    weighed = {
-        kind: share * (1.0 + _weight(kind, before)) * (_READ_ALIKE if kind == read else 1.0)
-        for kind, share in said.items()
-    }
+    weighed = {kind: share * (1.0 + _COUNTS * _weight(kind, before)) for kind, share in said.items()}
     kind = max(weighed, key=lambda each: weighed[each])
     first = next(iter(said))
     decided = next((one for one in before if one.kind == kind), None) if kind != first else None
