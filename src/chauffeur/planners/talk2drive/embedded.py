@@ -106,7 +106,8 @@ class EmbeddedParameters:
             return self._as_read(settled, request, begun)
         if situation.world == "parking" and (spot := named_spot(wish)):
             return self._park(spot, request, begun)
-        hint = hint_of(wish, situation, request.history)
+        read = "" if isinstance(settled, Plan) else kind_of(settled.linked.choice.intent)
+        hint = hint_of(wish, situation, request.history, read)
         if hint is not None and self._overrules(hint, settled, wish):
             return self._as_meant(hint, request, begun)
         return self._as_read(settled, request, begun)

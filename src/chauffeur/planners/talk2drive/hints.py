@@ -43,6 +43,11 @@ _SAME_WEIGHT: Final = 5.0
 _COUNTS: Final = 2.0
 """What a trip adds to a kind's prior, of which nobody's history holds 1."""
 
+_DEEDS: Final = ("pass", "right", "faster", "slower")
+_READ_ALIKE: Final = 3.0
+"""What makes a kind likelier that the language model read the same, if that is something to do: where it reads a mood,
+or that all is to stay as it is, it has often not understood a hint."""
+
 
 @dataclass(frozen=True, slots=True)
 class Hint:
@@ -59,20 +64,24 @@ class Hint:
     because: str = ""
 
 
-def hint_of(wish: str, situation: Situation, history: History) -> Hint | None:
+def hint_of(wish: str, situation: Situation, history: History, read: str = "") -> Hint | None:
     """What is likely meant here; None on roads for which nothing was learned.
 
     Args:
         wish: The words.
         situation: Where the car is, and who is around it.
         history: What memory recalled of the person.
+        read: The kind as which the language model read the words; empty where it did not.
     """
     kinds = _possible(situation)
     if not kinds:
         return None
     said = load_sorter(WEIGHTS).shares(wish, kinds)
     before = meant_before(history, situation.world)
-    weighed = {kind: share * (1.0 + _COUNTS * _weight(kind, before)) for kind, share in said.items()}
+    weighed = {
+        kind: share * (1.0 + _COUNTS * _weight(kind, before)) * (_READ_ALIKE if kind == read in _DEEDS else 1.0)
+        for kind, share in said.items()
+    }
     kind = max(weighed, key=lambda each: weighed[each])
     first = next(iter(said))
     decided = next((one for one in before if one.kind == kind), None) if kind != first else None
