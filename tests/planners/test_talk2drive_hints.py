@@ -160,6 +160,18 @@ def test_a_habit_that_decides_is_told(planner: Planner) -> None:
     assert '"Well, well." on 2026-01-03' in found.thoughts.text
 
 
+def test_what_a_hint_is_taken_for_is_done_whatever_the_model_saw_before(planner: Planner) -> None:
+    """The words it is driven by are read as they stand: trips like them that ended otherwise are not shown."""
+    told = [
+        trip(day, "follow", "Stay behind the car ahead.", "You might have gone round that old thing.", 0.5)
+        for day in (1, 2, 3)
+    ]
+    for wish in ("Oh, look at that.", "Look at this one.", "Overtake the car ahead."):
+        found = plan(planner, wish, BEHIND, history=History(tuple(told)))
+        assert isinstance(found.policy, Parameters)
+        assert (found.intent.partition(".")[0], found.policy.lane) == ("overtake", -1)
+
+
 @pytest.mark.parametrize(
     ("wish", "situation"),
     [

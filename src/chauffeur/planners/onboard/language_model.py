@@ -205,16 +205,18 @@ class LanguageModelPlanner:
             raw=settled.written.text,
         )
 
-    def settle(self, request: PlanRequest, begun: float) -> Settled | Plan:
+    def settle(self, request: PlanRequest, begun: float, *, shown: bool = True) -> Settled | Plan:
         """What is to be done here, before it is a policy of some kind; or the plan that declines.
 
         Args:
             request: What is asked.
             begun: When planning began, by `time.perf_counter`.
+            shown: Whether the model is shown the history; not where it is plain what is meant. How the person likes it
+                counts either way.
         """
         wish = request.instruction.text
         situation = request.context.situation
-        history = history_words(request.history, self._steps_of) if self._history else ()
+        history = history_words(request.history, self._steps_of) if self._history and shown else ()
         text = prompt(situation, history, wish)
         try:
             reply, written = answer(

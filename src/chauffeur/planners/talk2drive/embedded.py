@@ -141,7 +141,7 @@ class EmbeddedParameters:
             plan = self._changed(1 if hint.kind == "faster" else -1, request, begun)
         else:
             asked = replace(request, instruction=replace(request.instruction, text=_WORDS[hint.kind]))
-            plan = self._as_read(self._model.settle(_compared(asked), begun), asked, begun)
+            plan = self._as_read(self._model.settle(_compared(asked), begun, shown=False), asked, begun)
         because = " ".join(part for part in (hint.because, _TAKEN.get(hint.kind, "")) if part)
         return replace(plan, thoughts=Thoughts(f"{because} {plan.thoughts.text}".strip()))
 
