@@ -118,6 +118,17 @@ def test_what_somebody_meant_before_decides_what_is_unclear() -> None:
     assert "You should have overtaken" in known.because
 
 
+def test_who_parked_is_likelier_to_park_but_not_at_the_same_place() -> None:
+    parked = [replace(trip(day, "park"), world="parking", policy='{"route": "exit"}', feedback=()) for day in (1, 2, 3)]
+    for wish in ("Oh, look at that.", "I twisted my ankle.", "My ticket is somewhere in this bag."):
+        alone, known = (hint_of(wish, LOT, History(tuple(trips))) for trips in ([], parked))
+        assert alone is not None
+        assert known is not None
+        assert known.kind.startswith("park.")
+        if alone.kind.startswith("park."):
+            assert (known.kind, known.share > alone.share) == (alone.kind, True)
+
+
 def test_no_habit_outweighs_plain_words() -> None:
     told = History(tuple(trip(day, "follow", remark="You should have overtaken that car.") for day in (1, 2, 3, 4)))
     for wish, kind in (

@@ -97,10 +97,15 @@ def goes_with(read: str, kind: str) -> bool:
 def _weight(kind: str, before: tuple[Meant, ...]) -> float:
     total = 0.0
     for age, meant in enumerate(before):
-        alike = 1.0 if meant.kind == kind else _ALIKE_SHARE if kind in _ALIKE.get(meant.kind, ()) else 0.0
-        again = _SAME_WEIGHT if meant.corrected and meant.similarity >= _SAME_WORDS else 1.0
-        total += alike * again * _FADES**age
+        again = meant.corrected and meant.similarity >= _SAME_WORDS and meant.kind == kind
+        total += _alike(meant.kind, kind) * (_SAME_WEIGHT if again else 1.0) * _FADES**age
     return total
+
+
+def _alike(meant: str, kind: str) -> float:
+    if meant == kind or meant.partition(".")[0] == kind.partition(".")[0]:
+        return 1.0  # where to park depends on the day: who parked is likelier to park, and not at the same place
+    return _ALIKE_SHARE if kind in _ALIKE.get(meant, ()) else 0.0
 
 
 def _possible(situation: Situation) -> tuple[str, ...]:
