@@ -46,7 +46,7 @@ class Person:
 
     def __init__(self, **options: object) -> None:
         self.said: list[Said] = []
-        starts = (Start(PLACE, PLACE.seed, most_s=600.0), Start(PLACE, PLACE.seed + 1, most_s=600.0))
+        starts = (Start(PLACE, PLACE.seed, most_s=3_600.0), Start(PLACE, PLACE.seed + 1, most_s=3_600.0))
         memory = "vault" if options.get("person") else ""
         settings = Settings(starts, planner="talk2drive", memory=memory, realtime=False)
         self.talk = Talk(settings, self.said.append, **options)  # pyright: ignore[reportArgumentType]
