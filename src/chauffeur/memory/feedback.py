@@ -18,7 +18,8 @@ from chauffeur.memory.phrases import Want, read_wants, speaks_of_the_drive
 from chauffeur.memory.remarks import Sorted, sort_remark
 from chauffeur.memory.words import even
 
-_MILD, _PLAIN, _STRONG = 0.35, 0.6, 1.0
+_MILD, PLAIN, _STRONG = 0.35, 0.6, 1.0
+"""Strength of mild, plain and strong words."""
 _MILD_WORDS = re.compile(
     r"\b(?:(?:a|the) (?:tiny |little |wee |small )?(?:bit|little|touch|tad|smidge|hair|notch|shade)|slightly|somewhat"
     r"|little bit|kind of|kinda|sort of|marginally|just a)\b"
@@ -67,10 +68,11 @@ def interpret_feedback(text: str) -> Feedback:
         cancel out. A plain complaint counts as dislike; a mild one, or a request, does not. What comes after a "but"
         decides: "fine, but a bit slow" complains, "a bit slow, but fine" does not.
     """
-    return _sorted(text, _by_phrases(text))
+    wants = read_wants(text)
+    return _sorted(text, wants, _by_phrases(text, wants))
 
 
-def _sorted(text: str, read: Feedback) -> Feedback:
+def _sorted(text: str, wants: tuple[Want, ...], read: Feedback) -> Feedback:
     """What is meant, where the phrases say nothing, or something of another kind than what the sorter is sure of.
 
     Which way something was wrong, and what praise takes back, the phrases tell better: they know negations and turns.
@@ -78,7 +80,7 @@ def _sorted(text: str, read: Feedback) -> Feedback:
     found = sort_remark(text)
     meant = _of_kind(text, found)
     if not (read.speed or read.gap or read.comfort or read.approval):
-        if read_wants(text):  # of which each takes back another
+        if wants:  # of which each takes back another
             return read
         return meant if found.share >= (_CERTAIN if speaks_of_the_drive(text) else _LIKELY) else read
     if read.approval < 0 and not (read.speed or read.gap or read.comfort):  # a dislike that need not have a reason
@@ -97,13 +99,12 @@ def _tells(read: Feedback, meant: Feedback) -> bool:
 
 def _of_kind(text: str, found: Sorted) -> Feedback:
     speed, gap, comfort, approval = _SIGNS.get(found.kind, (0, 0, 0, 0))
-    strength = _STRENGTHS.get(found.kind.partition("/")[2], _PLAIN) if speed or gap or comfort or approval < 0 else 0.0
+    strength = _STRENGTHS.get(found.kind.partition("/")[2], PLAIN) if speed or gap or comfort or approval < 0 else 0.0
     return Feedback(text, speed, gap, comfort, approval, strength)
 
 
-def _by_phrases(text: str) -> Feedback:
+def _by_phrases(text: str, wants: tuple[Want, ...]) -> Feedback:
     """What the phrases say that the book holds."""
-    wants = read_wants(text)
     opinions = [want for want in wants if want.topic == "approval"]
     deciding = _deciding(opinions)
     praised = any(want.sign > 0 for want in deciding)
@@ -119,7 +120,7 @@ def _by_phrases(text: str) -> Feedback:
     }
     telling = [want for want in about if signs.get(want.topic, 0)]
     strength = max((_strength(want) for want in telling), default=0.0)
-    complained = any(want.manner not in ("request", "plea") and _strength(want) >= _PLAIN for want in telling)
+    complained = any(want.manner not in ("request", "plea") and _strength(want) >= PLAIN for want in telling)
 
     approval: Literal[-1, 0, 1] = 0
     if praised and not blamed and not telling:
@@ -127,7 +128,7 @@ def _by_phrases(text: str) -> Feedback:
     elif (blamed and not praised) or (complained and not praised):
         approval = -1
     if approval < 0 and not telling:
-        strength = _PLAIN
+        strength = PLAIN
     return Feedback(text, signs["speed"], signs["gap"], signs["comfort"], approval, strength)
 
 
@@ -163,4 +164,4 @@ def _strength(want: Want) -> float:
     words = even(want.clause)
     if _MILD_WORDS.search(words):
         return _MILD
-    return _STRONG if _STRONG_WORDS.search(words) else _PLAIN
+    return _STRONG if _STRONG_WORDS.search(words) else PLAIN

@@ -58,15 +58,15 @@ def make_sorters(folder: Path, recipe: Recipe, told: Told, *, measured: bool = F
     """
     folder.mkdir(parents=True, exist_ok=True)
     found: dict[Name, tuple[Sequence[Sentence], Figures]] = {}
+    tables = drawn(recipe.seed)
     for name in NAMES:
         own, kinds = sentences(name), kinds_of(name)
-        beside = drawn(recipe.seed) if name == "wishes" else ()
-        sorter = train((*own, *beside), kinds, recipe, _percent(name, told))
+        sorter = train((*own, *(tables if name == "wishes" else ())), kinds, recipe, _percent(name, told))
         write(sorter, folder / f"{name}.npz")
         hits = by_writer(own, kinds, recipe, _percent(f"{name} without a writer", told)) if measured else None
         found[name] = own, _figures(own, right(sorter, own), hits)
     card = folder / "CARD.md"
-    publish(card, _card(found, recipe).encode(), "card")
+    publish(card, _card(found, recipe, len(tables)).encode(), "card")
     return card
 
 
@@ -83,8 +83,8 @@ def _figures(own: Sequence[Sentence], learned: np.ndarray[Any, Any], hits: np.nd
     return Figures(float(learned.mean()), float(hits.mean()), by_kind)
 
 
-def _card(found: dict[Name, tuple[Sequence[Sentence], Figures]], recipe: Recipe) -> str:
-    parts = [_HEAD.format(version=VERSION, seed=recipe.seed, epochs=recipe.epochs, tables=len(drawn(recipe.seed)))]
+def _card(found: dict[Name, tuple[Sequence[Sentence], Figures]], recipe: Recipe, tables: int) -> str:
+    parts = [_HEAD.format(version=VERSION, seed=recipe.seed, epochs=recipe.epochs, tables=tables)]
     for name, (own, figures) in found.items():
         text = resources.files(PACKAGE).joinpath(f"{name}.tsv").read_bytes()
         writers = len({one.writer for one in own})

@@ -108,18 +108,17 @@ class EmbeddedParameters:
             return self._park(spot, request, begun)
         read = "" if isinstance(settled, Plan) else kind_of(settled.linked.choice.intent)
         hint = hint_of(wish, situation, request.history, read)
-        if hint is not None and self._overrules(hint, settled, wish):
+        if hint is not None and self._overrules(hint, settled, read, wish):
             return self._as_meant(hint, request, begun)
         return self._as_read(settled, request, begun)
 
-    def _overrules(self, hint: Hint, settled: Settled | Plan, wish: str) -> bool:
+    def _overrules(self, hint: Hint, settled: Settled | Plan, read: str, wish: str) -> bool:
         """Whether what words hint at counts for more than how they were read."""
         if hint.kind == "else" or _tells_an_amount(wish):
             return False
         if isinstance(settled, Plan):
             sure = _SURER if _forbidden(settled) and hint.kind in _BRISK else _SURE
             return hint.kind != "none" and hint.share >= sure
-        read = kind_of(settled.linked.choice.intent)
         if goes_with(read, hint.kind):
             return hint.kind == "go"  # read alike, it is still to be driven without dawdling
         if hint.kind == "pass" and read == "stay" and _PASSING & negated(wish):

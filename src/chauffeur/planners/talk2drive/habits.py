@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from chauffeur.concept import Feedback, History, HistoryItem
+from chauffeur.memory.feedback import PLAIN
 from chauffeur.memory.remarks import sort_remark
 
 SIGN_SETTING: Final = "speed_limit_mps"
@@ -70,8 +71,6 @@ _DID: Final[tuple[tuple[str, str], ...]] = (
     ("turn.straight", "go"),
 )
 """What was done, by the beginning of its intent."""
-_PLAIN: Final = 0.6
-"""Strength of a complaint that is not a mild one."""
 _SURE: Final = 0.4
 """From this share a remark is taken for what it was sorted as."""
 
@@ -144,7 +143,7 @@ def _meant(item: HistoryItem) -> Meant | None:
 
 def _taken_wrongly(done: str, said: Feedback) -> bool:
     """Whether a plain complaint of the pace says that its change went the wrong way."""
-    return said.strength >= _PLAIN and ((done == "slower" and said.speed > 0) or (done == "faster" and said.speed < 0))
+    return said.strength >= PLAIN and ((done == "slower" and said.speed > 0) or (done == "faster" and said.speed < 0))
 
 
 def pace_of(history: History, world: str, intent: str, chosen_share: float) -> Pace | None:

@@ -103,7 +103,7 @@ def _weight(kind: str, before: tuple[Meant, ...]) -> float:
 
 
 def _alike(meant: str, kind: str) -> float:
-    if meant == kind or meant.partition(".")[0] == kind.partition(".")[0]:
+    if meant.partition(".")[0] == kind.partition(".")[0]:
         return 1.0  # where to park depends on the day: who parked is likelier to park, and not at the same place
     return _ALIKE_SHARE if kind in _ALIKE.get(meant, ()) else 0.0
 
