@@ -1,4 +1,4 @@
-"""The exchangeable parts a command line can name: planner, limits, referee."""
+"""The exchangeable parts a command line can name: planner, limits, speech engine, referee."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, Parameters, 
 if TYPE_CHECKING:
     from chauffeur.describe.services.sources import SourceSettings
     from chauffeur.drive.episode import Referee
+    from chauffeur.drive.talk.hearing import Engine
     from chauffeur.planners.base import Planner
     from chauffeur.planners.prompts import Setting
     from chauffeur.worlds.base import World
@@ -43,6 +44,21 @@ def planner_named(spec: str, base_url: str | None, on_text: Callable[[str, int],
     if on_text is not None and takes_option(spec, "on_text"):
         options["on_text"] = on_text
     return make_planner(spec, **options)
+
+
+def engine_named(spec: str) -> Engine | None:
+    """The speech engine a specification names; None for `none`.
+
+    Raises:
+        ConfigError: There is no such engine.
+    """
+    from chauffeur.drive.talk.hearing import Engine
+    from chauffeur.speech.engines import ENGINES
+
+    name, _, model = spec.strip().partition("/")
+    if name not in (*ENGINES, "none"):
+        raise ConfigError(f"Unknown speech engine {spec!r}.", hint=f"Known: {', '.join(ENGINES)}, none.")
+    return Engine(name, model, favoured=True) if name != "none" else None
 
 
 def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:

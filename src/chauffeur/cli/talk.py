@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 if TYPE_CHECKING:
-    from chauffeur.drive.talk.hearing import Engine
     from chauffeur.hmi.cabin import Cabin
 
 EXAMPLES = """
@@ -26,7 +25,8 @@ Examples:
     chauffeur talk --scenario intersection --audit trips/talk.jsonl < wishes.txt
 
 Type a wish and Enter; `!too fast` is an opinion, `take over` and `give back` are the wheel, `help` tells the rest.
-`stop` or Ctrl-C brings the car to a stand and ends, a second Ctrl-C ends at once. Every drive is simulated.
+`stop` or Ctrl-C brings the car to a stand and ends, a second Ctrl-C ends at once. Every drive is simulated. To a real
+vehicle one talks with `chauffeur vehicle drive vehicle.toml --microphone`.
 """
 
 STOPPED_WITH_CTRL_C: Final = 130
@@ -64,7 +64,7 @@ def talk(
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.interrupts import Interrupts
     from chauffeur.cli.lines import Lines, standard_input
-    from chauffeur.cli.parts import not_kept, planner_named
+    from chauffeur.cli.parts import engine_named, not_kept, planner_named
     from chauffeur.cli.talk_drive import TalkDrive
     from chauffeur.cli.talk_screen import TalkScreen
     from chauffeur.concept import Limits, PersonId, SandboxError
@@ -92,7 +92,8 @@ def talk(
     )
     if who:
         open_memory()  # one that cannot be had is refused here
-    ear = _engine_named(engine, wanted=microphone or page)
+    named = engine_named(engine)  # an unknown one is refused also where nobody listens
+    ear = named if microphone or page else None
     console = stdout()
     screen = TalkScreen(console)
     books = None
@@ -127,22 +128,6 @@ def talk(
         raise typer.Exit(STOPPED_WITH_CTRL_C)
     if session.outcome not in WELL or (closing is not None and not closing.complete):
         raise typer.Exit(FAILED)
-
-
-def _engine_named(spec: str, *, wanted: bool) -> Engine | None:
-    """The speech engine a specification names; None where nobody listens.
-
-    Raises:
-        ConfigError: There is no such engine.
-    """
-    from chauffeur.concept import ConfigError
-    from chauffeur.drive.talk.hearing import Engine
-    from chauffeur.speech.engines import ENGINES
-
-    name, _, model = spec.strip().partition("/")
-    if name not in (*ENGINES, "none"):
-        raise ConfigError(f"Unknown speech engine {spec!r}.", hint=f"Known: {', '.join(ENGINES)}, none.")
-    return Engine(name, model, favoured=True) if wanted and name != "none" else None
 
 
 def _cabin() -> Cabin:

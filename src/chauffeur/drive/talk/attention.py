@@ -32,6 +32,11 @@ class _Question:
     heard: Heard
     until_s: float
 
+    @property
+    def dropped(self) -> str:
+        """That it was not meant, in words."""
+        return f"“{self.heard.text}” is not {'kept' if self.heard.hotword == 'evaluate' else 'driven'}."
+
 
 class Attention:
     """Listens for one session."""
@@ -116,7 +121,7 @@ class Attention:
                 case HeardAt():
                     self._understand(news)
         if self._question is not None and time.monotonic() > self._question.until_s:
-            self.withdraw(f"Nobody said yes: “{self._question.heard.text}” is not driven.")
+            self.withdraw(f"Nobody said yes: {self._question.dropped}")
 
     def confirm(self, yes: bool, answer: Words) -> None:
         """Yes or no to what was heard; nothing where nothing was asked.
@@ -128,7 +133,7 @@ class Attention:
         question = self._question
         if question is None:
             return
-        self.withdraw("" if yes else f"“{question.heard.text}” is not driven.")
+        self.withdraw("" if yes else question.dropped)
         if yes:
             words = replace(answer, text=question.heard.text, spoken=True)
             self._act(question.heard.hotword or "command", words)

@@ -1,0 +1,87 @@
+"""What is typed and said to a vehicle during `chauffeur vehicle drive`, handed to its session."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import AsyncGenerator, Coroutine
+from typing import Final
+
+from chauffeur.cli.lines import Lines, standard_input
+from chauffeur.cli.vehicle_screen import VehicleScreen
+from chauffeur.drive.onroad import OnRoad
+from chauffeur.drive.onroad.spoken import listening
+from chauffeur.drive.talk.asking import Words
+from chauffeur.drive.talk.attention import Attention
+from chauffeur.drive.talk.hearing import Engine
+from chauffeur.drive.talk.sound import Sound
+from chauffeur.drive.talk.voice import Voice
+from chauffeur.speech.answers import answer_in
+
+_EVALUATE: Final = "evaluate"
+_END: Final = ("end", "quit", "exit")
+_LISTEN_S: Final = 0.2
+
+
+class Desk:
+    """Takes what is typed and said to a session."""
+
+    def __init__(self, road: OnRoad, screen: VehicleScreen) -> None:
+        self._road, self._screen = road, screen
+        self._running: set[asyncio.Task[None]] = set()
+        self._attention: Attention | None = None
+
+    @contextlib.asynccontextmanager
+    async def open(self, engine: Engine | None, sound: Sound | None, voice: Voice | None) -> AsyncGenerator[Desk]:
+        """Listen as long as this is entered, if there is an engine; wishes that were taken are answered at the end."""
+        async with contextlib.AsyncExitStack() as stack:
+            if engine is not None:
+                self._attention = Attention(engine, sound, voice, self._screen.hear, self._spoken)
+                await stack.enter_async_context(listening(self._attention, self._screen.trouble))
+                self._screen.listens(self._attention.engine)
+            yield self
+            await asyncio.gather(*self._running)
+
+    async def take(self, line: str, spoken: Words | None = None) -> None:
+        """One line: a wish, or what the person says of the drive."""
+        first, _, rest = line.strip().partition(" ")
+        if first.lower().rstrip(":,") == _EVALUATE:
+            self._screen.answer(await self._road.evaluate(rest), spoken)
+        else:
+            source = "text" if spoken is None else "speech"
+            self._screen.answer(await self._road.ask(line, source=source), spoken)
+
+    async def read(self) -> None:
+        """Lines of standard input: what is typed is meant now, what a file holds is meant in its turn. While somebody
+        listens, a file that ends ends nothing."""
+        with Lines(standard_input()) as lines:
+            if lines.terminal:
+                self._screen.say("Type a wish and press Enter. `stop`, `evaluate ...`, `end`.", style="dim")
+            while lines.open or (self._attention is not None and not lines.terminal):
+                for line in await asyncio.to_thread(lines.read, _LISTEN_S):
+                    if line.strip().lower() in _END:
+                        return
+                    if not line.strip() or self._answered(line):
+                        continue
+                    task = self._start(self.take(line))
+                    if not lines.terminal:
+                        await task
+
+    def _answered(self, line: str) -> bool:
+        """Whether a line was yes or no to what was heard."""
+        answer = None if self._attention is None or self._attention.question is None else answer_in(line)
+        if answer is None or self._attention is None:
+            return False
+        self._attention.confirm(answer, Words(line, ended_s=time.monotonic()))
+        return True
+
+    def _spoken(self, hotword: str, words: Words) -> None:
+        line = f"{_EVALUATE} {words.text}" if hotword == _EVALUATE else words.text
+        self._start(self.take(line, words))
+
+    def _start(self, taking: Coroutine[object, object, None]) -> asyncio.Task[None]:
+        task = asyncio.get_running_loop().create_task(taking)
+        self._running.add(task)
+        task.add_done_callback(self._running.discard)
+        return task
