@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 from string import Formatter
 from typing import Final, get_args
 
@@ -12,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from chauffeur.bench.personalization import sayings
 from chauffeur.bench.personalization.population import Passenger, draw_passengers
 from chauffeur.bench.personalization.sayings import (
     FEEDBACK,
@@ -28,7 +30,7 @@ from chauffeur.bench.personalization.sayings import (
 from chauffeur.bench.personalization.scenes import AIMS, TASKS
 from chauffeur.bench.personalization.takeover import Mood, aim_of, judge, wanted_mps
 from chauffeur.bench.personalization.traces import Trace
-from chauffeur.concept import ConfigError
+from chauffeur.concept import ConfigError, DataError
 from chauffeur.memory.feedback import interpret_feedback
 
 ANA = Passenger(
@@ -76,11 +78,22 @@ def plain(text: str) -> str:
     return " ".join(re.findall(r"\w+", text.casefold()))
 
 
-def test_every_aim_has_ten_wordings_at_every_level_in_both_halves() -> None:
+def test_every_aim_has_ten_wordings_at_every_level_and_more_where_figures_are_reported() -> None:
     wanted: list[tuple[Aim, Level]] = [(aim, level) for task in TASKS for aim in AIMS[task] for level in LEVELS]
     for half in HALVES:
         assert set(WISHES[half]) == set(wanted)
-        assert [len(wishes_of(aim, level, half)) for aim, level in wanted] == [10] * len(wanted)
+    assert [len(wishes_of(aim, level, "tuning")) for aim, level in wanted] == [10] * len(wanted)
+    assert min(len(wishes_of(aim, level, "test")) for aim, level in wanted) >= 37
+
+
+@pytest.mark.parametrize("line", ["wish\tfly/I\tUp.\ta", "wish\tgo/IV\tGo.\ta", "wish\tgo/I\tGo.", "say\tgo/I\tGo.\ta"])
+def test_a_line_that_is_none_is_told_without_its_words(
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "test.tsv").write_text(f"wish\tgo/I\tGo on.\ta\n{line}\n")
+    monkeypatch.setattr(sayings.resources, "files", lambda _: tmp_path)
+    with pytest.raises(DataError, match=r"^Line 2 of test\.tsv is no sentence with its aim and writer\.$"):
+        sayings._texts("test", "wish")
 
 
 def test_no_sentence_is_said_twice_in_a_half_or_across_halves() -> None:

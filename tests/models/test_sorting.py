@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from chauffeur.bench.personalization import sayings_test
+from chauffeur.bench.personalization.sayings import FEEDBACK, WISHES
 from chauffeur.cli.main import app
 from chauffeur.concept import DataError
 from chauffeur.language.sorter import load_sorter
@@ -54,7 +54,7 @@ def test_no_sentence_is_one_that_figures_are_reported_on() -> None:
     def bare(text: str) -> tuple[str, ...]:
         return tuple(token for token in tokens_of(text) if token.isalnum())
 
-    tables_reported = (*sayings_test.WISHES.values(), *sayings_test.FEEDBACK.values())
+    tables_reported = (*WISHES["test"].values(), *FEEDBACK["test"].values())
     reported = {bare(text) for texts in tables_reported for text in texts}
     for name in pipeline.NAMES:
         assert not sum(bare(one.text) in reported for one in sentences(name))

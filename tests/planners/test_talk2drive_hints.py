@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import pytest
@@ -27,6 +28,7 @@ from chauffeur.planners.onboard.moods import mood_of, pace_complaint
 from chauffeur.planners.onboard.patterns import said
 from chauffeur.planners.onboard.words.files import ONBOARD, words_file
 from chauffeur.planners.registry import make_planner
+from chauffeur.planners.talk2drive import hints
 from chauffeur.planners.talk2drive.hints import HINT_KINDS, hint_of
 from chauffeur.planners.talk2drive.lanes import eased_mps, fitting_mps
 
@@ -88,6 +90,37 @@ def test_a_hint_is_sorted_where_it_is_said(wish: str, situation: Situation, kind
     assert found.kind == kind
     assert 0.0 < found.share <= 1.0
     assert not found.because
+
+
+class Told:
+    """A sorter that is sure of what it was told."""
+
+    def __init__(self, **shares: float) -> None:
+        self.told = shares
+
+    def shares(self, text: str, among: Collection[str]) -> Mapping[str, float]:
+        assert text
+        return {kind: self.told.get(kind, 0.0) for kind in sorted(among, key=lambda one: -self.told.get(one, 0.0))}
+
+
+@pytest.mark.parametrize(
+    ("situation", "shares", "kind", "share"),
+    [
+        (BEHIND, {"stay": 0.36, "pass": 0.3, "hurry": 0.2, "faster": 0.1, "none": 0.04}, "pass", 0.6),
+        (BEHIND, {"none": 0.4, "stay": 0.3, "calm": 0.2, "right": 0.1}, "stay", 0.6),
+        (BEHIND, {"none": 0.4, "stay": 0.3, "pass": 0.3}, "none", 0.4),
+        (LEFT, {"faster": 0.4, "right": 0.35, "slower": 0.25}, "right", 0.6),
+        (CROSSING, {"yield": 0.4, "go": 0.3, "hurry": 0.3}, "go", 0.6),
+        (LOT, {"park.exit": 0.4, "faster": 0.35, "slower": 0.25}, "park.exit", 0.4),
+    ],
+)
+def test_what_speaks_for_the_same_counts_together(
+    situation: Situation, shares: dict[str, float], kind: str, share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hints, "load_sorter", lambda _: Told(**shares))
+    found = hint_of("Hm.", situation, History())
+    assert found is not None
+    assert (found.kind, found.share) == (kind, pytest.approx(share))
 
 
 def test_nothing_is_meant_that_cannot_be_done_here() -> None:

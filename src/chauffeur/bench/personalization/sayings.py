@@ -1,9 +1,11 @@
 """What the simulated passengers say: wishes at three levels of directness (seed Tab. VII), and feedback on a drive.
 
-The words are two halves of the same shape, and no planner is trained on either. `tuning` was written by the authors of
-the planner and may be looked at while a planner is improved. `test` is what figures are reported on: it was written
-afterwards by a writer (a large language model) who had not seen the planner nor, but for a few sentences
-(`sayings_test` says which), the tuning half, and was never looked at while the planner was improved.
+The words are two halves of the same shape, tables in `words/` with a sentence a line: what it is, for what, the
+sentence, its writer. `tuning` was written by the authors of the planner and may be looked at while a planner is
+improved, or trained. `test` is what figures are reported on, and no planner is trained on it. It was written by large
+language models that were given the aims, levels, topics and situations and had seen neither the planner nor the tuning
+half, but for the ten direct wishes to overtake and a few sentences more, which writer b met. It was never looked at
+while the planner was improved: whoever does makes it a tuning half.
 
 Level I asks directly; level II comments on what the car does, or on the road; level III only hints at how the passenger
 is or what awaits them.
@@ -12,9 +14,10 @@ is or what awaits them.
 from __future__ import annotations
 
 import hashlib
-from typing import Final, Literal
+from importlib import resources
+from typing import Any, Final, Literal, get_args
 
-from chauffeur.bench.personalization import sayings_test, sayings_tuning
+from chauffeur.concept import DataError
 
 Level = Literal["I", "II", "III"]
 Half = Literal["test", "tuning"]
@@ -33,13 +36,33 @@ Topic = Literal[
 """What a passenger has to say of a drive."""
 Force = Literal["bit", "plain", "much"]
 
+_PACKAGE: Final = "chauffeur.bench.personalization.words"
+
+
+def _texts(half: Half, kind: Literal["wish", "feedback"]) -> dict[Any, tuple[str, ...]]:
+    """Sentences of a half by what they are for and how they put it, in the table's order."""
+    found: dict[tuple[str, str], tuple[str, ...]] = {}
+    text = resources.files(_PACKAGE).joinpath(f"{half}.tsv").read_text(encoding="utf-8")
+    for number, line in enumerate(text.splitlines(), start=1):
+        what, _, rest = line.partition("\t")
+        label, _, rest = rest.partition("\t")
+        sentence, _, writer = rest.partition("\t")
+        name, _, how = label.partition("/")
+        names, hows = (Aim, Level) if what == "wish" else (Topic, Force)
+        if what not in ("wish", "feedback") or name not in get_args(names) or how not in get_args(hows) or not writer:
+            raise DataError(f"Line {number} of {half}.tsv is no sentence with its aim and writer.")  # not what it says
+        if what == kind:
+            found[name, how] = (*found.get((name, how), ()), sentence)
+    return found
+
+
 WISHES: Final[dict[Half, dict[tuple[Aim, Level], tuple[str, ...]]]] = {
-    "test": sayings_test.WISHES,
-    "tuning": sayings_tuning.WISHES,
+    "test": _texts("test", "wish"),
+    "tuning": _texts("tuning", "wish"),
 }
 FEEDBACK: Final[dict[Half, dict[tuple[Topic, Force], tuple[str, ...]]]] = {
-    "test": sayings_test.FEEDBACK,
-    "tuning": sayings_tuning.FEEDBACK,
+    "test": _texts("test", "feedback"),
+    "tuning": _texts("tuning", "feedback"),
 }
 PLACE_WORDS: Final[dict[str, str]] = {
     "nearest": "in the nearest free spot",

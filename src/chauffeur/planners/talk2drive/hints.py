@@ -27,6 +27,13 @@ HINT_KINDS: Final[Mapping[str, tuple[str, ...]]] = {
 """What can be meant, by world. `none`: nothing that is for the driver; `else`: a wish of another kind, which has to be
 read word by word."""
 
+_SIDES: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
+    "highway": (("pass", "hurry", "faster"), ("stay", "right", "calm", "slower")),
+    "intersection": (("go", "hurry"), ("yield", "calm")),
+}
+"""Kinds that speak for one another: who may be in a hurry, or after more speed, or past the car ahead, is not after
+calm, however the likelihood of the first is split."""
+
 _ALIKE: Final = {
     "pass": ("hurry", "faster"), "hurry": ("pass", "faster", "go"), "faster": ("hurry",), "go": ("hurry",),
     "stay": ("calm",), "calm": ("stay", "right", "slower", "yield"), "right": ("calm",), "slower": ("calm",),
@@ -55,7 +62,7 @@ class Hint:
 
     Attributes:
         kind: One of the world's HINT_KINDS.
-        share: How likely it is that, 0..1, with what the person meant before.
+        share: How likely it is that or what speaks for it, 0..1, with what the person meant before.
         because: The trip that decided, a full sentence; empty where the words alone say it.
     """
 
@@ -82,10 +89,22 @@ def hint_of(wish: str, situation: Situation, history: History, read: str = "") -
         kind: share * (1.0 + _COUNTS * _weight(kind, before)) * (_READ_ALIKE if kind == read in _DEEDS else 1.0)
         for kind, share in said.items()
     }
-    kind = max(weighed, key=lambda each: weighed[each])
-    first = next(iter(said))
+    kind, share = _likeliest(weighed, situation.world)
+    first, _ = _likeliest(said, situation.world)
     decided = next((one for one in before if one.kind == kind), None) if kind != first else None
-    return Hint(kind, weighed[kind] / math.fsum(weighed.values()), decided.because if decided is not None else "")
+    return Hint(kind, share, decided.because if decided is not None else "")
+
+
+def _likeliest(shares: Mapping[str, float], world: str) -> tuple[str, float]:
+    """The likeliest kind of the likeliest side, and the share of that side in all."""
+    sides = _SIDES.get(world, ())
+    on_sides = [kind for side in sides for kind in side]
+    likely = {
+        side: math.fsum(shares.get(kind, 0.0) for kind in side)
+        for side in (*sides, *((kind,) for kind in shares if kind not in on_sides))
+    }
+    side = max(likely, key=lambda each: likely[each])
+    return max(side, key=lambda kind: shares.get(kind, 0.0)), likely[side] / math.fsum(shares.values())
 
 
 def goes_with(read: str, kind: str) -> bool:

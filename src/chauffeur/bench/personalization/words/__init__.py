@@ -1,0 +1,1 @@
+"""Tables of what simulated passengers say."""
