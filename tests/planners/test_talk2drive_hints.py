@@ -107,8 +107,8 @@ class Told:
     ("situation", "shares", "kind", "share"),
     [
         (BEHIND, {"stay": 0.36, "pass": 0.3, "hurry": 0.2, "faster": 0.1, "none": 0.04}, "pass", 0.6),
-        (BEHIND, {"none": 0.4, "stay": 0.3, "calm": 0.2, "right": 0.1}, "stay", 0.6),
-        (BEHIND, {"none": 0.4, "stay": 0.3, "pass": 0.3}, "none", 0.4),
+        (BEHIND, {"none": 0.28, "stay": 0.32, "calm": 0.2, "right": 0.2}, "stay", 0.72),
+        (BEHIND, {"none": 0.4, "stay": 0.3, "calm": 0.2, "pass": 0.1}, "none", 0.4),
         (LEFT, {"faster": 0.4, "right": 0.35, "slower": 0.25}, "right", 0.6),
         (CROSSING, {"yield": 0.4, "go": 0.3, "hurry": 0.3}, "go", 0.6),
         (LOT, {"park.exit": 0.4, "faster": 0.35, "slower": 0.25}, "park.exit", 0.4),

@@ -40,7 +40,7 @@ from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.base import Planner
 from chauffeur.planners.talk2drive.recent import RecentToo
 
-BENCH_VERSION: Final = "personalization-v2"
+BENCH_VERSION: Final = "personalization-v3"
 
 Arm = Literal["keyword", "keyword-fair", "without", "with", "ideal"]
 ARMS: Final[tuple[Arm, ...]] = ("keyword", "keyword-fair", "without", "with", "ideal")

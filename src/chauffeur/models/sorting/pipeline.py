@@ -25,7 +25,7 @@ from chauffeur.models.sorting.training import Recipe, by_writer, right, train, w
 Told = Callable[[str, int, int], None]
 """Is told a stage, how much of it is done, and of how much."""
 
-VERSION: Final = "sorters-v1"
+VERSION: Final = "sorters-v2"
 NAMES: Final[tuple[Name, ...]] = ("wishes", "remarks")
 
 
@@ -51,7 +51,7 @@ def make_sorters(folder: Path, recipe: Recipe, told: Told, *, measured: bool = F
         folder: Where to.
         recipe: How; its seed draws the tables' sentences too.
         told: Is told how far it is.
-        measured: Whether sorters are also trained without each writer in turn, to see how they sort that writer's.
+        measured: Whether sorters are also trained without a fifth of the writers in turn, to see how they sort those.
 
     Raises:
         StorageError, DataError: The folder cannot be written.
@@ -114,10 +114,11 @@ and parts of words; int8 weights, {epochs} epochs, seed {seed}. `chauffeur train
 again from the tables in `chauffeur/models/sorting/words`.
 
 - **Data**: written for this repository by writers (large language models) who were told the situation and what a
-  passenger has in mind, and nothing of the planner, its tables, or the words it is measured on; two tables are older
-  development data, of which one (writer k) is the tuning half of the simulated passengers. Nobody's own words are in
-  it. To the wishes, sentences of the on-board model's tables are added ({tables:,}), half of them of kinds no hint is
-  sorted as. One label a sentence: what is vague by nature has the label it was written for.
+  passenger has in mind, and nothing of the planner, its tables, or the words it is measured on; three writers are the
+  planner's developers: j and k (the tuning half of the simulated passengers) with older development data, bb with plain
+  sentences that had been misread. Nobody's own words are in it. To the wishes, sentences of the on-board model's tables
+  are added ({tables:,}), half of them of kinds no hint is sorted as. One label a sentence: what is vague by nature has the
+  label it was written for.
 - **Meant for** reading hints behind the refusal of dangerous wishes, and before all checks: a hint becomes an ordinary
   wish, never more. Feedback that known phrases read is left as they read it, but where this is sure of another thing.
 - **Not for** other languages, longer texts, roads other than highways, junctions and parking lots, or deciding anything

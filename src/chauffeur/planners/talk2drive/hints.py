@@ -34,6 +34,10 @@ _SIDES: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
 """Kinds that speak for one another: who may be in a hurry, or after more speed, or past the car ahead, is not after
 calm, however the likelihood of the first is split."""
 
+_WANTS_NOTHING: Final = 2.0
+"""How much more `none` counts against whole sides: it has nothing that speaks for it, and who chats is to be left in
+peace."""
+
 _ALIKE: Final = {
     "pass": ("hurry", "faster"), "hurry": ("pass", "faster", "go"), "faster": ("hurry",), "go": ("hurry",),
     "stay": ("calm",), "calm": ("stay", "right", "slower", "yield"), "right": ("calm",), "slower": ("calm",),
@@ -103,7 +107,8 @@ def _likeliest(shares: Mapping[str, float], world: str) -> tuple[str, float]:
         side: math.fsum(shares.get(kind, 0.0) for kind in side)
         for side in (*sides, *((kind,) for kind in shares if kind not in on_sides))
     }
-    side = max(likely, key=lambda each: likely[each])
+    nothing = _WANTS_NOTHING if sides else 1.0
+    side = max(likely, key=lambda each: likely[each] * (nothing if each == ("none",) else 1.0))
     return max(side, key=lambda kind: shares.get(kind, 0.0)), likely[side] / math.fsum(shares.values())
 
 
