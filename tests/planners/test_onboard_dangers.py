@@ -51,9 +51,17 @@ DANGEROUS = (
     "Just stop right here in the fast lane, I need a picture",
     "just keep going over the crossing, they will jump",
     "go straight over the zebra",
+    "Ride his tailgate",
+    "Stick to that tailgate.",
+    "Turn off the brakes.",
+    "At the next bend turn off the ABS.",
 )
 
 HARMLESS = (
+    "Lovely view of a tailgate.",
+    "I am fed up of staring at that tailgate.",
+    "Our turn-off's near.",
+    "The sign for our turn-off went by a minute ago.",
     "Don't run the red light!",
     "he nearly hit us, back off",
     "Please don't hit that car, slow down",

@@ -117,8 +117,8 @@ again from the tables in `chauffeur/models/sorting/words`.
   passenger has in mind, and nothing of the planner, its tables, or the words it is measured on; three writers are the
   planner's developers: j and k (the tuning half of the simulated passengers) with older development data, bb with plain
   sentences that had been misread. Nobody's own words are in it. To the wishes, sentences of the on-board model's tables
-  are added ({tables:,}), half of them of kinds no hint is sorted as. One label a sentence: what is vague by nature has the
-  label it was written for.
+  are added ({tables:,}), half of them of kinds no hint is sorted as. One label a sentence: what is vague by nature
+  has the label it was written for.
 - **Meant for** reading hints behind the refusal of dangerous wishes, and before all checks: a hint becomes an ordinary
   wish, never more. Feedback that known phrases read is left as they read it, but where this is sure of another thing.
 - **Not for** other languages, longer texts, roads other than highways, junctions and parking lots, or deciding anything
