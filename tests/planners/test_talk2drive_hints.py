@@ -311,7 +311,7 @@ def test_speeds_that_words_leave_open() -> None:
     assert fitting_mps(30.0, "overtake.left", BEHIND, Limits()) == pytest.approx(29.4)
     assert fitting_mps(30.0, "overtake.left", LEFT, Limits()) == 30.0
     assert fitting_mps(22.0, "follow", BEHIND, Limits()) == pytest.approx(24.0)
-    assert fitting_mps(28.0, "lane.right", LEFT, Limits()) == pytest.approx(24.9)
+    assert fitting_mps(28.0, "lane.right", LEFT, Limits()) == pytest.approx(25.5)
     assert fitting_mps(24.0, "lane.right", LEFT, Limits()) == 24.0
     assert fitting_mps(28.0, "lane.left", LEFT, Limits()) == 28.0
     assert fitting_mps(22.0, "follow", LEFT, Limits()) == 22.0

@@ -80,9 +80,9 @@ def passing_mps(situation: Situation, wanted_mps: float, leaning_mps: float = 0.
 def fitting_mps(speed_mps: float, intent: str, situation: Situation, limits: Limits, leaning_mps: float = 0.0) -> float:
     """A speed that was chosen for a highway, made fit for where we are, m/s.
 
-    Who is in a hurry drives close to the limit, who leaves for the right lane, asked to or at ease, a little below it.
-    At ease elsewhere, four fifths of it are enough; behind somebody, whom the cruise control follows in any case, that
-    is what the car goes up to when they go on. In a lot speeds are small, and so are the steps between them.
+    Who is in a hurry drives close to the limit, who leaves for the right lane a little below it. At ease, four fifths
+    of it are enough; behind somebody, whom the cruise control follows in any case, that is what the car goes up to when
+    they go on. In a lot speeds are small, and so are the steps between them.
 
     Args:
         speed_mps: As it was chosen.
@@ -97,19 +97,17 @@ def fitting_mps(speed_mps: float, intent: str, situation: Situation, limits: Lim
     if situation.world != "highway" or not speed_mps:
         return speed_mps
     brisk, calm = BRISK_SHARE * sign + leaning_mps, CALM_SHARE * sign + leaning_mps
-    right = max(RIGHT_SHARE * sign + leaning_mps, 0.0)
     if intent.startswith(_HURRIES):
         return min(max(speed_mps, brisk), max(speed_mps, sign))
     if intent.startswith("overtake") and situation.front is not None:
         return min(speed_mps, max(brisk, situation.front.speed_mps + _PASSES_BY_MPS))
     if intent.startswith(_EASES):
-        if mood_lane(intent, situation):
-            return right if now > RIGHT_SHARE * sign else min(speed_mps, now)
-        return calm if follows(situation) or now > CALM_SHARE * sign else min(speed_mps, now)
+        keeps_behind = follows(situation) and mood_lane(intent, situation) == 0
+        return calm if keeps_behind or now > CALM_SHARE * sign else min(speed_mps, now)
     if intent.startswith(_STAYS) and follows(situation):
         return max(speed_mps, calm)
     if intent == "lane.right":
-        return min(speed_mps, right)
+        return min(speed_mps, max(RIGHT_SHARE * sign + leaning_mps, 0.0))
     return speed_mps
 
 

@@ -35,7 +35,7 @@ LOOK_AHEAD: Final[dict[Manner, LookAhead]] = {
 LOOK_AHEAD_PARKING: Final = LookAhead(4.0, 1.0)
 BRISK_SHARE: Final = 0.98
 CALM_SHARE: Final = 0.8
-RIGHT_SHARE: Final = 0.83
+RIGHT_SHARE: Final = 0.85
 LOT_SHARE: Final = 0.75
 """Speeds as shares of the limit where words name none: in a hurry, at ease, at most in the right lane, and in a lot.
 Chosen by trips of simulated passengers (`bench personalization --words tuning`, `benchmarks/personalization_floor.py`).
