@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import queue
 import shutil
@@ -17,6 +18,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chauffeur.cli import vehicle_desk
+from chauffeur.cli.vehicle_desk import Desk
+from chauffeur.drive.talk.hearing import Engine
 from chauffeur.safety.audit import read_records, verify
 
 ALSA = Path("/usr/share/alsa/alsa.conf")
@@ -199,3 +203,52 @@ def test_wishes_of_the_command_line_come_first_and_ctrl_c_ends_listening(room: R
         terminal.process.send_signal(signal.SIGINT)
         terminal.until("It was a dry run: nothing was published.")
         assert terminal.process.wait(WITHIN_S) == 130
+
+
+class Deaf:
+    """Ears that break at once."""
+
+    engine = ("grammar", False)
+    question = None
+
+    def __init__(self, *_: object) -> None:
+        self.closed = False
+
+    def start(self) -> None:
+        pass
+
+    def poll(self) -> None:
+        raise RuntimeError("out of paper")
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class Told:
+    """A screen."""
+
+    def __init__(self) -> None:
+        self.words: list[str] = []
+
+    def hear(self, _: object) -> None:
+        pass
+
+    def listens(self, engine: tuple[str, bool]) -> None:
+        self.words.append(engine[0])
+
+    def trouble(self, words: str) -> None:
+        self.words.append(words)
+
+
+def test_who_can_neither_be_heard_nor_type_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(vehicle_desk, "Attention", Deaf)
+    monkeypatch.setattr(vehicle_desk, "standard_input", lambda: None)
+    screen = Told()
+
+    async def session() -> None:
+        desk = Desk(None, screen)  # pyright: ignore[reportArgumentType]
+        async with desk.open(Engine(), None, None):
+            await asyncio.wait_for(desk.read(), WITHIN_S)
+
+    asyncio.run(session())
+    assert screen.words == ["grammar", "Listening broke off: out of paper. Type what you want."]

@@ -37,9 +37,9 @@ class Desk:
         """Listen as long as this is entered, if there is an engine; wishes that were taken are answered at the end."""
         async with contextlib.AsyncExitStack() as stack:
             if engine is not None:
-                self._attention = Attention(engine, sound, voice, self._screen.hear, self._spoken)
-                await stack.enter_async_context(listening(self._attention, self._screen.trouble))
-                self._screen.listens(self._attention.engine)
+                attention = self._attention = Attention(engine, sound, voice, self._screen.hear, self._spoken)
+                await stack.enter_async_context(listening(attention, self._deaf))
+                self._screen.listens(attention.engine)
             yield self
             await asyncio.gather(*self._running)
 
@@ -67,6 +67,11 @@ class Desk:
                     task = self._start(self.take(line))
                     if not lines.terminal:
                         await task
+
+    def _deaf(self, why: str) -> None:
+        """Nobody listens any more; who cannot type either has nothing to wait for."""
+        self._attention = None
+        self._screen.trouble(why)
 
     def _answered(self, line: str) -> bool:
         """Whether a line was yes or no to what was heard."""
