@@ -131,7 +131,7 @@ def test_a_master_that_dies_and_comes_back(folder: Path) -> None:
     with debian.rosmaster(folder, port):
         car = Ros1Vehicle(STACK, Ros1Settings(master=f"http://{ros.HOST}:{port}"), check_s=0.1)
         with rospy_node(LISTENER, folder, port, "pure_pursuit", "follower") as old:
-            eventually(lambda: car.state().counts and dict(car.state().counts).get("subscribers"))
+            eventually(lambda: (seen := dict(car.state().counts)).get("subscribers") and seen.get("registrations"))
             car.apply(Parameters(4.0, 8.0, 2.0))
             eventually(lambda: old.got)
     eventually(lambda: "refused" in " ".join(car.state().notes))
