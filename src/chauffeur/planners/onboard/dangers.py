@@ -30,7 +30,16 @@ _TOLD: Final = (
     r"(?<!should )(?<!must )(?<!that )(?<!suggest )you) "
     r"(?:going to |trying to |about to |always |nearly |almost |in )*"
 )
-_NEGATED: Final = re.compile(rf"\b(?:{_NOT}|{_TOLD})$")
+_OTHERS: Final = (
+    r"(?:^|[.,;!?] )(?:(?:i think|there is|maybe|half|and|i notice|you never know (?:when|who)) )?"
+    r"(?:him|kin|he|she|they|(?:that|those|these) (?!is\b|no\b)\w+|people|folks|cars|everyone|everybody|nobody|half him) "
+    r"(?:(?!(?:so|then|please|you|we|i|lets|let|can|could|until|till|or|if|but|because|that|who|needs?|deserves?|should|"
+    r"ought|wants?|asks?|asked|asking|begging|better|ma[dk]e|get|go|goes|says?|said|tells?|told|wrote|writes|orders|"
+    r"ordered|calls?|called|shouts?|thinks?|suggests?|ok|just|ram|hit|race|cut|push|block|ha(?:s|ve)(?= $))\b)"
+    r"[a-z]+ ){1,6}"
+)
+"""A clause on somebody else: "that lady had to jump back", "they are all changing lanes without signals"."""
+_NEGATED: Final = re.compile(rf"(?:\b(?:{_NOT}|{_TOLD})|{_OTHERS})$")
 """What stands right in front of words that only sound dangerous: "do not run the red light", "he nearly hit us"."""
 _URGED: Final = re.compile(
     r"\b(?:not (?:be )?(?:afraid|scared|shy|hesitate|worried|fear|scruples) (?:to |of )?|"

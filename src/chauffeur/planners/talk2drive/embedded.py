@@ -78,6 +78,8 @@ _TAKEN: Final[dict[str, str]] = {
     "faster": "I take it that this is too slow for you.",
     "slower": "I take it that this is too fast for you.",
 }
+_LONGEST_GAP_M: Final = 150.0
+"""No gap to keep is longer: so far ahead a vehicle counts as one to follow."""
 _ONE_BY_ONE: Final = "With these parameters I can do one thing at a time. What shall I do first?"
 
 
@@ -108,13 +110,13 @@ class EmbeddedParameters:
             return self._park(spot, request, begun)
         read = "" if isinstance(settled, Plan) else kind_of(settled.linked.choice.intent)
         hint = hint_of(wish, situation, request.history, read)
-        if hint is not None and self._overrules(hint, settled, read, wish):
+        if hint is not None and self._overrules(hint, settled, read, wish, situation.world):
             return self._as_meant(hint, request, begun)
         return self._as_read(settled, request, begun)
 
-    def _overrules(self, hint: Hint, settled: Settled | Plan, read: str, wish: str) -> bool:
+    def _overrules(self, hint: Hint, settled: Settled | Plan, read: str, wish: str, world: str) -> bool:
         """Whether what words hint at counts for more than how they were read."""
-        if hint.kind == "else" or _tells_an_amount(wish):
+        if hint.kind == "else" or _asks_an_amount(wish, settled, world):
             return False
         if isinstance(settled, Plan):
             sure = _SURER if _forbidden(settled) and hint.kind in _BRISK else _SURE
@@ -230,9 +232,14 @@ def _parameters(speed_mps: float, look: LookAhead, route: str = "") -> Parameter
     return Parameters(round(speed_mps, 2), look.distance_m, look.ratio_s, 0, route)
 
 
-def _tells_an_amount(wish: str) -> bool:
-    """Whether words name a speed or a distance, which no hint does."""
-    return any(dimension in ("speed", "distance") for dimension, _ in measured(wish))
+def _asks_an_amount(wish: str, settled: Settled | Plan, world: str) -> bool:
+    """Whether words name a speed, or a distance that may be one to keep: our exit two miles on is none."""
+    told = measured(wish)
+    if any(dimension == "speed" for dimension, _ in told):
+        return True
+    if world == "parking" or not any(kind == "distance" and value <= _LONGEST_GAP_M for kind, value in told):
+        return False
+    return isinstance(settled, Plan) or any(step.intent.startswith("gap") for step in settled.linked.choice.steps)
 
 
 def _parks(intent: str) -> bool:
