@@ -107,6 +107,7 @@ class Settled:
 
     Attributes:
         source: The model's program.
+        steps: What it does, as written.
         linked: Its skills with their numbers.
         used: What the person's history said about each.
         situation: Where we are.
@@ -114,6 +115,7 @@ class Settled:
     """
 
     source: str
+    steps: tuple[Step, ...]
     linked: Linked
     used: tuple[Leaning, ...]
     situation: Situation
@@ -240,7 +242,7 @@ class LanguageModelPlanner:
             intent = "+".join(step.meaning.family for step in reply.steps)
             return declined(self, linked.words, begun, intent=intent, usage=usage_of(written), raw=written.text)
         used = tuple(leaning(step.meaning.family) for step in reply.steps)
-        return Settled(reply.source, linked, used, situation, written)
+        return Settled(reply.source, tuple(reply.steps), linked, used, situation, written)
 
     def _steps_of(self, wish: str) -> tuple[Step, ...]:
         """What an earlier wish asked for, for trips that were driven by another planner; empty when that is unclear."""

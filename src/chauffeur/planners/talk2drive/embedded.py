@@ -17,6 +17,7 @@ from chauffeur.language.sorter import negated
 from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.dangers import danger
+from chauffeur.planners.onboard.dialect import Step
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.language_model import LanguageModelPlanner, Settled, usage_of
 from chauffeur.planners.onboard.moods import EASE, HURRY
@@ -78,6 +79,8 @@ _TAKEN: Final[dict[str, str]] = {
     "faster": "I take it that this is too slow for you.",
     "slower": "I take it that this is too fast for you.",
 }
+_PACES: Final = ("speed.increase", "speed.decrease")
+_AT_ONCE: Final = "With these parameters I can only do things at once. Tell me when it is time."
 _LONGEST_GAP_M: Final = 150.0
 """No gap to keep is longer: so far ahead a vehicle counts as one to follow."""
 _ONE_BY_ONE: Final = "With these parameters I can do one thing at a time. What shall I do first?"
@@ -108,24 +111,26 @@ class EmbeddedParameters:
             return self._as_read(settled, request, begun)
         if situation.world == "parking" and (spot := named_spot(wish)):
             return self._park(spot, request, begun)
-        read = "" if isinstance(settled, Plan) else kind_of(settled.linked.choice.intent)
-        hint = hint_of(wish, situation, request.history, read)
-        if hint is not None and self._overrules(hint, settled, read, wish, situation.world):
+        reads = () if isinstance(settled, Plan) else tuple(map(kind_of, settled.linked.choice.intent.split("+")))
+        hint = hint_of(wish, situation, request.history, reads[0] if reads else "")
+        if hint is not None and self._overrules(hint, settled, reads, wish, situation.world):
             return self._as_meant(hint, request, begun)
         return self._as_read(settled, request, begun)
 
-    def _overrules(self, hint: Hint, settled: Settled | Plan, read: str, wish: str, world: str) -> bool:
+    def _overrules(self, hint: Hint, settled: Settled | Plan, reads: Sequence[str], wish: str, world: str) -> bool:
         """Whether what words hint at counts for more than how they were read."""
         if hint.kind == "else" or _asks_an_amount(wish, settled, world):
             return False
         if isinstance(settled, Plan):
             sure = _SURER if _forbidden(settled) and hint.kind in _BRISK else _SURE
             return hint.kind != "none" and hint.share >= sure
-        if goes_with(read, hint.kind):
-            return hint.kind == "go"  # read alike, it is still to be driven without dawdling
-        if hint.kind == "pass" and read == "stay" and _PASSING & negated(wish):
+        if any(dimension == "time" for dimension, _ in measured(wish)) and any(map(_in_time, settled.steps)):
             return False
-        plainly = not read and settled.written.sure >= _PLAINLY  # a turn, a stop, the left lane
+        if any(goes_with(read, hint.kind) for read in reads):
+            return hint.kind == "go"  # read alike, it is still to be driven without dawdling
+        if hint.kind == "pass" and "stay" in reads and _PASSING & negated(wish):
+            return False
+        plainly = not any(reads) and settled.written.sure >= _PLAINLY  # a turn, a stop, the left lane
         return hint.share >= (_SURER if plainly else _SURE)
 
     def _as_meant(self, hint: Hint, request: PlanRequest, begun: float) -> Plan:
@@ -282,7 +287,9 @@ def _overruled(history: History, used: Sequence[Leaning]) -> Iterator[str]:
 def parameters_of(settled: Settled, limits: Limits) -> Parameters | Declined:
     """What was settled as parameters, or why it is no matter of parameters."""
     steps = settled.linked.choice.steps
-    if len(steps) > 1 and any(step.lanes_moved for step in steps[1:]):
+    if any(_in_time(step) for step in settled.steps):
+        return Declined(_AT_ONCE)
+    if len(steps) > 1 and any(_sideways(step) for step in steps[1:]) and not _one_deed(steps):
         return Declined(_ONE_BY_ONE)  # which of them comes first is lost in one set of numbers
     for step in steps:
         kind = step.intent.partition(".")[0]
@@ -299,6 +306,22 @@ def parameters_of(settled: Settled, limits: Limits) -> Parameters | Declined:
     if mood < 0:
         speed = passing_mps(settled.situation, speed, leaning)
     return Parameters(round(speed, 2), look.distance_m, look.ratio_s, lane or mood, turn)
+
+
+def _in_time(step: Step) -> bool:
+    """Whether it is to be done later, or depends on more than a free lane, which the car sees to by itself."""
+    depends = step.condition is not None and not step.condition.name.startswith("clear_")
+    return depends or step.wait_s is not None
+
+
+def _sideways(step: Chosen) -> bool:
+    """Whether it leaves the lane, if only for a while."""
+    return step.lanes_moved != 0 or step.intent.startswith("overtake")
+
+
+def _one_deed(steps: tuple[Chosen, ...]) -> bool:
+    """Whether it is a change of the lane, faster or slower, which may be done at the same time."""
+    return len(steps) == 2 and steps[0].intent in _PACES  # noqa: PLR2004
 
 
 def _speed(steps: tuple[Chosen, ...], now_mps: float) -> float:
