@@ -13,6 +13,7 @@ from typing import Final, Literal
 
 from chauffeur.concept import History, Limits, Parameters, Plan, PlanRequest, Situation, Thoughts
 from chauffeur.language import measured
+from chauffeur.language.corrections import last_said
 from chauffeur.language.sorter import negated
 from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.planners.base import declined
@@ -105,10 +106,12 @@ class EmbeddedParameters:
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; what is not understood, not possible or no matter of parameters is declined in words."""
         begun = time.perf_counter()
-        wish, situation = request.instruction.text, request.context.situation
+        said, situation = request.instruction.text, request.context.situation
+        if danger(said):  # which the model's own reading refuses, whatever of it was taken back
+            return self._as_read(self._model.settle(_compared(request), begun), request, begun)
+        wish = last_said(said)
+        request = replace(request, instruction=replace(request.instruction, text=wish))
         settled = self._model.settle(_compared(request), begun)
-        if danger(wish):  # which the model's own reading refuses
-            return self._as_read(settled, request, begun)
         if situation.world == "parking" and (spot := named_spot(wish)):
             return self._park(spot, request, begun)
         reads = () if isinstance(settled, Plan) else tuple(map(kind_of, settled.linked.choice.intent.split("+")))
@@ -128,7 +131,7 @@ class EmbeddedParameters:
             return False
         if any(goes_with(read, hint.kind) for read in reads):
             return hint.kind == "go"  # read alike, it is still to be driven without dawdling
-        if hint.kind == "pass" and "stay" in reads and _PASSING & negated(wish):
+        if hint.kind == "pass" and not hint.outright and "stay" in reads and _PASSING & negated(wish):
             return False
         plainly = not any(reads) and settled.written.sure >= _PLAINLY  # a turn, a stop, the left lane
         return hint.share >= (_SURER if plainly else _SURE)

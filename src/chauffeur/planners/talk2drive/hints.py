@@ -16,6 +16,7 @@ from chauffeur.concept import History, Situation
 from chauffeur.language.sorter import load_sorter
 from chauffeur.planners.talk2drive.habits import Meant, meant_before
 from chauffeur.planners.talk2drive.lanes import last_lane
+from chauffeur.planners.talk2drive.passing import told
 
 WEIGHTS: Final = Path(__file__).parent / "weights" / "wishes.npz"
 
@@ -26,6 +27,11 @@ HINT_KINDS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """What can be meant, by world. `none`: nothing that is for the driver; `else`: a wish of another kind, which has to be
 read word by word."""
+
+_BEHIND: Final = ("stay", "right", "slower", "faster")
+"""What may be meant of who says outright that nobody is to be passed."""
+_CHATS: Final = 0.6
+"""From this share of `none` words are not even taken at their word: "pass the mints"."""
 
 _SIDES: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
     "highway": (("pass", "hurry", "faster"), ("stay", "right", "calm", "slower")),
@@ -68,11 +74,13 @@ class Hint:
         kind: One of the world's HINT_KINDS.
         share: How likely it is that or what speaks for it, 0..1, with what the person meant before.
         because: The trip that decided, a full sentence; empty where the words alone say it.
+        outright: Whether it is no hint: it was said in so many words.
     """
 
     kind: str
     share: float
     because: str = ""
+    outright: bool = False
 
 
 def hint_of(wish: str, situation: Situation, history: History, read: str = "") -> Hint | None:
@@ -88,6 +96,11 @@ def hint_of(wish: str, situation: Situation, history: History, read: str = "") -
     if not kinds:
         return None
     said = load_sorter(WEIGHTS).shares(wish, kinds)
+    outright = told(wish) if "pass" in kinds and said.get("none", 0.0) < _CHATS else ""
+    if outright == "pass":
+        return Hint("pass", 1.0, outright=True)
+    if outright == "stay":
+        return Hint(max(_BEHIND, key=lambda kind: said.get(kind, 0.0)), 1.0, outright=True)
     before = meant_before(history, situation.world)
     weighed = {
         kind: share * (1.0 + _COUNTS * _weight(kind, before)) * (_READ_ALIKE if kind == read in _DEEDS else 1.0)

@@ -1,0 +1,58 @@
+"""What is left of a wish whose speaker corrects themselves."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chauffeur.language.corrections import last_said
+
+
+@pytest.mark.parametrize(
+    ("text", "left"),
+    [
+        ("Stay behind, no wait, scratch that, overtake him.", "overtake him."),
+        ("Go slower, uh sorry, I meant go past the slow one.", "go past the slow one."),
+        ("Go past, hmm, actually forget it, hang back behind the trailer.", "hang back behind the trailer."),
+        ("Faster, wait, no, sorry, slower, I said it wrong.", "slower, I said it wrong."),
+        ("Near the exit, no, never mind, take the nearest one.", "take the nearest one."),
+        ("Near the exit, sorry, near the stadium I meant, park there.", "near the stadium I meant, park there."),
+        ("Take it easy, hmm, actually don’t, go a bit quicker.", "go a bit quicker."),
+        ("Take your time, no, strike that, hurry.", "hurry."),
+        ("I want, uh, actually, go past him", "go past him"),
+    ],
+)
+def test_what_was_said_before_is_taken_back(text: str, left: str) -> None:
+    assert last_said(text) == left
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Never mind the truck, overtake.",
+        "Stay behind him, I mean it.",
+        "Pass him, sorry, I'm late.",
+        "Sorry, can you pass him?",
+        "No, no, stay here.",
+        "Don't pass him, never mind.",
+        "Actually, pass him.",
+        "Slow down, actually.",
+        "I'd rather stay behind him.",
+        "Pass him, I'd actually go left.",
+        "Could you actually go faster?",
+        "He is, I mean, really slow.",
+        "Go faster. Actually, no.",
+        "Get past that school bus, I mean the tour bus.",
+        "",
+    ],
+)
+def test_what_only_looks_like_it_stays_whole(text: str) -> None:
+    assert last_said(text) == text
+
+
+@given(st.text(max_size=80))
+def test_it_is_the_end_of_the_text_or_all_of_it(text: str) -> None:
+    left = last_said(text)
+    assert text.replace("’", "'").endswith(left.replace("’", "'"))
+    assert left or not text
