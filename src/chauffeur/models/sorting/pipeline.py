@@ -25,7 +25,7 @@ from chauffeur.models.sorting.training import Recipe, by_writer, right, train, w
 Told = Callable[[str, int, int], None]
 """Is told a stage, how much of it is done, and of how much."""
 
-VERSION: Final = "sorters-v2"
+VERSION: Final = "sorters-v3"
 NAMES: Final[tuple[Name, ...]] = ("wishes", "remarks")
 
 
