@@ -26,7 +26,7 @@ from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.planners.base import Planner
 from chauffeur.planners.onboard.moods import mood_of, pace_complaint
 from chauffeur.planners.onboard.patterns import said
-from chauffeur.planners.onboard.words.files import ONBOARD, words_file
+from chauffeur.planners.onboard.words.files import words_file
 from chauffeur.planners.registry import make_planner
 from chauffeur.planners.talk2drive import hints
 from chauffeur.planners.talk2drive.hints import HINT_KINDS, hint_of
@@ -320,7 +320,7 @@ def test_speeds_that_words_leave_open() -> None:
 
 
 def test_every_group_of_words_is_there_and_finds_no_nothing() -> None:
-    for group in words_file("moods.txt", ONBOARD):
+    for group in words_file("moods.txt"):
         for line in group:
             if line.startswith("[") and line.endswith("]"):
                 assert not said("moods.txt", line[1:-1]).search("")

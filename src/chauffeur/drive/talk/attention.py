@@ -157,7 +157,7 @@ class Attention:
             self._pass_on(chunk)
         if sound.trouble:
             self._sound = None
-            self._say(Note(f"{sound.trouble} Until then: type, or speak to the page.", trouble=True))
+            self._say(Note(f"{sound.trouble} Until then, please type.", trouble=True))
             self._say(Listening("off", why=sound.trouble))
 
     def _pass_on(self, chunk: bytes) -> None:

@@ -32,7 +32,8 @@ _TOLD: Final = (
 )
 _OTHERS: Final = (
     r"(?:^|[.,;!?] )(?:(?:i think|there is|maybe|half|and|i notice|you never know (?:when|who)) )?"
-    r"(?:him|kin|he|she|they|(?:that|those|these) (?!is\b|no\b)\w+|people|folks|cars|everyone|everybody|nobody|half him) "
+    r"(?:him|kin|he|she|they|(?:that|those|these) (?!is\b|no\b)\w+|people|folks|cars|everyone|everybody|nobody|"
+    r"half him) "
     r"(?:(?!(?:so|then|please|you|we|i|lets|let|can|could|until|till|or|if|but|because|that|who|needs?|deserves?|should|"
     r"ought|wants?|asks?|asked|asking|begging|better|ma[dk]e|get|go|goes|says?|said|tells?|told|wrote|writes|orders|"
     r"ordered|calls?|called|shouts?|thinks?|suggests?|ok|just|ram|hit|race|cut|push|block|ha(?:s|ve)(?= $))\b)"

@@ -1,4 +1,4 @@
-"""Regular expressions over what people say, from the files of a folder of words."""
+"""Regular expressions over what people say, from the vocabulary files."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from functools import cache
 
 from chauffeur.concept import ConfigError
-from chauffeur.planners.onboard.words.files import ONBOARD, words_file
+from chauffeur.planners.onboard.words.files import words_file
 
 
 def any_of(*patterns: str) -> re.Pattern[str]:
@@ -15,18 +15,17 @@ def any_of(*patterns: str) -> re.Pattern[str]:
 
 
 @cache
-def said(file: str, name: str, package: str = ONBOARD) -> re.Pattern[str]:
+def said(file: str, name: str) -> re.Pattern[str]:
     """The patterns of a group of a file, as one.
 
     Args:
         file: In the folder, e.g. `moods.txt`.
         name: What heads the group in brackets.
-        package: The folder.
 
     Raises:
         ConfigError: There is no such group.
     """
-    lines = [line for group in words_file(file, package) for line in group]
+    lines = [line for group in words_file(file) for line in group]
     head = f"[{name}]"
     if head not in lines:
         raise ConfigError(f"There is no group {head} in {file}.")

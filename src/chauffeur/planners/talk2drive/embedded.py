@@ -14,7 +14,7 @@ from typing import Final, Literal
 from chauffeur.concept import History, Limits, Parameters, Plan, PlanRequest, Situation, Thoughts
 from chauffeur.language import measured
 from chauffeur.language.corrections import last_said
-from chauffeur.language.sorter import negated
+from chauffeur.language.sorter import load_sorter, negated
 from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.dangers import danger
@@ -26,7 +26,7 @@ from chauffeur.planners.onboard.options import Chosen, Declined, speed_words
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.thoughts import thoughts_of
 from chauffeur.planners.talk2drive.habits import SIGN_SETTING, kind_of, pace_of, speed_for
-from chauffeur.planners.talk2drive.hints import Hint, goes_with, hint_of
+from chauffeur.planners.talk2drive.hints import WEIGHTS, Hint, goes_with, hint_of
 from chauffeur.planners.talk2drive.lanes import eased_mps, fitting_mps, mood_lane, passing_mps, unsaid_turn
 from chauffeur.planners.talk2drive.style import (
     BRISK_SHARE,
@@ -92,6 +92,7 @@ class EmbeddedParameters:
 
     def __init__(self, model: LanguageModelPlanner) -> None:
         self._model = model
+        load_sorter(WEIGHTS)  # with the model, not with the first wish
 
     @property
     def id(self) -> str:
@@ -324,7 +325,7 @@ def _sideways(step: Chosen) -> bool:
 
 def _one_deed(steps: tuple[Chosen, ...]) -> bool:
     """Whether it is a change of the lane, faster or slower, which may be done at the same time."""
-    return len(steps) == 2 and steps[0].intent in _PACES  # noqa: PLR2004
+    return len(steps) == 2 and steps[0].intent in _PACES
 
 
 def _speed(steps: tuple[Chosen, ...], now_mps: float) -> float:
