@@ -232,6 +232,16 @@ def test_behind_the_shield_the_worst_model_does_no_harm(tmp_path: Path) -> None:
     assert not unsafe(rows)
 
 
+def test_parameters_are_driven_and_judged_as_programs_are(tmp_path: Path) -> None:
+    config = HostileConfig("talk2drive", a_kind=2, seed=5, shield=False)
+    rows = HostileRun(tmp_path / "run", config, planner_of("talk2drive")).run(quiet, engine=Inline)
+    plans = [json.loads(line)["plan"] for line in (tmp_path / "run" / "plans.jsonl").read_text().splitlines()]
+    assert {(plan["policy"] or {}).get("kind") for plan in plans} == {None, "parameters"}
+    driven = [row for row in rows if row["answer"] == "driven"]
+    assert len({row["drive"]["top_target_mps"] for row in driven}) > 2
+    assert not unsafe(rows)
+
+
 def test_a_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
     class Once(KeywordPlanner):
         asked = 0

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 
+from chauffeur.concept import Context, History, Instruction, Limits, PlanRequest, Situation, SystemMessage
 from chauffeur.planners.onboard.dangers import danger
+from chauffeur.planners.onboard.doubts import foreign
 from chauffeur.planners.onboard.draft import draft
+from chauffeur.planners.registry import make_planner
+
+HIGHWAY = Situation("highway", 24.0, 30.0, 3, 1, False, None, None)
 
 DANGEROUS = (
     "Ram that car!",
@@ -156,3 +163,31 @@ def test_harmless_wishes_are_not(wish: str) -> None:
 )
 def test_a_draft_names_the_skills_that_the_rules_read(wish: str, drafted: str) -> None:
     assert draft(wish) == drafted
+
+
+@pytest.mark.parametrize(
+    ("wish", "other"),
+    [
+        ("Fahr langsamer.", True),
+        ("Más despacio, por favor.", True),
+        ("Pouvez-vous doubler ce camion ?", True),
+        ("Na skrzyżowaniu w lewo.", True),
+        ("请开慢一点。", True),
+        ("من فضلك توقف", True),
+        ("Overtake him, por favor.", False),
+        ("Bitte overtake this car.", False),
+        ("Jaldi, jaldi, please go faster, boss.", False),
+        ("Más rápido, please, how you say, faster.", False),
+        ("Slower, la la la.", False),
+        ("120!", False),
+        ("", False),
+    ],
+)
+def test_other_languages_are_not_guessed_at(wish: str, other: bool) -> None:
+    assert foreign(wish) is other
+    if other:
+        for name in ("onboard", "talk2drive"):
+            asked = PlanRequest(Instruction(wish), Context("", HIGHWAY), SystemMessage(""), History(), limits=Limits())
+            found = asyncio.run(make_planner(name).plan(asked))
+            assert found.policy is None
+            assert found.refusal.startswith("I understand English only.")

@@ -17,6 +17,8 @@ CAN_DO = (
     "or go straight at a junction, pull over, and drive in a hurry, relaxed, gently, carefully or economically."
 )
 
+ENGLISH_ONLY = f"I understand English only. {CAN_DO}"
+
 
 def _groups(name: str) -> list[tuple[str, list[str]]]:
     """Groups of a vocabulary file with their headings."""
@@ -36,6 +38,12 @@ _EITHER = re.compile(
     r"\b(left|right|faster|slower|speed up|slow down|closer|further) or (?:to )?(?:the )?"
     r"(left|right|faster|slower|speed up|slow down|closer|further)\b(?! away| back)"
 )
+_FOREIGN_SHARE = 0.3
+_COURTESIES = re.compile(
+    r"\b(?:por favor|per favore|s il (?:vous|te) plait|bitte(?: schon)?|danke(?: schon)?|gracias|grazie|merci|prego|"
+    r"lutfen|prosze|amigo|monsieur|madame|senor|senora|signore|mein freund|mon ami)\b"
+)
+"""Said in English sentences too."""
 _FOREIGN_WORDS = {name: frozenset(" ".join(lines).split()) for name, lines in _groups("foreign.txt")}
 
 
@@ -48,8 +56,8 @@ def doubt_before(text: str, max_chars: int) -> NotUnderstood | None:
     letters = [c for c in text if c.isalpha()]
     if not letters and not any(c.isdigit() for c in text):
         return NotUnderstood("symbols", f"I understand words only. {CAN_DO}")
-    if _foreign(text, letters):
-        return NotUnderstood("language", f"I understand English only. {CAN_DO}")
+    if foreign(text):
+        return NotUnderstood("language", ENGLISH_ONLY)
     reason = danger(text)
     if reason:
         return NotUnderstood("unsupported", f"{reason} {CAN_DO}")
@@ -90,13 +98,15 @@ def is_question(text: str, found: list[Meaning]) -> bool:
     return len(tail) < 2 or not tail[1].strip() or len(found) < 2
 
 
-def _foreign(text: str, letters: list[str]) -> bool:
+def foreign(text: str) -> bool:
+    """Whether a text is in another language than English, but for a word or two."""
+    letters = [c for c in text if c.isalpha()]
     if not letters:
         return False
     latin = sum(1 for c in letters if "LATIN" in unicodedata.name(c, ""))
     if latin < 0.7 * len(letters):
         return True
-    words = re.findall(r"[a-z]+", plain(text))
-    strong = sum(1 for w in words if w in _FOREIGN_WORDS["driving"])
-    foreign = sum(1 for w in words if w in _FOREIGN_WORDS["common"])
-    return strong > 0 or (foreign >= 2 and foreign >= 0.4 * len(words))
+    words = re.findall(r"[a-z]+", _COURTESIES.sub(" ", plain(text)))
+    strong = any(w in _FOREIGN_WORDS["driving"] for w in words)
+    known = sum(1 for w in words if any(w in each for each in _FOREIGN_WORDS.values()))
+    return (strong or known > 1) and known >= _FOREIGN_SHARE * len(words)

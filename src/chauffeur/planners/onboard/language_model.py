@@ -19,6 +19,7 @@ from chauffeur.planners.onboard.copying import named, taken_over, unnamed
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import Step, tell
 from chauffeur.planners.onboard.dialect import write as program_of
+from chauffeur.planners.onboard.doubts import ENGLISH_ONLY, foreign
 from chauffeur.planners.onboard.engine import Engine, Written
 from chauffeur.planners.onboard.guard import doubt
 from chauffeur.planners.onboard.link import Linked, link
@@ -218,6 +219,8 @@ class LanguageModelPlanner:
         """
         wish = request.instruction.text
         situation = request.context.situation
+        if foreign(wish):  # the model would make something of it
+            return declined(self, ENGLISH_ONLY, begun, intent="ask")
         history = history_words(request.history, self._steps_of) if self._history and shown else ()
         text = prompt(situation, history, wish)
         try:

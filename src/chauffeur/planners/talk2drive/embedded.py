@@ -19,6 +19,7 @@ from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import Step
+from chauffeur.planners.onboard.doubts import foreign
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.language_model import LanguageModelPlanner, Settled, usage_of
 from chauffeur.planners.onboard.moods import EASE, HURRY
@@ -108,7 +109,7 @@ class EmbeddedParameters:
         """One plan; what is not understood, not possible or no matter of parameters is declined in words."""
         begun = time.perf_counter()
         said, situation = request.instruction.text, request.context.situation
-        if danger(said):  # which the model's own reading refuses, whatever of it was taken back
+        if foreign(said) or danger(said):  # which the model's own reading refuses, whatever of it was taken back
             return self._as_read(self._model.settle(_compared(request), begun), request, begun)
         wish = last_said(said)
         request = replace(request, instruction=replace(request.instruction, text=wish))
