@@ -42,9 +42,10 @@ _SKILLS: Final[Mapping[str, tuple[str, ...]]] = {
 """Skills of the tables by the kind of hint that says the same."""
 _DIRECT: Final = ("refuse.", "ask.")
 _VALUES: Final[Mapping[str, str]] = {"n": "80", "v": "25", "d": "30", "x": "30", "t": "2", "k": "two"}
-_EACH, _EACH_LANE, _EACH_ELSE = 60, 240, 20
+_EACH, _EACH_LANE, _EACH_GAP, _EACH_ELSE = 60, 240, 100, 20
 """Sentences of a skill at most; of one that says which lane to be in, where it is the vehicles that are of many names;
-and of one of the many that no hint is sorted as."""
+of one for a gap, which is near to staying behind; and of one of the many others that no hint is sorted as."""
+_GAPS: Final = ("closer", "further", "gap_of", "hold_gap")
 _LANE: Final = ("pass", "stay", "right")
 _ELSEWHERE: Final = 1.0 / 3.0
 """Share of what is said on a highway that is said in another world too, where it can be."""
@@ -56,8 +57,9 @@ def drawn(seed: int) -> tuple[Sentence, ...]:
     tables = wordings()
     found: list[Sentence] = []
     for kind, skills in _SKILLS.items():
-        each = _EACH_LANE if kind in _LANE else _EACH_ELSE if kind == "else" else _EACH
         for skill in skills:
+            each = _EACH_LANE if kind in _LANE else _EACH_ELSE if kind == "else" else _EACH
+            each = _EACH_GAP if skill in _GAPS else each
             for section in (skill,) if skill.startswith(_DIRECT) else levels(skill):
                 for _ in range(min(each, len(tables.templates(section)))):
                     found += _said_in_worlds(utter(section, _VALUES, rng).text, kind, rng)

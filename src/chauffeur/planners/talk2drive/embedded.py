@@ -131,6 +131,8 @@ class EmbeddedParameters:
             return hint.kind != "none" and hint.share >= sure
         if any(dimension == "time" for dimension, _ in measured(wish)) and any(map(_in_time, settled.steps)):
             return False
+        if hint.outright and hint.kind == "stay" and any(step.meaning.family == "gap" for step in settled.steps):
+            return False  # not only behind, but how far
         if any(goes_with(read, hint.kind) for read in reads):
             return hint.kind == "go"  # read alike, it is still to be driven without dawdling
         if hint.kind == "pass" and not hint.outright and "stay" in reads and _PASSING & negated(wish):

@@ -41,7 +41,8 @@ _OVERTAKE: Final = _any(
 )
 _OVERTAKING: Final = _any(r"overtaking\b", rf"passing\b(?={_END}| {_THEM}\b)", rf"(?:getting|going) {_PAST} {_THEM}\b")
 _STAY: Final = _any(
-    r"(?:stay|keep|remain|hang|sit|wait|drop|hold|tuck|settle|fall)(?: (?!not|no)\w+){0,3}? (?:behind|back of)\b",
+    r"(?:stay|keep|remain|hang|sit|wait|drop|hold|tuck|settle|fall)"
+    r"(?: (?!not\b|no\b|further|farther|closer|nearer|more\b|tight)\w+){0,3}? (?:behind|back of)\b",
     rf"(?:hang|stay|keep) (?:well |right )?back\b(?={_END}| (?:and|here|please|a bit|from|behind)\b)",
     rf"follow {_THEM}\b",
     r"keep following\b",
