@@ -120,20 +120,21 @@ def watch(cpu: int) -> None:
     os.sched_setaffinity(0, {cpu})
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
     lock_memory()
+    parent, before = os.getppid(), _stolen_ms(cpu)
+    due = time.monotonic_ns() + _STEP_NS
     _say({"ready": cpu})
-    parent, before = os.getppid(), 0
-    for step in count():
-        if step % _LOOK_STEPS == 0:
-            before = _stolen_ms(cpu)
-            if os.getppid() != parent:
-                return
-        due = time.monotonic_ns() + _STEP_NS
+    for step in count(1):
         time.sleep(_STEP_NS / 1e9)
         now = time.monotonic_ns()
-        if now - due > _LATE_NS:
+        late, from_ns = now - due > _LATE_NS, due
+        due = now + _STEP_NS  # what is done until the next sleep is watched as well
+        if late or step % _LOOK_STEPS == 0:
             stolen = _stolen_ms(cpu)
-            _say({"cpu": cpu, "from_ns": due, "to_ns": now, "stolen_ms": stolen - before})
+            if late:
+                _say({"cpu": cpu, "from_ns": from_ns, "to_ns": now, "stolen_ms": stolen - before})
             before = stolen
+            if os.getppid() != parent:
+                return
 
 
 def _stolen_ms(cpu: int) -> int:
