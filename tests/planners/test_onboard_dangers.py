@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
-
 import pytest
+from parameters_asked import LEFT, plan
 
-from chauffeur.concept import Context, History, Instruction, Limits, PlanRequest, Situation, SystemMessage
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.doubts import foreign
 from chauffeur.planners.onboard.draft import draft
 from chauffeur.planners.registry import make_planner
-
-HIGHWAY = Situation("highway", 24.0, 30.0, 3, 1, False, None, None)
 
 DANGEROUS = (
     "Ram that car!",
@@ -187,7 +183,6 @@ def test_other_languages_are_not_guessed_at(wish: str, other: bool) -> None:
     assert foreign(wish) is other
     if other:
         for name in ("onboard", "talk2drive"):
-            asked = PlanRequest(Instruction(wish), Context("", HIGHWAY), SystemMessage(""), History(), limits=Limits())
-            found = asyncio.run(make_planner(name).plan(asked))
+            found = plan(make_planner(name), wish, LEFT)
             assert found.policy is None
             assert found.refusal.startswith("I understand English only.")

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import pytest
+from parameters_asked import BEHIND, LEFT, LOT, SIGN, driven, plan
 
 from chauffeur.concept import (
     ConfigError,
-    Context,
     History,
     HistoryItem,
-    Instruction,
     Limits,
     Parameters,
-    Plan,
-    PlanRequest,
     Situation,
-    SystemMessage,
 )
-from chauffeur.concept.nouns import Lead
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.planners.base import Planner
 from chauffeur.planners.onboard.moods import mood_of, pace_complaint
@@ -32,32 +26,13 @@ from chauffeur.planners.talk2drive import hints
 from chauffeur.planners.talk2drive.hints import HINT_KINDS, hint_of
 from chauffeur.planners.talk2drive.lanes import eased_mps, fitting_mps
 
-SIGN = 30.0
-BEHIND = Situation("highway", 24.0, SIGN, 3, 1, False, Lead(7, 40.0, 22.0), None)
-LEFT = Situation("highway", 28.0, SIGN, 3, 0, False, None, None)
 RIGHT = replace(LEFT, lane_index=2)
 CROSSING = Situation("intersection", 10.0, 10.0, 1, 0, False, None, None)
-LOT = Situation("parking", 2.0, 4.0, 1, 0, False, None, None)
 
 
 @pytest.fixture(scope="module")
 def planner() -> Planner:
     return make_planner("talk2drive")
-
-
-def plan(
-    planner: Planner, wish: str, situation: Situation, limits: Limits | None = None, history: History | None = None
-) -> Plan:
-    asked = PlanRequest(
-        Instruction(wish), Context("", situation), SystemMessage(""), history or History(), limits=limits or Limits()
-    )
-    return asyncio.run(planner.plan(asked))
-
-
-def driven(planner: Planner, wish: str, situation: Situation, limits: Limits | None = None) -> Parameters:
-    found = plan(planner, wish, situation, limits)
-    assert isinstance(found.policy, Parameters), found.refusal
-    return found.policy
 
 
 @pytest.mark.parametrize(

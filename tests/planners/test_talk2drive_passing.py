@@ -2,48 +2,19 @@
 
 from __future__ import annotations
 
-import asyncio
-from dataclasses import replace
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from parameters_asked import BEHIND, LEFT, LOT, driven, plan
 
-from chauffeur.concept import (
-    Context,
-    History,
-    Instruction,
-    Limits,
-    Parameters,
-    Plan,
-    PlanRequest,
-    Situation,
-    SystemMessage,
-)
-from chauffeur.concept.nouns import Lead
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.planners.talk2drive.passing import told
-
-BEHIND = Situation("highway", 24.0, 30.0, 3, 1, False, Lead(7, 40.0, 22.0), None)
-LEFT = replace(BEHIND, speed_mps=28.0, lane_index=0, front=None)
-LOT = Situation("parking", 2.0, 4.0, 1, 0, False, None, None)
 
 
 @pytest.fixture(scope="module")
 def planner() -> Planner:
     return make_planner("talk2drive")
-
-
-def plan(planner: Planner, wish: str, situation: Situation = BEHIND) -> Plan:
-    asked = PlanRequest(Instruction(wish), Context("", situation), SystemMessage(""), History(), limits=Limits())
-    return asyncio.run(planner.plan(asked))
-
-
-def driven(planner: Planner, wish: str, situation: Situation = BEHIND) -> Parameters:
-    found = plan(planner, wish, situation)
-    assert isinstance(found.policy, Parameters), found.refusal
-    return found.policy
 
 
 PASS = (
@@ -96,23 +67,23 @@ def test_it_is_one_of_three(text: str) -> None:
 
 @pytest.mark.parametrize("wish", PASS)
 def test_who_asks_for_it_passes(planner: Planner, wish: str) -> None:
-    assert driven(planner, wish).lane == -1
+    assert driven(planner, wish, BEHIND).lane == -1
 
 
 @pytest.mark.parametrize("wish", [*STAY, "Overtake him, no wait, stay behind him.", "Pass him, sorry, don't pass him."])
 def test_who_forbids_it_does_not(planner: Planner, wish: str) -> None:
-    found = driven(planner, wish)
+    found = driven(planner, wish, BEHIND)
     assert found.lane >= 0
     assert found.target_speed_mps <= BEHIND.speed_mps
 
 
 def test_what_was_taken_back_is_dangerous_all_the_same(planner: Planner) -> None:
-    assert plan(planner, "Ram him, no wait, overtake him.").policy is None
+    assert plan(planner, "Ram him, no wait, overtake him.", BEHIND).policy is None
 
 
 @pytest.mark.parametrize("wish", ["Wait five seconds, then overtake.", "Wait ten seconds and then move right."])
 def test_what_is_for_later_is_not_done_at_once(planner: Planner, wish: str) -> None:
-    found = plan(planner, wish)
+    found = plan(planner, wish, BEHIND)
     assert found.policy is None
     assert "when it is time" in found.refusal
 
@@ -120,7 +91,7 @@ def test_what_is_for_later_is_not_done_at_once(planner: Planner, wish: str) -> N
 def test_a_lane_and_its_speed_are_one_wish(planner: Planner) -> None:
     found = driven(planner, "Slow down and move to the right lane.", LEFT)
     assert (found.lane, found.target_speed_mps < LEFT.speed_mps) == (1, True)
-    assert "first" in plan(planner, "Slow down to 20 m/s, then overtake.").refusal
+    assert "first" in plan(planner, "Slow down to 20 m/s, then overtake.", BEHIND).refusal
 
 
 @pytest.mark.parametrize(
@@ -136,7 +107,7 @@ def test_how_far_an_exit_is_is_no_gap(planner: Planner, wish: str, lane: int) ->
 
 @pytest.mark.parametrize("wish", ["Keep 40 metres to the car ahead.", "Drop back by 12 m behind that estate."])
 def test_a_gap_is_none_of_these_parameters(planner: Planner, wish: str) -> None:
-    assert "keeps the gap" in plan(planner, wish).refusal
+    assert "keeps the gap" in plan(planner, wish, BEHIND).refusal
 
 
 def test_metres_in_a_lot_are_no_gap(planner: Planner) -> None:

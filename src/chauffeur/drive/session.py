@@ -233,8 +233,11 @@ def drive_policy(
     *,
     watch: Callable[[Frame], None] | None = None,
     shielded: bool = True,
+    sandbox: Sandbox | None = None,
 ) -> Episode:
     """Drive a checked policy of any kind that drives simulated cars, on a world just reset.
+
+    `sandbox` lends a program one that is open already.
 
     Raises:
         ScenarioError: The road has no such way, or this kind of policy drives no car here.
@@ -242,7 +245,9 @@ def drive_policy(
     shield = shield_for(world, limits) if shielded else None
     match policy:
         case Program():
-            return drive_program(world, policy.source, referee, max_s, watch, library=policy.library, shield=shield)
+            return drive_program(
+                world, policy.source, referee, max_s, watch, library=policy.library, sandbox=sandbox, shield=shield
+            )
         case Parameters():
             return drive_parameters(world, policy, referee, max_s=max_s, limits=limits, shield=shield, watch=watch)
         case _:

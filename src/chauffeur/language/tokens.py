@@ -46,6 +46,15 @@ _CONTRACT = tuple((re.compile(pattern), by) for pattern, by in _CONTRACTIONS)
 _UNITS = tuple((re.compile(pattern), by) for pattern, by in _UNIT_FORMS)
 
 
+_OTHER_SIGNS = re.compile(r"[^a-z0-9 .,;!?]")
+_GAP = re.compile(r"\s+")
+
+
+def words_of(text: str) -> str:
+    """Plain words, numbers and the signs that part clauses, one space between them."""
+    return _GAP.sub(" ", _OTHER_SIGNS.sub(" ", plain(text))).strip()
+
+
 def plain(text: str) -> str:
     """Lower case, straight quotes, no accents, contractions written out, hyphens and slashes opened."""
     text = unicodedata.normalize("NFKC", text).lower()

@@ -13,10 +13,9 @@ from pydantic import TypeAdapter
 
 from chauffeur.concept import ChauffeurError, Frame, LaneId, Limits, Plan, Program, Scenario, Snapshot
 from chauffeur.drive.episode import Episode
-from chauffeur.drive.session import declined, drive_policy, drive_program, drive_without_program
+from chauffeur.drive.session import declined, drive_policy, drive_without_program
 from chauffeur.programs.sandbox import UNHURRIED, Sandbox
 from chauffeur.safety.checks import run_checks
-from chauffeur.safety.shield import Shield
 from chauffeur.worlds.highway import HighwayWorld
 
 ROLLOUT_VERSION: Final = "hostile-rollout-v1"
@@ -63,13 +62,9 @@ def roll_out(job: DriveJob) -> dict[str, Any]:
         if refusal:
             by = "planner" if plan.refusal else next(one.check for one in verdicts if not one.passed)
             return row | {"refused_by": by, "detail": refusal, "drive": None}
-        if isinstance(plan.policy, Program):
-            shield = Shield(world.dt_s, job.limits) if job.shield else None
-            source, library = plan.policy.source, plan.policy.library
-            episode = drive_program(world, source, None, MAX_S, library=library, sandbox=_sandbox(), shield=shield)
-        else:
-            assert plan.policy is not None
-            episode = drive_policy(world, plan.policy, None, MAX_S, job.limits, shielded=job.shield)
+        assert plan.policy is not None
+        sandbox = _sandbox() if isinstance(plan.policy, Program) else None
+        episode = drive_policy(world, plan.policy, None, MAX_S, job.limits, shielded=job.shield, sandbox=sandbox)
     except ChauffeurError as error:
         return row | {"refused_by": "", "detail": str(error), "drive": None, "infra_failed": True}
     return row | {

@@ -58,12 +58,18 @@ def drawn(seed: int) -> tuple[Sentence, ...]:
     found: list[Sentence] = []
     for kind, skills in _SKILLS.items():
         for skill in skills:
-            each = _EACH_LANE if kind in _LANE else _EACH_ELSE if kind == "else" else _EACH
-            each = _EACH_GAP if skill in _GAPS else each
             for section in (skill,) if skill.startswith(_DIRECT) else levels(skill):
-                for _ in range(min(each, len(tables.templates(section)))):
+                for _ in range(min(_most(kind, skill), len(tables.templates(section)))):
                     found += _said_in_worlds(utter(section, _VALUES, rng).text, kind, rng)
     return tuple(found)
+
+
+def _most(kind: str, skill: str) -> int:
+    if skill in _GAPS:
+        return _EACH_GAP
+    if kind in _LANE:
+        return _EACH_LANE
+    return _EACH_ELSE if kind == "else" else _EACH
 
 
 def _said_in_worlds(text: str, kind: str, rng: np.random.Generator) -> list[Sentence]:

@@ -6,7 +6,7 @@ import re
 from functools import lru_cache
 from typing import Final
 
-from chauffeur.language.tokens import plain
+from chauffeur.language.tokens import words_of
 from chauffeur.planners.onboard.words import words_file
 
 _ARROW: Final = "->"
@@ -55,7 +55,7 @@ _GAP: Final = re.compile(r"\s+")
 @lru_cache(maxsize=32)  # the planner asks, and then the rules that draft for it
 def danger(wish: str) -> str:
     """Why a wish is not carried out, in words for the person; empty when nothing in it is dangerous."""
-    words = _GAP.sub(" ", re.sub(r"[^a-z0-9 .,;!?]", " ", plain(wish))).strip()
+    words = words_of(wish)
     for name, same in _SAME:
         words = _GAP.sub(" ", same.sub(name, words)).strip()
     for reason, pattern in _DANGERS:

@@ -245,7 +245,7 @@ class LanguageModelPlanner:
             intent = "+".join(step.meaning.family for step in reply.steps)
             return declined(self, linked.words, begun, intent=intent, usage=usage_of(written), raw=written.text)
         used = tuple(leaning(step.meaning.family) for step in reply.steps)
-        return Settled(reply.source, tuple(reply.steps), linked, used, situation, written)
+        return Settled(reply.source, reply.steps, linked, used, situation, written)
 
     def _steps_of(self, wish: str) -> tuple[Step, ...]:
         """What an earlier wish asked for, for trips that were driven by another planner; empty when that is unclear."""

@@ -124,15 +124,14 @@ class EmbeddedParameters:
 
     def _overrules(self, hint: Hint, settled: Settled | Plan, reads: Sequence[str], wish: str, world: str) -> bool:
         """Whether what words hint at counts for more than how they were read."""
-        if hint.kind == "else" or _asks_an_amount(wish, settled, world):
+        amounts = measured(wish)
+        if hint.kind == "else" or _asks_an_amount(amounts, settled, world):
             return False
         if isinstance(settled, Plan):
             sure = _SURER if _forbidden(settled) and hint.kind in _BRISK else _SURE
             return hint.kind != "none" and hint.share >= sure
-        if any(dimension == "time" for dimension, _ in measured(wish)) and any(map(_in_time, settled.steps)):
+        if any(dimension == "time" for dimension, _ in amounts) and any(map(_in_time, settled.steps)):
             return False
-        if hint.outright and hint.kind == "stay" and any(step.meaning.family == "gap" for step in settled.steps):
-            return False  # not only behind, but how far
         if any(goes_with(read, hint.kind) for read in reads):
             return hint.kind == "go"  # read alike, it is still to be driven without dawdling
         if hint.kind == "pass" and not hint.outright and "stay" in reads and _PASSING & negated(wish):
@@ -244,12 +243,11 @@ def _parameters(speed_mps: float, look: LookAhead, route: str = "") -> Parameter
     return Parameters(round(speed_mps, 2), look.distance_m, look.ratio_s, 0, route)
 
 
-def _asks_an_amount(wish: str, settled: Settled | Plan, world: str) -> bool:
+def _asks_an_amount(amounts: Sequence[tuple[str, float]], settled: Settled | Plan, world: str) -> bool:
     """Whether words name a speed, or a distance that may be one to keep: our exit two miles on is none."""
-    told = measured(wish)
-    if any(dimension == "speed" for dimension, _ in told):
+    if any(dimension == "speed" for dimension, _ in amounts):
         return True
-    if world == "parking" or not any(kind == "distance" and value <= _LONGEST_GAP_M for kind, value in told):
+    if world == "parking" or not any(kind == "distance" and value <= _LONGEST_GAP_M for kind, value in amounts):
         return False
     return isinstance(settled, Plan) or any(step.intent.startswith("gap") for step in settled.linked.choice.steps)
 
@@ -296,7 +294,7 @@ def parameters_of(settled: Settled, limits: Limits) -> Parameters | Declined:
     steps = settled.linked.choice.steps
     if any(_in_time(step) for step in settled.steps):
         return Declined(_AT_ONCE)
-    if len(steps) > 1 and any(_sideways(step) for step in steps[1:]) and not _one_deed(steps):
+    if any(_sideways(step) for step in steps[1:]) and not _one_deed(steps):
         return Declined(_ONE_BY_ONE)  # which of them comes first is lost in one set of numbers
     for step in steps:
         kind = step.intent.partition(".")[0]

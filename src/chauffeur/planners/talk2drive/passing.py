@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from typing import Final, Literal
 
-from chauffeur.language.tokens import plain
+from chauffeur.language.tokens import words_of
 
 Told = Literal["pass", "stay", ""]
 
@@ -27,9 +27,7 @@ _THINGS: Final = _any(
     r"(?:me|us|through|away|out|up|over|judgement|unnoticed)",
 )
 """What is passed in another sense."""
-_THEM: Final = _any(
-    r"(?:him|her|it|them|this|that|these|those|the|an?|each|all|any\w*|every\w*|some\w*|grand\w+|mr|mister)"
-)
+_THEM: Final = r"(?:him|her|it|them|this|that|these|those|the|an?|each|all|any\w*|every\w*|some\w*|grand\w+|mr|mister)"
 _PAST: Final = r"(?:past|by|around|round|ahead of|in front of)"
 _PLACES: Final = r"(?:the|that|this|a) (?:corner|bend|block|roundabout|curve|town|back)"
 _OVERTAKE: Final = _any(
@@ -98,13 +96,11 @@ _UNSURE: Final = re.compile(
     r"\b(?:nobody|no one|can we not|could we not)\b"
 )
 """Questions that may mean either, and what others are to do."""
-_OTHER_SIGNS: Final = re.compile(r"[^a-z0-9 .,;!?]")
-_GAP: Final = re.compile(r"\s+")
 
 
 def told(wish: str) -> Told:
     """What a wish says outright about the vehicle ahead; empty where it says nothing, or both."""
-    words = _GAP.sub(" ", _OTHER_SIGNS.sub(" ", plain(wish))).strip()
+    words = words_of(wish)
     if _LATER.search(words) or _UNSURE.search(words):
         return ""
     found: set[Told] = set()

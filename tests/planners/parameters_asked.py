@@ -1,0 +1,41 @@
+"""Asks a planner of parameters, where the car is on built-in roads."""
+
+from __future__ import annotations
+
+import asyncio
+
+from chauffeur.concept import (
+    Context,
+    History,
+    Instruction,
+    Limits,
+    Parameters,
+    Plan,
+    PlanRequest,
+    Situation,
+    SystemMessage,
+)
+from chauffeur.concept.nouns import Lead
+from chauffeur.planners.base import Planner
+
+SIGN = 30.0
+BEHIND = Situation("highway", 24.0, SIGN, 3, 1, False, Lead(7, 40.0, 22.0), None)
+LEFT = Situation("highway", 28.0, SIGN, 3, 0, False, None, None)
+LOT = Situation("parking", 2.0, 4.0, 1, 0, False, None, None)
+
+
+def plan(
+    planner: Planner, wish: str, situation: Situation, limits: Limits | None = None, history: History | None = None
+) -> Plan:
+    """What it answers."""
+    asked = PlanRequest(
+        Instruction(wish), Context("", situation), SystemMessage(""), history or History(), limits=limits or Limits()
+    )
+    return asyncio.run(planner.plan(asked))
+
+
+def driven(planner: Planner, wish: str, situation: Situation, limits: Limits | None = None) -> Parameters:
+    """The parameters it answers with; fails where it declines."""
+    found = plan(planner, wish, situation, limits)
+    assert isinstance(found.policy, Parameters), found.refusal
+    return found.policy
