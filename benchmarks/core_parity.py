@@ -37,10 +37,10 @@ def main() -> None:
     if SWITCH not in os.environ and not chosen.as_is:  # before NumPy is imported
         os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, SWITCH: WITHOUT})
     import numpy as np
-    from parity_episode import POLICIES, TOLERANCE, Episode, compare
-    from speed.scenes import load_samples
 
     from chauffeur.bench.lampilot.report import markdown
+    from parity_episode import POLICIES, TOLERANCE, Episode, compare
+    from speed.scenes import load_samples
 
     samples = load_samples(chosen.data)[:: chosen.every]
     most = round(chosen.seconds * 10)

@@ -30,17 +30,16 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from speed.scenes import COMMANDS, Sample, as_many, load_samples, plan
-from speed.shares import CORE, HARNESS, RESET, SANDBOX, Shares
-from speed.sides import Clock, Drive, Peer, PlainWorld, cpu_seconds, drive_idm, drive_job, forget, median, on_one_core
-
 from chauffeur.bench.engine import LocalEngine
 from chauffeur.bench.lampilot import rollout
 from chauffeur.bench.lampilot.report import markdown
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
 from chauffeur.bench.store import Row, RowStore
 from chauffeur.worlds.highway import HighwayWorld
-from chauffeur.worlds.highway.reference import ReferenceWorld
+from highway_oracle import ReferenceWorld
+from speed.scenes import COMMANDS, Sample, as_many, load_samples, plan
+from speed.shares import CORE, HARNESS, RESET, SANDBOX, Shares
+from speed.sides import Clock, Drive, Peer, PlainWorld, cpu_seconds, drive_idm, drive_job, forget, median, on_one_core
 
 STEPPING_GOAL = 150.0
 PROGRAMS_GOAL = 50.0

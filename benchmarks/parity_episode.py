@@ -14,7 +14,7 @@ from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.concept import Scenario
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.core import layout as at
-from chauffeur.worlds.highway.reference import ReferenceWorld
+from highway_oracle import ReferenceWorld
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "worlds"))
 

@@ -24,8 +24,8 @@ from chauffeur.programs.gate import _judged
 from chauffeur.programs.rewrite import _prepared
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway import world as compiled
-from chauffeur.worlds.highway.reference import ReferenceWorld
-from chauffeur.worlds.highway.reference.plain import plain_highway_env
+from highway_oracle import ReferenceWorld
+from highway_oracle.plain import plain_highway_env
 
 _PEER_SCRIPT = Path(__file__).resolve().parents[1] / "lampilot_peer.py"
 _PROCESS_CLOCK = 2

@@ -135,7 +135,7 @@ def test_what_a_person_needs_to_see_is_there(highway_page: str) -> None:
     values = [m["value"] for m in payload["metrics"]]  # type: ignore[attr-defined]
     assert values == ["89.4 points", "91.2 points", "66.7 points", "85.3 points", "does not apply"]
     names = [name for name, _ in payload["provenance"]]  # type: ignore[attr-defined]
-    assert {"planner", "model", "seed", "highway-env", "limits"} <= set(names)
+    assert {"planner", "model", "seed", "engine", "limits"} <= set(names)
     assert "Simulated drive (highway-env physics)" in highway_page
 
 

@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import highway_oracle
 from chauffeur.concept import Command, Scenario, Wishes
 from chauffeur.control import LAMPILOT_EGO, LAMPILOT_STEERING, idm_acceleration, lane_keeping_steering
 from chauffeur.worlds.base import EGO
@@ -23,33 +24,36 @@ from chauffeur.worlds.highway.core import CoreRoad
 from chauffeur.worlds.highway.core import lanes as geometry
 from chauffeur.worlds.highway.core import layout as at
 from chauffeur.worlds.highway.dblv1 import load_dataset
-from chauffeur.worlds.highway.reference import ReferenceWorld
 from chauffeur.worlds.highway.roads import build_scene, parse_config
 from chauffeur.worlds.highway.scenarios import BUILT_IN
+from highway_oracle import ReferenceWorld
 
 BY_ID = {s.id: s for s in BUILT_IN}
 TOLERANCE = 1e-9
 POLICIES = ("idm", "mobil", "restless")
 
 
-def _scene(name: str) -> Any:
+ROADS = ("overtake", "emergency-lane", "intersection")
+
+
+def _built(build: Any, name: str) -> Any:
     scenario = BY_ID[name]
-    return build_scene(parse_config(scenario.config, name), np.random.default_rng(scenario.seed))
+    return build(parse_config(scenario.config, name), np.random.default_rng(scenario.seed))
 
 
-ROADS = {name: _scene(name) for name in ("overtake", "emergency-lane", "intersection")}
-MAPS = {name: CoreRoad.of(scene).road for name, scene in ROADS.items()}
+NETWORKS = {name: _built(highway_oracle.build_scene, name).road.network for name in ROADS}
+CORES = {name: CoreRoad.of(_built(build_scene, name)) for name in ROADS}
 
 
 @given(
-    st.sampled_from(sorted(ROADS)),
+    st.sampled_from(ROADS),
     st.floats(-200, 3000, allow_subnormal=False),
     st.floats(-130, 130, allow_subnormal=False),
     st.floats(-7, 7, allow_subnormal=False),
 )
 @settings(max_examples=300, deadline=None)
 def test_lane_geometry_is_highway_envs(name: str, x: float, y: float, heading: float) -> None:
-    network, road = ROADS[name].road.network, MAPS[name]
+    network, road = NETWORKS[name], CORES[name].road
     point = np.array([x, y])
     for row, lane_id in enumerate(road.lane_ids):
         lane = network.get_lane(lane_id)
@@ -78,7 +82,7 @@ def test_lane_geometry_is_highway_envs(name: str, x: float, y: float, heading: f
 def test_the_egos_driver_is_controls(
     speed: float, other_speed: float, gap: float, headway: float, target: float, heading: float
 ) -> None:
-    core = CoreRoad.of(ROADS["overtake"])
+    core = CORES["overtake"].copy()
     ego, other = core.floats[0], core.floats[1]
     ego[at.X], ego[at.Y], ego[at.SPEED], ego[at.HEADING] = 900.0, 1.3, speed, heading
     other[at.X], other[at.Y], other[at.SPEED], other[at.HEADING] = 900.0 + gap, 0.0, other_speed, 0.0

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from chauffeur.concept import Command, Scenario
-from chauffeur.worlds.highway.reference import ReferenceWorld
-from chauffeur.worlds.highway.reference.plain import plain_highway_env
 from chauffeur.worlds.highway.scenarios import BUILT_IN
-from chauffeur.worlds.highway.traffic import FastRegulatedRoad
+from highway_oracle import ReferenceWorld
+from highway_oracle.plain import plain_highway_env
+from highway_oracle.traffic import FastRegulatedRoad
 
 
 def _trace(scenario: Scenario, steps: int) -> list[Any]:

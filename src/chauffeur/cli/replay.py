@@ -79,17 +79,18 @@ def drive_again(recorded: RecordedTrip) -> RecordedTrip:
 def other_versions(recorded: RecordedTrip) -> list[str]:
     """What has changed on this machine since the recording, as far as it could matter."""
     import platform
-    from importlib.metadata import PackageNotFoundError, version
+
+    from chauffeur import __version__
+    from chauffeur.drive.session import make_world
 
     changed: list[str] = []
     for name, then in recorded.trip.record:
         if name == "python":
             now = platform.python_version()
-        elif name in ("chauffeur", "highway-env"):
-            try:
-                now = version(name)
-            except PackageNotFoundError:
-                now = "not installed"
+        elif name == "chauffeur":
+            now = __version__
+        elif name == "engine":
+            now = make_world(recorded.scenario).engine
         else:
             continue
         if now != then:

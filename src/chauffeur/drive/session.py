@@ -368,7 +368,7 @@ def provenance(plan: Plan, scenario: Scenario, seed: int, limits: Limits) -> tup
     """What a result must name to be repeated."""
     return (
         ("chauffeur", version("chauffeur")),
-        ("highway-env", version("highway-env")),
+        ("engine", make_world(scenario).engine),
         ("python", platform.python_version()),
         ("planner", plan.planner),
         ("model", plan.model),

@@ -86,6 +86,11 @@ class World(Protocol):
     """A simulated or real place to drive in."""
 
     @property
+    def engine(self) -> str:
+        """What moves the vehicles, with its version: every result names it."""
+        ...
+
+    @property
     def dt_s(self) -> float:
         """Control period."""
         ...

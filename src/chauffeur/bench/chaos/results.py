@@ -16,8 +16,9 @@ from chauffeur.bench.chaos.runner import ChaosConfig
 from chauffeur.bench.chaos.table import failures, figures, headline, table_markdown
 from chauffeur.bench.store import Row
 from chauffeur.drive.files import publish
+from chauffeur.worlds.highway import HighwayWorld
 
-_PACKAGES: Final = ("chauffeur", "highway-env", "numpy", "numba", "pydantic-monty", "openai")
+_PACKAGES: Final = ("chauffeur", "numpy", "numba", "pydantic-monty", "openai")
 
 
 def write_results(folder: Path, config: ChaosConfig, rows: Sequence[Row]) -> None:
@@ -39,5 +40,6 @@ def provenance(config: ChaosConfig) -> dict[str, Any]:
         "versions": {name: version(name) for name in _PACKAGES},
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} CPUs",
-        "note": "simulated drives (highway-env); real processes, faults injected from the outside",
+        "engine": HighwayWorld.engine,
+        "note": "simulated drives (highway-env physics); real processes, faults injected from the outside",
     }

@@ -24,6 +24,7 @@ from chauffeur.bench.lampilot.rollout import BASELINES, REHEARSAL_SEED, ROLLOUT_
 from chauffeur.bench.store import Row, RowStore
 from chauffeur.drive.files import publish
 from chauffeur.safety.shield import SHIELD_VERSION
+from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import Item
 
 SCHEMA = "lampilot-results-v2"
@@ -203,7 +204,8 @@ def provenance(frozen: Frozen) -> Mapping[str, Any]:
         "config": frozen.config,
         "model": frozen.model,
         "labels": list(frozen.labels),
-        "versions": {name: _version(name) for name in ("chauffeur", "highway-env", "numpy", "numba", "pydantic-monty")},
+        "versions": {name: _version(name) for name in ("chauffeur", "numpy", "numba", "pydantic-monty")},
+        "engine": HighwayWorld.engine,
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} CPUs",
     }

@@ -4,31 +4,29 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 from chauffeur.concept import Command, LaneId, Turn, Wishes
 from chauffeur.control import Actuation, full_scale
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.core import CoreRoad
 from chauffeur.worlds.highway.core import layout as at
+from chauffeur.worlds.highway.network import LaneNetwork
 from chauffeur.worlds.highway.perception import HighwayPerception
 
 DESTINATIONS: dict[Turn, str] = {"left": "o1", "straight": "o2", "right": "o3"}
 
 
-def route_of(network: Any, here: LaneId, turn: Turn) -> list[tuple[str, str]]:
+def route_of(network: LaneNetwork, here: LaneId, turn: Turn) -> list[tuple[str, str]]:
     """Roads of the shortest way to the exit of a turn, the present one first; only that one where there is none."""
-    try:
-        path = network.shortest_path(here[1], DESTINATIONS[turn])
-    except KeyError:  # a road without that exit
-        path = []
-    return [here[:2], *((str(a), str(b)) for a, b in pairwise(path))]
+    return [here[:2], *pairwise(network.shortest_path(here[1], DESTINATIONS[turn]))]
 
 
 class HighwayDriver:
     """LaMPilot's autopilot. Its only state is the route, planned when a turn is first wished."""
 
-    def __init__(self, core: CoreRoad, perception: HighwayPerception, actuation: Actuation, network: Any) -> None:
+    def __init__(
+        self, core: CoreRoad, perception: HighwayPerception, actuation: Actuation, network: LaneNetwork
+    ) -> None:
         self._core = core
         self._perception = perception
         self._actuation = actuation

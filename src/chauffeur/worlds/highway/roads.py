@@ -10,31 +10,32 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from itertools import pairwise
+from typing import Any, Literal
 
 import numpy as np
-from highway_env.road.lane import CircularLane, LineType, SineLane, StraightLane
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from chauffeur.concept import LaneId, LaneView, ScenarioError
 from chauffeur.control import LAMPILOT_HIGHWAY, LAMPILOT_INTERSECTION, Actuation
-from chauffeur.worlds.highway.traffic import (
-    AxisLane,
-    DynamicEgo,
-    FastNetwork,
-    FastRegulatedRoad,
-    FastRoad,
-    IDMVehicle,
-    KinematicEgo,
-    Obstacle,
-    StopSign,
+from chauffeur.worlds.highway.network import (
+    LANE_WIDTH_M,
+    ArcLane,
+    FloatArray,
+    Lane,
+    LaneNetwork,
+    SineLane,
+    StraightLane,
 )
 
 DT_S = 0.1
 HIGHWAY_LIMIT_MPS = 31.2928  # 70 mph
 RAMP_LIMIT_MPS = 24.5872  # 55 mph
-LANE_WIDTH_M = 4.0
 _CLEAR_M = 20.0
+_CAR_M = (5.0, 2.0)
+_OBSTACLE_M = (2.0, 2.0)
+_EXPONENTS = (3.5, 4.5)
+"""IDM's exponent differs from driver to driver, drawn between these (highway-env's `DELTA_RANGE`)."""
 
 
 class EgoConfig(BaseModel):
@@ -70,13 +71,41 @@ class RoadConfig(BaseModel):
 
 
 @dataclass(slots=True)
+class Spawn:
+    """A vehicle or object where it enters the scene.
+
+    Attributes:
+        kind: What it is.
+        position: (x, y), m.
+        heading_rad, speed_mps: Its own.
+        lane: Closest lane.
+        size_m: (length, width).
+        exponent: IDM's delta of a car of the traffic.
+        timer_s: How long ago a car of the traffic last looked for a lane change.
+        route: Roads it takes, for a car of the traffic that has a goal.
+    """
+
+    kind: Literal["ego", "traffic", "obstacle", "stop_sign"]
+    position: FloatArray
+    heading_rad: float
+    speed_mps: float
+    lane: LaneId
+    size_m: tuple[float, float] = _CAR_M
+    exponent: float = 0.0
+    timer_s: float = 0.0
+    route: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(slots=True)
 class Scene:
     """A road with its traffic, ready to be stepped.
 
     Attributes:
         kind: `highway` or `intersection`.
-        road: highway-env road.
-        ego: The ego vehicle; last in the road's vehicles once it has entered.
+        network: The lanes.
+        ego: The ego.
+        traffic: All other vehicles, in the order in which they were placed.
+        objects: Obstacles and signs.
         emergency_lanes: Lanes nobody but a car in distress may use.
         actuation: Full-scale pedal and wheel values.
         alone_steps: Steps of the traffic before the ego enters; 0 where it is there from the start.
@@ -85,28 +114,24 @@ class Scene:
         bounds: (min x, max x, min y): leaving them ends the trip.
     """
 
-    kind: str
-    road: Any
-    ego: Any
+    kind: Literal["highway", "intersection"]
+    network: LaneNetwork
+    ego: Spawn
+    traffic: list[Spawn]
+    objects: list[Spawn]
     actuation: Actuation
     warm_up_steps: int
     duration_s: float
     bounds: tuple[float, float, float]
     alone_steps: int = 0
-    emergency_lanes: frozenset[tuple[str, str, int]] = field(default_factory=frozenset[tuple[str, str, int]])
-
-
-def lane_id(index: tuple[Any, Any, Any]) -> LaneId:
-    """A lane index with plain Python types; highway-env mixes in NumPy strings and integers."""
-    return str(index[0]), str(index[1]), int(index[2])
+    emergency_lanes: frozenset[LaneId] = field(default_factory=frozenset[LaneId])
 
 
 def lane_views(scene: Scene) -> tuple[LaneView, ...]:
     """The road as geometry for snapshots."""
     views: list[LaneView] = []
-    lanes: dict[Any, Any] = scene.road.network.lanes_dict()
-    for index, lane in lanes.items():
-        length = float(lane.length)
+    for name, lane in scene.network.lanes().items():
+        length = lane.length
         straight = lane.heading_at(0.0) == lane.heading_at(length) == lane.heading_at(length / 2)
         points = 2 if straight else max(9, round(length / 2))
         centre = tuple(
@@ -114,12 +139,12 @@ def lane_views(scene: Scene) -> tuple[LaneView, ...]:
         )
         views.append(
             LaneView(
-                id=lane_id(index),
-                width_m=float(lane.width_at(0.0)),
+                id=name,
+                width_m=LANE_WIDTH_M,
                 length_m=length,
                 speed_limit_mps=float(lane.speed_limit),
-                forbidden=bool(lane.forbidden),
-                emergency=lane_id(index) in scene.emergency_lanes,
+                forbidden=lane.forbidden,
+                emergency=name in scene.emergency_lanes,
                 centre_m=centre,
             )
         )
@@ -152,93 +177,64 @@ def build_scene(config: RoadConfig, rng: np.random.Generator) -> Scene:
 
 
 def _ramp_merge(config: RoadConfig, rng: np.random.Generator) -> Scene:
-    before, converging, merge, after = _stages(config, 4, (500.0, 80.0, 80.0, 2000.0))
+    before, converging, merge, after = stages(config, 4, (500.0, 80.0, 80.0, 2000.0))
     ends = (0.0, before + converging, before + converging + merge, before + converging + merge + after)
-    network = FastNetwork()
-    continuous, striped, none = LineType.CONTINUOUS_LINE, LineType.STRIPED, LineType.NONE
-    outer = [(continuous, striped), (none, continuous)]
-    beside_merge = [(continuous, striped), (none, striped)]
+    network = LaneNetwork()
     for i in range(2):
         y = i * LANE_WIDTH_M
-        for nodes, start, end, lines in (
-            (("a", "b"), ends[0], ends[1], outer),
-            (("b", "c"), ends[1], ends[2], beside_merge),
-            (("c", "d"), ends[2], ends[3], outer),
-        ):
-            network.add_lane(*nodes, AxisLane([start, y], [end, y], line_types=lines[i], speed_limit=HIGHWAY_LIMIT_MPS))
+        for nodes, start, end in ((("a", "b"), ends[0], ends[1]), (("b", "c"), *ends[1:3]), (("c", "d"), *ends[2:])):
+            network.add(*nodes, StraightLane([start, y], [end, y], speed_limit=HIGHWAY_LIMIT_MPS))
     ramp_y, amplitude = 6.5 + 4 + 4, 3.25
-    edges = (continuous, continuous)
-    ramp = AxisLane([0, ramp_y], [before, ramp_y], line_types=edges, forbidden=True, speed_limit=RAMP_LIMIT_MPS)
+    ramp = StraightLane([0, ramp_y], [before, ramp_y], forbidden=True, speed_limit=RAMP_LIMIT_MPS)
     curve = SineLane(
         ramp.position(before, -amplitude),
         ramp.position(before + converging, -amplitude),
         amplitude,
         2 * np.pi / (2 * converging),
         np.pi / 2,
-        line_types=[continuous, continuous],
         forbidden=True,
         speed_limit=RAMP_LIMIT_MPS,
     )
     merge_start = curve.position(converging, 0)
     merging = StraightLane(
-        merge_start,
-        merge_start + np.array([merge, 0]),
-        line_types=(none, continuous),
-        forbidden=True,
-        speed_limit=HIGHWAY_LIMIT_MPS,
+        merge_start, merge_start + np.array([merge, 0]), forbidden=True, speed_limit=HIGHWAY_LIMIT_MPS
     )
-    network.add_lane("j", "k", ramp)
-    network.add_lane("k", "b", curve)
-    network.add_lane("b", "c", merging)
-    network.freeze()
-    road = FastRoad(network=network, np_random=rng)
-    road.objects.append(Obstacle(road, merging.position(merge, 0)))
-    ego = _place_ego(road, config, ("c", "d", 1), (105.0, 0.0))
-    _populate(road, config, rng, spare_last_lane=False)
-    road.vehicles.append(ego)
-    return _highway_scene(road, ego)
+    network.add("j", "k", ramp)
+    network.add("k", "b", curve)
+    network.add("b", "c", merging)
+    barrier = _standing(network, "obstacle", merging.position(merge, 0))
+    ego = _place_ego(network, config, ("c", "d", 1), (105.0, 0.0))
+    traffic = _populate(network, config, rng, spare_last_lane=False)
+    return _highway_scene(network, ego, traffic, objects=[barrier])
 
 
 def _multi_lane(config: RoadConfig, rng: np.random.Generator) -> Scene:
-    (length,) = _stages(config, 1, (2000.0,))
-    network = FastNetwork()
-    continuous, striped, none = LineType.CONTINUOUS_LINE, LineType.STRIPED, LineType.NONE
+    (length,) = stages(config, 1, (2000.0,))
+    network = LaneNetwork()
     regular = config.num_lanes - 1 if config.emergency_lane else config.num_lanes
-    for i in range(regular):
-        left = continuous if i == 0 else none
-        right = continuous if i == regular - 1 else striped
+    for i in range(config.num_lanes):
         y = i * LANE_WIDTH_M
-        network.add_lane(
-            "a", "b", AxisLane([0, y], [length, y], line_types=(left, right), speed_limit=HIGHWAY_LIMIT_MPS)
-        )
-    emergency: frozenset[tuple[str, str, int]] = frozenset()
-    if config.emergency_lane:
-        y = regular * LANE_WIDTH_M
-        network.add_lane(
-            "a",
-            "b",
-            AxisLane(
-                [0, y],
-                [length, y],
-                line_types=(continuous, continuous),
-                forbidden=True,
-                speed_limit=HIGHWAY_LIMIT_MPS,
-            ),
-        )
-        emergency = frozenset({("a", "b", regular)})
-    network.freeze()
-    road = FastRoad(network=network, np_random=rng)
-    ego = _place_ego(road, config, ("a", "b", 0), (380.0, 0.0))
-    _populate(road, config, rng, spare_last_lane=config.emergency_lane)
-    road.vehicles.append(ego)
-    return _highway_scene(road, ego, emergency)
+        network.add("a", "b", StraightLane([0, y], [length, y], forbidden=i >= regular, speed_limit=HIGHWAY_LIMIT_MPS))
+    ego = _place_ego(network, config, ("a", "b", 0), (380.0, 0.0))
+    traffic = _populate(network, config, rng, spare_last_lane=config.emergency_lane)
+    emergency = frozenset({("a", "b", regular)} if config.emergency_lane else ())
+    return _highway_scene(network, ego, traffic, emergency=emergency)
 
 
-def _highway_scene(road: Any, ego: Any, emergency: frozenset[tuple[str, str, int]] = frozenset()) -> Scene:
+def _highway_scene(
+    network: LaneNetwork,
+    ego: Spawn,
+    traffic: list[Spawn],
+    *,
+    objects: Sequence[Spawn] = (),
+    emergency: frozenset[LaneId] = frozenset(),
+) -> Scene:
     return Scene(
         kind="highway",
-        road=road,
+        network=network,
         ego=ego,
+        traffic=traffic,
+        objects=list(objects),
         actuation=LAMPILOT_HIGHWAY,
         warm_up_steps=30,
         duration_s=1000.0,
@@ -247,109 +243,69 @@ def _highway_scene(road: Any, ego: Any, emergency: frozenset[tuple[str, str, int
     )
 
 
-def _stages(config: RoadConfig, count: int, default: tuple[float, ...]) -> tuple[float, ...]:
+def stages(config: RoadConfig, count: int, default: tuple[float, ...]) -> tuple[float, ...]:
+    """Lengths of a road's stretches, m. Raises ScenarioError for another number of them than the road has."""
     stages = config.stage_length or default
     if len(stages) != count:
         raise ScenarioError(f"stage_length of a {config.type} road needs {count} lengths in metres, not {len(stages)}.")
     return tuple(stages)
 
 
+def _standing(network: LaneNetwork, kind: Literal["obstacle", "stop_sign"], position: FloatArray) -> Spawn:
+    return Spawn(kind, position, 0.0, 0.0, network.closest(position, 0.0), size_m=_OBSTACLE_M)
+
+
+def _car(network: LaneNetwork, lane: Lane, longitudinal_m: float, speed_mps: float) -> Spawn:
+    """A car of the traffic on the centre of a lane."""
+    position, heading = lane.position(longitudinal_m, 0), lane.heading_at(longitudinal_m)
+    return Spawn(
+        "traffic",
+        position,
+        heading,
+        speed_mps,
+        network.closest(position, heading),
+        timer_s=float((np.sum(position) * np.pi) % 1.0),
+    )
+
+
 def _place_ego(
-    road: Any, config: RoadConfig, default_lane: tuple[str, str, int], default_position: tuple[float, float]
-) -> KinematicEgo:
+    network: LaneNetwork, config: RoadConfig, default_lane: LaneId, default_position: tuple[float, float]
+) -> Spawn:
     ego = config.ego_vehicle or EgoConfig(start_lane_index=default_lane, start_position=default_position)
     try:
-        lane = road.network.get_lane(ego.start_lane_index)
+        lane = network.lane(ego.start_lane_index)
     except (KeyError, IndexError):
         raise ScenarioError(f"The ego's start lane {ego.start_lane_index} is not on this {config.type} road.") from None
-    return KinematicEgo(road, lane.position(*ego.start_position), speed=ego.speed)
+    position = lane.position(*ego.start_position)
+    return Spawn("ego", position, 0.0, ego.speed, network.closest(position, 0.0))
 
 
-def _populate(road: Any, config: RoadConfig, rng: np.random.Generator, *, spare_last_lane: bool) -> None:
-    graph = road.network.graph
+def _populate(
+    network: LaneNetwork, config: RoadConfig, rng: np.random.Generator, *, spare_last_lane: bool
+) -> list[Spawn]:
+    graph = network.graph
+    traffic: list[Spawn] = []
     for i in range(config.vehicles_count):
         # The first car starts on the first road; its node draws are not made.
         start = "a" if i == 0 else rng.choice(list(graph.keys()))
         end = "b" if i == 0 else rng.choice(list(graph[start].keys()))
         lanes = graph[start][end]
-        index = rng.choice(list(range(len(lanes) - 1))) if spare_last_lane else rng.choice(len(lanes))
-        lane = road.network.get_lane((start, end, index))
+        lane = lanes[rng.choice(list(range(len(lanes) - 1))) if spare_last_lane else rng.choice(len(lanes))]
         speed = rng.uniform(0.8 * lane.speed_limit, 1.1 * lane.speed_limit)
         spacing = (12 + speed) * (1 / config.vehicles_density)
-        furthest = np.max([lane.local_coordinates(v.position)[0] for v in road.vehicles]) if road.vehicles else 12
+        furthest = max((lane.local_coordinates(car.position)[0] for car in traffic), default=12)
         s = furthest + spacing * rng.uniform(0.7, 1.3)
-        vehicle = IDMVehicle(road, lane.position(s, 0), lane.heading_at(s), speed)
-        vehicle.randomize_behavior()
-        road.vehicles.append(vehicle)
+        car = _car(network, lane, s, speed)
+        car.exponent = rng.uniform(*_EXPONENTS)
+        traffic.append(car)
+    return traffic
 
 
 def _intersection(config: RoadConfig, rng: np.random.Generator) -> Scene:
-    network = FastNetwork()
-    right_radius = LANE_WIDTH_M + 5
-    left_radius = right_radius + LANE_WIDTH_M
-    outer = right_radius + LANE_WIDTH_M / 2
-    access = 50 + 50
-    none, continuous, striped = LineType.NONE, LineType.CONTINUOUS, LineType.STRIPED
-    for corner in range(4):
-        angle = np.radians(90 * corner)
-        priority = 3 if corner % 2 else 1
-        rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        into, left, ahead, right = (
-            f"ir{corner}",
-            f"il{(corner + 1) % 4}",
-            f"il{(corner + 2) % 4}",
-            f"il{(corner - 1) % 4}",
-        )
-        start = rotation @ np.array([LANE_WIDTH_M / 2, access + outer])
-        end = rotation @ np.array([LANE_WIDTH_M / 2, outer])
-        network.add_lane(
-            f"o{corner}",
-            into,
-            StraightLane(start, end, line_types=(striped, continuous), priority=priority, speed_limit=10),
-        )
-        network.add_lane(
-            into,
-            right,
-            CircularLane(
-                rotation @ np.array([outer, outer]),
-                right_radius,
-                angle + np.radians(180),
-                angle + np.radians(270),
-                line_types=[none, continuous],
-                priority=priority,
-                speed_limit=10,
-            ),
-        )
-        network.add_lane(
-            into,
-            left,
-            CircularLane(
-                rotation @ np.array([-left_radius + LANE_WIDTH_M / 2, left_radius - LANE_WIDTH_M / 2]),
-                left_radius,
-                angle + np.radians(0),
-                angle + np.radians(-90),
-                clockwise=False,
-                line_types=[none, none],
-                priority=priority - 1,
-                speed_limit=10,
-            ),
-        )
-        start = rotation @ np.array([LANE_WIDTH_M / 2, outer])
-        end = rotation @ np.array([LANE_WIDTH_M / 2, -outer])
-        network.add_lane(
-            into, ahead, StraightLane(start, end, line_types=(none, none), priority=priority, speed_limit=10)
-        )
-        start = rotation @ np.flip([LANE_WIDTH_M / 2, access + outer], axis=0)
-        end = rotation @ np.flip([LANE_WIDTH_M / 2, outer], axis=0)
-        network.add_lane(
-            right,
-            f"o{(corner - 1) % 4}",
-            StraightLane(end, start, line_types=(none, continuous), priority=priority, speed_limit=10),
-        )
-    network.freeze()
-    road = FastRegulatedRoad(network=network, np_random=rng)
-    approach = network.get_lane(("o0", "ir0", 0))
-    road.objects.append(StopSign(road, approach.position(95, 0)))
+    network = _crossroads()
+    approach = network.lane(("o0", "ir0", 0))
+    sign = _standing(network, "stop_sign", approach.position(95, 0))
+    traffic: list[Spawn] = []
     for origin, goal, count, probability, position_deviation, speed_deviation in (
         (
             "o3",
@@ -369,18 +325,82 @@ def _intersection(config: RoadConfig, rng: np.random.Generator) -> Scene:
         ),
     ):
         for s in np.linspace(0, 100, count):
-            _spawn_crossing(road, rng, (origin, goal), s, probability, position_deviation, speed_deviation)
-    ego = DynamicEgo(road, approach.position(10, 0), speed=approach.speed_limit, heading=approach.heading_at(60))
+            car = _crossing_car(network, rng, (origin, goal), s, probability, position_deviation, speed_deviation)
+            if car is None or any(np.linalg.norm(other.position - car.position) < 15 for other in traffic):
+                continue
+            path = network.shortest_path(car.lane[1], goal)
+            car.route = (car.lane[:2], *pairwise(path))
+            car.exponent = rng.uniform(*_EXPONENTS)
+            traffic.append(car)
+    position, heading = approach.position(10, 0), approach.heading_at(60)
+    ego = Spawn("ego", position, heading, approach.speed_limit, network.closest(position, heading))
     return Scene(
         kind="intersection",
-        road=road,
+        network=network,
         ego=ego,
+        traffic=traffic,
+        objects=[sign],
         actuation=LAMPILOT_INTERSECTION,
         warm_up_steps=0,
         duration_s=100.0,
         bounds=(-40.0, 40.0, -40.0),
         alone_steps=30,
     )
+
+
+def _crossroads() -> LaneNetwork:
+    """Four arms of one lane a direction; arms 1 and 3 have the right of way, left turns yield."""
+    network = LaneNetwork()
+    right_radius = LANE_WIDTH_M + 5
+    left_radius = right_radius + LANE_WIDTH_M
+    outer = right_radius + LANE_WIDTH_M / 2
+    access = 50 + 50
+    for corner in range(4):
+        angle = np.radians(90 * corner)
+        priority = 3 if corner % 2 else 1
+        rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        into, left, ahead, right = (
+            f"ir{corner}",
+            f"il{(corner + 1) % 4}",
+            f"il{(corner + 2) % 4}",
+            f"il{(corner - 1) % 4}",
+        )
+        start = rotation @ np.array([LANE_WIDTH_M / 2, access + outer])
+        end = rotation @ np.array([LANE_WIDTH_M / 2, outer])
+        network.add(f"o{corner}", into, StraightLane(start, end, priority=priority, speed_limit=10))
+        network.add(
+            into,
+            right,
+            ArcLane(
+                rotation @ np.array([outer, outer]),
+                right_radius,
+                angle + np.radians(180),
+                angle + np.radians(270),
+                1,
+                priority=priority,
+                speed_limit=10,
+            ),
+        )
+        network.add(
+            into,
+            left,
+            ArcLane(
+                rotation @ np.array([-left_radius + LANE_WIDTH_M / 2, left_radius - LANE_WIDTH_M / 2]),
+                left_radius,
+                angle + np.radians(0),
+                angle + np.radians(-90),
+                -1,
+                priority=priority - 1,
+                speed_limit=10,
+            ),
+        )
+        start = rotation @ np.array([LANE_WIDTH_M / 2, outer])
+        end = rotation @ np.array([LANE_WIDTH_M / 2, -outer])
+        network.add(into, ahead, StraightLane(start, end, priority=priority, speed_limit=10))
+        start = rotation @ np.flip([LANE_WIDTH_M / 2, access + outer], axis=0)
+        end = rotation @ np.flip([LANE_WIDTH_M / 2, outer], axis=0)
+        network.add(right, f"o{(corner - 1) % 4}", StraightLane(end, start, priority=priority, speed_limit=10))
+    return network
 
 
 def crowded_rows(positions: Sequence[tuple[float, float]], ego: tuple[float, float]) -> list[int]:
@@ -399,27 +419,20 @@ def crowded_rows(positions: Sequence[tuple[float, float]], ego: tuple[float, flo
     return removed
 
 
-def _spawn_crossing(
-    road: Any,
+def _crossing_car(
+    network: LaneNetwork,
     rng: np.random.Generator,
     route: tuple[str, str],
     longitudinal_m: float,
     probability: float,
     position_deviation_m: float,
     speed_deviation_mps: float,
-) -> None:
+) -> Spawn | None:
+    """A car on its way across; None where none is drawn."""
     if rng.uniform() > probability:
-        return
+        return None
     rng.choice(range(4), size=2, replace=False)  # a route LaMPilot draws and then overwrites
-    origin, goal = route
-    vehicle = IDMVehicle.make_on_lane(
-        road,
-        (origin, origin.replace("o", "ir"), 0),
-        longitudinal=longitudinal_m + 5 + rng.normal() * position_deviation_m,
-        speed=8 + rng.normal() * speed_deviation_mps,
-    )
-    if any(np.linalg.norm(v.position - vehicle.position) < 15 for v in road.vehicles):
-        return
-    vehicle.plan_route_to(goal)
-    vehicle.randomize_behavior()
-    road.vehicles.append(vehicle)
+    origin, _ = route
+    lane = network.lane((origin, origin.replace("o", "ir"), 0))
+    s = longitudinal_m + 5 + rng.normal() * position_deviation_m
+    return _car(network, lane, s, 8 + rng.normal() * speed_deviation_mps)

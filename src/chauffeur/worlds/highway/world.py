@@ -1,7 +1,7 @@
 """The highway world: LaMPilot's roads behind the `World` contract, stepped by the compiled core.
 
-`reference.ReferenceWorld` is the same world on the highway-env package itself; the two agree to rounding over whole
-trips (tests/worlds/test_core.py), which is what makes this one's results LaMPilot's.
+`benchmarks/highway_oracle` is the same world on the highway-env package itself; scenes equal to the bit and whole trips
+to rounding (tests/worlds/test_core.py) are what makes this one's results LaMPilot's.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ from chauffeur.worlds.highway.roads import DT_S, Scene, build_scene, lane_views,
 FOLLOW_WITHIN_M = 50.0
 """LaMPilot starts the ego at the speed of a vehicle closer than this ahead, at the speed limit otherwise."""
 
+ENGINE = "highway core 1 (physics of highway-env 1.12.1)"
+
 _KEPT_STARTS = 64
 _INSTANT = struct.Struct("<Qd")
 """Control periods since the trip began, and the simulator's own clock, s."""
@@ -47,6 +49,8 @@ _starts: OrderedDict[tuple[str, int], _Start] = OrderedDict()
 
 class HighwayWorld:
     """Ramp merge, multi-lane highway and intersection, stepped at 10 Hz."""
+
+    engine = ENGINE
 
     def __init__(self) -> None:
         self._start: _Start | None = None
@@ -173,7 +177,7 @@ class HighwayWorld:
         """The low-level driver of the present trip; the same until the next reset."""
         if self._driver is None:
             scene = self._started().scene
-            self._driver = HighwayDriver(self._road(), self.perception(), scene.actuation, scene.road.network)
+            self._driver = HighwayDriver(self._road(), self.perception(), scene.actuation, scene.network)
         return self._driver
 
 

@@ -111,6 +111,8 @@ class _Ego(Ego):
 class ParkingWorld:
     """A parking lot, stepped at 10 Hz."""
 
+    engine = "parking lot 1"
+
     def __init__(self) -> None:
         self._scene: _Ground | None = None
         self._ego = _Ego(Pose(0.0, 0.0, 0.0), 0.0)

@@ -13,6 +13,7 @@ from chauffeur.bench.lampilot.scenes.annotations import FILE
 from chauffeur.bench.lampilot.scenes.kinds import KINDS, MAIN
 from chauffeur.bench.lampilot.scenes.statistics import statistics_of
 from chauffeur.bench.lampilot.scenes.writer import Item
+from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import Dataset
 
 _SPLITS = ("train", "val", "test")
@@ -30,7 +31,8 @@ def manifest_of(
     """
     main = [datasets[name] for name in _SPLITS if name in datasets]
     return {
-        "versions": {name: version(name) for name in ("chauffeur", "highway-env", "numpy")},
+        "versions": {name: version(name) for name in ("chauffeur", "numpy")},
+        "engine": HighwayWorld.engine,
         "items": {name: len(dataset.items()) for name, dataset in datasets.items()},
         "statistics": asdict(statistics_of(main)),
         "phrasing": dict(sorted(Counter(item.note.phrasing or "extras" for item in items).items())),

@@ -24,6 +24,7 @@ from chauffeur.bench.lampilot.scenes.writer import Item, folder_of, items_of, wr
 from chauffeur.bench.store import Row, RowStore
 from chauffeur.concept import ConfigError
 from chauffeur.drive.files import publish
+from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 
 GENERATOR = "lampilot-scenes-v1"
@@ -78,7 +79,8 @@ class Suite:
             "generator": GENERATOR,
             "solvers": list(SOLVERS),
             "config": asdict(self.config),
-            "versions": {name: version(name) for name in ("chauffeur", "highway-env", "numpy")},
+            "versions": {name: version(name) for name in ("chauffeur", "numpy")},
+            "engine": HighwayWorld.engine,
         }
         path = self.folder / PLAN
         if path.exists():

@@ -1,20 +1,21 @@
-"""From highway-env's objects, as a scene spawns them, to arrays."""
+"""From a scene as it was placed to arrays."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chauffeur.concept import LaneId
 from chauffeur.worlds.highway.core import layout as at
-from chauffeur.worlds.highway.roads import Scene
-from chauffeur.worlds.highway.traffic import CircularLane, IDMVehicle, KinematicEgo, SineLane, StopSign
+from chauffeur.worlds.highway.network import LANE_WIDTH_M, ArcLane, Lane, LaneNetwork, SineLane, StraightLane
+from chauffeur.worlds.highway.roads import Scene, Spawn
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+_KINDS = {"traffic": at.TRAFFIC, "ego": at.EGO_KIND, "obstacle": at.OBSTACLE, "stop_sign": at.SIGN}
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +39,9 @@ class RoadMap:
     road_rows: dict[tuple[str, str], int]
 
 
-def map_network(network: Any) -> RoadMap:
-    """Arrays of a highway-env road network."""
-    found: dict[LaneId, Any] = {
-        (str(start), str(end), i): lane
-        for start, ends in network.graph.items()
-        for end, lanes in ends.items()
-        for i, lane in enumerate(lanes)
-    }
+def map_network(network: LaneNetwork) -> RoadMap:
+    """A road's lanes as arrays."""
+    found = network.lanes()
     ids = tuple(found)
     pairs = list(dict.fromkeys((start, end) for start, end, _ in ids))
     nodes = {name: k for k, name in enumerate(dict.fromkeys(n for pair in pairs for n in pair))}
@@ -66,15 +62,16 @@ def map_network(network: Any) -> RoadMap:
     return RoadMap(ids, {name: k for k, name in enumerate(ids)}, lanes, traits, roads, road_rows)
 
 
-def _lane_row(numbers: Floats, traits: Ints, lane: Any) -> None:
-    numbers[at.LANE_LENGTH], numbers[at.LANE_WIDTH], numbers[at.LIMIT] = lane.length, lane.width, lane.speed_limit
-    traits[at.FORBIDDEN], traits[at.PRIORITY] = int(lane.forbidden), int(lane.priority)
-    if isinstance(lane, CircularLane):
+def _lane_row(numbers: Floats, traits: Ints, lane: Lane) -> None:
+    numbers[at.LANE_LENGTH], numbers[at.LANE_WIDTH], numbers[at.LIMIT] = lane.length, LANE_WIDTH_M, lane.speed_limit
+    traits[at.FORBIDDEN], traits[at.PRIORITY] = int(lane.forbidden), lane.priority
+    if isinstance(lane, ArcLane):
         traits[at.SHAPE] = at.ARC
-        numbers[at.START_X], numbers[at.START_Y] = lane.center
+        numbers[at.START_X], numbers[at.START_Y] = lane.centre
         numbers[at.RADIUS], numbers[at.START_PHASE] = lane.radius, lane.start_phase
-        numbers[at.TURN_SIGN] = lane.direction
+        numbers[at.TURN_SIGN] = lane.turn_sign
         return
+    assert isinstance(lane, StraightLane)
     traits[at.SHAPE] = at.STRAIGHT
     numbers[at.START_X], numbers[at.START_Y] = lane.start
     numbers[at.DIRECTION_X], numbers[at.DIRECTION_Y] = lane.direction
@@ -86,38 +83,29 @@ def _lane_row(numbers: Floats, traits: Ints, lane: Any) -> None:
 
 def place_entities(scene: Scene, road: RoadMap) -> tuple[Floats, Ints, Ints]:
     """Entities of a scene just built, the ego in row 0 whether it has entered or not, and the scene's own numbers."""
-    traffic = [v for v in scene.road.vehicles if v is not scene.ego]
-    entities = [scene.ego, *traffic, *scene.road.objects]
+    entities = [scene.ego, *scene.traffic, *scene.objects]
     floats = np.zeros((len(entities), at.ENTITY_FLOATS))
     ints = np.zeros((len(entities), at.ENTITY_INTS), dtype=np.int64)
     for k, entity in enumerate(entities):
         _entity_row(floats[k], ints[k], entity, road)
     numbers = np.zeros(at.SCENE_INTS, dtype=np.int64)
-    numbers[at.VEHICLES], numbers[at.ENTITIES] = 1 + len(traffic), len(entities)
+    numbers[at.VEHICLES], numbers[at.ENTITIES] = 1 + len(scene.traffic), len(entities)
     numbers[at.PARALLEL] = int(bool(np.all(road.traits[:, at.SHAPE] != at.ARC)))
-    numbers[at.REGULATED] = int(scene.kind == "intersection")
-    numbers[at.DYNAMIC_EGO] = int(not isinstance(scene.ego, KinematicEgo))
+    numbers[at.REGULATED] = numbers[at.DYNAMIC_EGO] = int(scene.kind == "intersection")
     numbers[at.EGO_PRESENT] = int(scene.alone_steps == 0)
     return floats, ints, numbers
 
 
-def _entity_row(numbers: Floats, traits: Ints, entity: Any, road: RoadMap) -> None:
-    start, end, index = entity.lane_index
+def _entity_row(numbers: Floats, traits: Ints, entity: Spawn, road: RoadMap) -> None:
     numbers[at.X], numbers[at.Y] = entity.position
-    numbers[at.HEADING], numbers[at.SPEED] = entity.heading, entity.speed
-    numbers[at.LENGTH], numbers[at.WIDTH] = entity.LENGTH, entity.WIDTH
-    traits[at.LANE] = road.rows[str(start), str(end), int(index)]
-    traits[at.TARGET_LANE] = traits[at.LANE]
-    traits[at.KIND] = at.EGO_KIND
-    driver: Any = entity
-    if isinstance(entity, IDMVehicle):
-        traits[at.KIND] = at.TRAFFIC
-        start, end, index = entity.target_lane_index
-        traits[at.TARGET_LANE] = road.rows[str(start), str(end), int(index)]
-        numbers[at.TARGET_SPEED], numbers[at.EXPONENT] = driver.target_speed, driver.DELTA
-        numbers[at.TIMER] = driver.timer
-        for leg in driver.route or ():
-            traits[at.ROUTE + traits[at.ROUTE_END]] = road.road_rows[str(leg[0]), str(leg[1])]
-            traits[at.ROUTE_END] += 1
-    elif not hasattr(entity, "action"):
-        traits[at.KIND] = at.SIGN if isinstance(entity, StopSign) else at.OBSTACLE
+    numbers[at.HEADING], numbers[at.SPEED] = entity.heading_rad, entity.speed_mps
+    numbers[at.LENGTH], numbers[at.WIDTH] = entity.size_m
+    traits[at.LANE] = traits[at.TARGET_LANE] = road.rows[entity.lane]
+    traits[at.KIND] = _KINDS[entity.kind]
+    if entity.kind != "traffic":
+        return
+    numbers[at.TARGET_SPEED], numbers[at.EXPONENT] = entity.speed_mps, entity.exponent
+    numbers[at.TIMER] = entity.timer_s
+    legs = [road.road_rows[leg] for leg in entity.route]
+    traits[at.ROUTE : at.ROUTE + len(legs)] = legs
+    traits[at.ROUTE_END] = len(legs)

@@ -38,7 +38,7 @@ class CoreRoad:
     @classmethod
     def of(cls, scene: Scene) -> Self:
         """Arrays of a scene just built."""
-        road = map_network(scene.road.network)
+        road = map_network(scene.network)
         return cls(road, *place_entities(scene, road))
 
     def make_ready(self) -> None:

@@ -16,7 +16,7 @@ from highway_env.road.regulation import RegulatedRoad
 from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.dynamics import BicycleVehicle
 
-from chauffeur.worlds.highway import roads
+from highway_oracle import scenes
 
 
 class _PlainNetwork(RoadNetwork):
@@ -52,11 +52,11 @@ def plain_highway_env(*, record_history: bool = False) -> Generator[None]:
         "FastRegulatedRoad": partial(_PlainRegulatedRoad, record_history=record_history),
         "DynamicEgo": _PlainDynamicEgo,
     }
-    ours = {name: getattr(roads, name) for name in plain}
+    ours = {name: getattr(scenes, name) for name in plain}
     try:
         for name, value in plain.items():
-            setattr(roads, name, value)
+            setattr(scenes, name, value)
         yield
     finally:
         for name, value in ours.items():
-            setattr(roads, name, value)
+            setattr(scenes, name, value)

@@ -12,8 +12,8 @@ from chauffeur.control import (
 )
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.driver import route_of
-from chauffeur.worlds.highway.reference.perception import ReferencePerception
-from chauffeur.worlds.highway.roads import Scene, lane_id
+from highway_oracle.perception import ReferencePerception
+from highway_oracle.scenes import Scene, lane_id
 
 
 class ReferenceDriver:

@@ -12,9 +12,9 @@ from chauffeur.concept import LaneId, VehicleState
 from chauffeur.control import LAMPILOT_EGO, idm_acceleration
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.instant import Instant
-from chauffeur.worlds.highway.reference.conflicts import ttc_along, ttc_lane, ttc_plane
-from chauffeur.worlds.highway.roads import Scene, lane_id
-from chauffeur.worlds.highway.traffic import IDMVehicle, StopSign, Vehicle
+from highway_oracle.conflicts import ttc_along, ttc_lane, ttc_plane
+from highway_oracle.scenes import Scene, lane_id
+from highway_oracle.traffic import IDMVehicle, StopSign, Vehicle
 
 
 class ReferencePerception:

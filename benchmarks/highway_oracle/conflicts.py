@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from chauffeur.control import guard_zero
-from chauffeur.worlds.highway.traffic import StopSign
+from highway_oracle.traffic import StopSign
 
 
 def ttc_along(ego: Any, vehicles: list[Any]) -> float:

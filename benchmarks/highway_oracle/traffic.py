@@ -1,4 +1,4 @@
-"""The highway-env physics under the highway worlds, made quicker without changing a bit of its results.
+"""The highway-env physics under the oracle, made quicker without changing a bit of its results.
 
 Three costs dominate highway-env on LaMPilot's roads: searching neighbours (quadratic in vehicles, repeated for every
 query), testing every pair for collision, and deep-copying the ego to predict where it goes. Here positions along a lane

@@ -9,14 +9,17 @@ import numpy as np
 from chauffeur.concept import Command, LaneView, Lead, Scenario, ScenarioError, Snapshot
 from chauffeur.control import Actuation
 from chauffeur.worlds.base import EGO
-from chauffeur.worlds.highway.reference.driver import ReferenceDriver
-from chauffeur.worlds.highway.reference.perception import ReferencePerception, vehicle_state
-from chauffeur.worlds.highway.roads import DT_S, Scene, build_scene, crowded_rows, lane_views, parse_config
+from chauffeur.worlds.highway.roads import DT_S, crowded_rows, parse_config
 from chauffeur.worlds.highway.world import FOLLOW_WITHIN_M
+from highway_oracle.driver import ReferenceDriver
+from highway_oracle.perception import ReferencePerception, vehicle_state
+from highway_oracle.scenes import Scene, build_scene, lane_views
 
 
 class ReferenceWorld:
     """Ramp merge, multi-lane highway and intersection, stepped at 10 Hz."""
+
+    engine = "highway-env"
 
     def __init__(self) -> None:
         self._scene: Scene | None = None
