@@ -12,14 +12,8 @@ SOURCE = Path(chauffeur.__file__).parent
 STEPS_A_WORLD = {"drive/actuate.py"}
 """Law 1: the only module that hands a command to a world."""
 
-STEPS_ITS_OWN = {
-    "worlds/highway/reference/world.py",
-    "worlds/highway/traffic.py",
-    "worlds/highway/gym.py",
-    "worlds/highway/provoked.py",
-}
-"""Inside a world: highway-env's vehicles and roads, and the gymnasium face of the world itself."""
-
+STEPS_ITS_OWN = {"worlds/highway/gym.py", "worlds/highway/provoked.py"}
+"""Inside a world: its disturbed twin, and its gymnasium face."""
 
 STEPS_AN_OPTIMISER = {"models/onboard/training.py", "models/onboard/adapting.py"}
 

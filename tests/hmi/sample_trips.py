@@ -113,7 +113,7 @@ def _trip(wish: str, frames: list[Frame], scenario: str, program: str, **more: o
         "scenario": scenario,
         "seed": 42,
         "said": tuple((f.snapshot.time_s, t) for f in frames for t in f.said),
-        "record": (("chauffeur", "0.1.0"), ("highway-env", "1.12.1"), ("limits", {"name": "default"})),
+        "record": (("chauffeur", "0.1.0"), ("engine", "highway core 1"), ("limits", {"name": "default"})),
     }
     return Trip(**(values | more))  # type: ignore[arg-type]
 
