@@ -20,7 +20,7 @@ Examples:
 
     chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --demo12 --critic evaluator
 
-    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --items left_lc_s0_c0
+    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --ids left_lc_s0_c0
 
 Answer each drive with `success` (done as asked: its program is kept), `commit` (keep it, whatever the evaluator
 thinks), `skip`, `quit`, or with what was wrong: those words go back to the model. Ctrl-C keeps what is done; the same
@@ -35,7 +35,7 @@ def coach(
     critic: Annotated[
         str, typer.Option(help="`person` at this terminal, or `evaluator`: the benchmark's verdict in words.")
     ] = "person",
-    items: Annotated[str, typer.Option(help="Items by id, separated by commas.")] = "",
+    ids: Annotated[str, typer.Option(help="Items by id, separated by commas.")] = "",
     demo12: Annotated[
         bool, typer.Option("--demo12", help="The twelve items LaMPilot's own model was coached on.")
     ] = False,
@@ -55,7 +55,7 @@ def coach(
 
     console = stdout()
     judge = _critic(critic, console)
-    wanted = items_named(load_dataset(data), _ids(items, DEMO_ITEMS if demo12 else ()))
+    wanted = items_named(load_dataset(data), _ids(ids, DEMO_ITEMS if demo12 else ()))
     folder = out or Path("runs") / f"coach-{planner.replace('/', '-')}"
     kept_in = PolicyRepository(repository, create=True)
     teller = _Teller(console, folder / "drives" if critic == "person" else None)

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 EXAMPLES = """
 Examples:
 
-    chauffeur bench human --data DbLv1 --driver ana
+    chauffeur bench human --data DbLv1 --as ana
 
-    chauffeur bench human --data DbLv1 --driver ana --items 98
+    chauffeur bench human --data DbLv1 --as ana --items 98
 
 Each drive counts from the moment it is started and cannot be repeated. Ctrl-C, or closing the page, stops between
 drives without loss; the same command goes on. The page is served on this machine only.
@@ -33,7 +33,7 @@ _LONGEST_NAME = 60
 
 def human(
     data: Annotated[Path, typer.Option(help="Folder with LaMPilot's DbLv1 task files.")],
-    driver: Annotated[str, typer.Option(help="Name of the person, shown with every result.")] = "anonymous",
+    driver: Annotated[str, typer.Option("--as", help="Name of the person, shown with every result.")] = "anonymous",
     out: Annotated[
         Path | None, typer.Option(help="Run folder; default runs/lampilot-human, with the driver's name if given.")
     ] = None,
