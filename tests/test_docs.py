@@ -75,6 +75,13 @@ def test_documents_speak_of_the_product_alone() -> None:
         assert not re.search(r"issue #?\d|TODO|FIXME", text), document.name
 
 
+def test_a_seed_is_a_number_and_a_paper_a_paper() -> None:
+    meant = re.compile(r"\bseed('s|s')? (Tab\.|Sec\.|Eq\.|Fig\.|survey|section)|\bthe seeds' |\bof the seeds\b", re.IGNORECASE)
+    texts = [*DOCUMENTS, ROOT / "ARCHITECTURE.md", ROOT / "benchmarks" / "RESULTS.md", *sorted((ROOT / "src").rglob("*.py"))]
+    found = [path.relative_to(ROOT) for path in texts if meant.search(path.read_text(encoding="utf-8"))]
+    assert not found
+
+
 def test_the_evidence_of_the_safety_case_is_there() -> None:
     text = (ROOT / "docs" / "safety-case.md").read_text(encoding="utf-8")
     named = re.findall(r"`((?:tests|safety|drive)/[\w/]+(?:\.py)?)(?:::(\w+))?`", text)

@@ -133,7 +133,7 @@ def lampilot(
         ),
     ] = None,
 ) -> None:
-    """LaMPilot-Bench (seed Tab. IV): completion, collisions and scores of a planner that follows instructions."""
+    """LaMPilot-Bench (paper Tab. IV): completion, collisions and scores of a planner that follows instructions."""
     from chauffeur.bench.lampilot.policy_aid import HUMAN_FEEDBACK, aid_for
     from chauffeur.bench.lampilot.runner import RunConfig
     from chauffeur.bench.lampilot.scenes import annotated

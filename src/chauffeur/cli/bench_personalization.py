@@ -43,7 +43,7 @@ def personalization(
     shard: Annotated[str | None, typer.Option(help="Only part i of n, as for `bench lampilot`.")] = None,
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
 ) -> None:
-    """Takeover rates of simulated passengers (seed Tab. VIII, IX, X): keywords, Talk2Drive, and with memory."""
+    """Takeover rates of simulated passengers (paper Tab. VIII, IX, X): keywords, Talk2Drive, and with memory."""
     from chauffeur.bench.personalization.report import markdown
     from chauffeur.bench.personalization.runner import StudyConfig, StudyRun
     from chauffeur.bench.shards import WHOLE, Shard

@@ -70,7 +70,7 @@ def generate(
     ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
 ) -> None:
-    """A suite of our own with the statistics of LaMPilot-Bench (seed Tab. III), split for training and testing."""
+    """A suite of our own with the statistics of LaMPilot-Bench (paper Tab. III), split for training and testing."""
     from chauffeur.bench.lampilot.scenes.suite import Suite, SuiteConfig
     from chauffeur.cli.console import stdout
     from chauffeur.worlds.highway.dblv1 import load_dataset

@@ -19,7 +19,7 @@ study_app = typer.Typer(
     cls=WithExamples,
     no_args_is_help=True,
     rich_markup_mode="markdown",
-    help="A study with people: who takes over how often, blind, randomised and counterbalanced (seed Tab. IX and X).",
+    help="A study with people: who takes over how often, blind, randomised and counterbalanced (paper Tab. IX and X).",
 )
 
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The study.")]

@@ -46,7 +46,7 @@ def human(
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0 takes a free one.")] = 0,
     browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
 ) -> None:
-    """LaMPilot-Bench driven by a person with the arrow keys (seed Tab. IV, row Human Driver), scored like the rest."""
+    """LaMPilot-Bench driven by a person with the arrow keys (paper Tab. IV, row Human Driver), scored like the rest."""
     import asyncio
 
     from chauffeur.bench.lampilot.human_run import HumanConfig, HumanRun
