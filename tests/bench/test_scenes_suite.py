@@ -290,7 +290,9 @@ def test_command_line(suite: tuple[Path, Any], faulty: Path, tmp_path: Path) -> 
     )
     assert again.exit_code == 0, again.output
     assert "Next: chauffeur bench lampilot" in again.output
-    wrong = runner.invoke(app, ["bench", "scenes", "check", str(faulty), "--workers", "1", "--out", str(tmp_path / "f.jsonl")])
+    wrong = runner.invoke(
+        app, ["bench", "scenes", "check", str(faulty), "--workers", "1", "--out", str(tmp_path / "f.jsonl")]
+    )
     assert wrong.exit_code == 1
     assert "Take the right lane." in wrong.output
     assert len((tmp_path / "f.jsonl").read_text().splitlines()) == 6

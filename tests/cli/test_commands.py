@@ -248,7 +248,9 @@ def test_a_changed_recording_is_noticed(driven: Path) -> None:
 
 def test_a_page_is_rendered_again(driven: Path) -> None:
     page, strip = driven / "again.html", driven / "again.png"
-    result = invoke("show", "page", str(driven / "trip.mcap"), "--out", str(page), "--filmstrip", str(strip), "--pictures", "2")
+    result = invoke(
+        "show", "page", str(driven / "trip.mcap"), "--out", str(page), "--filmstrip", str(strip), "--pictures", "2"
+    )
     assert result.exit_code == 0, result.output
     assert page.read_text(encoding="utf-8") == (driven / "trip.html").read_text(encoding="utf-8")
     assert strip.read_bytes().startswith(b"\x89PNG")

@@ -43,7 +43,8 @@ def apis(
 
         near = difflib.get_close_matches(name, list(APIS), n=1)
         raise ConfigError(
-            f"There is no driving API {name!r}.", hint=f"Did you mean {near[0]}?" if near else "Run: chauffeur show apis"
+            f"There is no driving API {name!r}.",
+            hint=f"Did you mean {near[0]}?" if near else "Run: chauffeur show apis",
         )
     api = APIS[name]
     console.print(Syntax(api.signature, "python", theme="ansi_dark", background_color="default"))

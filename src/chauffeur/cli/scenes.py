@@ -63,7 +63,9 @@ def generate(
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
     extras: Annotated[
         int | None,
-        typer.Option(min=0, help="Items beyond the original: hints, several steps, refusals, units. Default a fifth of --items."),
+        typer.Option(
+            min=0, help="Items beyond the original: hints, several steps, refusals, units. Default a fifth of --items."
+        ),
     ] = None,
     avoid: Annotated[
         Path | None, typer.Option(help="DbLv1 folder whose instructions must not come up, e.g. LaMPilot's own.")
@@ -77,7 +79,9 @@ def generate(
 
     console = stdout()
     avoided = None if avoid is None else load_dataset(avoid)
-    config = SuiteConfig(items, seed, items // 5 if extras is None else extras, "" if avoided is None else avoided.sha256)
+    config = SuiteConfig(
+        items, seed, items // 5 if extras is None else extras, "" if avoided is None else avoided.sha256
+    )
     suite = Suite(out, config, avoided)
     try:
         with _progress(console, "made") as show:

@@ -8,12 +8,14 @@ import threading
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from itertools import count
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from chauffeur.concept import ChauffeurError, ConfigError, Limits
-from chauffeur.planners.base import Planner
+
+if TYPE_CHECKING:
+    from chauffeur.planners.base import Planner
 
 EXAMPLES = """
 Examples:

@@ -61,7 +61,8 @@ def folders_of(path: Path) -> dict[str, Path]:
     if not found:
         if (path / "plan.json").is_file():
             raise DataError(
-                f"The suite in {path} is not finished.", hint="Run its `chauffeur bench scenes generate` again: it goes on."
+                f"The suite in {path} is not finished.",
+                hint="Run its `chauffeur bench scenes generate` again: it goes on.",
             )
         if path.is_dir() and any(path.glob("*.json")):
             return {path.name: path}
