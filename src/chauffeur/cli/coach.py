@@ -43,7 +43,7 @@ def coach(
     out: Annotated[Path | None, typer.Option(help="Folder of the attempts; default `runs/coach-<planner>`.")] = None,
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
 ) -> None:
-    """Human feedback (paper Tab. IV): drive, say what was wrong, drive again; what did well is kept for other wishes."""
+    """Human feedback (paper Tab. IV): drive, say what was wrong, drive again; what did well is kept for more wishes."""
     from chauffeur.bench.lampilot.coaching import DEMO_ITEMS, Coach, items_named, spent
     from chauffeur.bench.store import RowStore
     from chauffeur.cli.console import path_text, plain, stdout

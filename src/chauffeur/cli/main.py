@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from chauffeur import __version__
+from chauffeur.cli import adapt as adapting
 from chauffeur.cli import (
     apis,
     bench_alignment,
@@ -32,7 +33,6 @@ from chauffeur.cli import (
     train,
     wheel,
 )
-from chauffeur.cli import adapt as adapting
 from chauffeur.cli.audit import audit_app
 from chauffeur.cli.bench import bench_app
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash

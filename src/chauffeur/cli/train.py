@@ -56,8 +56,8 @@ def onboard(
 ) -> None:
     """The on-board language model: words to driving programs, offline."""
     from chauffeur.cli.console import stdout
-    from chauffeur.cli.stages import stage_lines
     from chauffeur.cli.parts import needs
+    from chauffeur.cli.stages import stage_lines
     from chauffeur.models.onboard.pipeline import Plan, build_data, train_model
 
     if not data_only:  # half an hour of data first, and then nothing to train with, helps nobody

@@ -340,8 +340,8 @@ def _made_by(base: dict[str, Any]) -> str:
         return "the folder of its weights, as that version\n  of the package shipped them"
     return (
         "that version's folder, made by the\n"
-        f"  version of this repository that shipped it: `chauffeur model train onboard --out BASE --size {earlier['size']}\n"
-        f"  --steps {earlier['steps']} --more {earlier['more']} --seed {earlier['seed']}\n"
+        f"  version of this repository that shipped it: `chauffeur model train onboard --out BASE\n"
+        f"  --size {earlier['size']} --steps {earlier['steps']} --more {earlier['more']} --seed {earlier['seed']}\n"
         f"  --draws {plan['draws']} --per-case {plan['per_case']}`"
     )
 
