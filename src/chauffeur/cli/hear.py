@@ -36,7 +36,7 @@ Exit codes: 0 a wish or an opinion was heard, 1 none was, 2 bad input.
 
 def hear(
     file: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="A recording: WAV, or what ffmpeg reads.")
+        Path | None, typer.Argument(metavar="FILE", help="A recording: WAV, or what ffmpeg reads.")
     ] = None,
     *,
     engine: Annotated[

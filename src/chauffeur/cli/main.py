@@ -21,7 +21,6 @@ from chauffeur.cli import (
     drive,
     feedback,
     hear,
-    live,
     page,
     policies,
     replay,
@@ -131,7 +130,6 @@ def chauffeur(
 
 app.command(epilog=drive.EXAMPLES, rich_help_panel=DRIVE)(drive.drive)
 app.command(epilog=talk.EXAMPLES, rich_help_panel=DRIVE)(talk.talk)
-app.command(epilog=live.EXAMPLES, rich_help_panel=DRIVE)(live.live)
 app.command(epilog=feedback.EXAMPLES, rich_help_panel=DRIVE)(feedback.feedback)
 app.add_typer(me_app, name="me", rich_help_panel=DRIVE)
 

@@ -56,7 +56,7 @@ def policies() -> None:
 
 def show_policies(
     folder: Folder,
-    name: Annotated[str, typer.Argument(metavar="[NAME]", help="One program, in full; all in short without it.")] = "",
+    name: Annotated[str, typer.Argument(metavar="NAME", help="One program, in full; all in short without it.")] = "",
     query: Annotated[str, typer.Option("--for", help="Order them by how near they are to this wish.")] = "",
 ) -> None:
     """List learned programs: what each does, what it was learned for, who judged it; or show one of them."""
@@ -150,7 +150,7 @@ def describe(
 @policies_app.command()
 def prune(
     folder: Folder,
-    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", help="Programs to take out.")] = None,
+    names: Annotated[list[str] | None, typer.Argument(metavar="NAME", help="Programs to take out.")] = None,
     superseded: Annotated[
         bool, typer.Option("--superseded", help="Those learned again later for the same wish.")
     ] = False,
@@ -193,9 +193,7 @@ def prune(
 def export_policies(
     folder: Folder,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The file to write, JSON lines.")],
-    names: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME]...", help="Programs to write; default all.")
-    ] = None,
+    names: Annotated[list[str] | None, typer.Argument(metavar="NAME", help="Programs to write; default all.")] = None,
 ) -> None:
     """Write programs to one file for somebody else. It holds wishes and critiques in their own words."""
     from chauffeur.cli.console import path_text, plain, stdout
