@@ -26,21 +26,38 @@ def _commands(text: str) -> list[str]:
     return [line for line in lines if line.startswith("chauffeur ")] + INLINE.findall(text)
 
 
+def _check(line: str, where: str) -> None:
+    command = typer.main.get_command(app)
+    words = shlex.split(line.split(" < ")[0])[1:]
+    options = [word.partition("=")[0] for word in words if word.startswith("--")]
+    for word in words:
+        children = getattr(command, "commands", {})
+        if word in children:
+            command = children[word]
+        elif children:
+            break  # what is no command where one is due is judged below
+    known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
+    rest = [word for word in words if word not in ("...", "|") and not word.startswith("-")]
+    assert not getattr(command, "commands", {}) or command.name in rest[-1:] or not rest, where
+    assert set(options) <= known | {"--help"}, where
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
 def test_commands_exist(document: Path) -> None:
     for line in _commands(document.read_text(encoding="utf-8")):
-        command = typer.main.get_command(app)
-        words = shlex.split(line)[1:]
-        options = [word for word in words if word.startswith("--")]
-        for word in words:
-            children = getattr(command, "commands", {})
-            if word in children:
-                command = children[word]
-        known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
-        assert command.name != "chauffeur" or not [w for w in words if not w.startswith("-")], (
-            f"{document.name}: {line}"
-        )
-        assert set(options) <= known | {"--help"}, f"{document.name}: {line}"
+        _check(line, f"{document.name}: {line}")
+
+
+def test_commands_that_the_program_names_exist() -> None:
+    """In its hints, its help and its comments."""
+    found = 0
+    for file in sorted((ROOT / "src").rglob("*.py")):
+        text = file.read_text(encoding="utf-8")
+        examples = re.findall(r"^    (chauffeur [a-z][^\n{]*)$", text, re.MULTILINE)
+        for line in [*examples, *re.findall(r"`(chauffeur [a-z][^`\n{]*)`", text)]:
+            found += 1
+            _check(line, f"{file.relative_to(ROOT)}: {line}")
+    assert found > 100
 
 
 def test_programs_shown_are_programs() -> None:

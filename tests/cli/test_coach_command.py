@@ -160,7 +160,7 @@ def test_the_evaluator_as_critic_is_labelled_and_the_end_of_input_keeps_what_is_
 
 def test_bad_options_are_named(options: list[str]) -> None:
     runner = CliRunner()
-    for arguments in (["--critic", "robot"], ["--ids", "left_lc_s9_c9"], ["--ids", ""], ["--demo12"]):
+    for arguments in (["--critic", "robot"], ["--ids", "left_lc_s9_c9"], ["--ids", ""], ["--ids", "demo12"]):
         assert runner.invoke(app, ["bench", "coach", *options, *arguments]).exit_code != 0
 
 

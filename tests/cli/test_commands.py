@@ -129,7 +129,7 @@ def test_an_option_has_one_name() -> None:
         (("model", "train", "onboard", "--out", "run"), "torch", "models"),
         (("model", "adapt", "--base", "base", "--out", "run", "--as", "ana"), "peft", "models"),
         (("report", "run", "--inspect", "run.eval"), "inspect_ai", "inspect"),
-        (("study", "export", "lab", "--csv", "trips.csv", "--parquet", "trips.parquet"), "pyarrow", "tables"),
+        (("study", "export", "lab", "--out", "trips.parquet"), "pyarrow", "tables"),
         (("bench", "lampilot", "--data", "DbLv1", "--ray", "local"), "ray", "cluster"),
     ],
 )

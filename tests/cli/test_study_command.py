@@ -45,7 +45,7 @@ def test_a_trip_from_consent_to_the_analysis(lab: str, tmp_path: Path) -> None:
     assert "The memory heard the comment" in said(kept)
     assert "trip 2 of 30" in said(run("study", "next", lab))
     table = tmp_path / "trips.csv"
-    assert run("study", "export", lab, "--csv", str(table)).exit_code == 0
+    assert run("study", "export", lab, "--out", str(table)).exit_code == 0
     assert "A bit too slow." in table.read_text(encoding="utf-8")
     assert run("study", "unblind", lab).exit_code != 0
     assert run("study", "unblind", lab, "--early").exit_code == 0

@@ -42,11 +42,7 @@ def adapt(
     passes: Annotated[int, typer.Option(min=1, help="How often each interaction is seen.", rich_help_panel=_HOW)] = 30,
     rate: Annotated[float, typer.Option(help="Highest learning rate.", rich_help_panel=_HOW)] = 3e-3,
     tolerance: Annotated[float, typer.Option(min=0.0, help="Points of validation that may be lost.")] = 0.5,
-    judged: Annotated[int, typer.Option(min=1, help="Most validation examples judged.", rich_help_panel=_HOW)] = 1000,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
-    threads: Annotated[
-        int, typer.Option(min=0, help="Threads that train; 0 leaves it to PyTorch.", rich_help_panel=_HOW)
-    ] = 0,
 ) -> None:
     """Fit the on-board language model to interactions that people accepted. Exit code 1: the old model stays."""
     from rich.text import Text
@@ -86,9 +82,7 @@ def adapt(
         passes=passes,
         rate=rate,
         tolerance=tolerance,
-        judged=judged,
         seed=seed,
-        threads=threads,
     )
     try:
         verdict = adapt_model(base, found, out, recipe, stage_lines(console))

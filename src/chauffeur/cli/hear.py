@@ -35,9 +35,7 @@ Exit codes: 0 a wish or an opinion was heard, 1 none was, 2 bad input.
 
 
 def hear(
-    file: Annotated[
-        Path | None, typer.Argument(metavar="FILE", help="A recording: WAV, or what ffmpeg reads.")
-    ] = None,
+    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="A recording: WAV, or what ffmpeg reads.")] = None,
     *,
     engine: Annotated[
         str, typer.Option(help="`grammar` (offline, driving words only), `whisper/<folder>` or `endpoint/<model>`.")

@@ -36,7 +36,7 @@ Examples:
 
     chauffeur study record lab --participant P001 --number 1 --takeover --rating 3 --comment "Too slow for me."
 
-    chauffeur study export lab --csv trips.csv
+    chauffeur study export lab --out trips.csv
 
     chauffeur study withdraw lab --participant P001
 
@@ -163,8 +163,7 @@ def withdraw(
 @study_app.command()
 def export(
     folder: Folder,
-    csv: Annotated[Path | None, typer.Option("--csv", help="File for comma-separated values.")] = None,
-    parquet: Annotated[Path | None, typer.Option("--parquet", help="File for Parquet (extra `tables`).")] = None,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="File to write: `.csv`, or `.parquet` (extra `tables`).")],
 ) -> None:
     """Write the recorded trips, in code letters."""
     from chauffeur.bench.personalization.people import csv_text, write_parquet
@@ -173,15 +172,15 @@ def export(
     from chauffeur.concept import ConfigError
     from chauffeur.drive.files import publish
 
-    if parquet is not None:
+    if out.suffix not in (".csv", ".parquet"):
+        raise ConfigError(f"{out.name} is no name for an export.", hint="It ends in .csv or .parquet.")
+    if out.suffix == ".parquet":
         needs("tables", "Parquet", "pyarrow")
     rows = _open(folder).rows()
-    if csv is None and parquet is None:
-        raise ConfigError("There is no file to write to.", hint="Add --csv trips.csv or --parquet trips.parquet.")
-    if csv is not None:
-        publish(csv, csv_text(rows).encode(), "export")
-    if parquet is not None:
-        write_parquet(parquet, rows)
+    if out.suffix == ".parquet":
+        write_parquet(out, rows)
+    else:
+        publish(out, csv_text(rows).encode(), "export")
     stdout().print(f"{len(rows)} trips, in code letters.")
 
 

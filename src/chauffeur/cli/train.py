@@ -51,7 +51,6 @@ def onboard(
         typer.Option(help="Finished run, or model that ships, whose network is trained on, at half the rate."),
     ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes that make data; default one per core.")] = None,
-    threads: Annotated[int, typer.Option(min=0, help="Threads that train; 0 leaves it to PyTorch.")] = 0,
     data_only: Annotated[bool, typer.Option("--data-only", help="Make the data and stop.")] = False,
 ) -> None:
     """The on-board language model: words to driving programs, offline."""
@@ -71,7 +70,7 @@ def onboard(
         if data_only:
             console.print(f"Data: {out / 'data'}; its card: {out / 'data' / 'DATA_CARD.md'}", soft_wrap=True)
             return
-        model = train_model(out, plan, told, threads=threads)
+        model = train_model(out, plan, told)
     except KeyboardInterrupt:
         console.print(f"Stopped. What is done is kept in {out}; run the same command to go on.", soft_wrap=True)
         raise typer.Exit(130) from None
