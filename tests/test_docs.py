@@ -28,7 +28,7 @@ def _commands(text: str) -> list[str]:
 
 def _check(line: str, where: str) -> None:
     command = typer.main.get_command(app)
-    words = shlex.split(line.split(" < ")[0])[1:]
+    words = shlex.split(line.split(" < ", maxsplit=1)[0])[1:]
     options = [word.partition("=")[0] for word in words if word.startswith("--")]
     for word in words:
         children = getattr(command, "commands", {})
