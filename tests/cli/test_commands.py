@@ -145,6 +145,13 @@ def test_a_missing_extra_is_said_before_any_work(
     assert list(tmp_path.iterdir()) == [], "nothing was begun"
 
 
+def test_a_command_that_stands_in_a_group_is_found() -> None:
+    for name, where in (("scenarios", "chauffeur show scenarios"), ("train", "chauffeur model train")):
+        result = invoke(name)
+        assert result.exit_code == 2
+        assert f"Did you mean: {where}?" in " ".join(result.output.replace("│", " ").split())
+
+
 def test_the_module_is_the_command() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "chauffeur", "--version"], capture_output=True, text=True, timeout=60, check=False
