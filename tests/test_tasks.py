@@ -16,7 +16,8 @@ from pathlib import Path
 import pytest
 
 from chauffeur.cli.serve import Endpoint
-from chauffeur.concept import Limits
+from chauffeur.concept import Limits, Program
+from chauffeur.drive.recording import read_trip
 from chauffeur.planners.registry import make_planner
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -93,8 +94,9 @@ def test_a_model_of_ones_own_is_evaluated(endpoint: str, suite: Path, tmp_path: 
     assert made == SUITE
     assert "passengers" in passengers and "hostile" in hostile, "long; the tests of these benchmarks run them"
     shutil.copytree(suite, tmp_path / "suite")
-    (drive, *_) = run([first, *bench], tmp_path)
-    assert "planner openai/onboard" in drive and "P def " in drive
+    run([first, *bench], tmp_path)
+    trip = read_trip(tmp_path / "trips" / "first" / "trip.mcap").trip
+    assert trip.plan.planner == "openai/onboard" and isinstance(trip.plan.policy, Program)
     assert (tmp_path / "runs" / "report" / "report.html").stat().st_size > 10_000
 
 
@@ -113,8 +115,9 @@ def test_a_planner_of_ones_own_drives(tmp_path: Path) -> None:
     )
     drive, bench = commands("your-planner.md")
     assert bench.startswith("chauffeur bench passengers --planner mine/22")
-    (said,) = run([drive], tmp_path, path=package)
-    assert "I drive at 22.0 m/s." in said and "planner mine, model mine-v1" in said
+    run([drive], tmp_path, path=package)
+    plan = read_trip(tmp_path / "trips" / "mine" / "trip.mcap").trip.plan
+    assert (plan.planner, plan.model, plan.thoughts.text) == ("mine", "mine-v1", "I drive at 22.0 m/s.")
 
 
 def test_a_vehicle_is_asked_without_one(tmp_path: Path) -> None:
