@@ -11,6 +11,7 @@ BIN := $(VENV)/bin
 WISH ?= Overtake the car in front of you.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 JOBS ?= auto
+VERSIONS ?= 3.11 3.12 3.13
 
 .PHONY: drive test lint format bench docs fresh-import clean
 
@@ -37,15 +38,20 @@ bench: $(VENV)/.dev
 docs: $(VENV)/.docs
 	$(BIN)/zensical build
 
-# The package must import, and show its help, in an environment that has nothing but its own requirements.
+# The package must import, show its help and drive in an environment that has nothing but its own requirements, with
+# every Python it is for; those that are not installed here are left out.
 fresh-import:
-	rm -rf .venv-fresh
-	$(PYTHON) -m venv .venv-fresh
-	.venv-fresh/bin/python -m pip --disable-pip-version-check --quiet install -c constraints.txt .
-	.venv-fresh/bin/python -c "import chauffeur, chauffeur.cli.main, chauffeur.drive.session, chauffeur.planners.onboard"
-	.venv-fresh/bin/chauffeur --help > /dev/null
-	.venv-fresh/bin/chauffeur drive "Change to the left lane." --quiet
-	rm -rf .venv-fresh
+	@set -e; for version in $(VERSIONS); do \
+		python$$version -c "" 2>/dev/null || { echo "No python$$version here: not tried."; continue; }; \
+		echo "Python $$version, core requirements alone ..."; \
+		rm -rf .venv-fresh; \
+		python$$version -m venv .venv-fresh; \
+		.venv-fresh/bin/python -m pip --disable-pip-version-check --quiet install -c constraints.txt .; \
+		.venv-fresh/bin/python -c "import chauffeur, chauffeur.drive.session, chauffeur.planners.onboard"; \
+		.venv-fresh/bin/python -m chauffeur --help > /dev/null; \
+		.venv-fresh/bin/chauffeur drive "Change to the left lane." --quiet; \
+		rm -rf .venv-fresh; \
+	done
 
 $(VENV)/.made:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Chauffeur needs Python 3.11 or newer; set PYTHON=/path/to/python3.11")'

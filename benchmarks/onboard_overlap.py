@@ -19,7 +19,7 @@ from chauffeur.worlds.highway.dblv1 import load_dataset
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--run", type=Path, required=True, help="Folder of `chauffeur train onboard`.")
+    parser.add_argument("--run", type=Path, required=True, help="Folder of `chauffeur model train onboard`.")
     parser.add_argument("--data", type=Path, required=True, help="LaMPilot's DbLv1 folder.")
     arguments = parser.parse_args()
     with (arguments.run / "data" / "train.jsonl").open(encoding="utf-8") as file:

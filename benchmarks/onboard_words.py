@@ -160,7 +160,7 @@ def outcomes(
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--run", type=Path, required=True, help="Folder of `chauffeur train onboard`.")
+    parser.add_argument("--run", type=Path, required=True, help="Folder of `chauffeur model train onboard`.")
     parser.add_argument("--model", type=Path, default=SHIPPED)
     parser.add_argument("--most", type=int, default=1200, help="Examples of each split.")
     parser.add_argument("--ablations", action="store_true")

@@ -26,28 +26,45 @@ def _commands(text: str) -> list[str]:
     return [line for line in lines if line.startswith("chauffeur ")] + INLINE.findall(text)
 
 
+def _check(line: str, where: str) -> None:
+    command = typer.main.get_command(app)
+    words = shlex.split(line.split(" < ", maxsplit=1)[0])[1:]
+    options = [word.partition("=")[0] for word in words if word.startswith("--")]
+    for word in words:
+        children = getattr(command, "commands", {})
+        if word in children:
+            command = children[word]
+        elif children:
+            break  # what is no command where one is due is judged below
+    known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
+    rest = [word for word in words if word not in ("...", "|") and not word.startswith("-")]
+    assert not getattr(command, "commands", {}) or command.name in rest[-1:] or not rest, where
+    assert set(options) <= known | {"--help"}, where
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
 def test_commands_exist(document: Path) -> None:
     for line in _commands(document.read_text(encoding="utf-8")):
-        command = typer.main.get_command(app)
-        words = shlex.split(line)[1:]
-        options = [word for word in words if word.startswith("--")]
-        for word in words:
-            children = getattr(command, "commands", {})
-            if word in children:
-                command = children[word]
-        known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
-        assert command.name != "chauffeur" or not [w for w in words if not w.startswith("-")], (
-            f"{document.name}: {line}"
-        )
-        assert set(options) <= known | {"--help"}, f"{document.name}: {line}"
+        _check(line, f"{document.name}: {line}")
+
+
+def test_commands_that_the_program_names_exist() -> None:
+    """In its hints, its help and its comments."""
+    found = 0
+    for file in sorted((ROOT / "src").rglob("*.py")):
+        text = file.read_text(encoding="utf-8")
+        examples = re.findall(r"^    (chauffeur [a-z][^\n{]*)$", text, re.MULTILINE)
+        for line in [*examples, *re.findall(r"`(chauffeur [a-z][^`\n{]*)`", text)]:
+            found += 1
+            _check(line, f"{file.relative_to(ROOT)}: {line}")
+    assert found > 100
 
 
 def test_programs_shown_are_programs() -> None:
     shown = 0
     for document in DOCUMENTS:
         for language, block in BLOCKS.findall(document.read_text(encoding="utf-8")):
-            if language == "python" and "yield autopilot()" in block:
+            if language == "python" and "yield autopilot()" in block and "from chauffeur" not in block:
                 shown += 1
                 if document.name == "onboard.md":  # the dialect: its skills come with the program
                     assert read(block)
@@ -75,6 +92,20 @@ def test_documents_speak_of_the_product_alone() -> None:
         assert not re.search(r"issue #?\d|TODO|FIXME", text), document.name
 
 
+def test_a_seed_is_a_number_and_a_paper_a_paper() -> None:
+    meant = re.compile(
+        r"\bseed('s|s')? (Tab\.|Sec\.|Eq\.|Fig\.|survey|section)|\bthe seeds' |\bof the seeds\b", re.IGNORECASE
+    )
+    texts = [
+        *DOCUMENTS,
+        ROOT / "ARCHITECTURE.md",
+        ROOT / "benchmarks" / "RESULTS.md",
+        *sorted((ROOT / "src").rglob("*.py")),
+    ]
+    found = [path.relative_to(ROOT) for path in texts if meant.search(path.read_text(encoding="utf-8"))]
+    assert not found
+
+
 def test_the_evidence_of_the_safety_case_is_there() -> None:
     text = (ROOT / "docs" / "safety-case.md").read_text(encoding="utf-8")
     named = re.findall(r"`((?:tests|safety|drive)/[\w/]+(?:\.py)?)(?:::(\w+))?`", text)
@@ -87,3 +118,97 @@ def test_the_evidence_of_the_safety_case_is_there() -> None:
     for cell in re.findall(r"RESULTS, ((?:\"[^\"]+\"(?:, | and )?)+)", text):
         for title in re.findall(r"\"([^\"]+)\"", cell):
             assert re.search(rf"^##+ {re.escape(title)}$", results, re.MULTILINE), title
+
+
+# Links and figures ------------------------------------------------------------------------------------------------
+
+LINK = re.compile(r"\]\(([^()\s]+)\)")
+PAGES = [*DOCUMENTS, ROOT / "ARCHITECTURE.md", ROOT / "CHANGELOG.md", ROOT / "benchmarks" / "RESULTS.md"]
+
+
+def _anchors(page: Path) -> set[str]:
+    titles = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_no_link_is_dead(page: Path) -> None:
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    for target in LINK.findall(text):
+        if target.startswith(("http://", "https://", "mailto:")):
+            continue
+        name, _, anchor = target.partition("#")
+        found = (page.parent / name).resolve() if name else page
+        assert found.exists(), f"{page.name}: {target}"
+        assert not anchor or anchor in _anchors(found), f"{page.name}: {target}"
+        # The site is made of docs/ alone: from there, a link leads nowhere else.
+        assert page.parent.name != "docs" or found.is_relative_to(ROOT / "docs"), f"{page.name}: {target}"
+
+
+def test_every_page_is_in_the_menu_and_at_the_start() -> None:
+    menu = set(re.findall(r": ([\w-]+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE))
+    start = set(LINK.findall((ROOT / "docs" / "index.md").read_text(encoding="utf-8"))) | {"index.md"}
+    pages = {page.name for page in (ROOT / "docs").glob("*.md")}
+    assert menu == pages and start >= pages
+
+
+FIGURES = {
+    "right outcomes": (
+        r"(\d+) % right outcomes on 417",
+        r"417 wishes of passengers: right outcome \| \d+ \(\*\*([\d.]+) %",
+    ),
+    "of the rules": (
+        r"`retrieval`: (\d+) %\)",
+        r"417 wishes of passengers: right outcome .*?\| \d+ \(([\d.]+) %\) \| 85 %",
+    ),
+    "planning": (r"(\d+) ms a wish on one CPU", r"wish to reply, median / 95 %, one thread \| (\d+) /"),
+    "size of the model": (r"language model, (\d+) MB\)", r"int8, ([\d.]+) MB with its tokenizer"),
+    "parameters": (r"language model of ([\d.]+) M", r"([\d.]+) M parameters \(Llama"),
+    "stepping": (r"at (\d+) times its stepping", r"Goal 150 times: \*\*(\d+) times"),
+    "first drive": (r"The first `make drive` takes (\d+) s", r"`make drive` for the first time .*?\| (\d+) s"),
+    "installing": (r"\((\d+) s installing", r"of which installing .*?\| (\d+) s"),
+    "compiling": (r"installing, (\d+) s\s+compiling", r"of which compiling .*?\| (\d+) s"),
+    "next drive": (r"the next (\d+) s", r"`make drive` after that \| (\d+) s"),
+    "disk": (r"`\.venv` is then (\d+) MB", r"`\.venv` after it, .*?\| (\d+) MB"),
+}
+"""What the README says in prose, and where RESULTS has it."""
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_figures_of_the_readme_are_those_of_the_results(name: str) -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    results = (ROOT / "benchmarks" / "RESULTS.md").read_text(encoding="utf-8")
+    said, measured = (re.findall(pattern, text) for pattern, text in zip(FIGURES[name], (readme, results), strict=True))
+    assert len(said) == 1 and len(measured) == 1, (said, measured)
+    digits = len(said[0].partition(".")[2])
+    assert said[0] == f"{float(measured[0]):.{digits}f}"
+
+
+def test_the_table_of_the_readme_is_that_of_the_results() -> None:
+    def rows(text: str) -> dict[str, list[str]]:
+        lines = [
+            [cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")
+        ]
+        return {cells[0]: [re.sub(r" \[.*\]", "", cell) for cell in cells[1:]] for cells in lines}
+
+    results = (ROOT / "benchmarks" / "RESULTS.md").read_text(encoding="utf-8")
+    measured = rows(results.partition("### Under `origin`")[2].partition("\n### ")[0])
+    shown = rows((ROOT / "README.md").read_text(encoding="utf-8").partition("| Method |")[2].partition("\n## ")[0])
+    methods = {name: cells for name, cells in shown.items() if not name.startswith(("---", "to", "Items"))}
+    assert len(methods) > 8 and {"onboard (language model, 7 MB)", "retrieval (rules)"} <= methods.keys()
+    for name, cells in methods.items():
+        assert cells == measured[name], name
+
+
+def test_the_headline_of_the_model_is_the_row_of_its_table() -> None:
+    results = (ROOT / "benchmarks" / "RESULTS.md").read_text(encoding="utf-8")
+    table = results.partition("### Under `origin`")[2].partition("\n### ")[0]
+    (headline,) = re.findall(
+        r"development data, 3,136 .*?\| ([\d.]+) / ([\d.]+) / \*\*([\d.]+)\*\* \| ([\d.]+) / ([\d.]+) / ([\d.]+)",
+        results,
+    )
+    for label, (done, collided, score) in (("onboard (", headline[:3]), ("retrieval (", headline[3:])):
+        (cells,) = [
+            re.sub(r" \[.*?\]", "", line).split(" | ") for line in table.splitlines() if line.startswith(f"| {label}")
+        ]
+        assert (cells[3], cells[2], cells[-1].rstrip(" |")) == (done, collided, score), label

@@ -30,7 +30,7 @@ def ttc_along(ego: Any, vehicles: list[Any]) -> float:
 
 
 def ttc_plane(ego: Any, vehicles: list[Any]) -> float:
-    """Seed Eq. 1 and 2: least positive time to the closest approach of two centres, s; -1 for none."""
+    """Paper Eq. 1 and 2: least positive time to the closest approach of two centres, s; -1 for none."""
     times: list[float] = []
     for other in vehicles:
         relative = ego.velocity - other.velocity

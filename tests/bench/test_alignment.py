@@ -106,7 +106,7 @@ def test_scores_are_counted_right() -> None:
 def test_the_command_shows_and_saves(tmp_path: Path) -> None:
     app = typer.Typer()
     app.command()(alignment)
-    result = CliRunner().invoke(app, ["--cases", "20", "--seed", "4", "--out", str(tmp_path)])
+    result = CliRunner().invoke(app, ["--items", "20", "--seed", "4", "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
     assert "Generated (synthetic)" in result.output
     assert "Written by hand, test half" in result.output

@@ -1,4 +1,4 @@
-"""Talk2Drive's driving score: all twenty printed rows of the seed's Tab. VIII, and what the parts mean."""
+"""Talk2Drive's driving score: all twenty printed rows of the paper's Tab. VIII, and what the parts mean."""
 
 from __future__ import annotations
 

@@ -281,16 +281,18 @@ def test_statistics_stand_next_to_the_papers(lampilot_data: Path) -> None:
 @pytest.mark.slow
 def test_command_line(suite: tuple[Path, Any], faulty: Path, tmp_path: Path) -> None:
     runner = CliRunner()
-    shown = runner.invoke(app, ["scenes", "stats", str(suite[0])])
+    shown = runner.invoke(app, ["bench", "scenes", "stats", str(suite[0])])
     assert shown.exit_code == 0
     assert "Average instruction length" in shown.output
     assert "extras/directness" in shown.output
     again = runner.invoke(
-        app, ["scenes", "generate", "--n", "17", "--seed", "5", "--extras", "10", "--out", str(suite[0])]
+        app, ["bench", "scenes", "generate", "--items", "17", "--seed", "5", "--extras", "10", "--out", str(suite[0])]
     )
     assert again.exit_code == 0, again.output
     assert "Next: chauffeur bench lampilot" in again.output
-    wrong = runner.invoke(app, ["scenes", "check", str(faulty), "--workers", "1", "--json", str(tmp_path / "f.jsonl")])
+    wrong = runner.invoke(
+        app, ["bench", "scenes", "check", str(faulty), "--workers", "1", "--out", str(tmp_path / "f.jsonl")]
+    )
     assert wrong.exit_code == 1
     assert "Take the right lane." in wrong.output
     assert len((tmp_path / "f.jsonl").read_text().splitlines()) == 6
@@ -298,9 +300,9 @@ def test_command_line(suite: tuple[Path, Any], faulty: Path, tmp_path: Path) -> 
         ["stats", str(tmp_path / "nowhere")],
         ["check", str(tmp_path / "nowhere")],
         ["generate", "--out", str(faulty)],
-        ["generate", "--n", "17", "--seed", "6", "--out", str(suite[0])],
+        ["generate", "--items", "17", "--seed", "6", "--out", str(suite[0])],
     ):
-        assert runner.invoke(app, ["scenes", *arguments]).exit_code == 2, arguments
+        assert runner.invoke(app, ["bench", "scenes", *arguments]).exit_code == 2, arguments
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""`chauffeur bench coach` with a person at a terminal, and `chauffeur policies` on what it left behind."""
+"""`chauffeur bench coach` with a person at a terminal, and `chauffeur model policies` on what it left behind."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def options(tmp_path: Path, server: Any, monkeypatch: pytest.MonkeyPatch) -> lis
     make_data(tmp_path / "data")
     return [
         "--data", str(tmp_path / "data"), "--planner", "openai/m", "--base-url", server.url,
-        "--repository", str(tmp_path / "policies"), "--out", str(tmp_path / "run"), "--items", "left_lc_s0_c0",
+        "--repository", str(tmp_path / "policies"), "--out", str(tmp_path / "run"), "--ids", "left_lc_s0_c0",
     ]  # fmt: skip
 
 
@@ -154,15 +154,13 @@ def test_the_evaluator_as_critic_is_labelled_and_the_end_of_input_keeps_what_is_
     assert told.count("critic: evaluator (not a person)") == 2 and "kept as go_left()" in told
     assert "The car never changed into the left lane." in told
     for arguments in ([], ["go_left"]):
-        shown = runner.invoke(
-            app, ["policies", "show" if arguments else "list", str(tmp_path / "policies"), *arguments]
-        )
+        shown = runner.invoke(app, ["show", "policies", str(tmp_path / "policies"), *arguments])
         assert "evaluator (not a person)" in plain(shown.output), shown.output
 
 
 def test_bad_options_are_named(options: list[str]) -> None:
     runner = CliRunner()
-    for arguments in (["--critic", "robot"], ["--items", "left_lc_s9_c9"], ["--items", ""], ["--demo12"]):
+    for arguments in (["--critic", "robot"], ["--ids", "left_lc_s9_c9"], ["--ids", ""], ["--ids", "demo12"]):
         assert runner.invoke(app, ["bench", "coach", *options, *arguments]).exit_code != 0
 
 
@@ -171,35 +169,37 @@ def test_policies_are_listed_shown_described_shared_and_pruned(server: Any, opti
     runner = CliRunner()
 
     def run(*arguments: str, answer: str | None = None) -> str:
-        result = runner.invoke(app, ["policies", *arguments], input=answer)
+        group = "show" if arguments[0] == "policies" else "model"
+        words = arguments if group == "show" else ("policies", *arguments)
+        result = runner.invoke(app, [group, *words], input=answer)
         assert result.exit_code == 0, result.output
         return plain(result.output)
 
     server.script(stream(reply(GO_LEFT)), stream(DESCRIPTION), stream(reply(USE_IT)), stream(DESCRIPTION))
     items = "left_lc_s0_c0,left_lc_s1_c1"
-    assert runner.invoke(app, ["bench", "coach", *options, "--critic", "evaluator", "--items", items]).exit_code == 0
+    assert runner.invoke(app, ["bench", "coach", *options, "--critic", "evaluator", "--ids", items]).exit_code == 0
     folder = str(tmp_path / "policies")
-    listed = run("list", folder, "--for", "to the left please")
+    listed = run("policies", folder, "--for", "to the left please")
     assert "go_left()" in listed and "left_and_say_so()" in listed and "Change lanes to the left." in listed
-    shown = run("show", folder, "go_left")
+    shown = run("policies", folder, "go_left")
     assert "by the model" in shown and "def go_left():" in shown and "left_lc_s0_c0" in shown and "openai/m" in shown
     assert "Moves over." in run("describe", folder, "go_left", "Moves over.")
-    assert "by a person" in run("show", folder, "go_left")
+    assert "by a person" in run("policies", folder, "go_left")
 
     out = tmp_path / "team.jsonl"
     assert "1 programs written" in run("export", folder, str(out), "go_left")
     with out.open("ab") as file:
         file.write(b'{"schema": "chauffeur-policy-v1", "name": "\x1b[2J"}\n')
-    told = run("import", str(tmp_path / "mine"), str(out))
+    told = run("add", str(tmp_path / "mine"), str(out))
     assert "1 programs added" in told and "not believed" in told
-    told = run("merge", str(tmp_path / "all"), folder, str(tmp_path / "mine"))
+    told = run("add", str(tmp_path / "all"), folder, str(tmp_path / "mine"))
     assert "policies: 2 programs added, 0 known already." in told and "mine: 0 programs added, 1 known already." in told
-    assert "received from policies" in run("show", str(tmp_path / "all"), "go_left")
+    assert "received from policies" in run("policies", str(tmp_path / "all"), "go_left")
 
-    assert runner.invoke(app, ["policies", "prune", folder, "go_left"], input="n\n").exit_code != 0
+    assert runner.invoke(app, ["model", "policies", "prune", folder, "go_left"], input="n\n").exit_code != 0
     assert len(PolicyRepository(Path(folder)).entries) == 2
     assert "1 programs taken out" in run("prune", folder, "go_left", answer="y\n")
     assert "Nothing to take out." in run("prune", folder, "--judged-by", "person")
     assert "1 programs taken out; 0 are left" in run("prune", folder, "--judged-by", "evaluator", "--yes")
-    missing = runner.invoke(app, ["policies", "list", str(tmp_path / "nowhere")])
+    missing = runner.invoke(app, ["show", "policies", str(tmp_path / "nowhere")])
     assert missing.exit_code != 0

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import click
 import pytest
 import typer
 from pydantic import TypeAdapter
@@ -19,8 +21,6 @@ from chauffeur.cli.failures import show_crash
 from chauffeur.cli.main import app
 from chauffeur.concept import ChauffeurError, PlannerError, ScenarioError, Verdict
 from chauffeur.drive.recording import read_trip, write_trip
-
-COMMANDS = ["drive", "feedback", "scenarios", "apis", "replay", "page", "doctor"]
 
 WISH = "Overtake the car in front of you."
 PROGRAM = """def overtake():
@@ -61,19 +61,102 @@ def driven(answers: str, tmp_path: Path) -> Path:
     return folder
 
 
+def every_command() -> Iterator[tuple[tuple[str, ...], click.Command]]:
+    """Each command and group with the words that name it."""
+
+    def walk(command: click.Command, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], click.Command]]:
+        yield path, command
+        for name, child in getattr(command, "commands", {}).items():
+            yield from walk(child, (*path, name))
+
+    yield from walk(typer.main.get_command(app), ())
+
+
 def test_help_has_examples_everywhere() -> None:
-    for command in ([], *([name] for name in COMMANDS)):
-        result = invoke(*command, "--help")
-        assert result.exit_code == 0, command
-        assert "Examples:" in result.output, command
-        assert "chauffeur" in result.output
+    """Of itself: each example begins with the command it explains."""
+    for path, command in every_command():
+        assert "Examples:" in (command.epilog or ""), path
+        assert " ".join(("chauffeur", *path)) in (command.epilog or ""), path
+    for path in ((), ("drive",), ("show",), ("me", "erase")):
+        result = invoke(*path, "--help")
+        assert result.exit_code == 0 and "Examples:" in result.output, path
 
 
-def test_no_command_has_more_than_twelve_options() -> None:
-    group = typer.main.get_command(app)
-    for name, command in group.commands.items():  # type: ignore[attr-defined]
-        options = [p for p in command.params if p.param_type_name == "option" and p.name != "help"]
-        assert len(options) <= 12, name
+def test_the_top_of_the_help_is_what_somebody_comes_for() -> None:
+    panels = dict[str, list[str]]()
+    for name, command in typer.main.get_command(app).commands.items():  # type: ignore[attr-defined]
+        panels.setdefault(command.rich_help_panel, []).append(name)
+    assert {heading: sorted(names) for heading, names in panels.items()} == {
+        "Drive": ["drive", "feedback", "me", "talk"],
+        "Look": ["doctor", "replay", "report", "show"],
+        "Measure": ["bench", "study"],
+        "Build": ["audit", "model", "vehicle"],
+    }
+
+
+@pytest.mark.parametrize("columns", [80, 120])
+def test_the_help_fits_the_terminal(columns: int) -> None:
+    result = CliRunner().invoke(app, ["--help"], env={"COLUMNS": str(columns), "TERMINAL_WIDTH": str(columns)})
+    lines = result.output.splitlines()
+    assert max(map(len, lines)) <= columns
+    assert len(lines) < 70, "two screens"
+    assert [line.split("─")[1].strip() for line in lines if line.startswith("╭")] == [
+        "Options", "Drive", "Look", "Measure", "Build",
+    ]  # fmt: skip
+
+
+def test_an_option_has_one_name() -> None:
+    """What is asked for in one command by a name is asked for by it in all; a name means one thing."""
+    options = [
+        parameter
+        for _, command in every_command()
+        for parameter in command.params
+        if parameter.param_type_name == "option"
+    ]
+    names = {name for option in options for name in option.opts}
+    synonyms = {"--cases", "--n", "--first", "--driver", "--person", "--model", "--url", "--kinds", "--output"}
+    assert not names & synonyms
+    kinds = dict[str, set[object]]()
+    for option in options:
+        kind = repr(option.type_descriptor.annotation).replace(" | None", "")
+        kinds.setdefault(max(option.opts, key=len), set()).add(kind)
+    assert {name: found for name, found in kinds.items() if len(found) > 1} == {}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "module", "extra"),
+    [
+        (("model", "train", "onboard", "--out", "run"), "torch", "models"),
+        (("model", "adapt", "--base", "base", "--out", "run", "--as", "ana"), "peft", "models"),
+        (("report", "run", "--inspect", "run.eval"), "inspect_ai", "inspect"),
+        (("study", "export", "lab", "--out", "trips.parquet"), "pyarrow", "tables"),
+        (("bench", "lampilot", "--data", "DbLv1", "--ray", "local"), "ray", "cluster"),
+    ],
+)
+def test_a_missing_extra_is_said_before_any_work(
+    arguments: tuple[str, ...], module: str, extra: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, module, None)
+    result = invoke(*arguments)
+    assert result.exit_code == 2
+    said = " ".join(result.output.split())
+    assert module in said and "".join(install_command(extra).split()) in "".join(result.output.split())
+    assert list(tmp_path.iterdir()) == [], "nothing was begun"
+
+
+def test_a_command_that_stands_in_a_group_is_found() -> None:
+    for name, where in (("scenarios", "chauffeur show scenarios"), ("train", "chauffeur model train")):
+        result = invoke(name)
+        assert result.exit_code == 2
+        assert f"Did you mean: {where}?" in " ".join(result.output.replace("│", " ").split())
+
+
+def test_the_module_is_the_command() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "chauffeur", "--version"], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stdout.strip()) == (0, f"chauffeur {__version__}")
 
 
 def test_version() -> None:
@@ -172,7 +255,9 @@ def test_a_changed_recording_is_noticed(driven: Path) -> None:
 
 def test_a_page_is_rendered_again(driven: Path) -> None:
     page, strip = driven / "again.html", driven / "again.png"
-    result = invoke("page", str(driven / "trip.mcap"), "--out", str(page), "--filmstrip", str(strip), "--pictures", "2")
+    result = invoke(
+        "show", "page", str(driven / "trip.mcap"), "--out", str(page), "--filmstrip", str(strip), "--pictures", "2"
+    )
     assert result.exit_code == 0, result.output
     assert page.read_text(encoding="utf-8") == (driven / "trip.html").read_text(encoding="utf-8")
     assert strip.read_bytes().startswith(b"\x89PNG")
@@ -213,12 +298,12 @@ def test_feedback_reaches_the_last_trip(answers: str) -> None:
         (["drive", "go", "--seed", "-1"], "--seed"),
         (["drive"], "Missing argument"),
         (["replay", "absent.mcap"], "There is no recording at absent.mcap"),
-        (["page", "absent.mcap"], "There is no recording at absent.mcap"),
+        (["show", "page", "absent.mcap"], "There is no recording at absent.mcap"),
         (["feedback", " ", "--as", "ana"], "The feedback is empty"),
         (["feedback", "fine"], "--as"),
-        (["apis", "is_safe_entr"], "Did you mean is_safe_enter?"),
-        (["scenarios", "--find", "moon"], "No scenario matches"),
-        (["scenarios", "--data", "absent"], "absent"),
+        (["show", "apis", "is_safe_entr"], "Did you mean is_safe_enter?"),
+        (["show", "scenarios", "--find", "moon"], "No scenario matches"),
+        (["show", "scenarios", "--data", "absent"], "absent"),
         (["dirve"], "No such command"),
     ],
 )
@@ -257,17 +342,17 @@ def test_ctrl_c_is_130(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_scenarios_and_apis_are_listed() -> None:
-    listed = invoke("scenarios").output
+    listed = invoke("show", "scenarios").output
     assert "intersection" in listed
     assert "--data DIR" in listed
-    assert "set_target_speed(target_speed: float)" in invoke("apis").output
-    one = invoke("apis", "set_target_speed").output
+    assert "set_target_speed(target_speed: float)" in invoke("show", "apis").output
+    one = invoke("show", "apis", "set_target_speed").output
     assert "m/s" in one
     assert "example" in one
 
 
 def test_official_samples_are_listed_too(lampilot_data: Path) -> None:
-    result = invoke("scenarios", "--data", str(lampilot_data / "DbLv1-dev"), "--find", "pull_over")
+    result = invoke("show", "scenarios", "--data", str(lampilot_data / "DbLv1-dev"), "--find", "pull_over")
     assert result.exit_code == 0, result.output
     assert "pull_over_s0" in result.output
 

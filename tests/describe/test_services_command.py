@@ -1,4 +1,4 @@
-"""`chauffeur context`, as it is typed."""
+"""`chauffeur show context`, as it is typed."""
 
 from __future__ import annotations
 
@@ -9,22 +9,17 @@ import sys
 from pathlib import Path
 
 import pytest
-import typer
 from test_services_map import write_file
 from test_services_server import Asked, reply, roads_json, serving, traffic_json, weather_json
 from typer.testing import CliRunner
 
-from chauffeur.cli import context
-from chauffeur.cli.failures import FriendlyGroup
+from chauffeur.cli.main import app
 
 STREET = [(48.137, 11.56), (48.137, 11.59)]
 
 
 def run(*words: str) -> tuple[int, str]:
-    app = typer.Typer(cls=FriendlyGroup, rich_markup_mode="markdown")
-    app.command(epilog=context.EXAMPLES)(context.context)
-    app.command()(lambda: None)  # with a second command, the first is called by its name
-    result = CliRunner().invoke(app, ["context", *words])
+    result = CliRunner().invoke(app, ["show", "context", *words])
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     return result.exit_code, result.output
 
@@ -53,14 +48,13 @@ def test_services(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENWEATHER_API_KEY", "k1")
     monkeypatch.setenv("TOMTOM_API_KEY", "k2")
     with serving(answer) as service:
-        urls = [f"--{name}-url={service.url}" for name in ("weather", "map", "traffic")]
-        asked = [f"--online={name}" for name in ("weather", "map", "traffic")]
-        code, said = run("--at=48.137,11.575", "--heading=90", *urls, *asked, "--budget=20", "--region=germany")
+        asked = [f"--online={name}={service.url}" for name in ("weather", "map", "traffic")]
+        code, said = run("--at=48.137,11.575", "--heading=90", *asked, "--budget=20", "--region=germany")
         assert code == 0
         assert "light rain" in said
         assert "High Street" in said
         assert "Traffic: slow, at 31 km/h where 72 km/h is usual." in said
-        code, said = run("--at=48.137,11.575", "--heading=90", *urls, *asked, "--budget=20", "--json")
+        code, said = run("--at=48.137,11.575", "--heading=90", *asked, "--budget=20", "--json")
         told = json.loads(said)
         readings = {one["name"]: one for one in told["readings"]}
         assert readings["speed_limit"]["value"] == pytest.approx(50 / 3.6)
@@ -74,7 +68,7 @@ def test_services(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_service_that_is_late_is_said_to_be(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENWEATHER_API_KEY", "k1")
     with serving(lambda _: None) as service:
-        code, said = run("--at=48.137,11.575", f"--weather-url={service.url}", "--online=weather", "--budget=0.05")
+        code, said = run("--at=48.137,11.575", f"--online=weather={service.url}", "--budget=0.05")
     assert code == 0
     assert "Weather: not known (the service did not answer within 0.05 s)." in said
     assert "--budget 3" in said
@@ -97,7 +91,7 @@ def test_south_and_west_are_negative() -> None:
         (["--at", "48,11", "--online", "astrology"], "no online service 'astrology'"),
         (["--at", "48,11", "--budget", "-1"], "budget"),
         (["--at", "48,11", "--heading", "nan"], "is not a heading."),
-        (["--at", "48,11", "--map-url", "nowhere"], "map_url is not an HTTP address."),
+        (["--at", "48,11", "--online", "map=nowhere"], "map_url is not an HTTP address."),
     ],
 )
 def test_what_cannot_be_used_is_said(words: list[str], said: str) -> None:
@@ -110,7 +104,7 @@ def test_what_cannot_be_used_is_said(words: list[str], said: str) -> None:
 def test_help_shows_examples() -> None:
     code, said = run("--help")
     assert code == 0
-    assert "chauffeur context --at 48.137,11.575 --region germany" in said
+    assert "chauffeur show context --at 48.137,11.575 --region germany" in said
 
 
 def test_the_program_in_the_documentation_runs(tmp_path: Path) -> None:

@@ -200,7 +200,7 @@ def test_a_missing_package_is_said_with_the_command_that_installs_it(
 def test_the_command_serves_drives_keeps_and_goes_on(tmp_path: Path) -> None:
     dataset_of(tmp_path / "data", "left_lc", "dec_rel_speed4")
     command = [sys.executable, "-c", "from chauffeur.cli.main import run; run()", "bench", "human", "--no-open"]
-    command += ["--data", str(tmp_path / "data"), "--out", str(tmp_path / "run"), "--driver", "ana"]
+    command += ["--data", str(tmp_path / "data"), "--out", str(tmp_path / "run"), "--as", "ana"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     assert process.stdout is not None
     lines: list[str] = []

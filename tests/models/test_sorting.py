@@ -109,7 +109,7 @@ def test_the_command_writes_sorters_and_their_card(monkeypatch: pytest.MonkeyPat
     some = {name: sentences(name)[::60] for name in ("wishes", "remarks")}
     monkeypatch.setattr(pipeline, "sentences", lambda name: some[name])
     monkeypatch.setattr(pipeline, "drawn", lambda seed: drawn(seed)[::60])
-    result = CliRunner().invoke(app, ["train", "sorters", "--out", str(tmp_path / "made"), "--measured"])
+    result = CliRunner().invoke(app, ["model", "train", "sorters", "--out", str(tmp_path / "made"), "--measured"])
     assert result.exit_code == 0, result.output
     card = (tmp_path / "made" / "CARD.md").read_text()
     assert "when their writer was left out" in card

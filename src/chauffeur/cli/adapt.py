@@ -1,4 +1,4 @@
-"""`chauffeur adapt`: models of our own, made to fit a person or a fleet."""
+"""`chauffeur model adapt`: models of our own, made to fit a person or a fleet."""
 
 from __future__ import annotations
 
@@ -7,14 +7,12 @@ from typing import Annotated, Final
 
 import typer
 
-adapt_app = typer.Typer(no_args_is_help=True, rich_markup_mode="markdown", help="Adapt models of our own.")
-
-ONBOARD_EXAMPLES = """
+EXAMPLES = """
 Examples:
 
-    chauffeur adapt onboard --base runs/onboard/transformers --out runs/ana --as ana
+    chauffeur model adapt --base runs/onboard/transformers --out runs/ana --as ana
 
-    chauffeur adapt onboard --base runs/onboard/transformers --out runs/fleet --interactions a.jsonl --interactions b.jsonl
+    chauffeur model adapt --base runs/onboard/transformers --out runs/fleet --interactions a.jsonl --interactions b.jsonl
 
     chauffeur drive "Step on it, love." --as ana --planner onboard/runs/ana/current
 
@@ -27,13 +25,7 @@ old one stays. It needs PyTorch and peft: pip install 'chauffeur[models]'.
 _HOW: Final = "How it learns"
 
 
-@adapt_app.callback()
-def adapt() -> None:
-    """Models of our own, made to fit."""
-
-
-@adapt_app.command(epilog=ONBOARD_EXAMPLES)
-def onboard(
+def adapt(
     base: Annotated[Path, typer.Option(help="`transformers` folder of a trained model.")],
     out: Annotated[Path, typer.Option(help="Folder of the adapted models; `current` in it names the one in use.")],
     interactions: Annotated[
@@ -50,16 +42,13 @@ def onboard(
     passes: Annotated[int, typer.Option(min=1, help="How often each interaction is seen.", rich_help_panel=_HOW)] = 30,
     rate: Annotated[float, typer.Option(help="Highest learning rate.", rich_help_panel=_HOW)] = 3e-3,
     tolerance: Annotated[float, typer.Option(min=0.0, help="Points of validation that may be lost.")] = 0.5,
-    judged: Annotated[int, typer.Option(min=1, help="Most validation examples judged.", rich_help_panel=_HOW)] = 1000,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
-    threads: Annotated[
-        int, typer.Option(min=0, help="Threads that train; 0 leaves it to PyTorch.", rich_help_panel=_HOW)
-    ] = 0,
 ) -> None:
-    """The on-board language model, on interactions that people accepted. Exit code 1: the old model stays."""
+    """Fit the on-board language model to interactions that people accepted. Exit code 1: the old model stays."""
     from rich.text import Text
 
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.parts import needs
     from chauffeur.cli.stages import stage_lines
     from chauffeur.concept import ConfigError, PersonId
     from chauffeur.memory.choice import open_memory
@@ -72,6 +61,7 @@ def onboard(
         load_interactions,
     )
 
+    needs("models", "Adapting", "torch", "transformers", "tokenizers", "onnx", "onnxscript", "peft", "safetensors")
     if not interactions and not person:
         raise ConfigError("There is nothing to learn from.", hint="Give --as NAME, --interactions FILE, or both.")
     console = stdout()
@@ -92,9 +82,7 @@ def onboard(
         passes=passes,
         rate=rate,
         tolerance=tolerance,
-        judged=judged,
         seed=seed,
-        threads=threads,
     )
     try:
         verdict = adapt_model(base, found, out, recipe, stage_lines(console))

@@ -1,4 +1,4 @@
-"""`chauffeur apis`: what a program may ask of the car."""
+"""`chauffeur show apis`: what a program may ask of the car."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import typer
 EXAMPLES = """
 Examples:
 
-    chauffeur apis
+    chauffeur show apis
 
-    chauffeur apis is_safe_enter
+    chauffeur show apis is_safe_enter
 """
 
 
@@ -43,7 +43,8 @@ def apis(
 
         near = difflib.get_close_matches(name, list(APIS), n=1)
         raise ConfigError(
-            f"There is no driving API {name!r}.", hint=f"Did you mean {near[0]}?" if near else "Run: chauffeur apis"
+            f"There is no driving API {name!r}.",
+            hint=f"Did you mean {near[0]}?" if near else "Run: chauffeur show apis",
         )
     api = APIS[name]
     console.print(Syntax(api.signature, "python", theme="ansi_dark", background_color="default"))

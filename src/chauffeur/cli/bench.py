@@ -133,7 +133,7 @@ def lampilot(
         ),
     ] = None,
 ) -> None:
-    """LaMPilot-Bench (seed Tab. IV): completion, collisions and scores of a planner that follows instructions."""
+    """LaMPilot-Bench (paper Tab. IV): completion, collisions and scores of a planner that follows instructions."""
     from chauffeur.bench.lampilot.policy_aid import HUMAN_FEEDBACK, aid_for
     from chauffeur.bench.lampilot.runner import RunConfig
     from chauffeur.bench.lampilot.scenes import annotated
@@ -226,11 +226,13 @@ def _effort(
     from chauffeur.bench.engine import LocalEngine
     from chauffeur.bench.lampilot.runner import Effort
     from chauffeur.bench.spending import Budget, Price
+    from chauffeur.cli.parts import needs
 
     if ray is not None and workers is not None:
         raise ConfigError("--workers is for this machine; a Ray cluster knows its own size.", hint="Leave one out.")
     engine: Any = LocalEngine
     if ray is not None:
+        needs("cluster", "A Ray cluster", "ray")
         from chauffeur.bench.cluster import RayEngine
 
         engine = partial(RayEngine, ray)

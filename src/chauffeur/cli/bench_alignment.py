@@ -20,7 +20,7 @@ Examples:
 
     chauffeur bench alignment
 
-    chauffeur bench alignment --cases 400 --out runs/alignment
+    chauffeur bench alignment --items 400 --out runs/alignment
 
 Texts and programs, about half of them with one mismatch. The generated ones are synthetic: our own programs over
 simulated scenes, told by a grammar. The others were written by hand, before the judge's rules; rules may be tuned on
@@ -29,7 +29,7 @@ their tuning half only.
 
 
 def alignment(
-    cases: Annotated[int, typer.Option(min=0, help="How many generated cases; 0 for the hand-written alone.")] = 2400,
+    items: Annotated[int, typer.Option(min=0, help="How many generated cases; 0 for the hand-written alone.")] = 2400,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the generated cases.")] = 7,
     out: Annotated[Path | None, typer.Option(help="Folder for `cases.jsonl`: every case and its verdict.")] = None,
 ) -> None:
@@ -39,9 +39,9 @@ def alignment(
 
     console = stdout()
     sets: list[tuple[str, tuple[Judged, ...]]] = []
-    if cases:
-        console.print(f"Alignment: {cases} generated cases, seed {seed}, judge {JUDGE}", soft_wrap=True)
-        sets.append(("Generated (synthetic)", judge_cases(generate(cases, seed))))
+    if items:
+        console.print(f"Alignment: {items} generated cases, seed {seed}, judge {JUDGE}", soft_wrap=True)
+        sets.append(("Generated (synthetic)", judge_cases(generate(items, seed))))
     written = handwritten()
     sets.append(("Written by hand, test half", judge_cases(of_half(written, "test"))))
     sets.append(("Written by hand, tuning half", judge_cases(of_half(written, "tuning"))))

@@ -37,13 +37,13 @@ def personalization(
     passengers: Annotated[int, typer.Option(min=1, help="How many simulated passengers.")] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Seed of passengers, moods, words and order.")] = 1,
     trips: Annotated[int, typer.Option(min=0, help="Trips the memory learns from, for each task.")] = 5,
-    words: Annotated[str, typer.Option(help="Wordings: `test`, or `tuning` to improve a planner.")] = "test",
+    half: Annotated[str, typer.Option(help="Wordings: `test`, or `tuning` to improve a planner.")] = "test",
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/personalization-PLANNER.")] = None,
     workers: Annotated[int, typer.Option(min=1, help="Simulation processes.")] = 1,
     shard: Annotated[str | None, typer.Option(help="Only part i of n, as for `bench lampilot`.")] = None,
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
 ) -> None:
-    """Takeover rates of simulated passengers (seed Tab. VIII, IX, X): keywords, Talk2Drive, and with memory."""
+    """Takeover rates of simulated passengers (paper Tab. VIII, IX, X): keywords, Talk2Drive, and with memory."""
     from chauffeur.bench.personalization.report import markdown
     from chauffeur.bench.personalization.runner import StudyConfig, StudyRun
     from chauffeur.bench.shards import WHOLE, Shard
@@ -53,13 +53,13 @@ def personalization(
     from chauffeur.drive.files import publish
 
     console = stdout()
-    if words not in ("test", "tuning"):
-        raise ConfigError(f"There are no wordings {words!r}.", hint="Write --words test or --words tuning.")
+    if half not in ("test", "tuning"):
+        raise ConfigError(f"There are no wordings {half!r}.", hint="Write --half test or --half tuning.")
     part = WHOLE if shard is None else Shard.parse(shard, os.environ)
     folder = out or Path("runs") / f"personalization-{planner.replace('/', '-')}"
     if part != WHOLE:
         folder = folder / part.folder
-    config = StudyConfig(passengers, seed, planner, "test" if words == "test" else "tuning", trips)
+    config = StudyConfig(passengers, seed, planner, "test" if half == "test" else "tuning", trips)
     options = () if base_url is None else (("base_url", base_url),)
     run = StudyRun(folder, config, shard=part, options=options)
     console.print(

@@ -1,4 +1,4 @@
-"""`chauffeur chaos`: drives in real time, with faults injected from the outside."""
+"""`chauffeur bench chaos`: drives in real time, with faults injected from the outside."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 EXAMPLES = """
 Examples:
 
-    chauffeur chaos --cases 1010 --out runs/chaos
+    chauffeur bench chaos --items 1010 --out runs/chaos
 
-    chauffeur chaos --kinds policy-killed,planner-hangs --cases 20 --out runs/kills
+    chauffeur bench chaos --kind policy-killed --kind planner-hangs --items 20 --out runs/kills
 
-    chauffeur chaos --case 17
+    chauffeur bench chaos --case 17
 
 Every drive is simulated; processes, network, memory, disk and clock are real. Ctrl-C keeps the cases that were played;
 the same command goes on.
@@ -32,13 +32,12 @@ Exit codes: 0 all safe and every wish answered, 1 something failed, 2 bad input,
 
 
 def chaos(
-    cases: Annotated[int, typer.Option(min=1, help="How many cases.")] = 1010,
-    first: Annotated[int, typer.Option(min=0, help="Seed of the suite.")] = 0,
-    kinds: Annotated[str, typer.Option(help="Only these kinds of fault, with commas; all by default.")] = "",
+    items: Annotated[int, typer.Option(min=1, help="How many cases.")] = 1010,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the suite.")] = 0,
+    kind: Annotated[list[str] | None, typer.Option(help="A kind of fault, may be repeated; default all.")] = None,
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/chaos.")] = None,
-    workers: Annotated[int, typer.Option(min=1, max=1, help="Drives at a time; they keep real time, so one.")] = 1,
-    speed: Annotated[
-        float, typer.Option(min=0.1, max=5.0, help="Vehicle time per time of the clock; 5 has periods of 20 ms.")
+    time_scale: Annotated[
+        float, typer.Option(min=0.1, max=5.0, help="Seconds of the car's time in a second; 5 has periods of 20 ms.")
     ] = 5.0,
     realtime: Annotated[
         bool, typer.Option("--realtime/--no-realtime", help="Whether control asks for real-time scheduling.")
@@ -49,11 +48,8 @@ def chaos(
     from chauffeur.bench.chaos.runner import ChaosConfig
     from chauffeur.cli.console import stdout
 
-    del workers
     console = stdout()
-    config = ChaosConfig(
-        cases, first, tuple(name.strip() for name in kinds.split(",") if name.strip()), speed, realtime
-    )
+    config = ChaosConfig(items, seed, tuple(kind or ()), time_scale, realtime)
     if case is not None:
         _replay(console, config, case)
         return

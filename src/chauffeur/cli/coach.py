@@ -16,16 +16,19 @@ if TYPE_CHECKING:
 EXAMPLES = """
 Examples:
 
-    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --demo12
+    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --ids demo12
 
-    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --demo12 --critic evaluator
+    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --ids demo12 --critic evaluator
 
-    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --items left_lc_s0_c0
+    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --ids left_lc_s0_c0
 
 Answer each drive with `success` (done as asked: its program is kept), `commit` (keep it, whatever the evaluator
 thinks), `skip`, `quit`, or with what was wrong: those words go back to the model. Ctrl-C keeps what is done; the same
 command goes on.
 """
+
+
+_DEMO = "demo12"
 
 
 def coach(
@@ -35,15 +38,15 @@ def coach(
     critic: Annotated[
         str, typer.Option(help="`person` at this terminal, or `evaluator`: the benchmark's verdict in words.")
     ] = "person",
-    items: Annotated[str, typer.Option(help="Items by id, separated by commas.")] = "",
-    demo12: Annotated[
-        bool, typer.Option("--demo12", help="The twelve items LaMPilot's own model was coached on.")
-    ] = False,
+    ids: Annotated[
+        str,
+        typer.Option(help="Items by id, with commas; `demo12` for the twelve LaMPilot's own model was coached on."),
+    ] = "",
     rounds: Annotated[int, typer.Option(min=1, max=50, help="Attempts at most for each item.")] = 5,
     out: Annotated[Path | None, typer.Option(help="Folder of the attempts; default `runs/coach-<planner>`.")] = None,
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
 ) -> None:
-    """Human feedback (seed Tab. IV): drive, say what was wrong, drive again; what did well is kept for other wishes."""
+    """Human feedback (paper Tab. IV): drive, say what was wrong, drive again; what did well is kept for more wishes."""
     from chauffeur.bench.lampilot.coaching import DEMO_ITEMS, Coach, items_named, spent
     from chauffeur.bench.store import RowStore
     from chauffeur.cli.console import path_text, plain, stdout
@@ -55,7 +58,7 @@ def coach(
 
     console = stdout()
     judge = _critic(critic, console)
-    wanted = items_named(load_dataset(data), _ids(items, DEMO_ITEMS if demo12 else ()))
+    wanted = items_named(load_dataset(data), _ids(ids, DEMO_ITEMS))
     folder = out or Path("runs") / f"coach-{planner.replace('/', '-')}"
     kept_in = PolicyRepository(repository, create=True)
     teller = _Teller(console, folder / "drives" if critic == "person" else None)
@@ -86,9 +89,10 @@ def coach(
 def _ids(listed: str, demo: tuple[str, ...]) -> tuple[str, ...]:
     from chauffeur.concept import ConfigError
 
-    ids = dict.fromkeys([*(one.strip() for one in listed.split(",") if one.strip()), *demo])
+    named = [one.strip() for one in listed.split(",") if one.strip()]
+    ids = dict.fromkeys(each for one in named for each in (demo if one == _DEMO else (one,)))
     if not ids:
-        raise ConfigError("No items to coach on.", hint="Give --demo12, or --items with ids, e.g. left_lc_s0_c0.")
+        raise ConfigError("No items to coach on.", hint="Give --ids demo12, or e.g. --ids left_lc_s0_c0.")
     return tuple(ids)
 
 

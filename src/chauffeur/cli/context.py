@@ -1,4 +1,4 @@
-"""`chauffeur context`: what the driving context would say of a place on the earth."""
+"""`chauffeur show context`: what the driving context would say of a place on the earth."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 EXAMPLES = """
 Examples:
 
-    chauffeur context --at 48.137,11.575 --region germany
+    chauffeur show context --at 48.137,11.575 --region germany
 
-    chauffeur context --at 40.4237,-86.9212 --heading 90 --map lafayette.osm.pbf --region indiana
+    chauffeur show context --at 40.4237,-86.9212 --heading 90 --map lafayette.osm.pbf --region indiana
 
-    chauffeur context --at 51.5074,-0.1278 --region united_kingdom --online weather --online map --budget 3
+    chauffeur show context --at 51.5074,-0.1278 --region united_kingdom --online weather --online map --budget 3
 
-    chauffeur context --at 35.681,139.767 --region japan --online map --map-url http://localhost:12345
+    chauffeur show context --at 35.681,139.767 --region japan --online map=http://localhost:12345
 
 Keys are read from OPENWEATHER_API_KEY and TOMTOM_API_KEY. Nothing is asked over the network unless --online names it.
 """
@@ -33,12 +33,10 @@ def context(
     map_file: Annotated[Path | None, typer.Option("--map", metavar="FILE", help="An OpenStreetMap file.")] = None,
     region: Annotated[str, typer.Option(help="Whose traffic rules hold: a name, or a rule file (.toml).")] = "",
     online: Annotated[
-        list[str] | None, typer.Option(help="A service to ask: `weather`, `map` or `traffic`; may be repeated.")
+        list[str] | None,
+        typer.Option(help="A service to ask: `weather`, `map` or `traffic`, or `map=URL` for a server of your own."),
     ] = None,
     budget: Annotated[float, typer.Option(help="Seconds that all services together may take.")] = 0.3,
-    weather_url: Annotated[str, typer.Option(help="A server that speaks OpenWeather 2.5.")] = "",
-    map_url: Annotated[str, typer.Option(help="A server that speaks Overpass.")] = "",
-    traffic_url: Annotated[str, typer.Option(help="A server that speaks TomTom's flow segment data.")] = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON.")] = False,
 ) -> None:
     """Tell what a driving context would say of a place: weather, road, limit, traffic, rules; with ages and sources."""
@@ -47,7 +45,7 @@ def context(
     from chauffeur.describe.services import ContextServices, load_road_map, load_rules
 
     here = position(at, heading, accuracy)
-    settings = _settings(online or [], weather_url, map_url, traffic_url)
+    settings = _settings(online or [])
     rules = load_rules(region) if region else None
     road_map = load_road_map(map_file) if map_file is not None else None
 
@@ -81,19 +79,20 @@ def position(at: str, heading: float | None, accuracy: float) -> Position:
     return Position(latitude, longitude, heading, accuracy)
 
 
-def _settings(online: list[str], weather_url: str, map_url: str, traffic_url: str) -> ServiceSettings:
+def _settings(online: list[str]) -> ServiceSettings:
     from chauffeur.concept import ConfigError
     from chauffeur.describe.services import ServiceSettings
     from chauffeur.describe.services.settings import MAP_URL, ONLINE, TRAFFIC_URL, WEATHER_URL
 
-    for name in online:
+    urls = {name: url for name, _, url in (one.partition("=") for one in online)}
+    for name in urls:
         if name not in ONLINE:
             raise ConfigError(f"There is no online service {name!r}.", hint=f"Known: {', '.join(ONLINE)}.")
     return ServiceSettings(
-        online=frozenset(name for name in ONLINE if name in online),
-        weather_url=weather_url or WEATHER_URL,
-        map_url=map_url or MAP_URL,
-        traffic_url=traffic_url or TRAFFIC_URL,
+        online=frozenset(name for name in ONLINE if name in urls),
+        weather_url=urls.get("weather") or WEATHER_URL,
+        map_url=urls.get("map") or MAP_URL,
+        traffic_url=urls.get("traffic") or TRAFFIC_URL,
     )
 
 

@@ -98,7 +98,7 @@ _TRY_REALTIME = "import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_par
 
 
 def _realtime() -> str:
-    """Whether `chauffeur live` may have a core to itself when it needs one; tried in a process of its own."""
+    """Whether `chauffeur talk` may have a core to itself when it needs one; tried in a process of its own."""
     tried = subprocess.run([sys.executable, "-I", "-c", _TRY_REALTIME], capture_output=True, check=False)  # noqa: S603
     if tried.returncode == 0:
         return "allowed: control keeps its rate whatever else runs"

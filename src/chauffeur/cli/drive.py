@@ -32,7 +32,8 @@ _DONE = ("success", "ended")
 def drive(
     wish: Annotated[str, typer.Argument(help="What you want, in your own words.")],
     scenario: Annotated[
-        str | None, typer.Option(help="Where to drive; default one that suits the wish. See `chauffeur scenarios`.")
+        str | None,
+        typer.Option(help="Where to drive; default one that suits the wish. See `chauffeur show scenarios`."),
     ] = None,
     planner: Annotated[
         str, typer.Option(help="`onboard`, `keyword`, `openai/<model>`, `replay/<file>`, or an installed one.")

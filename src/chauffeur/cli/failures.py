@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from types import TracebackType
 from typing import Any
 
@@ -30,6 +31,12 @@ _BAD_INPUT = (ConfigError, DataError, InstructionError, MissingExtraError, Profi
 class FriendlyGroup(TyperGroup):
     """Commands whose own errors end in words, not in a traceback; CHAUFFEUR_DEBUG=1 shows the traceback."""
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the command; one that stands in a group is named with it."""
+        if args and args[0] not in self.commands and (found := list(_places(self, args[0], "chauffeur"))):
+            ctx.fail(f"No such command {args[0]!r}. Did you mean: {' or '.join(found)}?")
+        return super().resolve_command(ctx, args)
+
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
         try:
@@ -39,6 +46,15 @@ class FriendlyGroup(TyperGroup):
                 raise
             show_error(error)
             raise typer.Exit(exit_code(error)) from error
+
+
+def _places(group: Any, name: str, path: str) -> Iterator[str]:
+    """Every command or group of a name below a group, as it is typed."""
+    for known, command in group.commands.items():
+        if known == name:
+            yield f"{path} {known}"
+        if hasattr(command, "commands"):
+            yield from _places(command, name, f"{path} {known}")
 
 
 def debugging() -> bool:

@@ -1,4 +1,4 @@
-"""`chauffeur hear`: what the car would hear in a recording, or from the microphone, and how long it took."""
+"""`chauffeur show speech`: what the car would hear in a recording, or from the microphone, and how long it took."""
 
 from __future__ import annotations
 
@@ -20,29 +20,26 @@ if TYPE_CHECKING:
 EXAMPLES = """
 Examples:
 
-    chauffeur hear wish.wav
+    chauffeur show speech wish.wav
 
-    chauffeur hear wish.wav --button command --json
+    chauffeur show speech wish.wav --button command --json
 
-    chauffeur hear wish.ogg --engine whisper --model models/small.en
+    chauffeur show speech wish.ogg --engine whisper/models/small.en
 
-    chauffeur hear wish.wav --engine endpoint --base-url http://localhost:8000/v1
+    chauffeur show speech wish.wav --engine endpoint/whisper-1 --base-url http://localhost:8000/v1
 
-    chauffeur hear --microphone --device USB
+    chauffeur show speech --microphone --device USB
 
 Exit codes: 0 a wish or an opinion was heard, 1 none was, 2 bad input.
 """
 
 
 def hear(
-    file: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="A recording: WAV, or what ffmpeg reads.")
-    ] = None,
+    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="A recording: WAV, or what ffmpeg reads.")] = None,
     *,
     engine: Annotated[
-        str, typer.Option(metavar="NAME", help="grammar (offline, driving words only), whisper or endpoint.")
+        str, typer.Option(help="`grammar` (offline, driving words only), `whisper/<folder>` or `endpoint/<model>`.")
     ] = "grammar",
-    model: Annotated[str, typer.Option(metavar="MODEL", help="Whisper: its folder. Endpoint: its name there.")] = "",
     base_url: Annotated[str | None, typer.Option(metavar="URL", help="The endpoint; usually ends in /v1.")] = None,
     timeout: Annotated[float, typer.Option(metavar="S", help="For one answer of the endpoint.")] = 10.0,
     button: Annotated[
@@ -62,13 +59,14 @@ def hear(
     from chauffeur.speech import HOTWORDS, open_recogniser, read_recording
 
     if (file is None) != microphone:
-        raise ConfigError("Give a recording, or --microphone.", hint="E.g. chauffeur hear wish.wav")
+        raise ConfigError("Give a recording, or --microphone.", hint="E.g. chauffeur show speech wish.wav")
     if button and button not in HOTWORDS:
         raise ConfigError(f"There is no button {button!r}.", hint=f"Known: {', '.join(HOTWORDS)}.")
     if button and microphone:
         raise ConfigError("A terminal has no button to hold.", hint="Say the hotword instead.")
     recording = None if file is None else read_recording(file)
-    recogniser = open_recogniser(engine, model=model, base_url=base_url, timeout_s=timeout)
+    name, _, model = engine.strip().partition("/")
+    recogniser = open_recogniser(name, model=model, base_url=base_url, timeout_s=timeout)
     console = stdout()
     if recording is None:
         found = _listen(recogniser, device)

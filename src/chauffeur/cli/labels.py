@@ -1,4 +1,4 @@
-"""What the terminals of `live`, `talk` and `hear` call the things they tell of."""
+"""What the terminals call the things they tell of."""
 
 from __future__ import annotations
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from chauffeur import __version__
+from chauffeur.cli import adapt as adapting
 from chauffeur.cli import (
     apis,
     bench_alignment,
@@ -20,24 +21,22 @@ from chauffeur.cli import (
     drive,
     feedback,
     hear,
-    live,
     page,
+    policies,
     replay,
     report,
     scenarios,
+    scenes,
+    serve,
     talk,
+    train,
     wheel,
 )
-from chauffeur.cli.adapt import adapt_app
 from chauffeur.cli.audit import audit_app
 from chauffeur.cli.bench import bench_app
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
 from chauffeur.cli.me import me_app
-from chauffeur.cli.policies import policies_app
-from chauffeur.cli.scenes import scenes_app
-from chauffeur.cli.serve import serve_app
 from chauffeur.cli.study import study_app
-from chauffeur.cli.train import train_app
 from chauffeur.cli.vehicle import vehicle_app
 
 EXAMPLES = """
@@ -47,16 +46,49 @@ Examples:
 
     chauffeur drive "I'm in a hurry" --as ana --save trips/hurry --open
 
-    chauffeur live "Overtake the car in front of you."
-
     chauffeur talk --as ana
 
     chauffeur feedback "A bit too close for me." --as ana
 
     chauffeur replay trips/hurry/trip.mcap
 
+    chauffeur show scenarios
+
 Every drive is simulated. Exit codes: 0 done, 1 refused or failed, 2 bad input, 130 stopped with Ctrl-C.
 """
+
+SHOW_EXAMPLES = """
+Examples:
+
+    chauffeur show scenarios
+
+    chauffeur show apis is_safe_enter
+
+    chauffeur show page trips/hurry/trip.mcap --open
+"""
+
+BENCH_EXAMPLES = """
+Examples:
+
+    chauffeur bench lampilot --data DbLv1 --planner openai/gpt-4o
+
+    chauffeur bench passengers --planner onboard
+
+    chauffeur report runs/lampilot-*
+"""
+
+MODEL_EXAMPLES = """
+Examples:
+
+    chauffeur model train onboard --out runs/onboard
+
+    chauffeur model adapt --base runs/onboard/transformers --out runs/ana --as ana
+
+    chauffeur model serve --port 8040
+"""
+
+DRIVE, LOOK, MEASURE, BUILD = "Drive", "Look", "Measure", "Build"
+"""What somebody comes for; the headings of `chauffeur --help`."""
 
 app = typer.Typer(
     cls=FriendlyGroup,
@@ -65,6 +97,18 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=EXAMPLES,
+)
+show_app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    help="Show scenarios, driving APIs, learned policies, the context of a place, a trip's page, what is heard.",
+    epilog=SHOW_EXAMPLES,
+)
+model_app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    help="Models of our own: train, adapt, export, serve; and the policies learned from feedback.",
+    epilog=MODEL_EXAMPLES,
 )
 
 
@@ -84,34 +128,40 @@ def chauffeur(
     del version
 
 
-app.command(epilog=drive.EXAMPLES)(drive.drive)
-app.command(epilog=live.EXAMPLES)(live.live)
-app.command(epilog=talk.EXAMPLES)(talk.talk)
-app.command(epilog=chaos.EXAMPLES)(chaos.chaos)
-app.command(epilog=feedback.EXAMPLES)(feedback.feedback)
-app.command(epilog=hear.EXAMPLES)(hear.hear)
-app.command(epilog=context.EXAMPLES)(context.context)
-app.command(epilog=scenarios.EXAMPLES)(scenarios.scenarios)
-app.command(epilog=apis.EXAMPLES)(apis.apis)
-app.command(epilog=replay.EXAMPLES)(replay.replay)
-app.command(epilog=page.EXAMPLES)(page.page)
-app.command(epilog=report.EXAMPLES)(report.report)
-app.command(epilog=doctor.EXAMPLES)(doctor.doctor)
+app.command(epilog=drive.EXAMPLES, rich_help_panel=DRIVE)(drive.drive)
+app.command(epilog=talk.EXAMPLES, rich_help_panel=DRIVE)(talk.talk)
+app.command(epilog=feedback.EXAMPLES, rich_help_panel=DRIVE)(feedback.feedback)
+app.add_typer(me_app, name="me", rich_help_panel=DRIVE)
+
+app.command(epilog=replay.EXAMPLES, rich_help_panel=LOOK)(replay.replay)
+app.command(epilog=report.EXAMPLES, rich_help_panel=LOOK)(report.report)
+app.add_typer(show_app, name="show", rich_help_panel=LOOK)
+app.command(epilog=doctor.EXAMPLES, rich_help_panel=LOOK)(doctor.doctor)
+show_app.command(epilog=scenarios.EXAMPLES)(scenarios.scenarios)
+show_app.command(epilog=apis.EXAMPLES)(apis.apis)
+show_app.command("policies", epilog=policies.SHOW_EXAMPLES)(policies.show_policies)
+show_app.command(epilog=context.EXAMPLES)(context.context)
+show_app.command(epilog=page.EXAMPLES)(page.page)
+show_app.command("speech", epilog=hear.EXAMPLES)(hear.hear)
+
+app.add_typer(bench_app, name="bench", rich_help_panel=MEASURE, epilog=BENCH_EXAMPLES)
+app.add_typer(study_app, name="study", rich_help_panel=MEASURE)
 bench_app.command(epilog=wheel.EXAMPLES)(wheel.human)
 bench_app.command(epilog=coach.EXAMPLES)(coach.coach)
-bench_app.command(epilog=bench_alignment.EXAMPLES)(bench_alignment.alignment)
 bench_app.command(epilog=bench_hostile.EXAMPLES)(bench_hostile.hostile)
+bench_app.command(epilog=bench_alignment.EXAMPLES)(bench_alignment.alignment)
 bench_app.command(epilog=bench_personalization.EXAMPLES)(bench_personalization.personalization)
-app.add_typer(bench_app, name="bench")
-app.add_typer(me_app, name="me")
-app.add_typer(policies_app, name="policies")
-app.add_typer(scenes_app, name="scenes")
-app.add_typer(study_app, name="study")
-app.add_typer(train_app, name="train")
-app.add_typer(serve_app, name="serve")
-app.add_typer(adapt_app, name="adapt")
-app.add_typer(audit_app, name="audit")
-app.add_typer(vehicle_app, name="vehicle")
+bench_app.command(epilog=chaos.EXAMPLES)(chaos.chaos)
+bench_app.add_typer(scenes.scenes_app, name="scenes", epilog=scenes.GENERATE_EXAMPLES)
+
+app.add_typer(model_app, name="model", rich_help_panel=BUILD)
+app.add_typer(vehicle_app, name="vehicle", rich_help_panel=BUILD)
+app.add_typer(audit_app, name="audit", rich_help_panel=BUILD)
+model_app.add_typer(train.train_app, name="train", epilog=train.ONBOARD_EXAMPLES)
+model_app.command(epilog=adapting.EXAMPLES)(adapting.adapt)
+model_app.command(epilog=serve.EXAMPLES)(serve.serve)
+model_app.command(epilog=train.GGUF_EXAMPLES)(train.gguf)
+model_app.add_typer(policies.policies_app, name="policies")
 
 
 def run() -> None:

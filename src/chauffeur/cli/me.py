@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chauffeur.cli.examples import WithExamples
+
 if TYPE_CHECKING:
     from chauffeur.memory.privacy import Privacy
 
 me_app = typer.Typer(
+    cls=WithExamples,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="What is remembered of you: see it, take it with you, erase it.",

@@ -1,4 +1,4 @@
-"""`chauffeur page`: a recorded trip as a page, and as a strip of pictures."""
+"""`chauffeur show page`: a recorded trip as a page, and as a strip of pictures."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import typer
 EXAMPLES = """
 Examples:
 
-    chauffeur page trips/hurry/trip.mcap --open
+    chauffeur show page trips/hurry/trip.mcap --open
 
-    chauffeur page trip.mcap --out docs/trip.html --filmstrip docs/trip.png
+    chauffeur show page trip.mcap --out docs/trip.html --filmstrip docs/trip.png
 """
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, Parameters, Plan, Scenario
+from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, MissingExtraError, Parameters, Plan, Scenario
 
 if TYPE_CHECKING:
     from chauffeur.describe.services.sources import SourceSettings
@@ -16,6 +17,31 @@ if TYPE_CHECKING:
     from chauffeur.worlds.base import World
 
 _LIMITS = {"default": Limits(), "lampilot": LAMPILOT_LIMITS}
+
+
+def needs(extra: str, what: str, *modules: str) -> None:
+    """Say before any work is done that an extra is missing. Nothing is imported.
+
+    Args:
+        extra: The extra of this package that brings the modules.
+        what: Who needs it, as the subject of a sentence.
+        modules: Top-level modules.
+
+    Raises:
+        MissingExtraError: One cannot be found; the hint installs the extra for this interpreter.
+    """
+    missing = [name for name in modules if not _importable(name)]
+    if missing:
+        from chauffeur.cli.doctor import install_command
+
+        raise MissingExtraError(f"{what} needs {', '.join(missing)}.", hint=f"Run: {install_command(extra)}")
+
+
+def _importable(name: str) -> bool:
+    try:
+        return find_spec(name) is not None
+    except ValueError:  # it is being kept from being imported
+        return False
 
 
 def limits_named(name: str) -> Limits:

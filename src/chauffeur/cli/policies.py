@@ -1,4 +1,4 @@
-"""`chauffeur policies`: look into a policy repository, put it right, and share it."""
+"""`chauffeur show policies` and `chauffeur model policies`: look into a policy repository, put it right, share it."""
 
 from __future__ import annotations
 
@@ -7,34 +7,45 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chauffeur.cli.examples import WithExamples
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rich.console import Console
 
-    from chauffeur.memory.policies import Merged, PolicyEntry, PolicyRepository
+    from chauffeur.memory.policies import Merged, PolicyEntry, PolicyRepository, Rejected
 
 policies_app = typer.Typer(
+    cls=WithExamples,
     no_args_is_help=True,
     rich_markup_mode="markdown",
-    help="Policy repositories: programs that did well, learned from feedback.",
+    help="Policy repositories (programs that did well, learned from feedback): describe, prune, share.",
 )
 
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The repository.")]
 Name = Annotated[str, typer.Argument(metavar="NAME", help="A program's name as it is called, or its id.")]
 
+SHOW_EXAMPLES = """
+Examples:
+
+    chauffeur show policies policies
+
+    chauffeur show policies policies left_overtake
+
+    chauffeur show policies policies --for "Get past the truck."
+"""
+
 EXAMPLES = """
 Examples:
 
-    chauffeur policies list policies
+    chauffeur model policies export policies team.jsonl left_overtake pull_over
 
-    chauffeur policies show policies left_overtake
+    chauffeur model policies add mine team.jsonl other-policies
 
-    chauffeur policies export policies team.jsonl left_overtake pull_over
+    chauffeur model policies describe policies left_overtake "Overtakes on the left and moves back in."
 
-    chauffeur policies import mine team.jsonl
-
-    chauffeur policies prune policies --superseded --yes
+    chauffeur model policies prune policies --superseded --yes
 """
 
 
@@ -43,12 +54,19 @@ def policies() -> None:
     """Policy repositories."""
 
 
-@policies_app.command("list")
-def list_policies(
+def show_policies(
     folder: Folder,
+    name: Annotated[str, typer.Argument(metavar="NAME", help="One program, in full; all in short without it.")] = "",
     query: Annotated[str, typer.Option("--for", help="Order them by how near they are to this wish.")] = "",
 ) -> None:
-    """List the programs: what each does, what it was learned for, and who judged it."""
+    """List learned programs: what each does, what it was learned for, who judged it; or show one of them."""
+    if name:
+        _show_one(folder, name)
+    else:
+        _list(folder, query)
+
+
+def _list(folder: Path, query: str) -> None:
     from rich.table import Table
     from rich.text import Text
 
@@ -87,9 +105,7 @@ def list_policies(
     _not_believed(console, repository)
 
 
-@policies_app.command()
-def show(folder: Folder, name: Name) -> None:
-    """Show one program with everything that is known of it."""
+def _show_one(folder: Path, name: str) -> None:
     from rich.syntax import Syntax
 
     from chauffeur.cli.console import columns, plain, stdout
@@ -134,7 +150,7 @@ def describe(
 @policies_app.command()
 def prune(
     folder: Folder,
-    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", help="Programs to take out.")] = None,
+    names: Annotated[list[str] | None, typer.Argument(metavar="NAME", help="Programs to take out.")] = None,
     superseded: Annotated[
         bool, typer.Option("--superseded", help="Those learned again later for the same wish.")
     ] = False,
@@ -177,9 +193,7 @@ def prune(
 def export_policies(
     folder: Folder,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The file to write, JSON lines.")],
-    names: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME]...", help="Programs to write; default all.")
-    ] = None,
+    names: Annotated[list[str] | None, typer.Argument(metavar="NAME", help="Programs to write; default all.")] = None,
 ) -> None:
     """Write programs to one file for somebody else. It holds wishes and critiques in their own words."""
     from chauffeur.cli.console import path_text, plain, stdout
@@ -190,32 +204,27 @@ def export_policies(
     stdout().print(plain(f"{len(entries)} programs written to"), path_text(file))
 
 
-@policies_app.command("import")
-def import_policies(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The repository; made if there is none.")],
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A file that `export` wrote.")],
+@policies_app.command()
+def add(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The repository to add to; made if there is none.")],
+    others: Annotated[
+        list[Path], typer.Argument(metavar="OTHER...", help="Repositories, or files that `export` wrote.")
+    ],
 ) -> None:
-    """Take in programs from a file. Each is checked before it is believed."""
+    """Add the programs of others. Each is checked before it is believed; names that collide get a version."""
     from chauffeur.memory.policies import PolicyRepository, read_policies
 
-    entries, rejected = read_policies(file)
-    merged = PolicyRepository(folder, create=True).merge(entries, received=f"from {file.name}")
-    _say_merged(str(file), merged, [one.reason for one in rejected])
-
-
-@policies_app.command()
-def merge(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The repository to add to; made if there is none.")],
-    others: Annotated[list[Path], typer.Argument(metavar="OTHER...", help="Repositories to take programs from.")],
-) -> None:
-    """Add the programs of other repositories; names that collide get a version."""
-    from chauffeur.memory.policies import PolicyRepository
-
-    sources = [_open(other) for other in others]
+    sources: list[tuple[Path, Sequence[PolicyEntry], Sequence[Rejected]]] = []
+    for other in others:
+        if other.is_dir():
+            source = _open(other)
+            sources.append((other, source.entries, source.rejected))
+        else:
+            sources.append((other, *read_policies(other)))
     repository = PolicyRepository(folder, create=True)
-    for source in sources:
-        merged = repository.merge(source.entries, received=f"from {source.folder.name}")
-        _say_merged(str(source.folder), merged, [one.reason for one in source.rejected])
+    for other, entries, rejected in sources:
+        merged = repository.merge(entries, received=f"from {other.name}")
+        _say_merged(str(other), merged, [one.reason for one in rejected])
 
 
 def _open(folder: Path) -> PolicyRepository:

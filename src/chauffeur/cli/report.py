@@ -54,12 +54,15 @@ def report(
     from chauffeur.bench.report.latex import render_latex
     from chauffeur.bench.report.text import render_markdown
     from chauffeur.cli.console import columns, path_text, plain, stdout
+    from chauffeur.cli.parts import needs
     from chauffeur.concept import ConfigError
     from chauffeur.drive.files import publish
     from chauffeur.hmi.report_page import write_report_page
 
     if inspect is not None and len(runs) != 1:
         raise ConfigError("An Inspect log holds one run.", hint="Give --inspect with one RUN, once for each.")
+    if inspect is not None:
+        needs("inspect", "An Inspect log", "inspect_ai")
     console = stdout()
     choices = Choices(metrics or "", data, gallery)
     with _progress(console) as show:

@@ -1,4 +1,4 @@
-"""`chauffeur scenarios`: where one can drive."""
+"""`chauffeur show scenarios`: where one can drive."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import typer
 EXAMPLES = """
 Examples:
 
-    chauffeur scenarios
+    chauffeur show scenarios
 
-    chauffeur scenarios --data DbLv1 --find overtake
+    chauffeur show scenarios --data DbLv1 --find overtake
 """
 
 _SHOWN = 40
@@ -34,7 +34,7 @@ def scenarios(
     wanted = find.casefold()
     found = [s for s in list_scenarios(data) if wanted in s.id.casefold() or wanted in s.title.casefold()]
     if not found:
-        raise ScenarioError(f"No scenario matches {find!r}.", hint="Run `chauffeur scenarios` for the whole list.")
+        raise ScenarioError(f"No scenario matches {find!r}.", hint="Run `chauffeur show scenarios` for the whole list.")
     shown = found if every else found[:_SHOWN]
     table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
     for heading in ("Scenario", "Road", "A wish it shows well"):

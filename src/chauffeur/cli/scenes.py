@@ -1,4 +1,4 @@
-"""`chauffeur scenes`: scenes and instructions of our own, in LaMPilot's format."""
+"""`chauffeur bench scenes`: scenes and instructions of our own, in LaMPilot's format."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ scenes_app = typer.Typer(
 GENERATE_EXAMPLES = """
 Examples:
 
-    chauffeur scenes generate --out suite
+    chauffeur bench scenes generate --out suite
 
-    chauffeur scenes generate --n 490 --seed 7 --out small --extras 100
+    chauffeur bench scenes generate --items 490 --seed 7 --out small --extras 100
 
-    chauffeur scenes generate --out suite --avoid DbLv1
+    chauffeur bench scenes generate --out suite --avoid DbLv1
 
 Every scene is driven by a scripted expert before it is kept, and every instruction is read back. The same seed gives
 the same suite, however many processes make it. Ctrl-C keeps what is made; the same command goes on.
@@ -37,9 +37,9 @@ the same suite, however many processes make it. Ctrl-C keeps what is made; the s
 CHECK_EXAMPLES = """
 Examples:
 
-    chauffeur scenes check suite
+    chauffeur bench scenes check suite
 
-    chauffeur scenes check DbLv1 --json faults.jsonl
+    chauffeur bench scenes check DbLv1 --out faults.jsonl
 
 Exit code 1 when anything is wrong. LaMPilot's own data has scenes that are impossible or ask for nothing.
 """
@@ -47,9 +47,9 @@ Exit code 1 when anything is wrong. LaMPilot's own data has scenes that are impo
 STATS_EXAMPLES = """
 Examples:
 
-    chauffeur scenes stats suite
+    chauffeur bench scenes stats suite
 
-    chauffeur scenes stats DbLv1
+    chauffeur bench scenes stats DbLv1
 """
 
 _LINE_EVERY_S: Final = 10.0
@@ -59,25 +59,29 @@ _SHOWN: Final = 20
 @scenes_app.command(epilog=GENERATE_EXAMPLES)
 def generate(
     out: Annotated[Path, typer.Option(help="Folder to write; a suite begun there is continued.")],
-    n: Annotated[int, typer.Option("--n", min=1, help="Items of the main suite.")] = 4900,
+    items: Annotated[int, typer.Option(min=1, help="Items of the main suite.")] = 4900,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
     extras: Annotated[
         int | None,
-        typer.Option(min=0, help="Items beyond the original: hints, several steps, refusals, units. Default n / 5."),
+        typer.Option(
+            min=0, help="Items beyond the original: hints, several steps, refusals, units. Default a fifth of --items."
+        ),
     ] = None,
     avoid: Annotated[
         Path | None, typer.Option(help="DbLv1 folder whose instructions must not come up, e.g. LaMPilot's own.")
     ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
 ) -> None:
-    """A suite of our own with the statistics of LaMPilot-Bench (seed Tab. III), split for training and testing."""
+    """A suite of our own with the statistics of LaMPilot-Bench (paper Tab. III), split for training and testing."""
     from chauffeur.bench.lampilot.scenes.suite import Suite, SuiteConfig
     from chauffeur.cli.console import stdout
     from chauffeur.worlds.highway.dblv1 import load_dataset
 
     console = stdout()
     avoided = None if avoid is None else load_dataset(avoid)
-    config = SuiteConfig(n, seed, n // 5 if extras is None else extras, "" if avoided is None else avoided.sha256)
+    config = SuiteConfig(
+        items, seed, items // 5 if extras is None else extras, "" if avoided is None else avoided.sha256
+    )
     suite = Suite(out, config, avoided)
     try:
         with _progress(console, "made") as show:
@@ -112,7 +116,7 @@ def _folders(manifest: Any) -> list[tuple[str, str, str]]:
 def check(
     data: Annotated[Path, typer.Argument(help="Suite, or any DbLv1 folder.")],
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
-    json_out: Annotated[Path | None, typer.Option("--json", help="Write every fault as a JSON line.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write every fault as a JSON line.")] = None,
 ) -> None:
     """Drive every scene with the scripted expert, and read every instruction back."""
     from chauffeur.bench.lampilot.scenes.checking import as_row, counts
@@ -123,9 +127,9 @@ def check(
     console = stdout()
     with _progress(console, "checked") as show:
         items, faults = look_over(data, workers or os.cpu_count() or 1, show)
-    if json_out is not None:
+    if out is not None:
         lines = "".join(json.dumps(as_row(fault), ensure_ascii=False) + "\n" for fault in faults)
-        publish(json_out, lines.encode(), "list of faults")
+        publish(out, lines.encode(), "list of faults")
     if not faults:
         console.print(f"{items:,} items: every scene is solved by the expert, every instruction says its goal.")
         return
@@ -136,7 +140,7 @@ def check(
         said = f'  "{fault.text}"' if fault.text else ""
         console.print(plain(f"{fault.where}: {fault.why}{said}"), soft_wrap=True)
     if len(faults) > _SHOWN:
-        console.print(f"... and {len(faults) - _SHOWN:,} more: add --json FILE.")
+        console.print(f"... and {len(faults) - _SHOWN:,} more: add --out FILE.")
     raise typer.Exit(1)
 
 

@@ -1,4 +1,4 @@
-"""`chauffeur serve`: the on-board planner as a chat-completions endpoint on this machine."""
+"""`chauffeur model serve`: the on-board planner as a chat-completions endpoint on this machine."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import threading
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from itertools import count
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from chauffeur.concept import ChauffeurError, ConfigError, Limits
-from chauffeur.planners.base import Planner
 
-serve_app = typer.Typer(no_args_is_help=True, rich_markup_mode="markdown", help="Serve models of our own.")
+if TYPE_CHECKING:
+    from chauffeur.planners.base import Planner
 
 EXAMPLES = """
 Examples:
 
-    chauffeur serve onboard --port 8040
+    chauffeur model serve --port 8040
 
     chauffeur drive "Overtake it." --planner openai/onboard --base-url http://127.0.0.1:8040/v1
 
@@ -32,26 +32,20 @@ MAX_BODY_BYTES: Final = 1_000_000
 _PIECE_CHARS: Final = 24
 
 
-@serve_app.callback()
-def serve() -> None:
-    """Models of our own, served."""
-
-
-@serve_app.command(epilog=EXAMPLES)
-def onboard(
+def serve(
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes a free one.")] = 8040,
-    model: Annotated[str, typer.Option(help="Planner to serve: `onboard`, or `onboard/FOLDER`.")] = "onboard",
+    planner: Annotated[str, typer.Option(help="Planner to serve: `onboard`, or `onboard/FOLDER`.")] = "onboard",
     limits: Annotated[str, typer.Option(help="Bounds of its own choices: `default` or `lampilot`.")] = "default",
 ) -> None:
-    """The on-board planner through the chat-completions protocol."""
+    """Serve the on-board planner on this machine, in OpenAI's chat-completions protocol."""
     from chauffeur.cli.console import stdout
     from chauffeur.cli.parts import limits_named
     from chauffeur.planners.registry import make_planner
 
-    server = Endpoint(host, port, make_planner(model), limits_named(limits))
+    server = Endpoint(host, port, make_planner(planner), limits_named(limits))
     address = f"http://{host}:{server.server_port}/v1"
-    stdout().print(f"Serving {model} at {address} (Ctrl-C ends it)", soft_wrap=True)
+    stdout().print(f"Serving {planner} at {address} (Ctrl-C ends it)", soft_wrap=True)
     try:
         server.serve_forever()
     except KeyboardInterrupt:

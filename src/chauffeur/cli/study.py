@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chauffeur.cli.examples import WithExamples
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -14,9 +16,10 @@ if TYPE_CHECKING:
     from chauffeur.bench.personalization.protocol import PeopleArm, PlannedTrip
 
 study_app = typer.Typer(
+    cls=WithExamples,
     no_args_is_help=True,
     rich_markup_mode="markdown",
-    help="A study with people: who takes over how often, blind, randomised and counterbalanced (seed Tab. IX and X).",
+    help="A study with people: who takes over how often, blind, randomised and counterbalanced (paper Tab. IX and X).",
 )
 
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The study.")]
@@ -31,9 +34,11 @@ Examples:
 
     chauffeur study next lab --participant P001 --words "Could you go a bit faster?"
 
-    chauffeur study record lab --participant P001 --trip 1 --takeover --rating 3 --comment "Too slow for me."
+    chauffeur study record lab --participant P001 --number 1 --takeover --rating 3 --comment "Too slow for me."
 
-    chauffeur study export lab --csv trips.csv
+    chauffeur study export lab --out trips.csv
+
+    chauffeur study withdraw lab --participant P001
 
     chauffeur study unblind lab
 
@@ -107,7 +112,7 @@ def next_trip(
     if words is not None:
         _drive(console, made, trip, words, planner)
     console.print(
-        f"Then: chauffeur study record {folder} --participant {trip.participant} --trip {trip.number} "
+        f"Then: chauffeur study record {folder} --participant {trip.participant} --number {trip.number} "
         "--takeover | --no-takeover --rating 1..7",
         soft_wrap=True,
         markup=False,
@@ -118,10 +123,10 @@ def next_trip(
 def record(
     folder: Folder,
     participant: Participant,
-    trip: Annotated[int, typer.Option(min=1, help="Number of the trip, as `study next` says it.")],
+    trip: Annotated[int, typer.Option("--number", min=1, help="Number of the trip, as `study next` says it.")],
     takeover: Annotated[bool, typer.Option("--takeover/--no-takeover", help="Whether the participant took over.")],
     rating: Annotated[int | None, typer.Option(help="1 (bad) to 7 (good).")] = None,
-    at: Annotated[float | None, typer.Option(help="When they took over, s into the trip.")] = None,
+    at: Annotated[float | None, typer.Option("--takeover-s", help="When they took over, s into the trip.")] = None,
     said: Annotated[str, typer.Option(help="What they had asked the car for.")] = "",
     comment: Annotated[str, typer.Option(help="What they said afterwards; while learning, the memory hears it.")] = "",
 ) -> None:
@@ -158,22 +163,24 @@ def withdraw(
 @study_app.command()
 def export(
     folder: Folder,
-    csv: Annotated[Path | None, typer.Option("--csv", help="File for comma-separated values.")] = None,
-    parquet: Annotated[Path | None, typer.Option("--parquet", help="File for Parquet (extra `tables`).")] = None,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="File to write: `.csv`, or `.parquet` (extra `tables`).")],
 ) -> None:
     """Write the recorded trips, in code letters."""
     from chauffeur.bench.personalization.people import csv_text, write_parquet
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.parts import needs
     from chauffeur.concept import ConfigError
     from chauffeur.drive.files import publish
 
+    if out.suffix not in (".csv", ".parquet"):
+        raise ConfigError(f"{out.name} is no name for an export.", hint="It ends in .csv or .parquet.")
+    if out.suffix == ".parquet":
+        needs("tables", "Parquet", "pyarrow")
     rows = _open(folder).rows()
-    if csv is None and parquet is None:
-        raise ConfigError("There is no file to write to.", hint="Add --csv trips.csv or --parquet trips.parquet.")
-    if csv is not None:
-        publish(csv, csv_text(rows).encode(), "export")
-    if parquet is not None:
-        write_parquet(parquet, rows)
+    if out.suffix == ".parquet":
+        write_parquet(out, rows)
+    else:
+        publish(out, csv_text(rows).encode(), "export")
     stdout().print(f"{len(rows)} trips, in code letters.")
 
 

@@ -1,4 +1,4 @@
-"""`chauffeur talk`: a drive that one talks with."""
+"""`chauffeur talk`: a drive in real time that one talks with."""
 
 from __future__ import annotations
 
@@ -16,63 +16,100 @@ Examples:
 
     chauffeur talk --as ana
 
+    chauffeur talk "Overtake the car in front of you." "Now slow down to 80 km/h." --every 10
+
     chauffeur talk --as ana --page
 
-    chauffeur talk --as ana --microphone --planner talk2drive
+    chauffeur talk --as ana --microphone --speak --engine whisper/models/small.en
 
-    chauffeur talk --engine whisper/models/small.en --microphone --speak
+    chauffeur talk "Park near the stadium." --planner talk2drive --scenario parking-stadium
 
-    chauffeur talk --scenario intersection --audit trips/talk.jsonl < wishes.txt
+    chauffeur talk --scenario intersection --audit trips/talk.jsonl --time-scale 4 < wishes.txt
 
 Type a wish and Enter; `!too fast` is an opinion, `take over` and `give back` are the wheel, `help` tells the rest.
 `stop` or Ctrl-C brings the car to a stand and ends, a second Ctrl-C ends at once. Every drive is simulated. To a real
-vehicle one talks with `chauffeur vehicle drive vehicle.toml --microphone`.
+vehicle one talks with `chauffeur vehicle drive vehicle.toml --microphone`. Exit code 1: a wish that was given as an
+argument or a line of a file was not driven, or the drive ended badly.
 """
 
 STOPPED_WITH_CTRL_C: Final = 130
+_QUIET_ROAD: Final = "overtake"
+"""Where one drives until something is wished."""
+_VOICE: Final = "Voice and page"
 _TRIP_S: Final = 75.0
 """A road takes about so long; then another begins."""
 
 
 def talk(
+    wishes: Annotated[
+        list[str] | None, typer.Argument(metavar="WISH", help="What you want, one after the other.")
+    ] = None,
     person: Annotated[str, typer.Option("--as", help="Whose wishes they are; their memory is used.")] = "",
     planner: Annotated[
         str, typer.Option(help="`onboard`, `talk2drive`, `keyword`, `openai/<model>`, or an installed one.")
     ] = "onboard",
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint of the planner.")] = None,
-    scenario: Annotated[str, typer.Option(help="Where to drive.")] = "overtake",
+    scenario: Annotated[str | None, typer.Option(help="Where to drive; default one that suits the first wish.")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of the traffic; default the scenario's own.")] = None,
-    duration: Annotated[float, typer.Option(min=1.0, max=7200.0, help="Seconds to drive at most.")] = 900.0,
+    limits: Annotated[str, typer.Option(help="Bounds no plan may cross: `default` or `lampilot`.")] = "default",
+    duration: Annotated[
+        float, typer.Option(min=1.0, max=7200.0, help="Seconds to drive at most, in the car's time.")
+    ] = 900.0,
+    every: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0, help="Seconds from one given wish to the next; default when it is done, or driven for 10 s."
+        ),
+    ] = None,
+    time_scale: Annotated[float, typer.Option(min=0.1, max=20.0, help="Seconds of the car's time in a second.")] = 1.0,
+    realtime: Annotated[
+        bool, typer.Option("--realtime/--no-realtime", help="Whether control asks for real-time scheduling.")
+    ] = True,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the outcome only.")] = False,
     engine: Annotated[
-        str, typer.Option(help="For speech: `grammar`, `whisper/<folder>`, `endpoint/<model>`, or `none`.")
+        str,
+        typer.Option(
+            help="For speech: `grammar`, `whisper/<folder>`, `endpoint/<model>`, or `none`.", rich_help_panel=_VOICE
+        ),
     ] = "grammar",
     microphone: Annotated[
-        bool, typer.Option("--microphone/--no-microphone", help="Listen to this machine's microphone.")
+        bool,
+        typer.Option(
+            "--microphone/--no-microphone", help="Listen to this machine's microphone.", rich_help_panel=_VOICE
+        ),
     ] = False,
-    device: Annotated[str, typer.Option(help="Which one: number or part of its name.")] = "",
-    page: Annotated[bool, typer.Option("--page/--no-page", help="Open the cabin page in the browser.")] = False,
-    speak: Annotated[bool, typer.Option("--speak", help="Say replies aloud (espeak-ng).")] = False,
+    device: Annotated[str, typer.Option(help="Which one: number or part of its name.", rich_help_panel=_VOICE)] = "",
+    page: Annotated[
+        bool, typer.Option("--page/--no-page", help="Open the cabin page in the browser.", rich_help_panel=_VOICE)
+    ] = False,
+    speak: Annotated[bool, typer.Option("--speak", help="Say replies aloud (espeak-ng).", rich_help_panel=_VOICE)] = (
+        False
+    ),
     audit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
     ] = None,
 ) -> None:
-    """Talk with the car while it drives: it says what it thinks, what was checked, and remembers how you liked it."""
+    """Drive in real time and talk: it says what it thinks and what was checked, and remembers how you liked it."""
     from contextlib import ExitStack
 
+    from rich.console import Console
+
     from chauffeur.cli.audit import auditor_for, tell_closing
-    from chauffeur.cli.console import stdout
+    from chauffeur.cli.console import columns, plain, stdout
+    from chauffeur.cli.control_figures import control_figures
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.interrupts import Interrupts
     from chauffeur.cli.lines import Lines, standard_input
-    from chauffeur.cli.parts import engine_named, not_kept, planner_named
+    from chauffeur.cli.parts import engine_named, limits_named, not_kept, planner_named
     from chauffeur.cli.talk_drive import TalkDrive
     from chauffeur.cli.talk_screen import TalkScreen
-    from chauffeur.concept import Limits, PersonId, SandboxError
+    from chauffeur.concept import PersonId, SandboxError
     from chauffeur.drive.live.books import Books, unanswered
     from chauffeur.drive.live.settings import Settings
     from chauffeur.drive.live.starts import Start
-    from chauffeur.drive.scenarios import find
-    from chauffeur.drive.session import make_world
+    from chauffeur.drive.scenarios import find, suiting
+    from chauffeur.drive.session import make_world, parse_wish
+    from chauffeur.drive.surroundings import services_file
     from chauffeur.drive.talk.session import WELL, Talk
     from chauffeur.drive.talk.sound import Sound
     from chauffeur.drive.talk.voice import Voice
@@ -80,22 +117,26 @@ def talk(
     from chauffeur.memory.personal_limits import personal_limits
 
     who = PersonId(person.strip())
-    place = find(scenario)
+    given = [parse_wish(wish, who).text for wish in wishes or ()]
+    place = find(scenario or _QUIET_ROAD) if scenario or not given else suiting(given[0])
     first = place.seed if seed is None else seed
-    bounds = personal_limits(who, Limits())
+    bounds = personal_limits(who, limits_named(limits))
     trips = math.ceil(duration / _TRIP_S)
     settings = Settings(
         starts=tuple(Start(place, first + number, bounds, duration) for number in range(trips)),
         planner=planner,
         base_url=base_url,
         memory=chosen_memory() if who else "",
+        services=str(services_file() or ""),
+        speed=time_scale,
+        realtime=realtime,
     )
     if who:
         open_memory()  # one that cannot be had is refused here
     named = engine_named(engine)  # an unknown one is refused also where nobody listens
     ear = named if microphone or page else None
     console = stdout()
-    screen = TalkScreen(console)
+    screen = TalkScreen(Console(quiet=True) if quiet else console)
     books = None
     with ExitStack() as stack:
         left = () if audit is None else unanswered(audit)
@@ -103,7 +144,7 @@ def talk(
             books = stack.enter_context(Books(auditor_for(audit, place, first), make_world(place).dt_s))
         sound = stack.enter_context(Sound(device)) if microphone else None
         voice = Voice() if speak else None
-        drive = TalkDrive(screen, stack.enter_context(_cabin()) if page else None)
+        drive = TalkDrive(screen, stack.enter_context(_cabin()) if page else None, given, every)
         if private := not_kept(who):
             screen.note(private)
         for wish in left:
@@ -122,11 +163,15 @@ def talk(
             raise
         drive.run(session, lines, interrupts)
     closing = None if books is None else books.close()
-    if audit is not None and closing is not None:
+    if quiet:
+        console.print(plain(f"{screen.ended} ({screen.time_s:.1f} s, simulated drive)"))
+    else:
+        console.print(columns((name, plain(said)) for name, said in control_figures(session.tally)))
+    if audit is not None and closing is not None and not quiet:
         tell_closing(console, audit, closing)
     if interrupts.count:
         raise typer.Exit(STOPPED_WITH_CTRL_C)
-    if session.outcome not in WELL or (closing is not None and not closing.complete):
+    if session.outcome not in WELL or not drive.well or (closing is not None and not closing.complete):
         raise typer.Exit(FAILED)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import typer
@@ -10,7 +11,7 @@ from chauffeur.cli.interrupts import Interrupts
 from chauffeur.cli.lines import Lines
 from chauffeur.cli.talk_screen import TalkScreen
 from chauffeur.cli.talk_typed import read_line
-from chauffeur.drive.talk.messages import Said, Stop
+from chauffeur.drive.talk.messages import Conversation, Said, Say, Stop
 from chauffeur.drive.talk.session import Talk
 
 if TYPE_CHECKING:
@@ -22,17 +23,30 @@ DRIVEN_FOR_S: Final = 10.0
 _MOST_AT_ONCE: Final = 100
 """Messages of the page that are taken before the drive is looked at again."""
 _MOST_WAITING: Final = 64
+_UNDRIVEN: Final = ("declined", "unplanned", "refused", "stale", "failed")
+"""What becomes of a wish that is not driven."""
 
 
 class TalkDrive:
     """The terminal and the page around one session."""
 
-    def __init__(self, screen: TalkScreen, cabin: Cabin | None) -> None:
-        """Args: the terminal; the page, None for none."""
-        self._screen, self._cabin = screen, cabin
-        self._given: list[str] = []
-        self._were_given = self._stopped = False
+    def __init__(
+        self, screen: TalkScreen, cabin: Cabin | None, given: Sequence[str] = (), every_s: float | None = None
+    ) -> None:
+        """Set up.
+
+        Args:
+            screen: The terminal.
+            cabin: The page, None for none.
+            given: Wishes that are asked one after the other, before those of a file.
+            every_s: From one of them to the next, in the car's time; None for when it is done, or driven for a while.
+        """
+        self._screen, self._cabin, self._every_s = screen, cabin, every_s
+        self._given: list[str] = list(given)
+        self._were_given = bool(given)
+        self._stopped = False
         self._last_s = 0.0
+        self._handed_on = 0
 
     def tell(self, said: Said) -> None:
         """What the session says, to every screen."""
@@ -54,8 +68,15 @@ class TalkDrive:
                     session.take(Stop())
                 typing = lines.terminal and lines.open and not session.stopping
                 self._screen.refresh(lines.typed if typing else None)
+            self._give_up(session)
         except KeyboardInterrupt:
             session.abort()
+
+    @property
+    def well(self) -> bool:
+        """Whether every wish that was given was asked, and driven or gave way to a newer one or to the person."""
+        asked = [each for each in self._screen.conversations if not each.follows and not each.spoken]
+        return not self._handed_on or (len(asked) >= self._handed_on and all(map(_driven, asked)))
 
     def _take_from_page(self, session: Talk) -> None:
         if self._cabin is None:
@@ -73,14 +94,16 @@ class TalkDrive:
         if lines.terminal:
             for line in read:
                 self._line(session, line)
-            return
-        self._given += [line for line in read if line.strip()]
-        self._were_given = self._were_given or bool(self._given)
+        else:
+            self._given += [line for line in read if line.strip()]
+            self._were_given = self._were_given or bool(self._given)
+        if session.stopping:
+            self._give_up(session)
         if session.stopping or session.busy or not self._in_turn():
             return
         if self._given:
             self._last_s = self._screen.time_s
-            self._line(session, self._given.pop(0))
+            self._hand_on(session)
         elif self._were_given and not lines.open and not self._stopped:
             self._stopped = True
             session.take(Stop())
@@ -90,9 +113,22 @@ class TalkDrive:
         last = next(reversed(self._screen.conversations), None)
         if last is None:
             return True
+        if self._every_s is not None and self._given:
+            return self._screen.time_s - self._last_s >= self._every_s
         if last.stage == "driven":
             return not 0.0 <= self._screen.time_s - self._last_s < DRIVEN_FOR_S
         return last.stage == "closed"
+
+    def _hand_on(self, session: Talk) -> None:
+        line = self._given.pop(0)
+        told = read_line(line, taken_over=self._screen.taken_over)
+        self._handed_on += isinstance(told, Say)
+        self._line(session, line)
+
+    def _give_up(self, session: Talk) -> None:
+        """Wishes that are left when the car stops, or the road ends: the session says so, and writes it down."""
+        while self._given:
+            self._hand_on(session)
 
     def _line(self, session: Talk, line: str) -> None:
         told = read_line(line, taken_over=self._screen.taken_over)
@@ -102,3 +138,10 @@ class TalkDrive:
             self._screen.note(told)
         else:
             session.take(told)
+
+
+def _driven(each: Conversation) -> bool:
+    """Whether a wish was driven, or gave way."""
+    if each.outcome in _UNDRIVEN or not each.outcome:
+        return False
+    return each.outcome != "interrupted" or each.stages.check_s is not None

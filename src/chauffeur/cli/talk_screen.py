@@ -53,7 +53,11 @@ _LISTENING: Final = {
 
 
 class TalkScreen:
-    """Shows one session. Use as a context manager."""
+    """Shows one session. Use as a context manager.
+
+    Attributes:
+        ended: How the drive ended, in words; empty before.
+    """
 
     def __init__(self, console: Console) -> None:
         """Args: where to print."""
@@ -68,6 +72,7 @@ class TalkScreen:
         self._shown: dict[str, Conversation] = {}
         self._question = self._how = ""
         self._show_memory = False
+        self.ended = ""
 
     def __enter__(self) -> Self:
         return self
@@ -244,6 +249,7 @@ class TalkScreen:
                 self._line("", "", "", plain(f"{when}  “{each.text}” {each.outcome}{said}"))
 
     def _end(self, ended: Ended) -> None:
+        self.ended = ended.text
         self._still()
         style = "bold" if ended.outcome in ("ended", "stopped") else "bold red"
         self.console.print(Text.assemble((ended.text, style), (" (simulated drive)", "dim")))

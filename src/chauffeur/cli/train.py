@@ -1,4 +1,4 @@
-"""`chauffeur train`: models of our own, from a seed."""
+"""`chauffeur model train`, and `model gguf`: models of our own, from data that is made from a seed."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ train_app = typer.Typer(no_args_is_help=True, rich_markup_mode="markdown", help=
 ONBOARD_EXAMPLES = """
 Examples:
 
-    chauffeur train onboard --out runs/onboard
+    chauffeur model train onboard --out runs/onboard
 
-    chauffeur train onboard --out runs/large --size large --steps 20000 --draws 60000
+    chauffeur model train onboard --out runs/large --size large --steps 20000 --draws 60000
 
-    chauffeur train onboard --out runs/onboard --more 4000
+    chauffeur model train onboard --out runs/onboard --more 4000
 
-    chauffeur train onboard --out runs/wider --base runs/onboard --steps 8000
+    chauffeur model train onboard --out runs/wider --base runs/onboard --steps 8000
 
-    chauffeur train onboard --out runs/onboard --data-only
+    chauffeur model train onboard --out runs/onboard --data-only
 
     chauffeur bench passengers --planner onboard/runs/onboard/model
 
@@ -51,16 +51,17 @@ def onboard(
         typer.Option(help="Finished run, or model that ships, whose network is trained on, at half the rate."),
     ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes that make data; default one per core.")] = None,
-    threads: Annotated[int, typer.Option(min=0, help="Threads that train; 0 leaves it to PyTorch.")] = 0,
-    device: Annotated[str, typer.Option(help="`cpu` or `cuda`; default the best at hand.")] = "",
     data_only: Annotated[bool, typer.Option("--data-only", help="Make the data and stop.")] = False,
 ) -> None:
     """The on-board language model: words to driving programs, offline."""
     from chauffeur.cli.console import stdout
+    from chauffeur.cli.parts import needs
     from chauffeur.cli.stages import stage_lines
-    from chauffeur.concept import ConfigError, MissingExtraError
     from chauffeur.models.onboard.pipeline import Plan, build_data, train_model
 
+    if not data_only:  # half an hour of data first, and then nothing to train with, helps nobody
+        needs("models", "Training", "torch", "transformers", "tokenizers", "onnx", "onnxscript", "safetensors")
+        _check_size(size)
     console = stdout()
     plan = Plan(seed, draws, per_case, size, steps, more, base)
     told = stage_lines(console)
@@ -69,27 +70,27 @@ def onboard(
         if data_only:
             console.print(f"Data: {out / 'data'}; its card: {out / 'data' / 'DATA_CARD.md'}", soft_wrap=True)
             return
-        try:
-            from chauffeur.models.onboard.training import SIZES
-        except ImportError as error:
-            raise MissingExtraError(
-                f"Training needs {error.name}.", hint="Run: pip install 'chauffeur[models]'"
-            ) from error
-        if size not in SIZES:
-            raise ConfigError(f"There is no size {size!r}.", hint=f"Sizes: {', '.join(SIZES)}.")
-        model = train_model(out, plan, told, threads=threads, device=device)
+        model = train_model(out, plan, told)
     except KeyboardInterrupt:
         console.print(f"Stopped. What is done is kept in {out}; run the same command to go on.", soft_wrap=True)
         raise typer.Exit(130) from None
     console.print(f"Model: {model}. Try it: chauffeur bench passengers --planner onboard/{model}", soft_wrap=True)
 
 
+def _check_size(size: str) -> None:
+    from chauffeur.concept import ConfigError
+    from chauffeur.models.onboard.training import SIZES
+
+    if size not in SIZES:
+        raise ConfigError(f"There is no size {size!r}.", hint=f"Sizes: {', '.join(SIZES)}.")
+
+
 SORTERS_EXAMPLES = """
 Examples:
 
-    chauffeur train sorters --out runs/sorters
+    chauffeur model train sorters --out runs/sorters
 
-    chauffeur train sorters --out runs/sorters --measured
+    chauffeur model train sorters --out runs/sorters --measured
 
 Two minutes, without PyTorch; with `--measured`, which leaves out a fifth of the writers in turn, about eight. The same
 seed gives the same files; those that ship are of seed 0.
@@ -125,9 +126,9 @@ def sorters(
 GGUF_EXAMPLES = """
 Examples:
 
-    chauffeur train gguf runs/onboard/transformers onboard.gguf
+    chauffeur model gguf runs/onboard/transformers onboard.gguf
 
-    chauffeur train gguf runs/onboard/transformers onboard-q8.gguf --eight-bit
+    chauffeur model gguf runs/onboard/transformers onboard-q8.gguf --eight-bit
 
     llama-server --model onboard.gguf --jinja --port 8080
 
@@ -135,7 +136,6 @@ Examples:
 """
 
 
-@train_app.command(epilog=GGUF_EXAMPLES)
 def gguf(
     checkpoint: Annotated[Path, typer.Argument(help="Folder `transformers` of a run.")],
     file: Annotated[Path, typer.Argument(help="GGUF file to write.")],

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from chauffeur.cli.examples import WithExamples
 from chauffeur.cli.vehicle_drive import DRIVE_EXAMPLES, drive
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from chauffeur.worlds.ros import VehicleInterface, VehicleState
 
 vehicle_app = typer.Typer(
+    cls=WithExamples,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="Vehicles behind ROS: what is asked of them, and how the way to them is.",
@@ -29,11 +31,15 @@ Examples:
 
     chauffeur vehicle apply vehicle.toml --speed 8 --look-ahead 10 --ratio 2
 
+    chauffeur vehicle release vehicle.toml
+
     chauffeur vehicle watch vehicle.toml
 
     chauffeur vehicle drive vehicle.toml "Drive a bit slower." --as ana --dry-run
 
     chauffeur vehicle engage vehicle.toml
+
+    chauffeur vehicle disengage vehicle.toml
 
 These commands talk to a real vehicle, unless --dry-run is given. They publish a speed cap and a look-ahead for its own
 planner; they do not steer, brake or watch the road.

@@ -37,7 +37,7 @@ _STOPPED_WITH_CTRL_C: Final = 130
 def drive(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The vehicle's configuration file; see docs/ros.md.")],
     wishes: Annotated[
-        list[str] | None, typer.Argument(metavar="[WISH]...", help="What you want, one after the other.")
+        list[str] | None, typer.Argument(metavar="WISH", help="What you want, one after the other.")
     ] = None,
     person: Annotated[str, typer.Option("--as", help="Whose wishes they are; what they said before counts.")] = "",
     planner: Annotated[

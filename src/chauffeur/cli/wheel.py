@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 EXAMPLES = """
 Examples:
 
-    chauffeur bench human --data DbLv1 --driver ana
+    chauffeur bench human --data DbLv1 --as ana
 
-    chauffeur bench human --data DbLv1 --driver ana --items 98
+    chauffeur bench human --data DbLv1 --as ana --items 98
 
 Each drive counts from the moment it is started and cannot be repeated. Ctrl-C, or closing the page, stops between
 drives without loss; the same command goes on. The page is served on this machine only.
@@ -33,7 +33,7 @@ _LONGEST_NAME = 60
 
 def human(
     data: Annotated[Path, typer.Option(help="Folder with LaMPilot's DbLv1 task files.")],
-    driver: Annotated[str, typer.Option(help="Name of the person, shown with every result.")] = "anonymous",
+    driver: Annotated[str, typer.Option("--as", help="Name of the person, shown with every result.")] = "anonymous",
     out: Annotated[
         Path | None, typer.Option(help="Run folder; default runs/lampilot-human, with the driver's name if given.")
     ] = None,
@@ -46,7 +46,7 @@ def human(
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0 takes a free one.")] = 0,
     browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
 ) -> None:
-    """LaMPilot-Bench driven by a person with the arrow keys (seed Tab. IV, row Human Driver), scored like the rest."""
+    """LaMPilot-Bench driven by a person with the arrow keys (paper Tab. IV, row Human Driver), scored like the rest."""
     import asyncio
 
     from chauffeur.bench.lampilot.human_run import HumanConfig, HumanRun

@@ -1,6 +1,6 @@
-"""The nouns of the LLM4AD concept (seed Sec. II, Tab. I): I, C, S, H, F, R, P and what surrounds them.
+"""The nouns of the LLM4AD concept (paper Sec. II, Tab. I): I, C, S, H, F, R, P and what surrounds them.
 
-All are frozen values. The seed's letter stands in each docstring.
+All are frozen values. The paper's letter stands in each docstring.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class Thoughts:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """P as a language-model program: a generator function over the driving APIs (seed Sec. II-F).
+    """P as a language-model program: a generator function over the driving APIs (paper Sec. II-F).
 
     Attributes:
         source: Program text exactly as the planner gave it.
@@ -121,7 +121,7 @@ class Program:
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """P as controller parameters (Talk2Drive, seed Eq. 15).
+    """P as controller parameters (Talk2Drive, paper Eq. 15).
 
     Attributes:
         target_speed_mps: Speed to drive.
@@ -142,7 +142,7 @@ class Parameters:
 
 @dataclass(frozen=True, slots=True)
 class ActionMatrix:
-    """P as the on-board VLM's action matrix (seed Eq. 22): PID gains and MPC weights.
+    """P as the on-board VLM's action matrix (paper Eq. 22): PID gains and MPC weights.
 
     Attributes:
         pid: (Kp, Ki, Kd).

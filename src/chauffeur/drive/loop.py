@@ -1,4 +1,4 @@
-"""The LLM4AD loop (seed Sec. II, Fig. 2), in the seed's letters.
+"""The LLM4AD loop (paper Sec. II, Fig. 2), in the paper's letters.
 
 I  instruction        what the person wants, in their own words
 C  context            the situation, put into words by the situation descriptor

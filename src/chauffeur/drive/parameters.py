@@ -1,4 +1,4 @@
-"""Drives a `Parameters` policy (Talk2Drive, seed Eq. 15): target speed, look-ahead distance, look-ahead ratio, lane.
+"""Drives a `Parameters` policy (Talk2Drive, paper Eq. 15): target speed, look-ahead distance, look-ahead ratio, lane.
 
 The same parameters drive on a highway, over an intersection and in a parking lot. The vehicle follows a path with pure
 pursuit; what the path is depends on the road: the middle of its lane, that of the wished lane once there is a gap, the

@@ -56,7 +56,7 @@ def find(name: str, data_dir: Path | None = None) -> Scenario:
             return scenario
     known = [s.id for s in list_scenarios(data_dir)]
     near = difflib.get_close_matches(name, known, n=3)
-    hint = f"Did you mean {' or '.join(near)}?" if near else "Run `chauffeur scenarios` for the list."
+    hint = f"Did you mean {' or '.join(near)}?" if near else "Run `chauffeur show scenarios` for the list."
     if dataset is None and re.search(r"_s\d+", name):
         hint = f"Official LaMPilot samples need their folder: --data DIR, or {DATA_VARIABLE} in the environment."
     raise ScenarioError(f"Unknown scenario {name!r}.", hint=hint)

@@ -1,7 +1,8 @@
 """Sorts short sentences into kinds: a linear model over words, pairs of words, negated words and parts of words.
 
 What is learned lies in one small file of numbers; looking at a sentence takes a tenth of a millisecond, needs no
-network and gives the same shares everywhere. `chauffeur train sorters` makes the files (`chauffeur.models.sorting`).
+network and gives the same shares everywhere. `chauffeur model train sorters` makes the files
+(`chauffeur.models.sorting`).
 """
 
 from __future__ import annotations

@@ -106,7 +106,7 @@ class PolicyRepository:
         if len(found) != 1:
             what = "no program" if not found else "several programs"
             raise DataError(
-                f"{self.folder} holds {what} {key!r}.", hint=f"List them: chauffeur policies list {self.folder}"
+                f"{self.folder} holds {what} {key!r}.", hint=f"List them: chauffeur show policies {self.folder}"
             )
         return found[0]
 
@@ -182,7 +182,7 @@ class PolicyRepository:
             if len(ids) > MAX_ENTRIES:
                 raise DataError(
                     f"{self.folder} would hold {len(ids)} programs; {MAX_ENTRIES} are the most.",
-                    hint="Prune it first: chauffeur policies prune",
+                    hint="Prune it first: chauffeur model policies prune",
                 )
             append_lines(self._path, b"".join(write_entry(entry) for entry in added))
             self.entries = (*self.entries, *added)

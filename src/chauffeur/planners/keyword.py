@@ -1,4 +1,4 @@
-"""The seeds' rule-based baseline: lists of substrings, each with a fixed answer (Talk2Drive's baseline condition).
+"""The papers' rule-based baseline: lists of substrings, each with a fixed answer (Talk2Drive's baseline condition).
 
 It is kept as a baseline to compare with, faults included: it looks for substrings, is blind to "not", to case and to
 word borders, and knows no numbers. "Do not speed up" makes it faster, "Is that right?" changes lanes, "It is breakfast

@@ -12,7 +12,7 @@ from chauffeur.safety.format import check_format
 from chauffeur.safety.reach import check_reach
 
 DEFAULT_CHECKS: tuple[Check, ...] = (check_format, check_parameters)
-"""The two checks of the seeds: format, then parameters in context."""
+"""The two checks of the papers: format, then parameters in context."""
 
 DRIVE_CHECKS: tuple[Check, ...] = (*DEFAULT_CHECKS, check_reach)
 """What stands before a drive for a person: also what no reading of constants finds, at some milliseconds a program."""

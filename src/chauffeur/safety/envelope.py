@@ -1,4 +1,4 @@
-"""`parameters-v1`: every number and manoeuvre of a plan fits the situation. The second of the seeds' safety checks.
+"""`parameters-v1`: every number and manoeuvre of a plan fits the situation. The second of the papers' safety checks.
 
 It judges what can be known before driving: constants in API calls, settings the planner relies on, lane moves and
 turns the road does not have. What only shows while driving is the shield's.

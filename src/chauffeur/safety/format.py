@@ -1,4 +1,4 @@
-"""`format-v1`: the plan holds a policy of a known form. The first of the seeds' two safety checks (Sec. V-A4)."""
+"""`format-v1`: the plan holds a policy of a known form. The first of the papers' two safety checks (Sec. V-A4)."""
 
 from __future__ import annotations
 

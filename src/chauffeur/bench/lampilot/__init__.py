@@ -1,4 +1,4 @@
-"""LaMPilot-Bench: instruction following on highway and intersection (seed Sec. IV-A)."""
+"""LaMPilot-Bench: instruction following on highway and intersection (paper Sec. IV-A)."""
 
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.runner import LampilotBenchmark, LampilotRun, RunConfig

@@ -1,4 +1,4 @@
-"""Learning from a critic (seed Sec. IV-A, the human-feedback rows of Tab. IV).
+"""Learning from a critic (paper Sec. IV-A, the human-feedback rows of Tab. IV).
 
 For each item: the model writes a program, it is checked and driven, and a critic says how it was. Words of critique go
 back to the model, with the last program, the command, the situation, and the programs of the repository that are

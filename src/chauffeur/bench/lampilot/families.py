@@ -1,4 +1,4 @@
-"""Task families of DbLv1, as the seed groups them (Tab. III)."""
+"""Task families of DbLv1, as the paper groups them (Tab. III)."""
 
 from __future__ import annotations
 

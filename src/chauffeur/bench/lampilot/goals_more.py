@@ -1,7 +1,7 @@
 """Success conditions that LaMPilot has no words for: things in a row, a change without a number, a refusal.
 
-They judge the scenes of `chauffeur scenes generate` that go beyond the original; LaMPilot's own conditions stay in
-`goals`, untouched.
+They judge the scenes of `chauffeur bench scenes generate` that go beyond the original; LaMPilot's own conditions stay
+in `goals`, untouched.
 """
 
 from __future__ import annotations

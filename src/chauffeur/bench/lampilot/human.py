@@ -1,4 +1,4 @@
-"""LaMPilot-Bench driven by hand (seed Tab. IV, row Human Driver): a person's drive on a sample, recorded and judged.
+"""LaMPilot-Bench driven by hand (paper Tab. IV, row Human Driver): a person's drive on a sample, recorded and judged.
 
 The drive is judged by the same referee as every program. What the hands did is kept as a trace, and driving the trace
 again gives the same row: the person stands where a planner stands, the trace where its program stands.

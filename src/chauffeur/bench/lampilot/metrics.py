@@ -1,6 +1,6 @@
 """The two rulers of LaMPilot-Bench: how the signals of a drive become points.
 
-`origin` is what LaMPilot's code computes, the ruler of all published rows. `paper` is seed Eq. 1-8 as printed. They
+`origin` is what LaMPilot's code computes, the ruler of all published rows. `paper` is paper Eq. 1-8 as printed. They
 differ in more than rounding (docs/rulers.md lists every place), so a table is under one of them, and its
 id says which.
 """
@@ -16,9 +16,9 @@ Row = dict[str, Any]
 
 TTC_SAFE_S = 2.0
 SPEED_STD_FULL_MPS = 10.0
-"""sigma_safe of seed Eq. 6; the seed gives no number, this is LaMPilot's."""
+"""sigma_safe of paper Eq. 6; the paper gives no number, this is LaMPilot's."""
 TIME_LIMIT_S = 60.0
-"""T_limit of seed Eq. 7; the seed gives no number, this is LaMPilot's."""
+"""T_limit of paper Eq. 7; the paper gives no number, this is LaMPilot's."""
 WEIGHTS = {"ttc": 0.5, "speed_variance": 0.3, "time_efficiency": 0.2}
 COLLISION_WEIGHT = 500.0
 STOPPED_MPS = 1.0
@@ -51,7 +51,7 @@ class Ruler:
 
 
 ORIGIN = Ruler("lampilot-origin-v1", "LaMPilot's code", "ttc_along_s", -100.0, False, True, COLLISION_WEIGHT, False)
-PAPER = Ruler("lampilot-paper-v1", "seed Eq. 1-8 as printed", "ttc_plane_s", 0.0, True, False, 0.0, True)
+PAPER = Ruler("lampilot-paper-v1", "paper Eq. 1-8 as printed", "ttc_plane_s", 0.0, True, False, 0.0, True)
 RULERS = {"origin": ORIGIN.id, "paper": PAPER.id}
 _BY_ID = {ruler.id: ruler for ruler in (ORIGIN, PAPER)}
 
@@ -105,7 +105,7 @@ def points(rollout: Row, ruler_id: str) -> Row:
 
 
 def _ttc_points(least_s: float | None, ruler: Ruler) -> float:
-    """100 without a conflict closer than 2 s, else 100 - 1/TTC, not below the ruler's floor (seed Eq. 3)."""
+    """100 without a conflict closer than 2 s, else 100 - 1/TTC, not below the ruler's floor (paper Eq. 3)."""
     if least_s is None or least_s > TTC_SAFE_S:
         return 100.0
     return max(100.0 - 1.0 / least_s, ruler.ttc_floor)
@@ -130,6 +130,6 @@ def metrics_of(rollout: Row, ruler: Ruler = ORIGIN) -> tuple[Metric, ...]:
 def driving_score(completion: float, mean_score_of_successes: float, collision: float, ruler: Ruler = ORIGIN) -> float:
     """Aggregate: completion x mean score of successes - weight x collision rate; rates in 0..1.
 
-    The seed prints no aggregate; under `paper` it is the mean score over all items, those not completed counting 0.
+    The paper prints no aggregate; under `paper` it is the mean score over all items, those not completed counting 0.
     """
     return completion * mean_score_of_successes - ruler.collision_weight * collision

@@ -1,4 +1,4 @@
-"""Published results on LaMPilot-Bench (seed survey, Tab. IV), for reference beside ours.
+"""Published results on LaMPilot-Bench (paper survey, Tab. IV), for reference beside ours.
 
 They were measured by the paper's authors on 98 items (110 for the rows with human feedback), not on the items of a run
 here. Columns: collision %, completion %, TTC, SV, TE and driving score in points.

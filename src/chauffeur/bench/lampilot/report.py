@@ -1,4 +1,4 @@
-"""From rows to tables: one line a family, the seed's columns, the causes beside the outcomes."""
+"""From rows to tables: one line a family, the paper's columns, the causes beside the outcomes."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def summaries(rows: Sequence[Row]) -> list[Summary]:
 
 
 def families_in(rows: Iterable[Row]) -> list[str]:
-    """Families that occur: the seed's in its order, then any others as they come."""
+    """Families that occur: the paper's in its order, then any others as they come."""
     names = dict.fromkeys(str(row["family"]) for row in rows)
     return [*(f for f in FAMILIES if f in names), *(f for f in names if f not in FAMILIES)]
 
@@ -250,7 +250,7 @@ def _cells(summary: Summary, rows: Sequence[Row], draws: int) -> list[str]:
 
 
 def comparison_lines(name: str, rows: Sequence[Row], *more: tuple[str, Sequence[Row]], draws: int = 0) -> Table:
-    """Runs in the columns of the seed's Tab. IV, the published rows below them, marked as the paper's.
+    """Runs in the columns of the paper's Tab. IV, the published rows below them, marked as the paper's.
 
     The published rows were measured by LaMPilot's code, so they stand below runs of that ruler only.
 

@@ -23,9 +23,9 @@ class Signals:
     Attributes:
         steps: Control periods of 0.1 s.
         ttc_along_s: Least positive time to collision of LaMPilot's code; None for no conflict.
-        ttc_plane_s: Least positive value of seed Eq. 1 (2-D, centres); None for none.
+        ttc_plane_s: Least positive value of paper Eq. 1 (2-D, centres); None for none.
         ttc_lane_s: Least bumper-to-bumper time to collision in the ego's lane or width; 0 on contact, None for none.
-        speed_mean_mps, speed_std_mps: Seed Eq. 5 and 4.
+        speed_mean_mps, speed_std_mps: Paper Eq. 5 and 4.
         crashed: Whether the ego was in a collision at any time.
         off_road, past_end: Whether it ended off the road; whether only because the road ended.
         stop_speed_mps: Lowest speed in the last 15 m before a stop sign that was passed; None where none was.

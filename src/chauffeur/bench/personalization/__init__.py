@@ -1,4 +1,4 @@
-"""Talk2Drive's evaluation (seed Sec. V-C): how a drive scores, and how often a person takes over."""
+"""Talk2Drive's evaluation (paper Sec. V-C): how a drive scores, and how often a person takes over."""
 
 from chauffeur.bench.personalization.scoring import (
     SCORE_VERSION,

@@ -1,4 +1,4 @@
-"""The rule-based system Talk2Drive is compared with (seed Sec. V-D): keywords, each with a fixed effect on parameters.
+"""The rule-based system Talk2Drive is compared with (paper Sec. V-D): keywords, each with a fixed effect on parameters.
 
 Two of them. `keyword` follows the baseline that was published with Talk2Drive, faults included: substrings, no case
 folding, no negation, a misspelt stadium. `keyword-fair` is what somebody would build who meant well: whole words in any

@@ -85,12 +85,12 @@ def _reduction(totals: Array) -> Array:
 
 
 def table_ix(rows: Rows, before: str = "keyword", after: str = "without") -> list[Compared]:
-    """Takeover rates by scenario and level (seed Tab. IX)."""
+    """Takeover rates by scenario and level (paper Tab. IX)."""
     return _cells(rows, before, after, lambda row: row["task"] != LOT_PACE)
 
 
 def table_x(rows: Rows) -> list[Compared]:
-    """What memory adds (seed Tab. X), everywhere; the seed's own experiment is the speed in the lot."""
+    """What memory adds (paper Tab. X), everywhere; the paper's own experiment is the speed in the lot."""
     return _cells(rows, "without", "with", lambda row: True)  # noqa: ARG005
 
 
@@ -151,9 +151,9 @@ class Performance:
 
 
 def table_viii(rows: Rows, arms: Sequence[str] = ("without", "with", "keyword")) -> list[Performance]:
-    """Driving performance (seed Tab. VIII, Eq. 18 to 20).
+    """Driving performance (paper Tab. VIII, Eq. 18 to 20).
 
-    The seed's baseline is the mean of its human drivers. There are none here: the baseline is the drive that the
+    The paper's baseline is the mean of its human drivers. There are none here: the baseline is the drive that the
     simulated passengers would have chosen for themselves (`ideal`), task by task.
     """
     measured = [row for row in rows if row["phase"] == "measured"]

@@ -1,4 +1,4 @@
-"""What the simulated passengers say: wishes at three levels of directness (seed Tab. VII), and feedback on a drive.
+"""What the simulated passengers say: wishes at three levels of directness (paper Tab. VII), and feedback on a drive.
 
 The words are two halves of the same shape, tables in `words/` with a sentence a line: what it is, for what, the
 sentence, its writer. `tuning` was written by the authors of the planner and may be looked at while a planner is

@@ -14,7 +14,7 @@ from chauffeur.bench.personalization.sayings import Aim
 from chauffeur.concept import Scenario
 
 Task = Literal["overtake", "follow", "right_lane", "yield", "go", "park", "pace"]
-"""What a passenger wants on the whole (seed Tab. VIII and IX; `pace` is the speed in a lot, Tab. X)."""
+"""What a passenger wants on the whole (paper Tab. VIII and IX; `pace` is the speed in a lot, Tab. X)."""
 Ground = Literal["highway", "intersection", "parking"]
 
 TASKS: Final[tuple[Task, ...]] = ("overtake", "follow", "right_lane", "yield", "go", "park", "pace")

@@ -1,9 +1,9 @@
-"""Talk2Drive's driving score (seed Eq. 18 to 20, Tab. VIII): safety and comfort of a drive, against human drivers.
+"""Talk2Drive's driving score (paper Eq. 18 to 20, Tab. VIII): safety and comfort of a drive, against human drivers.
 
 Each sub-score is 100 for a drive that has none of what it measures and falls with the drive's share of the baseline's
-value; a smallest time to collision below 1.5 s scores 0 for safety. The seed prints neither the weights nor the
+value; a smallest time to collision below 1.5 s scores 0 for safety. The paper prints neither the weights nor the
 sensitivity; least squares over the twenty rows of Tab. VIII give, rounded, the values below, which reproduce every
-printed score within 0.12: as near as the printed inputs, rounded themselves, allow. (The seed's text says that a time
+printed score within 0.12: as near as the printed inputs, rounded themselves, allow. (The paper's text says that a time
 to collision above the threshold scores zero; Eq. 19 and the table say 100.)
 """
 

@@ -8,7 +8,7 @@ from chauffeur.bench.report.model import Column
 ITEMS = Column("items", "Items", meaning="How many items (one scene with one command) the figures are over.")
 
 SCORE_KEYS = ("collision", "completion", "ttc", "speed_variance", "time_efficiency", "driving_score")
-"""The columns of the seed's Tab. IV, in its order."""
+"""The columns of the paper's Tab. IV, in its order."""
 
 _COLLISION = {
     True: "Share of all planned items in which the car crashed or left the road (the end of the road included).",
@@ -22,7 +22,7 @@ _COMPLETION = {
 
 
 def score_columns(ruler: Ruler) -> tuple[Column, ...]:
-    """The columns of the seed's Tab. IV, as a ruler fills them."""
+    """The columns of the paper's Tab. IV, as a ruler fills them."""
     penalty = ""
     if ruler.collision_weight:
         penalty = f", less {ruler.collision_weight / 100:g} points for each per cent of collisions. It can be negative"

@@ -100,7 +100,7 @@ def published_table() -> ReportTable:
 
 
 def published_lines() -> tuple[Line, ...]:
-    """The rows of the seed's Tab. IV."""
+    """The rows of the paper's Tab. IV."""
     lines: list[Line] = []
     for method, setting, *values in TABLE_IV:
         columns = col.score_columns(ORIGIN)

@@ -1,4 +1,4 @@
-"""What stands between a plan and a real vehicle: whether it is a wish for this vehicle, then the seeds' two checks.
+"""What stands between a plan and a real vehicle: whether it is a wish for this vehicle, then the papers' two checks.
 
 The vehicle's interface checks every number once more (`worlds/ros/limits.py`), whatever was found here.
 """
@@ -82,7 +82,7 @@ def _within(value: float, bounds: tuple[float, float]) -> float:
 
 
 def check_all(plan: Plan, seen: Seen, before: Seen) -> tuple[Verdict, ...]:
-    """Every verdict on a plan, in order; the seeds' checks are not asked about a plan that is none for this vehicle.
+    """Every verdict on a plan, in order; the papers' checks are not asked about a plan that is none for this vehicle.
 
     Args:
         plan: As the planner gave it, with its look-ahead fitted.

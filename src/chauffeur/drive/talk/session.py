@@ -48,6 +48,7 @@ from chauffeur.drive.talk.messages import (
     Told,
 )
 from chauffeur.drive.talk.sound import Sound
+from chauffeur.drive.talk.tally import Tally
 from chauffeur.drive.talk.view import View
 from chauffeur.drive.talk.voice import Voice
 from chauffeur.memory.feedback import interpret_feedback
@@ -92,6 +93,7 @@ class Talk:
 
     Attributes:
         outcome: Of the drive, once it is over; empty before.
+        tally: What control did, for the end.
     """
 
     def __init__(
@@ -137,6 +139,7 @@ class Talk:
         self._driven_s = self._before_s = 0.0
         self._recent: tuple[str, float] = "", 0.0
         self.outcome = ""
+        self.tally = Tally()
 
     def __enter__(self) -> Self:
         """Start hearing and driving.
@@ -259,6 +262,7 @@ class Talk:
     def _wish(self, words: Words) -> None:
         if self._stopping:
             self._say(Note(f"The car is stopping; “{words.text}” is not asked."))
+            self._asking.pass_over(words.text, "not_asked", OVER)
             return
         if self._runtime is not None and self._runtime.taken_over:
             self._say(Note(f"You have the wheel; give it back before you wish for something: “{words.text}”."))
@@ -399,6 +403,7 @@ class Talk:
             self._closed(interaction)
 
     def _report(self, report: Report) -> None:
+        self.tally.add(report)
         if report.tick == 0 and report.trip > 1:
             self._before_s = self._driven_s
             self._say(Note("The road has ended; another one begins. Both are simulated."))
@@ -467,8 +472,9 @@ class Talk:
                 self._say(said)
         for text in (*self._asking.give_up(runtime), *(change.words.text for change in self._changes)):
             self._say(Note(f"Not asked: “{text}”. {OVER}"))
+        self.tally.end(runtime, died=self.outcome == "died")
         if self._books is not None:
-            self._books.end(self.outcome, runtime.figures(), runtime.lost_reports)
+            self._books.end(self.outcome, self.tally.figures, runtime.lost_reports)
         if self._keeper is not None:
             for news in self._keeper.close(ABORTED_WITHIN_S if self.outcome == "aborted" else CLOSE_WITHIN_S):
                 self._kept(news)

@@ -139,7 +139,7 @@ def _sha256(file: Path) -> str:
     except OSError as error:
         raise DataError(
             f"{file} cannot be read.",
-            hint="--base is the folder of a finished run of `chauffeur train onboard`, or of a model that ships.",
+            hint="--base is the folder of a finished run of `chauffeur model train onboard`, or of a model that ships.",
         ) from error
 
 
@@ -217,7 +217,7 @@ def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, devic
     data = folder / "data"
     if not (data / "data.json").exists():
         raise DataError(
-            f"{folder} holds no data to train on.", hint="Build it first: chauffeur train onboard --data-only"
+            f"{folder} holds no data to train on.", hint="Build it first: chauffeur model train onboard --data-only"
         )
     if threads:
         torch.set_num_threads(threads)
@@ -292,7 +292,7 @@ def model_card(about: dict[str, Any], facts: dict[str, Any], parameters: int) ->
     tokens = steps * recipe["batch_tokens"] / 1e6
     made = f"--draws {facts['plan']['draws']} --per-case {facts['plan']['per_case']}"
     command = (
-        f"chauffeur train onboard --out DIR --size {recipe['size']}\n"
+        f"chauffeur model train onboard --out DIR --size {recipe['size']}\n"
         f"  --steps {recipe['steps']} --more {recipe['more']} --seed {recipe['seed']}\n  {made}"
     )
     more = f"the last\n  {recipe['more']:,} of them a second round at half the rate,"
@@ -304,7 +304,7 @@ def model_card(about: dict[str, Any], facts: dict[str, Any], parameters: int) ->
     if base is not None:
         earlier = base["recipe"]
         command = (
-            f"chauffeur train onboard --out DIR --base BASE --size {recipe['size']}\n"
+            f"chauffeur model train onboard --out DIR --base BASE --size {recipe['size']}\n"
             f"  --steps {recipe['steps']} --seed {recipe['seed']} {made}"
         )
         made_by = _made_by(base)
@@ -340,8 +340,8 @@ def _made_by(base: dict[str, Any]) -> str:
         return "the folder of its weights, as that version\n  of the package shipped them"
     return (
         "that version's folder, made by the\n"
-        f"  version of this repository that shipped it: `chauffeur train onboard --out BASE --size {earlier['size']}\n"
-        f"  --steps {earlier['steps']} --more {earlier['more']} --seed {earlier['seed']}\n"
+        f"  version of this repository that shipped it: `chauffeur model train onboard --out BASE\n"
+        f"  --size {earlier['size']} --steps {earlier['steps']} --more {earlier['more']} --seed {earlier['seed']}\n"
         f"  --draws {plan['draws']} --per-case {plan['per_case']}`"
     )
 

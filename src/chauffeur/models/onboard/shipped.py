@@ -53,7 +53,7 @@ def shipped_weights(folder: Path) -> dict[str, torch.Tensor]:
     names = [f"model.layers.{layer}.{part}.weight" for layer in range(layers) for part in _LAYER]
     if not layers or len(products) != len(names) + 1:
         raise DataError(
-            f"{folder / 'model.onnx'} is no int8 model of `chauffeur train onboard`.",
+            f"{folder / 'model.onnx'} is no int8 model of `chauffeur model train onboard`.",
             hint="--base takes the folder of a finished run, or that of the weights of a version of this package.",
         )
     embedded = plain["model.embed_tokens.weight"]

@@ -63,7 +63,7 @@ def to_gguf(checkpoint: Path, target: Path, *, eight_bit: bool = False) -> Path:
     except (OSError, ValueError, SafetensorError) as error:
         raise DataError(
             f"{checkpoint} holds no exported checkpoint: {error}",
-            hint="Give the `transformers` folder of a run of `chauffeur train onboard`.",
+            hint="Give the `transformers` folder of a run of `chauffeur model train onboard`.",
         ) from error
     if config.get("model_type") != "llama" or config.get("attention_bias") or not config.get("tie_word_embeddings"):
         raise DataError(

@@ -303,7 +303,7 @@ def finished(folder: Path) -> tuple[Recipe, dict[str, torch.Tensor]]:
     Raises:
         ConfigError: There is none, or it is not finished.
     """
-    hint = "--base is the folder of a finished run of `chauffeur train onboard`."
+    hint = "--base is the folder of a finished run of `chauffeur model train onboard`."
     try:
         state: dict[str, Any] = torch.load(folder / "state.pt", map_location="cpu", weights_only=True)
     except OSError as error:

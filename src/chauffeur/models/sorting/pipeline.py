@@ -110,8 +110,8 @@ _HEAD: Final = """# Data and model card: {version}
 
 Two sorters of short English sentences for the `talk2drive` planner and for feedback: what a passenger is after who only
 hints at it, and what a remark after a drive says. Softmax regression over hashed words, pairs of words, negated words
-and parts of words; int8 weights, {epochs} epochs, seed {seed}. `chauffeur train sorters --out DIR` makes the same files
-again from the tables in `chauffeur/models/sorting/words`.
+and parts of words; int8 weights, {epochs} epochs, seed {seed}. `chauffeur model train sorters --out DIR` makes the same
+files again from the tables in `chauffeur/models/sorting/words`.
 
 - **Data**: written for this repository by writers (large language models) who were told the situation and what a
   passenger has in mind, and nothing of the planner, its tables, or the words it is measured on; three writers are the

@@ -158,7 +158,7 @@ class LanguageModelPlanner:
     def from_spec(cls, argument: str, *, on_text: OnText | None = None) -> Planner:
         """The planner named `onboard`: the model of the package; `onboard/FOLDER` is the model of a folder.
 
-        A FOLDER that is a symbolic link is looked at before each request: `chauffeur adapt` exchanges models that way.
+        A FOLDER that is a symbolic link is looked at before each request: `chauffeur model adapt` exchanges models so.
 
         Raises:
             ConfigError: The argument is no folder.

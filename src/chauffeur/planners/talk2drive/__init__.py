@@ -1,4 +1,4 @@
-"""Talk2Drive's planner (seed Sec. V): words to controller parameters, with the on-board model or any endpoint."""
+"""Talk2Drive's planner (paper Sec. V): words to controller parameters, with the on-board model or any endpoint."""
 
 from chauffeur.planners.talk2drive.planner import Talk2DrivePlanner
 

@@ -1,6 +1,6 @@
 """What a mood asks for where nothing was named: past a slower car in a hurry, out of the fast lane at ease.
 
-The seed's own example (Sec. V, S) answers "I'm really in a hurry now" behind a slower car with a free lane on the left
+The paper's own example (Sec. V, S) answers "I'm really in a hurry now" behind a slower car with a free lane on the left
 by changing lanes. Whether the lane is free is for the driver to see, who waits until it is.
 """
 

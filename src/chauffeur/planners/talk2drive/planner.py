@@ -1,4 +1,4 @@
-"""Asks a language model for controller parameters: S, C, I and H as in the seed's Eq. 11 to 17.
+"""Asks a language model for controller parameters: S, C, I and H as in the paper's Eq. 11 to 17.
 
 `talk2drive` reads with the on-board model; `talk2drive/openai/<model>` asks any OpenAI-compatible endpoint. What comes
 back is parameters and the thought behind them, and nothing else: no text of a model is run, and engaging the vehicle

@@ -1,6 +1,6 @@
 """How closely the car follows its path: pure pursuit's two numbers for a way of driving.
 
-A long look-ahead cuts corners and is smooth, a short one is exact and busy. The seed's example (Eq. 15) is 12 m and
+A long look-ahead cuts corners and is smooth, a short one is exact and busy. The paper's example (Eq. 15) is 12 m and
 2.0 s; around it stand a gentler and a livelier pair.
 """
 

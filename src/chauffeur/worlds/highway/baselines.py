@@ -1,4 +1,4 @@
-"""LaMPilot's MOBIL baseline: lane choice without any instruction (seed Tab. IV, rows IDM and MOBIL).
+"""LaMPilot's MOBIL baseline: lane choice without any instruction (paper Tab. IV, rows IDM and MOBIL).
 
 The IDM baseline needs no code: it is the driver with its initial wishes.
 """

@@ -43,7 +43,9 @@ class HighwayEnvironment(gymnasium.Env[FloatArray, FloatArray]):
         if isinstance(scenario, str):
             found = next((s for s in BUILT_IN if s.id == scenario), None)
             if found is None:
-                raise ScenarioError(f"Unknown scenario {scenario!r}.", hint="Run `chauffeur scenarios` for the list.")
+                raise ScenarioError(
+                    f"Unknown scenario {scenario!r}.", hint="Run `chauffeur show scenarios` for the list."
+                )
             scenario = found
         self.render_mode = render_mode
         self._scenario = scenario

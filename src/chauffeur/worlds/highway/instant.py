@@ -21,7 +21,7 @@ class Instant(NamedTuple):
         crashed, on_road: Collision flag; whether the centre is on the lane.
         past_end: Off the road because it ended, not sideways.
         ttc_along_s: Least time to collision as LaMPilot's code has it; -1 for none.
-        ttc_plane_s: Least time to the closest approach (seed Eq. 1); -1 for none.
+        ttc_plane_s: Least time to the closest approach (paper Eq. 1); -1 for none.
         ttc_lane_s: Least bumper-to-bumper time to collision in the ego's lane or overlapping it; -1 for none.
     """
 

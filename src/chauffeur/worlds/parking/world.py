@@ -328,7 +328,7 @@ def _parse(scenario: Scenario) -> LotConfig:
         faults = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'config'}: {e['msg']}" for e in error.errors())
         raise ScenarioError(
             f"Scenario {scenario.id!r} has a bad lot configuration: {faults}.",
-            hint="Compare it with a built-in one: chauffeur scenarios.",
+            hint="Compare it with a built-in one: chauffeur show scenarios.",
         ) from error
     return config
 

@@ -36,7 +36,7 @@ class Annotation:
         template: Grammar template of the words.
         phrasing: `seen` when training items use the same template, `unseen` when only the test split does; empty for
             extras.
-        directness: 1, 2 or 3 (seed Tab. VII); 0 where it was not varied.
+        directness: 1, 2 or 3 (paper Tab. VII); 0 where it was not varied.
         unit: Unit named in the words; empty for none.
         system: `metric`, `imperial` or `informal` (car lengths); empty for none.
         steps: What is to happen, in order.

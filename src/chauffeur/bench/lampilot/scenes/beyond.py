@@ -29,7 +29,7 @@ from chauffeur.concept import Snapshot
 
 Generator = np.random.Generator
 
-# Hints: a wish at three levels of directness (seed Tab. VII)
+# Hints: a wish at three levels of directness (paper Tab. VII)
 
 
 def _hint(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:

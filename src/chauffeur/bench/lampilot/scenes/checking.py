@@ -61,13 +61,14 @@ def folders_of(path: Path) -> dict[str, Path]:
     if not found:
         if (path / "plan.json").is_file():
             raise DataError(
-                f"The suite in {path} is not finished.", hint="Run its `chauffeur scenes generate` again: it goes on."
+                f"The suite in {path} is not finished.",
+                hint="Run its `chauffeur bench scenes generate` again: it goes on.",
             )
         if path.is_dir() and any(path.glob("*.json")):
             return {path.name: path}
         raise DataError(
             f"{path} holds neither a DbLv1 folder (config_list.txt) nor a suite of them (train, val, test).",
-            hint="Make one with: chauffeur scenes generate --out DIR",
+            hint="Make one with: chauffeur bench scenes generate --out DIR",
         )
     return found
 

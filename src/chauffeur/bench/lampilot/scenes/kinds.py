@@ -1,4 +1,4 @@
-"""What a suite is made of: kinds of scenes, how many of each, and which split each item belongs to (seed Tab. III)."""
+"""What a suite is made of: kinds of scenes, how many of each, and which split each item belongs to (paper Tab. III)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """What is read off an instant: who is ahead, how close a collision is by three definitions, and the ego's driver.
 
 The three times to collision (s, -1 for none) are those of LaMPilot's code (along the ego's lane, whatever the lateral
-distance), of the seed's Eq. 1 (in the plane, between centres), and our lane-aware one (bumper to bumper, vehicles in
+distance), of the paper's Eq. 1 (in the plane, between centres), and our lane-aware one (bumper to bumper, vehicles in
 the ego's lane or overlapping it sideways).
 """
 
@@ -67,7 +67,7 @@ def ttc_along(lanes: Array, traits: Array, floats: Array, ints: Array, scene: Ar
 
 @compiled
 def ttc_plane(floats: Array, scene: Array) -> float:
-    """Least positive time to the closest approach, seed Eq. 1, s; -1 for none."""
+    """Least positive time to the closest approach, paper Eq. 1, s; -1 for none."""
     vx, vy = floats[0, SPEED] * math.cos(floats[0, HEADING]), floats[0, SPEED] * math.sin(floats[0, HEADING])
     least = -1.0
     for j in range(1, scene[VEHICLES]):

@@ -1,0 +1,19 @@
+"""Examples in the help of every command: a group's serve the commands that have none of their own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from typer.core import TyperGroup
+
+
+class WithExamples(TyperGroup):
+    """A group of commands; one without an epilog shows those of the group's examples that begin with its name."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        lines = [line for line in (self.epilog or "").splitlines() if line.startswith("    chauffeur ")]
+        for name, command in self.commands.items():
+            own = [line for line in lines if f" {self.name} {name} " in f"{line} "]
+            if not command.epilog and own:
+                command.epilog = "\nExamples:\n\n" + "\n\n".join(own) + "\n"

@@ -1,0 +1,57 @@
+"""What control did in a drive, counted for its end: changes of the shield, bounds, fallbacks, punctuality."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from chauffeur.concept import Intervention
+from chauffeur.drive.live.messages import Report, Rung
+from chauffeur.drive.live.supervisor import Runtime
+
+
+@dataclass(slots=True)
+class Tally:
+    """Filled from control's reports, one a control period.
+
+    Attributes:
+        changes: What the shield changed.
+        clipped: Control periods in which a set-point was held within a bound, by the bound.
+        rungs: Control periods on each fallback level.
+        figures: Punctuality as control told it at the end; None where it could not.
+        last: The newest report.
+        lost_reports: Reports that were never heard.
+        trouble: Last words of a control process that died.
+    """
+
+    changes: list[Intervention] = field(default_factory=list[Intervention])
+    clipped: Counter[str] = field(default_factory=Counter[str])
+    rungs: Counter[Rung] = field(default_factory=Counter[Rung])
+    figures: Mapping[str, Any] | None = None
+    last: Report | None = None
+    lost_reports: int = 0
+    trouble: str = ""
+
+    def add(self, report: Report) -> None:
+        """Count one control period."""
+        self.changes += report.interventions
+        self.clipped.update(report.clipped)
+        self.rungs[report.rung] += 1
+        self.last = report
+
+    def end(self, runtime: Runtime, *, died: bool) -> None:
+        """Ask for what is known only at the end, while the runtime's files are there."""
+        self.figures, self.lost_reports = runtime.figures(), runtime.lost_reports
+        if died:
+            self.trouble = _last_words(runtime)
+
+
+def _last_words(runtime: Runtime) -> str:
+    """The last line control has left in its log."""
+    try:
+        lines = (runtime.folder / "control.log").read_text(errors="replace").strip().splitlines()
+    except OSError:
+        return ""
+    return lines[-1] if lines else ""
