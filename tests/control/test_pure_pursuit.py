@@ -9,30 +9,30 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from chauffeur.control.pure_pursuit import (
-    Path,
-    Pose,
     chord_curvature,
     kept_within,
     look_ahead_distance,
+    look_ahead_point,
     pursuit_curvature,
     pursuit_steering,
     steering_angle,
 )
+from chauffeur.geometry import Polyline, Pose
 
 WHEELBASE_M = 2.8
 MOST_RAD = 0.6
-STRAIGHT = Path.of([(0.0, 0.0), (4000.0, 0.0)])
+STRAIGHT = Polyline.of([(0.0, 0.0), (4000.0, 0.0)])
 
 speeds = st.floats(0.0, 40.0)
 places = st.floats(-200.0, 200.0)
 angles = st.floats(-10.0, 10.0)
 
 
-def _circle(radius_m: float, side: int = 1, step_m: float = 0.25, turns: float = 1.5) -> Path:
+def _circle(radius_m: float, side: int = 1, step_m: float = 0.25, turns: float = 1.5) -> Polyline:
     """A circle that is entered at the origin along +x and turns where headings grow (`side` 1) or fall."""
     count = math.ceil(2.0 * math.pi * radius_m * turns / step_m)
     angle = [2.0 * math.pi * turns * i / count for i in range(count + 1)]
-    return Path.of([(radius_m * math.sin(a), side * radius_m * (1.0 - math.cos(a))) for a in angle])
+    return Polyline.of([(radius_m * math.sin(a), side * radius_m * (1.0 - math.cos(a))) for a in angle])
 
 
 def _roll(rear: Pose, curvature: float, way_m: float) -> Pose:
@@ -45,7 +45,9 @@ def _roll(rear: Pose, curvature: float, way_m: float) -> Pose:
     return Pose(rear.x_m + c * forward - s * sideways, rear.y_m + s * forward + c * sideways, rear.heading_rad + turned)
 
 
-def _follow(rear: Pose, path: Path, look_ahead_m: float, speed_mps: float, seconds: float) -> list[tuple[float, float]]:
+def _follow(
+    rear: Pose, path: Polyline, look_ahead_m: float, speed_mps: float, seconds: float
+) -> list[tuple[float, float]]:
     """(offset, curvature driven) every 0.1 s."""
     rows, station = [], path.nearest(rear.x_m, rear.y_m)
     for _ in range(round(seconds / 0.1)):
@@ -91,8 +93,8 @@ def test_it_comes_to_a_straight_path(offset: float, heading: float, speed: float
 @given(places, places, angles, st.floats(1e-3, 80.0), st.floats(-50.0, 300.0))
 def test_steering_is_finite_bounded_and_symmetric(x: float, y: float, heading: float, ahead: float, at: float) -> None:
     points = [(0.0, 0.0), (40.0, 3.0), (90.0, -12.0), (120.0, 30.0)]
-    path, mirrored = Path.of(points), Path.of([(px, -py) for px, py in points])
-    forward, sideways = Pose(x, y, heading).sees(*path.look_ahead_point(x, y, ahead, at))
+    path, mirrored = Polyline.of(points), Polyline.of([(px, -py) for px, py in points])
+    forward, sideways = Pose(x, y, heading).sees(*look_ahead_point(path, x, y, ahead, at))
     assume(forward >= 0.0 or abs(sideways) > 1e-9)  # straight behind, either side is as good
     angle = pursuit_steering(Pose(x, y, heading), path, ahead, at, WHEELBASE_M, MOST_RAD)
     other = pursuit_steering(Pose(x, -y, -heading), mirrored, ahead, at, WHEELBASE_M, MOST_RAD)
@@ -118,20 +120,20 @@ def test_a_point_on_the_circle_asks_for_that_circle() -> None:
 
 
 def test_the_look_ahead_point_lies_on_the_path_and_the_circle() -> None:
-    path = Path.of([(0.0, 0.0), (10.0, 0.0), (10.0, 20.0)])
-    assert path.look_ahead_point(4.0, 1.0, math.hypot(6.0, 4.0), 4.0) == pytest.approx((10.0, 5.0))
-    assert path.look_ahead_point(9.0, 19.0, 5.0, 29.0)[0] == pytest.approx(10.0)  # beyond the end: straight on
-    assert path.look_ahead_point(9.0, 19.0, 5.0, 29.0)[1] > 20.0
-    assert path.look_ahead_point(4.0, 30.0, 5.0, 4.0) == pytest.approx((4.0, 0.0))  # too far away: its nearest point
+    path = Polyline.of([(0.0, 0.0), (10.0, 0.0), (10.0, 20.0)])
+    assert look_ahead_point(path, 4.0, 1.0, math.hypot(6.0, 4.0), 4.0) == pytest.approx((10.0, 5.0))
+    assert look_ahead_point(path, 9.0, 19.0, 5.0, 29.0)[0] == pytest.approx(10.0)  # beyond the end: straight on
+    assert look_ahead_point(path, 9.0, 19.0, 5.0, 29.0)[1] > 20.0
+    assert look_ahead_point(path, 4.0, 30.0, 5.0, 4.0) == pytest.approx((4.0, 0.0))  # too far away: its nearest point
     with pytest.raises(ValueError, match="two different points"):
-        Path.of([(1.0, 1.0), (1.0, 1.0)])
+        Polyline.of([(1.0, 1.0), (1.0, 1.0)])
     with pytest.raises(ValueError, match="nan"):
-        Path.of([(1.0, 1.0), (math.nan, 1.0)])
+        Polyline.of([(1.0, 1.0), (math.nan, 1.0)])
 
 
 @given(places, places, st.floats(-30.0, 60.0), st.floats(0.0, 40.0))
 def test_the_nearest_point_is_nearest(x: float, y: float, low: float, wide: float) -> None:
-    path = Path.of([(0.0, 0.0), (10.0, 0.0), (14.0, 9.0), (2.0, 12.0)])
+    path = Polyline.of([(0.0, 0.0), (10.0, 0.0), (14.0, 9.0), (2.0, 12.0)])
     found = path.nearest(x, y, low, low + wide)
     assert low <= found <= low + wide
     here = path.at(found)
@@ -155,7 +157,7 @@ def test_corners_are_cut_by_no_more_than_the_room(ahead: float, room: float, rad
     angles = [turn * i / 60 for i in range(61)]
     arc = [(20.0 + radius * math.sin(a), radius * (1.0 - math.cos(a))) for a in angles]
     end = Pose(*arc[-1], turn).ahead(30.0)
-    path = Path.of([(0.0, 0.0), *arc, (end.x_m, end.y_m)])
+    path = Polyline.of([(0.0, 0.0), *arc, (end.x_m, end.y_m)])
     rear, station, worst = Pose(0.0, 0.0, 0.0), 0.0, 0.0
     while station < path.length_m - 5.0:
         station = path.nearest(rear.x_m, rear.y_m, station - 1.0, station + 3.0)

@@ -12,7 +12,7 @@ from chauffeur.concept import Command, Scenario
 from chauffeur.drive.actuate import actuate
 from chauffeur.drive.parameters import LotShield, shield_for
 from chauffeur.safety.shield import Guarded
-from chauffeur.worlds.parking import Box, ParkingWorld, overlap
+from chauffeur.worlds.parking import ParkingWorld, overlap
 
 wheels = st.sampled_from([-0.6, -0.3, -0.1, 0.0, 0.1, 0.3, 0.6])
 pedals = st.sampled_from([-8.0, -1.0, 0.0, 1.0, 3.0])
@@ -54,7 +54,7 @@ def test_straight_at_the_parked_cars_it_stops_in_front_of_them() -> None:
     assert not final.ego.crashed
     assert final.ego.speed_mps < 0.2
     assert "room" in rules
-    assert any(overlap(Box.of(final.ego).grown(0.5), Box.of(other)) for other in final.others), "not sooner than needed"
+    assert any(overlap(final.ego.box.grown(0.5), other.box) for other in final.others), "not sooner than needed"
 
 
 def test_what_is_well_is_let_through_and_what_is_no_number_is_not() -> None:

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chauffeur.concept import ScenarioError
-from chauffeur.control.pure_pursuit import Pose
-from chauffeur.worlds.parking.boxes import Box, overlap
+from chauffeur.geometry import Box, Pose, overlap
 from chauffeur.worlds.parking.lot import Lot, build_lot
 from chauffeur.worlds.parking.places import PLACES, parked_in, spot_for
 from chauffeur.worlds.parking.routes import TURN_M, way_along, way_to_spot

@@ -10,7 +10,7 @@ from chauffeur.concept import Command, Scenario, ScenarioError, Snapshot, Wishes
 from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.drive.actuate import actuate
 from chauffeur.worlds.base import EGO, Driver, Perception, World
-from chauffeur.worlds.parking import BUILT_IN, Box, ParkingWorld, overlap
+from chauffeur.worlds.parking import BUILT_IN, ParkingWorld, overlap
 from chauffeur.worlds.parking.actors import Walker
 from chauffeur.worlds.parking.world import CHASSIS, DT_S, STEERING_RATE
 
@@ -120,7 +120,7 @@ def test_who_is_there_is_as_configured() -> None:
         assert view.forbidden == (view.id in taken)
     for i, one in enumerate(others):
         for other in others[:i]:
-            assert not overlap(Box.of(one), Box.of(other))
+            assert not overlap(one.box, other.box)
 
 
 def test_the_ego_is_a_bicycle() -> None:
@@ -154,7 +154,7 @@ def test_driving_into_a_parked_car_is_a_collision() -> None:
     assert final.ego.crashed
     hit = [other for other in final.others if other.crashed]
     assert len(hit) == 1
-    assert overlap(Box.of(final.ego).grown(0.3), Box.of(hit[0]))
+    assert overlap(final.ego.box.grown(0.3), hit[0].box)
 
 
 def test_leaving_the_pavement_ends_the_trip() -> None:
@@ -201,7 +201,7 @@ def test_a_walker_goes_to_and_fro_and_waits_for_cars() -> None:
         shy.decide([car], DT_S)
         shy.move(DT_S)
     assert not shy.walks
-    assert not overlap(Box.of(car), Box.of(shy.state()))
+    assert not overlap(car.box, shy.state().box)
 
 
 def test_a_walker_does_not_brush_past_a_car() -> None:
@@ -211,7 +211,7 @@ def test_a_walker_does_not_brush_past_a_car() -> None:
     for _ in range(25):
         walker.decide([car], DT_S)
         walker.move(DT_S)
-        assert not overlap(Box.of(car), Box.of(walker.state()))
+        assert not overlap(car.box, walker.state().box)
     assert walker.way_m > 0.1
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from chauffeur.concept.nouns import Lead
+from chauffeur.geometry import Box
 
 LaneId = tuple[str, str, int]
 """(from node, to node, index); index 0 is leftmost."""
@@ -72,6 +73,11 @@ class VehicleState:
     width_m: float
     lane: LaneId | None
     crashed: bool = False
+
+    @property
+    def box(self) -> Box:
+        """The ground it covers."""
+        return Box(self.x_m, self.y_m, self.heading_rad, self.length_m, self.width_m)
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,13 +30,11 @@ from chauffeur.concept import (
     VehicleState,
     Wishes,
 )
-from chauffeur.control.pure_pursuit import Path
 from chauffeur.drive.episode import Episode, Referee, run_episode
-from chauffeur.geometry import wrap_to_pi
+from chauffeur.geometry import Box, Polyline, wrap_to_pi
 from chauffeur.safety.shield import LAMPILOT_SHIELD, Guarded, Shield
 from chauffeur.safety.shield.gaps import braking_gap_m, rss_gap_m
 from chauffeur.worlds.base import EGO, World
-from chauffeur.worlds.parking.boxes import Box
 from chauffeur.worlds.parking.corridor import Body
 from chauffeur.worlds.parking.driver import JAM_M
 from chauffeur.worlds.parking.following import LOT_BEND_MPS2, Chassis, Follower, Look
@@ -114,7 +112,7 @@ class _Stretch:
     """Lanes one after the other, as one path, and where along it each begins."""
 
     lanes: tuple[LaneView, ...]
-    path: Path
+    path: Polyline
     starts_m: tuple[float, ...]
 
     def lane_at(self, station_m: float) -> LaneView:
@@ -283,7 +281,7 @@ class ParametersDriver:
             raise ScenarioError("The car is on no lane of this road.", hint="Reset the world first.")
         return self._lanes[lane]
 
-    def _follow(self, path: Path) -> None:
+    def _follow(self, path: Polyline) -> None:
         lane = next(iter(self._lanes.values()))
         ego = self._world.snapshot().ego
         self._follower.take(path, max(0.2, (lane.width_m - ego.width_m) / 2.0))
@@ -298,9 +296,9 @@ class ParametersDriver:
             lanes.append(onward)
         starts, points = [0.0], list(lanes[0].centre_m)
         for lane in lanes[1:]:
-            starts.append(Path.of(points).length_m)
+            starts.append(Polyline.of(points).length_m)
             points.extend(lane.centre_m)
-        return _Stretch(tuple(lanes), _ended(Path.of(points), self._overhang_m + _SHORT_M), tuple(starts))
+        return _Stretch(tuple(lanes), _ended(Polyline.of(points), self._overhang_m + _SHORT_M), tuple(starts))
 
     @property
     def _overhang_m(self) -> float:
@@ -400,10 +398,10 @@ class ParametersDriver:
         begin = there.path.nearest(last.x_m, last.y_m)
         rest = zip(there.path.points_m, there.path.stations_m, strict=True)
         points.extend([point for point, at in rest if at > begin])
-        self._follow(Path.of(points))
+        self._follow(Polyline.of(points))
         return True
 
-    def _hindrance(self, snapshot: Snapshot, path: Path, width_m: float, reserve_m: float) -> str:
+    def _hindrance(self, snapshot: Snapshot, path: Polyline, width_m: float, reserve_m: float) -> str:
         """Who keeps the car from entering a lane, in words; empty where the gap allows it, with a reserve."""
         ego, table = snapshot.ego, LAMPILOT_SHIELD
         here = path.nearest(ego.x_m, ego.y_m)
@@ -544,14 +542,14 @@ def _turned(lane: LaneView) -> float:
     return wrap_to_pi(math.atan2(dy - cy, dx - cx) - math.atan2(by - ay, bx - ax))
 
 
-def _ended(path: Path, short_m: float) -> Path:
+def _ended(path: Polyline, short_m: float) -> Polyline:
     """A path that ends a way earlier."""
     end = max(path.length_m - short_m, path.length_m / 2.0)
     last = path.at(end)
     kept: Iterable[tuple[float, float]] = (
         point for point, at in zip(path.points_m, path.stations_m, strict=True) if at < end
     )
-    return Path.of([*kept, (last.x_m, last.y_m)])
+    return Polyline.of([*kept, (last.x_m, last.y_m)])
 
 
 def _least_ahead(speed_mps: float, lead_mps: float) -> float:

@@ -1,6 +1,6 @@
 """A parking lot: one-way aisles, slanted spots, parked cars, a car on its way out, people on foot."""
 
-from chauffeur.worlds.parking.boxes import Box, overlap
+from chauffeur.geometry import Box, overlap
 from chauffeur.worlds.parking.driver import ParkingDriver
 from chauffeur.worlds.parking.following import Chassis, Follower, Look
 from chauffeur.worlds.parking.lot import Lot, Spot

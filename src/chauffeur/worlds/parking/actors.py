@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from chauffeur.concept import LaneId, VehicleState
-from chauffeur.worlds.parking.boxes import Box, overlap
+from chauffeur.geometry import Box, overlap
 from chauffeur.worlds.parking.corridor import Body
 from chauffeur.worlds.parking.following import Chassis, Follower, Look
 from chauffeur.worlds.parking.routes import Way
@@ -170,7 +170,7 @@ class Walker:
                 car.width_m + 2.0 * shy,
             )
             nearer = math.dist(there, (car.x_m, car.y_m)) < math.dist(here, (car.x_m, car.y_m))
-            if (nearer and ground.holds(*there)) or overlap(next_ground, Box.of(car).grown(_TOUCH_M)):
+            if (nearer and ground.holds(*there)) or overlap(next_ground, car.box.grown(_TOUCH_M)):
                 self.walks = False
         self.kept_s = 0.0 if self.walks else self.kept_s + dt_s
         if self.kept_s > _PATIENCE_S:

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chauffeur.concept import VehicleState
-from chauffeur.control.pure_pursuit import Path
-from chauffeur.geometry import wrap_to_pi
+from chauffeur.geometry import Polyline, wrap_to_pi
 
 _Array = NDArray[np.float64]
 
@@ -65,26 +64,14 @@ class Ahead(NamedTuple):
     crosses: bool
 
 
-def poses_along(path: Path, step_m: float) -> tuple[_Array, _Array, _Array]:
-    """(x, y, heading) every so many metres of a path, its end included: what `Path.at` says, all at once."""
-    count = max(2, math.ceil(path.length_m / step_m) + 1)
-    way = np.minimum(np.arange(count) * step_m, path.length_m)
-    corners, stations = np.array(path.points_m), np.array(path.stations_m)
-    leg = np.clip(np.searchsorted(stations, way, side="right"), 1, len(stations) - 1) - 1
-    here, step = corners[leg], np.diff(corners, axis=0)
-    share = (way - stations[leg]) / (stations[leg + 1] - stations[leg])
-    headings = np.array([math.atan2(dy, dx) for dx, dy in step.tolist()])
-    return here[:, 0] + share * step[leg, 0], here[:, 1] + share * step[leg, 1], headings[leg]
-
-
 class Corridor:
     """The ground along one path, for one body."""
 
-    def __init__(self, path: Path, body: Body, side_m: float) -> None:
+    def __init__(self, path: Polyline, body: Body, side_m: float) -> None:
         """Args: path of the rear axle; the body; clear distance to be left at its sides."""
         self.path = path
         self._body = body
-        x, y, heading = poses_along(path, STEP_M)
+        x, y, heading = path.poses(path.every(STEP_M))
         self._cos, self._sin, self._heading = np.cos(heading), np.sin(heading), heading
         self._x = x + self._cos * body.rear_to_middle_m
         self._y = y + self._sin * body.rear_to_middle_m

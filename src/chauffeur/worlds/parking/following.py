@@ -21,11 +21,10 @@ from typing import Final
 from chauffeur.concept import Command, VehicleState
 from chauffeur.control import IdmParameters
 from chauffeur.control.idm import idm_acceleration
-from chauffeur.control.pure_pursuit import Path, Pose, kept_within, look_ahead_distance, pursuit_curvature
+from chauffeur.control.pure_pursuit import kept_within, look_ahead_distance, pursuit_curvature
 from chauffeur.control.pure_pursuit import steering_angle as angle_of
-from chauffeur.geometry import wrap_to_pi
-from chauffeur.worlds.parking.boxes import Box, overlap
-from chauffeur.worlds.parking.corridor import Ahead, Body, Corridor, poses_along
+from chauffeur.geometry import Box, Polyline, Pose, overlap, wrap_to_pi
+from chauffeur.worlds.parking.corridor import Ahead, Body, Corridor
 
 STEADY_S: Final = 0.5
 """Shortest look-ahead, as a time: twice that below which a car weaves whose steering answers after 0.1 s."""
@@ -100,7 +99,7 @@ class Follower:
         self._room_m = 0.0
 
     @property
-    def path(self) -> Path | None:
+    def path(self) -> Polyline | None:
         """What is followed."""
         return None if self._corridor is None else self._corridor.path
 
@@ -114,7 +113,7 @@ class Follower:
         """Way left to the end of the path, m; nothing where there is no path."""
         return 0.0 if self._corridor is None else self._corridor.path.length_m - self.station_m
 
-    def take(self, path: Path, room_m: float) -> None:
+    def take(self, path: Polyline, room_m: float) -> None:
         """Follow a path of the rear axle from now on, with so much room beside it."""
         self._corridor = Corridor(path, self._chassis.body, min(_SIDE_M, room_m))
         self._fastest = _speeds_for_bends(path, self._bend_mps2)
@@ -216,7 +215,7 @@ class Follower:
             if math.hypot(other.x_m - ego.x_m, other.y_m - ego.y_m)
             < around + math.hypot(other.length_m, other.width_m) / 2.0
             and abs(other.speed_mps) < _SLOW_MPS
-            for box in [Box.of(other)]
+            for box in [other.box]
         ]
         if not near or speed <= 0.0:
             return math.inf
@@ -276,9 +275,9 @@ def stopping_acceleration(speed_mps: float, distance_m: float, braking_mps2: flo
     return (then - speed_mps) / dt_s
 
 
-def _speeds_for_bends(path: Path, sideways_mps2: float) -> tuple[float, ...]:
+def _speeds_for_bends(path: Polyline, sideways_mps2: float) -> tuple[float, ...]:
     """Highest speed every 2 m of a path, m/s: what its bends allow, there and farther on."""
-    headings: list[float] = poses_along(path, _BEND_M)[2].tolist()
+    headings: list[float] = path.poses(path.every(_BEND_M))[2].tolist()
     count = len(headings)
     speeds = [math.inf] * count
     for i, (one, two) in enumerate(pairwise(headings)):

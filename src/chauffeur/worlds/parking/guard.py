@@ -17,8 +17,7 @@ from typing import Final
 
 from chauffeur.concept import Command, Snapshot, VehicleState
 from chauffeur.concept.units import kmh
-from chauffeur.control.pure_pursuit import Pose
-from chauffeur.worlds.parking.boxes import Box, overlap
+from chauffeur.geometry import Box, Pose, overlap
 from chauffeur.worlds.parking.following import HARDEST_MPS2, Chassis
 
 MARGIN_M: Final = 0.05
@@ -133,10 +132,10 @@ class Guard:
 def _meets(own: Box, other: VehicleState, at_s: float) -> bool:
     """Whether somebody may be where the car is, after a time."""
     if other.kind != "car":
-        return overlap(own, Box.of(other).grown(MARGIN_M + WALK_MPS * at_s))
+        return overlap(own, other.box.grown(MARGIN_M + WALK_MPS * at_s))
     speed = max(other.speed_mps, 0.0)
     if speed <= _STAND_MPS:
-        return overlap(own, Box.of(other).grown(MARGIN_M))
+        return overlap(own, other.box.grown(MARGIN_M))
     way = speed * at_s + SPEED_UP_MPS2 * at_s * at_s / 2.0
     c, s = math.cos(other.heading_rad), math.sin(other.heading_rad)
     x, y = other.x_m + c * way / 2.0, other.y_m + s * way / 2.0

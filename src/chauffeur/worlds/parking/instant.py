@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import DataError
-from chauffeur.control.pure_pursuit import Pose
+from chauffeur.geometry import Pose
 from chauffeur.worlds.parking.actors import CarMoved, LeavingCar, Walker
 
 _HEAD: Final = struct.Struct("<QdddddBBBH")

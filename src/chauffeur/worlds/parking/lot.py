@@ -23,7 +23,7 @@ from typing import Final
 
 from chauffeur.concept import LaneId, LaneView
 from chauffeur.concept.units import MPS_PER_KMH
-from chauffeur.worlds.parking.boxes import Box
+from chauffeur.geometry import Box
 
 Points = tuple[tuple[float, float], ...]
 

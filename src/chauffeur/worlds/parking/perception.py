@@ -9,7 +9,7 @@ from dataclasses import replace
 from chauffeur.concept import LaneId, Snapshot, VehicleState
 from chauffeur.control import LAMPILOT_EGO
 from chauffeur.control.idm import idm_acceleration
-from chauffeur.control.pure_pursuit import Path
+from chauffeur.geometry import Polyline
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.parking.lot import Lot
 
@@ -19,9 +19,9 @@ class LaneMap:
 
     def __init__(self, lot: Lot) -> None:
         """Args: the lot."""
-        self.paths = {view.id: Path.of(view.centre_m) for view in lot.lanes}
+        self.paths = {view.id: Polyline.of(view.centre_m) for view in lot.lanes}
         self._spots = tuple(lot.spots.values())
-        self._ways: list[tuple[LaneId, Path, tuple[float, float, float, float]]] = []
+        self._ways: list[tuple[LaneId, Polyline, tuple[float, float, float, float]]] = []
         for lane, path in self.paths.items():
             if lane[1] not in lot.spots:
                 xs, ys = zip(*path.points_m, strict=True)

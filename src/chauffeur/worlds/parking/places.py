@@ -7,8 +7,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from chauffeur.concept import ScenarioError
-from chauffeur.control.pure_pursuit import Pose
-from chauffeur.worlds.parking.boxes import Box
+from chauffeur.geometry import Box, Pose
 from chauffeur.worlds.parking.lot import Lot, Spot
 from chauffeur.worlds.parking.routes import way_to_spot
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from chauffeur.concept import LaneId
-from chauffeur.control.pure_pursuit import Path, Pose
-from chauffeur.geometry import wrap_to_pi
+from chauffeur.geometry import Polyline, Pose, wrap_to_pi
 from chauffeur.worlds.parking.lot import AISLE_M, CORNER_M, Lot, Points, Spot
 
 TURN_M: Final = 5.4
@@ -40,7 +39,7 @@ class Way:
         room_m: How far beside the path the car may be, given what stands there.
     """
 
-    path: Path
+    path: Polyline
     room_m: float
 
 
@@ -73,7 +72,7 @@ def way_to_spot(lot: Lot, spot: Spot, rear: Pose, wheelbase_m: float) -> Way | N
     side = math.copysign(1.0, turn)
     onto = _arc(x - side * TURN_M, start_y, TURN_M, 0.0 if side > 0.0 else math.pi, turn)
     end = axis.x_m - math.cos(heading) * wheelbase_m / 2.0, axis.y_m - math.sin(heading) * wheelbase_m / 2.0
-    return Way(Path.of((*before, *onto, end)), SPOT_ROOM_M)
+    return Way(Polyline.of((*before, *onto, end)), SPOT_ROOM_M)
 
 
 def way_along(lot: Lot, lane: LaneId, overhang_m: float) -> Way:
@@ -85,11 +84,11 @@ def way_along(lot: Lot, lane: LaneId, overhang_m: float) -> Way:
             break
         views.append(min(onward, key=lambda view: view.id[1][0] != view.id[0][0]))
     points = [point for view in views for point in view.centre_m]
-    whole = Path.of(points)
+    whole = Polyline.of(points)
     end = whole.length_m - overhang_m - _SHORT_M
     kept = [point for point, at in zip(whole.points_m, whole.stations_m, strict=True) if at < end]
     last = whole.at(end)
-    return Way(Path.of([*kept, (last.x_m, last.y_m)]), (AISLE_M - 2.0) / 2.0)
+    return Way(Polyline.of([*kept, (last.x_m, last.y_m)]), (AISLE_M - 2.0) / 2.0)
 
 
 def _arc(x: float, y: float, radius: float, phase: float, turn: float) -> Points:

@@ -16,10 +16,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from chauffeur.concept import Command, LaneId, Lead, Scenario, ScenarioError, Snapshot, VehicleState
-from chauffeur.control.pure_pursuit import Path, Pose
+from chauffeur.geometry import Box, Polyline, Pose, overlap
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.parking.actors import LeavingCar, Walker
-from chauffeur.worlds.parking.boxes import Box, overlap
 from chauffeur.worlds.parking.corridor import Body
 from chauffeur.worlds.parking.driver import ParkingDriver
 from chauffeur.worlds.parking.following import Chassis
@@ -156,7 +155,7 @@ class ParkingWorld:
         taken = _taken(config, rng, scenario.id)
         lot = build_lot(config.aisles, config.spots_a_row, taken)
         parked = tuple(_park(lot.spots[name], i, rng) for i, name in enumerate(sorted(taken), start=1))
-        lanes, boxes = LaneMap(lot), tuple((car.id, Box.of(car)) for car in parked)
+        lanes, boxes = LaneMap(lot), tuple((car.id, car.box) for car in parked)
         first = len(parked) + 1
         self._cars = [_leaving(lot, first + i, i, rng) for i in range(config.cars)]
         self._walkers = [_walking(lot, first + config.cars + i, rng) for i in range(config.walkers)]
@@ -313,7 +312,7 @@ class ParkingWorld:
         ego, box = self._ego, self._ego.box
         movers: list[LeavingCar | Walker] = [*self._cars, *self._walkers]
         for mover in movers:
-            if overlap(box, Box.of(mover.state())):
+            if overlap(box, mover.state().box):
                 ego.crashed = mover.crashed = True
         for number, ground in self._started().boxes:
             if abs(ground.x_m - box.x_m) < _FAR_M and abs(ground.y_m - box.y_m) < _FAR_M and overlap(box, ground):
@@ -366,7 +365,7 @@ def _leaving(lot: Lot, number: int, place: int, rng: np.random.Generator) -> Lea
     views.append(lot.lane((f"n{aisle}", f"a{aisle}", 0)))
     points = [point for view in views for point in view.centre_m[:-1]]
     rest = way_along(lot, (f"a{aisle}", f"b{aisle}", 0), 0.0)
-    way = Way(Path.of([*points, *rest.path.points_m]), (AISLE_M - 2.0) / 2.0)
+    way = Way(Polyline.of([*points, *rest.path.points_m]), (AISLE_M - 2.0) / 2.0)
     return LeavingCar(number, way, start, speed, views[0].id, speed)
 
 
@@ -382,7 +381,7 @@ def _walking(lot: Lot, number: int, rng: np.random.Generator) -> Walker:
     return Walker(number, (x - side * half, y), (x + side * half, y), pause, waits_s=away)
 
 
-def _front(ego: VehicleState, others: Sequence[VehicleState], path: Path) -> Lead | None:
+def _front(ego: VehicleState, others: Sequence[VehicleState], path: Polyline) -> Lead | None:
     """The nearest car that is ahead in the ego's lane."""
     here = path.nearest(ego.x_m, ego.y_m)
     leads = [

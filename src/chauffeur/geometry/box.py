@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from chauffeur.concept import VehicleState
-
 
 @dataclass(frozen=True, slots=True)
 class Box:
@@ -17,11 +15,6 @@ class Box:
     heading_rad: float
     length_m: float
     width_m: float
-
-    @classmethod
-    def of(cls, body: VehicleState) -> Box:
-        """The ground a vehicle or object covers."""
-        return cls(body.x_m, body.y_m, body.heading_rad, body.length_m, body.width_m)
 
     def grown(self, margin_m: float) -> Box:
         """The box, larger by a margin on every side."""
@@ -57,10 +50,10 @@ def overlap(a: Box, b: Box) -> bool:
     reach = (math.hypot(a.length_m, a.width_m) + math.hypot(b.length_m, b.width_m)) / 2.0
     if math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) >= reach:
         return False
-    return not (_apart(a, b) or _apart(b, a))
+    return not (_separated(a, b) or _separated(b, a))
 
 
-def _apart(a: Box, b: Box) -> bool:
+def _separated(a: Box, b: Box) -> bool:
     """Whether an edge of `a` parts them."""
     places = [a.place_of(x, y) for x, y in b.corners()]
     for axis, half in ((0, a.length_m / 2.0), (1, a.width_m / 2.0)):
