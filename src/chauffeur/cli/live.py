@@ -38,9 +38,11 @@ def live(
     planner: Annotated[
         str,
         typer.Option(
-            help="`onboard`, `talk2drive`, `keyword`, `openai/<model>`, `replay/<file>`, or an installed one."
+            help="`onboard`, `talk2drive`, `keyword`, `openai/<model>`, `replay/<file>`, or an installed one; "
+            "default `onboard`, in a parking lot `talk2drive`.",
+            show_default=False,
         ),
-    ] = "onboard",
+    ] = "",
     person: Annotated[str, typer.Option("--as", help="Whose wishes they are; their history is recalled.")] = "",
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of the traffic; default the scenario's own.")] = None,
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
@@ -70,7 +72,7 @@ def live(
     from chauffeur.cli.lines import Lines, standard_input
     from chauffeur.cli.live_drive import STOP, LiveDrive, is_stop
     from chauffeur.cli.live_screen import LiveScreen, QuietScreen
-    from chauffeur.cli.parts import limits_named, not_kept, planner_named
+    from chauffeur.cli.parts import limits_named, not_kept, planner_for, planner_named
     from chauffeur.concept import PersonId, SandboxError
     from chauffeur.drive.live.books import Books, unanswered
     from chauffeur.drive.live.remembering import Remembering
@@ -86,6 +88,7 @@ def live(
     who = PersonId(person.strip())
     given = [STOP if is_stop(wish) else parse_wish(wish, who).text for wish in wishes or ()]
     place = find(scenario) if scenario is not None else suiting(given[0] if given else "")
+    planner = planner_for(planner, place)
     bounds = personal_limits(who, limits_named(limits))
     start = Start(place, place.seed if seed is None else seed, bounds, duration)
     settings = Settings(

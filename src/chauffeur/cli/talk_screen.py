@@ -307,8 +307,8 @@ def stages_in_words(stages: Stages) -> str:
 def _verdicts(verdicts: tuple[VerdictShown, ...]) -> Text:
     found = Text()
     for verdict in verdicts:
-        sign, style = ("✓", "green") if verdict.passed else (("!", "yellow") if verdict.informs else ("✗", "bold red"))
-        found.append(f"{sign} ", style).append_text(plain(verdict.check)).append("  ")
+        mark = verdict.mark
+        found.append(f"{words.MARKS[mark]} ", words.MARK_STYLES[mark]).append_text(plain(verdict.check)).append("  ")
         if not verdict.passed:
             found.append_text(plain(verdict.reason)).append("  ")
     return found

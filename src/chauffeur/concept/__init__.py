@@ -25,6 +25,7 @@ from chauffeur.concept.nouns import (
     Instruction,
     Lead,
     Limits,
+    Mark,
     Metric,
     Mismatch,
     MismatchKind,
@@ -43,6 +44,8 @@ from chauffeur.concept.nouns import (
     Trip,
     Usage,
     Verdict,
+    lines_before_library,
+    mark_of,
 )
 from chauffeur.concept.scene import (
     Command,
@@ -79,6 +82,7 @@ __all__ = [
     "LaneView",
     "Lead",
     "Limits",
+    "Mark",
     "Metric",
     "Mismatch",
     "MismatchKind",
@@ -109,4 +113,6 @@ __all__ = [
     "VehicleState",
     "Verdict",
     "Wishes",
+    "lines_before_library",
+    "mark_of",
 ]

@@ -148,13 +148,13 @@ def run_episode(
     hands: Hands | None = None,
     shield: Shield | None = None,
 ) -> Episode:
-    """Drive until the referee says that it is over, the world ends, the program has ended, or `max_s` simulated seconds passed.
+    """Drive until the referee says that it is over, the world ends, the program has ended, or `max_s` have passed.
 
     Args:
         world: A world just reset.
         policy: What states the wishes; None leaves the world's own driver alone (the IDM baseline).
         referee: Says when it is over and what came of it; None drives on until the program has ended.
-        max_s: Bound of the trip in simulated time.
+        max_s: Bound of the trip in simulated time, s.
         record: Whether to keep frames (a benchmark does not need them).
         adjust: Baseline that rewrites settled wishes each period, e.g. MOBIL's lane choice.
         watch: Called with each recorded frame, for live display.

@@ -1,10 +1,10 @@
 """When a free drive is over: once what was understood of the wish has been done, all of it, and held for a moment.
 
 A benchmark has goals of its own, and ends the instant one is met. A passenger who says "overtake and come back" has not
-been served in the left lane, nor one who wants 40 m when 38 m flash by. So a free drive is judged by the policy and what
-its plan says of it: every part of `Plan.intent` is done in its order, the set-points (lane, speed, gap) are reached and
-held, and a program that still has something to do has done it. This shows whether the car did what was understood, not
-whether that was what the person meant.
+been served in the left lane, nor one who wants 40 m when 38 m flash by. So a free drive is judged by the policy and
+what its plan says of it: every part of `Plan.intent` is done in its order, the set-points (lane, speed, gap) are
+reached and held, and a program that still has something to do has done it. This shows whether the car did what was
+understood, not whether that was what the person meant.
 """
 
 from __future__ import annotations
@@ -83,11 +83,21 @@ def asked_of(plan: Plan) -> tuple[Ask, ...]:
     return tuple(asks)
 
 
+_JUDGED: Final = _SETS_SPEED | {"gap", "follow"}
+"""Parts of which it is known when they are done."""
+
+
+def can_be_judged(plan: Plan) -> bool:
+    """Whether a plan says what it understood, in words of which it is known when they are done."""
+    asks = asked_of(plan)
+    return bool(asks) and all(ask.kind in _JUDGED for ask in asks)
+
+
 class Fulfilment:
     """The referee of a free drive; make it right after the world was reset."""
 
     def __init__(self, world: World, plan: Plan) -> None:
-        """Args: the world; the plan that is about to be driven, with an intent."""
+        """Args: the world; the plan that is about to be driven, one that `can_be_judged`."""
         self._world = world
         self._asks = asked_of(plan)
         self._start = world.snapshot()

@@ -11,7 +11,7 @@ from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.signals import SignalLog
 from chauffeur.concept import Metric, Outcome, Plan, ProgramState, Scenario, Wishes
 from chauffeur.drive.episode import Referee
-from chauffeur.drive.fulfilment import Fulfilment
+from chauffeur.drive.fulfilment import Fulfilment, can_be_judged
 from chauffeur.worlds.base import World
 from chauffeur.worlds.highway import HighwayWorld
 
@@ -26,7 +26,7 @@ def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
         return None
     if scenario.goal:
         return LampilotReferee(world, scenario)
-    return ScoredFulfilment(world, plan) if plan.intent else None
+    return ScoredFulfilment(world, plan) if can_be_judged(plan) else None
 
 
 class ScoredFulfilment:

@@ -11,7 +11,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from chauffeur.concept import LaneId
+from chauffeur.concept import LaneId, Mark, mark_of
 from chauffeur.drive.live.messages import MessageError
 
 MOST_TEXT: Final = 2000
@@ -150,6 +150,12 @@ class VerdictShown:
     passed: bool
     reason: str
     informs: bool = False
+    proven: bool = True
+
+    @property
+    def mark(self) -> Mark:
+        """How it is marked."""
+        return mark_of(passed=self.passed, vetoes=not self.informs, proven=self.proven)
 
 
 @dataclass(frozen=True, slots=True)
