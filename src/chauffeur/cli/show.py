@@ -74,10 +74,8 @@ class Quiet:
     def end(self, recorded: RecordedTrip) -> None:
         """What came of it."""
         trip = recorded.trip
-        sign, label, tone = words.trip_words(trip)
+        sign, label, tone = words.trip_words(trip, timed=True)
         line = Text(f"{sign} {label}", _STYLES[tone])
-        if recorded.frames:
-            line.append(f" after {trip.duration_s:.0f} s", style="not bold")
         self.console.print(line.append(" (simulated drive)", style="dim not bold"))
 
     def wrote(self, paths: list[Path]) -> None:
@@ -115,7 +113,8 @@ class Teller(Quiet):
         """How far the simulator is compiled: said once where lines stay, shown as it goes where they do not."""
         said = "Compiling the simulator, once on this machine (about half a minute)"
         if self._live is not None:
-            self._live_line(Group(Text(said), ProgressBar(total=of, completed=done, width=40)))
+            count = Text(f"  {done} of up to {of}", "dim")
+            self._live_line(Group(Text(said), Columns([ProgressBar(total=of, completed=done, width=40), count])))
             self._live.refresh()
         elif not self._compiles:
             self.console.print(f"{said} ...", style="dim")

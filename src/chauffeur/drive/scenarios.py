@@ -7,8 +7,8 @@ import os
 import re
 from pathlib import Path
 
-from chauffeur.concept import Scenario, ScenarioError
-from chauffeur.concept.registry import load_plugin
+from chauffeur.concept import Scenario, ScenarioError, Snapshot
+from chauffeur.drive.session import drive_without_program, make_world
 from chauffeur.planners.onboard.meaning import Manoeuvre, Reading
 from chauffeur.planners.onboard.understand import understand
 from chauffeur.planners.talk2drive.style import place_of
@@ -41,6 +41,8 @@ IN_REACH_M = 100.0
 _CLOSES_MPS = 2.0
 """Faster than the vehicle ahead by this much, the car comes up to it and stays behind it."""
 _TRIES = 60
+STAYS_S = 40.0
+"""How long a vehicle ahead stays in reach at least, on roads that keep one."""
 
 
 def find_data(folder: Path | None) -> Dataset | None:
@@ -110,18 +112,24 @@ def seeds_with_lead(scenario: Scenario, first: int, count: int) -> tuple[int, ..
     Raises:
         ScenarioError: The scenario cannot be set up.
     """
-    world: World = load_plugin("chauffeur.worlds", scenario.world)()
+    world = make_world(scenario)
     given = world.reset(scenario, scenario.seed)
     if given.kind != "highway" or given.front is None or given.front.distance_m > IN_REACH_M:
         return tuple(range(first, first + count))
     found: list[int] = []
     for seed in range(first, first + _TRIES * count):
-        shot = world.reset(scenario, seed)
-        lead = shot.front
-        if lead is None or lead.distance_m > IN_REACH_M or shot.ended:
-            continue
-        if shot.ego.speed_mps >= lead.speed_mps + _CLOSES_MPS:
+        if _keeps_lead(world, world.reset(scenario, seed)):
             found.append(seed)
         if len(found) == count:
             return tuple(found)
     return tuple(range(first, first + count))
+
+
+def _keeps_lead(world: World, shot: Snapshot) -> bool:
+    """Whether a world just reset has a vehicle ahead in reach, and still has while nobody wishes anything."""
+    lead = shot.front
+    if lead is None or lead.distance_m > IN_REACH_M or shot.ego.speed_mps < lead.speed_mps + _CLOSES_MPS:
+        return False
+    episode = drive_without_program(world, None, STAYS_S, record=False)
+    front = episode.final.front
+    return episode.outcome == "ended" and front is not None and front.distance_m <= IN_REACH_M

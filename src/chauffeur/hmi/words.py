@@ -95,9 +95,16 @@ def passenger_units(text: str, unit: Pace = "km/h") -> str:
     return _LENGTH.sub(lambda match: f"{float(match[1]):.0f} m", told)
 
 
-def trip_words(trip: Trip) -> tuple[str, str, Tone]:
-    """How a trip ended: mark, label and tone. No tick where the person was told something that is not so."""
+def trip_words(trip: Trip, *, timed: bool = False) -> tuple[str, str, Tone]:
+    """How a trip ended: mark, label and tone. No tick where the person was told something that is not so.
+
+    Args:
+        trip: The trip.
+        timed: Whether the label says after how long, where anything was driven.
+    """
     label, tone = outcome_words(trip.outcome)
+    if timed and trip.duration_s:
+        label = f"{label} after {trip.duration_s:.0f} s"
     if tone != "bad" and unexplained(trip.verdicts):
         return MARKS["differs"], f"{label}, not as explained", "neutral"
     signs: dict[Tone, str] = {"good": MARKS["passed"], "bad": MARKS["failed"], "neutral": "■"}
