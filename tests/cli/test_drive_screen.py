@@ -38,7 +38,7 @@ def test_the_outcome_comes_first_then_thoughts_and_program_in_the_passengers_uni
     told, _ = screen(Teller, "Overtake and come back.", "overtake")
     lines = [line.rstrip() for line in told.splitlines()]
     assert lines[0].startswith("✓ Done as asked after ")
-    assert lines[1].strip().startswith("Back in the lane where it began, speed ")
+    assert lines[1].strip().startswith("Past the vehicle ahead, back in the lane where it began, speed ")
     places = [next(i for i, line in enumerate(lines) if word in line) for word in ("Wish", "Thoughts", "Program")]
     assert places == sorted(places)
     assert "def drive():" in told and "def overtake_and_return" not in told

@@ -58,7 +58,7 @@ def test_overtaking_with_a_return_ends_back_in_the_lane(wish: str) -> None:
     assert first.front is not None
     lead = next(other for other in last.others if other.id == first.front.vehicle)
     assert lead.x_m < last.ego.x_m, "and past it"
-    assert "Back in the lane" in end_words(recorded.trip)
+    assert "back in the lane" in end_words(recorded.trip)
     assert drive_again(recorded).trip == recorded.trip
 
 

@@ -18,6 +18,7 @@ from rich.text import Text
 from chauffeur.cli.console import columns, plain
 from chauffeur.cli.labels import EVENTS, NOT_HEARD, RUNGS
 from chauffeur.cli.talk_typed import HELP
+from chauffeur.concept import HELPERS_HEAD
 from chauffeur.drive.talk.messages import (
     Answered,
     Conversation,
@@ -217,7 +218,7 @@ class TalkScreen:
             self._line(now.wish, "memory", "blue", plain(now.remembered))
 
     def _policy(self, now: Conversation) -> None:
-        lines = now.source.strip().splitlines()
+        lines = now.source.partition(HELPERS_HEAD)[0].strip().splitlines()
         more = f"\n... {len(lines) - _MOST_SOURCE} more lines" if len(lines) > _MOST_SOURCE else ""
         text = "\n".join(lines[:_MOST_SOURCE]) + more
         if now.policy == "program" and self._live is not None:

@@ -13,6 +13,7 @@ from chauffeur.concept.errors import (
     ScenarioError,
 )
 from chauffeur.concept.nouns import (
+    HELPERS_HEAD,
     LAMPILOT_LIMITS,
     NOBODY,
     ActionMatrix,
@@ -60,6 +61,7 @@ from chauffeur.concept.scene import (
 from chauffeur.concept.trace import ApiCall, Frame, Intervention, ProgramState
 
 __all__ = [
+    "HELPERS_HEAD",
     "LAMPILOT_LIMITS",
     "NOBODY",
     "ActionMatrix",

@@ -123,15 +123,16 @@ class Program:
         """Program and helper functions as one text, as it is shown; the lines of a drive count in it."""
         if not self.library:
             return self.source
-        return f"{self.source.rstrip()}{_HELPERS}{self.library.rstrip()}\n"
+        return f"{self.source.rstrip()}{HELPERS_HEAD}{self.library.rstrip()}\n"
 
 
-_HELPERS = "\n\n\n# Helper functions that it may call:\n"
+HELPERS_HEAD = "\n\n\n# Helper functions that it may call:\n"
+"""Stands between a program and its helper functions."""
 
 
 def lines_before_library(source: str) -> int:
     """How many lines of `Program.text` stand before its helper functions."""
-    return source.rstrip().count("\n") + _HELPERS.count("\n")
+    return source.rstrip().count("\n") + HELPERS_HEAD.count("\n")
 
 
 @dataclass(frozen=True, slots=True)

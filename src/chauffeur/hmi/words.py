@@ -132,6 +132,8 @@ def end_words(trip: Trip) -> str:
     found = {metric.id: metric.value for metric in trip.metrics}
     unit = pace_of(trip.instruction.text)
     parts: list[str] = []
+    if trip.outcome == "success" and any(tag.startswith("overtake") for tag in trip.plan.intent.split("+")):
+        parts.append("past the vehicle ahead")
     if "end-lane-v1" in found:
         moved = round(found["end-lane-v1"])
         if moved:

@@ -194,7 +194,7 @@ class Conversation:
         why: What was told last, in words.
         thoughts: R of the planner.
         policy: Kind of P (`program`, `parameters`), empty where there is none.
-        source: Program text, or the parameters one a line.
+        source: Program text with its helper functions, or the parameters one a line.
         recalled: What of the person's history was used, in words, one each; conflicts with both sides and dates.
         verdicts: Of the checks.
         said: What the program said to the passenger.
