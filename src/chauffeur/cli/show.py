@@ -163,7 +163,7 @@ class Teller(Quiet):
         if trip.plan.policy is None:
             return
         yield "Thoughts", plain(self._units(trip.plan.thoughts.text.strip()) or "(no reasoning given)")
-        yield "Program", self._program(trip.plan)
+        yield trip.plan.policy.kind.capitalize(), self._program(trip.plan)
         for at_s, text in trip.said:
             yield "Said", Text.assemble("“", plain(text), "”", (f"  after {at_s:.0f} s", "dim"))
         if trip.verdicts:
@@ -171,7 +171,7 @@ class Teller(Quiet):
 
     def _program(self, plan: Plan) -> RenderableType:
         if not isinstance(plan.policy, Program):
-            return plain(policy_words(plan.policy))
+            return plain(self._units(policy_words(plan.policy)))
         more = Text("its helper functions: --full", "dim") if plan.policy.library else Text()
         code = Syntax(plain(plan.policy.source.rstrip("\n")).plain, **_CODE)
         return Group(code, more) if more else code
