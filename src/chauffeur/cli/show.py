@@ -163,7 +163,7 @@ class Teller(Quiet):
         if trip.plan.policy is None:
             return
         yield "Thoughts", plain(self._units(trip.plan.thoughts.text.strip()) or "(no reasoning given)")
-        yield trip.plan.policy.kind.capitalize(), self._program(trip.plan)
+        yield trip.plan.policy.kind.replace("_", " ").capitalize(), self._program(trip.plan)
         for at_s, text in trip.said:
             yield "Said", Text.assemble("“", plain(text), "”", (f"  after {at_s:.0f} s", "dim"))
         if trip.verdicts:
