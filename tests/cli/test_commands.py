@@ -174,15 +174,17 @@ def test_importing_the_command_line_loads_nothing_heavy() -> None:
 def test_a_wish_is_driven_and_everything_is_said(answers: str) -> None:
     result = invoke("drive", WISH, "--planner", answers)
     assert result.exit_code == 0, result.output
-    for words in (WISH, "Left is free.", "def overtake():", "✓", "Drive ended after", "simulated drive", "replay/"):
+    for words in (WISH, "Left is free.", "def overtake():", "✓", "simulated drive"):
         assert words in result.output
+    assert result.output.startswith("■ Drive ended after 5 s"), "what came of it comes first"
     assert "Changing to the [bold]left[/] lane." in result.output, "a program's words are not markup"
     assert "\x1b" not in result.output, "no colour and no moving cursor in a pipe"
 
 
 def test_an_explanation_that_does_not_fit_is_told_and_the_drive_goes_on(answers: str, tmp_path: Path) -> None:
     log = tmp_path / "audit.jsonl"
-    result = invoke("drive", MISTOLD, "--planner", answers, "--save", str(tmp_path), "--audit", str(log))
+    arguments = ("drive", MISTOLD, "--planner", answers, "--save", str(tmp_path), "--full")
+    result = invoke(*arguments, "--audit", str(log))
     assert result.exit_code == 0, result.output
     told = " ".join(result.output.split())
     for words in (
@@ -190,7 +192,7 @@ def test_an_explanation_that_does_not_fit_is_told_and_the_drive_goes_on(answers:
         "wrong side: “I move to the right lane.”, but it changes lanes to the left (line 6)",
         "≠ The drive did not go as explained (score 0.00 of 1, 1 claim compared) alignment-driven-v1",
         "wrong side: “I move to the right lane.”, but it changed lanes to the left",
-        "Drive ended after 5.0 s, not as explained (simulated drive)",
+        "≠ Drive ended after 5 s, not as explained (simulated drive)",
     ):
         assert words in told, words
 
@@ -206,7 +208,7 @@ def test_an_explanation_that_does_not_fit_is_told_and_the_drive_goes_on(answers:
     assert "Wrong side: “I move to the right lane.”, but it changes lanes to the left" in shown
     assert "score 0.00 of 1" in shown
     quiet = invoke("drive", MISTOLD, "--planner", answers, "-q").output
-    assert quiet.strip() == "Drive ended after 5.0 s, not as explained (simulated drive)"
+    assert quiet.strip() == "≠ Drive ended after 5 s, not as explained (simulated drive)"
 
 
 def test_a_recording_from_before_explanations_were_judged_is_read(driven: Path) -> None:

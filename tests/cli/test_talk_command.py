@@ -143,7 +143,7 @@ def test_a_conversation_is_told_once_and_in_order() -> None:
     )  # fmt: skip
     told = [
         "simulated", "the sound stays on this machine", "Memory of ana", "“Slow [red]down[/].” (spoken)", "2026-11-01",
-        "I go slower.", "def drive():", "✓ format-v1", "! alignment-v1 It says left.", "“Slowing [b]down[/b].",
+        "I go slower.", "def drive():", "✓ format-v1", "≠ alignment-v1 It says left.", "“Slowing [b]down[/b].",
         "0.48 s from your words to the changed set-point: waiting 0.20, recognising 0.10, planning 0.03",
         "done", "“too fast”", "remembered as trip 0123", "how was it?", "The car stands. (simulated drive)",
     ]  # fmt: skip

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import re
 
 import pytest
 
+from chauffeur.concept import Program
 from chauffeur.programs import ProgramSyntaxError
 from chauffeur.programs.lower import PRELUDE, needs_prelude
 from chauffeur.programs.rewrite import MAX_SOURCE_CHARS, _prepared, parse, prepare
@@ -70,10 +72,14 @@ def test_delegation_becomes_a_call() -> None:
     assert "    ( h(2))" in prepare(source).program
 
 
-def test_library_ticks_report_the_programs_line() -> None:
-    prepared = prepare("def main():\n    yield from wait(3)\n    yield\n", "def wait(n):\n    yield n\n")
-    assert "__tick__(__site__[0], ( n))" in prepared.helpers
-    assert "(__site__.update({0: 2}), ( wait(3)))[1]" in prepared.program
+def test_library_ticks_report_the_line_of_the_text_that_is_shown() -> None:
+    program = Program("def main():\n    yield from wait(3)\n    yield\n", library="def wait(n):\n    yield n\n")
+    prepared = prepare(program.source, program.library)
+    shown = program.text.splitlines()
+    tick = re.search(r"__tick__\((\d+), \( n\)\)", prepared.helpers)
+    assert tick is not None
+    assert shown[int(tick[1]) - 1] == "    yield n"
+    assert "    ( wait(3))" in prepared.program
 
 
 def test_a_program_with_a_parenthesised_sort_still_parses() -> None:

@@ -36,8 +36,13 @@ def drive(
         typer.Option(help="Where to drive; default one that suits the wish. See `chauffeur show scenarios`."),
     ] = None,
     planner: Annotated[
-        str, typer.Option(help="`onboard`, `keyword`, `openai/<model>`, `replay/<file>`, or an installed one.")
-    ] = "onboard",
+        str,
+        typer.Option(
+            help="`onboard`, `talk2drive`, `keyword`, `openai/<model>`, `replay/<file>`, or an installed one; "
+            "default `onboard`, in a parking lot `talk2drive`.",
+            show_default=False,
+        ),
+    ] = "",
     person: Annotated[str, typer.Option("--as", help="Whose wish it is; their history is recalled and kept.")] = "",
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of the traffic; default the scenario's own.")] = None,
     save: Annotated[Path | None, typer.Option(help="Folder for recording, page and filmstrip.")] = None,
@@ -49,6 +54,9 @@ def drive(
         Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the outcome only.")] = False,
+    full: Annotated[
+        bool, typer.Option("--full", help="Print everything as it comes, in SI units: helpers, scores, provenance.")
+    ] = False,
     browser: Annotated[
         bool, typer.Option("--open/--no-open", help="Open the page of the drive; without --save in ./trips.")
     ] = False,
@@ -58,17 +66,19 @@ def drive(
     from contextlib import ExitStack
 
     from chauffeur.cli.audit import auditor_for, tell_closing
+    from chauffeur.cli.compiling import Compiling
     from chauffeur.cli.console import stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.parts import (
         limits_named,
         not_kept,
+        planner_for,
         planner_named,
         referee_for,
         setting_named,
         standing_sources,
     )
-    from chauffeur.cli.show import Quiet, Teller
+    from chauffeur.cli.show import FullTeller, Quiet, Teller
     from chauffeur.concept import PersonId
     from chauffeur.drive.auditing import told_to, with_head
     from chauffeur.drive.scenarios import find, suiting
@@ -80,8 +90,9 @@ def drive(
     instruction = parse_wish(wish, PersonId(person.strip()))
     bounds = personal_limits(instruction.person, limits_named(limits))
     place = suiting(instruction.text) if scenario is None else find(scenario, data)
+    planner = planner_for(planner, place)
     console = stdout()
-    teller = Quiet(console) if quiet else Teller(console)
+    teller = Quiet(console) if quiet else FullTeller(console) if full else Teller(console)
     session = Session(
         planner=planner_named(planner, base_url, teller.writing),
         memory=fitting(open_memory(), planner) if instruction.person else Forgetful(),
@@ -100,6 +111,7 @@ def drive(
         if private := not_kept(instruction.person):
             console.print(private, style="bold yellow", markup=False)
         stack.enter_context(teller)
+        stack.enter_context(Compiling(teller.compiling))
         recorded = asyncio.run(session.drive(instruction, place, start_seed, bounds))
     closing = None if auditor is None else auditor.close()
     if closing is not None:

@@ -72,6 +72,11 @@ def planner_named(spec: str, base_url: str | None, on_text: Callable[[str, int],
     return make_planner(spec, **options)
 
 
+def planner_for(spec: str, scenario: Scenario) -> str:
+    """The planner that was named, else one that can drive there: in a parking lot the one that parks."""
+    return spec or ("talk2drive" if scenario.world == "parking" else "onboard")
+
+
 def engine_named(spec: str) -> Engine | None:
     """The speech engine a specification names; None for `none`.
 
@@ -88,8 +93,8 @@ def engine_named(spec: str) -> Engine | None:
 
 
 def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
-    """LaMPilot's referee: by the scenario's own goal, else by what the planner understood, else none. In a parking lot,
-    the judge of the spot that is meant.
+    """The judge of a trip: LaMPilot's by the scenario's own goal, else what the planner understood, else none. In a
+    parking lot, the judge of the spot that is meant.
 
     Raises:
         ScenarioError: There is no such spot.

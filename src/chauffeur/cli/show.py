@@ -1,21 +1,23 @@
-"""A drive on the terminal: the loop's letters as they come, a live line while it moves, and what came of it."""
+"""A drive on the terminal: a live line while it moves, then what came of it and why; or everything, as it comes."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
+from rich.columns import Columns
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.padding import Padding
+from rich.progress_bar import ProgressBar
 from rich.syntax import Syntax
 from rich.text import Text
 
 from chauffeur.cli.console import columns, path_text, plain
 from chauffeur.concept import (
-    Alignment,
     Context,
     Frame,
     History,
@@ -32,6 +34,12 @@ from chauffeur.hmi.payload import policy_words
 from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.safety.alignment import mismatch_words, score_words
 
+_CODE: dict[str, Any] = {
+    "lexer": "python",
+    "theme": "ansi_dark",
+    "background_color": "default",
+    "word_wrap": True,
+}
 _STYLES = {"good": "bold green", "bad": "bold red", "neutral": "bold"}
 
 
@@ -52,6 +60,9 @@ class Quiet:
     def begin(self, scenario: Scenario, seed: int) -> None:
         """Before anything happens."""
 
+    def compiling(self, done: int, of: int) -> None:
+        """How far the simulator is compiled."""
+
     def tell(self, letter: str, value: object) -> None:
         """One of the loop's letters, or a frame."""
         if letter == "memory":  # what went wrong with it is said even where little is
@@ -63,20 +74,16 @@ class Quiet:
     def end(self, recorded: RecordedTrip) -> None:
         """What came of it."""
         trip = recorded.trip
-        label, tone = words.outcome_words(trip.outcome)
-        line = Text(label, _STYLES[tone])
-        if recorded.frames:
-            line.append(f" after {trip.duration_s:.1f} s", style="not bold")
-        if words.unexplained(trip.verdicts):
-            line.append(", not as explained", style="yellow")
-        self.console.print(line.append(" (simulated drive)", style="dim"))
+        sign, label, tone = words.trip_words(trip, timed=True)
+        line = Text(f"{sign} {label}", _STYLES[tone])
+        self.console.print(line.append(" (simulated drive)", style="dim not bold"))
 
     def wrote(self, paths: list[Path]) -> None:
         """Files of the trip."""
 
 
 class Teller(Quiet):
-    """Says everything, in the order in which it happens."""
+    """Says first what came of it, then what was wished, thought, driven and checked, in the passenger's units."""
 
     def __init__(self, console: Console) -> None:
         super().__init__(console)
@@ -84,6 +91,9 @@ class Teller(Quiet):
         self._live = Live(console=console, transient=True, refresh_per_second=10) if console.is_terminal else None
         self._waiting = False
         self._reply, self._attempt = "", 0
+        self._unit: words.Pace = "km/h"
+        self._source: tuple[str, ...] = ()
+        self._compiles = False
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -91,31 +101,37 @@ class Teller(Quiet):
         self._still()
 
     def begin(self, scenario: Scenario, seed: int) -> None:
-        """Name the road."""
-        title = plain(scenario.title or scenario.id)
-        self.console.print(Text.assemble(title, f" ({scenario.id}, seed {words.seed_words(seed)})", style="dim"))
+        """Before anything happens."""
+        del seed
+        self.stage(f"Setting up the road: {scenario.title or scenario.id}")
+
+    def stage(self, name: str) -> None:
+        """What is being done now, while there is nothing else to see."""
+        self._live_line(Text.assemble(plain(name), " ..."), "dim")
+
+    def compiling(self, done: int, of: int) -> None:
+        """How far the simulator is compiled: said once where lines stay, shown as it goes where they do not."""
+        said = "Compiling the simulator, once on this machine (about half a minute)"
+        if self._live is not None:
+            count = Text(f"  {done} of up to {of}", "dim")
+            self._live_line(Group(Text(said), Columns([ProgressBar(total=of, completed=done, width=40), count])))
+            self._live.refresh()
+        elif not self._compiles:
+            self.console.print(f"{said} ...", style="dim")
+        self._compiles = True
 
     def tell(self, letter: str, value: object) -> None:
-        """Print a letter as it comes; show a frame on the live line."""
+        """Go on to the next stage; show a frame on the live line. The letters are shown at the end."""
         match value:
             case Frame():
                 self._frame(value)
             case Instruction():
-                said_by = f"  ({value.person})" if value.person else ""
-                self._letter("I", Text.assemble(("“", "dim"), plain(value.text), ("”", "dim"), (said_by, "dim")))
-            case Context():
-                self._letter("C", plain(value.text))
+                self._unit = words.pace_of(value.text)
             case History():
-                self._history(value)
-                self._live_line(Text("planning ...", "dim"))
+                self.stage("Reading the wish")
             case Plan():
-                self._still()
-                self._plan(value)
-            case tuple() if letter == "V":
-                self._still()
-                for verdict in value:
-                    if isinstance(verdict, Verdict):
-                        self._verdict(verdict)
+                self._source = tuple(value.policy.text.splitlines()) if isinstance(value.policy, Program) else ()
+                self.stage("Checking the plan")
             case _:
                 super().tell(letter, value)
 
@@ -127,107 +143,79 @@ class Teller(Quiet):
         self._live_line(Text.assemble(("planning ... ", "dim"), plain(latest)))
 
     def end(self, recorded: RecordedTrip) -> None:
-        """Outcome, causes, scores, provenance."""
+        """What came of it; then the wish, the thoughts, the program, what was said and checked."""
         self._still()
-        trip = recorded.trip
-        self.console.print()
         super().end(recorded)
-        for cause in words.cause_words(trip.causes):
-            self.console.print(Padding(plain(cause), (0, 0, 0, 2)))
+        trip = recorded.trip
         shielded = words.shield_words([change for frame in recorded.frames for change in frame.interventions])
-        if shielded:
-            self.console.print(Padding(plain(shielded), (0, 0, 0, 2)))
-        if trip.metrics:
-            self.console.print(columns((words.metric_name(m.id), words.metric_value(m)) for m in trip.metrics))
-        facts = [f"planner {trip.plan.planner}"]
-        if trip.plan.model:
-            facts.append(f"model {trip.plan.model}")
-        facts.append(f"planned in {trip.plan.latency_s:.2f} s")
-        tokens = trip.plan.usage.prompt_tokens + trip.plan.usage.completion_tokens
-        if tokens:
-            facts.append(f"{tokens} tokens")
-        if trip.plan.usage.cost_usd is not None:
-            facts.append(f"{trip.plan.usage.cost_usd:.4f} USD")
-        record = dict(trip.record)
-        facts.append(f"scenario {trip.scenario} (sha256 {str(record.get('scenario_sha256', ''))[:12]})")
-        facts += [f"seed {words.seed_words(trip.seed)}", f"chauffeur {record.get('chauffeur', '')}", f"trip {trip.id}"]
-        self.console.print(Padding(plain(", ".join(facts)), (0, 0, 0, 2)), style="dim")
+        for told in (*words.cause_words(trip.causes), words.end_words(trip), shielded):
+            if told:
+                self.console.print(Padding(plain(self._units(told)), (0, 0, 0, 2)))
+        self.console.print()
+        self.console.print(columns(self._rows(recorded)))
+
+    def _rows(self, recorded: RecordedTrip) -> Iterator[tuple[str, RenderableType]]:
+        trip = recorded.trip
+        yield "Wish", Text.assemble("“", plain(trip.instruction.text), "”")
+        yield "Road", plain(recorded.scenario.title or recorded.scenario.id)
+        if trip.history.items:
+            yield "Memory", history_words(trip.history)
+        if trip.plan.policy is None:
+            return
+        yield "Thoughts", plain(self._units(trip.plan.thoughts.text.strip()) or "(no reasoning given)")
+        yield trip.plan.policy.kind.replace("_", " ").capitalize(), self._program(trip.plan)
+        for at_s, text in trip.said:
+            yield "Said", Text.assemble("“", plain(text), "”", (f"  after {at_s:.0f} s", "dim"))
+        if trip.verdicts:
+            yield "Checks", self._checks(trip.verdicts)
+
+    def _program(self, plan: Plan) -> RenderableType:
+        if not isinstance(plan.policy, Program):
+            return plain(self._units(policy_words(plan.policy)))
+        more = Text("its helper functions: --full", "dim") if plan.policy.library else Text()
+        code = Syntax(plain(plan.policy.source.rstrip("\n")).plain, **_CODE)
+        return Group(code, more) if more else code
+
+    def _checks(self, verdicts: tuple[Verdict, ...]) -> RenderableType:
+        """Marks side by side, and below them what is not as it should be."""
+        marks: list[Text] = []
+        told: list[RenderableType] = []
+        for verdict in verdicts:
+            if verdict.mark not in ("passed", "open"):
+                told.append(_told(verdict, self._units))
+                continue
+            name = words.check_name(verdict.check)
+            rest = ", not all proven" if verdict.mark == "open" else ""
+            mark = (words.MARKS[verdict.mark], words.MARK_STYLES[verdict.mark])
+            marks.append(Text.assemble(mark, f" {name}{rest}", no_wrap=True))
+        return Group(Columns(marks, padding=(0, 3)), *told)
+
+    def _units(self, text: str) -> str:
+        return words.passenger_units(text, self._unit)
 
     def wrote(self, paths: list[Path]) -> None:
         """List the files."""
         names = {".mcap": "recording", ".html": "page", ".png": "filmstrip"}
         self.console.print(columns((names.get(p.suffix, "file"), path_text(p)) for p in paths))
 
-    def _letter(self, letter: str, body: RenderableType) -> None:
-        self.console.print(columns([(Text(letter, "bold cyan not dim"), body)], indent=0))
-
-    def _history(self, history: History) -> None:
-        if not history.items:
-            return
-        lines: list[Text] = []
-        for item in history.items:
-            told = "; ".join(words.feedback_words(feedback) for feedback in item.feedback)
-            facts = ", ".join(part for part in (item.intent, item.outcome, told) if part)
-            lines.append(Text.assemble("“", plain(item.instruction), "” ", (f"({facts})", "dim")))
-        now = datetime.now(UTC)
-        lines.extend(Text(conflict.to_person(now), "yellow") for conflict in conflicts_in(history))
-        self._letter("H", Text("\n").join(lines))
-
-    def _plan(self, plan: Plan) -> None:
-        if plan.refusal:
-            self._letter("R", Text.assemble(("Declined: ", "bold yellow"), plain(plan.refusal)))
-            return
-        self._thoughts(plan.thoughts, plan.intent)
-        if isinstance(plan.policy, Program):
-            source = plain(policy_words(plan.policy).rstrip("\n")).plain
-            code = Syntax(source, "python", theme="ansi_dark", background_color="default", word_wrap=True)
-            self._letter("P", code)
-        else:
-            self._letter("P", plain(policy_words(plan.policy) or "none"))
-
-    def _thoughts(self, thoughts: Thoughts, intent: str) -> None:
-        body = plain(thoughts.text.strip() or "(no reasoning given)")
-        self._letter("R", Text.assemble(body, (f"  [{intent}]", "dim")) if intent else body)
-
-    def _verdict(self, verdict: Verdict) -> None:
-        if verdict.alignment is not None and not verdict.passed:
-            self._mismatches(verdict.check, verdict.alignment)
-            return
-        mark = Text("✓ ", "green") if verdict.passed else Text("✕ " if verdict.stops else "≠ ", "bold red")
-        # Of what passed, the doubts are on the page and in the recording.
-        reason = verdict.reason.split(". ", 1)[0].rstrip(".") + "." if verdict.passed else verdict.reason
-        where = f"{verdict.check}, line {verdict.line}" if verdict.line else verdict.check
-        body = Text.assemble(mark, plain(reason if verdict.reason else "passed"), (f"  {where}", "dim"))
-        if verdict.remedy and not verdict.passed:
-            body.append_text(Text("\n  ") + plain(verdict.remedy))
-        self._letter("V", body)
-
-    def _mismatches(self, check: str, alignment: Alignment) -> None:
-        """What the explanation says that is not so; nothing stops for it."""
-        title, score = words.doubt_words(check), score_words(alignment)
-        head = Text.assemble(("≠ ", "bold yellow"), (title, "bold"), f" ({score})", (f"  {check}", "dim"))
-        told = [Padding(plain(mismatch_words(mismatch)), (0, 0, 0, 2)) for mismatch in alignment.mismatches]
-        self._letter("V", Group(head, *told))
-
     def _frame(self, frame: Frame) -> None:
-        shot = frame.snapshot
-        for text in frame.said:
-            line = Text.assemble((f"{shot.time_s:6.1f} s  ", "dim"), ("“", "dim"), plain(text), ("”", "dim"))
-            self.console.print(line)
         if self._live is None:
             return
-        parts = [f"{shot.time_s:6.1f} s", f"{words.speed(shot.ego.speed_mps):>20}"]
+        shot = frame.snapshot
+        parts = [f"{shot.time_s:5.1f} s", f"{words.pace(shot.ego.speed_mps, self._unit):>8}"]
         if shot.front is not None:
-            parts.append(f"gap {shot.front.distance_m:5.1f} m")
+            parts.append(f"gap {shot.front.distance_m:3.0f} m")
         if shot.stop_sign_m is not None:
             parts.append(f"stop sign in {shot.stop_sign_m:.0f} m")
-        if frame.line is not None:
-            parts.append(f"line {frame.line}")
-        self._live_line(Text("   ".join(parts)))
+        if frame.line is not None and frame.line <= len(self._source):
+            parts.append(f"▸ {plain(self._source[frame.line - 1].strip()).plain}")
+        self._live_line(Text("   ".join(parts), no_wrap=True, overflow="ellipsis"))
 
-    def _live_line(self, line: Text) -> None:
+    def _live_line(self, line: RenderableType, style: str = "") -> None:
         if self._live is None:
             return
+        if isinstance(line, Text) and style:
+            line.stylize(style)
         if not self._waiting:
             self._live.start()
             self._waiting = True
@@ -237,3 +225,111 @@ class Teller(Quiet):
         if self._live is not None and self._waiting:
             self._live.stop()
             self._waiting = False
+
+
+class FullTeller(Teller):
+    """Says everything in SI units, as it happens: the loop's letters, helpers, scores, provenance."""
+
+    def begin(self, scenario: Scenario, seed: int) -> None:
+        """Name the road."""
+        title = plain(scenario.title or scenario.id)
+        self.console.print(Text.assemble(title, f" ({scenario.id}, seed {words.seed_words(seed)})", style="dim"))
+        super().begin(scenario, seed)
+
+    def tell(self, letter: str, value: object) -> None:
+        """Print a letter as it comes; show a frame on the live line."""
+        if not isinstance(value, Frame | Scenario):
+            self._still()
+        match value:
+            case Instruction():
+                said_by = f"  ({value.person})" if value.person else ""
+                self._letter("I", Text.assemble(("“", "dim"), plain(value.text), ("”", "dim"), (said_by, "dim")))
+            case Context():
+                self._letter("C", plain(value.text))
+            case History() if value.items:
+                self._letter("H", history_words(value))
+            case Plan():
+                self._plan(value)
+            case tuple() if letter == "V":
+                for verdict in value:
+                    if isinstance(verdict, Verdict):
+                        self._verdict(verdict)
+            case Frame():
+                for text in value.said:
+                    at = (f"{value.snapshot.time_s:6.1f} s  ", "dim")
+                    self.console.print(Text.assemble(at, ("“", "dim"), plain(text), ("”", "dim")))
+            case _:
+                pass
+        super().tell(letter, value)
+
+    def _units(self, text: str) -> str:
+        return text
+
+    def _rows(self, recorded: RecordedTrip) -> Iterator[tuple[str, RenderableType]]:
+        """Scores and provenance; the letters have been told."""
+        trip = recorded.trip
+        for metric in trip.metrics:
+            yield words.metric_name(metric.id), words.metric_value(metric)
+        yield "Planner", plain(", ".join(part for part in (trip.plan.planner, trip.plan.model) if part))
+        yield "Planned in", f"{trip.plan.latency_s:.2f} s"
+        tokens = trip.plan.usage.prompt_tokens + trip.plan.usage.completion_tokens
+        if tokens:
+            cost = trip.plan.usage.cost_usd
+            yield "Tokens", f"{tokens}" if cost is None else f"{tokens}, {cost:.4f} USD"
+        record = dict(trip.record)
+        yield "Scenario", plain(f"{trip.scenario} (sha256 {str(record.get('scenario_sha256', ''))[:12]})")
+        yield "Seed", words.seed_words(trip.seed)
+        yield "Chauffeur", f"{record.get('chauffeur', '')}, trip {trip.id}"
+
+    def _letter(self, letter: str, body: RenderableType) -> None:
+        self.console.print(columns([(Text(letter, "bold cyan not dim"), body)], indent=0))
+
+    def _plan(self, plan: Plan) -> None:
+        if plan.refusal:
+            self._letter("R", Text.assemble(("Declined: ", "bold yellow"), plain(plan.refusal)))
+            return
+        self._thoughts(plan.thoughts, plan.intent)
+        if isinstance(plan.policy, Program):
+            source = plain(policy_words(plan.policy).rstrip("\n")).plain
+            self._letter("P", Syntax(source, **_CODE))
+        else:
+            self._letter("P", plain(policy_words(plan.policy) or "none"))
+
+    def _thoughts(self, thoughts: Thoughts, intent: str) -> None:
+        body = plain(thoughts.text.strip() or "(no reasoning given)")
+        self._letter("R", Text.assemble(body, (f"  [{intent}]", "dim")) if intent else body)
+
+    def _verdict(self, verdict: Verdict) -> None:
+        if verdict.mark in ("differs", "failed"):
+            self._letter("V", _told(verdict, self._units, check=True))
+            return
+        # Of what passed, the doubts are on the page and in the recording.
+        reason = verdict.reason.split(". ", 1)[0].rstrip(".") + "." if verdict.reason else "passed"
+        mark = Text(f"{words.MARKS[verdict.mark]} ", words.MARK_STYLES[verdict.mark])
+        self._letter("V", Text.assemble(mark, plain(reason), (f"  {verdict.check}", "dim")))
+
+
+def history_words(history: History) -> Text:
+    """What is remembered that bears on the wish, a line each, and what of it contradicts itself."""
+    lines: list[Text] = []
+    for item in history.items:
+        told = "; ".join(words.feedback_words(feedback) for feedback in item.feedback)
+        facts = ", ".join(part for part in (item.intent, item.outcome, told) if part)
+        lines.append(Text.assemble("“", plain(item.instruction), "” ", (f"({facts})", "dim")))
+    now = datetime.now(UTC)
+    lines.extend(Text(conflict.to_person(now), "yellow") for conflict in conflicts_in(history))
+    return Text("\n").join(lines)
+
+
+def _told(verdict: Verdict, units: Callable[[str], str], *, check: bool = False) -> RenderableType:
+    """A verdict that is not as it should be: what is wrong and, of an explanation, each thing that is not so."""
+    mark = Text(f"{words.MARKS[verdict.mark]} ", words.MARK_STYLES[verdict.mark])
+    where = f"{verdict.check}, line {verdict.line}" if verdict.line else verdict.check
+    tail = (f"  {where}", "dim") if check else ("", "")
+    if verdict.alignment is not None:
+        title, score = words.doubt_words(verdict.check), f" ({score_words(verdict.alignment)})" if check else ""
+        told = [plain(units(mismatch_words(mismatch))) for mismatch in verdict.alignment.mismatches]
+        head = Text.assemble(mark, (title, "bold"), score, tail)
+        return Group(head, *(Padding(line, (0, 0, 0, 2)) for line in told))
+    body = Text.assemble(mark, plain(units(verdict.reason)), tail)
+    return Group(body, Padding(plain(verdict.remedy), (0, 0, 0, 2))) if verdict.remedy else body

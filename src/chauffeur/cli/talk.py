@@ -46,8 +46,13 @@ def talk(
     ] = None,
     person: Annotated[str, typer.Option("--as", help="Whose wishes they are; their memory is used.")] = "",
     planner: Annotated[
-        str, typer.Option(help="`onboard`, `talk2drive`, `keyword`, `openai/<model>`, or an installed one.")
-    ] = "onboard",
+        str,
+        typer.Option(
+            help="`onboard`, `talk2drive`, `keyword`, `openai/<model>`, or an installed one; "
+            "default `onboard`, in a parking lot `talk2drive`.",
+            show_default=False,
+        ),
+    ] = "",
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint of the planner.")] = None,
     scenario: Annotated[str | None, typer.Option(help="Where to drive; default one that suits the first wish.")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of the traffic; default the scenario's own.")] = None,
@@ -100,14 +105,14 @@ def talk(
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.interrupts import Interrupts
     from chauffeur.cli.lines import Lines, standard_input
-    from chauffeur.cli.parts import engine_named, limits_named, not_kept, planner_named
+    from chauffeur.cli.parts import engine_named, limits_named, not_kept, planner_for, planner_named
     from chauffeur.cli.talk_drive import TalkDrive
     from chauffeur.cli.talk_screen import TalkScreen
     from chauffeur.concept import PersonId, SandboxError
     from chauffeur.drive.live.books import Books, unanswered
     from chauffeur.drive.live.settings import Settings
     from chauffeur.drive.live.starts import Start
-    from chauffeur.drive.scenarios import find, suiting
+    from chauffeur.drive.scenarios import find, seeds_with_lead, suiting
     from chauffeur.drive.session import make_world, parse_wish
     from chauffeur.drive.surroundings import services_file
     from chauffeur.drive.talk.session import WELL, Talk
@@ -119,11 +124,13 @@ def talk(
     who = PersonId(person.strip())
     given = [parse_wish(wish, who).text for wish in wishes or ()]
     place = find(scenario or _QUIET_ROAD) if scenario or not given else suiting(given[0])
-    first = place.seed if seed is None else seed
+    planner = planner_for(planner, place)
     bounds = personal_limits(who, limits_named(limits))
     trips = math.ceil(duration / _TRIP_S)
+    seeds = seeds_with_lead(place, place.seed if seed is None else seed, trips)
+    first = seeds[0] if seed is None else seed  # a seed that was asked for is driven, whoever is on the road
     settings = Settings(
-        starts=tuple(Start(place, first + number, bounds, duration) for number in range(trips)),
+        starts=tuple(Start(place, number, bounds, duration) for number in (first, *seeds[1:])),
         planner=planner,
         base_url=base_url,
         memory=chosen_memory() if who else "",

@@ -18,6 +18,7 @@ from rich.text import Text
 from chauffeur.cli.console import columns, plain
 from chauffeur.cli.labels import EVENTS, NOT_HEARD, RUNGS
 from chauffeur.cli.talk_typed import HELP
+from chauffeur.concept import HELPERS_HEAD
 from chauffeur.drive.talk.messages import (
     Answered,
     Conversation,
@@ -222,7 +223,7 @@ class TalkScreen:
             self._line(now.wish, "memory", "blue", plain(now.remembered))
 
     def _policy(self, now: Conversation) -> None:
-        lines = now.source.strip().splitlines()
+        lines = now.source.partition(HELPERS_HEAD)[0].strip().splitlines()
         more = f"\n... {len(lines) - _MOST_SOURCE} more lines" if len(lines) > _MOST_SOURCE else ""
         text = "\n".join(lines[:_MOST_SOURCE]) + more
         if now.policy == "program" and self._live is not None:
@@ -313,8 +314,8 @@ def stages_in_words(stages: Stages) -> str:
 def _verdicts(verdicts: tuple[VerdictShown, ...]) -> Text:
     found = Text()
     for verdict in verdicts:
-        sign, style = ("✓", "green") if verdict.passed else (("!", "yellow") if verdict.informs else ("✗", "bold red"))
-        found.append(f"{sign} ", style).append_text(plain(verdict.check)).append("  ")
+        mark = verdict.mark
+        found.append(f"{words.MARKS[mark]} ", words.MARK_STYLES[mark]).append_text(plain(verdict.check)).append("  ")
         if not verdict.passed:
             found.append_text(plain(verdict.reason)).append("  ")
     return found

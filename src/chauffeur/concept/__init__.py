@@ -13,6 +13,7 @@ from chauffeur.concept.errors import (
     ScenarioError,
 )
 from chauffeur.concept.nouns import (
+    HELPERS_HEAD,
     LAMPILOT_LIMITS,
     NOBODY,
     ActionMatrix,
@@ -25,6 +26,7 @@ from chauffeur.concept.nouns import (
     Instruction,
     Lead,
     Limits,
+    Mark,
     Metric,
     Mismatch,
     MismatchKind,
@@ -43,6 +45,8 @@ from chauffeur.concept.nouns import (
     Trip,
     Usage,
     Verdict,
+    lines_before_library,
+    mark_of,
 )
 from chauffeur.concept.scene import (
     Command,
@@ -57,6 +61,7 @@ from chauffeur.concept.scene import (
 from chauffeur.concept.trace import ApiCall, Frame, Intervention, ProgramState
 
 __all__ = [
+    "HELPERS_HEAD",
     "LAMPILOT_LIMITS",
     "NOBODY",
     "ActionMatrix",
@@ -79,6 +84,7 @@ __all__ = [
     "LaneView",
     "Lead",
     "Limits",
+    "Mark",
     "Metric",
     "Mismatch",
     "MismatchKind",
@@ -109,4 +115,6 @@ __all__ = [
     "VehicleState",
     "Verdict",
     "Wishes",
+    "lines_before_library",
+    "mark_of",
 ]

@@ -118,6 +118,22 @@ class Program:
     kind: Literal["program"] = "program"
     library: str = ""
 
+    @property
+    def text(self) -> str:
+        """Program and helper functions as one text, as it is shown; the lines of a drive count in it."""
+        if not self.library:
+            return self.source
+        return f"{self.source.rstrip()}{HELPERS_HEAD}{self.library.rstrip()}\n"
+
+
+HELPERS_HEAD = "\n\n\n# Helper functions that it may call:\n"
+"""Stands between a program and its helper functions."""
+
+
+def lines_before_library(source: str) -> int:
+    """How many lines of `Program.text` stand before its helper functions."""
+    return source.rstrip().count("\n") + HELPERS_HEAD.count("\n")
+
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
@@ -369,6 +385,17 @@ class Alignment:
     claims: int
 
 
+Mark = Literal["passed", "open", "differs", "failed"]
+"""Of a verdict: right; nothing known to be wrong, and not proven; wrong, which stops nothing; wrong."""
+
+
+def mark_of(*, passed: bool, vetoes: bool, proven: bool = True) -> Mark:
+    """The one place where it is decided what deserves a tick."""
+    if passed:
+        return "passed" if proven else "open"
+    return "failed" if vetoes else "differs"
+
+
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """What one check thinks of a plan.
@@ -381,6 +408,8 @@ class Verdict:
         remedy: What would make it pass.
         vetoes: Whether a plan that does not pass is not driven; otherwise the verdict informs.
         alignment: Of a check that compares R with P or with what P did: what it found.
+        proven: Whether what passed was shown to be right; otherwise nothing is known to be wrong, and `reason` tells
+            what stayed open.
     """
 
     check: str
@@ -390,6 +419,12 @@ class Verdict:
     remedy: str = ""
     vetoes: bool = True
     alignment: Alignment | None = None
+    proven: bool = True
+
+    @property
+    def mark(self) -> Mark:
+        """How it is marked wherever it is shown: only what was shown to be right gets a tick."""
+        return mark_of(passed=self.passed, vetoes=self.vetoes, proven=self.proven)
 
     @property
     def stops(self) -> bool:

@@ -53,7 +53,7 @@ class Frame:
         requested: What the driver asked for.
         applied: What the world really did, after clipping.
         program: State of the program.
-        line: Program line it waits at (1-based), if it runs.
+        line: Line of `Program.text` it waits at (1-based), if it runs: in a helper function, that function's own.
         said: Texts told to the passenger in this period.
         calls: Driving-API calls made in this period.
         interventions: What the run-time shield changed in what the driver asked for.

@@ -75,7 +75,7 @@ def effect_of(episode: Episode) -> Effect | None:
         gaps_m=_gaps(first, last),
         turned=round(_turn_rad(first.ego.heading_rad, last.ego.heading_rad) / (math.pi / 2.0)),
         failed=episode.causes.policy_failed or episode.causes.infra_failed,
-        cut=episode.success or last.ego.crashed or last.off_road,
+        cut=(episode.success and episode.frames[-1].program == "running") or last.ego.crashed or last.off_road,
     )
 
 

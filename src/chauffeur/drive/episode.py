@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from chauffeur.concept import (
     ApiCall,
@@ -32,7 +32,7 @@ from chauffeur.worlds.base import EGO, World
 FALLBACK_S = 10.0
 """How long the fallback drives after a policy failed, before the trip is ended."""
 AFTER_END_S = 3.0
-"""How long a trip without a goal goes on after its program finished."""
+"""How long a trip without a referee goes on after its program finished."""
 
 
 class PolicyTick(Protocol):
@@ -81,6 +81,20 @@ class Referee(Protocol):
     def success(self) -> bool: ...
     def outcome(self) -> Outcome: ...
     def metrics(self) -> tuple[Metric, ...]: ...
+
+
+@runtime_checkable
+class FollowsPolicy(Protocol):
+    """What a referee offers that judges a trip by what its policy asks for."""
+
+    def follow(self, setpoints: Wishes, state: ProgramState) -> None:
+        """The set-points of a control period, and the program's state, before `observe`."""
+        ...
+
+    @property
+    def shortfall(self) -> str:
+        """What is missing, in words; empty when nothing is."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,13 +148,13 @@ def run_episode(
     hands: Hands | None = None,
     shield: Shield | None = None,
 ) -> Episode:
-    """Drive until the goal is decided, the world ends, the program has ended, or `max_s` simulated seconds passed.
+    """Drive until the referee says that it is over, the world ends, the program has ended, or `max_s` have passed.
 
     Args:
         world: A world just reset.
         policy: What states the wishes; None leaves the world's own driver alone (the IDM baseline).
-        referee: Judge of the goal; None drives freely.
-        max_s: Bound of the trip in simulated time.
+        referee: Says when it is over and what came of it; None drives on until the program has ended.
+        max_s: Bound of the trip in simulated time, s.
         record: Whether to keep frames (a benchmark does not need them).
         adjust: Baseline that rewrites settled wishes each period, e.g. MOBIL's lane choice.
         watch: Called with each recorded frame, for live display.
@@ -195,6 +209,8 @@ def run_episode(
             if watch is not None:
                 watch(frame)
         if referee is not None:
+            if isinstance(referee, FollowsPolicy):
+                referee.follow(wishes, tick.state)
             referee.observe()
             if referee.over and failure is None:
                 break
@@ -206,13 +222,14 @@ def run_episode(
                 break
     final = world.snapshot()
     success = referee is not None and referee.success and failure is None
+    shortfall = referee.shortfall if isinstance(referee, FollowsPolicy) and failure is None else ""
     return Episode(
         frames=tuple(frames),
         final=final,
         ticks=ticks,
         duration_s=round(ticks * world.dt_s, 3),
         outcome=_outcome(final, referee, failure),
-        causes=_causes(failure, fallback_used=hands is None),
+        causes=_causes(failure, fallback_used=hands is None) if failure is not None else Causes(detail=shortfall),
         metrics=() if referee is None else referee.metrics() if failure is None else _void(referee.metrics()),
         said=tuple(said),
         success=success,
@@ -240,9 +257,7 @@ def _outcome(final: Snapshot, referee: Referee | None, failure: ChauffeurError |
     return "ended" if referee is None else referee.outcome()
 
 
-def _causes(failure: ChauffeurError | None, *, fallback_used: bool) -> Causes:
-    if failure is None:
-        return Causes()
+def _causes(failure: ChauffeurError, *, fallback_used: bool) -> Causes:
     infra = isinstance(failure, SandboxError)
     return Causes(policy_failed=not infra, infra_failed=infra, fallback_used=fallback_used, detail=str(failure))
 

@@ -161,6 +161,7 @@ VERDICTS = Channel(
                 remedy=_text(),
                 vetoes=_FLAG,
                 alignment={"type": ["object", "null"]},
+                proven=_FLAG,
             )
         )
     ),

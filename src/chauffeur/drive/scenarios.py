@@ -7,7 +7,12 @@ import os
 import re
 from pathlib import Path
 
-from chauffeur.concept import Scenario, ScenarioError
+from chauffeur.concept import Scenario, ScenarioError, Snapshot
+from chauffeur.drive.session import drive_without_program, make_world
+from chauffeur.planners.onboard.meaning import Manoeuvre, Reading
+from chauffeur.planners.onboard.understand import understand
+from chauffeur.planners.talk2drive.style import place_of
+from chauffeur.worlds.base import World
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 from chauffeur.worlds.highway.scenarios import BUILT_IN as ROADS
 from chauffeur.worlds.parking.scenarios import BUILT_IN as LOTS
@@ -18,11 +23,26 @@ DATA_VARIABLE = "CHAUFFEUR_LAMPILOT"
 """Environment variable naming a DbLv1 folder, used when no folder is given."""
 
 _CROSSING = re.compile(r"\b(intersection|crossroads?|crossing|junction|stop sign|turn|lights?)\b", re.IGNORECASE)
-_STOPPING = re.compile(
-    r"\b(pull(ing)? (over|up|off|in)|shoulder|emergency lane|hard shoulder|park|let me out|drop)\b", re.I
-)
-_FOLLOWING = re.compile(r"\b(gap|distance|room|space|behind|tailgat\w*|bumper|follow\w*|close\w*|headway)\b", re.I)
-_RIGHTWARD = re.compile(r"\bright\b", re.IGNORECASE)
+_SHOULDER = re.compile(r"\b(shoulder|emergency lane|hard shoulder)\b", re.IGNORECASE)
+_LOT = re.compile(r"\b(park|parking|spots?|bays?|stalls?)\b", re.IGNORECASE)
+_PLACES = {"stadium": "parking-stadium", "exit": "parking-exit"}
+_ROADS: dict[Manoeuvre, str] = {
+    "turn": "intersection",
+    "pull_over": "emergency-lane",
+    "stop": "emergency-lane",
+    "gap": "following",
+    "follow": "following",
+    "yield": "following",
+}
+"""The road that can carry a manoeuvre; what is in none of these goes to the highway with a vehicle to overtake."""
+
+IN_REACH_M = 100.0
+"""So far ahead a vehicle counts as one to follow or to overtake."""
+_CLOSES_MPS = 2.0
+"""Faster than the vehicle ahead by this much, the car comes up to it and stays behind it."""
+_TRIES = 60
+STAYS_S = 40.0
+"""How long a vehicle ahead stays in reach at least, on roads that keep one."""
 
 
 def find_data(folder: Path | None) -> Dataset | None:
@@ -63,14 +83,53 @@ def find(name: str, data_dir: Path | None = None) -> Scenario:
 
 
 def suiting(wish: str) -> Scenario:
-    """The built-in scenario whose road lets the wish be shown: a crossing for a turn, a shoulder for a stop."""
+    """The built-in scenario whose road lets the wish be shown: a crossing for a turn, a lot for a spot.
+
+    The wish is read as a planner reads it; its first part decides.
+    """
     by_id = {scenario.id: scenario for scenario in BUILT_IN}
-    if _STOPPING.search(wish):
-        return by_id["emergency-lane"]
+    if _LOT.search(wish) and not _SHOULDER.search(wish):
+        return by_id[_PLACES.get(place_of(wish), "parking")]
+    reading = understand(wish)
+    first = reading.steps[0] if isinstance(reading, Reading) else None
+    if first is not None and first.manoeuvre in _ROADS and not (first.manoeuvre == "stop" and _CROSSING.search(wish)):
+        return by_id[_ROADS[first.manoeuvre]]
+    if first is not None and first.manoeuvre in ("lane", "overtake"):
+        return by_id["left-lane" if first.direction == "right" else "overtake"]
     if _CROSSING.search(wish):
         return by_id["intersection"]
-    if _FOLLOWING.search(wish):
-        return by_id["following"]
-    if _RIGHTWARD.search(wish):
-        return by_id["left-lane"]
+    if first is not None and first.manoeuvre == "speed" and first.change <= 0 and first.variant != "match":
+        return by_id["cruise"]  # a speed of one's own needs room ahead
     return by_id["overtake"]
+
+
+def seeds_with_lead(scenario: Scenario, first: int, count: int) -> tuple[int, ...]:
+    """Seeds from `first` on for drives that follow one another on this scenario's road.
+
+    Where the scenario has a vehicle ahead, as one to overtake, every one of them has: one in reach that the car comes
+    up to, since what drives as fast as the car slips out of reach while nobody wishes anything.
+
+    Raises:
+        ScenarioError: The scenario cannot be set up.
+    """
+    world = make_world(scenario)
+    given = world.reset(scenario, scenario.seed)
+    if given.kind != "highway" or given.front is None or given.front.distance_m > IN_REACH_M:
+        return tuple(range(first, first + count))
+    found: list[int] = []
+    for seed in range(first, first + _TRIES * count):
+        if _keeps_lead(world, world.reset(scenario, seed)):
+            found.append(seed)
+        if len(found) == count:
+            return tuple(found)
+    return tuple(range(first, first + count))
+
+
+def _keeps_lead(world: World, shot: Snapshot) -> bool:
+    """Whether a world just reset has a vehicle ahead in reach, and still has while nobody wishes anything."""
+    lead = shot.front
+    if lead is None or lead.distance_m > IN_REACH_M or shot.ego.speed_mps < lead.speed_mps + _CLOSES_MPS:
+        return False
+    episode = drive_without_program(world, None, STAYS_S, record=False)
+    front = episode.final.front
+    return episode.outcome == "ended" and front is not None and front.distance_m <= IN_REACH_M

@@ -180,7 +180,7 @@ def _title(draw: ImageDraw.ImageDraw, recorded: RecordedTrip, shielded: str) -> 
     room = (_WIDTH - 2 * _MARGIN) * k
     font = _font(_TITLE_PX)
     draw.text((_MARGIN * k, _MARGIN * k), _fit(draw, f'"{trip.instruction.text}"', font, room), _INK, font)
-    label, _ = words.outcome_words(trip.outcome)
+    _, label, _ = words.trip_words(trip)
     facts = (
         f"{label}   |   {trip.plan.planner or 'no planner'}   |   {trip.scenario}, seed {words.seed_words(trip.seed)}"
     )

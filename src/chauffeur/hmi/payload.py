@@ -41,7 +41,7 @@ Json = dict[str, Any]
 def page_payload(recorded: RecordedTrip) -> Json:
     """Everything the page shows."""
     trip = recorded.trip
-    label, tone = words.outcome_words(trip.outcome)
+    _, label, tone = words.trip_words(trip)
     return {
         "simulated": words.simulated(recorded.scenario.world),
         "wish": trip.instruction.text,
@@ -57,7 +57,7 @@ def page_payload(recorded: RecordedTrip) -> Json:
         "policy": policy_words(trip.plan.policy),
         "verdicts": [
             {"check": v.check, "passed": v.passed, "reason": _reason(v), "line": v.line, "remedy": v.remedy}
-            | {"vetoes": v.vetoes}
+            | {"vetoes": v.vetoes, "mark": v.mark, "sign": words.MARKS[v.mark]}
             for v in trip.verdicts
         ],
         "mismatches": [
@@ -65,7 +65,12 @@ def page_payload(recorded: RecordedTrip) -> Json:
             for one in _mismatches(trip)
         ],
         "shield": _shield(recorded),
-        "outcome": {"label": label, "tone": tone, "causes": words.cause_words(trip.causes)},
+        "outcome": {
+            "label": label,
+            "tone": tone,
+            "causes": words.cause_words(trip.causes),
+            "end": words.end_words(trip),
+        },
         "duration": round(trip.duration_s, 2),
         "metrics": [
             {"id": m.id, "name": words.metric_name(m.id), "value": words.metric_value(m), "applies": m.applies}
@@ -102,9 +107,7 @@ def policy_words(policy: Policy | None) -> str:
     if policy is None:
         return ""
     if isinstance(policy, Program):
-        if not policy.library:
-            return policy.source
-        return f"{policy.source.rstrip()}\n\n\n# Helper functions that it may call:\n{policy.library.rstrip()}\n"
+        return policy.text
     if isinstance(policy, Parameters):
         names = ("target_speed_mps", "look_ahead_m", "look_ahead_ratio")
         rows = [words.setting(name, float(getattr(policy, name))) for name in names]

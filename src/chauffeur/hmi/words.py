@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final, Literal
 
-from chauffeur.concept import Causes, Command, Feedback, Intervention, Metric, Outcome, Verdict
-from chauffeur.concept.units import kmh
+from chauffeur.concept import Causes, Command, Feedback, Intervention, Mark, Metric, Outcome, Trip, Verdict
+from chauffeur.concept.units import kmh, mph
 from chauffeur.safety.alignment import ALIGNMENT_CHECK, DRIVEN_CHECK
 
 Tone = Literal["good", "bad", "neutral"]
@@ -45,6 +45,12 @@ _METRICS = {
     "speed-variance": "Smooth-speed score",
     "time-efficiency": "Time-efficiency score",
     "score": "Driving score",
+    "asked-speed": "Planned speed",
+    "asked-gap": "Planned gap",
+    "end-speed": "Speed at the end",
+    "end-gap": "Gap at the end",
+    "end-lane": "Lanes to the right at the end",
+    "held": "Held as asked for",
 }
 
 _SUFFIXES = (
@@ -54,6 +60,105 @@ _SUFFIXES = (
     ("_m", "m"),
     ("_s", "s"),
 )
+
+
+MARKS: Final[dict[Mark, str]] = {"passed": "✓", "open": "~", "differs": "≠", "failed": "✕"}
+"""Signs of verdicts; which one a verdict gets is its own to say."""
+MARK_STYLES: Final[dict[Mark, str]] = {
+    "passed": "green",
+    "open": "yellow",
+    "differs": "bold yellow",
+    "failed": "bold red",
+}
+
+Pace = Literal["km/h", "mph"]
+"""Units of speed that people drive by."""
+
+_MPH: Final = re.compile(r"\b(?:mph|miles? (?:per|an) hour)\b", re.IGNORECASE)
+_SPEED: Final = re.compile(r"(?<![\w.])(\d{1,4}(?:\.\d{1,9})?) m/s(?![²2^\w/])(?: \([^()\n]{1,40}\))?")
+_LENGTH: Final = re.compile(r"(?<![\w.])(\d{1,5}\.\d{1,9}) m(?![\w/])")
+
+
+def pace_of(wish: str) -> Pace:
+    """The unit of speed for a person, by the words of their wish."""
+    return "mph" if _MPH.search(wish) else "km/h"
+
+
+def pace(speed_mps: float, unit: Pace = "km/h") -> str:
+    """A speed for the passenger: `85 km/h`."""
+    return f"{(mph if unit == 'mph' else kmh)(speed_mps):.0f} {unit}"
+
+
+def passenger_units(text: str, unit: Pace = "km/h") -> str:
+    """A text with its m/s in the person's unit and its metres whole; what stood in brackets behind was that, too."""
+    told = _SPEED.sub(lambda match: pace(float(match[1]), unit), text)
+    return _LENGTH.sub(lambda match: f"{float(match[1]):.0f} m", told)
+
+
+def trip_words(trip: Trip, *, timed: bool = False) -> tuple[str, str, Tone]:
+    """How a trip ended: mark, label and tone. No tick where the person was told something that is not so.
+
+    Args:
+        trip: The trip.
+        timed: Whether the label says after how long, where anything was driven.
+    """
+    label, tone = outcome_words(trip.outcome)
+    if timed and trip.duration_s:
+        label = f"{label} after {trip.duration_s:.0f} s"
+    if tone != "bad" and unexplained(trip.verdicts):
+        return MARKS["differs"], f"{label}, not as explained", "neutral"
+    signs: dict[Tone, str] = {"good": MARKS["passed"], "bad": MARKS["failed"], "neutral": "■"}
+    return signs[tone], label, tone
+
+
+_CHECKS: Final = {
+    "format": "driving language",
+    "parameters": "numbers fit",
+    "reach": "within limits",
+    "alignment": "explanation",
+    "alignment-driven": "drove as explained",
+    "shield": "shield",
+}
+
+
+def check_name(check: str) -> str:
+    """A versioned check id as a few words."""
+    name = _VERSION.sub("", check)
+    return _CHECKS.get(name, name.replace("-", " "))
+
+
+def end_words(trip: Trip) -> str:
+    """What the drive came to, in numbers beside those that were asked for; empty where nothing was measured."""
+    found = {metric.id: metric.value for metric in trip.metrics}
+    unit = pace_of(trip.instruction.text)
+    parts: list[str] = []
+    if trip.outcome == "success" and any(tag.startswith("overtake") for tag in trip.plan.intent.split("+")):
+        parts.append("past the vehicle ahead")
+    if "end-lane-v1" in found:
+        moved = round(found["end-lane-v1"])
+        if moved:
+            side = "left" if moved < 0 else "right"
+            count = "one lane" if abs(moved) == 1 else f"{abs(moved)} lanes"
+            parts.append(f"{count} to the {side} of where it began")
+        elif _changes_lanes(trip.plan.intent):
+            parts.append("back in the lane where it began")
+    if "end-gap-v1" in found:
+        parts.append(_beside("gap", found["end-gap-v1"], found.get("asked-gap-v1"), lambda gap: f"{gap:.0f} m"))
+    if "end-speed-v1" in found:
+        wanted = found.get("asked-speed-v1")
+        parts.append(_beside("speed", found["end-speed-v1"], wanted, lambda speed: pace(speed, unit)))
+    text = ", ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
+def _changes_lanes(intent: str) -> bool:
+    return any(tag.startswith(("overtake", "lane.left", "lane.right")) for tag in intent.split("+"))
+
+
+def _beside(name: str, value: float, asked: float | None, told: Callable[[float], str]) -> str:
+    if asked is None:
+        return f"{name} {told(value)}"
+    return f"{name} {told(value)} ({told(asked)} planned)"
 
 
 def outcome_words(outcome: Outcome) -> tuple[str, Tone]:

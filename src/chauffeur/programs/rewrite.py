@@ -2,8 +2,9 @@
 
 `yield E` becomes `__tick__(line, (E))`, a call that the host answers one control period later; `yield autopilot()`, the
 commonest, becomes `__drive__(line)`, which is both calls in one; `yield from f(...)` becomes `f(...)`, since the
-helper's own yields reach the host by themselves. Only those few characters change, and what `lower` does: every
-statement keeps its line, so the sandbox's tracebacks name the lines the model wrote.
+helper's own yields reach the host by themselves, with lines that count on from the program's as in `Program.text`. Only
+those few characters change, and what `lower` does: every statement keeps its line, so the sandbox's tracebacks name the
+lines the model wrote.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from functools import lru_cache
 from itertools import count
 from typing import Final
 
+from chauffeur.concept import lines_before_library
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.foresight import DRIVE, TICK, apis_named, closing, stand_ins
 from chauffeur.programs.lower import PRELUDE, Lowering, apply_edits, needs_prelude
@@ -26,7 +28,6 @@ MAX_SOURCE_CHARS: Final = 20_000
 MAX_NODES: Final = 5_000
 MAX_DEPTH: Final = 40
 
-_SITE: Final = "__site__"
 _BINDINGS: Final = "_chauffeur_bindings"
 _GENERATOR: Final = "_chauffeur_generator"
 _BINDING: Final = (
@@ -228,20 +229,19 @@ def _prepared(source: str, library: str) -> Prepared:
             hint="Write a function without parameters that yields autopilot() once per control period.",
         )
     library_tree = parse(library, "library")
-    library_generators = top_level_generators(library_tree) - generator_names(tree)
     stood_in = apis_named((tree, library_tree))
     helpers = stand_ins(stood_in)
     if needs_prelude(tree) or needs_prelude(library_tree):
         helpers += PRELUDE
     if library_tree.body:
-        helpers += f"{_rewrite(library, library_tree, frozenset(), in_library=True)}\n{_SITE} = {{0: 0}}\n"
-    program = _rewrite(source, tree, library_generators, in_library=False)
+        helpers += f"{_rewrite(library, library_tree, lines_before_library(source))}\n"
+    program = _rewrite(source, tree)
     # The first tick stands before the main call: a started program has run its top level and waits like a generator.
     program = f"{program}\n{TICK}(0, None)\n{closing(main.name)}"
     return Prepared(helpers, program, main.name, main.lineno, stood_in)
 
 
-def _rewrite(source: str, tree: ast.Module, library_generators: frozenset[str], *, in_library: bool) -> str:
+def _rewrite(source: str, tree: ast.Module, lines_before: int = 0) -> str:
     text = source.encode()
     lowering = Lowering(text, tree)
     edits = lowering.edits()
@@ -251,7 +251,7 @@ def _rewrite(source: str, tree: ast.Module, library_generators: frozenset[str], 
             raise ProgramSyntaxError("A yield cannot stand inside an f-string.", line=node.lineno)
         if isinstance(node, ast.Yield):
             start, end = lowering.span(node)
-            line = f"{_SITE}[0]" if in_library else f"{node.lineno}"
+            line = f"{lines_before + node.lineno}"
             if node.value is not None and not redefined and _is_autopilot(node.value):
                 breaks = "\n" * text.count(b"\n", start, end)
                 edits.append((start, end, f"{DRIVE}({line}{breaks})".encode()))
@@ -262,11 +262,7 @@ def _rewrite(source: str, tree: ast.Module, library_generators: frozenset[str], 
             start, end = lowering.span(node)
             keyword = _YIELD_FROM.match(text, start)
             assert keyword is not None  # the node starts with these two words
-            opening, closing = "(", ")"
-            if not in_library and called_name(node.value) in library_generators:
-                # A tick inside the library reports the program line that called it.
-                opening, closing = f"({_SITE}.update({{0: {node.lineno}}}), (", "))[1]"
-            edits += [(start, keyword.end(), opening.encode()), (end, end, closing.encode())]
+            edits += [(start, keyword.end(), b"("), (end, end, b")")]
     return apply_edits(text, edits).decode()
 
 

@@ -103,7 +103,7 @@ def judged(report: Verification, where: Circumstances, limits: Limits) -> Verdic
         return Verdict(REACH_CHECK, True, "Everything the program can come to fits the situation.")
     more = f" And {len(doubts) - _MAX_SHOWN} more." if len(doubts) > _MAX_SHOWN else ""
     reason = f"Nothing is known to be beyond the limits. Not proven or odd: {' '.join(doubts[:_MAX_SHOWN])}{more}"
-    return Verdict(REACH_CHECK, True, reason)
+    return Verdict(REACH_CHECK, True, reason, proven=False)
 
 
 def _placed(finding: _Finding) -> str:

@@ -1,43 +1,23 @@
-"""A referee for free drives: judges what the planner says it understood, by LaMPilot's success conditions.
+"""Who judges a trip on a highway world: LaMPilot's referee where the scenario brings a goal, else the wish itself.
 
-An official sample brings its own goal, and that alone decides there. Where a scenario has none, the goal is read from
-the plan's intent and numbers; it then shows whether the car did what was understood, not whether that was what the
-person meant. Wishes that LaMPilot has no condition for (a style, two things in a row) are driven without a goal.
+An official sample's own goal alone decides there. A free drive ends when what was understood is done and held
+(`drive/fulfilment.py`); LaMPilot's scores are measured along the way, its success conditions are not.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
-
+from chauffeur.bench.lampilot.metrics import metrics_of
 from chauffeur.bench.lampilot.referee import LampilotReferee
-from chauffeur.concept import Plan, Scenario, ScenarioError
+from chauffeur.bench.lampilot.signals import SignalLog
+from chauffeur.concept import Metric, Outcome, Plan, ProgramState, Scenario, Wishes
 from chauffeur.drive.episode import Referee
+from chauffeur.drive.fulfilment import Fulfilment, can_be_judged
 from chauffeur.worlds.base import World
 from chauffeur.worlds.highway import HighwayWorld
 
-_EXITS = {"left": ["il1", "o1", 0], "straight": ["il2", "o2", 0], "right": ["il3", "o3", 0]}
-
-
-def goal_understood(plan: Plan) -> dict[str, Any]:
-    """LaMPilot goal for a plan's intent; empty where none fits."""
-    manoeuvre, _, detail = plan.intent.partition(".")
-    settings = dict(plan.settings)
-    if manoeuvre in ("overtake", "lane") and detail in ("left", "right"):
-        return {"type": "OvertakeEval" if manoeuvre == "overtake" else "LaneChangeEval", "direction": detail}
-    if manoeuvre == "turn" and detail in _EXITS:
-        return {"type": "IntersectionEval", "direction": _EXITS[detail]}
-    if plan.intent == "pull_over":
-        return {"type": "PullOverEval"}
-    if manoeuvre == "speed" and "target_speed_mps" in settings:
-        return {"type": "ACCEvalbySpeed", "speed": settings["target_speed_mps"]}
-    if manoeuvre == "gap" and "gap_m" in settings:
-        return {"type": "ACCEvalbyDistance", "distance": settings["gap_m"]}
-    return {}
-
 
 def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
-    """Judge of a trip: by the scenario's own goal, else by what was understood, else none.
+    """Judge of a trip; None where nobody says what was to be done.
 
     Raises:
         ScenarioError: The scenario's own goal cannot be judged.
@@ -46,10 +26,46 @@ def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
         return None
     if scenario.goal:
         return LampilotReferee(world, scenario)
-    goal = goal_understood(plan)
-    if not goal:
-        return None
-    try:
-        return LampilotReferee(world, replace(scenario, goal=goal))
-    except ScenarioError:
-        return None  # e.g. a gap wish with nobody ahead: the drive itself still shows what the car does
+    return ScoredFulfilment(world, plan) if can_be_judged(plan) else None
+
+
+class ScoredFulfilment:
+    """The referee of a free drive, with LaMPilot's scores beside it."""
+
+    def __init__(self, world: HighwayWorld, plan: Plan) -> None:
+        self._road = world.perception()
+        self._log = SignalLog(self._road)
+        self._wish = Fulfilment(world, plan)
+
+    def follow(self, setpoints: Wishes, state: ProgramState) -> None:
+        """What the policy asks for in this control period."""
+        self._wish.follow(setpoints, state)
+
+    def observe(self) -> None:
+        """Look at the instant after a control period."""
+        self._log.observe(self._road.instant())
+        self._wish.observe()
+
+    @property
+    def over(self) -> bool:
+        """Whether the wish is done, or will not be."""
+        return self._wish.over
+
+    @property
+    def success(self) -> bool:
+        """Whether all of it is done, and holds."""
+        return self._wish.success
+
+    @property
+    def shortfall(self) -> str:
+        """What is missing, in words."""
+        return self._wish.shortfall
+
+    def outcome(self) -> Outcome:
+        """What came of it, collisions apart."""
+        return self._wish.outcome()
+
+    def metrics(self) -> tuple[Metric, ...]:
+        """What was asked for and reached; LaMPilot's scores by its own ruler."""
+        scores = metrics_of({"success": self.success, "signals": self._log.signals().as_row()})
+        return (*self._wish.metrics(), *scores)

@@ -194,10 +194,10 @@ class Conversations:
 
 
 def source_of(policy: Policy) -> str:
-    """P as text: a program as it stands, parameters one a line."""
+    """P as text: a program with the helper functions it runs through, parameters one a line."""
     match policy:
         case Program():
-            return policy.source
+            return policy.text
         case Parameters():
             speed = policy.target_speed_mps
             lines = [

@@ -45,4 +45,4 @@ def _as_told(verdicts: tuple[Verdict, ...], event: Event) -> bool:
 
 
 def _shown(verdict: Verdict, *, informs: bool = False) -> VerdictShown:
-    return VerdictShown(verdict.check, verdict.passed, verdict.reason, informs or not verdict.vetoes)
+    return VerdictShown(verdict.check, verdict.passed, verdict.reason, informs or not verdict.vetoes, verdict.proven)

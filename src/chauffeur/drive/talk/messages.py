@@ -11,7 +11,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from chauffeur.concept import LaneId
+from chauffeur.concept import LaneId, Mark, mark_of
 from chauffeur.drive.live.messages import MessageError
 
 MOST_TEXT: Final = 2000
@@ -150,6 +150,12 @@ class VerdictShown:
     passed: bool
     reason: str
     informs: bool = False
+    proven: bool = True
+
+    @property
+    def mark(self) -> Mark:
+        """How it is marked."""
+        return mark_of(passed=self.passed, vetoes=not self.informs, proven=self.proven)
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +194,7 @@ class Conversation:
         why: What was told last, in words.
         thoughts: R of the planner.
         policy: Kind of P (`program`, `parameters`), empty where there is none.
-        source: Program text, or the parameters one a line.
+        source: Program text with its helper functions, or the parameters one a line.
         recalled: What of the person's history was used, in words, one each; conflicts with both sides and dates.
         verdicts: Of the checks.
         said: What the program said to the passenger.

@@ -69,13 +69,16 @@ function fillProgram() {
   return [...list.children];
 }
 
+/* What a mark looks like and is called; which one a verdict gets was decided where it was judged. */
+const MARKS = { passed: ['pass', 'passed'], open: ['open', 'not proven'], differs: ['doubt', 'does not fit'], failed: ['fail', 'not passed'] };
+
 function fillVerdicts() {
   if (!trip.verdicts.length) $('verdicts').append(make('li', 'No check was run.', 'none'));
   for (const verdict of trip.verdicts) {
-    const look = verdict.passed ? ['pass', '✓', 'passed'] : verdict.vetoes ? ['fail', '✕', 'not passed'] : ['doubt', '≠', 'does not fit'];
-    const item = make('li', null, look[0]);
-    const icon = make('b', look[1]);
-    icon.setAttribute('aria-label', look[2]);
+    const [look, said] = MARKS[verdict.mark];
+    const item = make('li', null, look);
+    const icon = make('b', verdict.sign);
+    icon.setAttribute('aria-label', said);
     icon.setAttribute('role', 'img');
     const where = verdict.line ? `${verdict.check}, line ${verdict.line}` : verdict.check;
     item.append(icon, make('span', verdict.reason || (verdict.passed ? 'Passed.' : 'Not passed.')));
@@ -91,6 +94,7 @@ function fillResults() {
   for (const cause of trip.outcome.causes) $('causes').append(make('li', cause));
   const scores = $('scores');
   pair(scores, 'Outcome', trip.outcome.label);
+  if (trip.outcome.end) pair(scores, 'At the end', trip.outcome.end);
   pair(scores, 'Time driven', `${trip.duration.toFixed(1)} s`);
   for (const metric of trip.metrics) {
     const dd = pair(scores, metric.name, metric.value, metric.id);

@@ -89,7 +89,7 @@ export function makeConversation() {
 
   /* What did not pass is always seen; what passed, on demand. */
   function checks(wish, entry) {
-    const [passed, failed] = [wish.verdicts.filter((one) => one.passed), wish.verdicts.filter((one) => !one.passed)];
+    const [passed, failed] = [wish.verdicts.filter(proven), wish.verdicts.filter((one) => !proven(one))];
     const all = make('details', { class: 'checked', open: entry.checked },
       make('summary', { 'data-part': 'checks' }, make('span', { class: 'sign', 'aria-hidden': 'true', text: '✓' }), ` ${passed.length} passed: ${passed.map((one) => checkName(one.check)).join(', ')}`),
       make('ul', { class: 'verdicts' }, ...passed.map(verdict)));
@@ -97,10 +97,16 @@ export function makeConversation() {
     return [failed.length ? make('ul', { class: 'verdicts' }, ...failed.map(verdict)) : null, passed.length ? all : null].filter(Boolean);
   }
 
+  /* Only what was shown to be right gets a tick. */
+  function proven(one) {
+    return one.passed && one.proven !== false;
+  }
+
   function verdict(one) {
-    const outcome = one.passed ? 'passed' : one.informs ? 'did not pass, which stops nothing' : 'did not pass';
-    return make('li', { class: one.passed ? 'passed' : 'failed' },
-      make('span', { class: 'sign', 'aria-hidden': 'true', text: one.passed ? '✓' : '✕' }),
+    const open = one.passed && !proven(one);
+    const outcome = open ? 'found nothing wrong, and did not prove all' : one.passed ? 'passed' : one.informs ? 'did not pass, which stops nothing' : 'did not pass';
+    return make('li', { class: open ? 'open' : one.passed ? 'passed' : 'failed' },
+      make('span', { class: 'sign', 'aria-hidden': 'true', text: open ? '~' : one.passed ? '✓' : one.informs ? '≠' : '✕' }),
       make('span', {}, make('b', { text: `${checkName(one.check)} ${outcome}` }), one.reason ? `: ${one.reason}` : ''));
   }
 

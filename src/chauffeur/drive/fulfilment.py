@@ -1,0 +1,318 @@
+"""When a free drive is over: once what was understood of the wish has been done, all of it, and held for a moment.
+
+A benchmark has goals of its own, and ends the instant one is met. A passenger who says "overtake and come back" has not
+been served in the left lane, nor one who wants 40 m when 38 m flash by. So a free drive is judged by the policy and
+what its plan says of it: every part of `Plan.intent` is done in its order, the set-points (lane, speed, gap) are
+reached and held, and a program that still has something to do has done it. This shows whether the car did what was
+understood, not whether that was what the person meant.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, Literal
+
+from chauffeur.concept import LaneId, Metric, Outcome, Plan, ProgramState, Snapshot, VehicleState, Wishes
+from chauffeur.concept.units import M_PER_CAR_LENGTH
+from chauffeur.control.pure_pursuit import Path
+from chauffeur.worlds.base import World
+
+HELD_S: Final = 2.5
+"""How long everything has to be as asked."""
+THROUGH_S: Final = 1.0
+"""The same behind a crossing: the way back is none, and the road may end."""
+SETTLES_S: Final = 12.0
+"""How long the set-points of a program that has ended have time to be reached."""
+SPEED_MPS: Final = 0.8
+"""A speed this near the one asked for is that speed (3 km/h): a vehicle far ahead already takes half of it."""
+SET_MPS: Final = 0.3
+"""A set-point that changes by more while it is held is still on its way."""
+GAP_M: Final = 1.0
+GAP_SHARE: Final = 0.03
+"""A gap is the one asked for within 1 m, or 3 % where that is more."""
+STANDING_MPS: Final = 0.6
+"""Slower is standing: the highway simulator's driver rocks about a standstill by one period's braking, 0.5 m/s."""
+IN_LANE_M: Final = 0.6
+"""The car is in a lane once its middle is this near the lane's."""
+
+_STEPS: Final = frozenset({"overtake", "lane"})
+"""What may take several steps: a program that is still at it may have one to go, e.g. coming back."""
+_SETS_SPEED: Final = _STEPS | {"turn", "pull_over", "speed", "style", "stop", "yield", "resume", "keep", "park"}
+"""Parts that may write the plan's target speed; of one name, the last in a plan counts."""
+_QUARTERS: Final = {"left": -1, "straight": 0, "right": 1}
+
+Bound = Literal["exact", "at_most", "at_least"]
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """One part of what was understood.
+
+    Attributes:
+        kind: First part of its intent: `overtake`, `gap`, ...
+        detail: The rest: `left`, `set`, ...
+        speed_mps, gap_m, headway_s: Numbers that go with it, where the plan names them.
+    """
+
+    kind: str
+    detail: str
+    speed_mps: float | None = None
+    gap_m: float | None = None
+    headway_s: float | None = None
+
+    @property
+    def bound(self) -> Bound:
+        """Whether the number is to be met or only kept to."""
+        bounds: dict[str, Bound] = {"cap": "at_most", "floor": "at_least"}
+        return bounds.get(self.detail, "exact")
+
+
+def asked_of(plan: Plan) -> tuple[Ask, ...]:
+    """The parts of a plan's intent in their order; empty where the planner does not say what it understood."""
+    tags = [tag.partition(".") for tag in plan.intent.split("+") if tag]
+    numbers = dict(plan.settings)
+    asks: list[Ask] = []
+    for place, (kind, _, detail) in enumerate(tags):
+        later = {after for after, _, _ in tags[place + 1 :]}
+        speed = numbers.get("target_speed_mps") if kind in _SETS_SPEED and not later & _SETS_SPEED else None
+        follows = kind in ("gap", "follow", "yield") and not later & {"gap", "follow", "yield"}
+        gap, headway = (numbers.get("gap_m"), numbers.get("time_headway_s")) if follows else (None, None)
+        asks.append(Ask(kind, detail, speed, gap, headway))
+    return tuple(asks)
+
+
+_JUDGED: Final = _SETS_SPEED | {"gap", "follow"}
+"""Parts of which it is known when they are done."""
+
+
+def can_be_judged(plan: Plan) -> bool:
+    """Whether a plan says what it understood, in words of which it is known when they are done."""
+    asks = asked_of(plan)
+    return bool(asks) and all(ask.kind in _JUDGED for ask in asks)
+
+
+class Fulfilment:
+    """The referee of a free drive; make it right after the world was reset."""
+
+    def __init__(self, world: World, plan: Plan) -> None:
+        """Args: the world; the plan that is about to be driven, one that `can_be_judged`."""
+        self._world = world
+        self._asks = asked_of(plan)
+        self._start = world.snapshot()
+        self._began = self._start
+        self._done = 0
+        self._lead: int | None = None
+        self._passed = ""
+        self._held = self._ended = 0
+        self._setpoints, self._state = Wishes(), "none"
+        self._set_mps = math.nan
+
+    def follow(self, setpoints: Wishes, state: ProgramState) -> None:
+        """What the policy asks for in this control period, before it is seen what came of it."""
+        self._setpoints, self._state = setpoints, state
+
+    def observe(self) -> None:
+        """Look at the instant after a control period."""
+        shot = self._world.snapshot()
+        self._mind_the_lead(shot)
+        holds = self._met(self._asks[self._done], shot) and self._in_lane(shot)
+        self._held = self._held + 1 if holds else 0
+        self._ended = self._ended + 1 if self._state == "finished" else 0
+        if self._holds and self._done < len(self._asks) - 1:
+            self._done, self._held, self._began = self._done + 1, 0, shot
+            self._lead, self._passed = None, ""
+
+    @property
+    def _held_s(self) -> float:
+        return self._held * self._world.dt_s
+
+    @property
+    def _holds(self) -> bool:
+        """Whether the part that is being done has been held for long enough."""
+        return self._held_s >= (THROUGH_S if self._asks[self._done].kind == "turn" else HELD_S)
+
+    @property
+    def success(self) -> bool:
+        """Whether all of it is done, and holds."""
+        return self._done == len(self._asks) - 1 and self._holds
+
+    @property
+    def over(self) -> bool:
+        """Whether it is done with nothing left to do, or the program has ended and it will not be done any more."""
+        if self._state == "running" and any(ask.kind in _STEPS for ask in self._asks):
+            return False
+        return self.success or self._ended * self._world.dt_s >= SETTLES_S
+
+    def outcome(self) -> Outcome:
+        """What came of it, collisions apart: not done by a program that ended, or not in the time there was."""
+        if self.success:
+            return "success"
+        return "failure" if self._state == "finished" else "timeout"
+
+    @property
+    def shortfall(self) -> str:
+        """What is missing, in a sentence; empty when nothing is."""
+        if self.success:
+            return ""
+        ask, shot = self._asks[self._done], self._world.snapshot()
+        missing = _MISSING.get(ask.kind, "The car did not settle as planned.")
+        if ask.kind == "overtake" and self._passed and not self._in_lane(shot):
+            missing = "The vehicle ahead was passed, but the car is not in the lane it was to end in."
+        front = shot.front
+        slow = front is not None and front.distance_m < _HELD_UP_M and front.speed_mps < self._wanted_mps(ask)
+        if slow and ask.kind in ("speed", "style"):
+            missing = "The vehicle ahead held the car up."
+        later = len(self._asks) - 1 - self._done
+        return f"{missing} {later} more to do after it." if later else missing
+
+    def metrics(self) -> tuple[Metric, ...]:
+        """What was asked for in numbers, and what there was at the end."""
+        shot, last = self._world.snapshot(), self._asks[-1]
+        found: list[Metric] = []
+        for ask in self._asks:
+            if ask.kind in ("speed", "style", "resume") and ask.speed_mps is not None:
+                found.append(Metric("asked-speed-v1", ask.speed_mps, "m/s"))
+            gap = _gap_asked(ask, shot)
+            if gap is not None:
+                found.append(Metric("asked-gap-v1", gap, "m"))
+        if shot.kind != "parking":
+            found.append(Metric("end-speed-v1", shot.ego.speed_mps, "m/s"))
+        if shot.front is not None and last.kind in ("gap", "follow", "yield", "style"):
+            found.append(Metric("end-gap-v1", shot.front.distance_m, "m"))
+        if shot.kind == "highway" and shot.ego.lane is not None and self._start.ego.lane is not None:
+            found.append(Metric("end-lane-v1", float(shot.ego.lane[2] - self._start.ego.lane[2]), "lanes"))
+        return (*found, Metric("held-v1", self._held_s, "s", applies=self.success))
+
+    # The parts ------------------------------------------------------------------------------------------------------
+
+    def _met(self, ask: Ask, shot: Snapshot) -> bool:
+        match ask.kind:
+            case "overtake":
+                return self._passed == (ask.detail or self._passed) != ""
+            case "lane" if ask.detail in ("left", "right"):
+                return _moved(self._began, shot) * _QUARTERS[ask.detail] > 0
+            case "turn":
+                return self._out_of_the_crossing(shot) and self._turned(shot) == _QUARTERS.get(ask.detail)
+            case "pull_over":
+                return shot.ego.speed_mps < STANDING_MPS and self._on_emergency_lane(shot)
+            case "stop":
+                return shot.ego.speed_mps < STANDING_MPS
+            case "speed":
+                return ask.speed_mps is None or _near(shot.ego.speed_mps, ask.speed_mps, SPEED_MPS, ask.bound)
+            case "style":  # a mood has no number of its own: its set-point, which may follow traffic, comes to rest
+                speed = self._setpoints.target_speed_mps
+                return speed is None or (self._set_for(speed) and abs(shot.ego.speed_mps - speed) <= SPEED_MPS)
+            case "gap" | "yield" | "follow":
+                gap = _gap_asked(ask, shot)
+                if gap is None or shot.front is None:
+                    return gap is None or ask.gap_m is None  # a headway to whoever comes is kept while nobody does
+                if ask.kind == "follow":
+                    return _near(shot.front.distance_m, gap, max(GAP_M, GAP_SHARE * gap), "at_least")
+                return _near(shot.front.distance_m, gap, max(GAP_M, GAP_SHARE * gap), ask.bound)
+            case _:
+                return True
+
+    def _set_for(self, speed_mps: float) -> bool:
+        """Whether the set-point is that from which it was last seen to move."""
+        if not abs(speed_mps - self._set_mps) <= SET_MPS:  # nor is the first one, which is compared with no number
+            self._set_mps = speed_mps
+            return False
+        return True
+
+    def _wanted_mps(self, ask: Ask) -> float:
+        return ask.speed_mps if ask.speed_mps is not None else self._setpoints.target_speed_mps or 0.0
+
+    def _mind_the_lead(self, shot: Snapshot) -> None:
+        """Keep an eye on whom this part is to pass, and on which side it is passed."""
+        if self._asks[self._done].kind != "overtake":
+            return
+        if self._lead is None:
+            front = self._began.front if self._began.front is not None else shot.front
+            self._lead = None if front is None else front.vehicle
+        lead = next((other for other in shot.others if other.id == self._lead), None)
+        if lead is None or lead.lane is None or shot.ego.lane is None:
+            return
+        ahead = _ahead_m(shot.ego, lead)
+        if ahead > 0.0:
+            self._passed = ""
+        elif not self._passed and ahead <= -(shot.ego.length_m + lead.length_m) / 2.0:
+            beside = shot.ego.lane[2] - lead.lane[2]
+            self._passed = "left" if beside < 0 else "right" if beside > 0 else ""
+
+    def _in_lane(self, shot: Snapshot) -> bool:
+        """Whether the car is in the lane that is its set-point, and not still on its way there."""
+        lane, wanted = shot.ego.lane, self._setpoints.target_lane
+        if lane is None or shot.off_road:
+            return False
+        if wanted is not None and (lane != wanted if lane[:2] == wanted[:2] else lane[2] != wanted[2]):
+            return False
+        path = self._paths.get(lane)
+        if path is None or shot.kind == "parking":
+            return True
+        return abs(path.offset(shot.ego.x_m, shot.ego.y_m, path.nearest(shot.ego.x_m, shot.ego.y_m))) <= IN_LANE_M
+
+    @cached_property
+    def _paths(self) -> dict[LaneId, Path]:
+        return {lane.id: Path.of(lane.centre_m) for lane in self._start.lanes}
+
+    def _on_emergency_lane(self, shot: Snapshot) -> bool:
+        return any(lane.emergency and lane.id == shot.ego.lane for lane in self._start.lanes)
+
+    def _out_of_the_crossing(self, shot: Snapshot) -> bool:
+        """Whether the car is on a road that leads away."""
+        here = next((lane for lane in self._start.lanes if lane.id == shot.ego.lane), None)
+        return here is not None and all(
+            math.dist(here.centre_m[-1], other.centre_m[0]) > _JOINT_M for other in self._start.lanes
+        )
+
+    def _turned(self, shot: Snapshot) -> int:
+        """Quarter turns to the right since the start; y grows to the right of +x in these worlds."""
+        turned = math.remainder(shot.ego.heading_rad - self._start.ego.heading_rad, 2.0 * math.pi)
+        return round(turned / (math.pi / 2.0))
+
+
+_HELD_UP_M: Final = 80.0
+_JOINT_M: Final = 0.5
+_MISSING: Final = {
+    "overtake": "The vehicle ahead was not passed.",
+    "lane": "The car is not in the lane that was asked for.",
+    "turn": "The car did not come through the turn that was asked for.",
+    "pull_over": "The car does not stand on the shoulder.",
+    "stop": "The car does not stand.",
+    "speed": "The speed was not reached.",
+    "style": "The speed that was planned was not reached.",
+    "gap": "The gap was not reached.",
+    "yield": "The gap was not reached.",
+    "follow": "The gap was not reached.",
+}
+"""What is missing while a part is not done."""
+
+
+def _near(value: float, asked: float, within: float, bound: Bound) -> bool:
+    low = value >= asked - within
+    high = value <= asked + within
+    return low and high if bound == "exact" else low if bound == "at_least" else high
+
+
+def _gap_asked(ask: Ask, shot: Snapshot) -> float | None:
+    """The gap that is to be kept, m, centre to centre; of a time headway, at the present speed."""
+    if ask.gap_m is not None:
+        return ask.gap_m
+    if ask.headway_s is None or ask.kind not in ("gap", "follow"):
+        return None
+    return M_PER_CAR_LENGTH + ask.headway_s * shot.ego.speed_mps
+
+
+def _moved(first: Snapshot, last: Snapshot) -> int:
+    """Lanes to the right."""
+    if first.ego.lane is None or last.ego.lane is None:
+        return 0
+    return last.ego.lane[2] - first.ego.lane[2]
+
+
+def _ahead_m(ego: VehicleState, other: VehicleState) -> float:
+    """Way along the ego to the middle of another, negative behind it."""
+    dx, dy = other.x_m - ego.x_m, other.y_m - ego.y_m
+    return dx * math.cos(ego.heading_rad) + dy * math.sin(ego.heading_rad)
