@@ -86,11 +86,10 @@ import time
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
-from chauffeur.drive.talk import Talk
+from chauffeur.drive.talk.session import Talk
 from chauffeur.drive.talk.messages import Say, Stop
-from chauffeur.concept import Limits
 if __name__ == "__main__":
-    with Talk(Settings((Start(find("overtake"), 17, Limits(), 120.0),), planner="onboard"), print) as session:
+    with Talk(Settings((Start(find("overtake"), 17),), planner="onboard"), print) as session:
         session.take(Say("Overtake the car in front of you."))
         until = time.monotonic() + 14.0  # telemetry waits some ten seconds before it sends for the first time
         while session.driving and time.monotonic() < until:
