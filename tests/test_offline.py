@@ -125,5 +125,7 @@ def test_what_somebody_has_set_deliberately_is_kept() -> None:
 def test_every_process_that_imports_the_package_has_them_off() -> None:
     code = "import os, json, chauffeur; print(json.dumps(dict(os.environ)))"
     bare = {name: value for name, value in os.environ.items() if name not in SWITCHES}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=bare, timeout=60, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=bare, timeout=60, check=True
+    )
     assert SWITCHES.items() <= json.loads(done.stdout).items()

@@ -77,7 +77,8 @@ def _walk(tree: Any) -> tuple[str, list[tuple[str, str]]]:
         elif kind is op.IN:
             text += _char(value)
         elif kind is op.BRANCH:
-            text += [inside(branch) for branch in value[1]][0]
+            first, *_ = [inside(branch) for branch in value[1]]
+            text += first
         elif kind is op.SUBPATTERN:
             text += inside(value[3])
         elif kind is op.ATOMIC_GROUP:

@@ -27,8 +27,8 @@ from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Interaction
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import make_world
-from chauffeur.drive.talk.asking import Words
 from chauffeur.drive.talk import judging
+from chauffeur.drive.talk.asking import Words
 from chauffeur.drive.talk.conversations import MOST_SAID_SHOWN, Conversations, recalled_of, source_of
 from chauffeur.drive.talk.judging import JUDGED, verdicts_of
 from chauffeur.drive.talk.messages import Conversation, HowWasIt
@@ -184,7 +184,7 @@ def test_nobody_waits_for_verdicts(monkeypatch: pytest.MonkeyPatch) -> None:
     assert list(told.conversations.look(15.0)) == []
     assert list(told.conversations.look(15.0)) == []
     may_go_on.set()
-    assert [each.check for each in told.judged().verdicts][0] == "format-v1"
+    assert told.judged().verdicts[0].check == "format-v1"
 
 
 @pytest.mark.parametrize("thoughts", ["1" * 8000, "1 " * 4000, "1." * 4000, "(" * 8000, "the left lane " * 570])

@@ -73,7 +73,7 @@ class Judge:
         while (case := self._cases.get()) is not None:
             try:
                 verdicts = verdicts_of(case.plan, case.snapshot, case.limits, case.event)
-            except Exception:  # what was told is shown, whatever is wrong with the checks
+            except Exception:  # noqa: BLE001 - what was told is shown, whatever is wrong with the checks
                 _log.exception("a plan could not be judged again")
                 verdicts = (_told(case.event),)
             with self._changed:
