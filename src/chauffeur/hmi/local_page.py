@@ -184,7 +184,6 @@ class LocalPage:
         # Its messages about strangers' broken handshakes are no concern of the person's terminal.
         quiet = logging.getLogger("chauffeur.hmi.local_page")
         quiet.setLevel(logging.CRITICAL)
-        encrypted = {} if self._tls is None else {"ssl": self._tls, "ssl_handshake_timeout": AT_THE_DOOR_S}
         try:
             self._door = _Door.at(self._host, port)
             server = await serve(
@@ -197,7 +196,8 @@ class LocalPage:
                 open_timeout=AT_THE_DOOR_S,
                 close_timeout=1,
                 backlog=_BACKLOG,
-                **encrypted,
+                ssl=self._tls,
+                ssl_handshake_timeout=None if self._tls is None else AT_THE_DOOR_S,
             )
         except OSError as error:
             where = f"Port {port}" if self._host == HOST else f"{self._host}, port {port},"
