@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import zlib
 from functools import cache
 
@@ -13,12 +14,15 @@ from fuzz.words import changed
 
 MAX_CHARS = 600
 """Of the explanation; most thoughts are shorter."""
+LONGEST_CHARS, WITHIN_S = 8000, 3.0
+"""The longest thoughts that a planner hands on, and their share of a processor; one text in sixteen is stretched."""
 _WHERE = Surroundings(25.0, 30.0, 40.0, 20.0, 100.0, crossing=True)
 _TEXTS = (
     "The passenger is in a hurry. First I check whether the left lane is free, then I overtake at 30 m/s and go back.",
     "I slow down by 10 mph and keep a gap of two seconds to the car ahead; after five seconds I resume 100 km/h.",
     "I do not change lanes. If the car ahead is slower than 20 m/s I pass it on the right, otherwise I stay behind.",
     "I stop at the sign, wait 3 seconds until the crossing traffic has passed, and turn left at the intersection.",
+    "1" * 500,
     "I pull over to the right and stay there. The headway goes up from 1.5 to 2.5 s, unless somebody is close behind.",
 )
 
@@ -41,6 +45,10 @@ def examine(data: bytes) -> str:
     facts = _facts()[number % len(_facts())]
     found = judge(text[:MAX_CHARS], facts, _WHERE if number % 3 else None)
     _holds(found)
+    if text and number % 16 == 0:
+        before = time.thread_time()
+        judge((text * (LONGEST_CHARS // len(text) + 1))[:LONGEST_CHARS], facts, _WHERE)
+        expect(time.thread_time() - before < WITHIN_S, "a long text takes too long")
     read_facts(text)
     return f"{min(found.claims, 10)} claims, {'fits' if found.aligned else 'does not fit'}"
 
@@ -55,8 +63,8 @@ def _holds(found: Alignment) -> None:
 TARGET = Target(
     name="explanations",
     invariant=(
-        "No explanation and no program makes the reading of either raise; a judgement's score, verdict and mismatches "
-        "agree."
+        "No explanation and no program makes the reading of either raise, or take seconds; a judgement's score, "
+        "verdict and mismatches agree."
     ),
     reads=("chauffeur.safety.alignment", "chauffeur.language"),
     seeds=seeds,

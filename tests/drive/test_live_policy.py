@@ -242,3 +242,42 @@ def test_a_plan_without_a_program_is_refused(rig: Rig) -> None:
     rig.period()
     (event,) = rig.told()
     assert (event.kind, event.text) == ("refused", "I cannot fly.")
+
+
+GROWS = """
+def drive():
+    kept = []
+    while True:
+        kept.append("x" * 400000 + str(len(kept)))
+        yield autopilot()
+"""
+LEAPS = """
+def drive():
+    yield autopilot()
+    kept = ["x" * 400000 + str(i) for i in range(18)]
+    while True:
+        yield autopilot()
+"""
+
+
+def test_a_program_that_grows_is_not_put_down_beyond_its_ring_and_ends_with_its_process(rig: Rig) -> None:
+    rig.period(2)
+    rig.order(GROWS)
+    rig.period(8)
+    head = rig.rings.checkpoints.head
+    rig.period(8)
+    assert rig.rings.checkpoints.head == head
+    assert rig.kinds() == [("started", "w1")]
+    rig.die()
+    assert rig.period().plan == ""  # an older state of it is not taken up again
+    assert rig.kinds() == [("interrupted", "w1")]
+
+
+def test_a_program_that_fails_of_being_put_down_has_failed_and_the_policy_goes_on(rig: Rig) -> None:
+    rig.period(2)
+    rig.order(LEAPS)
+    assert rig.period(6).state == "failed"
+    assert rig.kinds() == [("started", "w1"), ("failed", "w1")]
+    rig.order(HOLD_20, "w2")
+    wish = rig.period()
+    assert (wish.plan, wish.state, wish.wishes.target_speed_mps) == ("w2", "running", 20.0)

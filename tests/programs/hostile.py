@@ -213,6 +213,22 @@ FLOODS = [
         prints_and_calls="while True:\n    print('x' * 100)\n    get_target_speed()",
     ),
     *_make("flood", "time memory calls", prints="while True:\n    print('x' * 1000)"),
+    *_make(
+        "flood",
+        "calls",
+        wishes_that_wait="for i in range(1000):\n    for j in range(50):\n        set_target_speed(20.0 + j)\n"
+        "    get_target_speed()",
+    ),
+    *_make(
+        "flood",
+        "harmless",
+        says="while True:\n    for i in range(150):\n        say('a' * 490)\n    yield autopilot()",
+    ),
+    *_make(
+        "flood",
+        "memory crash",
+        leaping_state="kept = ['x' * 400000 + str(i) for i in range(18)]\nwhile kept:\n    yield autopilot()",
+    ),
     *_make("flood", "raised", long_say="say('a' * 10 ** 6)"),
     *_make("flood", "raised memory", huge_say="say('a' * 10 ** 7)"),
 ]
@@ -286,7 +302,7 @@ TAMPERING = [
             " ('set_target_speed', [[]]), ('set_target_speed', 5.0, 6.0)])\nyield\n" * 3
         ),
     ),
-    Hostile("tamper/waiting_flood", frozenset({"harmless"}), _body("__pending__.extend([[]] * 10 ** 5)\nyield\n" * 3)),
+    Hostile("tamper/waiting_flood", frozenset({"calls"}), _body("__pending__.extend([[]] * 10 ** 5)\nyield\n" * 3)),
     Hostile(
         "tamper/wish_call",
         frozenset({"harmless"}),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import time
@@ -12,16 +13,20 @@ from straight_road import LANES, StraightRoad
 
 from chauffeur.concept import LaneId, Program, SandboxError, Wishes
 from chauffeur.programs import (
+    UNHURRIED,
     Budget,
     ProgramCallsError,
     ProgramCrashError,
     ProgramExecutor,
+    ProgramMemoryError,
     ProgramRaisedError,
     ProgramRecursionError,
     ProgramRefusedError,
     ProgramTimeError,
     Sandbox,
 )
+from chauffeur.programs.catalogue import APIS, MAX_SAID
+from chauffeur.programs.rewrite import prepare
 
 COUNTING = """
 def helper(n):
@@ -354,4 +359,89 @@ def test_what_the_sandbox_makes_of_values_in_a_deep_recursion_reaches_no_api(
     executor.start(source, road)
     result = executor.tick()
     assert result.state == "failed"
-    assert set(result.said) == {"never"}
+    assert result.said[0] == "never"
+
+
+GROWS = """
+def drive():
+    kept = []
+    while True:
+        kept.append("x" * 400000 + str(len(kept)))
+        yield autopilot()
+"""
+
+
+def test_a_program_that_grows_too_large_to_be_dumped_has_failed_and_nothing_raises(road: StraightRoad) -> None:
+    with Sandbox(UNHURRIED) as sandbox, ProgramExecutor(sandbox=sandbox) as executor:
+        executor.start(GROWS, road)
+        for _ in range(60):
+            result = executor.tick()
+            if result.state != "running":
+                break
+            with contextlib.suppress(SandboxError):
+                executor.dump()
+        assert result.state == "failed"
+        assert isinstance(result.error, ProgramMemoryError | ProgramCrashError)
+        assert executor.tick().state == "failed"
+        with pytest.raises(SandboxError):
+            executor.dump()
+        assert executor.start(COUNTING, road) == "running"  # the worker was replaced
+        assert executor.tick().state == "running"
+
+
+def test_a_pool_that_has_given_its_worker_up_is_a_typed_error() -> None:
+    with Sandbox(UNHURRIED) as sandbox:
+        run = sandbox.start(prepare("def drive():\n    while True:\n        yield\n"), APIS)
+        run._session.__exit__(None, None, None)  # as the pool does by itself when a worker dies
+        run.begin_tick()
+        with pytest.raises(ProgramCrashError, match="finished"):
+            run.answer(None)
+
+
+def test_wishes_that_wait_count_as_they_come_and_not_at_the_end_of_the_period(road: StraightRoad) -> None:
+    source = """
+def drive():
+    while True:
+        for _ in range(1000):
+            for i in range(50):
+                set_target_speed(20.0 + 0.01 * i)
+            get_target_speed()
+        yield autopilot()
+"""
+    with Sandbox(UNHURRIED) as sandbox, ProgramExecutor(sandbox=sandbox) as executor:
+        executor.start(source, road)
+        result = executor.tick()
+    assert isinstance(result.error, ProgramCallsError)
+    assert len(result.made) <= UNHURRIED.calls + 50
+
+
+def test_the_time_the_host_takes_counts_when_the_period_ends() -> None:
+    now_s = 0.0
+    with Sandbox(UNHURRIED, clock=lambda: now_s) as sandbox:
+        run = sandbox.start(prepare("def drive():\n    while True:\n        yield\n"), APIS)
+        run.begin_tick()
+        assert run.answer(None) is not None
+        run.charge(0)
+        now_s = 1.1 * UNHURRIED.tick_s
+        with pytest.raises(ProgramTimeError):
+            run.charge(0)
+
+
+def test_what_is_said_is_capped_in_a_period_and_in_all_and_that_is_said(sandbox: Sandbox, road: StraightRoad) -> None:
+    source = """
+def drive():
+    n = 0
+    while True:
+        for _ in range(150):
+            n = n + 1
+            say(str(n))
+        yield autopilot()
+"""
+    with ProgramExecutor(sandbox=sandbox) as executor:
+        executor.start(source, road)
+        first = executor.tick()
+        assert first.said == ("1", "2", "3", "4", "(146 more remarks were left out.)")
+        assert first.state == "running"
+        said = [text for _ in range(60) for text in executor.tick().said]
+    assert len(first.said) + len(said) == MAX_SAID
+    assert said[-1].startswith("(The program says too much")

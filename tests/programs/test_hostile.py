@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ import pytest
 from hostile import CANARY, HOSTILE, Hostile
 from straight_road import StraightRoad, start_cars
 
+from chauffeur.concept import SandboxError
 from chauffeur.programs import (
     ProgramCallsError,
     ProgramCrashError,
@@ -81,6 +83,8 @@ def _attack(hostile: Hostile, sandbox: Sandbox, *, gate: bool) -> Attack:
             said += result.said
             if result.state != "running":
                 break
+            with contextlib.suppress(SandboxError):  # put down after each period, as in real time; it may fail of it
+                executor.dump()
     assert road.cars == start_cars()
     error = result.error
     assert error is None or isinstance(error, ProgramFaultError)

@@ -14,8 +14,8 @@ from typing import Self
 
 from chauffeur.concept import ConfigError
 
-_FORM = re.compile(r"(\d+)/(\d+)")
-_AUTO = re.compile(r"auto(?:/(\d+))?")
+_FORM = re.compile(r"(\d{1,9})/(\d{1,9})")
+_AUTO = re.compile(r"auto(?:/(\d{1,9}))?")
 _HINT = "Write --shard 3/8 (the third of eight), or --shard auto in a Slurm array, --shard auto/8 in an indexed job."
 
 

@@ -3,6 +3,9 @@
 Any web page open in the person's browser can reach a server on this machine, so each request must show three things
 that a foreign page cannot: the random token in its path, a Host that is this server by name or number (a name that
 was made to point here is refused), and, to talk, the page's own Origin. What is served loads nothing from elsewhere.
+
+Who has not shown them yet takes a place at the door (`_Door`): there are few, a newcomer gets the place of whoever has
+stood there longest, and nobody stands there for more than seconds. So strangers cannot use up what the drive needs.
 """
 
 from __future__ import annotations
@@ -11,14 +14,15 @@ import hmac
 import ipaddress
 import logging
 import secrets
+import socket
 import ssl
 from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from http import HTTPStatus
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from chauffeur.concept import ConfigError, MissingExtraError
 
@@ -28,6 +32,12 @@ if TYPE_CHECKING:
 
 HOST: Final = "127.0.0.1"
 """This machine alone."""
+MOST_AT_THE_DOOR: Final = 32
+"""Connections that have not shown the token. A page opens some ten at once for its files."""
+MOST_SCREENS: Final = 32
+"""Connections that talk."""
+AT_THE_DOOR_S: Final = 5.0
+"""How long a connection may take to show the token, after as long again to agree on encryption."""
 
 _HEADERS: Final = {
     "Cache-Control": "no-store",
@@ -97,6 +107,7 @@ class LocalPage:
         self._port = 0
         self._token = secrets.token_urlsafe(18)
         self._tls = _tls(certificate)
+        self._door: _Door | None = None
         self._headers = _HEADERS | {"Permissions-Policy": _PERMISSIONS + ("(self)" if microphone else "()")}
 
     @property
@@ -123,6 +134,9 @@ class LocalPage:
         if rest == self._socket:
             if request.headers.get_all("Origin") not in [[origin] for origin in self._origins()]:
                 return self._answer(connection, HTTPStatus.FORBIDDEN, "Only the page itself may talk to this server.")
+            own: socket.socket = connection.transport.get_extra_info("socket")
+            if self._door is not None and not self._door.admit(own.fileno()):
+                return self._answer(connection, HTTPStatus.SERVICE_UNAVAILABLE, "Too many screens look at this drive.")
             return None
         file = self._files.get(rest)
         if file is None:
@@ -171,16 +185,19 @@ class LocalPage:
         quiet = logging.getLogger("chauffeur.hmi.local_page")
         quiet.setLevel(logging.CRITICAL)
         try:
+            self._door = _Door.at(self._host, port)
             server = await serve(
                 talk,
-                self._host,
-                port,
+                sock=self._door,
                 process_request=self.admit,
                 compression=None,
                 max_size=most_bytes,
                 logger=quiet,
+                open_timeout=AT_THE_DOOR_S,
                 close_timeout=1,
+                backlog=_BACKLOG,
                 ssl=self._tls,
+                ssl_handshake_timeout=None if self._tls is None else AT_THE_DOOR_S,
             )
         except OSError as error:
             where = f"Port {port}" if self._host == HOST else f"{self._host}, port {port},"
@@ -189,6 +206,57 @@ class LocalPage:
         async with server:
             self._port = server.sockets[0].getsockname()[1]
             yield
+
+
+class _Door(socket.socket):
+    """A listening socket that knows who came in and has not been admitted yet, and lets no crowd gather."""
+
+    _waiting: list[socket.socket]
+    _screens: list[socket.socket]
+
+    @classmethod
+    def at(cls, host: str, port: int) -> _Door:
+        """Bound to the first address of a host.
+
+        Raises:
+            OSError: The address cannot be used.
+        """
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        door = cls(family, kind, protocol)
+        try:
+            door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, True)
+            door.setblocking(False)
+            door.bind(address)
+        except BaseException:
+            door.close()
+            raise
+        door._waiting, door._screens = [], []
+        return door
+
+    def accept(self) -> tuple[socket.socket, Any]:
+        """Take the next connection; where too many have shown nothing yet, the one that came first has to go."""
+        connection, address = super().accept()
+        self._waiting = [one for one in self._waiting if one.fileno() >= 0]
+        for oldest in self._waiting[: max(0, 1 + len(self._waiting) - MOST_AT_THE_DOOR)]:
+            with suppress(OSError):  # it has gone by itself
+                oldest.shutdown(socket.SHUT_RDWR)  # its own loop hears of it, and closes it
+        self._waiting.append(connection)
+        return connection, address
+
+    def admit(self, number: int) -> bool:
+        """Let the connection with this file descriptor stay; False where there are too many already."""
+        self._screens = [one for one in self._screens if one.fileno() >= 0]
+        if len(self._screens) >= MOST_SCREENS:
+            return False
+        self._screens += [one for one in self._waiting if one.fileno() == number]
+        self._waiting = [one for one in self._waiting if one.fileno() != number]
+        return True
+
+
+_BACKLOG: Final = 16
+"""Connections that wait to be taken: the loop takes so many at once before it closes any."""
 
 
 def _is_loopback(host: str) -> bool:

@@ -13,9 +13,10 @@ _TAKES_BACK: Final = re.compile(
     rf"(?<=\w)[\s,.;…-]+(?:"
     r"no,? wait|wait,? no|no,? no|scratch that|strike that|forget (?:it|that|what i said)|never ?mind(?: that)?|"
     r"actually,? (?:no|don't|do not)|i said it wrong|not that|correction"
-    rf")\b(?:[\s,.;:…-]+(?:sorry|uh|um|hmm|no|actually|rather|i mean|i meant|scratch that|strike that))*[,.;:…-]+\s*"
-    rf"(?=\w)|(?<=\w)\s*[,.;…-]+\s*(?:(?:uh|um|oh|no|wait)[\s,]+)*(?:sorry|actually|rather|i mean|i meant)[\s,.;:…-]+"
-    rf"(?:(?:i mean|i meant|no|uh|um)[\s,]+)*(?={_VERBS}\b)",
+    rf")\b(?:[\s,.;:…-]+(?:sorry|uh|um|hmm|no|actually|rather|i mean|i meant|scratch that|strike that)){{0,4}}"
+    rf"[,.;:…-]+\s*(?=\w)|(?<=\w)\s*[,.;…-]+\s*(?:(?:uh|um|oh|no|wait)[\s,]+){{0,4}}"
+    rf"(?:sorry|actually|rather|i mean|i meant)[\s,.;:…-]+"
+    rf"(?:(?:i mean|i meant|no|uh|um)[\s,]+){{0,4}}(?={_VERBS}\b)",
     re.IGNORECASE,
 )
 """Words that take back those before them. The weaker ones ("sorry", "I mean") only before what may be a wish."""

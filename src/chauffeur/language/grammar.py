@@ -281,4 +281,4 @@ def _alternatives(bits: list[str], i: int) -> tuple[Node, int]:
 
 def _clean(text: str) -> str:
     text = re.sub(r"\s+", " ", text).strip()
-    return re.sub(r"\s+([,.;:?!])", r"\1", text)
+    return re.sub(r"(?<!\s)\s+([,.;:?!])", r"\1", text)

@@ -10,7 +10,15 @@ from itertools import chain, islice
 from typing import Any, Final
 
 from chauffeur.concept import ApiCall, LaneId, Turn, Wishes
-from chauffeur.programs.catalogue import APIS, MAX_SAY_CHARS, Api, Param, argument_problem
+from chauffeur.programs.catalogue import (
+    APIS,
+    MAX_SAID,
+    MAX_SAID_AT_ONCE,
+    MAX_SAY_CHARS,
+    Api,
+    Param,
+    argument_problem,
+)
 from chauffeur.programs.errors import BadArgumentTypeError, BadArgumentValueError
 from chauffeur.programs.foresight import CAN_WAIT, FORESEEABLE, HOST, LATER, MAX_PENDING, NOT_FORESEEN
 from chauffeur.programs.handles import HandleTable, describe
@@ -31,6 +39,7 @@ def starting_wishes(perception: Perception, time_headway_s: float = 1.5) -> Wish
     )
 
 
+_SAYS_TOO_MUCH: Final = "(The program says too much: what it says from here on is left out.)"
 _TOO_DEEP: Final = "<deeply nested>"
 """What the sandbox hands over in place of a value, whatever it was, where a program has called itself too often."""
 
@@ -71,6 +80,7 @@ class DrivingApis:
         self._perception = perception
         self._driver = driver
         self._said: list[str] = []
+        self._said_before = 0
         self._calls: list[MadeCall] = []
         self._tick = 0
         self._questions = Questions()
@@ -83,6 +93,7 @@ class DrivingApis:
         """A new control period: look at its instant, forget the last one's calls."""
         self._perception = perception
         self._tick += 1
+        self._said_before += len(self.said)
         self._said = []
         self._calls = []
         self._late = []
@@ -93,8 +104,14 @@ class DrivingApis:
 
     @property
     def said(self) -> tuple[str, ...]:
-        """What was said in this control period."""
-        return tuple(self._said)
+        """What was said in this control period, and that something was left out where that was too much."""
+        room = MAX_SAID - self._said_before  # the last place is for the note
+        if len(self._said) <= min(room - 1, MAX_SAID_AT_ONCE):
+            return tuple(self._said)
+        if room <= MAX_SAID_AT_ONCE:
+            return (*self._said[: room - 1], _SAYS_TOO_MUCH) if room > 0 else ()
+        kept = MAX_SAID_AT_ONCE - 1
+        return (*self._said[:kept], f"({len(self._said) - kept} more remarks were left out.)")
 
     @property
     def made(self) -> tuple[MadeCall, ...]:
@@ -181,19 +198,19 @@ class DrivingApis:
                 makes no sense is passed over.
 
         Returns:
-            How many calls never reached the host.
+            How many calls it made in the sandbox alone that were not counted yet.
         """
         if not isinstance(told, tuple | list) or len(told) != 2:
             return 0
         used, pending = told
+        count = len(pending) if isinstance(pending, list) else 0
         with suppress(BadArgumentTypeError, BadArgumentValueError):  # the stand-ins let no such wish wait
             self.wish_later(pending)
         if not isinstance(used, list):
             self._calls += self._late
-            return len(self._late)
+            return count
         made, late = iter(self._calls), iter(self._late)
         self._calls = []
-        count = len(self._late)
         for mark in used:
             if isinstance(mark, bool) or not isinstance(mark, int):
                 continue

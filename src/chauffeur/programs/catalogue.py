@@ -30,6 +30,10 @@ _STUB_TYPES: Final[dict[ValueKind, str]] = {
 
 MAX_SAY_CHARS: Final = 500
 """Longest text `say` takes; a passenger reads it while driving."""
+MAX_SAID_AT_ONCE: Final = 5
+"""Texts of one control period that are handed on; what is said beyond is counted, and that is said instead."""
+MAX_SAID: Final = 200
+"""Texts of one program that are handed on: every screen, log and recording keeps them."""
 
 
 @dataclass(frozen=True, slots=True)

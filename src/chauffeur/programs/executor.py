@@ -156,7 +156,9 @@ class ProgramExecutor:
         while call is not None and call.name not in _PERIOD_ENDS:
             try:
                 if call.name == WISH:
-                    value: Any = apis.wish_later(call.arguments[0] if call.arguments else None)
+                    pending = call.arguments[0] if call.arguments else None
+                    run.charge(len(pending) if isinstance(pending, list) else 0)
+                    value: Any = apis.wish_later(pending)
                 else:
                     value = apis.call(call.name, call.arguments, call.keywords, call.slot)
             except BadArgumentTypeError as error:
@@ -182,10 +184,15 @@ class ProgramExecutor:
         """The waiting program with its wishes, to be continued by `load`; keep the bytes in a trusted place.
 
         Raises:
-            SandboxError: No program is running.
+            SandboxError: No program is running, or this one failed of it; the next tick then says why.
         """
         if self._run is None or self._apis is None:
             raise SandboxError("Only a running program can be dumped.")
+        try:
+            body = self._run.dump()
+        except ProgramFaultError as error:
+            self._fail(error)
+            raise SandboxError(f"The program failed while it was put down: {error}") from error
         vehicles, lanes = self._apis.handles.issued()
         wishes = self._apis.wishes
         head = {
@@ -200,7 +207,7 @@ class ProgramExecutor:
                 "served_stops": sorted(wishes.served_stops),
             },
         }
-        return json.dumps(head).encode() + b"\n" + self._run.dump()
+        return json.dumps(head).encode() + b"\n" + body
 
     def load(self, state: bytes, world: World) -> None:
         """Continue a dumped program in a world at the same instant. Only for bytes from a trusted place.

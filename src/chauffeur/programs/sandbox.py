@@ -11,14 +11,20 @@ from __future__ import annotations
 import contextlib
 import datetime
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from typing import Any, Final, Self
 
 import pydantic_monty as monty
 
 from chauffeur.concept import SandboxError
-from chauffeur.programs.errors import ProgramCallsError, ProgramRaisedError, ProgramTimeError
+from chauffeur.programs.errors import (
+    ProgramCallsError,
+    ProgramCrashError,
+    ProgramFaultError,
+    ProgramRaisedError,
+    ProgramTimeError,
+)
 from chauffeur.programs.faults import MAX_MESSAGE_CHARS, fault_of
 from chauffeur.programs.foresight import AT_FAULT, DRIVE, END, FORESEEABLE, TICK, WISH, hidden
 from chauffeur.programs.rewrite import Prepared
@@ -33,7 +39,8 @@ class Budget:
 
     Attributes:
         turn_s: Computation between two calls to the host.
-        tick_s: One control period, the host's answers included.
+        tick_s: One control period, the host's answers included. Looked at before and after each stretch of
+            computation, so that a period lasts `tick_s + turn_s + grace_s` at most.
         grace_s: How long past `turn_s` a worker may take to stop by itself before it is killed.
         start_s: Reading the program and running its top level.
         calls: Calls to the host in one control period.
@@ -251,14 +258,18 @@ class SandboxRun:
         self._snapshot = snapshot
 
     def dump(self) -> bytes:
-        """The waiting program as bytes. Raises SandboxError when it does not wait, or its worker has died."""
+        """The waiting program as bytes.
+
+        Raises:
+            SandboxError: It does not wait.
+            ProgramFaultError: Its worker died of it, e.g. because the state does not fit into the program's memory a
+                second time; the run is closed.
+        """
         if self._snapshot is None:
             raise SandboxError("Only a waiting program can be dumped.")
         head = f"{' '.join(sorted(self._names))}\n{' '.join(sorted(self._slotted))}\n{self._program_feed}\n"
-        try:
+        with self._faults():
             return head.encode() + self._snapshot.dump()
-        except monty.MontyError as error:
-            raise SandboxError(f"The program cannot be dumped: {str(error)[:MAX_MESSAGE_CHARS]}.") from error
 
     def answer(self, value: object) -> HostCall | None:
         """Give the result of the waiting call; returns the next call, or None when the program has ended.
@@ -275,11 +286,14 @@ class SandboxRun:
         return self._advance(lambda: snapshot.resume({"exception": error}))
 
     def charge(self, calls: int) -> None:
-        """Count calls that were answered inside the sandbox. Raises ProgramCallsError."""
+        """Count calls that were answered inside the sandbox, and look at the time.
+
+        Raises:
+            ProgramCallsError, ProgramTimeError: The period's budget is used up; the run is closed.
+        """
         self._calls += calls
-        if self._calls > self._budget.calls:
-            self.close()
-            raise self._too_many_calls(None)
+        with self._faults():
+            self._look_at_budget(None)
 
     def close(self) -> None:
         """Give the worker back. May be called twice."""
@@ -287,7 +301,7 @@ class SandboxRun:
             self._open = False
             self._snapshot = None
             # A worker that is already gone has nothing to give back.
-            with contextlib.suppress(monty.MontyError, OSError):
+            with contextlib.suppress(monty.MontyError, OSError, RuntimeError):
                 self._session.__exit__(None, None, None)
 
     def _waiting(self) -> monty.FunctionSnapshot:
@@ -296,12 +310,13 @@ class SandboxRun:
 
     def _advance(self, step: Callable[[], monty.SyncSnapshot]) -> HostCall | None:
         self._snapshot = None
-        try:
+        with self._faults():
             while True:
                 state = step()
                 if isinstance(state, monty.MontyComplete):
                     return None
-                self._charge(state)
+                self._calls += 1
+                self._look_at_budget(state)
                 if isinstance(state, monty.NameLookupSnapshot):
                     step = state.resume  # left undefined: NameError in the program
                 elif isinstance(state, monty.FutureSnapshot):
@@ -316,10 +331,24 @@ class SandboxRun:
                     return HostCall(name, arguments, state.kwargs)
                 else:
                     step = _unknown(state)
+
+    @contextlib.contextmanager
+    def _faults(self) -> Generator[None]:
+        """Whatever goes wrong with the worker meanwhile is the program's fault, in words, and the end of the run."""
+        try:
+            yield
+        except ProgramFaultError:
+            self.close()
+            raise
         except monty.MontyError as error:
             self._read_used(error)
             self.close()
             raise fault_of(error, self._program_feed) from None
+        except (RuntimeError, OSError, ValueError) as error:  # how the pool speaks of a worker that is gone
+            self.close()
+            raise ProgramCrashError(
+                f"The program's sandbox worker is gone: {str(error)[:MAX_MESSAGE_CHARS]}."
+            ) from error
         except BaseException:
             self.close()
             raise
@@ -330,8 +359,10 @@ class SandboxRun:
             with contextlib.suppress(monty.MontyError, OSError, RuntimeError):  # or it is gone
                 self.used_at_fault = self._session.feed_run(AT_FAULT)
 
-    def _charge(self, state: monty.FunctionSnapshot | monty.NameLookupSnapshot | monty.FutureSnapshot) -> None:
-        self._calls += 1
+    def _look_at_budget(
+        self, state: monty.FunctionSnapshot | monty.NameLookupSnapshot | monty.FutureSnapshot | None
+    ) -> None:
+        """Raise ProgramCallsError or ProgramTimeError where the period's budget is used up."""
         if self._calls > self._budget.calls:
             raise self._too_many_calls(self._line_of(state))
         if self._clock() > self._deadline:
@@ -348,7 +379,9 @@ class SandboxRun:
             hint="Yield autopilot() once per pass through every loop.",
         )
 
-    def _line_of(self, state: monty.FunctionSnapshot | monty.NameLookupSnapshot | monty.FutureSnapshot) -> int | None:
+    def _line_of(
+        self, state: monty.FunctionSnapshot | monty.NameLookupSnapshot | monty.FutureSnapshot | None
+    ) -> int | None:
         """Line at which a program waits that will not go on: an error raised there tells; None if it is caught."""
         if isinstance(state, monty.FunctionSnapshot):
             try:

@@ -8,7 +8,7 @@ from typing import Final
 
 from chauffeur.speech.base import HOTWORDS, Hotword
 
-_FIRST: Final = re.compile(rf"\W*({'|'.join(HOTWORDS)})\b[\s,.:;!?…-]*", re.IGNORECASE)
+_FIRST: Final = re.compile(rf"\A\W*({'|'.join(HOTWORDS)})\b[\s,.:;!?…-]*", re.IGNORECASE)
 
 
 def split_hotword(text: str) -> tuple[Hotword | None, str]:

@@ -14,7 +14,7 @@ from chauffeur.concept import DataError
 
 _TOKEN: Final = re.compile(r"<[\w.]+>|[\[\]()|;=]|[\w'.-]+|\S")
 _REMARK: Final = re.compile(r"//[^\n]*")
-_WORD: Final = re.compile(r"[a-z][a-z'.-]*\Z")
+_WORD: Final = re.compile(r"\A[a-z][a-z'.-]*\Z")
 _DEEPEST: Final = 40
 
 

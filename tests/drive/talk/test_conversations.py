@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from dataclasses import dataclass, field, replace
+
+import pytest
 
 from chauffeur.concept import (
     Context,
@@ -23,10 +27,11 @@ from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Interaction
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import make_world
+from chauffeur.drive.talk import judging
 from chauffeur.drive.talk.asking import Words
-from chauffeur.drive.talk.conversations import Conversations, recalled_of, source_of
+from chauffeur.drive.talk.conversations import MOST_SAID_SHOWN, Conversations, recalled_of, source_of
 from chauffeur.drive.talk.judging import JUDGED, verdicts_of
-from chauffeur.drive.talk.messages import HowWasIt
+from chauffeur.drive.talk.messages import Conversation, HowWasIt
 
 PLACE = find("overtake")
 PROGRAM = Program("def drive():\n    set_target_speed(20.0)\n    yield autopilot()\n")
@@ -69,6 +74,16 @@ class Told:
             interaction.stage, interaction.answer = "closed", event
         self.conversations.event(event, interaction)
 
+    def judged(self) -> Conversation:
+        """The next thing to be shown: the verdicts, when they are there."""
+        until = time.monotonic() + 20.0
+        while not (shown := list(self.conversations.look(15.0))):
+            assert time.monotonic() < until
+            time.sleep(0.001)
+        (conversation,) = shown
+        assert isinstance(conversation, Conversation)
+        return conversation
+
 
 def drive(seen: bool = True) -> Told:
     now, snapshot = [100.0], instant()
@@ -94,7 +109,7 @@ def test_a_wish_from_words_to_set_point_with_where_the_time_went() -> None:
     assert list(told.conversations.look(15.0)) == [], "verdicts wait for the set-point"
     told.now[0] = 101.0
     told.conversations.report(report_of(11, "w1"))
-    (shown,) = told.conversations.look(15.0)
+    shown = told.judged()
     assert shown.kind == "conversation" and shown.stage == "driven" and shown.spoken
     assert (shown.policy, shown.source) == ("program", PROGRAM.source)
     stages = shown.stages
@@ -112,7 +127,8 @@ def test_somebody_is_asked_once_about_a_wish_they_felt() -> None:
     told.conversations.brief(brief("w1", plan()))
     told.event(Event("started", "w1", "", 1, 10))
     told.conversations.report(report_of(100, "w1"))
-    assert not [each for each in told.conversations.look(15.0) if isinstance(each, HowWasIt)]
+    told.conversations.report(report_of(140, "w1"))
+    told.judged()
     told.conversations.report(report_of(161, "w1"))
     assert list(told.conversations.look(15.0)) == [HowWasIt("w1", "Slower.")]
     told.event(Event("finished", "w1", "", 1, 170), closes=True)
@@ -139,7 +155,7 @@ def test_a_refusal_shows_the_check_that_refused_and_the_same_reason() -> None:
     told.ask("w1", Words("As fast as it goes."))
     told.conversations.brief(brief("w1", plan(UNLAWFUL)))
     told.event(Event("refused", "w1", reason, 1, 5), closes=True)
-    shown = told.conversations["w1"]
+    shown = told.judged()
     assert shown.outcome == "refused" and shown.why == reason
     assert [each.check for each in shown.verdicts if not each.passed and not each.informs] == [e.check for e in failed]
 
@@ -150,6 +166,42 @@ def test_what_was_not_seen_is_not_judged_again() -> None:
         assert (verdict.check, verdict.passed) == (JUDGED, passed)
     started = verdicts_of(plan(UNLAWFUL), instant(), Limits(), Event("started", "w1"))
     assert [each.check for each in started if not each.informs] == [JUDGED], "it was started, so that is what is shown"
+
+
+def test_nobody_waits_for_verdicts(monkeypatch: pytest.MonkeyPatch) -> None:
+    may_go_on = threading.Event()
+
+    def slowly(*case: object) -> object:
+        assert may_go_on.wait(20.0)
+        return verdicts_of(*case)  # pyright: ignore
+
+    monkeypatch.setattr(judging, "verdicts_of", slowly)
+    told = drive()
+    told.ask("w1", Words("Slower."))
+    told.conversations.brief(brief("w1", plan()))
+    told.event(Event("started", "w1", "", 1, 10))
+    told.conversations.report(report_of(11, "w1"))
+    assert list(told.conversations.look(15.0)) == []
+    assert list(told.conversations.look(15.0)) == []
+    may_go_on.set()
+    assert told.judged().verdicts[0].check == "format-v1"
+
+
+@pytest.mark.parametrize("thoughts", ["1" * 8000, "1 " * 4000, "1." * 4000, "(" * 8000, "the left lane " * 570])
+def test_thoughts_of_the_longest_kind_are_judged_at_once(thoughts: str) -> None:
+    before = time.thread_time()
+    assert verdicts_of(plan(thoughts=thoughts), instant(), Limits(), Event("started", "w1"))
+    assert time.thread_time() - before < 1.0
+
+
+def test_what_a_plan_says_does_not_grow_without_bound() -> None:
+    told = drive()
+    told.ask("w1", Words("Slower."))
+    for number in range(500):
+        told.event(Event("said", "w1", f"{number} " + 490 * "x"))
+    said = told.conversations["w1"].said
+    assert len(said) == MOST_SAID_SHOWN
+    assert said[-1].startswith("499 ") and said[0].startswith("(")
 
 
 def test_an_explanation_that_does_not_fit_informs() -> None:

@@ -6,12 +6,14 @@ import asyncio
 import json
 import ssl
 import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import httpx
 import pytest
@@ -39,6 +41,7 @@ from chauffeur.hmi.cabin import Cabin, Certificate
 from chauffeur.hmi.cabin.board import MOST_WAITING, Board, Outbox
 from chauffeur.hmi.cabin.room import NOT_UNDERSTOOD
 from chauffeur.hmi.cabin.server import MOST_SOUND_BYTES
+from chauffeur.hmi.local_page import MOST_AT_THE_DOOR
 
 pytestmark = pytest.mark.server
 
@@ -399,3 +402,57 @@ def test_telling_is_quick_even_of_a_long_road(cabin: Cabin) -> None:
 
     run(check)
     assert drawing.is_set() and handed_over < time.perf_counter() - began
+
+
+def open_files() -> int:
+    return sum(1 for _ in Path("/proc/self/fd").iterdir())
+
+
+def test_a_crowd_at_the_door_takes_nothing_from_the_drive_and_keeps_nobody_out(
+    cabin: Cabin, caplog: pytest.LogCaptureFixture
+) -> None:
+    own = open_files()
+    where = urlsplit(cabin.url)
+    port = where.port
+    crowd = subprocess.Popen(
+        [sys.executable, "-c", CROWD, str(port)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert crowd.stdout is not None and crowd.stdin is not None
+        assert crowd.stdout.readline() == "300 came\n"
+        until = time.monotonic() + 20.0
+        while (taken := open_files() - own) > MOST_AT_THE_DOOR + 16:
+            assert time.monotonic() < until, f"{taken} descriptors are taken"
+            time.sleep(0.01)
+        assert httpx.get(cabin.url).status_code == 200
+
+        async def look() -> None:
+            async with screen_of(cabin) as socket:
+                await hear(socket, "place")
+
+        asyncio.run(look())
+        assert not [record for record in caplog.records if record.name == "asyncio"]
+        gone = int(crowd.communicate("\n", timeout=60)[0])  # all of them, once the time at the door is over
+        assert gone == 300
+    finally:
+        crowd.kill()
+        crowd.wait()
+
+
+CROWD = """
+import resource, select, socket, sys, time
+resource.setrlimit(resource.RLIMIT_NOFILE, (1024, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+came = [socket.create_connection(("127.0.0.1", int(sys.argv[1])), 20) for _ in range(300)]
+print(len(came), "came", flush=True)
+input()
+gone, until = 0, time.monotonic() + 40
+for one in came:
+    one.settimeout(max(0.1, until - time.monotonic()))
+    try:
+        gone += one.recv(100) == b"" or 1
+    except TimeoutError:
+        pass
+    except OSError:
+        gone += 1
+print(gone)
+"""

@@ -12,7 +12,7 @@ from chauffeur.concept import Scenario
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
-SUITE_VERSION: Final = "chaos-v2"
+SUITE_VERSION: Final = "chaos-v3"
 
 Family = Literal["model", "process", "memory", "disk", "clock"]
 Stage = Literal["before-plan", "planning", "ordered", "running", "lane-change", "junction", "end"]
@@ -61,6 +61,7 @@ class Kind:
 _MODEL: Final = (
     "silent", "trickle", "cut", "bad-utf8", "bad-json", "http-500", "http-429", "endless", "empty", "chatter",
     "unknown-api", "imports", "never-yields", "spins-later", "dies-later", "beyond-limits", "creeps-beyond", "late",
+    "grows", "leaps", "says-on-and-on", "wishes-on-and-on", "long-thoughts",
 )  # fmt: skip
 _MEMORY: Final = (
     "wishes-garbage", "wishes-torn", "wishes-nonsense", "wishes-other-trip", "wishes-future-tick", "wishes-replayed",

@@ -246,5 +246,10 @@ FAULTS: Final[dict[str, Callable[[_Exchange, str], None]]] = {
     "dies-later": _says(replies.DIES_LATER),
     "beyond-limits": _says(replies.BEYOND_LIMITS),
     "creeps-beyond": _says(replies.CREEPS_BEYOND),
+    "grows": _says(replies.GROWS),
+    "leaps": _says(replies.LEAPS),
+    "says-on-and-on": _says(replies.SAYS_ON_AND_ON),
+    "wishes-on-and-on": _says(replies.WISHES_ON_AND_ON),
+    "long-thoughts": _says(replies.LONG_THOUGHTS),
 }
 """How to answer, by name; `late` is the good answer after a while."""

@@ -117,4 +117,27 @@ CREEPS_BEYOND: Final = reply(
     "def race():\n    speed = get_target_speed()\n    while True:\n        speed = speed + 1.5\n"
     "        set_target_speed(speed)\n        set_desired_time_headway(speed / 4000.0)\n        yield autopilot()\n",
 )
+GROWS: Final = reply(
+    "I hold 25 m/s.",
+    "def hold():\n    set_target_speed(25.0)\n    kept = []\n    while True:\n"
+    "        kept.append('x' * 400000 + str(len(kept)))\n        yield autopilot()\n",
+)
+LEAPS: Final = reply(
+    "I hold 25 m/s.",
+    "def hold():\n    set_target_speed(25.0)\n    yield autopilot()\n"
+    "    kept = ['x' * 400000 + str(i) for i in range(18)]\n    while kept:\n        yield autopilot()\n",
+)
+SAYS_ON_AND_ON: Final = reply(
+    "I hold 25 m/s.",
+    "def hold():\n    set_target_speed(25.0)\n    while True:\n        for i in range(150):\n"
+    "            say(str(i) + 'x' * 490)\n        yield autopilot()\n",
+)
+WISHES_ON_AND_ON: Final = reply(
+    "I hold 25 m/s.",
+    "def hold():\n    while True:\n        for i in range(1000):\n            for j in range(50):\n"
+    "                set_target_speed(25.0 + 0.001 * j)\n            get_target_speed()\n        yield autopilot()\n",
+)
+LONG_THOUGHTS: Final = reply(
+    "1" * 8000, "def hold():\n    set_target_speed(25.0)\n    while True:\n        yield autopilot()\n"
+)
 REFUSES: Final = "I am a language model and would rather talk about the weather."

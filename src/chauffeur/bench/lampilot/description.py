@@ -12,7 +12,7 @@ FALLBACK_WORDS = "A program that did well when the wish was: {command}"
 
 _SENTENCE = re.compile(r"(?<=[.!?])\s+(?=[^\s])")
 _LABEL = re.compile(r"\A[\s*_#]*(?:Description|Entry)[*_ \t]*:[*_ \t]*", re.IGNORECASE)
-_CODE = re.compile(r"`{3,}|^\s*(?:def |import |from |while |for .*:$|REFUSE\b)|\byield\b", re.MULTILINE)
+_CODE = re.compile(r"`{3,}|^[ \t]*(?:def |import |from |while |for .*:$|REFUSE\b)|\byield\b", re.MULTILINE)
 _LEAST_CHARS = 12
 
 

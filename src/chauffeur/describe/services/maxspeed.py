@@ -144,7 +144,7 @@ def _lowest(given: list[Maxspeed]) -> Maxspeed | None:
 def _conditional(text: str) -> list[Conditional]:
     """`VALUE @ (CONDITION); VALUE @ CONDITION`: semicolons inside of parentheses belong to the condition."""
     found: list[Conditional] = []
-    for piece in re.split(r";(?![^()]*\))", text[:_MAX_CHARS]):
+    for piece in re.split(r";(?![^()]{0,255}\))", text[:_MAX_CHARS]):
         value, at, condition = piece.partition("@")
         limit = read_maxspeed(value.strip())
         words = condition.strip().removeprefix("(").removesuffix(")").strip()

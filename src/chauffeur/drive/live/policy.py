@@ -14,7 +14,6 @@ that goes on where it stood. When the person takes the wheel, it ends.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import struct
 import time
@@ -80,6 +79,8 @@ class _Driven:
     by: ProgramExecutor | Steered
     state: ProgramState = "running"
     resumed: int = 0
+    grown: bool = False
+    """Its state has once been too large to be put down: it ends with this process."""
 
     @property
     def steered(self) -> Steered | None:
@@ -327,14 +328,28 @@ class Policy:
     # Putting down and picking up --------------------------------------------------------------------------------------
 
     def _put_down(self, driven: _Driven) -> None:
+        if driven.grown:  # putting it down again would take longer each period, and come to nothing
+            return
+        body = b""
+        if isinstance(driven.by, ProgramExecutor):
+            try:
+                body = driven.by.dump()
+            except SandboxError:
+                return  # it failed of it, and the next period says so
+        message = self._checkpoint(driven, body)
+        if len(message) > self._rings.checkpoints.size:
+            driven.grown = True
+            message = self._checkpoint(driven, b"")  # an older state of it would be worse than none
+        self._rings.checkpoints.write(message)
+
+    def _checkpoint(self, driven: _Driven, body: bytes) -> bytes:
         head = {
             "trip": self._trip, "wish": driven.wish, "expires_ns": driven.expires_ns, "resumed": driven.resumed,
             "hands": self._hands, "parameters": None if driven.steered is None else driven.steered.fields(),
+            "grown": driven.grown,
         }  # fmt: skip
         text = json.dumps(head).encode()
-        with contextlib.suppress(ValueError, SandboxError):  # too large to be put down: it ends with this process
-            body = driven.by.dump() if isinstance(driven.by, ProgramExecutor) else b""
-            self._rings.checkpoints.write(_HEAD.pack(len(text)) + text + body)
+        return _HEAD.pack(len(text)) + text + body
 
     def _pick_up(self) -> None:
         """Go on with the plan of the process before this one, if there was one in this trip.
@@ -349,12 +364,15 @@ class Policy:
             head = json.loads(message.payload[_HEAD.size : _HEAD.size + length])
             if head["trip"] != self._trip or self._clock_ns() > head["expires_ns"] or self._ended_since(head["wish"]):
                 return
-            resumed, hands = int(head["resumed"]) + 1, int(head["hands"])
+            resumed, hands, grown = int(head["resumed"]) + 1, int(head["hands"]), bool(head["grown"])
             steered = None if head["parameters"] is None else Steered.read(head["parameters"])
         except (struct.error, ValueError, KeyError, TypeError):  # it must not keep every later process from starting
             return
         if hands != self._hands:
             self._tell("interrupted", head["wish"], TOOK_OVER)
+            return
+        if grown:
+            self._tell("interrupted", head["wish"], "The plan kept too much to be put down; it ended with its process.")
             return
         if resumed > MOST_RESUMPTIONS:
             self._tell("interrupted", head["wish"], "The plan was driven whenever its process died.")

@@ -99,6 +99,11 @@ class Ring:
         """Unmap. The file stays."""
         self._map.close()
 
+    @property
+    def size(self) -> int:
+        """Most bytes of a message."""
+        return self._size
+
     def touch_pages(self) -> None:
         """Have every page in memory, so that no later access waits for one."""
         for at in range(0, len(self._map), mmap.PAGESIZE):

@@ -29,7 +29,7 @@ _SLACK_MPS: Final = 0.05
 
 _ENGAGING: Final = re.compile(r"\b(?:(?:dis|re)?engag(?:e|ed|ing)|drive[- ]by[- ]wire|autopilot on)\b", re.IGNORECASE)
 _STOPPING: Final = re.compile(
-    r"[\s.!,]*(?:please[\s,]+)?(?:stop|halt|stop now)[\s.!,]*(?:please[\s.!]*)?", re.IGNORECASE
+    r"\A[\s.!,]*(?:please[\s,]+)?(?:stop|halt|stop now)[\s.!,]*(?:please[\s.!]*)?", re.IGNORECASE
 )
 
 ENGAGING_WORDS: Final = (

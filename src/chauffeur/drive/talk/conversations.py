@@ -13,14 +13,19 @@ from chauffeur.drive.live.orders import Brief, Event
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Interaction
 from chauffeur.drive.talk.asking import Words
-from chauffeur.drive.talk.judging import verdicts_of
+from chauffeur.drive.talk.judging import Case, Judge
 from chauffeur.drive.talk.messages import Conversation, HowWasIt, Stages
 
 JUDGED_WITHIN_S: Final = 1.0
 """Verdicts are worked out when the set-point has changed, or so long after the start: nothing waits for them."""
 FELT_AFTER_S: Final = 3.0
 """A wish that was driven for less, in the car's time, cannot have been felt: nobody is asked about it."""
+JUDGED_AT_END_S: Final = 2.0
+"""How long the end of a session waits for verdicts that are still worked on."""
+MOST_SAID_SHOWN: Final = 40
+"""What a plan said last; every screen is told a conversation anew whenever something is added to it."""
 
+_EARLIER: Final = "(What was said earlier is not shown.)"
 _LANES: Final = {-1: "one to the left", 0: "the present one", 1: "one to the right"}
 
 
@@ -61,6 +66,7 @@ class Conversations:
         self._starts, self._dt_s, self._instant, self._clock = starts, dt_s, instant, clock
         self._wishes: dict[str, _Wish] = {}
         self._trip, self._now_s = 0, 0.0
+        self._judge = Judge()
 
     def __iter__(self) -> Iterator[Conversation]:
         return (each.shown for each in self._wishes.values())
@@ -117,7 +123,7 @@ class Conversations:
             case "resumed":
                 shown = replace(shown, stage="driven", why=event.text)
             case "said":
-                shown = replace(shown, said=(*shown.said, event.text))
+                shown = replace(shown, said=_most((*shown.said, event.text)))
             case "refused":
                 each.to_judge = event
             case _:
@@ -126,7 +132,7 @@ class Conversations:
             shown = replace(shown, stage="closed", outcome=event.kind, why=event.text)
         each.shown = replace(shown, stages=stages)
         if event.kind == "refused":
-            self._judge(each)
+            self._hand_in(each)
         return each.shown
 
     def brief(self, brief: Brief) -> Conversation | None:
@@ -171,8 +177,9 @@ class Conversations:
             if each.to_judge is not None and each.started_s is not None:
                 changed = each.shown.stages.set_point_s is not None
                 if over or changed or self._clock() - each.started_s > JUDGED_WITHIN_S:
-                    self._judge(each)
-                    yield each.shown
+                    self._hand_in(each)
+        for wish, verdicts in self._judge.ready(JUDGED_AT_END_S if over else 0.0):
+            yield self.change(wish, verdicts=verdicts)
         newest = self._wishes.get(self.last_felt)
         if newest is None or newest.asked_how or newest.felt_from_s is None:
             return
@@ -184,13 +191,25 @@ class Conversations:
             if not newest.shown.opinion:
                 yield HowWasIt(newest.shown.wish, newest.shown.text)
 
-    def _judge(self, each: _Wish) -> None:
+    def close(self) -> None:
+        """Judge nothing more."""
+        self._judge.close()
+
+    def _hand_in(self, each: _Wish) -> None:
+        """Have a plan judged again, in the judge's own time."""
         event, each.to_judge = each.to_judge, None
         if event is None or each.brief is None:
             return
         limits = self._starts[max(1, min(event.trip, len(self._starts))) - 1].limits
         snapshot = self._instant(event.trip, event.tick)
-        each.shown = replace(each.shown, verdicts=verdicts_of(each.brief.plan, snapshot, limits, event))
+        self._judge.submit(Case(each.shown.wish, each.brief.plan, snapshot, limits, event))
+
+
+def _most(said: tuple[str, ...]) -> tuple[str, ...]:
+    """The newest texts, behind a note where there were more."""
+    if len(said) <= MOST_SAID_SHOWN:
+        return said
+    return (_EARLIER, *said[1 - MOST_SAID_SHOWN :])
 
 
 def source_of(policy: Policy) -> str:

@@ -7,6 +7,10 @@ the sum of the verdicts is not what was told, only what was told is shown.
 
 from __future__ import annotations
 
+import logging
+import queue
+import threading
+from dataclasses import dataclass
 from typing import Final
 
 from chauffeur.concept import Limits, Plan, Program, Snapshot, Verdict
@@ -17,6 +21,65 @@ from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
 
 JUDGED: Final = "live"
 """Name of the sum of all verdicts, as in the books."""
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """What is to be judged; the fields are those of `verdicts_of`."""
+
+    wish: str
+    plan: Plan
+    snapshot: Snapshot | None
+    limits: Limits
+    event: Event
+
+
+class Judge:
+    """Works verdicts out in a thread of its own, one case after the other.
+
+    A plan is foreign text, and how long its checks take depends on it; whoever hands a case in reads "stop" meanwhile.
+    """
+
+    def __init__(self) -> None:
+        self._cases: queue.SimpleQueue[Case | None] = queue.SimpleQueue()
+        self._ready: list[tuple[str, tuple[VerdictShown, ...]]] = []
+        self._waiting = 0
+        self._changed = threading.Condition()
+        self._thread: threading.Thread | None = None
+
+    def submit(self, case: Case) -> None:
+        """Hand a case in; its verdicts come with `ready`."""
+        with self._changed:
+            self._waiting += 1
+        self._cases.put(case)
+        if self._thread is None:  # a daemon: a case that takes long must not keep the process from ending
+            self._thread = threading.Thread(target=self._run, name="verdicts", daemon=True)
+            self._thread.start()
+
+    def ready(self, within_s: float = 0.0) -> list[tuple[str, tuple[VerdictShown, ...]]]:
+        """Wishes and their verdicts since the last call; waits so long for those that are still worked on."""
+        with self._changed:
+            self._changed.wait_for(lambda: not self._waiting, within_s)
+            ready, self._ready = self._ready, []
+        return ready
+
+    def close(self) -> None:
+        """Take no further case; the thread ends with those it has."""
+        self._cases.put(None)
+
+    def _run(self) -> None:
+        while (case := self._cases.get()) is not None:
+            try:
+                verdicts = verdicts_of(case.plan, case.snapshot, case.limits, case.event)
+            except Exception:  # noqa: BLE001 - what was told is shown, whatever is wrong with the checks
+                _log.exception("a plan could not be judged again")
+                verdicts = (_told(case.event),)
+            with self._changed:
+                self._ready.append((case.wish, verdicts))
+                self._waiting -= 1
+                self._changed.notify_all()
 
 
 def verdicts_of(plan: Plan, snapshot: Snapshot | None, limits: Limits, event: Event) -> tuple[VerdictShown, ...]:
@@ -31,12 +94,17 @@ def verdicts_of(plan: Plan, snapshot: Snapshot | None, limits: Limits, event: Ev
     verdicts = () if snapshot is None else run_checks(plan, snapshot, limits, DRIVE_CHECKS)
     told = tuple(_shown(verdict) for verdict in verdicts)
     if not verdicts or not _as_told(verdicts, event):
-        started = event.kind == "started"
-        told = (VerdictShown(JUDGED, started, "" if started else event.text),)
+        told = (_told(event),)
     if snapshot is None or not isinstance(plan.policy, Program):
         return told
     fits = run_checks(plan, snapshot, limits, (check_alignment,))
     return (*told, *(_shown(verdict, informs=True) for verdict in fits))
+
+
+def _told(event: Event) -> VerdictShown:
+    """The sum of the verdicts, as the policy process told it."""
+    started = event.kind == "started"
+    return VerdictShown(JUDGED, started, "" if started else event.text)
 
 
 def _as_told(verdicts: tuple[Verdict, ...], event: Event) -> bool:

@@ -482,6 +482,7 @@ class Talk:
 
     def _close_parts(self) -> None:
         self._attention.close()
+        self._conversations.close()
         if self._runtime is not None:
             self._runtime.close()
         self._runtime = None

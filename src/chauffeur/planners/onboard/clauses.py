@@ -12,9 +12,9 @@ from chauffeur.planners.onboard.lexicon import FILLERS, rewrite
 from chauffeur.planners.onboard.meaning import Side
 
 _BREAK = re.compile(
-    r"\s*(?P<hard>[.;!?]|\b(?:and then|then|after that|afterwards?|followed by"
+    r"(?P<hard>[.;!?]|\b(?:and then|then|after that|afterwards?|followed by"
     r"|next(?= (?:turn|change|pull|overtake)))\b)\s*"
-    r"|\s*(?P<soft>,|\b(?:and|but|because|since|so that|so(?= (?:please|go|speed up|drive|can|could|do|i|we|you|he))|"
+    r"|(?P<soft>,|\b(?:and|but|because|since|so that|so(?= (?:please|go|speed up|drive|can|could|do|i|we|you|he))|"
     r"although|though|while|until|just|instead(?! of)|rather(?! (?:slow|fast|close|far|than|not)))\b)\s*"
 )
 _NEGATOR = re.compile(
@@ -82,7 +82,7 @@ def clauses_of(text: str) -> list[Clause]:
 def _parts(line: str) -> list[tuple[str, bool]]:
     """Clause texts with whether each begins a step of its own, reordered where "after" or "before" turns them round."""
     parts: list[tuple[str, bool]] = []
-    for sentence in re.split(r"\s*[.;!?]\s*", line):
+    for sentence in map(str.rstrip, re.split(r"[.;!?]\s*", line)):
         for pattern in (_AFTER, _BEFORE, _THEN_AFTER):
             turned = pattern.match(sentence)
             if turned is not None:

@@ -47,9 +47,11 @@ _URGED: Final = re.compile(
     r"(?:love it|like it|nice|great|good|cool|fun|funny|happy|glad|appreciate it|mind|what) if (?:you|we) (?:could )?)$"
 )
 """What looks like a negation and is none: "do not be afraid to hit him"."""
-_TAKEN_BACK: Final = re.compile(r" ?[.,;?!]* ?(?:no|nope|better not|rather not|or (?:rather )?not)(?: ?[.,;!?]|$)")
+_TAKEN_BACK: Final = re.compile(r" ?[.,;?!]{0,9} ?(?:no|nope|better not|rather not|or (?:rather )?not)(?: ?[.,;!?]|$)")
 """What takes the words before it back: "turn around? No, ..."."""
 _GAP: Final = re.compile(r"\s+")
+_NEAR: Final = 240
+"""Characters in front of a danger in which its negation is looked for: some ten long words and what joins them."""
 
 
 @lru_cache(maxsize=32)  # the planner asks, and then the rules that draft for it
@@ -60,8 +62,8 @@ def danger(wish: str) -> str:
         words = _GAP.sub(" ", same.sub(name, words)).strip()
     for reason, pattern in _DANGERS:
         for found in pattern.finditer(words):
-            before = words[: found.start()]
-            if _NEGATED.search(before) and not _URGED.search(before):
+            begin, end = max(0, found.start() - _NEAR), found.start()
+            if _NEGATED.search(words, begin, end) and not _URGED.search(words, begin, end):
                 continue
             if not _TAKEN_BACK.match(words, found.end()):
                 return reason

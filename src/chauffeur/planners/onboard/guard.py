@@ -19,7 +19,7 @@ from chauffeur.planners.onboard.understand import understand
 
 _SIDES: Final = ("left", "right")
 _SERVICE: Final = re.compile(
-    r"(?:please|hey|ok|okay|can you|could you|would you|will you|just|now|\W)*"
+    r"\A(?:please|hey|ok|okay|can you|could you|would you|will you|just|now|\W)*"
     r"(?:play|sing|order|book|ring|phone|email|text|google|tell (?:me|us) (?:a|about)|put on (?:the|some))\b",
     re.IGNORECASE,
 )

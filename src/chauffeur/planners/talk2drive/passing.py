@@ -50,7 +50,7 @@ _STAY: Final = _any(
 _FILLERS: Final = (
     r"(?:(?:please|ok|okay|hey|so|just|now|then|come on|go on|go ahead|and|well|yes|yeah|right|alright|computer|car|"
     r"driver|buddy|dear|sir|mate|pal|chief|boss|hurry up|speed up|step on it|quick|quickly|um|uh|kindly|simply|really|"
-    r"actually|also|maybe|perhaps|better|be patient|relax|easy|go go go|do|carefully|let us|lets) ?,? ?)*"
+    r"actually|also|maybe|perhaps|better|be patient|relax|easy|go go go|do|carefully|let us|lets) ?,? ?){0,8}"
 )
 _POLITE: Final = r"(?:please |just |kindly |maybe |perhaps |want to )*"
 _ASKS: Final = _any(

@@ -27,7 +27,7 @@ _AS_IT_IS: Final = re.compile(
     r"\b(?:just )?(?:as|the way) (?:it|they) (?:is|are)(?: now)?(?=\s*[,.;:!]|$)", re.IGNORECASE
 )
 _NOISE: Final = (
-    re.compile(r"\d+(?:\.\d+)?\s*m/s\s*(?:2|²|\^2)(?!\d)|m/s\s*(?:2|²|\^2)(?!\d)", re.IGNORECASE),
+    re.compile(r"(?<!\d)\d+(?:\.\d+)?\s*m/s\s*(?:2|²|\^2)(?!\d)|m/s\s*(?:2|²|\^2)(?!\d)", re.IGNORECASE),
     re.compile(r"\bleft[ _-]to[ _-]right\b|\bright[ _-]to[ _-]left\b", re.IGNORECASE),
     re.compile(
         r"(?<!the )(?<!our )\bright (?:now|away|after|here|of way|before|behind)\b|\ball right\b", re.IGNORECASE

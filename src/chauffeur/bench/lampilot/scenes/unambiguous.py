@@ -25,7 +25,7 @@ _SIDE = re.compile(r"\b(left|right)\b")
 _NOT_A_SIDE = re.compile(r"\b(?:right (?:now|away|here)|all right|alright)\b")
 _DIFFERENCE_BEFORE = re.compile(
     r"\b(?:by|another|extra|add|adding|subtract|deduct|take|takes|knock|shave|lose|gain|shed|trim|pick up|put|put on"
-    r"|scrub off|catch up|take off)(?: (?:by|about|another|an extra))* $"
+    r"|scrub off|catch up|take off)(?: (?:by|about|another|an extra)){0,4} $"
 )
 _DIFFERENCE_BEHIND = re.compile(
     r"^#\d+ (?:of (?:extra|speed)|more|less|closer|nearer|further|farther|faster|slower|shorter|smaller|tighter|longer"
