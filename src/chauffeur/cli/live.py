@@ -68,7 +68,7 @@ def live(
     from chauffeur.cli.console import stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.lines import Lines, standard_input
-    from chauffeur.cli.live_drive import STOP, LiveDrive, is_stop
+    from chauffeur.cli.live_drive import LiveDrive
     from chauffeur.cli.live_screen import LiveScreen, QuietScreen
     from chauffeur.cli.parts import limits_named, not_kept, planner_named
     from chauffeur.concept import PersonId, SandboxError
@@ -84,7 +84,7 @@ def live(
     from chauffeur.memory.personal_limits import personal_limits
 
     who = PersonId(person.strip())
-    given = [STOP if is_stop(wish) else parse_wish(wish, who).text for wish in wishes or ()]
+    given = [parse_wish(wish, who).text for wish in wishes or ()]
     place = find(scenario) if scenario is not None else suiting(given[0] if given else "")
     bounds = personal_limits(who, limits_named(limits))
     start = Start(place, place.seed if seed is None else seed, bounds, duration)

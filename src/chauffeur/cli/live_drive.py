@@ -9,15 +9,15 @@ from chauffeur.cli.interrupts import Interrupts
 from chauffeur.cli.lines import Lines
 from chauffeur.cli.live_screen import QuietScreen, last_words
 from chauffeur.concept import InstructionError, PersonId
+from chauffeur.drive.emergency import STOPPING, stop_wanted
 from chauffeur.drive.live.books import Books
 from chauffeur.drive.live.messages import Key, Report
 from chauffeur.drive.live.orders import Brief, Event
 from chauffeur.drive.live.remembering import Remembering
 from chauffeur.drive.live.supervisor import Interaction, Replaced, Runtime
 from chauffeur.drive.talk.asking import OVER, Asking, Words
+from chauffeur.language.emergency import read_emergency
 
-STOP: Final = "stop"
-"""The line that ends the drive."""
 TAKE_OVER: Final = "take over"
 GIVE_BACK: Final = "give back"
 """The lines with which the person takes the wheel and gives it back."""
@@ -103,7 +103,7 @@ class LiveDrive:
 
     def _stop(self, runtime: Runtime) -> None:
         self._stopping = True
-        self._screen.note("Stopping. The car comes to a stand; Ctrl-C ends at once.")
+        self._screen.note(f"{STOPPING} Ctrl-C ends at once.")
         runtime.halt()
 
     # Wishes -----------------------------------------------------------------------------------------------------------
@@ -190,8 +190,8 @@ class LiveDrive:
 
 
 def is_stop(line: str) -> bool:
-    """Whether a line ends the drive."""
-    return line.strip().lower() == STOP
+    """Whether a line asks for a stop at once, which ends the drive."""
+    return stop_wanted(read_emergency(line))
 
 
 def _driven(interaction: Interaction) -> bool:

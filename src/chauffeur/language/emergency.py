@@ -152,7 +152,7 @@ _LATE: Final = re.compile(
 _NOT_TO_THE_CAR: Final = re.compile(
     r"\b(?:he|she|they|who|told|tell|tells|telling|say|says|said|asks?|asked|shouted?|yelled|screamed?|heard|wants?|wish|if|when"
     r"|whenever|until|till|unless|after|before|where|why|how|would|might|in case|once|never|game|song|movie|film|book)\b"
-    r"|\b(?:to|at|the|an?|any|not|next|can|could|would|should|will|did|does|do|or|than|of|bus|pit|truck|full|and)(?: \w+)? $|~ ?$"
+    r"|\b(?:to|at|the|an?|any|not|next|can|could|would|should|will|did|does|do|or|than|of|bus|pit|truck|full|and|last|first) $|~ ?$"
 )
 """In front of such a late "stop the car": told of somebody, supposed, or a noun."""
 _TAKEN_BACK: Final = re.compile(
