@@ -54,8 +54,7 @@ def read_emergency(text: str) -> Emergency | None:
     masked = line
     for match in refusals:
         masked = f"{masked[: match.start()]}{'~' * (match.end() - match.start())}{masked[match.end() :]}"
-    stops = [found for found in (_stop_in(piece, at) for piece, at in _pieces(masked)) if found is not None]
-    last_stop = max(stops, default=None)
+    last_stop = max(_stops_in(masked), default=None)
     last_no = max((match.start(), match[0]) for match in refusals) if refusals else None
     if last_stop is not None and (last_no is None or last_stop[0] > last_no[0]):
         taken_back = _TAKEN_BACK.search(masked, last_stop[0] + len(last_stop[1]))
@@ -104,7 +103,7 @@ _CAR: Final = r"(?:(?:the|this|your|our|my|that) )?(?:damn(?:ed)? |bloody |fucki
 _BRAKES: Final = r"(?:the |your |those )?(?:emergency )?(?:brakes?|breaks?|hand ?brake)"
 _STOP: Final = (
     rf"(?:(?:do |make |perform )?(?:an )?emergency (?:stop|halt|brake|braking)|full braking"
-    rf"|(?:stop|halt)(?: (?:{_CAR}|driving|moving|rolling|going))?(?! sign\b| light\b)"
+    rf"|cease driving|(?:stop|halt)(?: (?:{_CAR}|driving|moving|rolling|going|everything))?(?! sign\b| light\b)"
     rf"|brake(?: {_CAR})?|(?:slam|stand|step|jam|get|put|hit|press|apply|pull|use)(?: on)? {_BRAKES}(?: on)?"
     rf"|bring {_CAR} to a (?:\w+ )?(?:stop|halt|stand|standstill)"
     rf"|come to a (?:\w+ )?(?:stop|halt|stand|standstill)|stand still"
@@ -127,7 +126,7 @@ _TRAIL: Final = (
     rf"(?: (?:{_COURTESY}|here|right here|right there|there(?! (?:is|are|was|has)\b)|right|this (?:very )?(?:instant|second"
     r"|minute|moment)|instantly|straight away|directly|asap|fast|hard|as hard as you can|on the spot|where you are|already|ok"
     r"|completely|dead|for me|will you|would you|can you|could you|thank you|thanks|you (?:idiot|fool|moron)|i mean it"
-    rf"|do it|do you hear(?: me)?|{_CAR}|stop|halt|brake|break))*+"
+    rf"|do it|do you hear(?: me)?|{_CAR}|stop|halt|brake|break)(?= |$))*+"
 )
 _REASON: Final = (
     r"(?: (?:because|cause|as (?:i|he|she|they|there))\b| before (?:we|you|i|it|he|she|they|some(?:one|body|thing))(?: all)? (?:hit|crash|kill|die|hurt|get"
@@ -138,7 +137,7 @@ _REASON: Final = (
     r"| before\b(?= it is too late))"
 )
 _STOP_CLAUSE: Final = re.compile(rf"^ (?P<lead>{_LEAD})(?P<stop>{_STOP})(?P<trail>{_TRAIL})(?: ?$|(?={_REASON}))")
-_HOMOPHONE: Final = re.compile(rf"^ (?:{_COURTESY} )*+(?P<stop>break(?: break)*)(?: (?:now|hard|please|break))*+ ?$")
+_HOMOPHONE: Final = re.compile(rf"^ (?:{_COURTESY} )*+(?P<stop>break(?: break)*)(?: (?:now|hard|please|break)(?= |$))*+ ?$")
 _NEED: Final = re.compile(
     rf"^ (?:{_COURTESY} )*+(?:we|i) (?:really |just )?(?:must|should|have to|need to|have got to|got to|want to|better)"
     rf" (?P<stop>{_STOP})(?P<trail>{_TRAIL}) ?$"
@@ -159,6 +158,18 @@ _TAKEN_BACK: Final = re.compile(
     r"\b(?:never mind|cancel(?: that| it| the stop)?|scratch that|forget (?:it|that)|just kidding|only joking|false alarm"
     r"|(?:keep|carry|go|drive) (?:going|on|driving|moving))\b"
 )
+
+
+_SUPPOSED: Final = re.compile(rf"^(?: {_COURTESY})*+ (?:if|when|whenever|unless|in case|once|as soon as|should (?:there|you|we|i))\b")
+
+
+def _stops_in(line: str) -> list[tuple[int, str]]:
+    """Where a line asks for a stop; what a sentence only supposes ("if ..., brake") asks for none."""
+    found: list[tuple[int, str] | None] = []
+    for sentence in re.finditer(r"[^.]+", line):
+        if _SUPPOSED.match(sentence[0]) is None:
+            found += [_stop_in(piece, sentence.start() + at) for piece, at in _pieces(sentence[0])]
+    return [one for one in found if one is not None]
 
 
 def _stop_in(piece: str, at: int) -> tuple[int, str] | None:
@@ -205,7 +216,7 @@ _HITTING: Final = re.compile(
 _ONLY_TOLD: Final = re.compile(
     r"\b(?:if|when|whenever|until|unless|in case|might|may|could|would|was|were|had|saw|did|used to|yesterday|last|ago|once|story"
     r"|film|movie|book|song|news|radio|imagine|suppose|is there|are there|watch for|look for|mind|beware|careful of|sometimes|often"
-    r"|always|never|not|no|nobody|slower|slow|drive|driving|parked|car with|as there|like)\b|~"
+    r"|always|never|(?:is|are) (?:no|not)|nobody|slower|slow|drive|driving|parked|car with|as there|like)\b|~"
 )
 
 
@@ -218,14 +229,14 @@ def _ahead_in(piece: str, at: int) -> tuple[int, str] | None:
 
 # No stop -------------------------------------------------------------------------------------------------------------
 
-_GERUND: Final = r"(?:(?!anything|during|everything|nothing|something|morning|evening|crossing)\w+ing\b)"
+_GERUND: Final = r"(?:(?!anything|during|everything|nothing|something|morning|evening|crossing|driving|moving|rolling|going)\w+ing\b)"
 _NEGATED: Final = re.compile(
     r"\b(?:(?:do|does|did|must|should|need|can|may|will|would|could|shall|ought|are|is|better|please|and|but|just) not|never|not"
     r"|(?:there is |there was )?(?:no|without any|without a) (?:need|reason|cause|point|use|sense)(?: in)?|without|avoid|refrain from|no longer|rather than"
-    r"|instead of|no(?= (?:stopping|braking|halting|pulling|parking|slowing)\b))"
+    r"|instead of|under no circumstances|no(?= (?:stopping|braking|halting|pulling|parking|slowing)\b))"
     r"(?: ,? ?(?:under any circumstances|whatever happens|whatever you do|no matter what|i beg you|please|ever) ?,?(?= ))?"
     r"(?: (?:you|to|for|even|ever|think|about|of|dare|try|trying|want|wanting|wish|need|have|be|please|just|now|suddenly|necessary"
-    r"|any|us|me|go|going|start|at|all|bother|be|being|like|supposed|allowed|let|the|car|anybody|anyone|going|planning)){0,8}?"
+    r"|any|us|me|we|i|that|should|go|going|start|at|all|bother|be|being|like|supposed|allowed|let|the|car|anybody|anyone|going|planning)){0,8}?"
     r" (?:(?P<slow>brak(?:e|ing)|slow(?:ing)?(?: (?:down|up|any))?|(?:hit|touch|step on|slam on|use)(?:ting|ing)? (?:the )?brakes?)"
     r"|(?:emergency )?stop(?:ping|s)?|halt(?:ing)?"
     r"|(?:pull|pulling) (?:over|in|up|off|aside|out of|to the (?:side|right|shoulder)|on ?to the (?:side|shoulder))"
@@ -238,11 +249,11 @@ _MEANT_OTHERWISE: Final = re.compile(
 )
 """Behind the verb: what makes it another act ("don't stop accelerating") or is about its manner ("don't brake so hard")."""
 _FILLER: Final = re.compile(
-    rf"^(?: (?:[.,~]+|{_COURTESY}|{_STOP}|never mind|cancel(?: that)?|forget it|can you|could you|would you|here|yet|the car|car|at all|there|for (?:anything|anybody|anyone|him|her|them|me|us)|whatever happens"
+    rf"^(?: (?:[.,~]+|{_COURTESY}|{_STOP}|driving|moving|going|rolling|never mind|cancel(?: that)?|forget it|can you|could you|would you|here|yet|the car|car|at all|there|for (?:anything|anybody|anyone|him|her|them|me|us)|whatever happens"
     r"|whatever you do|no matter what|under any circumstances|on any account|again|anywhere|in this lane|on the (?:road|highway"
     r"|motorway|freeway|shoulder)|in the (?:lane|road)|(?:you (?:can )?)?(?:just )?(?:keep|carry|go|drive|move|roll)"
     r" (?:going|on|driving|moving|rolling|ahead)|keep it (?:up|going|rolling)|continue|we are fine|i am fine|it is (?:fine|ok)"
-    r"|everything is (?:fine|ok)|all is (?:fine|well|good)|for now|right|ever|i|you|and|but))*+ ?$"
+    r"|everything is (?:fine|ok)|all is (?:fine|well|good)|for now|right|ever|i|you|we|lets|rather|there is|until i (?:say|tell you)(?: so)?|anyway|and|but)(?= |$))*+ ?$"
 )
 
 
@@ -263,11 +274,11 @@ _SAFE: Final = re.compile(
 _GRAVE: Final = re.compile(
     r"\b(?:(?:there is|i (?:can )?(?:see|smell)|(?:see|smell)s?(?: like| of)?|is that|lots? of|so much|black|white|filling with|full of)"
     r" (?:\w+ )?(?:smoke|flames|burning|gas|petrol|fuel)|smoke (?:is|in|from|under|out|coming|everywhere|inside|behind)"
-    r"|(?:smell|smells|smelling|smelled) (?:of |like )?(?:\w+ )?(?:burning|burnt|smoke|fire|gas|petrol|fuel)|burning smell|smell of fire"
+    r"|(?:smell|smells|smelling|smelled) (?:of |like )?(?:\w+ )?(?:burning|burnt|smoke|fire|gas|petrol|fuel)|burning smell|smell of fire|flames (?:are|coming|from|out|in|under)"
     r"|fire smell|on fire|caught fire|catching fire|(?:there is|a) fire (?:in|under|inside|here)|(?:something|engine|car|seat|battery) (?:is )?(?:burning|smoking|on fire|in flames|overheating)"
-    r"|(?:flat|burst|blown|punctured|bust|popped) (?:out )?(?:tyre|tire|wheel)|(?:tyre|tire|wheel)s? (?:\w+ )?(?:is |are |has |have |feels |just )*(?:flat|burst|blown|blew|punctured|popped"
+    r"|(?:flat|burst|blown|punctured|bust|popped|lost) (?:out )?(?:(?:a|the|our|one of the|my) )?(?:\w+ )?(?:tyre|tire|wheel)s?|(?:have|got|have got) a flat(?! (?:in|on|near|share))|(?:tyre|tire|wheel)s? (?:\w+ )?(?:is |are |has |have |feels |just )*(?:flat|burst|blown|blew|punctured|popped"
     r"|exploded|gone flat|gone|coming off|come off|falling off|fell off|losing air)|puncture|blow ?out"
-    r"|brakes (?:are |have |do |just )*(?:failed|failing|not work(?:ing)?|gone|fail)|engine (?:has |is |just )*(?:died|dying|failed|failing|overheating)"
+    r"|brakes (?:are |have |do |just )*(?:failed|failing|not work(?:ing)?|gone|fail)|brake failure|(?:something|anything) is (?:badly |really |very )?wrong with (?:the|this|our) (?:car|engine|brakes?|steering|tyres?|tires?|wheels?)|steering (?:wheel )?(?:is |does |has )?(?:shaking|locked|stuck|not work\w*|gone)|warning light|can not see (?:anything|a thing)|lost my sight|broken? (?:my|his|her) (?:arm|leg|neck|hand|foot|rib)s?|engine (?:has |is |just )*(?:died|dying|failed|failing|overheating)"
     r"|heart attack|(?:having|has|had) a stroke|cardiac arrest|chest (?:pains?|hurts?|is (?:tight|hurting|aching)|feels tight|aches)"
     r"|(?:pains?|tightness|pressure) in (?:my|his|her|the) chest|(?:can not|can barely|can hardly|hard to|struggling to|unable to|trouble|difficulty|could not) breath(?:e|ing)?"
     r"|not breathing|unconscious|passed out|passing out|fainted|collapsed|choking|seizure|convuls\w+|bleeding|allergic (?:shock|reaction)|anaphyla\w+"
@@ -283,8 +294,8 @@ _UNWELL: Final = re.compile(
     r"|(?:not|do not|does not) (?:feel|feeling)(?: \w+){0,2}? (?:well|good|great|right|ok)\b"
     r"|throwing up|vomiting|blacking out|getting blurry|(?:everything|head|world) is spinning|makes? me (?:sick|dizzy|nauseous))\b"
 )
-_EMERGENCY_ALONE: Final = re.compile(r"^ (?:please |quick |hey |car )?(?:(?:emergency|mayday|sos|help us|help me|help|smoke|fire)[., ]*+)++$")
-_STOP_THAT: Final = re.compile(rf"^ (?:{_COURTESY} )*+(?:stop (?:it|that|this))(?: {_COURTESY})*+ ?$")
+_EMERGENCY_ALONE: Final = re.compile(r"^ (?:please |quick |hey |car )?(?:(?:emergency|mayday|sos|help us|help me|(?:i |we )?(?:need )?help|smoke|fire)[., ]*+)++$")
+_STOP_THAT: Final = re.compile(rf"^ (?:{_COURTESY} )*+(?:stop (?:it|that|this))(?: {_COURTESY}(?= |$))*+ ?$")
 _SAID_WHAT_TO_DO: Final = re.compile(
     r"\b(?:hospital|clinic|doctor s|faster|hurry|speed up|step on it|quick(?:ly)? to|slow down|slower|slowly|ease|easy|gentl[ey]|gentler"
     r"|smooth(?:er|ly)?|softer|careful(?:ly)?|calm(?:er|ly)?|overtake|pull over|lane|window|air|heating|less|more|shoulder|get me to|get us to|take me|take us)\b"
@@ -292,7 +303,7 @@ _SAID_WHAT_TO_DO: Final = re.compile(
 _NO_DISTRESS: Final = re.compile(
     r"\b(?:if|unless|in case|yesterday|last (?:week|year|time|night|month|summer|winter)|ago|once had|used to|story|film|movie|book|song|news|radio|imagine|suppose|joke"
     r"|no (?:smoke|fire|flames)|is there|never had|fire (?:engine|truck|brigade|department|station|fighters?)|no longer|anymore|any more"
-    r"|(?:no|not an?|without) (?:emergency|ambulance|doctor)|not (?:feel(?:ing)? )?(?:sick|dizzy|faint|ill|bleeding|hurt|in pain|on fire|an emergency)|he was|she was|in (?:that|the) game|his|their|other car|that car|car (?:ahead|in front|behind))\b"
+    r"|(?:no|not an?|without) (?:emergency|ambulance|doctor)|not (?:feel(?:ing)? )?(?:sick|dizzy|faint|ill|bleeding|hurt|in pain|on fire|an emergency)|he was|she was|in (?:that|the) game|(?:his|her|their|other|that|this) (?:car|truck|lorry|van|exhaust|engine|tyre|tire|bus)|car (?:ahead|in front|behind))\b"
 )
 
 
