@@ -19,6 +19,7 @@ EMERGENCY_PLANNER: Final = "emergency"
 
 STOPPING: Final = "Stopping: hazard lights on, the car keeps its lane and brakes to a stand."
 GOING_ON: Final = "I do not stop. The car goes on as it was."
+NO_SHOULDER: Final = "There is no shoulder here. To stop in this lane at once, say: “Stop!”"
 QUESTION: Final = "Shall I stop at the next safe place?"
 ASKED: Final = f"I cannot call anybody. {QUESTION} If so, say: “{SAFE_STOP_WISH}” To stop at once, say: “Stop!”"
 """The question where nobody waits for a yes."""

@@ -349,15 +349,17 @@ class Control:
         return done, settled, tuple(text for _, text in pursuit.notes[known:])
 
     def _risk_least(self, command: Command, snapshot: Snapshot, settled: Wishes | None) -> Command:
-        """Once asked to stop: the minimal-risk manoeuvre's even braking, or more where the lead vehicle asks for it."""
+        """Once asked to stop: the minimal-risk manoeuvre's even braking, or more where a slower lead vehicle asks for it."""
         if not self._stopping or isinstance(self._shield, LotShield):
             return command
         speed = max(0.0, snapshot.ego.speed_mps)
-        needed = command
-        if settled is not None and self._driver is not None:  # the driver's own law brakes for a set-point of 0 with all it has
-            needed = self._driver.command(replace(settled, target_speed_mps=max(speed, 1.0)))
         braking = min(MINIMAL_RISK_BRAKING_MPS2, speed / self.dt_s)
-        return replace(command, acceleration_mps2=min(needed.acceleration_mps2, -braking))
+        if snapshot.front is not None and snapshot.front.speed_mps < speed:
+            needed = command
+            if settled is not None and self._driver is not None:  # its law brakes for a set-point of 0 with all it has
+                needed = self._driver.command(replace(settled, target_speed_mps=max(speed, 1.0)))
+            braking = max(braking, -needed.acceleration_mps2)
+        return replace(command, acceleration_mps2=-braking)
 
     def _actuated(self, snapshot: Snapshot, command: Command, settled: Wishes) -> Actuated:
         return actuate(self._world, snapshot, command, settled.target_lane, self._shield)

@@ -284,7 +284,7 @@ class OnRoad:
             return Answer(number, text[:MAX_WISH_CHARACTERS], "declined", str(error)), None
         answer = Answer(number, instruction.text, "declined", ENGAGING_WORDS)
         self._book(lambda books: books.wish(number, instruction))
-        if is_about_engaging(instruction.text):
+        if is_about_engaging(instruction.text) and not is_stop(instruction.text):
             return answer, None
         if words := answered_at_once(instruction.text):
             return replace(answer, words=words), None

@@ -280,10 +280,10 @@ class Talk:
         return True
 
     def _shoulder(self) -> bool:
-        """Whether a shoulder can be reached from here, as far as is seen."""
+        """Whether a shoulder can be reached from here; where nothing is seen yet, the planner process finds out."""
         report = None if self._runtime is None else self._runtime.report
         now = None if report is None else self._instant(report.trip, report.tick)
-        return now is not None and shoulder_at_right(now)
+        return now is None or shoulder_at_right(now)
 
     def _is_stopping_by_plan(self) -> bool:
         """Whether the plan that is driven brings the car to a stand."""
