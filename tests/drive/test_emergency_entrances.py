@@ -233,5 +233,3 @@ def test_a_vehicle_is_asked_for_a_stop_and_for_none_that_was_refused() -> None:
     stopped = (*answers[: len(STOPS)], answers[-1])
     assert all(one.status == "dry-run" and one.plan is not None and one.plan.intent == "stop" for one in stopped)
     assert all(one.status == "declined" for one in answers[len(STOPS) : -1])
-
-

@@ -14,7 +14,13 @@ from chauffeur.safety.minimum_speed import LEAST_MPS, check_minimum_speed, least
 Snap = Callable[..., Snapshot]
 LIMITS = Limits()
 CONSTANT = "def go():\n    set_target_speed({speed})\n    while True:\n        yield autopilot()\n"
-WORKED_OUT = "def go():\n    speed = 40.0\n    for _ in range(9):\n        speed = speed * 0.5\n    set_target_speed({speed} + 0.0 * speed)\n    yield autopilot()\n"
+WORKED_OUT = """def go():
+    speed = 40.0
+    for _ in range(9):
+        speed = speed * 0.5
+    set_target_speed({speed} + 0.0 * speed)
+    yield autopilot()
+"""
 PULL_OVER = """def pull_over():
     ego = get_ego_vehicle()
     right = get_right_lane(ego)
@@ -85,5 +91,3 @@ def test_only_what_makes_for_a_shoulder_may_stand_there(snap: Snap) -> None:
 def test_it_stands_before_drives_of_people_and_not_in_a_benchmarks_rules() -> None:
     assert check_minimum_speed in DRIVE_CHECKS
     assert check_minimum_speed not in DEFAULT_CHECKS
-
-

@@ -1,7 +1,8 @@
 """What the car does about emergency words, before any planner is asked: the plans are fixed, and no model decides.
 
-The minimal-risk manoeuvre keeps the lane and brakes evenly, at no more than 4 m/s2 unless the lead vehicle asks for more,
-with hazard lights on (UN Regulation No. 157, 5.5). A simulated car has no lamps: that they are on is said in words.
+The minimal-risk manoeuvre keeps the lane and brakes evenly, at no more than 4 m/s2 unless the lead vehicle asks for
+more, with hazard lights on (UN Regulation No. 157, 5.5). A simulated car has no lamps: that they are on is said in
+words.
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ ASKED: Final = f"I cannot call anybody. {QUESTION} If so, say: “{SAFE_STOP_WIS
 _STOPPED_MPS: Final = 0.1
 _SLACK_MPS: Final = 0.5
 _FULL_SCALE_MPS2: Final = 30.0
-"""LaMPilot's car-following law on a free road: acceleration = 30 (1 - (v / v0)^4) m/s2, cut at 5 (control/actuation.py)."""
+"""LaMPilot's car-following law on a free road: 30 (1 - (v / v0)^4) m/s2, cut at 5 (control/actuation.py)."""
 _STOPPING_INTENTS: Final = frozenset({"stop", "pull_over", "park"})
 
-_STOP_PROGRAM: Final = f'''def minimal_risk_manoeuvre():
+_STOP_PROGRAM: Final = f"""def minimal_risk_manoeuvre():
     # Hazard lights on; keep the lane, and brake with an even {MINIMAL_RISK_BRAKING_MPS2:g} m/s2 to a stand.
     ego = get_ego_vehicle()
     say("Hazard lights on. I stop in this lane.")
@@ -41,8 +42,8 @@ _STOP_PROGRAM: Final = f'''def minimal_risk_manoeuvre():
         yield autopilot()
     set_target_speed(0.0)
     yield autopilot()
-'''
-_SAFE_STOP_PROGRAM: Final = f'''def stop_on_the_shoulder():
+"""
+_SAFE_STOP_PROGRAM: Final = f"""def stop_on_the_shoulder():
     # Hazard lights on; lane by lane to the shoulder, which has none to its right, and an even 3 m/s2 to a stand there.
     ego = get_ego_vehicle()
     say("Hazard lights on. I stop on the shoulder.")
@@ -65,7 +66,7 @@ _SAFE_STOP_PROGRAM: Final = f'''def stop_on_the_shoulder():
         yield autopilot()
     set_target_speed(0.0)
     yield autopilot()
-'''
+"""
 _GO_ON_PROGRAM: Final = """def go_on():
     # No stop: speed and lane as they are, and no slower than traffic allows for.
     set_target_speed({speed:.2f})
@@ -88,7 +89,9 @@ def planned_for(text: str, snapshot: Snapshot) -> Plan | None:
         case "stop":
             return _plan(STOPPING, _STOP_PROGRAM, "stop", 0.0)
         case "safe_stop" if shoulder_at_right(snapshot):
-            return _plan("Hazard lights on: I make for the shoulder and stop there.", _SAFE_STOP_PROGRAM, "pull_over", 0.0)
+            return _plan(
+                "Hazard lights on: I make for the shoulder and stop there.", _SAFE_STOP_PROGRAM, "pull_over", 0.0
+            )
         case "safe_stop":
             return _plan(f"There is no shoulder here. {STOPPING}", _STOP_PROGRAM, "stop", 0.0)
         case "ask":

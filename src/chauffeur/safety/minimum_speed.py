@@ -42,7 +42,9 @@ def check_minimum_speed(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdi
         return Verdict(MINIMUM_SPEED_CHECK, True, f"No set-point is below the least speed of {speed_words(least)}.")
     speed, line = min(slow, key=lambda one: one[0])
     verb = "stand" if speed <= 0.5 else f"drive at {speed_words(speed)}"
-    reason = f"To {verb} in a lane of a highway is dangerous: others drive far faster. At least {speed_words(least)} here."
+    reason = (
+        f"To {verb} in a lane of a highway is dangerous: others drive far faster. At least {speed_words(least)} here."
+    )
     remedy = f"Ask for {math.ceil(least / MPS_PER_KMH - _ROUNDING):d} km/h or more"
     remedy += ", or to pull over on the shoulder." if shoulder_at_right(snapshot) else "; to stop at once, say “Stop!”"
     return Verdict(MINIMUM_SPEED_CHECK, False, reason, line, remedy)
@@ -84,7 +86,8 @@ def _set_points(plan: Plan, snapshot: Snapshot) -> Iterator[tuple[float, int | N
         case Program(source=source, library=library):
             reading = read_program(source)
             rightward = any(
-                use.name == "set_target_lane" and use.lane_offset in (1, None) for use in (*reading.uses, *read_program(library).uses)
+                use.name == "set_target_lane" and use.lane_offset in (1, None)
+                for use in (*reading.uses, *read_program(library).uses)
             )
             if rightward and shoulder_at_right(snapshot):
                 return  # where it slows down is seen while driving

@@ -349,7 +349,7 @@ class Control:
         return done, settled, tuple(text for _, text in pursuit.notes[known:])
 
     def _risk_least(self, command: Command, snapshot: Snapshot, settled: Wishes | None) -> Command:
-        """Once asked to stop: the minimal-risk manoeuvre's even braking, or more where a slower lead vehicle asks for it."""
+        """Once asked to stop: the minimal-risk manoeuvre's even braking, or more for a slower lead vehicle."""
         if not self._stopping or isinstance(self._shield, LotShield):
             return command
         speed = max(0.0, snapshot.ego.speed_mps)

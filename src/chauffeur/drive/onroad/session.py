@@ -43,8 +43,8 @@ from chauffeur.concept import (
 )
 from chauffeur.describe.services.sources import Sources
 from chauffeur.drive.auditing import FLUSH_TIMEOUT_S
-from chauffeur.drive.onroad.books import RoadBooks
 from chauffeur.drive.emergency import check_told_not_to
+from chauffeur.drive.onroad.books import RoadBooks
 from chauffeur.drive.onroad.checks import (
     ENGAGING_WORDS,
     answered_at_once,
