@@ -8,8 +8,9 @@ from dataclasses import replace
 import pytest
 
 from chauffeur.concept import Lead, Limits, Parameters, Plan, Program, Snapshot, Thoughts
+from chauffeur.safety.bounds import LEAST_MPS, least_speed_mps
 from chauffeur.safety.checks import DEFAULT_CHECKS, DRIVE_CHECKS
-from chauffeur.safety.minimum_speed import LEAST_MPS, check_minimum_speed, least_speed_mps
+from chauffeur.safety.minimum_speed import check_minimum_speed
 
 Snap = Callable[..., Snapshot]
 LIMITS = Limits()

@@ -12,7 +12,7 @@ from typing import Final
 from chauffeur.concept import Parameters, Plan, Program, Snapshot, Thoughts, Verdict
 from chauffeur.drive.fallback import MINIMAL_RISK_BRAKING_MPS2
 from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency
-from chauffeur.safety.minimum_speed import least_speed_mps, shoulder_at_right
+from chauffeur.safety.bounds import least_speed_mps, shoulder_at_right
 from chauffeur.safety.reading import read_program
 
 EMERGENCY_CHECK: Final = "emergency-v1"

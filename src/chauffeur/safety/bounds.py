@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Final
 
-from chauffeur.concept import Limits, Wishes
+from chauffeur.concept import LaneView, Limits, Snapshot, Wishes
+from chauffeur.concept.units import MPS_PER_KMH
+
+LEAST_MPS: Final = 60.0 * MPS_PER_KMH
+SHARE_OF_LIMIT: Final = 0.6
+AHEAD_M: Final = 100.0
+"""Traffic that far ahead says how fast one can drive."""
 
 
 def bounded(
@@ -35,3 +42,31 @@ def bounded(
     if not changed:
         return wishes, ()
     return replace(wishes, target_speed_mps=speed, time_headway_s=headway), tuple(changed)
+
+
+def least_speed_mps(snapshot: Snapshot, limits: Limits | None = None) -> float | None:
+    """The least speed that may be asked for where the ego is; None where there is none: off a highway, on its shoulder.
+
+    Args:
+        snapshot: The instant.
+        limits: Of the person: a lower cap of theirs is no crawl.
+    """
+    lane = _lane_of(snapshot)
+    if snapshot.kind != "highway" or lane is None or lane.emergency or lane.forbidden:
+        return None
+    least = min(LEAST_MPS, SHARE_OF_LIMIT * lane.speed_limit_mps)
+    cap = None if limits is None else limits.max_speed_mps
+    ahead = () if snapshot.front is None or snapshot.front.distance_m > AHEAD_M else (snapshot.front.speed_mps,)
+    return max(0.0, min((least, *ahead, *(() if cap is None else (cap,)))))
+
+
+def shoulder_at_right(snapshot: Snapshot) -> bool:
+    """Whether the ego is on a shoulder, or can get to one lane by lane to the right."""
+    own = snapshot.ego.lane
+    return own is not None and any(
+        lane.emergency and lane.id[:2] == own[:2] and lane.id[2] >= own[2] for lane in snapshot.lanes
+    )
+
+
+def _lane_of(snapshot: Snapshot) -> LaneView | None:
+    return next((lane for lane in snapshot.lanes if lane.id == snapshot.ego.lane), None)

@@ -15,19 +15,16 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
-from chauffeur.concept import LaneView, Limits, Parameters, Plan, Program, Snapshot, Verdict
+from chauffeur.concept import Limits, Parameters, Plan, Program, Snapshot, Verdict
 from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.verify import Circumstances, verify
+from chauffeur.safety.bounds import least_speed_mps, shoulder_at_right
 from chauffeur.safety.reading import read_program
 from chauffeur.safety.words import speed_words
 
 MINIMUM_SPEED_CHECK: Final = "minimum-speed-v1"
 
-LEAST_MPS: Final = 60.0 * MPS_PER_KMH
-SHARE_OF_LIMIT: Final = 0.6
-AHEAD_M: Final = 100.0
-"""Traffic that far ahead says how fast one can drive."""
 _ROUNDING: Final = 0.02
 """Planners write speeds in hundredths of m/s or whole km/h."""
 
@@ -48,34 +45,6 @@ def check_minimum_speed(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdi
     remedy = f"Ask for {math.ceil(least / MPS_PER_KMH - _ROUNDING):d} km/h or more"
     remedy += ", or to pull over on the shoulder." if shoulder_at_right(snapshot) else "; to stop at once, say “Stop!”"
     return Verdict(MINIMUM_SPEED_CHECK, False, reason, line, remedy)
-
-
-def least_speed_mps(snapshot: Snapshot, limits: Limits | None = None) -> float | None:
-    """The least speed that may be asked for where the ego is; None where there is none: off a highway, on its shoulder.
-
-    Args:
-        snapshot: The instant.
-        limits: Of the person: a lower cap of theirs is no crawl.
-    """
-    lane = _lane_of(snapshot)
-    if snapshot.kind != "highway" or lane is None or lane.emergency or lane.forbidden:
-        return None
-    least = min(LEAST_MPS, SHARE_OF_LIMIT * lane.speed_limit_mps)
-    cap = None if limits is None else limits.max_speed_mps
-    ahead = () if snapshot.front is None or snapshot.front.distance_m > AHEAD_M else (snapshot.front.speed_mps,)
-    return max(0.0, min((least, *ahead, *(() if cap is None else (cap,)))))
-
-
-def shoulder_at_right(snapshot: Snapshot) -> bool:
-    """Whether the ego is on a shoulder, or can get to one lane by lane to the right."""
-    own = snapshot.ego.lane
-    return own is not None and any(
-        lane.emergency and lane.id[:2] == own[:2] and lane.id[2] >= own[2] for lane in snapshot.lanes
-    )
-
-
-def _lane_of(snapshot: Snapshot) -> LaneView | None:
-    return next((lane for lane in snapshot.lanes if lane.id == snapshot.ego.lane), None)
 
 
 def _set_points(plan: Plan, snapshot: Snapshot) -> Iterator[tuple[float, int | None]]:

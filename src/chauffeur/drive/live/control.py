@@ -27,8 +27,7 @@ from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.wheel import Wheel, pressed
 from chauffeur.drive.parameters import LotShield, ParametersDriver, shield_for
-from chauffeur.safety.bounds import bounded
-from chauffeur.safety.minimum_speed import least_speed_mps
+from chauffeur.safety.bounds import bounded, least_speed_mps
 from chauffeur.safety.shield import Shield, foresight
 from chauffeur.worlds.base import Driver, MirroredWorld
 

@@ -53,7 +53,7 @@ from chauffeur.drive.talk.view import View
 from chauffeur.drive.talk.voice import Voice
 from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency
 from chauffeur.memory.feedback import interpret_feedback
-from chauffeur.safety.minimum_speed import shoulder_at_right
+from chauffeur.safety.bounds import shoulder_at_right
 from chauffeur.speech.answers import answer_in
 
 ASK_AFTER_S: Final = 15.0
