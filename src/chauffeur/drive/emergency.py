@@ -18,7 +18,7 @@ from chauffeur.safety.reading import read_program
 EMERGENCY_CHECK: Final = "emergency-v1"
 EMERGENCY_PLANNER: Final = "emergency"
 
-STOPPING: Final = "Stopping: hazard lights on, the car keeps its lane and brakes to a stand."
+STOPPING: Final = "Stopping. Hazard lights are on; the car keeps its lane and brakes to a stand."
 GOING_ON: Final = "I do not stop. The car goes on as it was."
 NO_SHOULDER: Final = "There is no shoulder here. To stop in this lane at once, say: “Stop!”"
 QUESTION: Final = "Shall I stop at the next safe place?"
