@@ -114,7 +114,7 @@ class LiveDrive:
             return
         if not typed:
             self._given.append(line)
-        elif is_stop(line):
+        elif is_stop(line) and not (runtime.taken_over and line.strip().lower() in KEYS):  # `brake` is a key then
             self._stop(runtime)
         elif not self._at_the_wheel(runtime, " ".join(line.lower().split())):
             self._typed.append(line)
