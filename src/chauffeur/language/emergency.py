@@ -67,12 +67,6 @@ def read_emergency(text: str) -> Emergency | None:
     return _distress_in(line)
 
 
-def forbids_stopping(text: str) -> bool:
-    """Whether a person says that the car is not to stop, brake or pull over."""
-    found = read_emergency(text)
-    return found is not None and found.kind == "no_stop"
-
-
 # From text to a line of plain words ----------------------------------------------------------------------------------
 
 _SENTENCE_END: Final = re.compile(r"[.!?;:\n]+")

@@ -16,7 +16,7 @@ from typing import Final, Self
 
 from chauffeur.concept import NOBODY, ChauffeurError, Feedback, Limits, PersonId, Snapshot
 from chauffeur.concept.units import kmh
-from chauffeur.drive.emergency import GOING_ON, QUESTION, STOPPING, brings_to_a_stand
+from chauffeur.drive.emergency import GOING_ON, QUESTION, STOPPING, brings_to_a_stand, stop_wanted
 from chauffeur.drive.live.books import Books
 from chauffeur.drive.live.messages import Report
 from chauffeur.drive.live.orders import Brief, Event
@@ -334,7 +334,7 @@ class Talk:
     def _evaluate(self, text: str, wish: str, words: Words) -> None:
         said = " ".join(text.split())
         wish = wish or self._conversations.last_felt
-        if not said or self._emergency(replace(words, text=said)):
+        if not said or (stop_wanted(read_emergency(said)) and self._emergency(replace(words, text=said))):
             return
         if wish not in self._conversations:
             self._say(Note("Nothing was driven yet that there could be an opinion on."))
