@@ -34,7 +34,6 @@ from chauffeur.drive.talk.messages import (
     Scene,
     Session,
     Stages,
-    Stop,
     TakeOver,
     VerdictShown,
 )
@@ -50,7 +49,7 @@ SCENE = Scene(12.0, EGO, (), 0.0, 0.0, 31.0, 20.0, 1.5, ("a", "b", 1), "follow",
     ("line", "told"),
     [
         ("slow down", Say("slow down")),
-        ("  Stop ", Stop()),
+        ("  Stop ", Say("Stop")),  # the session reads emergency words
         ("!too fast", Evaluate("too fast")),
         ("evaluate, that was good", Evaluate("that was good")),
         ("Evaluate: fine", Evaluate("fine")),

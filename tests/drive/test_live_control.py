@@ -167,6 +167,30 @@ def test_asked_to_stop_it_stands_and_ends(bench: Bench) -> None:
     assert not bench.control.begin_trip()
 
 
+def test_the_minimal_risk_manoeuvre_brakes_evenly_in_its_lane(bench: Bench) -> None:
+    lane = bench.world.snapshot().ego.lane
+    bench.control.stop()
+    braking: list[float] = []
+    for _ in range(300):
+        report = bench.tick()
+        braking.append(-report.applied.acceleration_mps2)
+        assert report.lane == lane
+        if report.ended:
+            break
+    assert report.outcome == "stopped"
+    assert braking[2:40] == [pytest.approx(4.0)] * 38  # the lead vehicle, close as it is, draws away
+    assert len(braking) * 0.1 < 10.0
+
+
+@pytest.mark.parametrize("asked", [0.0, 5.0])
+def test_a_policy_that_crawls_among_others_is_brought_up_to_the_least_speed(bench: Bench, asked: float) -> None:
+    for _ in range(10):
+        bench.wish(Wishes(asked))
+        report = bench.tick()
+    assert "target_speed" in report.clipped
+    assert report.wishes.target_speed_mps is not None and report.wishes.target_speed_mps >= 15.0
+
+
 def test_an_error_in_a_period_brakes_and_control_goes_on(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(*_: object) -> None:
         raise ZeroDivisionError

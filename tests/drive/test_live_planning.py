@@ -36,7 +36,7 @@ class Written:
                 await asyncio.sleep(30.0)
             case "raise":
                 raise ConfigError("No such model.")
-            case "break":
+            case "fault":
                 raise ZeroDivisionError("oops")
             case "decline":
                 return Plan(Thoughts(""), None, refusal="Cars cannot fly.")
@@ -107,7 +107,7 @@ def test_a_wish_becomes_an_order_that_says_what_it_was_made_for(rig: Rig) -> Non
         ("decline", "declined", "cannot fly"),
         ("nothing", "declined", "no program"),
         ("raise", "unplanned", "No such model"),
-        ("break", "unplanned", "ZeroDivisionError"),
+        ("fault", "unplanned", "ZeroDivisionError"),
         ("long", "unplanned", "does not fit"),
         ("x" * 3000, "unplanned", "3000 characters"),
     ],

@@ -25,6 +25,15 @@ limits = st.builds(
 )
 
 
+@pytest.mark.parametrize(("asked", "driven"), [(0.0, 16.0), (-3.0, 16.0), (15.9, 16.0), (16.0, 16.0), (20.0, 20.0)])
+def test_a_policy_is_brought_up_to_the_least_speed(asked: float, driven: float) -> None:
+    wishes, changed = bounded(Wishes(asked, 1.5), LIMITS, SIGN, 16.0)
+    assert wishes.target_speed_mps == driven
+    assert changed == (() if asked == driven else ("target_speed",))
+    assert bounded(Wishes(asked, 1.5), replace(LIMITS, max_speed_mps=10.0), SIGN, 16.0)[0].target_speed_mps == 10.0
+    assert bounded(Wishes(math.nan, 1.5), LIMITS, SIGN, 16.0)[0].target_speed_mps == 0.0  # no number: the car stops
+
+
 @given(speed=st.none() | anything, headway=anything, limits=limits, sign=st.floats(0.0, 40.0) | st.just(math.nan))
 def test_what_comes_out_is_within_the_limits_and_bounding_it_again_changes_nothing(
     speed: float | None, headway: float, limits: Limits, sign: float

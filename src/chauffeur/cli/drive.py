@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from chauffeur.concept import Instruction
     from chauffeur.drive.recording import RecordedTrip
 
 EXAMPLES = """
@@ -89,6 +90,7 @@ def drive(
 
     instruction = parse_wish(wish, PersonId(person.strip()))
     bounds = personal_limits(instruction.person, limits_named(limits))
+    instruction = asked_back(instruction)
     place = suiting(instruction.text) if scenario is None else find(scenario, data)
     planner = planner_for(planner, place)
     console = stdout()
@@ -127,6 +129,20 @@ def drive(
             typer.launch((save / "trip.html").resolve().as_uri())
     if recorded.trip.outcome not in _DONE or (closing is not None and not closing.complete):
         raise typer.Exit(FAILED)
+
+
+def asked_back(instruction: Instruction) -> Instruction:
+    """What is wished once the car's question is answered: somebody in distress is asked, where there is a terminal."""
+    import sys
+    from dataclasses import replace
+
+    from chauffeur.drive.emergency import QUESTION
+    from chauffeur.language.emergency import SAFE_STOP_WISH, read_emergency
+
+    found = read_emergency(instruction.text)
+    if found is None or found.kind != "ask" or not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return instruction
+    return replace(instruction, text=SAFE_STOP_WISH) if typer.confirm(QUESTION, default=True) else instruction
 
 
 def save_trip(folder: Path, recorded: RecordedTrip) -> list[Path]:

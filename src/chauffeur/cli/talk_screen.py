@@ -175,6 +175,10 @@ class TalkScreen:
         if heard.status != "heard":
             self._line("", NOT_HEARD.get(heard.status, heard.status), "yellow", plain(heard.reason))
             return
+        if not heard.engine:  # the car's own question, and not what was heard
+            self._question = heard.text
+            self._line("", "question", "bold yellow", Text(f"{heard.reason} Say or type yes or no."))
+            return
         sure = "" if heard.confidence is None else f", {heard.confidence:.0%} sure"
         after = Text(f"  ({heard.after_speech_s:.2f} s after you spoke{sure})", "dim")
         name = "heard" if heard.hotword != "evaluate" else "opinion"

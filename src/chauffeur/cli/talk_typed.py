@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-from chauffeur.drive.talk.messages import Evaluate, Hand, MemoryOrder, Say, Stop, TakeOver, Told
+from chauffeur.drive.talk.messages import Evaluate, Hand, MemoryOrder, Say, TakeOver, Told
 
 HELP: Final = (
     ("any words", "a wish, e.g. slow down a bit"),
@@ -37,8 +37,6 @@ def read_line(line: str, *, taken_over: bool) -> Told | str | None:
     match words:
         case [] | ["help"] | ["?"]:
             return None
-        case ["stop"]:
-            return Stop()
         case ["take", "over"]:
             return TakeOver(True)
         case ["give", "back"]:

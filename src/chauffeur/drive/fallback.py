@@ -9,6 +9,8 @@ from chauffeur.concept import LaneId, Wishes
 
 FALLBACK_HEADWAY_S: Final = 2.0
 """Time headway of the fallback: the two seconds of driving schools."""
+MINIMAL_RISK_BRAKING_MPS2: Final = 4.0
+"""How hard the minimal-risk manoeuvre brakes on a free road: the most of UN Regulation No. 157, 5.5.1."""
 
 
 def keep_lane_and_gap(wishes: Wishes, speed_mps: float, lane: LaneId | None) -> Wishes:

@@ -30,6 +30,7 @@ from chauffeur.concept import (
     Trip,
     Verdict,
 )
+from chauffeur.drive.emergency import check_told_not_to, not_checked, planned_for
 from chauffeur.planners.base import Planner
 from chauffeur.safety.screening import screen_request
 from chauffeur.worlds.base import World
@@ -68,10 +69,11 @@ async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, s
 
     request, screened = screen_request(PlanRequest(I, C, S, H, limits=limits))  # words are data
     stages.tell("screened", screened)
-    plan = await stages.planner.plan(request)  # R, P
+    own = planned_for(I.text, snapshot)  # emergency words are no planner's to decide
+    plan = own or await stages.planner.plan(request)  # R, P
     stages.tell("RP", plan)
 
-    V = stages.check(plan, snapshot, limits)  # noqa: N806
+    V = not_checked(plan) if own else checked(I, plan, snapshot, limits, stages)  # noqa: N806
     stages.tell("V", V)
 
     trip = stages.execute(request, plan, V, scenario, seed)  # drives P only if no verdict stops it
@@ -79,3 +81,14 @@ async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, s
 
     stages.memory.remember(trip, None)  # H + (I, C, P, R); F joins when the person speaks
     return trip
+
+
+def checked(
+    I: Instruction,  # noqa: E741, N803
+    plan: Plan,
+    snapshot: Snapshot,
+    limits: Limits,
+    stages: Stages,
+) -> tuple[Verdict, ...]:
+    """What stands between a planner's plan and the vehicle: the checks, and what the person has forbidden in words."""
+    return (*stages.check(plan, snapshot, limits), *check_told_not_to(I.text, plan, snapshot))

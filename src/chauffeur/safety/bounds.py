@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import Final
 
-from chauffeur.concept import Limits, Wishes
+from chauffeur.concept import LaneView, Limits, Snapshot, Wishes
+from chauffeur.concept.units import MPS_PER_KMH
+
+LEAST_MPS: Final = 60.0 * MPS_PER_KMH
+SHARE_OF_LIMIT: Final = 0.6
+AHEAD_M: Final = 100.0
+"""Traffic that far ahead says how fast one can drive."""
 
 
-def bounded(wishes: Wishes, limits: Limits, speed_limit_mps: float) -> tuple[Wishes, tuple[str, ...]]:
+def bounded(
+    wishes: Wishes, limits: Limits, speed_limit_mps: float, least_mps: float = 0.0
+) -> tuple[Wishes, tuple[str, ...]]:
     """The wishes, with numbers brought within the limits, and the names of what was changed.
 
     Args:
         wishes: As the policy states them.
         limits: Of the person and the operator.
         speed_limit_mps: Of the lane that is driven.
+        least_mps: Least speed a policy may ask for there, within the limits; 0 where there is none.
     """
     most_mps = max(0.0, limits.most_mps(speed_limit_mps))  # below 0, or no number: the car stops
     changed: list[str] = []
     speed = wishes.target_speed_mps
-    if speed is not None and not 0.0 <= speed <= most_mps:
-        speed = most_mps if speed > most_mps else 0.0  # a speed that is no number stops the car
+    least_mps = min(max(0.0, least_mps), most_mps)
+    if speed is not None and not least_mps <= speed <= most_mps:
+        # a speed that is no number stops the car
+        speed = most_mps if speed > most_mps else 0.0 if math.isnan(speed) else least_mps
         changed.append("target_speed")
     headway = wishes.time_headway_s
     if not limits.min_time_headway_s <= headway <= limits.max_time_headway_s:
@@ -29,3 +42,31 @@ def bounded(wishes: Wishes, limits: Limits, speed_limit_mps: float) -> tuple[Wis
     if not changed:
         return wishes, ()
     return replace(wishes, target_speed_mps=speed, time_headway_s=headway), tuple(changed)
+
+
+def least_speed_mps(snapshot: Snapshot, limits: Limits | None = None) -> float | None:
+    """The least speed that may be asked for where the ego is; None where there is none: off a highway, on its shoulder.
+
+    Args:
+        snapshot: The instant.
+        limits: Of the person: a lower cap of theirs is no crawl.
+    """
+    lane = _lane_of(snapshot)
+    if snapshot.kind != "highway" or lane is None or lane.emergency or lane.forbidden:
+        return None
+    least = min(LEAST_MPS, SHARE_OF_LIMIT * lane.speed_limit_mps)
+    cap = None if limits is None else limits.max_speed_mps
+    ahead = () if snapshot.front is None or snapshot.front.distance_m > AHEAD_M else (snapshot.front.speed_mps,)
+    return max(0.0, min((least, *ahead, *(() if cap is None else (cap,)))))
+
+
+def shoulder_at_right(snapshot: Snapshot) -> bool:
+    """Whether the ego is on a shoulder, or can get to one lane by lane to the right."""
+    own = snapshot.ego.lane
+    return own is not None and any(
+        lane.emergency and lane.id[:2] == own[:2] and lane.id[2] >= own[2] for lane in snapshot.lanes
+    )
+
+
+def _lane_of(snapshot: Snapshot) -> LaneView | None:
+    return next((lane for lane in snapshot.lanes if lane.id == snapshot.ego.lane), None)

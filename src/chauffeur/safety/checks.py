@@ -9,13 +9,15 @@ from chauffeur.concept import Limits, Plan, Snapshot, Verdict
 from chauffeur.safety.base import Check
 from chauffeur.safety.envelope import check_parameters
 from chauffeur.safety.format import check_format
+from chauffeur.safety.minimum_speed import check_minimum_speed
 from chauffeur.safety.reach import check_reach
 
 DEFAULT_CHECKS: tuple[Check, ...] = (check_format, check_parameters)
 """The two checks of the papers: format, then parameters in context."""
 
-DRIVE_CHECKS: tuple[Check, ...] = (*DEFAULT_CHECKS, check_reach)
-"""What stands before a drive for a person: also what no reading of constants finds, at some milliseconds a program."""
+DRIVE_CHECKS: tuple[Check, ...] = (*DEFAULT_CHECKS, check_reach, check_minimum_speed)
+"""What stands before a drive for a person: also what no reading of constants finds, at some milliseconds a program, and
+the least speed among others. A benchmark's own rules know neither."""
 
 _log = logging.getLogger(__name__)
 

@@ -116,7 +116,7 @@ def test_a_wish_from_words_to_set_point_with_where_the_time_went() -> None:
     assert (stages.wait_s, stages.recognise_s) == (0.5, 0.25)
     assert (stages.plan_s, stages.check_s, stages.set_point_s, stages.total_s) == (0.25, 0.25, 0.5, 2.0)
     assert [verdict.check for verdict in shown.verdicts if not verdict.informs] == [
-        "format-v1", "parameters-v1", "reach-v1",
+        "format-v1", "parameters-v1", "reach-v1", "minimum-speed-v1",
     ]  # fmt: skip
     assert all(verdict.passed for verdict in shown.verdicts)
 

@@ -93,7 +93,9 @@ def test_wish_opinion_memory_wheel_and_stop() -> None:
         person.until(lambda: person.driven("w1"))
         first = person.conversation("w1")
         assert first is not None and first.policy == "parameters" and "70 km/h" in first.source
-        assert [each.check for each in first.verdicts] == ["format-v1", "parameters-v1", "reach-v1"]
+        assert [each.check for each in first.verdicts] == [
+            "format-v1", "parameters-v1", "reach-v1", "minimum-speed-v1",
+        ]  # fmt: skip
         assert all(each.passed for each in first.verdicts)
         person.until(lambda: person.target_mps() == pytest.approx(70 / 3.6, abs=0.01))  # a scene comes after its policy
         person.until(lambda: person.all(HowWasIt))

@@ -19,6 +19,7 @@ from typing import Final
 
 from chauffeur.concept import Command, Parameters, Snapshot, Wishes
 from chauffeur.drive.actuate import Actuated, actuate
+from chauffeur.drive.fallback import MINIMAL_RISK_BRAKING_MPS2
 from chauffeur.drive.live.ladder import Ladder
 from chauffeur.drive.live.messages import MessageError, Observation, Report, Rung, Steered, Wish
 from chauffeur.drive.live.realtime import Ticker
@@ -26,7 +27,7 @@ from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.wheel import Wheel, pressed
 from chauffeur.drive.parameters import LotShield, ParametersDriver, shield_for
-from chauffeur.safety.bounds import bounded
+from chauffeur.safety.bounds import bounded, least_speed_mps
 from chauffeur.safety.shield import Shield, foresight
 from chauffeur.worlds.base import Driver, MirroredWorld
 
@@ -165,7 +166,8 @@ class Control:
             if not self._wheel.taken:
                 age_s = self._hear(start)
             rung, wishes = self._choose(at_s, age_s, snapshot)
-            wishes, clipped = bounded(wishes, start.limits, self._limit_mps(wishes, snapshot))
+            least = self._least_mps(rung, wishes, snapshot, start)
+            wishes, clipped = bounded(wishes, start.limits, self._limit_mps(wishes, snapshot), least)
             done, settled, told = self._act(rung, snapshot, wishes)
             wishes = wishes if self._pursuit is None else settled
             said += told
@@ -321,6 +323,14 @@ class Control:
         limits = [self._world.perception().speed_limit(lane) for lane in lanes]
         return max(limits, default=math.inf)
 
+    def _least_mps(self, rung: Rung, wishes: Wishes, snapshot: Snapshot, start: Start) -> float:
+        """The least speed a policy may ask for; 0 for the ladder and for the person's hands, and on the way to a
+        shoulder that is entered now."""
+        aim = next((lane for lane in snapshot.lanes if lane.id == wishes.target_lane), None)
+        if rung not in ("follow", "hold") or (aim is not None and aim.emergency):
+            return 0.0
+        return least_speed_mps(snapshot, start.limits) or 0.0
+
     def _act(self, rung: Rung, snapshot: Snapshot, wishes: Wishes) -> tuple[Actuated, Wishes, tuple[str, ...]]:
         """Drive a period; returns what was done, the wishes as they were driven, and what there is to tell."""
         assert self._driver is not None
@@ -331,11 +341,24 @@ class Control:
             if settled.target_speed_mps is not None and settled.target_speed_mps <= STANDING_MPS:
                 # LaMPilot's IDM has no standing still: it would start off again every other period.
                 command = replace(command, acceleration_mps2=min(command.acceleration_mps2, 0.0))
-            return self._actuated(snapshot, command, settled), settled, ()
+            return self._actuated(snapshot, self._risk_least(command, snapshot, settled), settled), settled, ()
         known = len(pursuit.notes)
         settled = pursuit.wishes(wishes) if rung in ("follow", "hold") else pursuit.held_to(wishes)
-        done = self._actuated(snapshot, pursuit.command(), settled)
+        done = self._actuated(snapshot, self._risk_least(pursuit.command(), snapshot, None), settled)
         return done, settled, tuple(text for _, text in pursuit.notes[known:])
+
+    def _risk_least(self, command: Command, snapshot: Snapshot, settled: Wishes | None) -> Command:
+        """Once asked to stop: the minimal-risk manoeuvre's even braking, or more for a slower lead vehicle."""
+        if not self._stopping or isinstance(self._shield, LotShield):
+            return command
+        speed = max(0.0, snapshot.ego.speed_mps)
+        braking = min(MINIMAL_RISK_BRAKING_MPS2, speed / self.dt_s)
+        if snapshot.front is not None and snapshot.front.speed_mps < speed:
+            needed = command
+            if settled is not None and self._driver is not None:  # its law brakes for a set-point of 0 with all it has
+                needed = self._driver.command(replace(settled, target_speed_mps=max(speed, 1.0)))
+            braking = max(braking, -needed.acceleration_mps2)
+        return replace(command, acceleration_mps2=-braking)
 
     def _actuated(self, snapshot: Snapshot, command: Command, settled: Wishes) -> Actuated:
         return actuate(self._world, snapshot, command, settled.target_lane, self._shield)

@@ -15,6 +15,7 @@ from typing import Final
 
 from chauffeur.concept import ChauffeurError, History, PersonId, Plan, PlanRequest
 from chauffeur.describe.services.sources import Sources, SourceSettings
+from chauffeur.drive.emergency import NO_SHOULDER, check_told_not_to, planned_for
 from chauffeur.drive.live.messages import MessageError
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.orders import (
@@ -153,7 +154,13 @@ class Planning:
         history = self._memory.recall(instruction.person, instruction, context, _RECALLED)
         system = build_system_message(self._setting, limits=limits)
         asked, _ = screen_request(PlanRequest(instruction, context, system, history, limits=limits))
-        plan: Plan = await self._planner.plan(asked)
+        own = planned_for(request.text, snapshot)  # emergency words are no planner's to decide
+        plan: Plan = own or await self._planner.plan(asked)
+        if own is not None and own.intent == "stop":  # only control may stand in a lane, and it was not told to
+            plan = replace(own, policy=None, refusal=NO_SHOULDER)
+        forbidden = () if own else check_told_not_to(request.text, plan, snapshot)
+        if any(verdict.stops for verdict in forbidden):
+            plan = replace(plan, policy=None, refusal=" ".join(verdict.reason for verdict in forbidden))
         self._brief(Brief(request.wish, instruction, context, history, plan, self._mirror.trip, snapshot.tick))
         return Order(
             wish=request.wish,

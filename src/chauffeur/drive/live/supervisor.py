@@ -23,6 +23,7 @@ from types import TracebackType
 from typing import Any, Final, Literal, Self
 
 from chauffeur.concept import NOBODY, SandboxError
+from chauffeur.drive.emergency import STOPPING, stop_wanted
 from chauffeur.drive.live.__main__ import FIGURES_FILE, READY_SUFFIX
 from chauffeur.drive.live.messages import Hand, Key, MessageError, Report, Wish
 from chauffeur.drive.live.orders import (
@@ -38,6 +39,7 @@ from chauffeur.drive.live.orders import (
 )
 from chauffeur.drive.live.ring import Message, Reader
 from chauffeur.drive.live.settings import SIZES, RingName, Settings, ring
+from chauffeur.language.emergency import read_emergency
 
 Role = Literal["control", "policy", "spare", "planner"]
 """`spare`: a policy process that waits to take over."""
@@ -165,10 +167,17 @@ class Runtime:
     # For whoever drives -----------------------------------------------------------------------------------------------
 
     def ask(self, text: str, person: str = NOBODY) -> str:
-        """Hand a wish to the planner; returns its id. What becomes of it is told by events."""
+        """Hand a wish to the planner; returns its id. What becomes of it is told by events.
+
+        A stop at once is no planner's to decide: the car is brought to a stand, whoever asks.
+        """
         wish = self.next_wish
-        self.interactions[wish] = Interaction(Request(wish, text, person), since_s=time.monotonic())
-        self._send(self.interactions[wish])
+        interaction = self.interactions[wish] = Interaction(Request(wish, text, person), since_s=time.monotonic())
+        if stop_wanted(read_emergency(text)):
+            self.halt()
+            self._close(interaction, Event("interrupted", wish, STOPPING))
+        else:
+            self._send(interaction)
         return wish
 
     @property

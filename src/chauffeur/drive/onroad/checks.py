@@ -11,8 +11,10 @@ from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept import Parameters, Plan, Verdict
+from chauffeur.drive.emergency import stop_wanted
 from chauffeur.drive.onroad.seeing import Seen
 from chauffeur.drive.onroad.words import in_own_words, speed_text
+from chauffeur.language.emergency import read_emergency
 from chauffeur.safety.checks import DEFAULT_CHECKS, run_checks
 from chauffeur.worlds.ros import VehicleLimits
 
@@ -28,9 +30,6 @@ _UPWARDS: Final = frozenset({"speed.increase", "style.hurry", "style.sporty"})
 _SLACK_MPS: Final = 0.05
 
 _ENGAGING: Final = re.compile(r"\b(?:(?:dis|re)?engag(?:e|ed|ing)|drive[- ]by[- ]wire|autopilot on)\b", re.IGNORECASE)
-_STOPPING: Final = re.compile(
-    r"\A[\s.!,]*(?:please[\s,]+)?(?:stop|halt|stop now)[\s.!,]*(?:please[\s.!]*)?", re.IGNORECASE
-)
 
 ENGAGING_WORDS: Final = (
     "Handing the vehicle to its computer, and taking it back, is a person's act; no wish does it. "
@@ -44,9 +43,21 @@ def is_about_engaging(text: str) -> bool:
 
 
 def is_stop(text: str) -> bool:
-    """Whether a wish is the one word that needs no planner."""
-    words = " ".join(re.sub(r"[.,!]", " ", text).split())
-    return _STOPPING.fullmatch(words) is not None
+    """Whether a wish needs no planner: the car is to stop at once."""
+    return stop_wanted(read_emergency(text))
+
+
+def answered_at_once(text: str) -> str:
+    """What is said to words that ask nothing of this vehicle's planner but are no remark either; empty for others.
+
+    Where to stop is chosen by the vehicle; what it can be asked for at once is a speed of 0.
+    """
+    found = read_emergency(text)
+    if found is None or not found.alone or found.kind == "stop":
+        return ""
+    if found.kind == "no_stop":
+        return "I ask for no stop. What was asked of the vehicle stays in force."
+    return "I cannot call anybody, and where to stop is chosen by the vehicle. Shall it stop now? If so, say: “Stop!”"
 
 
 def fitted(plan: Plan, limits: VehicleLimits, cap_mps: float) -> Plan:

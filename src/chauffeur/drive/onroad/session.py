@@ -43,8 +43,16 @@ from chauffeur.concept import (
 )
 from chauffeur.describe.services.sources import Sources
 from chauffeur.drive.auditing import FLUSH_TIMEOUT_S
+from chauffeur.drive.emergency import check_told_not_to
 from chauffeur.drive.onroad.books import RoadBooks
-from chauffeur.drive.onroad.checks import ENGAGING_WORDS, check_all, fitted, is_about_engaging, is_stop
+from chauffeur.drive.onroad.checks import (
+    ENGAGING_WORDS,
+    answered_at_once,
+    check_all,
+    fitted,
+    is_about_engaging,
+    is_stop,
+)
 from chauffeur.drive.onroad.events import Answer, Event, EventKind, Status
 from chauffeur.drive.onroad.seeing import Seen, counted_from, describe_vehicle
 from chauffeur.drive.onroad.trips import make_trip
@@ -246,6 +254,8 @@ class OnRoad:
 
     async def evaluate(self, text: str) -> Answer:
         """Keep what the person says of the drive with their last trip."""
+        if is_stop(text):
+            return await self.ask(text)
         self._count += 1
         number, words = self._count, " ".join(text.split())
         if not words:
@@ -274,8 +284,10 @@ class OnRoad:
             return Answer(number, text[:MAX_WISH_CHARACTERS], "declined", str(error)), None
         answer = Answer(number, instruction.text, "declined", ENGAGING_WORDS)
         self._book(lambda books: books.wish(number, instruction))
-        if is_about_engaging(instruction.text):
+        if is_about_engaging(instruction.text) and not is_stop(instruction.text):
             return answer, None
+        if words := answered_at_once(instruction.text):
+            return replace(answer, words=words), None
         state = self._observed()
         if state.link not in _USABLE:
             return replace(answer, status="unreachable", words=_unreachable(state)), None
@@ -325,6 +337,8 @@ class OnRoad:
         plan = fitted(plan, self._settings.stack.limits, before.cap_mps)
         seen = await self._look(0.0)  # the vehicle has gone on while it was planned
         verdicts = check_all(plan, seen, before)
+        if not stopping:
+            verdicts += check_told_not_to(instruction.text, plan, seen.bounds(before))
         if plan.refusal and verdicts[0].stops:
             plan = refused_in_own_words(plan, verdicts[0])
         told = plan

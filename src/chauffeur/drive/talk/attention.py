@@ -11,12 +11,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
+from chauffeur.drive.emergency import stop_wanted
 from chauffeur.drive.talk.asking import Words
 from chauffeur.drive.talk.ear import Ear, Ears, HeardAt, Trouble
 from chauffeur.drive.talk.hearing import Engine
 from chauffeur.drive.talk.messages import Answered, Button, HeardWords, Listening, Note, Said
 from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.voice import Voice
+from chauffeur.language.emergency import read_emergency
 from chauffeur.speech.answers import answer_in
 from chauffeur.speech.base import Heard
 
@@ -108,6 +110,8 @@ class Attention:
 
     def poll(self) -> None:
         """Hear what there is to hear."""
+        if self._question is not None and time.monotonic() > self._question.until_s:
+            self.withdraw(f"Nobody said yes: {self._question.dropped}")
         if self._ear is None:
             return
         self._take_microphone()
@@ -120,8 +124,6 @@ class Attention:
                     self._say(Note(news.text, trouble=True))
                 case HeardAt():
                     self._understand(news)
-        if self._question is not None and time.monotonic() > self._question.until_s:
-            self.withdraw(f"Nobody said yes: {self._question.dropped}")
 
     def confirm(self, yes: bool, answer: Words) -> None:
         """Yes or no to what was heard; nothing where nothing was asked.
@@ -137,6 +139,25 @@ class Attention:
         if yes:
             words = replace(answer, text=question.heard.text, spoken=True)
             self._act(question.heard.hotword or "command", words)
+
+    def offer(self, question: str, wish: str) -> None:
+        """The car's own question: a yes wishes what it offers.
+
+        Args:
+            question: In words.
+            wish: What a yes stands for.
+        """
+        self.withdraw()
+        shown = HeardWords("heard", wish, "command", "", None, to_confirm=True, reason=question, after_speech_s=0.0)
+        self._ask_back(shown, Heard("heard", wish, "command", ""))
+        self._say(shown)
+        if self._voice is not None:
+            self._voice.say(question)
+
+    def _ask_back(self, shown: HeardWords, heard: Heard) -> None:
+        self._question = _Question(shown, heard, time.monotonic() + ANSWER_WITHIN_S)
+        if self._ear is not None:
+            self._ear.expect_answer(True)
 
     def withdraw(self, why: str = "") -> None:
         """Ask no more whether something was heard rightly, and say why."""
@@ -179,7 +200,8 @@ class Attention:
         # With a button held, yes comes as a command.
         answers = understood and (heard.hotword is None or (self._question is not None and heard.hotword == "command"))
         answer = answer_in(heard.text) if answers else None
-        asks = understood and heard.to_confirm and answer is None
+        at_once = stop_wanted(read_emergency(heard.text)) if understood else False  # a stop is not asked back
+        asks = understood and heard.to_confirm and answer is None and not at_once
         shown = HeardWords(
             status=heard.status,
             text=heard.text,
@@ -195,9 +217,8 @@ class Attention:
         self._say(shown)
         if answer is not None:
             self.confirm(answer, words)
-        elif asks and self._ear is not None:
-            self._question = _Question(shown, heard, time.monotonic() + ANSWER_WITHIN_S)
-            self._ear.expect_answer(True)
+        elif asks:
+            self._ask_back(shown, heard)
             if self._voice is not None:
                 self._voice.say(f"Did you mean: {heard.text}?")
         elif understood:

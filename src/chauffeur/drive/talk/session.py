@@ -16,6 +16,7 @@ from typing import Final, Self
 
 from chauffeur.concept import NOBODY, ChauffeurError, Feedback, Limits, PersonId, Snapshot
 from chauffeur.concept.units import kmh
+from chauffeur.drive.emergency import GOING_ON, QUESTION, STOPPING, brings_to_a_stand, stop_wanted
 from chauffeur.drive.live.books import Books
 from chauffeur.drive.live.messages import Report
 from chauffeur.drive.live.orders import Brief, Event
@@ -51,11 +52,11 @@ from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.tally import Tally
 from chauffeur.drive.talk.view import View
 from chauffeur.drive.talk.voice import Voice
+from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency
 from chauffeur.memory.feedback import interpret_feedback
+from chauffeur.safety.bounds import shoulder_at_right
 from chauffeur.speech.answers import answer_in
 
-STOP: Final = "stop"
-"""Typed alone, it brings the car to a stand and ends the drive."""
 ASK_AFTER_S: Final = 15.0
 """So long a wish is driven, in the car's time, before the car asks how it is: many have no end of their own."""
 OPINION_WITHIN_S: Final = 2.0
@@ -253,13 +254,49 @@ class Talk:
         answer = answer_in(text) if self.question else None
         if answer is not None:
             self._attention.confirm(answer, Words("", ended_s=time.monotonic()))
-        elif text.strip().lower().rstrip(".!") == STOP:
-            self._stop()
         else:
             self._attention.withdraw()
             self._wish(Words(text.strip(), ended_s=time.monotonic()))
 
+    def _emergency(self, words: Words) -> bool:
+        """What has to be certain is done here, whoever has the wheel and whatever is planned; whether that was all."""
+        found = read_emergency(words.text)
+        if found is None or self._runtime is None or self._stopping:
+            return False
+        match found:
+            case Emergency(kind="stop"):
+                self._asking.pass_over(words.text, "stopped", STOPPING)
+                self._stop()
+            case Emergency(kind="safe_stop") if not self._shoulder():
+                self._asking.pass_over(words.text, "stopped", STOPPING)
+                self._say(Note("There is no shoulder here."))
+                self._stop()
+            case Emergency(kind="ask"):
+                self._asking.pass_over(words.text, "asked_back", QUESTION)
+                self._attention.offer(QUESTION, SAFE_STOP_WISH)
+            case Emergency(kind="no_stop", alone=True) if not self._is_stopping_by_plan():
+                self._asking.pass_over(words.text, "answered", GOING_ON)
+                self._say(Note(GOING_ON))
+                self._speak(GOING_ON)
+            case _:
+                return False
+        return True
+
+    def _shoulder(self) -> bool:
+        """Whether a shoulder can be reached from here; where nothing is seen yet, the planner process finds out."""
+        report = None if self._runtime is None else self._runtime.report
+        now = None if report is None else self._instant(report.trip, report.tick)
+        return now is None or shoulder_at_right(now)
+
+    def _is_stopping_by_plan(self) -> bool:
+        """Whether the plan that is driven brings the car to a stand."""
+        runtime = self._runtime
+        driven = [] if runtime is None else [one for one in runtime.open_wishes if one.stage in ("planned", "driven")]
+        return any(one.brief is not None and brings_to_a_stand(one.brief.plan) for one in driven)
+
     def _wish(self, words: Words) -> None:
+        if self._emergency(words):
+            return
         if self._stopping:
             self._say(Note(f"The car is stopping; “{words.text}” is not asked."))
             self._asking.pass_over(words.text, "not_asked", OVER)
@@ -292,7 +329,8 @@ class Talk:
             return
         self._stopping = True
         self._attention.withdraw()
-        self._say(Note("Stopping. The car comes to a stand."))
+        self._say(Note(STOPPING))
+        self._speak(STOPPING)
         self._runtime.halt()
 
     # Opinions ---------------------------------------------------------------------------------------------------------
@@ -300,7 +338,7 @@ class Talk:
     def _evaluate(self, text: str, wish: str, words: Words) -> None:
         said = " ".join(text.split())
         wish = wish or self._conversations.last_felt
-        if not said:
+        if not said or (stop_wanted(read_emergency(said)) and self._emergency(replace(words, text=said))):
             return
         if wish not in self._conversations:
             self._say(Note("Nothing was driven yet that there could be an opinion on."))

@@ -160,7 +160,7 @@ function showScene() {
 function showHeardWords(heard) {
   question = heard.to_confirm ? heard : null;
   $('confirm').hidden = !question;
-  const words = heard.status === 'heard' ? `Heard “${heard.text}”${question ? '. Is that what you mean?' : ''}` : [NOT_HEARD[heard.status], heard.reason].filter(Boolean).join(' ');
+  const words = question && !heard.engine ? heard.reason : heard.status === 'heard' ? `Heard “${heard.text}”${question ? '. Is that what you mean?' : ''}` : [NOT_HEARD[heard.status], heard.reason].filter(Boolean).join(' ');
   write($('heard-words'), words);
   $('heard').className = `heard ${question ? 'asks' : { heard: 'good', no_hotword: '' }[heard.status] ?? 'bad'}`;
   if (heard.status !== 'no_hotword') tell(words); // people in a cabin talk

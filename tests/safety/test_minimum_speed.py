@@ -1,0 +1,94 @@
+"""`minimum-speed-v1`: nobody crawls or stands in a lane of a highway because of words, whatever kind the policy is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from chauffeur.concept import Lead, Limits, Parameters, Plan, Program, Snapshot, Thoughts
+from chauffeur.safety.bounds import LEAST_MPS, least_speed_mps
+from chauffeur.safety.checks import DEFAULT_CHECKS, DRIVE_CHECKS
+from chauffeur.safety.minimum_speed import check_minimum_speed
+
+Snap = Callable[..., Snapshot]
+LIMITS = Limits()
+CONSTANT = "def go():\n    set_target_speed({speed})\n    while True:\n        yield autopilot()\n"
+WORKED_OUT = """def go():
+    speed = 40.0
+    for _ in range(9):
+        speed = speed * 0.5
+    set_target_speed({speed} + 0.0 * speed)
+    yield autopilot()
+"""
+PULL_OVER = """def pull_over():
+    ego = get_ego_vehicle()
+    right = get_right_lane(ego)
+    while right is not None:
+        while not is_safe_enter(right):
+            yield autopilot()
+        set_target_lane(right)
+        while get_lane_of(ego) != right:
+            yield autopilot()
+        right = get_right_lane(ego)
+    set_target_speed(0.0)
+    yield autopilot()
+"""
+
+
+def plans(speed: float) -> list[Plan]:
+    return [
+        Plan(Thoughts(""), Program(CONSTANT.format(speed=speed))),
+        Plan(Thoughts(""), Program(WORKED_OUT.format(speed=speed))),
+        Plan(Thoughts(""), Program("def go():\n    yield autopilot()\n"), settings=(("target_speed_mps", speed),)),
+        Plan(Thoughts(""), Parameters(speed, 10.0, 1.0)),
+    ]
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.7, 8.33, 16.0])
+def test_a_crawl_is_refused_with_what_to_say_instead(snap: Snap, speed: float) -> None:
+    for plan in plans(speed):
+        verdict = check_minimum_speed(plan, snap(), LIMITS)
+        assert verdict.stops, plan
+        assert "60 km/h" in verdict.reason and "60 km/h or more" in verdict.remedy
+
+
+@pytest.mark.parametrize("speed", [LEAST_MPS, 16.67, 25.0, 31.0])
+def test_what_is_no_crawl_passes(snap: Snap, speed: float) -> None:
+    assert all(check_minimum_speed(plan, snap(), LIMITS).passed for plan in plans(speed))
+
+
+def test_a_queue_is_followed_at_its_own_speed(snap: Snap) -> None:
+    slow = replace(snap(), front=Lead(1, 40.0, 3.0))
+    assert least_speed_mps(slow) == 3.0
+    assert all(check_minimum_speed(plan, slow, LIMITS).passed for plan in plans(4.0))
+    assert all(check_minimum_speed(plan, slow, LIMITS).stops for plan in plans(1.0))
+    far = replace(snap(), front=Lead(1, 400.0, 3.0))
+    assert least_speed_mps(far) == pytest.approx(LEAST_MPS)
+
+
+def test_a_persons_own_cap_is_no_crawl(snap: Snap) -> None:
+    assert least_speed_mps(snap(), Limits(max_speed_mps=10.0)) == 10.0
+
+
+def test_it_holds_on_highways_alone(snap: Snap) -> None:
+    crossing = replace(snap(), kind="intersection")
+    assert least_speed_mps(crossing) is None
+    assert all(check_minimum_speed(plan, crossing, LIMITS).passed for plan in plans(0.0))
+
+
+def test_only_what_makes_for_a_shoulder_may_stand_there(snap: Snap) -> None:
+    here = snap()
+    plan = Plan(Thoughts(""), Program(PULL_OVER), intent="pull_over", settings=(("target_speed_mps", 0.0),))
+    assert check_minimum_speed(plan, here, LIMITS).stops
+    shoulder = replace(here, lanes=(*here.lanes[:-1], replace(here.lanes[-1], emergency=True)))
+    assert check_minimum_speed(plan, shoulder, LIMITS).passed
+    on_it = replace(shoulder, ego=replace(shoulder.ego, lane=shoulder.lanes[-1].id))
+    assert least_speed_mps(on_it) is None
+    assert all(check_minimum_speed(crawl, shoulder, LIMITS).stops for crawl in plans(0.0))
+
+
+def test_it_stands_before_drives_of_people_and_not_in_a_benchmarks_rules() -> None:
+    assert check_minimum_speed in DRIVE_CHECKS
+    assert check_minimum_speed not in DEFAULT_CHECKS
