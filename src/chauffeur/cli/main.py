@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from typing import Annotated
 
@@ -34,6 +35,7 @@ from chauffeur.cli.bench import bench_app
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
 from chauffeur.cli.me import me_app
 from chauffeur.cli.policies import policies_app
+from chauffeur.cli.printable import PrintableFormatter
 from chauffeur.cli.scenes import scenes_app
 from chauffeur.cli.serve import serve_app
 from chauffeur.cli.study import study_app
@@ -116,6 +118,8 @@ app.add_typer(vehicle_app, name="vehicle")
 
 def run() -> None:
     """Entry point of the `chauffeur` script."""
+    if logging.lastResort is not None:
+        logging.lastResort.setFormatter(PrintableFormatter())
     if not debugging():
         sys.excepthook = show_crash
     # Calling `app` itself would put Typer's own exception hook in the place of ours.

@@ -101,7 +101,7 @@ class Teller(Quiet):
             case Frame():
                 self._frame(value)
             case Instruction():
-                said_by = f"  ({value.person})" if value.person else ""
+                said_by = f"  ({plain(value.person)})" if value.person else ""
                 self._letter("I", Text.assemble(("“", "dim"), plain(value.text), ("”", "dim"), (said_by, "dim")))
             case Context():
                 self._letter("C", plain(value.text))
@@ -187,7 +187,7 @@ class Teller(Quiet):
 
     def _thoughts(self, thoughts: Thoughts, intent: str) -> None:
         body = plain(thoughts.text.strip() or "(no reasoning given)")
-        self._letter("R", Text.assemble(body, (f"  [{intent}]", "dim")) if intent else body)
+        self._letter("R", Text.assemble(body, (f"  [{plain(intent)}]", "dim")) if intent else body)
 
     def _verdict(self, verdict: Verdict) -> None:
         if verdict.alignment is not None and not verdict.passed:
