@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import struct
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import Writer
+from mcap_protobuf.decoder import DecoderFactory
 
 from chauffeur.concept import (
     ApiCall,
@@ -42,6 +44,7 @@ from chauffeur.concept import (
     Verdict,
     Wishes,
 )
+from chauffeur.drive.foxglove import MESSAGES
 from chauffeur.drive.mcap_schemas import CHANNELS
 from chauffeur.drive.recording import RecordedTrip, compare_trips, read_trip, write_trip
 
@@ -207,25 +210,112 @@ def test_lanes_are_stored_once_and_shared(tmp_path: Path) -> None:
     assert all(frame.snapshot.lanes is back.final.lanes for frame in back.frames)
 
 
-def test_other_viewers_find_json_with_schemas(tmp_path: Path) -> None:
-    path = save(tmp_path / "trip.mcap", a_drive())
+def test_other_viewers_find_schemas_for_everything(tmp_path: Path) -> None:
+    drive = a_drive()
+    drive = replace(drive, frames=(replace(drive.frames[0], said=("Überholt – 快点",)), *drive.frames[1:]))
+    path = save(tmp_path / "trip.mcap", drive)
     with path.open("rb") as stream:
         reader = make_reader(stream)
         summary = reader.get_summary()
-        messages = [(schema, channel, json.loads(m.data)) for schema, channel, m in reader.iter_messages()]
+        messages = [(schema, channel, m.data) for schema, channel, m in reader.iter_messages()]
     assert summary is not None
-    assert {channel.topic for channel in summary.channels.values()} == {c.topic for c in CHANNELS}
-    assert {channel.message_encoding for channel in summary.channels.values()} == {"json"}
-    assert {schema.encoding for schema in summary.schemas.values()} == {"jsonschema"}
-    for schema, channel, payload in messages:
+    encodings = {c.topic: (c.message_encoding, summary.schemas[c.schema_id]) for c in summary.channels.values()}
+    assert set(encodings) == {c.topic for c in CHANNELS} | set(MESSAGES)
+    for topic, (encoding, schema) in encodings.items():
+        assert (encoding, schema.encoding) == (
+            ("protobuf", "protobuf") if topic in MESSAGES else ("json", "jsonschema")
+        )
+    for schema, channel, data in messages:
         assert schema is not None
-        declared = json.loads(schema.data)["properties"]
-        assert set(payload) <= set(declared), channel.topic
-    scene = [payload for schema, _, payload in messages if schema and schema.name == "foxglove.SceneUpdate"]
+        if channel.topic not in MESSAGES:
+            assert set(json.loads(data)) <= set(json.loads(schema.data)["properties"]), channel.topic
+
+
+def drawn(path: Path) -> dict[str, list[Any]]:
+    """What a viewer that knows protobuf, and nothing of Chauffeur, reads in a recording: topic -> messages."""
+    found: dict[str, list[Any]] = {}
+    with path.open("rb") as stream:
+        # The decoder builds its classes from the schema records alone.
+        reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        for _, channel, _, message in reader.iter_decoded_messages(topics=list(MESSAGES)):
+            found.setdefault(channel.topic, []).append(message)
+    return found
+
+
+def points_of(cloud: Any) -> list[tuple[float, float, float]]:
+    assert [(f.name, f.offset, f.type) for f in cloud.fields] == [("x", 0, 7), ("y", 4, 7), ("z", 8, 7)], "FLOAT32 is 7"
+    assert cloud.point_stride == 12
+    return list(struct.iter_unpack("<fff", cloud.data))
+
+
+def test_the_drive_is_drawn_in_foxglove_messages(tmp_path: Path) -> None:
+    drive = a_drive()
+    drive = replace(drive, frames=(replace(drive.frames[0], said=("Überholt – 快点",)), *drive.frames[1:]))
+    found = drawn(save(tmp_path / "trip.mcap", drive))
+    assert {topic: len(messages) for topic, messages in found.items()} == {
+        "/scene": 6, "/tf": 6, "/road": 1, "/vehicles": 6, "/log": 1,
+    }  # fmt: skip
+    assert {messages[0].DESCRIPTOR.full_name for messages in found.values()} == {
+        "foxglove.SceneUpdate", "foxglove.FrameTransform", "foxglove.PointCloud", "foxglove.Log",
+    }  # fmt: skip
+    first, second = found["/scene"][:2]
+    assert [entity.id for entity in first.entities] == ["ego", "traffic", "road", "objects"]
+    assert [entity.id for entity in second.entities] == ["ego", "traffic"], "the road is sent once"
+    ego, traffic, road, _ = first.entities
+    assert (ego.cubes[0].pose.position.x, ego.cubes[0].pose.position.y) == (0.0, -4.0), "Foxglove's y grows to the left"
+    assert (ego.cubes[0].size.x, ego.cubes[0].size.y) == (5.0, 2.0)
+    assert len(traffic.cubes) == 3
+    assert [[(p.x, p.y) for p in line.points] for line in road.lines] == [
+        [(0.0, 2.0), (2000.0, 2.0)], [(0.0, -2.0), (2000.0, -2.0)],
+        [(0.0, -2.0), (2000.0, -2.0)], [(0.0, -6.0), (2000.0, -6.0)],
+    ]  # fmt: skip
+    points = points_of(found["/road"][0])
+    assert {y for _, y, _ in points} == {2.0, -2.0, -6.0}
+    assert len(points) == 3 * 1001, "every two metres, and the edge that two lanes share once"
+    transform = found["/tf"][0]
+    assert (transform.parent_frame_id, transform.child_frame_id) == ("map", "ego")
+    assert math.isclose(2 * math.asin(transform.rotation.z), -0.01, abs_tol=3e-4)
+    assert found["/tf"][1].timestamp.ToNanoseconds() == 100_000_000
+    outline = points_of(found["/vehicles"][0])[:5]
+    assert all(abs(x) <= 3.26 and abs(y + 4.0) <= 1.1 for x, y, _ in outline)
+    assert max(outline)[0] > 3.0, "the nose shows where the car is heading"
+    assert found["/log"][0].message == "Überholt – 快点"
+
+
+def test_a_failed_simulation_is_drawn_all_the_same(tmp_path: Path) -> None:
+    for wrong in (math.nan, math.inf, -1e308, 1e39):
+        body = VehicleState(0, "car", wrong, wrong, wrong, 0.0, wrong, wrong, None)
+        lane = LaneView(("a", "b", 0), wrong, 1.0, 1.0, False, False, ((0.0, 0.0), (wrong, wrong), (1.0, wrong)))
+        shot = replace(a_snapshot(0, (lane,)), ego=body, others=(body,))
+        path = write_trip(tmp_path / "trip.mcap", a_trip(), [], a_scenario(), final=shot)
+        for x, y, _ in points_of(drawn(path)["/vehicles"][0]):
+            assert math.isfinite(x)
+            assert math.isfinite(y)
+
+
+def test_rerun_draws_road_road_users_and_frames_without_help(tmp_path: Path) -> None:
+    chunk = pytest.importorskip("rerun.chunk", reason="Rerun is not installed: pip install 'chauffeur[viewer]'")
+    drive = a_drive()
+    drive = replace(drive, frames=(replace(drive.frames[0], said=("Overtaken.",)), *drive.frames[1:]))
+    reader = chunk.McapReader(save(tmp_path / "trip.mcap", drive), timeline_type="duration_ns")
+    columns: dict[str, dict[str, Any]] = {}
+    for piece in reader.stream():
+        batch = piece.to_record_batch()
+        columns.setdefault(piece.entity_path, {}).update(zip(batch.schema.names, batch.columns, strict=True))
+    for topic, components in {
+        "/road": {"Points3D:positions", "CoordinateFrame:frame"},
+        "/vehicles": {"Points3D:positions", "CoordinateFrame:frame"},
+        "/tf": {"Transform3D:translation", "Transform3D:quaternion", "Transform3D:child_frame"},
+        "/log": {"TextLog:text"},
+    }.items():
+        assert components <= set(columns[topic]), topic
+        assert "McapMessage:data" not in columns[topic], "raw bytes"
+    assert len(columns["/road"]["Points3D:positions"][0]) == 3 * 1001
+    assert len(columns["/vehicles"]["Points3D:positions"]) == 6
+    assert len(columns["/vehicles"]["Points3D:positions"][0]) == 4 * 5
+    # Rerun has no picture for scenes; it decodes them by their schema.
+    scene = columns["/scene"]["foxglove.SceneUpdate:message"][0].as_py()
     assert [entity["id"] for entity in scene[0]["entities"]] == ["ego", "traffic", "road", "objects"]
-    assert [entity["id"] for entity in scene[1]["entities"]] == ["ego", "traffic"], "the road is sent once"
-    ego = scene[0]["entities"][0]["cubes"][0]
-    assert ego["pose"]["position"]["y"] == -4.0, "Foxglove's y grows to the left"
 
 
 def test_damage_is_told_in_words(tmp_path: Path) -> None:
@@ -279,7 +369,7 @@ def test_nothing_half_written_stays(tmp_path: Path) -> None:
     path = save(tmp_path / "trip.mcap", a_drive())
     before = path.read_bytes()
     scenario = replace(a_scenario(), config={"bad": math.nan})
-    with pytest.raises(DataError, match="cannot store"):
+    with pytest.raises(DataError, match="cannot be stored"):
         write_trip(path, a_trip(), (), scenario)
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["trip.mcap"]

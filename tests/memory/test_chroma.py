@@ -258,3 +258,19 @@ def test_kill_9_while_writing_loses_nothing_acknowledged(tmp_path: Path) -> None
     assert kept[: len(acknowledged)] == acknowledged
     memory.remember(trip("Ann", "drive faster"))
     assert len(json.loads(memory.export(ANN))["trips"]) == len(kept) + 1
+
+
+@needs_chroma
+def test_with_the_salt_lost_a_person_is_erased_all_the_same(memory: ChromaMemory, tmp_path: Path) -> None:
+    for person in ("Ann", "Ben"):
+        memory.remember(trip(person, "drive faster"))
+    salt = tmp_path / "home" / "chroma" / "salt"
+    salt.unlink()
+    fresh = ChromaMemory(tmp_path / "home")
+    with pytest.raises(ProfileError, match="salt is missing"):
+        fresh.remember(trip("Ann", "drive faster"))
+    assert fresh.erase(ANN)
+    assert not salt.exists()
+    assert fresh.erase(BEN)
+    assert not fresh.erase(BEN)
+    assert not [path for path in salt.parent.iterdir() if path.is_dir()]

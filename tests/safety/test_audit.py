@@ -53,7 +53,7 @@ def test_the_first_record_says_what_wrote_it(plain_log: tuple[bytes, str]) -> No
     first = fields(plain_log[0].splitlines()[0])
     assert first["kind"] == "opened"
     assert first["prev"] == "0" * 64
-    assert first["body"] == ABOUT | {"format": 1, "chauffeur": __version__, "key": "", "private": False}
+    assert first["body"] == ABOUT | {"format": 2, "chauffeur": __version__, "key": "", "private": False}
     assert first["time"] == "2026-01-02T03:04:05.100+00:00"
 
 
@@ -290,9 +290,9 @@ def test_what_is_no_log_is_said(tmp_path: Path) -> None:
     empty = tmp_path / "empty"
     empty.write_bytes(b"")
     assert not verify(empty).ok
-    newer, _ = seal(0, "0" * 64, "opened", "", {"format": 2}, {}, None)
+    newer, _ = seal(0, "0" * 64, "opened", "", {"format": 3}, {}, None)
     notes.write_bytes(newer)
-    with pytest.raises(DataError, match="reads up to 1"):
+    with pytest.raises(DataError, match="reads up to 2"):
         verify(notes)
 
 

@@ -227,6 +227,7 @@ def test_a_clock_that_fails_in_the_writer_is_said_and_stops_no_drive(
 def test_a_head_that_cannot_be_left_is_said(tmp_path: Path) -> None:
     path = tmp_path / "log"
     log = AuditLog(path, about=ABOUT, clock=ticking(), key=KEY)
+    head_path(path).unlink()
     head_path(path).mkdir()
     closing = log.close()
     assert closing.trouble.startswith("The head file could not be written: ")

@@ -38,11 +38,11 @@ from chauffeur.safety.audit.entries import (
     seal,
     storable,
 )
+from chauffeur.safety.audit.heads import Head, read_head
 from chauffeur.safety.audit.keys import key_name
 from chauffeur.safety.audit.reading import Line, lines, opened
 from chauffeur.safety.audit.redaction import Redaction
 from chauffeur.safety.audit.texts import TextState, erased, hide, states
-from chauffeur.safety.audit.verification import read_head
 
 WHEN = "2026-01-02T03:04:05.000+00:00"
 MAKE_ONE = "Make one with: head -c 32 /dev/urandom > audit.key"
@@ -159,7 +159,7 @@ def test_a_head_beside_a_log_is_read_without_its_line_end(tmp_path: Path) -> Non
     assert head_path(tmp_path / "log.jsonl") == tmp_path / "log.jsonl.head"
     assert read_head(tmp_path / "log") is None
     head_path(tmp_path / "log").write_text(f" {'0123456789abcdef' * 4}\n")
-    assert read_head(tmp_path / "log") == "0123456789abcdef" * 4
+    assert read_head(tmp_path / "log") == Head("0123456789abcdef" * 4)
 
 
 @pytest.mark.parametrize("head", ["", "a" * 63, "a" * 65, "A" * 64, "g" * 64, "X" * 64])
@@ -258,21 +258,21 @@ def test_a_file_without_a_record_is_no_log(tmp_path: Path) -> None:
 
 def test_a_newer_format_asks_for_a_newer_chauffeur() -> None:
     with pytest.raises(DataError) as caught:
-        look(chain(("opened", {"format": 2}))[0])
+        look(chain(("opened", {"format": 3}))[0])
     assert said(caught.value) == (
-        "the log has audit format 2; this Chauffeur reads up to 1.",
+        "the log has audit format 3; this Chauffeur reads up to 2.",
         "Upgrade: pip install -U chauffeur",
     )
 
 
-@pytest.mark.parametrize("first", [("opened", {"format": 0}), ("opened", {"format": "2"}), ("wish", {"format": 2})])
+@pytest.mark.parametrize("first", [("opened", {"format": 0}), ("opened", {"format": "3"}), ("wish", {"format": 3})])
 def test_only_an_opening_record_says_the_format(first: tuple[Kind, dict[str, Any]]) -> None:
     assert look(chain(first)[0]).records == 1
 
 
 def test_a_changed_record_cannot_make_a_log_unreadable() -> None:
     changed = fields(chain(OPENED)[0])
-    changed["body"]["format"] = 2
+    changed["body"]["format"] = 3
     assert told(canonical(changed) + b"\n") == [
         (1, "record 0 (opened) was changed: its content does not give its hash.")
     ]
@@ -635,7 +635,9 @@ def test_what_erasing_leaves(tmp_path: Path, key: bytes | None, torn: bytes) -> 
         done = redact(path, PersonId("ana"), key=key, clock=in_vienna)
     after = path.read_bytes().splitlines(keepends=True)
     assert (done.records, done.texts, done.head) == (4, 7, fields(after[-1])["hash"])
-    assert head_path(path).read_bytes() == done.head.encode() + b"\n"
+    left = read_head(path)
+    assert left is not None
+    assert (left.hash, left.records, left.closed) == (done.head, None if key is None else 15, True)
     for number, (old, new) in enumerate(zip(before, after[:-1], strict=True)):
         if number in (1, 2, 3, 6):
             kept = fields(old)

@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from audit_logs import ABOUT, KEY, counting_salt, far_east, fields, ticking
+from audit_logs import ABOUT, KEY, OTHER_KEY, counting_salt, far_east, fields, ticking
 
 from chauffeur import __version__
 from chauffeur.concept import DataError
-from chauffeur.safety.audit import AuditLog, Closing, head_path, read_records, storage, verify, writer
+from chauffeur.safety.audit import AuditLog, Closing, head_path, heads, read_records, storage, verify, writer
+from chauffeur.safety.audit.heads import read_head
 from chauffeur.safety.audit.keys import key_name
 from chauffeur.safety.audit.storage import LogFile, replace_whole, sync_directory
 from chauffeur.safety.audit.texts import states
@@ -122,9 +123,12 @@ def test_a_drive_begins_with_what_wrote_it(tmp_path: Path, key: bytes | None, pr
     closing = log.close()
     assert (closing.records, closing.lost, closing.trouble, closing.complete) == (2, 0, "", True)
     assert log.head == closing.head == verify(tmp_path / "log", key=key).head
-    assert head_path(tmp_path / "log").read_bytes() == closing.head.encode() + b"\n"
+    left = read_head(tmp_path / "log")
+    assert left is not None
+    assert (left.hash, left.records, left.closed) == (closing.head, None if key is None else 2, True)
+    assert (left.is_sealed_with(KEY), left.is_sealed_with(OTHER_KEY)) == (key is not None, False)
     name = "" if key is None else key_name(key)
-    about = {"format": 1, "chauffeur": __version__, "key": name, "private": private, **ABOUT}
+    about = {"format": 2, "chauffeur": __version__, "key": name, "private": private, **ABOUT}
     assert bodies(tmp_path / "log", "opened") == [about]
     assert bodies(tmp_path / "log", "closed") == [{"lost": 0}]
     assert log.close() == closing
@@ -473,7 +477,7 @@ def test_what_comes_after_the_closing_is_counted(tmp_path: Path) -> None:
 def test_why_a_head_was_not_left_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: OSError, why: str
 ) -> None:
-    monkeypatch.setattr(writer, "replace_whole", refusing(error))
+    monkeypatch.setattr(heads, "replace_whole", refusing(error))
     closing = AuditLog(tmp_path / "log", about={}).close()
     assert closing.trouble == f"The head file could not be written: {why}."
 

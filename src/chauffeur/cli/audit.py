@@ -387,6 +387,16 @@ def _notes(found: Verification) -> Iterator[tuple[str, str]]:
         "checked": "every record was looked at under the key given",
     }
     yield "key", words[found.key]
+    if found.key == "checked":
+        ends = {
+            "unknown": "the log is of an earlier format, whose key does not vouch for it: keep heads elsewhere",
+            "whole": "nothing is missing",
+            "open": "what was written after the last opening may be missing",
+            "doubtful": "nothing vouches for it",
+        }
+        yield "end", ends[found.end]
+    if found.unclosed:
+        yield "unclosed", f"gone on with {_counted(found.unclosed, 'time')} without having been closed before"
     if found.torn_bytes:
         yield "torn end", f"{found.torn_bytes} bytes of a record that was being written (a crash, or a drive going on)"
     if found.redacted:

@@ -30,7 +30,9 @@ def shown(console: Console, clock: Callable[[], float]) -> Generator[Callable[[S
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
     from rich.text import Text
 
-    bar = Progress(BarColumn(bar_width=24), MofNCompleteColumn(), TextColumn("{task.description}"), console=console)
+    bar = Progress(
+        BarColumn(bar_width=24), MofNCompleteColumn(), TextColumn("{task.description}", markup=False), console=console
+    )
     task = bar.add_task("starting", total=None)
     with Live(bar, console=console, refresh_per_second=4) as live:
 

@@ -97,7 +97,10 @@ def _ids(listed: str, demo: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _critic(name: str, console: Console) -> Critic:
+    from rich.text import Text
+
     from chauffeur.bench.lampilot.critic import EvaluatorCritic, PersonCritic
+    from chauffeur.cli.console import plain
     from chauffeur.concept import ConfigError
 
     if name == "evaluator":
@@ -107,7 +110,7 @@ def _critic(name: str, console: Console) -> Critic:
 
     def ask(question: str) -> str | None:
         try:
-            return console.input(f"[bold cyan]{question}[/bold cyan]\n> ")
+            return console.input(Text.assemble((plain(question).plain, "bold cyan"), "\n> "))
         except EOFError:
             return None
 

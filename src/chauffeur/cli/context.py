@@ -134,6 +134,8 @@ def _print_json(found: Surroundings) -> None:
     import json
     from dataclasses import asdict
 
+    from chauffeur.cli.console import echo
+
     at = found.at
     told = {
         "at": {"latitude_deg": at.latitude_deg, "longitude_deg": at.longitude_deg, "heading_deg": at.heading_deg},
@@ -141,4 +143,4 @@ def _print_json(found: Surroundings) -> None:
         "words": found.words(),
         "readings": [asdict(row) for row in found.rows()],
     }
-    typer.echo(json.dumps(told, ensure_ascii=False, indent=2))
+    echo(json.dumps(told, ensure_ascii=False, indent=2))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from typing import Annotated
 
@@ -36,6 +37,7 @@ from chauffeur.cli.audit import audit_app
 from chauffeur.cli.bench import bench_app
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
 from chauffeur.cli.me import me_app
+from chauffeur.cli.printable import PrintableFormatter
 from chauffeur.cli.study import study_app
 from chauffeur.cli.vehicle import vehicle_app
 
@@ -166,6 +168,8 @@ model_app.add_typer(policies.policies_app, name="policies")
 
 def run() -> None:
     """Entry point of the `chauffeur` script."""
+    if logging.lastResort is not None:
+        logging.lastResort.setFormatter(PrintableFormatter())
     if not debugging():
         sys.excepthook = show_crash
     # Calling `app` itself would put Typer's own exception hook in the place of ours.

@@ -100,7 +100,7 @@ def apply(
     wait: Wait = 5.0,
 ) -> None:
     """Ask the vehicle for parameters, once. They stay in force when the command ends."""
-    from chauffeur.cli.console import plain, stdout
+    from chauffeur.cli.console import echo, plain, stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.concept import Parameters
     from chauffeur.worlds.ros.dry import DryRun
@@ -113,7 +113,7 @@ def apply(
         stdout().print(plain(published.words))
         if isinstance(car, DryRun):
             for line in car.lines:
-                typer.echo(line)  # unwrapped, to be copied
+                echo(line)  # unwrapped, to be copied
             stdout().print("Dry run: nothing was published.")
             return
         state = _wait_for(car, wait, lambda state: state.delivered or state.link in ("refused", "replaced"))

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import time
 
-import typer
 from rich.console import Console
 from rich.text import Text
 
-from chauffeur.cli.console import plain
+from chauffeur.cli.console import echo, plain
 from chauffeur.cli.labels import NOT_HEARD
 from chauffeur.drive.onroad import Answer, Event
 from chauffeur.drive.talk.asking import Words
@@ -96,4 +95,4 @@ class VehicleScreen:
         if self._dry_run and not self._quiet and isinstance(published, Published):
             ros = 1 if isinstance(self._settings.stack, AutowareAi) else 2
             for message in published.messages:
-                typer.echo(command_line(message, ros))
+                echo(command_line(message, ros))

@@ -1,24 +1,62 @@
-"""A snapshot as Foxglove's well-known messages, for the 3D panel; for looking at only, nothing is read back from it.
+"""A snapshot as Foxglove's well-known messages, for viewers; for looking at only, nothing is read back from it.
 
-Foxglove's frames are right-handed with z up, the worlds' y grows to the right: y and heading change sign here.
-Numbers are rounded to a centimetre and a milliradian, which keeps a recording small.
+Foxglove draws all of them. Rerun 0.41 draws transforms, point clouds and logs, but no `SceneUpdate`: that is why roads
+and road users are sent as points, too. Foxglove's frames are right-handed with z up, the worlds' y grows to the right:
+y and heading change sign here. Lengths are rounded to 1/64 m and rotations to 1/8192: steps that are powers of two end
+in zero bits, which compress.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+import struct
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+
+from foxglove_schemas_protobuf.Color_pb2 import Color
+from foxglove_schemas_protobuf.CubePrimitive_pb2 import CubePrimitive
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
+from foxglove_schemas_protobuf.Point3_pb2 import Point3
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
+from foxglove_schemas_protobuf.Pose_pb2 import Pose
+from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
+from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
+from google.protobuf.timestamp_pb2 import Timestamp
 
 from chauffeur.concept import LaneView, Snapshot, VehicleState
+
+MESSAGES = {"/scene": SceneUpdate, "/tf": FrameTransform, "/road": PointCloud, "/vehicles": PointCloud, "/log": Log}
+"""Topic -> message, in the order in which the channels are registered."""
 
 _FRAME = "map"
 _EGO_FRAME = "ego"
 _HEIGHT_M = 1.5
-_EGO_COLOR = {"r": 1.0, "g": 0.7, "b": 0.0, "a": 1.0}
-_CAR_COLOR = {"r": 0.6, "g": 0.68, "b": 0.76, "a": 1.0}
-_OBJECT_COLOR = {"r": 0.85, "g": 0.2, "b": 0.15, "a": 1.0}
-_LANE_COLOR = {"r": 0.75, "g": 0.75, "b": 0.75, "a": 1.0}
-_LINE_STRIP = 0
+_EGO_COLOR = Color(r=1.0, g=0.7, b=0.0, a=1.0)
+_CAR_COLOR = Color(r=0.6, g=0.68, b=0.76, a=1.0)
+_OBJECT_COLOR = Color(r=0.85, g=0.2, b=0.15, a=1.0)
+_LANE_COLOR = Color(r=0.75, g=0.75, b=0.75, a=1.0)
+
+_LENGTH_PARTS = 64
+_ROTATION_PARTS = 8192
+
+_ROAD_POINTS_M = 2.0
+"""Distance between the points of a lane's edge."""
+
+_MOST_ROAD_POINTS = 20_000
+"""A road that would take more is drawn with larger gaps."""
+
+_POINT = struct.Struct("<fff")
+_FIELDS = [
+    PackedElementField(name=name, offset=4 * index, type=PackedElementField.FLOAT32) for index, name in enumerate("xyz")
+]
+
+_OUTLINE = ((-1, -1), (-1, 1), (1, -1), (1, 1), (1.3, 0))
+"""Points of a road user's outline, in half lengths and half widths; the last shows where its nose is."""
 
 
 def nanoseconds(time_s: float) -> int:
@@ -26,98 +64,150 @@ def nanoseconds(time_s: float) -> int:
     return round(time_s * 1e9)
 
 
-def scene_update(snapshot: Snapshot, *, with_road: bool) -> dict[str, Any]:
-    """`foxglove.SceneUpdate` of an instant; entities replace those of the same id, so the road is sent once."""
+def scene_update(snapshot: Snapshot, *, with_road: bool) -> SceneUpdate:
+    """The scene of an instant; entities replace those of the same id, so the road is sent once."""
     stamp = _stamp(snapshot.time_s)
     entities = [
         _entity("ego", stamp, cubes=[_cube(snapshot.ego, _EGO_COLOR)]),
         _entity("traffic", stamp, cubes=[_cube(car, _CAR_COLOR) for car in snapshot.others]),
     ]
     if with_road:
-        entities.append(_entity("road", stamp, lines=[_edge(lane, s) for lane in snapshot.lanes for s in (-1, 1)]))
+        entities.append(
+            _entity("road", stamp, lines=[_line(_edge(lane, side)) for lane in snapshot.lanes for side in (-1, 1)])
+        )
         entities.append(_entity("objects", stamp, cubes=[_cube(thing, _OBJECT_COLOR) for thing in snapshot.objects]))
-    return {"deletions": [], "entities": entities}
+    return SceneUpdate(entities=entities)
 
 
-def ego_transform(snapshot: Snapshot) -> dict[str, Any]:
-    """`foxglove.FrameTransform` map -> ego, so that a 3D panel can follow the car."""
+def ego_transform(snapshot: Snapshot) -> FrameTransform:
+    """The transform map -> ego, so that a 3D panel can follow the car."""
     ego = snapshot.ego
-    return {
-        "timestamp": _stamp(snapshot.time_s),
-        "parent_frame_id": _FRAME,
-        "child_frame_id": _EGO_FRAME,
-        "translation": _point(ego.x_m, ego.y_m, 0.0),
-        "rotation": _rotation(ego.heading_rad),
-    }
+    x, y = _place(ego.x_m, ego.y_m)
+    return FrameTransform(
+        timestamp=_stamp(snapshot.time_s),
+        parent_frame_id=_FRAME,
+        child_frame_id=_EGO_FRAME,
+        translation=Vector3(x=x, y=y),
+        rotation=_rotation(ego.heading_rad),
+    )
 
 
-def _stamp(time_s: float) -> dict[str, int]:
-    sec, nsec = divmod(nanoseconds(time_s), 1_000_000_000)
-    return {"sec": sec, "nsec": nsec}
+def road_points(snapshot: Snapshot) -> PointCloud:
+    """The edges of all lanes, `_ROAD_POINTS_M` apart."""
+    edges = [_edge(lane, side) for lane in snapshot.lanes for side in (-1, 1)]
+    length = sum(math.dist(a, b) for edge in edges for a, b in pairwise(edge))
+    step = max(_ROAD_POINTS_M, length / _MOST_ROAD_POINTS)
+    # Neighbouring lanes share an edge: each point once.
+    points = dict.fromkeys(point for edge in edges for point in _dotted(edge, step))
+    return _cloud(snapshot.time_s, points, 0.0)
 
 
-def _point(x_m: float, y_m: float, z_m: float) -> dict[str, float]:
-    return {"x": _round(x_m, 2), "y": _round(-y_m, 2), "z": z_m}
+def vehicle_points(snapshot: Snapshot) -> PointCloud:
+    """The outlines of the ego, the other road users and what stands on the road."""
+    bodies = (snapshot.ego, *snapshot.others, *snapshot.objects)
+    return _cloud(snapshot.time_s, (point for body in bodies for point in _outline(body)), _HEIGHT_M / 2.0)
 
 
-def _rotation(heading_rad: float) -> dict[str, float]:
-    half = -_round(heading_rad, 4) / 2.0
-    return {"x": 0.0, "y": 0.0, "z": round(math.sin(half), 4), "w": round(math.cos(half), 4)}
+def said(text: str, time_s: float) -> Log:
+    """What the car told the passenger."""
+    return Log(timestamp=_stamp(time_s), level=Log.INFO, message=text, name="chauffeur")
 
 
-def _round(value: float, digits: int) -> float:
+def _stamp(time_s: float) -> Timestamp:
+    seconds, nanos = divmod(nanoseconds(time_s), 1_000_000_000)
+    return Timestamp(seconds=seconds, nanos=nanos)
+
+
+def _place(x_m: float, y_m: float) -> tuple[float, float]:
+    return _round(x_m), _round(-y_m)
+
+
+def _rotation(heading_rad: float) -> Quaternion:
+    half = -heading_rad / 2.0 if math.isfinite(heading_rad) else 0.0
+    return Quaternion(z=_round(math.sin(half), _ROTATION_PARTS), w=_round(math.cos(half), _ROTATION_PARTS))
+
+
+def _round(value: float, parts: int = _LENGTH_PARTS) -> float:
     """Rounded; what is not a number (a failed simulation) is drawn at the origin, the lossless channels keep it."""
-    return round(value, digits) if math.isfinite(value) else 0.0
+    scaled = value * parts
+    return round(scaled) / parts if math.isfinite(scaled) else 0.0
 
 
-def _entity(name: str, stamp: dict[str, int], **primitives: list[dict[str, Any]]) -> dict[str, Any]:
-    return {
-        "timestamp": stamp,
-        "frame_id": _FRAME,
-        "id": name,
-        "lifetime": {"sec": 0, "nsec": 0},
-        "frame_locked": False,
-        "metadata": [],
-        "arrows": [],
-        "cubes": [],
-        "spheres": [],
-        "cylinders": [],
-        "lines": [],
-        "triangles": [],
-        "texts": [],
-        "models": [],
-        **primitives,
-    }
+def _entity(
+    name: str, stamp: Timestamp, *, cubes: Iterable[CubePrimitive] = (), lines: Iterable[LinePrimitive] = ()
+) -> SceneEntity:
+    return SceneEntity(timestamp=stamp, frame_id=_FRAME, id=name, cubes=cubes, lines=lines)
 
 
-def _cube(body: VehicleState, color: dict[str, float]) -> dict[str, Any]:
-    return {
-        "pose": {
-            "position": _point(body.x_m, body.y_m, _HEIGHT_M / 2.0),
-            "orientation": _rotation(body.heading_rad),
-        },
-        "size": {"x": _round(body.length_m, 2), "y": _round(body.width_m, 2), "z": _HEIGHT_M},
-        "color": color,
-    }
+def _cube(body: VehicleState, color: Color) -> CubePrimitive:
+    x, y = _place(body.x_m, body.y_m)
+    return CubePrimitive(
+        pose=Pose(position=Vector3(x=x, y=y, z=_HEIGHT_M / 2.0), orientation=_rotation(body.heading_rad)),
+        size=Vector3(x=_round(body.length_m), y=_round(body.width_m), z=_HEIGHT_M),
+        color=color,
+    )
 
 
-def _edge(lane: LaneView, side: int) -> dict[str, Any]:
-    """One edge of a lane as a line strip; `side` is -1 for left, +1 for right of its direction."""
-    points: list[dict[str, float]] = []
+def _line(edge: list[tuple[float, float]]) -> LinePrimitive:
+    return LinePrimitive(
+        type=LinePrimitive.LINE_STRIP,
+        pose=Pose(position=Vector3(), orientation=Quaternion(w=1.0)),
+        thickness=0.15,
+        points=[Point3(x=x, y=y) for x, y in edge],
+        color=_LANE_COLOR,
+    )
+
+
+def _edge(lane: LaneView, side: int) -> list[tuple[float, float]]:
+    """One edge of a lane; `side` is -1 for left, +1 for right of its direction."""
+    points: list[tuple[float, float]] = []
     centre = lane.centre_m
     for index, (x, y) in enumerate(centre):
         ahead, behind = centre[min(index + 1, len(centre) - 1)], centre[max(index - 1, 0)]
         dx, dy = ahead[0] - behind[0], ahead[1] - behind[1]
         norm = math.hypot(dx, dy) or 1.0
         offset = side * lane.width_m / 2.0
-        points.append(_point(x - dy / norm * offset, y + dx / norm * offset, 0.0))
-    return {
-        "type": _LINE_STRIP,
-        "pose": {"position": _point(0.0, 0.0, 0.0), "orientation": _rotation(0.0)},
-        "thickness": 0.15,
-        "scale_invariant": False,
-        "points": points,
-        "color": _LANE_COLOR,
-        "colors": [],
-        "indices": [],
-    }
+        points.append(_place(x - dy / norm * offset, y + dx / norm * offset))
+    return points
+
+
+def _dotted(edge: list[tuple[float, float]], step_m: float) -> Iterator[tuple[float, float]]:
+    """Points along an edge, at most a step apart."""
+    if not math.isfinite(step_m):  # a failed simulation's road
+        yield from edge
+        return
+    yield from edge[:1]
+    for (x, y), (next_x, next_y) in pairwise(edge):
+        pieces = math.ceil(math.dist((x, y), (next_x, next_y)) / step_m) or 1
+        for piece in range(1, pieces + 1):
+            part = piece / pieces
+            yield _round(x + (next_x - x) * part), _round(y + (next_y - y) * part)
+
+
+def _outline(body: VehicleState) -> Iterator[tuple[float, float]]:
+    heading = body.heading_rad if math.isfinite(body.heading_rad) else 0.0
+    forward, side = math.cos(heading), math.sin(heading)
+    length, width = _round(body.length_m) / 2.0, _round(body.width_m) / 2.0
+    for along, across in _OUTLINE:
+        dx, dy = along * length, across * width
+        yield _place(body.x_m + dx * forward - dy * side, body.y_m + dx * side + dy * forward)
+
+
+def _cloud(time_s: float, points: Iterable[tuple[float, float]], z_m: float) -> PointCloud:
+    # JSON and protobuf hold any double, these points 32 bits: what does not fit is drawn at the edge of what does.
+    data = b"".join(_POINT.pack(_float32(x), _float32(y), z_m) for x, y in points)
+    return PointCloud(
+        timestamp=_stamp(time_s),
+        frame_id=_FRAME,
+        pose=Pose(position=Vector3(), orientation=Quaternion(w=1.0)),
+        point_stride=_POINT.size,
+        fields=_FIELDS,
+        data=data,
+    )
+
+
+_MOST_FLOAT32 = 3.4e38
+
+
+def _float32(value: float) -> float:
+    return max(-_MOST_FLOAT32, min(_MOST_FLOAT32, value))

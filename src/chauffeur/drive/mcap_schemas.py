@@ -1,7 +1,7 @@
-"""The channels of a recorded trip: topic, schema name and JSON schema, as any MCAP reader finds them in the file.
+"""The channels a recorded trip is read back from: topic, schema name and JSON schema, as any MCAP reader finds them.
 
-Schemas stay within the subset that viewers understand: plain types, no references. `/scene` and `/tf` carry the
-well-known Foxglove schemas, so that a recording opens in a 3D panel without a converter.
+Schemas stay within the subset that viewers understand: plain types, no references. What is there to be drawn has
+channels of its own, in `foxglove.py`.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from typing import Any
 JsonSchema = dict[str, Any]
 
 
-def _object(title: str = "", /, **properties: JsonSchema) -> JsonSchema:
-    schema: JsonSchema = {"type": "object", "properties": properties}
-    return {"title": title, **schema} if title else schema
+def _object(**properties: JsonSchema) -> JsonSchema:
+    return {"type": "object", "properties": properties}
 
 
 def _array(items: JsonSchema, description: str = "") -> JsonSchema:
@@ -57,52 +56,6 @@ _VEHICLE = _object(
     crashed=_FLAG,
 )
 _COMMAND = _object(acceleration_mps2=_number("Along the heading"), steering_rad=_number("Front wheels"))
-
-# Foxglove's own schemas, reduced to the primitives that a trip uses.
-_TIME: JsonSchema = _object("time", sec=_INTEGER, nsec=_INTEGER)
-_DURATION: JsonSchema = _object("duration", sec=_INTEGER, nsec=_INTEGER)
-_VECTOR3 = _object("foxglove.Vector3", x=_number(), y=_number(), z=_number())
-_QUATERNION = _object("foxglove.Quaternion", x=_number(), y=_number(), z=_number(), w=_number())
-_POSE = _object("foxglove.Pose", position=_VECTOR3, orientation=_QUATERNION)
-_COLOR = _object("foxglove.Color", r=_number(), g=_number(), b=_number(), a=_number())
-_CUBE = _object("foxglove.CubePrimitive", pose=_POSE, size=_VECTOR3, color=_COLOR)
-_LINE = _object(
-    "foxglove.LinePrimitive",
-    type=_INTEGER,
-    pose=_POSE,
-    thickness=_number(),
-    scale_invariant=_FLAG,
-    points=_array(_object("foxglove.Point3", x=_number(), y=_number(), z=_number())),
-    color=_COLOR,
-    colors=_array(_COLOR),
-    indices=_array(_INTEGER),
-)
-_TEXT_PRIMITIVE = _object(
-    "foxglove.TextPrimitive",
-    pose=_POSE,
-    billboard=_FLAG,
-    font_size=_number(),
-    scale_invariant=_FLAG,
-    color=_COLOR,
-    text=_text(),
-)
-_SCENE_ENTITY = _object(
-    "foxglove.SceneEntity",
-    timestamp=_TIME,
-    frame_id=_text(),
-    id=_text(),
-    lifetime=_DURATION,
-    frame_locked=_FLAG,
-    metadata=_array(_object("foxglove.KeyValuePair", key=_text(), value=_text())),
-    arrows=_array(_ANY_OBJECT),
-    cubes=_array(_CUBE),
-    spheres=_array(_ANY_OBJECT),
-    cylinders=_array(_ANY_OBJECT),
-    lines=_array(_LINE),
-    triangles=_array(_ANY_OBJECT),
-    texts=_array(_TEXT_PRIMITIVE),
-    models=_array(_ANY_OBJECT),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,28 +204,6 @@ PROGRAM = Channel(
     ),
 )
 SAID = Channel("/said", "chauffeur.Said", _object(text=_text("What the car told the passenger")))
-SCENE = Channel(
-    "/scene",
-    "foxglove.SceneUpdate",
-    _object(
-        "foxglove.SceneUpdate",
-        deletions=_array(_object("foxglove.SceneEntityDeletion", timestamp=_TIME, type=_INTEGER, id=_text())),
-        entities=_array(_SCENE_ENTITY),
-    ),
-)
-TRANSFORM = Channel(
-    "/tf",
-    "foxglove.FrameTransform",
-    _object(
-        "foxglove.FrameTransform",
-        timestamp=_TIME,
-        parent_frame_id=_text(),
-        child_frame_id=_text(),
-        translation=_VECTOR3,
-        rotation=_QUATERNION,
-    ),
-)
-
 CHANNELS = (
     INSTRUCTION,
     CONTEXT,
@@ -288,7 +219,5 @@ CHANNELS = (
     COMMAND,
     PROGRAM,
     SAID,
-    SCENE,
-    TRANSFORM,
 )
-"""Every channel, in the order in which it is registered."""
+"""All of them, in the order in which they are registered."""

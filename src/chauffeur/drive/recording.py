@@ -13,13 +13,18 @@ import io
 import json
 import math
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
+import zstandard
+from google.protobuf.message import Message as Drawing
 from mcap.exceptions import McapError
-from mcap.reader import make_reader
+from mcap.records import Channel, Chunk, Header, McapRecord, Message, Metadata
+from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import CompressionType, Writer
+from mcap_protobuf.schema import register_schema
 from pydantic import TypeAdapter
 
 from chauffeur.concept import (
@@ -31,9 +36,9 @@ from chauffeur.concept import (
     SystemMessage,
     Trip,
 )
+from chauffeur.drive import foxglove
 from chauffeur.drive import mcap_schemas as channels
 from chauffeur.drive.files import publish
-from chauffeur.drive.foxglove import ego_transform, nanoseconds, scene_update
 
 FORMAT = 1
 """Version of the file layout; a reader refuses newer ones."""
@@ -41,10 +46,20 @@ FORMAT = 1
 _PROFILE = "chauffeur"
 _METADATA = "chauffeur.recording"
 _CHUNK_BYTES = 4 << 20
-_MAX_BYTES = 1 << 30
+_MESSAGE_HEAD_BYTES = 31
+_SCHEMAS_BYTES = 1 << 16
+"""Schemas and channels take less in a chunk."""
+
+# A recording may come from anybody, and a few kilobytes can unpack to gigabytes. What is written keeps the same bounds.
+_MAX_BYTES = 128 << 20
+_MAX_CHUNK_BYTES = 32 << 20
+_MAX_UNPACKED_BYTES = 256 << 20
+_MAX_VALUES = 8_000_000
+"""JSON values of all messages: 25 minutes among forty cars. A value of two bytes becomes an object of a hundred."""
 
 _UNREADABLE = (
     McapError,
+    zstandard.ZstdError,
     ArithmeticError,
     LookupError,
     MemoryError,
@@ -125,13 +140,15 @@ def write_trip(
         final: The instant after the last command.
 
     Raises:
-        DataError: The folder cannot be written, or a value is not storable.
+        DataError: The folder cannot be written, a value is not storable, or the trip is too long to be read again.
     """
     stream = io.BytesIO()
     try:
         _write(Writer(stream, _CHUNK_BYTES, CompressionType.ZSTD), trip, frames, scenario, system, final)
     except (TypeError, ValueError) as error:
-        raise DataError(f"The trip holds a value that a recording cannot store: {error}.") from error
+        raise DataError(f"The trip cannot be stored as a recording: {_first_line(error)}.") from error
+    if stream.tell() > _MAX_BYTES:
+        raise DataError(f"The trip cannot be stored as a recording: it has more than {_MAX_BYTES} bytes.")
     return publish(path, stream.getvalue(), "trip")
 
 
@@ -147,11 +164,6 @@ def read_trip(path: Path) -> RecordedTrip:
         raise
     except _UNREADABLE as error:
         raise _damaged(path, _first_line(error)) from error
-    except Exception as error:
-        # The decompressors raise their own types, and import nothing common to catch them by.
-        if type(error).__module__.split(".")[0] in {"zstandard", "zstd", "lz4", "mcap"}:
-            raise _damaged(path, _first_line(error)) from error
-        raise
 
 
 def compare_trips(first: RecordedTrip, second: RecordedTrip) -> Difference | None:
@@ -192,9 +204,20 @@ def _write(
     for channel in channels.CHANNELS:
         schema = writer.register_schema(channel.schema_name, "jsonschema", json.dumps(channel.schema).encode())
         ids[channel.topic] = writer.register_channel(channel.topic, "json", schema)
+    for topic, message in foxglove.MESSAGES.items():
+        ids[topic] = writer.register_channel(topic, "protobuf", register_schema(writer, message))
+
+    budget = _Budget()
+
+    def draw(topic: str, message: Drawing, log_time: int, sequence: int) -> None:
+        data = message.SerializeToString(deterministic=True)
+        budget.pack(data)
+        writer.add_message(ids[topic], log_time, data, log_time, sequence)
 
     def put(channel: channels.Channel, payload: Any, log_time: int = 0, sequence: int = 0) -> None:
         data = json.dumps(payload, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+        budget.pack(data)
+        budget.spend(data)
         writer.add_message(ids[channel.topic], log_time, data, log_time, sequence)
 
     whole = _trip.dump_python(trip)
@@ -211,17 +234,20 @@ def _write(
     snapshots = [frame.snapshot for frame in frames] + ([final] if final is not None else [])
     lanes: tuple[LaneView, ...] | None = None
     for index, snapshot in enumerate(snapshots):
-        time = nanoseconds(snapshot.time_s)
+        time = foxglove.nanoseconds(snapshot.time_s)
         new_road = snapshot.lanes is not lanes and snapshot.lanes != lanes
         if new_road:
             lanes = snapshot.lanes
             put(channels.LANES, {"lanes": _storable(_lanes.dump_python(lanes, mode="json"))}, time, index)
         payload = _snapshot.dump_python(snapshot, mode="json", exclude={"lanes"})
         put(channels.SNAPSHOT, _storable(payload), time, index)
-        put(channels.SCENE, _storable(scene_update(snapshot, with_road=new_road)), time, index)
-        put(channels.TRANSFORM, _storable(ego_transform(snapshot)), time, index)
+        if new_road:
+            draw("/road", foxglove.road_points(snapshot), time, index)
+        draw("/scene", foxglove.scene_update(snapshot, with_road=new_road), time, index)
+        draw("/vehicles", foxglove.vehicle_points(snapshot), time, index)
+        draw("/tf", foxglove.ego_transform(snapshot), time, index)
     for index, frame in enumerate(frames):
-        time = nanoseconds(frame.snapshot.time_s)
+        time = foxglove.nanoseconds(frame.snapshot.time_s)
         parts = _storable(_frame.dump_python(frame, mode="json", exclude={"snapshot"}))
         parts["wishes"]["served_stops"].sort()
         put(channels.WISHES, parts["wishes"], time, index)
@@ -230,6 +256,7 @@ def _write(
         put(channels.PROGRAM, program, time, index)
         for text in frame.said:
             put(channels.SAID, {"text": text}, time, index)
+            draw("/log", foxglove.said(text, frame.snapshot.time_s), time, index)
     # Counts let a reader tell a whole recording from one whose tail was lost and re-indexed by a repair tool.
     writer.add_metadata(_METADATA, {"format": str(FORMAT), "frames": str(len(frames)), "final": str(final is not None)})
     writer.finish()
@@ -249,16 +276,21 @@ def _storable(value: Any) -> Any:
 
 
 def _read(path: Path, stream: io.BytesIO) -> RecordedTrip:
-    reader = make_reader(stream, validate_crcs=True)
-    if reader.get_header().profile != _PROFILE:
-        raise DataError(
-            f"{path} is an MCAP file, but not a recorded trip of Chauffeur.",
-            hint="Record one with `chauffeur drive --save DIR`.",
-        )
+    messages: dict[str, list[tuple[int, Any]]] = {channel.topic: [] for channel in channels.CHANNELS}
+    topics: dict[int, str] = {}
     facts: dict[str, str] = {}
-    for record in reader.iter_metadata():
-        if record.name == _METADATA:
-            facts = record.metadata
+    budget = _Budget()
+    for record in _records(path, stream, budget):
+        match record:
+            case Channel():
+                topics[record.id] = record.topic
+            case Message() if (into := messages.get(topics[record.channel_id])) is not None:
+                budget.spend(record.data)
+                into.append((record.sequence, json.loads(record.data)))
+            case Metadata(name=name) if name == _METADATA:
+                facts = record.metadata
+            case _:
+                pass
     if not facts:
         raise _damaged(path, "its closing record is missing")
     if int(facts["format"]) > FORMAT:
@@ -266,10 +298,6 @@ def _read(path: Path, stream: io.BytesIO) -> RecordedTrip:
             f"{path} has recording format {facts['format']}; this Chauffeur reads up to {FORMAT}.",
             hint="Upgrade: pip install -U chauffeur",
         )
-    wanted = [c.topic for c in channels.CHANNELS if c not in (channels.SCENE, channels.TRANSFORM)]
-    messages: dict[str, list[tuple[int, Any]]] = {topic: [] for topic in wanted}
-    for _, channel, message in reader.iter_messages(topics=wanted, log_time_order=False):
-        messages[channel.topic].append((message.sequence, json.loads(message.data)))
 
     def single(channel: channels.Channel) -> Any:
         found = messages[channel.topic]
@@ -300,6 +328,63 @@ def _read(path: Path, stream: io.BytesIO) -> RecordedTrip:
         system=system[0] if system else None,
         final=snapshots[count] if has_final else None,
     )
+
+
+def _records(path: Path, stream: io.BytesIO, budget: _Budget) -> Iterator[McapRecord]:
+    """Every record from front to back, chunks unpacked. An index is not followed: it could lead to a chunk twice."""
+    records = StreamReader(stream, emit_chunks=True, validate_crcs=True).records
+    header = next(records)
+    if not isinstance(header, Header) or header.profile != _PROFILE:
+        raise DataError(
+            f"{path} is an MCAP file, but not a recorded trip of Chauffeur.",
+            hint="Record one with `chauffeur drive --save DIR`.",
+        )
+    for record in records:
+        if isinstance(record, Chunk):
+            yield from breakup_chunk(budget.unpack(record), validate_crc=True)
+        else:
+            yield record
+
+
+class _Budget:
+    """How much a recording may still take of the machine; what takes more is refused before it is unpacked."""
+
+    def __init__(self) -> None:
+        self._bytes, self._values = _MAX_UNPACKED_BYTES, _MAX_VALUES
+
+    def unpack(self, chunk: Chunk) -> Chunk:
+        """The chunk without compression. Raises ValueError: it is too large, or its declared size is not true."""
+        size = chunk.uncompressed_size
+        if size > _MAX_CHUNK_BYTES:
+            raise ValueError(f"a chunk would unpack to {size} bytes; {_MAX_CHUNK_BYTES} are the most one may have")
+        self._bytes -= size
+        if self._bytes < 0:
+            raise ValueError(f"it would unpack to more than {_MAX_UNPACKED_BYTES} bytes")
+        if chunk.compression == "":
+            data = chunk.data
+        elif chunk.compression == "zstd":
+            # A frame has a size of its own, which may be another one: no more than a byte too many is unpacked of it.
+            unpacker = zstandard.ZstdDecompressor(max_window_size=_MAX_CHUNK_BYTES)
+            data = unpacker.stream_reader(chunk.data, read_across_frames=True).read(size + 1)
+        else:
+            raise ValueError(f"a chunk is compressed with {chunk.compression[:20]!r}; a recording's are with 'zstd'")
+        if len(data) != size:
+            raise ValueError(f"a chunk does not unpack to the {size} bytes that it declares")
+        return replace(chunk, compression="", data=data)
+
+    def spend(self, message: bytes) -> None:
+        """Count a message's values before they are read. Raises ValueError: they are too many."""
+        self._values -= 1 + message.count(b",") + message.count(b"[") + message.count(b"{")
+        if self._values < 0:
+            raise ValueError(f"it holds more than {_MAX_VALUES} values")
+
+    def pack(self, message: bytes) -> None:
+        """Count a message that is to be written. Raises ValueError: no reader would take it any more."""
+        if len(message) > _MAX_CHUNK_BYTES - _CHUNK_BYTES:
+            raise ValueError(f"it holds a message of {len(message)} bytes")
+        self._bytes -= len(message) + _MESSAGE_HEAD_BYTES
+        if self._bytes < _SCHEMAS_BYTES:
+            raise ValueError(f"it has more than {_MAX_UNPACKED_BYTES} bytes")
 
 
 def _content(path: Path) -> io.BytesIO:

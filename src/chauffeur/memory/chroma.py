@@ -16,7 +16,7 @@ import os
 import secrets
 import struct
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import import_module
@@ -39,7 +39,7 @@ from chauffeur.concept import (
 )
 from chauffeur.memory.columns import Columns, Entry, packed
 from chauffeur.memory.files import data_home, locked, private_directory, sync_directory
-from chauffeur.memory.keys import KeyRing
+from chauffeur.memory.keys import KeyRing, same_name
 from chauffeur.memory.privacy import Privacy, read_privacy
 from chauffeur.memory.records import MAX_CHARS, body_of, feedback_body, item_of
 from chauffeur.memory.retrieval import UNCOMPARED, nearest
@@ -95,7 +95,7 @@ class ChromaMemory:
             ) from error
         root = data_home() if home is None else home
         self._root = root / "chroma"
-        self._names = KeyRing(self._root)
+        self._names = KeyRing(self._root, in_use=lambda: any(one.is_dir() for one in self._root.glob("*")))
         self._privacy = read_privacy(root) if privacy is None else privacy
         self._clock = clock
 
@@ -162,15 +162,29 @@ class ChromaMemory:
             return rows[-1].item()
 
     def erase(self, person: PersonId) -> bool:
-        """As `Memory.erase`, of damaged profiles too."""
+        """As `Memory.erase`, of damaged profiles too; with the salt lost, of those that still say whose they are."""
         if not _is_somebody(person) or not self._root.exists():
             return False
         with self._errors(person), self._locked():
-            folder = self._folder(person)
-            if not folder.exists():
-                return False
-            _destroy(folder)
-            return True
+            try:
+                folders = [self._folder(person)]
+            except ProfileError:
+                folders = [folder for folder, name in self._names_said() if same_name(name) == same_name(person)]
+                if not folders:
+                    raise
+            there = [folder for folder in folders if folder.exists()]
+            for folder in there:
+                _destroy(folder)
+            return bool(there)
+
+    def _names_said(self) -> Iterator[tuple[Path, PersonId]]:
+        """Folders with the names that their profiles say, whether or not the folder's own name fits."""
+        for folder in sorted(one for one in self._root.glob("*") if one.is_dir()):
+            with suppress(ProfileError), self._errors(folder.name):
+                current = _current(folder)
+                if current is not None:
+                    with self._opened(current, "", fits=False) as store:
+                        yield folder, store.person
 
     def sweep(self) -> int:
         """Delete every trip that is older than the retention, of everybody; how many there were."""
@@ -266,13 +280,13 @@ class ChromaMemory:
             yield store
 
     @contextmanager
-    def _opened(self, path: Path, person: str) -> Generator[_Store]:
+    def _opened(self, path: Path, person: str, *, fits: bool = True) -> Generator[_Store]:
         new = not any(path.iterdir())
         settings = self._chroma.config.Settings(anonymized_telemetry=False)
         client: Any = self._chroma.PersistentClient(path=str(path), settings=settings)
         try:
             store = _Store(_made(client, person) if new else _found(client))
-            if self._names.alias(store.person) != path.parent.name:
+            if fits and self._names.alias(store.person) != path.parent.name:
                 raise ValueError("it is somebody else's")
             yield store
         finally:

@@ -8,6 +8,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
 
+from chauffeur.memory.files import require_plain
+
 _sqlcipher: Any = import_module("sqlcipher3.dbapi2")
 
 DatabaseError: type[Exception] = _sqlcipher.DatabaseError
@@ -34,7 +36,10 @@ def connect(path: Path, key: bytes) -> sqlite3.Connection:
 
     Raises:
         DatabaseError: The file is missing, damaged, or is not a database under this key.
+        NotPlainFileError: It is a link, or something else that is no file; or a file beside it that belongs to it is.
     """
+    for suffix in ("", "-wal", "-shm", "-journal"):
+        require_plain(path.with_name(f"{path.name}{suffix}"))
     log = path.with_name(f"{path.name}-wal")
     if log.exists() and log.stat().st_size > 0:
         _read_through(path, key)

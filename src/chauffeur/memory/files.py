@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import secrets
+import stat
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +27,54 @@ def private_directory(path: Path) -> Path:
     """Make a directory only its owner may enter."""
     path.mkdir(mode=PRIVATE_DIRECTORY, parents=True, exist_ok=True)
     return path
+
+
+class NotPlainFileError(OSError):
+    """Something else stands where a plain file belongs: a link, a pipe, a device, a folder."""
+
+
+def open_plain(path: Path, flags: int = os.O_RDONLY) -> int:
+    """Descriptor of a plain file: never through a link, which could lead to any other file, nor of a pipe, which waits.
+
+    Raises:
+        NotPlainFileError: Something else stands there.
+        OSError: It cannot be opened.
+    """
+    try:
+        descriptor = os.open(path, flags | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK, PRIVATE_FILE)
+    except OSError as error:
+        # A link, a folder opened for writing, a pipe or a socket that nobody reads.
+        if error.errno in (errno.ELOOP, errno.EISDIR, errno.ENXIO):
+            raise _not_plain(path) from error
+        raise
+    # Opened first, asked afterwards: what is at the path cannot change in between.
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise _not_plain(path)
+    return descriptor
+
+
+def read_plain(path: Path) -> bytes:
+    """Content of a plain file. Raises as `open_plain`."""
+    with os.fdopen(open_plain(path), "rb") as file:
+        return file.read()
+
+
+def require_plain(path: Path) -> None:
+    """See that a plain file stands at a path, or nothing, without opening it; raises NotPlainFileError.
+
+    For files that a database opens by itself: to close a descriptor of one gives all of its locks back.
+    """
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return
+    if not stat.S_ISREG(mode):
+        raise _not_plain(path)
+
+
+def _not_plain(path: Path) -> NotPlainFileError:
+    return NotPlainFileError(errno.EINVAL, "it is a link, a pipe or a folder and not a plain file", str(path))
 
 
 def write_new(path: Path, content: bytes) -> None:
@@ -59,7 +109,7 @@ def sync_directory(path: Path) -> None:
 @contextmanager
 def locked(path: Path, *, alone: bool) -> Generator[None]:
     """Hold a lock between processes: many at a time, or `alone`."""
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, PRIVATE_FILE)
+    descriptor = open_plain(path, os.O_RDWR | os.O_CREAT)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
         yield

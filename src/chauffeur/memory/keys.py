@@ -13,11 +13,12 @@ import json
 import os
 import secrets
 import unicodedata
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from chauffeur.concept import PersonId, ProfileError
-from chauffeur.memory.files import publish, write_new
+from chauffeur.memory.files import NotPlainFileError, open_plain, publish, read_plain, write_new
 
 KEY_BYTES = 32
 _SCRYPT = {"n": 2**15, "r": 8, "p": 1}
@@ -30,15 +31,29 @@ _FORMAT = "chauffeur-key-1"
 class KeyRing:
     """Keys of all people, in one directory."""
 
-    def __init__(self, directory: Path, passphrase: str | None = None) -> None:
+    def __init__(
+        self, directory: Path, passphrase: str | None = None, *, in_use: Callable[[], bool] = lambda: False
+    ) -> None:
+        """A ring whose directory may not be there yet.
+
+        Args:
+            directory: Where the keys are, and the salt that people's aliases are made with.
+            passphrase: Seals the keys; empty or None: they are not sealed.
+            in_use: Whether there are profiles already. Then a lost salt is not replaced: nobody would be found again.
+        """
         self._directory = directory
+        self._in_use = in_use
         self._passphrase = passphrase or None
         self._salt: bytes | None = None
         self._opened: dict[str, tuple[bytes, bytes]] = {}
 
     def alias(self, person: PersonId) -> str:
-        """File name for a person: a keyed hash, so that neither the name nor a guess of it can be read from it."""
-        name = unicodedata.normalize("NFC", person).strip().encode("utf-8", "surrogatepass")
+        """File name for a person: a keyed hash, so that neither the name nor a guess of it can be read from it.
+
+        Raises:
+            ProfileError: The salt is lost or damaged.
+        """
+        name = same_name(person).encode("utf-8", "surrogatepass")
         return hashlib.blake2b(name, key=self._installation_salt(), digest_size=16).hexdigest()
 
     def path(self, alias: str) -> Path:
@@ -52,7 +67,7 @@ class KeyRing:
             ProfileError: The key file is damaged, or the passphrase does not fit.
         """
         try:
-            text = self.path(alias).read_bytes()
+            text = read_plain(self.path(alias))
         except FileNotFoundError:
             self._opened.pop(alias, None)
             return None
@@ -81,28 +96,42 @@ class KeyRing:
         return key
 
     def destroy(self, alias: str) -> bool:
-        """Overwrite and delete a key; False where there was none."""
+        """Overwrite and delete a key; False where there was none. Of a link, the link goes and nothing else."""
         self._opened.pop(alias, None)
         path = self.path(alias)
         try:
-            with path.open("r+b") as file:
-                file.write(secrets.token_bytes(max(1, path.stat().st_size)))
+            with os.fdopen(open_plain(path, os.O_RDWR), "r+b") as file:
+                file.write(secrets.token_bytes(max(1, os.fstat(file.fileno()).st_size)))
                 file.flush()
                 os.fsync(file.fileno())
-            path.unlink()
         except FileNotFoundError:
             return False
+        except NotPlainFileError:
+            pass
+        path.unlink()
         return True
 
     def _installation_salt(self) -> bytes:
         if self._salt is None:
             path = self._directory / "salt"
-            write_new(path, secrets.token_bytes(KEY_BYTES))
-            salt = path.read_bytes()
+            salt = self._read_salt(path)
             if len(salt) != KEY_BYTES:
                 raise _bad(path, f"has {len(salt)} bytes instead of {KEY_BYTES}")
             self._salt = salt
         return self._salt
+
+    def _read_salt(self, path: Path) -> bytes:
+        try:
+            if not os.path.lexists(path):
+                if self._in_use() or any(self._directory.glob("*.key")):
+                    raise ProfileError(
+                        f"{path} is missing, and without it no profile that is there is found by a person's name.",
+                        hint="Restore it from a backup. To erase a profile needs none: chauffeur me erase --as NAME",
+                    )
+                write_new(path, secrets.token_bytes(KEY_BYTES))
+            return read_plain(path)
+        except OSError as error:
+            raise _bad(path, f"cannot be read ({error.strerror})") from error
 
     def _pack(self, key: bytes) -> bytes:
         if self._passphrase is None:
@@ -144,6 +173,11 @@ class KeyRing:
                 hint="Set CHAUFFEUR_PASSPHRASE to the passphrase this profile was made with.",
             )
         return bytes(a ^ b for a, b in zip(body, pad, strict=True))
+
+
+def same_name(person: str) -> str:
+    """A name as it is compared: one written form for what looks the same."""
+    return unicodedata.normalize("NFC", person).strip()
 
 
 def _derive(passphrase: str, salt: bytes) -> tuple[bytes, bytes]:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-import stat
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from pathlib import Path
 
 from chauffeur.concept import DataError
-from chauffeur.memory.files import PRIVATE_FILE, locked
+from chauffeur.memory.files import locked, open_plain
 from chauffeur.memory.policies_entry import PolicyEntry, read_entry
 
 FILE = "policies.jsonl"
@@ -42,16 +41,11 @@ def read_policies(path: Path) -> tuple[tuple[PolicyEntry, ...], tuple[Rejected, 
     Raises:
         DataError: It is not a plain file, is missing, or is too large.
     """
-    with as_data_error(path):
-        # Opened first, asked afterwards: what is at the path cannot change in between. A pipe does not make us wait.
-        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
-        with os.fdopen(descriptor, "rb") as file:
-            about = os.fstat(file.fileno())
-            if not stat.S_ISREG(about.st_mode):
-                raise DataError(f"{path} is not a plain file.")
-            if about.st_size > MAX_FILE_BYTES:
-                raise DataError(f"{path} has {about.st_size} bytes; {MAX_FILE_BYTES} are the most it may have.")
-            content = file.read(MAX_FILE_BYTES + 1)
+    with as_data_error(path), os.fdopen(open_plain(path), "rb") as file:
+        about = os.fstat(file.fileno())
+        if about.st_size > MAX_FILE_BYTES:
+            raise DataError(f"{path} has {about.st_size} bytes; {MAX_FILE_BYTES} are the most it may have.")
+        content = file.read(MAX_FILE_BYTES + 1)
     entries: list[PolicyEntry] = []
     rejected: list[Rejected] = []
     names: set[str] = set()
@@ -91,8 +85,7 @@ def append_lines(path: Path, lines: bytes) -> None:
         return
     with as_data_error(path):
         # Never through a link: a repository from elsewhere could point at any file of this person's.
-        flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
-        descriptor = os.open(path, flags, PRIVATE_FILE)
+        descriptor = open_plain(path, os.O_RDWR | os.O_APPEND | os.O_CREAT)
         with os.fdopen(descriptor, "r+b", buffering=0) as file:
             end = file.seek(0, os.SEEK_END)
             if end:

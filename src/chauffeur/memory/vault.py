@@ -28,7 +28,7 @@ from chauffeur.concept import (
 )
 from chauffeur.memory.cipher import DatabaseError
 from chauffeur.memory.files import data_home, locked, private_directory, sync_directory
-from chauffeur.memory.keys import KeyRing
+from chauffeur.memory.keys import KeyRing, same_name
 from chauffeur.memory.privacy import Privacy, read_privacy
 from chauffeur.memory.profile import VERSION, Index, Profile, create_profile
 from chauffeur.memory.retrieval import UNCOMPARED, latest, nearest
@@ -105,7 +105,11 @@ class VaultMemory:
         self._profiles = root / "profiles"
         self._lock = self._profiles / "lock"
         self._keys = root / "keys" if keys is None else keys
-        self._ring = KeyRing(self._keys, os.environ.get("CHAUFFEUR_PASSPHRASE") if passphrase is None else passphrase)
+        self._ring = KeyRing(
+            self._keys,
+            os.environ.get("CHAUFFEUR_PASSPHRASE") if passphrase is None else passphrase,
+            in_use=lambda: any(self._profiles.glob("*.db")),
+        )
         self._privacy = read_privacy(root) if privacy is None else privacy
         self._clock = clock
         self._guard = threading.RLock()
@@ -171,19 +175,53 @@ class VaultMemory:
             return None if profile is None else profile.forget_last()
 
     def erase(self, person: PersonId) -> bool:
-        """As `Memory.erase`, of damaged profiles too: the key goes first, so nothing can be read from then on."""
+        """As `Memory.erase`, of damaged profiles too: the key goes first, so nothing can be read from then on.
+
+        Every profile that says it is this person's goes, also where its file has another name: the salt that names are
+        made with may have been lost, or replaced.
+
+        Raises:
+            ProfileError: A file cannot be erased; or the salt is lost, and the profile is none that can be opened.
+        """
         if not _is_somebody(person) or not self._profiles.exists():
             return False
+        aliases, closed = self._aliases_of(person)
+        try:
+            aliases.add(self._ring.alias(person))
+        except ProfileError as error:
+            if not aliases and closed:
+                raise ProfileError(
+                    f"Whether anything is kept of {person!r} cannot be told: {error.message} And {len(closed)} "
+                    f"profiles cannot be opened: {', '.join(closed)}.",
+                    hint=f"Restore the salt, or the passphrase; or delete these files in {self._keys} and "
+                    f"{self._profiles}, whosever they are.",
+                ) from error
+        existed = False
         with self._guard, self._errors(person), locked(self._lock, alone=True):
-            alias = self._ring.alias(person)
-            self._shut(alias)
-            existed = self._ring.destroy(alias)
-            for leftover in (*self._keys.glob(f"{alias}.*"), *self._profiles.glob(f"{alias}.*")):
-                leftover.unlink(missing_ok=True)
-                existed = True
+            for alias in aliases:
+                self._shut(alias)
+                existed |= self._ring.destroy(alias)
+                for leftover in (*self._keys.glob(f"{alias}.*"), *self._profiles.glob(f"{alias}.*")):
+                    leftover.unlink(missing_ok=True)
+                    existed = True
             sync_directory(self._keys)
             sync_directory(self._profiles)
         return existed
+
+    def _aliases_of(self, person: PersonId) -> tuple[set[str], list[str]]:
+        """Names of the files that say they are a person's, and of those that cannot be opened and so say nothing."""
+        found: set[str] = set()
+        closed: list[str] = []
+        for alias in sorted({path.stem for path in (*self._profiles.glob("*.db"), *self._keys.glob("*.key"))}):
+            try:
+                with self._open(alias, alias) as profile:
+                    if profile is None:  # a key without a profile
+                        closed.append(alias)
+                    elif same_name(profile.person) == same_name(person):
+                        found.add(alias)
+            except ProfileError:
+                closed.append(alias)
+        return found, closed
 
     def sweep(self) -> int:
         """Delete every trip that is older than the retention, of everybody; how many there were."""

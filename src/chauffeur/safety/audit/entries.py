@@ -16,8 +16,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal, get_args
 
-FORMAT: Final = 1
-"""Version of the line layout; a reader refuses newer ones."""
+FORMAT: Final = 2
+"""Version of the log; a reader refuses newer ones. Lines are as in 1, whose key did not seal the head."""
 
 Kind = Literal[
     "opened",

@@ -11,10 +11,11 @@ from typing import Any
 
 from chauffeur.concept import ConfigError, DataError, PersonId
 from chauffeur.safety.audit.entries import NotARecordError, Record, canonical, parse, seal
+from chauffeur.safety.audit.heads import SEALED_SINCE, leave_head
 from chauffeur.safety.audit.reading import lines, opened
 from chauffeur.safety.audit.storage import LogFile, replace_whole
 from chauffeur.safety.audit.texts import erased, says
-from chauffeur.safety.audit.verification import head_path, verify
+from chauffeur.safety.audit.verification import verify
 from chauffeur.safety.audit.writer import utc_now
 
 PERSON = "person"
@@ -70,7 +71,7 @@ def redact(
 
 def _redact(path: Path, person: PersonId, key: bytes | None, clock: Callable[[], datetime]) -> Redaction:
     found = verify(path, key=key)
-    if not found.ok:
+    if not found.usable:
         raise DataError(
             f"The audit log {path} is not as it was written ({found.findings[0]}); nothing was erased.",
             hint=f"Look at it with: chauffeur audit verify {path}",
@@ -102,8 +103,11 @@ def _redact(path: Path, person: PersonId, key: bytes | None, clock: Callable[[],
     stamp = clock().astimezone(UTC).isoformat(timespec="milliseconds")
     last, head = seal(found.records, found.head, "redaction", stamp, body, {}, key)
     kept.append(last)
+    sealing = key if found.format >= SEALED_SINCE else None
+    if sealing is not None:  # between the two files, a crash must leave a log that was not closed, and not a wrong head
+        leave_head(path, found.head, found.records, key=sealing, closed=False)
     replace_whole(path, b"".join(kept))
-    replace_whole(head_path(path), f"{head}\n".encode())
+    leave_head(path, head, found.records + 1, key=sealing, closed=found.end != "open")
     return Redaction(len(numbers), texts, head)
 
 

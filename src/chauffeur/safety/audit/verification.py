@@ -1,19 +1,19 @@
 """Whether an audit log is as it was written: every line looked at, everything that is wrong said in words.
 
 The chain shows any change, removal, insertion or swap of lines that were written before the last one. It cannot show
-that lines are missing at the end, nor that the whole log was written anew: for the first, keep the hash of the last
-record elsewhere (`head`); for the second, write the log under a key, or keep the head where the rewriter cannot reach.
+that lines are missing at the end, nor that the whole log was written anew. A log under a key shows both: every record
+and the head beside the log are sealed. For a log without one, keep the hash of the last record elsewhere (`head`).
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, BinaryIO, Final, Literal
 
-from chauffeur.concept import ConfigError, DataError
+from chauffeur.concept import DataError
 from chauffeur.safety.audit.entries import (
     FORMAT,
     NO_RECORD,
@@ -23,14 +23,13 @@ from chauffeur.safety.audit.entries import (
     is_sealed_with,
     parse,
 )
+from chauffeur.safety.audit.heads import SEALED_SINCE, Head, as_hash, head_path, read_head
 from chauffeur.safety.audit.keys import key_name
 from chauffeur.safety.audit.reading import Line, lines, opened
 from chauffeur.safety.audit.texts import states
 
 MAX_FINDINGS: Final = 100
 """Findings kept in words; the others are counted."""
-
-HASH_CHARACTERS: Final = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +65,12 @@ class Verification:
         closed: Whether the log was closed, and not cut off.
         key: `none` (the log has no key), `unchecked` (it has, none was given) or `checked`.
         after_head: Records behind the one that the given head names; None when no head was given.
+        format: What the log says of its own layout; 0 when it says nothing.
+        unclosed: How often the log was gone on with although it had not been closed: after a crash, or an end cut off.
+        end: Whether nothing is missing at the end: `unknown` (no key, none given, or a log of before such heads),
+            `whole` (the head sealed with the key says so, or the head given is the last record), `open` (it was not
+            closed, or is being written: what came behind the head may be missing), or `doubtful` (a head that is
+            missing, of another key, or says otherwise).
     """
 
     findings: tuple[Finding, ...]
@@ -80,36 +85,23 @@ class Verification:
     closed: bool
     key: Literal["none", "unchecked", "checked"]
     after_head: int | None
+    format: int = 0
+    unclosed: int = 0
+    end: Literal["unknown", "whole", "open", "doubtful"] = "unknown"
 
     @property
     def ok(self) -> bool:
         """Whether nothing is wrong. A torn tail is not: what was never whole was never acknowledged."""
         return not self.findings
 
-
-def head_path(path: Path) -> Path:
-    """Where the head of a log is kept beside it."""
-    return path.with_name(f"{path.name}.head")
-
-
-def read_head(path: Path) -> str | None:
-    """The hash in the head file beside a log, or None where there is no such file.
-
-    Raises:
-        DataError: It is there and cannot be used.
-    """
-    beside = head_path(path)
-    try:
-        text = beside.read_text(encoding="ascii").strip()
-    except FileNotFoundError:
-        return None
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"The head file {beside} cannot be read: {error}.", hint="Remove it, or restore it.") from error
-    return _hash(text, f"The head in {beside}")
+    @property
+    def usable(self) -> bool:
+        """Whether it may be gone on with: nothing is wrong, but that it may not have been closed."""
+        return not self.findings or (self.end == "open" and len(self.findings) == 1)
 
 
 def verify(path: Path, *, head: str | None = None, key: bytes | None = None) -> Verification:
-    """Look at every record of a log.
+    """Look at every record of a log, and under a key at the head beside it, too.
 
     Args:
         path: The log.
@@ -121,9 +113,47 @@ def verify(path: Path, *, head: str | None = None, key: bytes | None = None) -> 
         DataError: The file cannot be read, is not an audit log, or is of a newer format.
         ConfigError: The head is not a hash.
     """
-    anchor = read_head(path) if head is None else _hash(head, "The head given")
+    given = None if head is None else as_hash(head, "The head given")
+    beside = read_head(path) if given is None or key is not None else None
+    # A log that was being opened for the first time had no record yet that could be found in it.
+    named = beside.hash if beside is not None and beside.records != 0 else None
+    anchor = given or named
     with opened(path) as file:
-        return verify_stream(file, str(path), head=anchor, key=key)
+        found = verify_stream(file, str(path), head=anchor, key=key)
+    if key is None or found.key != "checked" or found.format < SEALED_SINCE:
+        return found
+    if given is not None and found.after_head == 0:
+        return replace(found, end="whole")
+    end, what = _look_at_end(found, beside, head_path(path).name, key)
+    if not what:
+        return replace(found, end=end)
+    return replace(found, end=end, findings=(*found.findings, Finding(None, what)))
+
+
+def _look_at_end(
+    found: Verification, head: Head | None, name: str, key: bytes
+) -> tuple[Literal["whole", "open", "doubtful"], str]:
+    """What the head beside a log under a key says of its end, and in words what is wrong; empty when nothing is."""
+    if head is None:
+        return "doubtful", f"the head file {name} is missing: whether the end of the log is cannot be told."
+    if not head.is_sealed_with(key):
+        return "doubtful", f"the head file {name} was not written with this key."
+    assert head.records is not None  # what is sealed has a number
+    if head.records > found.records:
+        return (
+            "doubtful",
+            f"the end was cut off: the head counts {head.records} records, and {found.records} are there.",
+        )
+    if not head.closed:
+        return "open", (
+            f"the log was not closed, or is being written: behind record {head.records} its end may have been cut off."
+        )
+    if head.records < found.records or head.hash != found.head:
+        return "doubtful", (
+            f"the head file {name} is not this log's last: it names record {head.records - 1}, and the last one is "
+            f"record {found.records - 1}."
+        )
+    return "whole", ""
 
 
 def verify_stream(file: BinaryIO, name: str, *, head: str | None = None, key: bytes | None = None) -> Verification:
@@ -147,6 +177,8 @@ class _Examination:
     foreign_key: bool = False
     """Whether the log names another key than the one given; its seals are then not looked at one by one."""
     closed: bool = False
+    format: int = 0
+    unclosed: int = 0
     torn_bytes: int = 0
     lost: int = 0
     withheld: int = 0
@@ -211,6 +243,8 @@ class _Examination:
             closed=self.closed and not self.torn_bytes,
             key="none" if not self.keyed else "unchecked" if self.key is None else "checked",
             after_head=None if self.anchor_at is None else total - self.anchor_at,
+            format=self.format,
+            unclosed=self.unclosed,
         )
 
     def _begin(self, line: int, record: Record) -> None:
@@ -221,6 +255,8 @@ class _Examination:
                 f"{self.name} has audit format {version}; this Chauffeur reads up to {FORMAT}.",
                 hint="Upgrade: pip install -U chauffeur",
             )
+        if record.kind == "opened" and type(version) is int:
+            self.format = version
         name = record.body.get("key") if record.kind == "opened" else record.mac
         self.keyed = bool(name)
         if self.key is None:
@@ -275,6 +311,8 @@ class _Examination:
             self._say(line, f"record {record.seq} ({record.kind}) was not written with this key.")
 
     def _take_note(self, record: Record, *, sound: bool) -> None:
+        if record.kind == "opened" and self.kinds and not self.closed:
+            self.unclosed += 1
         self.kinds[record.kind] += 1
         if record.kind != "redaction":
             self.closed = record.kind == "closed"
@@ -293,12 +331,3 @@ class _Examination:
         self.found += 1
         if self.found <= MAX_FINDINGS:
             self.findings.append(Finding(line, what))
-
-
-def _hash(text: str, where: str) -> str:
-    if len(text) != HASH_CHARACTERS or set(text) - set("0123456789abcdef"):
-        raise ConfigError(
-            f"{where} is not a hash of {HASH_CHARACTERS} hexadecimal digits.",
-            hint="Give the hash that was printed when the log was closed.",
-        )
-    return text

@@ -25,10 +25,11 @@ from typing import Any, Final, Self
 from chauffeur import __version__
 from chauffeur.concept import DataError
 from chauffeur.safety.audit.entries import BATCHED, FORMAT, LINE_START, NO_RECORD, Kind, seal
+from chauffeur.safety.audit.heads import SEALED_SINCE, head_path, leave_head
 from chauffeur.safety.audit.keys import key_name
-from chauffeur.safety.audit.storage import LogFile, replace_whole
+from chauffeur.safety.audit.storage import LogFile
 from chauffeur.safety.audit.texts import REFERENCES, hide
-from chauffeur.safety.audit.verification import Verification, head_path, verify
+from chauffeur.safety.audit.verification import Verification, verify
 
 CAPACITY: Final = 4096
 """Records that may wait to be written: minutes of a drive."""
@@ -118,7 +119,8 @@ class AuditLog:
         self._capacity, self._sync_every_s, self._make_salt = capacity, sync_every_s, make_salt
         self._file = LogFile(path)
         try:
-            self._seq, self._head, torn = self._go_on()
+            self._seq, self._head, before = self._go_on()
+            self._announce()
         except BaseException:
             self._file.close()
             raise
@@ -150,7 +152,7 @@ class AuditLog:
                 "chauffeur": __version__,
                 "key": "" if key is None else key_name(key),
                 "private": private,
-                **torn,
+                **before,
                 **about,
             },
         )
@@ -254,13 +256,14 @@ class AuditLog:
             return Closing(self._head, self._seq, self._lost_in_all + missing, trouble)
 
     def _go_on(self) -> tuple[int, str, dict[str, Any]]:
-        """(next sequence number, hash of the last record, what to say of a torn end) of the file as it is."""
+        """(next sequence number, hash of the last record, what to say of how it ended) of the file as it is."""
         if not self._file.size:
             return 0, NO_RECORD, {}
         found = verify(self._path, key=self._key)
         _must_go_on(self._path, found)
+        before: dict[str, Any] = {"unclosed": True} if found.end == "open" else {}
         if not found.torn_bytes:
-            return found.records, found.head, {}
+            return found.records, found.head, before
         whole = self._file.size - found.torn_bytes
         with self._path.open("rb") as file:
             file.seek(whole)
@@ -268,7 +271,20 @@ class AuditLog:
         if not found.records and torn[: len(LINE_START)] != LINE_START[: len(torn)]:
             raise DataError(f"{self._path} is not an audit log.", hint="Name another file.")
         self._file.cut(whole)
-        return found.records, found.head, {"torn_bytes": len(torn), "torn_sha256": hashlib.sha256(torn).hexdigest()}
+        before |= {"torn_bytes": len(torn), "torn_sha256": hashlib.sha256(torn).hexdigest()}
+        return found.records, found.head, before
+
+    def _announce(self) -> None:
+        """Say under the key that records will follow: after a crash, the head tells where what is sure of them ends."""
+        if self._key is None or not self._file.is_regular:
+            return
+        try:
+            leave_head(self._path, self._head, self._seq, key=self._key, closed=False)
+        except OSError as error:
+            raise DataError(
+                f"The head file {head_path(self._path)} cannot be written: {error.strerror or error}.",
+                hint="Name another file.",
+            ) from error
 
     def _work(self) -> None:
         """The writer thread."""
@@ -400,7 +416,7 @@ class AuditLog:
         if not self._file.is_regular:
             return
         try:
-            replace_whole(head_path(self._path), f"{self._head}\n".encode())
+            leave_head(self._path, self._head, self._seq, key=self._key)
         except OSError as error:
             with self._lock:
                 self._trouble = f"The head file could not be written: {error.strerror or error}."
@@ -408,7 +424,7 @@ class AuditLog:
 
 def _must_go_on(path: Path, found: Verification) -> None:
     """Raises DataError where a log must not be continued."""
-    if not found.ok and found.records:
+    if not found.usable and found.records:
         raise DataError(
             f"The audit log {path} is not as it was written ({found.findings[0]}), so it is not continued.",
             hint=f"Look at it with: chauffeur audit verify {path}; and name another file for this drive.",
@@ -417,6 +433,12 @@ def _must_go_on(path: Path, found: Verification) -> None:
         raise DataError(
             f"The audit log {path} is written under a key, so it is not continued without it.",
             hint="Give the key file, or name another file.",
+        )
+    if found.key == "checked" and found.format < SEALED_SINCE:
+        raise DataError(
+            f"The audit log {path} is of format {found.format}, whose end its key does not vouch for, so it is not "
+            "continued.",
+            hint="Name another file for this drive; the old log can be verified as before.",
         )
 
 
