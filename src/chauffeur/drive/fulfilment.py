@@ -16,7 +16,7 @@ from typing import Final, Literal
 
 from chauffeur.concept import LaneId, Metric, Outcome, Plan, ProgramState, Snapshot, VehicleState, Wishes
 from chauffeur.concept.units import M_PER_CAR_LENGTH
-from chauffeur.control.pure_pursuit import Path
+from chauffeur.geometry import Polyline
 from chauffeur.worlds.base import World
 
 HELD_S: Final = 2.5
@@ -254,8 +254,8 @@ class Fulfilment:
         return abs(path.offset(shot.ego.x_m, shot.ego.y_m, path.nearest(shot.ego.x_m, shot.ego.y_m))) <= IN_LANE_M
 
     @cached_property
-    def _paths(self) -> dict[LaneId, Path]:
-        return {lane.id: Path.of(lane.centre_m) for lane in self._start.lanes}
+    def _paths(self) -> dict[LaneId, Polyline]:
+        return {lane.id: Polyline.of(lane.centre_m) for lane in self._start.lanes}
 
     def _on_emergency_lane(self, shot: Snapshot) -> bool:
         return any(lane.emergency and lane.id == shot.ego.lane for lane in self._start.lanes)
