@@ -122,6 +122,12 @@ def read_quantities(text: str) -> tuple[Quantity, ...]:
     return tuple(mark_quantities(tokens_of(text))[1])
 
 
+def number_of(tokens: list[str]) -> list[str]:
+    """The number with which the tokens of a quantity begin, without its unit."""
+    found = _number(tokens, 0)
+    return tokens if found is None else tokens[: found[1]]
+
+
 def measured(text: str) -> tuple[tuple[str, float], ...]:
     """(dimension, SI value) of every speed, distance and time span in a text; other numbers are left out."""
     if text.isascii() and _COUNTS.search(text.lower()) is None:

@@ -34,6 +34,7 @@ _ONLY_LETTERS_FOR_DIGITS: Final = re.compile(r"[oli|sbz]{2,}")
 _NUMBER_AND_REST: Final = re.compile(rf"(?P<number>{_NUMERAL.pattern})(?P<rest>[a-z].*)", re.ASCII)
 _UNIT_LETTERS: Final = re.compile(r"(?=[^aeiou]+$)[kmphftydcnsg]{2,6}")
 """What has no vowel and only letters of units is one that was mistyped: `mhp`, `kmg`."""
+_LONGEST_UNIT: Final = 20
 _MUCH: Final = frozenset(("thousand", "million"))
 _NOUGHTS: Final = ("oh", "o")
 """How a nought is said between digits."""
@@ -145,7 +146,7 @@ def _apart(chunks: list[_Chunk], index: int) -> tuple[_Chunk, _Unit | None]:
     """A chunk as its number and the unit that is glued to it or follows."""
     chunk = chunks[index]
     first = next((at for at, sign in enumerate(chunk.text) if sign.isdigit()), len(chunk.text))
-    for at in range(first + 1, len(chunk.text)):
+    for at in range(max(first + 1, len(chunk.text) - _LONGEST_UNIT), len(chunk.text)):
         of_letters = chunk.text[at - 1].isalpha() and not _LIKE_DIGITS_END.search(chunk.text[:at])
         if of_letters and len(chunk.text) - at == 1:
             continue  # 5pm

@@ -68,8 +68,13 @@ def plain(text: str) -> str:
     text = _NO_NOUGHT.sub("0.", _DECIMAL_COMMA.sub(".", _NUMBER_COMMA.sub("", text)))
     for pattern, by in (*_CONTRACT, *_UNITS):
         text = pattern.sub(by, text)
-    text = _GLUED_UNIT.sub(r"\1 ", text)
+    text = split_units(text)
     return text.replace("-", " ").replace("–", " ")
+
+
+def split_units(text: str) -> str:
+    """The text with a space between a number and the unit that touches it; names such as A1 and 12b stay whole."""
+    return _GLUED_UNIT.sub(r"\1 ", text.lower())
 
 
 def tokens_of(text: str) -> list[str]:
