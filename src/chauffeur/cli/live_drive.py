@@ -63,6 +63,8 @@ class LiveDrive:
                 self._at_s = heard.tick * self._screen.dt_s
             case Event(kind="started"):
                 self._driven_at_s = self._at_s
+            case Event(kind="declined") if heard.offer:
+                self._asking.offer(heard.text, heard.offer)
             case _:
                 pass
         if self._books is not None:
@@ -168,7 +170,8 @@ class LiveDrive:
 
     def _put(self, line: str) -> None:
         try:
-            self._asking.put(Words(line))
+            if note := self._asking.put(Words(line)):
+                self._screen.note(note)
         except InstructionError as error:
             self._screen.note(str(error))
             self._passed_over += 1

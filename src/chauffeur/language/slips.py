@@ -339,10 +339,10 @@ def _chunks(text: str) -> list[_Chunk]:
     for found in re.finditer(r"[^\s–—-]+|(?<=\s)[–—-]+(?=\s)", text):
         begin = len(found[0]) - len(found[0].lstrip(_AROUND))
         bare = found[0][begin:].rstrip(_AROUND)
-        whole = bare.rstrip(_ENDS)
+        whole = bare.removesuffix("'s").removesuffix("’s").rstrip(_ENDS)
         if whole.strip("–—-"):
             start = found.start() + begin
-            chunks.append(_Chunk(whole, start, start + len(whole), ends=len(whole) < len(bare)))
+            chunks.append(_Chunk(whole, start, start + len(whole), ends=bare[-1:] in _ENDS))
         elif chunks:  # a sign, or a dash between spaces, ends what stands before it
             chunks[-1] = replace(chunks[-1], ends=True)
     return chunks

@@ -37,6 +37,9 @@ UNSURE_WORDS: Final = "I am not sure what you want."
 _STANDS: Final = "We would stand in the way of others."
 _CRAWLS: Final = "That is less than half the speed of the traffic here."
 
+_OUTRIGHT: Final = 1.0
+"""Score of a meaning from which it is a verb with its object; below it is a lone word: "a lorry from the right"."""
+
 PACES: Final = {"hurry": 1, "sporty": 1, "relax": -1, "careful": -1, "comfort": -1, "eco": -1}
 """Moods that quicken (1) or calm (-1) the drive."""
 
@@ -56,8 +59,9 @@ class Said:
     @classmethod
     def of(cls, meanings: Sequence[Meaning]) -> Self:
         """What the rules found in the words; they know nothing of any network."""
-        sides = frozenset(m.direction for m in meanings if m.direction in ("left", "right"))
-        return cls(sides, _sign(m.change for m in meanings if m.manoeuvre == "speed"))
+        plain = [m for m in meanings if m.score >= _OUTRIGHT]
+        sides = frozenset(m.direction for m in plain if m.direction in ("left", "right"))
+        return cls(sides, _sign(m.change for m in plain if m.manoeuvre == "speed"))
 
     def contradicts(self, *, side: str, pace: int) -> bool:
         """Whether a reading that goes to a side (empty for none) at a pace (sign) drops or denies what was said."""
@@ -92,15 +96,11 @@ def agreed(meanings: Sequence[Meaning], intent: str) -> bool:
     return bool(meanings) and "+".join(m.family for m in meanings) == intent
 
 
-def confident(meanings: Sequence[Meaning], intent: str, sure: float) -> bool:
-    """Whether a network's reading may be driven without asking."""
-    return sure >= SURE or agreed(meanings, intent)
-
-
 def question_about(
     instruction: Instruction,
     shall_i: str,
-    meanings: Sequence[Meaning],
+    *,
+    witnessed: bool,
     choice: Choice,
     situation: Situation,
     sure: float,
@@ -110,12 +110,12 @@ def question_about(
     Args:
         instruction: The words, and what the person has answered already.
         shall_i: The question whether to do what was read.
-        meanings: What the rules found in the words.
+        witnessed: Whether something that knows nothing of the network says the same.
         choice: What would be driven.
         situation: Where we are.
         sure: Probability of the network's least sure choice.
     """
-    if not confident(meanings, choice.intent, sure):
+    if sure < SURE and not witnessed:
         return unanswered(instruction, f"{UNSURE_WORDS} {shall_i}")
     why = slow_words(choice.steps, situation)
     return unanswered(instruction, f"{why} {shall_i}") if why else ""
@@ -129,6 +129,8 @@ def unanswered(instruction: Instruction, question: str) -> str:
 def slow_words(steps: Iterable[Chosen], situation: Situation) -> str:
     """Why a plan endangers those behind us: it stops in the lane, or crawls; empty where it does neither."""
     for step in steps:
+        if step.intent.startswith("pull_over"):
+            continue  # to a stand, but not in anybody's way
         target = 0.0 if step.intent == "stop" else dict(step.settings).get("target_speed_mps")
         if target is not None and (why := slow_speed_words(target, situation)):
             return why

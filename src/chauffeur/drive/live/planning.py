@@ -134,7 +134,8 @@ class Planning:
             self._tell("unplanned", request.wish, f"The planner failed: {type(error).__name__}: {error}")
             return
         if order.plan.refusal or order.plan.policy is None:
-            self._tell("declined", request.wish, order.plan.refusal or "The planner gave no program.")
+            words = order.plan.refusal or "The planner gave no program."
+            self._tell("declined", request.wish, words, offer=order.plan.offer)
             return
         try:
             self._rings.orders.write(encode(order))
@@ -148,7 +149,7 @@ class Planning:
         self._mirror.follow()
         snapshot, limits = self._mirror.world.snapshot(), self._mirror.limits
         scene = Scene.of(self._mirror.trip, snapshot)
-        instruction = parse_wish(request.text, PersonId(request.person))
+        instruction = replace(parse_wish(request.text, PersonId(request.person)), confirmed=request.confirmed)
         context = (await describing(self._sources))(snapshot)
         history = self._memory.recall(instruction.person, instruction, context, _RECALLED)
         system = build_system_message(self._setting, limits=limits)
@@ -174,6 +175,7 @@ class Planning:
     def _say(self, text: str) -> None:
         self._tell("said", "" if self._request is None else self._request.wish, text)
 
-    def _tell(self, kind: EventKind, wish: str, text: str, *, again: bool = True) -> None:
-        event = Event(kind, wish, text[:MOST_SAID], self._mirror.trip, self._mirror.tick, again)
+    def _tell(self, kind: EventKind, wish: str, text: str, *, again: bool = True, offer: str = "") -> None:
+        offer = offer if len(text) + len(offer) <= MOST_SAID else ""  # half a wish is none
+        event = Event(kind, wish, text[:MOST_SAID], self._mirror.trip, self._mirror.tick, again, offer)
         self._rings.events.write(encode(event))

@@ -164,10 +164,17 @@ class Runtime:
 
     # For whoever drives -----------------------------------------------------------------------------------------------
 
-    def ask(self, text: str, person: str = NOBODY) -> str:
-        """Hand a wish to the planner; returns its id. What becomes of it is told by events."""
+    def ask(self, text: str, person: str = NOBODY, *, confirmed: str = "") -> str:
+        """Hand a wish to the planner; returns its id. What becomes of it is told by events.
+
+        Args:
+            text: The words.
+            person: Whose they are.
+            confirmed: The car's question to which they are the yes.
+        """
         wish = self.next_wish
-        self.interactions[wish] = Interaction(Request(wish, text, person), since_s=time.monotonic())
+        request = Request(wish, text, person, confirmed=confirmed)
+        self.interactions[wish] = Interaction(request, since_s=time.monotonic())
         self._send(self.interactions[wish])
         return wish
 

@@ -161,6 +161,7 @@ class OnRoad:
         self._turn = asyncio.Lock()
         self._count = self._newest = 0
         self._making: asyncio.Task[_Made] | None = None
+        self._offered: Plan | None = None
         self._asked: Parameters | None = None
         self._handed: tuple[int, Published] | None = None
         self._unconfirmed: tuple[int, Published] | None = None
@@ -269,7 +270,7 @@ class OnRoad:
     ) -> tuple[Answer, PlanRequest | None]:
         """The answer, and what was planned for, if anything was."""
         try:
-            instruction = replace(parse_wish(text, self._person), source=source)
+            instruction = replace(self._meant(text), source=source)
         except InstructionError as error:
             return Answer(number, text[:MAX_WISH_CHARACTERS], "declined", str(error)), None
         answer = Answer(number, instruction.text, "declined", ENGAGING_WORDS)
@@ -292,6 +293,13 @@ class OnRoad:
         if made.status is None:
             answer = await self._apply(number, answer)
         return answer, made.request
+
+    def _meant(self, text: str) -> Instruction:
+        """The wish, or the one that the car asked about, where the words are a yes to that. Raises InstructionError."""
+        plan, self._offered = self._offered, None
+        if plan is not None and answer_in(text):
+            return replace(parse_wish(plan.offer, self._person), confirmed=plan.refusal)
+        return parse_wish(text, self._person)
 
     async def _made(self, number: int, instruction: Instruction) -> _Made:
         """What the wish comes to, unless a newer one comes first. A stop gives way to nothing."""
@@ -333,6 +341,7 @@ class OnRoad:
         self._book(lambda books: books.verdicts(number, verdicts))
         self._say("verdicts", " ".join(one.reason for one in verdicts), number, verdicts)
         made = _Made(request, plan, verdicts)
+        self._offered = plan if plan.offer else None
         if plan.policy is None and not verdicts[0].stops:
             words = plan.refusal or "The planner gave no parameters."
             return replace(made, status="declined", words=f"{words} {counted_from(seen)}".rstrip())

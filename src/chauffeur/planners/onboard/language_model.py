@@ -13,8 +13,8 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Final
 
-from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Situation, Usage
-from chauffeur.planners.arbitration import UNSURE_WORDS, Wish, asked, question_about
+from chauffeur.concept import ConfigError, Instruction, Plan, PlanRequest, Program, ProgramError, Situation, Usage
+from chauffeur.planners.arbitration import UNSURE_WORDS, Wish, agreed, asked, question_about
 from chauffeur.planners.base import OnText, Planner, declined
 from chauffeur.planners.onboard.copying import named, taken_over, unnamed
 from chauffeur.planners.onboard.dangers import danger
@@ -127,6 +127,23 @@ class Settled:
     situation: Situation
     written: Written
 
+    @property
+    def witnessed(self) -> bool:
+        """Whether the rules read the same, or the number comes from what was done for this person before."""
+        remembered = unnamed(self.wish, (), self.steps) is not None
+        return remembered or agreed(meanings_said(self.wish), self.linked.choice.intent)
+
+    def question(self, instruction: Instruction) -> str:
+        """What to ask before this is driven; empty where nothing is."""
+        return question_about(
+            instruction,
+            shall_i(self.steps),
+            witnessed=self.witnessed,
+            choice=self.linked.choice,
+            situation=self.situation,
+            sure=self.written.sure,
+        )
+
 
 class LanguageModelPlanner:
     """Plans with the on-board language model, in this process."""
@@ -205,15 +222,7 @@ class LanguageModelPlanner:
         if isinstance(settled, Plan):
             return settled
         linked, used, wish = settled.linked, settled.used, settled.wish
-        asks = question_about(
-            request.instruction,
-            shall_i(settled.steps),
-            meanings_said(wish),
-            linked.choice,
-            settled.situation,
-            settled.written.sure,
-        )
-        if asks:
+        if asks := settled.question(request.instruction):
             plan = asked(self, asks, begun, offer=wish, raw=settled.written.text)
             return replace(plan, usage=usage_of(settled.written))
         return Plan(

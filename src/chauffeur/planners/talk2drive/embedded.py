@@ -19,16 +19,14 @@ from chauffeur.planners.arbitration import (
     SURE,
     Said,
     Wish,
-    agreed,
     asked,
     intent_pace,
-    question_about,
     unanswered,
     within_mood,
 )
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.dangers import danger
-from chauffeur.planners.onboard.dialect import Step, shall_i
+from chauffeur.planners.onboard.dialect import Step
 from chauffeur.planners.onboard.doubts import foreign
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.language_model import LanguageModelPlanner, Settled, usage_of
@@ -92,6 +90,8 @@ _TAKEN: Final[dict[str, str]] = {
     "faster": "I take it that this is too slow for you.",
     "slower": "I take it that this is too fast for you.",
 }
+_ANY_SPOT: Final = "nearest"
+"""Read where nothing of the words says which spot."""
 _PACES: Final = ("speed.increase", "speed.decrease")
 _PACE_OF_HINT: Final = {"pass": 1, "hurry": 1, "faster": 1, "go": 1, "calm": -1, "slower": -1}
 _AT_ONCE: Final = "With these parameters I can only do things at once. Tell me when it is time."
@@ -129,10 +129,10 @@ class EmbeddedParameters:
         wish = ready.instruction.text
         request = replace(request, instruction=ready.instruction)
         settled = self._model.settle(_compared(request), begun)
-        if situation.world == "parking" and (spot := _spot_read(wish, settled)):
-            return self._park(spot, request, begun)
         reads = () if isinstance(settled, Plan) else tuple(map(kind_of, settled.linked.choice.intent.split("+")))
         hint = hint_of(wish, situation, request.history, reads[0] if reads else "")
+        if situation.world == "parking" and (spot := _spot_read(wish, settled, hint)):
+            return self._park(spot, request, begun)
         if hint is not None and self._overrules(hint, settled, reads, wish, situation.world):
             return self._or_asked(self._as_meant(hint, request, begun), hint, request, begun)
         alike = hint is not None and any(goes_with(read, hint.kind) for read in reads)
@@ -143,19 +143,12 @@ class EmbeddedParameters:
         plan = self._as_read(settled, request, begun)
         if isinstance(settled, Plan) or plan.policy is None:
             return plan
-        asks = question_about(
-            request.instruction,
-            shall_i(settled.steps),
-            meanings_said(settled.wish),
-            settled.linked.choice,
-            settled.situation,
-            settled.written.sure,
-        )
+        asks = settled.question(request.instruction)
         return asked(self, asks, begun, offer=settled.wish, raw=plan.raw) if asks else plan
 
     def _or_asked(self, plan: Plan, hint: Hint, request: PlanRequest, begun: float) -> Plan:
         """What a hint was taken for, or, where that is not sure, the question whether it is meant."""
-        if plan.policy is None or hint.outright or hint.share >= _SURER or hint.kind not in _TAKEN:
+        if plan.policy is None or hint.outright or hint.because or hint.share >= _SURER or hint.kind not in _TAKEN:
             return plan
         question = unanswered(request.instruction, f"{_TAKEN[hint.kind]} Is that right?")
         return asked(self, question, begun, offer=request.instruction.text) if question else plan
@@ -172,7 +165,7 @@ class EmbeddedParameters:
         if isinstance(settled, Plan):
             sure = _SURER if _forbidden(settled) and hint.kind in _BRISK else _SURE
             return hint.kind != "none" and hint.share >= sure
-        if not hint.outright and settled.written.sure >= SURE and agreed(meanings, settled.linked.choice.intent):
+        if not hint.outright and settled.written.sure >= SURE and settled.witnessed:
             return any(goes_with(read, hint.kind) for read in reads) and hint.kind == "go"
         if any(dimension == "time" for dimension, _ in amounts) and any(map(_in_time, settled.steps)):
             return False
@@ -278,12 +271,14 @@ class EmbeddedParameters:
         )
 
 
-def _spot_read(wish: str, settled: Settled | Plan) -> str:
+def _spot_read(wish: str, settled: Settled | Plan, hint: Hint | None) -> str:
     """The spot of the lot that a wish means, unless it is read as something else to do there; empty for none."""
     if spot := named_spot(wish):
         return spot
     reads = settled.intent != "refuse" if isinstance(settled, Plan) else _parks(settled.linked.choice.intent)
-    return place_of(wish) if reads else ""
+    place = place_of(wish) if reads else ""
+    meant = "" if hint is None else hint.kind.partition("park.")[2]
+    return meant or place if place == _ANY_SPOT else place
 
 
 def _compared(request: PlanRequest) -> PlanRequest:
