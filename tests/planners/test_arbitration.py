@@ -72,7 +72,7 @@ def test_a_number_of_many_readings_is_asked_for(planners: dict[str, Planner], na
 
 
 @pytest.mark.parametrize("name", _PLANNERS)
-@pytest.mark.parametrize("wish", ["Drive at 20 km/h.", "Drive at 0.5 m/s.", "Slow down to 10 mph."])
+@pytest.mark.parametrize("wish", ["Drive at 20 km/h.", "Drive at 4 m/s.", "Slow down to 10 mph."])
 def test_a_crawl_among_faster_traffic_is_driven_only_after_a_yes(
     planners: dict[str, Planner], name: str, wish: str
 ) -> None:

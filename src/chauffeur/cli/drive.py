@@ -47,6 +47,7 @@ def drive(
     audit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
     ] = None,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Answer the car's question with yes.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the outcome only.")] = False,
     browser: Annotated[
         bool, typer.Option("--open/--no-open", help="Open the page of the drive; without --save in ./trips.")
@@ -55,6 +56,7 @@ def drive(
     """Drive a wish: plan it, check it, drive it, score it."""
     import asyncio
     from contextlib import ExitStack
+    from dataclasses import replace
 
     from chauffeur.cli.audit import auditor_for, tell_closing
     from chauffeur.cli.console import stdout
@@ -69,6 +71,7 @@ def drive(
     )
     from chauffeur.cli.show import Quiet, Teller
     from chauffeur.concept import PersonId
+    from chauffeur.drive.answering import ANSWERED
     from chauffeur.drive.auditing import told_to, with_head
     from chauffeur.drive.scenarios import find, suiting
     from chauffeur.drive.session import Forgetful, Session, parse_wish
@@ -100,6 +103,11 @@ def drive(
             console.print(private, style="bold yellow", markup=False)
         stack.enter_context(teller)
         recorded = asyncio.run(session.drive(instruction, place, start_seed, bounds))
+        plan = recorded.trip.plan
+        if plan.offer and auditor is None and (yes or (asking() and typer.confirm(plan.refusal))):
+            meant = replace(instruction, text=plan.offer, confirmed=plan.refusal)
+            teller.again()
+            recorded = asyncio.run(session.drive(meant, place, start_seed, bounds))
     closing = None if auditor is None else auditor.close()
     if closing is not None:
         recorded = with_head(recorded, closing)
@@ -112,8 +120,16 @@ def drive(
         teller.wrote(save_trip(save, recorded))
         if browser:
             typer.launch((save / "trip.html").resolve().as_uri())
-    if recorded.trip.outcome not in _DONE or (closing is not None and not closing.complete):
+    answered = recorded.trip.plan.intent == ANSWERED
+    if (recorded.trip.outcome not in _DONE and not answered) or (closing is not None and not closing.complete):
         raise typer.Exit(FAILED)
+
+
+def asking() -> bool:
+    """Whether somebody is there to answer a question."""
+    import sys
+
+    return sys.stdin.isatty() and sys.stdout.isatty()
 
 
 def save_trip(folder: Path, recorded: RecordedTrip) -> list[Path]:

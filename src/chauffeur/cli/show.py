@@ -26,12 +26,18 @@ from chauffeur.concept import (
     Thoughts,
     Verdict,
 )
+from chauffeur.drive.answering import ANSWERED
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.payload import policy_words
 from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.safety.alignment import mismatch_words, score_words
+from chauffeur.safety.words import reasons_once
 
+_UNDRIVEN: dict[str, tuple[str, words.Tone]] = {
+    ANSWERED: ("Answered, nothing driven", "neutral"),
+    "ask": ("Asked back, nothing driven", "neutral"),
+}
 _STYLES = {"good": "bold green", "bad": "bold red", "neutral": "bold"}
 
 
@@ -63,13 +69,16 @@ class Quiet:
     def end(self, recorded: RecordedTrip) -> None:
         """What came of it."""
         trip = recorded.trip
-        label, tone = words.outcome_words(trip.outcome)
+        label, tone = _UNDRIVEN.get(trip.plan.intent if trip.plan.refusal else "", words.outcome_words(trip.outcome))
         line = Text(label, _STYLES[tone])
         if recorded.frames:
             line.append(f" after {trip.duration_s:.1f} s", style="not bold")
         if words.unexplained(trip.verdicts):
             line.append(", not as explained", style="yellow")
         self.console.print(line.append(" (simulated drive)", style="dim"))
+
+    def again(self) -> None:
+        """The person has said yes: the same drive once more."""
 
     def wrote(self, paths: list[Path]) -> None:
         """Files of the trip."""
@@ -84,6 +93,7 @@ class Teller(Quiet):
         self._live = Live(console=console, transient=True, refresh_per_second=10) if console.is_terminal else None
         self._waiting = False
         self._reply, self._attempt = "", 0
+        self._given: set[str] = set()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -113,9 +123,9 @@ class Teller(Quiet):
                 self._plan(value)
             case tuple() if letter == "V":
                 self._still()
-                for verdict in value:
-                    if isinstance(verdict, Verdict):
-                        self._verdict(verdict)
+                verdicts = [verdict for verdict in value if isinstance(verdict, Verdict)]
+                for verdict in () if self._given else verdicts:  # a plan that declines has been told with its reason
+                    self._verdict(verdict)
             case _:
                 super().tell(letter, value)
 
@@ -133,6 +143,8 @@ class Teller(Quiet):
         self.console.print()
         super().end(recorded)
         for cause in words.cause_words(trip.causes):
+            if cause in self._given or (self._given and cause == words.DECLINED):
+                continue
             self.console.print(Padding(plain(cause), (0, 0, 0, 2)))
         shielded = words.shield_words([change for frame in recorded.frames for change in frame.interventions])
         if shielded:
@@ -152,6 +164,11 @@ class Teller(Quiet):
         facts.append(f"scenario {trip.scenario} (sha256 {str(record.get('scenario_sha256', ''))[:12]})")
         facts += [f"seed {words.seed_words(trip.seed)}", f"chauffeur {record.get('chauffeur', '')}", f"trip {trip.id}"]
         self.console.print(Padding(plain(", ".join(facts)), (0, 0, 0, 2)), style="dim")
+
+    def again(self) -> None:
+        """What was asked about is no reason any more."""
+        self._still()
+        self._given.clear()
 
     def wrote(self, paths: list[Path]) -> None:
         """List the files."""
@@ -175,7 +192,9 @@ class Teller(Quiet):
 
     def _plan(self, plan: Plan) -> None:
         if plan.refusal:
-            self._letter("R", Text.assemble(("Declined: ", "bold yellow"), plain(plan.refusal)))
+            self._given.add(plan.refusal)
+            head = {ANSWERED: "Answer: ", "ask": "Asks: "}.get(plan.intent, "Declined: ")
+            self._letter("R", Text.assemble((head, "bold yellow"), plain(plan.refusal)))
             return
         self._thoughts(plan.thoughts, plan.intent)
         if isinstance(plan.policy, Program):
@@ -194,8 +213,13 @@ class Teller(Quiet):
             self._mismatches(verdict.check, verdict.alignment)
             return
         mark = Text("✓ ", "green") if verdict.passed else Text("✕ " if verdict.stops else "≠ ", "bold red")
+        refused = reasons_once([verdict])
+        if refused and refused in self._given:
+            return  # another check has said so
+        if refused:
+            self._given.add(refused)
         # Of what passed, the doubts are on the page and in the recording.
-        reason = verdict.reason.split(". ", 1)[0].rstrip(".") + "." if verdict.passed else verdict.reason
+        reason = verdict.reason.split(". ", 1)[0].rstrip(".") + "." if verdict.passed else refused or verdict.reason
         where = f"{verdict.check}, line {verdict.line}" if verdict.line else verdict.check
         body = Text.assemble(mark, plain(reason if verdict.reason else "passed"), (f"  {where}", "dim"))
         if verdict.remedy and not verdict.passed:

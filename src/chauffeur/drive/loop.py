@@ -30,6 +30,7 @@ from chauffeur.concept import (
     Trip,
     Verdict,
 )
+from chauffeur.drive.answering import plan_or_answer
 from chauffeur.planners.base import Planner
 from chauffeur.safety.screening import screen_request
 from chauffeur.worlds.base import World
@@ -68,7 +69,7 @@ async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, s
 
     request, screened = screen_request(PlanRequest(I, C, S, H, limits=limits))  # words are data
     stages.tell("screened", screened)
-    plan = await stages.planner.plan(request)  # R, P
+    plan = await plan_or_answer(stages.planner, request)  # R, P
     stages.tell("RP", plan)
 
     V = stages.check(plan, snapshot, limits)  # noqa: N806

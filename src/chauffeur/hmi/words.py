@@ -84,6 +84,9 @@ _DOUBTS: Final = {
 }
 
 
+DECLINED: Final = "The wish was declined."
+
+
 def cause_words(causes: Causes) -> tuple[str, ...]:
     """Every cause that holds, in words; empty when nothing went wrong."""
     words = [
@@ -91,7 +94,7 @@ def cause_words(causes: Causes) -> tuple[str, ...]:
         for holds, text in (
             (causes.policy_failed, "The program was rejected, or failed while it ran."),
             (causes.infra_failed, "Endpoint, sandbox or machine failed; this says nothing about the plan."),
-            (causes.refused, "The wish was declined."),
+            (causes.refused, DECLINED),
             (causes.fallback_used, "The autopilot drove on without the program."),
         )
         if holds

@@ -15,6 +15,7 @@ from typing import Final
 
 from chauffeur.concept import ChauffeurError, History, PersonId, Plan, PlanRequest
 from chauffeur.describe.services.sources import Sources, SourceSettings
+from chauffeur.drive.answering import plan_or_answer
 from chauffeur.drive.live.messages import MessageError
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.orders import (
@@ -154,7 +155,7 @@ class Planning:
         history = self._memory.recall(instruction.person, instruction, context, _RECALLED)
         system = build_system_message(self._setting, limits=limits)
         asked, _ = screen_request(PlanRequest(instruction, context, system, history, limits=limits))
-        plan: Plan = await self._planner.plan(asked)
+        plan: Plan = await plan_or_answer(self._planner, asked)
         self._brief(Brief(request.wish, instruction, context, history, plan, self._mirror.trip, snapshot.tick))
         return Order(
             wish=request.wish,

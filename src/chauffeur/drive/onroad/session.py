@@ -42,6 +42,7 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.describe.services.sources import Sources
+from chauffeur.drive.answering import plan_or_answer
 from chauffeur.drive.auditing import FLUSH_TIMEOUT_S
 from chauffeur.drive.onroad.books import RoadBooks
 from chauffeur.drive.onroad.checks import ENGAGING_WORDS, check_all, fitted, is_about_engaging, is_stop
@@ -58,6 +59,8 @@ from chauffeur.planners.talk2drive.planner import system_text
 from chauffeur.planners.talk2drive.style import LOOK_AHEAD
 from chauffeur.safety.audit.writer import utc_now
 from chauffeur.safety.screening import screen_request
+from chauffeur.safety.words import reasons_once
+from chauffeur.speech.answers import answer_in
 from chauffeur.worlds.ros import Published, VehicleError, VehicleInterface, VehicleState
 from chauffeur.worlds.ros.autoware_ai import AutowareAi, PlannedSpeed
 from chauffeur.worlds.ros.settings import VehicleSettings
@@ -354,7 +357,7 @@ class OnRoad:
 
     async def _plan(self, request: PlanRequest) -> Plan | str:
         """R and P, or why there are none."""
-        task = asyncio.ensure_future(self._planner.plan(request))
+        task = asyncio.ensure_future(plan_or_answer(self._planner, request))
         try:
             done, _ = await asyncio.wait({task}, timeout=PLAN_WITHIN_S)
             if task.cancelled():
@@ -572,4 +575,4 @@ def _unreachable(state: VehicleState) -> str:
 
 def _reasons(verdicts: tuple[Verdict, ...]) -> str:
     """Why a plan must not be driven, with what would help; empty when it may."""
-    return " ".join(f"{one.reason} {one.remedy}".strip() for one in verdicts if one.stops)
+    return reasons_once(verdicts, remedies=True)
