@@ -76,6 +76,11 @@ class Quiet:
         if words.unexplained(trip.verdicts):
             line.append(", not as explained", style="yellow")
         self.console.print(line.append(" (simulated drive)", style="dim"))
+        if not recorded.frames:
+            self._why(trip.causes.detail)
+
+    def _why(self, detail: str) -> None:
+        self.console.print(plain(detail))
 
     def again(self) -> None:
         """The person has said yes: the same drive once more."""
@@ -164,6 +169,9 @@ class Teller(Quiet):
         facts.append(f"scenario {trip.scenario} (sha256 {str(record.get('scenario_sha256', ''))[:12]})")
         facts += [f"seed {words.seed_words(trip.seed)}", f"chauffeur {record.get('chauffeur', '')}", f"trip {trip.id}"]
         self.console.print(Padding(plain(", ".join(facts)), (0, 0, 0, 2)), style="dim")
+
+    def _why(self, detail: str) -> None:
+        """Told already, or below."""
 
     def again(self) -> None:
         """What was asked about is no reason any more."""

@@ -22,7 +22,7 @@ _ASKS: Final = re.compile(
     r"^(?:(?:please|hey|ok|so|and|well|excuse me|sorry) ?,? ?)*"
     r"(?:(?:can|could|would|will) you (?:please )?tell (?:me|us) |(?:do|did) you (?:happen to )?know |"
     r"tell (?:me|us) |i wonder )?"
-    r"(?:what|which|how (?:fast|far|many|much|long|old|big|tall|close|late)|where|when|who|whose|"
+    r"(?:whats?|which|how (?:fast|far|many|much|long|old|big|tall|close|late)|where|when|who|whose|"
     r"is there|are there|is it)\b"
 )
 """How a question begins that wants to know something; not one that asks for something, complains or proposes."""
