@@ -55,3 +55,8 @@ def test_different_reasons_are_all_told() -> None:
         )
     )
     assert said == "Too fast. Too near."
+
+
+def test_two_speeds_stay_two() -> None:
+    too_fast = Verdict("a", False, "A target speed of 5.1 m/s (18 km/h) is above the cap of 5 m/s (18 km/h).")
+    assert reasons_once((too_fast,)) == "A target speed of 18.4 km/h is above the cap of 18.0 km/h."

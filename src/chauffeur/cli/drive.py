@@ -47,7 +47,6 @@ def drive(
     audit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Answer the car's question with yes.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the outcome only.")] = False,
     browser: Annotated[
         bool, typer.Option("--open/--no-open", help="Open the page of the drive; without --save in ./trips.")
@@ -104,7 +103,7 @@ def drive(
         stack.enter_context(teller)
         recorded = asyncio.run(session.drive(instruction, place, start_seed, bounds))
         plan = recorded.trip.plan
-        if plan.offer and auditor is None and (yes or (asking() and typer.confirm(plan.refusal))):
+        if plan.offer and auditor is None and asking() and typer.confirm(plan.refusal):
             meant = replace(instruction, text=plan.offer, confirmed=plan.refusal)
             teller.again()
             recorded = asyncio.run(session.drive(meant, place, start_seed, bounds))

@@ -12,7 +12,7 @@ from chauffeur.concept.units import kmh
 IN_A_HELPER: Final = "(In a helper function.)"
 """Added for the model that repairs a program; the person has none."""
 _SENTENCE: Final = re.compile(r"(?<=[.!?])\s+(?=[A-Z(])")
-_BOTH_UNITS: Final = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)? m/s \((-?\d+ km/h)\)")
+_BOTH_UNITS: Final = re.compile(r"(\d+(?:\.\d+)?(?:e[+-]?\d+)?) m/s \((-?\d+ km/h)\)")
 
 
 def speed_words(speed_mps: float) -> str:
@@ -37,5 +37,11 @@ def reasons_once(verdicts: Iterable[Verdict], *, remedies: bool = False) -> str:
 
 
 def in_km_per_h(text: str) -> str:
-    """The text with speeds in km/h alone."""
-    return _BOTH_UNITS.sub(r"\1", text).strip()
+    """The text with speeds in km/h alone, to a tenth where whole ones would make two speeds the same."""
+    found = _BOTH_UNITS.findall(text)
+    alike = len({whole for _, whole in found}) < len({exact for exact, _ in found})
+
+    def one_unit(speed: re.Match[str]) -> str:
+        return f"{kmh(float(speed[1])):.1f} km/h" if alike else speed[2]
+
+    return _BOTH_UNITS.sub(one_unit, text).strip()
