@@ -206,12 +206,13 @@ def test_no_perturbed_speed_is_driven_as_another(planners: dict[str, Planner], n
 
 
 def test_a_slow_speed_is_slow_against_traffic_only() -> None:
-    assert slow_speed_words(10.0, LEFT)
-    assert not slow_speed_words(20.0, LEFT)
+    assert slow_speed_words(10.0, LEFT, Limits())
+    assert not slow_speed_words(20.0, LEFT, Limits())
     jam = replace(BEHIND, speed_mps=6.0, front=None)
-    assert not slow_speed_words(2.0, jam)
-    assert slow_speed_words(0.0, jam)
-    assert not slow_speed_words(0.0, LOT)
+    assert not slow_speed_words(2.0, jam, Limits())
+    assert slow_speed_words(0.0, jam, Limits())
+    assert not slow_speed_words(0.0, LOT, Limits())
+    assert not slow_speed_words(8.0, LEFT, Limits(max_speed_mps=10.0))
 
 
 @given(_SPEEDS, _SPEEDS, _SPEEDS)

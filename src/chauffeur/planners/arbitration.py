@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Literal, Self
 
-from chauffeur.concept import Instruction, Plan, Situation
+from chauffeur.concept import Instruction, Limits, Plan, PlanRequest, Situation
 from chauffeur.language.corrections import last_said
 from chauffeur.language.slips import slip_in
 from chauffeur.planners.base import Planner, declined
@@ -97,28 +97,26 @@ def agreed(meanings: Sequence[Meaning], intent: str) -> bool:
 
 
 def question_about(
-    instruction: Instruction,
+    request: PlanRequest,
     shall_i: str,
     *,
     witnessed: bool,
     choice: Choice,
-    situation: Situation,
     sure: float,
 ) -> str:
     """What to ask before a reading is driven; empty where nothing is, or where nobody is there to answer.
 
     Args:
-        instruction: The words, and what the person has answered already.
+        request: The words with what the person has answered already, where we are, and the limits.
         shall_i: The question whether to do what was read.
         witnessed: Whether something that knows nothing of the network says the same.
         choice: What would be driven.
-        situation: Where we are.
         sure: Probability of the network's least sure choice.
     """
     if sure < SURE and not witnessed:
-        return unanswered(instruction, f"{UNSURE_WORDS} {shall_i}")
-    why = slow_words(choice.steps, situation)
-    return unanswered(instruction, f"{why} {shall_i}") if why else ""
+        return unanswered(request.instruction, f"{UNSURE_WORDS} {shall_i}")
+    why = slow_words(choice.steps, request.context.situation, request.limits)
+    return unanswered(request.instruction, f"{why} {shall_i}") if why else ""
 
 
 def unanswered(instruction: Instruction, question: str) -> str:
@@ -126,21 +124,22 @@ def unanswered(instruction: Instruction, question: str) -> str:
     return "" if instruction.source == "benchmark" or question == instruction.confirmed else question
 
 
-def slow_words(steps: Iterable[Chosen], situation: Situation) -> str:
+def slow_words(steps: Iterable[Chosen], situation: Situation, limits: Limits) -> str:
     """Why a plan endangers those behind us: it stops in the lane, or crawls; empty where it does neither."""
     for step in steps:
         if step.intent.startswith("pull_over"):
             continue  # to a stand, but not in anybody's way
         target = 0.0 if step.intent == "stop" else dict(step.settings).get("target_speed_mps")
-        if target is not None and (why := slow_speed_words(target, situation)):
+        if target is not None and (why := slow_speed_words(target, situation, limits)):
             return why
     return ""
 
 
-def slow_speed_words(target_mps: float, situation: Situation) -> str:
-    """The same for one set-point."""
+def slow_speed_words(target_mps: float, situation: Situation, limits: Limits) -> str:
+    """The same for one set-point; who may not drive as fast as the traffic is not asked about that."""
     front = 0.0 if situation.front is None else situation.front.speed_mps
-    traffic_mps = min(situation.speed_limit_mps, max(situation.speed_mps, front))
+    most_mps = min(situation.speed_limit_mps, limits.most_mps(situation.speed_limit_mps))
+    traffic_mps = min(most_mps, max(situation.speed_mps, front))
     if target_mps == 0.0:
         return _STANDS if traffic_mps > _CREEP_MPS else ""
     crawls = traffic_mps >= _TRAFFIC_MPS and target_mps < SLOW_SHARE * traffic_mps

@@ -13,7 +13,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Final
 
-from chauffeur.concept import ConfigError, Instruction, Plan, PlanRequest, Program, ProgramError, Situation, Usage
+from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Situation, Usage
 from chauffeur.planners.arbitration import UNSURE_WORDS, Wish, agreed, asked, question_about
 from chauffeur.planners.base import OnText, Planner, declined
 from chauffeur.planners.onboard.copying import named, taken_over, unnamed
@@ -133,14 +133,13 @@ class Settled:
         remembered = unnamed(self.wish, (), self.steps) is not None
         return remembered or agreed(meanings_said(self.wish), self.linked.choice.intent)
 
-    def question(self, instruction: Instruction) -> str:
+    def question(self, request: PlanRequest) -> str:
         """What to ask before this is driven; empty where nothing is."""
         return question_about(
-            instruction,
+            request,
             shall_i(self.steps),
             witnessed=self.witnessed,
             choice=self.linked.choice,
-            situation=self.situation,
             sure=self.written.sure,
         )
 
@@ -222,7 +221,7 @@ class LanguageModelPlanner:
         if isinstance(settled, Plan):
             return settled
         linked, used, wish = settled.linked, settled.used, settled.wish
-        if asks := settled.question(request.instruction):
+        if asks := settled.question(request):
             plan = asked(self, asks, begun, offer=wish, raw=settled.written.text)
             return replace(plan, usage=usage_of(settled.written))
         return Plan(

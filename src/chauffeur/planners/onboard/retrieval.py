@@ -60,7 +60,7 @@ class RetrievalPlanner:
             intent = "+".join(step.family for step in reading.steps)
             return declined(self, choice.words, begun, intent=intent)
         used = [leaning(step.family) for step in reading.steps]
-        if why := slow_words(choice.steps, request.context.situation):
+        if why := slow_words(choice.steps, request.context.situation, request.limits):
             does = ", then ".join(step.does for step in choice.steps)
             if question := unanswered(request.instruction, f"{why} Shall I {does}?"):
                 return asked(self, question, begun, offer=ready.instruction.text)

@@ -143,7 +143,7 @@ class EmbeddedParameters:
         plan = self._as_read(settled, request, begun)
         if isinstance(settled, Plan) or plan.policy is None:
             return plan
-        asks = settled.question(request.instruction)
+        asks = settled.question(request)
         return asked(self, asks, begun, offer=settled.wish, raw=plan.raw) if asks else plan
 
     def _or_asked(self, plan: Plan, hint: Hint, request: PlanRequest, begun: float) -> Plan:
