@@ -25,17 +25,28 @@ LOT = Situation("parking", 2.0, 4.0, 1, 0, False, None, None)
 
 
 def plan(
-    planner: Planner, wish: str, situation: Situation, limits: Limits | None = None, history: History | None = None
+    planner: Planner,
+    wish: str,
+    situation: Situation,
+    limits: Limits | None = None,
+    history: History | None = None,
+    confirmed: str = "",
 ) -> Plan:
     """What it answers."""
     asked = PlanRequest(
-        Instruction(wish), Context("", situation), SystemMessage(""), history or History(), limits=limits or Limits()
+        Instruction(wish, confirmed=confirmed),
+        Context("", situation),
+        SystemMessage(""),
+        history or History(),
+        limits=limits or Limits(),
     )
     return asyncio.run(planner.plan(asked))
 
 
 def driven(planner: Planner, wish: str, situation: Situation, limits: Limits | None = None) -> Parameters:
-    """The parameters it answers with; fails where it declines."""
+    """The parameters it answers with, if need be after one yes; fails where it declines."""
     found = plan(planner, wish, situation, limits)
+    if found.offer:
+        found = plan(planner, found.offer, situation, limits, confirmed=found.refusal)
     assert isinstance(found.policy, Parameters), found.refusal
     return found.policy

@@ -40,8 +40,13 @@ CROSSING = Situation("intersection", 10.0, 10.0, 1, 0, False, None, 85.0, ("left
 
 
 def plan(words: str, situation: Situation = HIGHWAY, **fields: Any) -> Plan:
+    """The plan, if need be after one yes."""
     request = PlanRequest(Instruction(words), Context("", situation), SystemMessage(""), **fields)
-    return asyncio.run(RetrievalPlanner().plan(request))
+    made = asyncio.run(RetrievalPlanner().plan(request))
+    if not made.offer:
+        return made
+    confirmed = Instruction(made.offer, confirmed=made.refusal)
+    return asyncio.run(RetrievalPlanner().plan(replace(request, instruction=confirmed)))
 
 
 def source(made: Plan) -> str:

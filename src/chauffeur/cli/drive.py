@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from chauffeur.concept import Instruction
     from chauffeur.drive.recording import RecordedTrip
 
 EXAMPLES = """
@@ -65,6 +64,7 @@ def drive(
     """Drive a wish: plan it, check it, drive it, score it."""
     import asyncio
     from contextlib import ExitStack
+    from dataclasses import replace
 
     from chauffeur.cli.audit import auditor_for, tell_closing
     from chauffeur.cli.compiling import Compiling
@@ -81,6 +81,7 @@ def drive(
     )
     from chauffeur.cli.show import FullTeller, Quiet, Teller
     from chauffeur.concept import PersonId
+    from chauffeur.drive.answering import ANSWERED
     from chauffeur.drive.auditing import told_to, with_head
     from chauffeur.drive.scenarios import find, suiting
     from chauffeur.drive.session import Forgetful, Session, parse_wish
@@ -90,7 +91,6 @@ def drive(
 
     instruction = parse_wish(wish, PersonId(person.strip()))
     bounds = personal_limits(instruction.person, limits_named(limits))
-    instruction = asked_back(instruction)
     place = suiting(instruction.text) if scenario is None else find(scenario, data)
     planner = planner_for(planner, place)
     console = stdout()
@@ -115,6 +115,10 @@ def drive(
         stack.enter_context(teller)
         stack.enter_context(Compiling(teller.compiling))
         recorded = asyncio.run(session.drive(instruction, place, start_seed, bounds))
+        plan = recorded.trip.plan
+        if plan.offer and auditor is None and asking() and typer.confirm(plan.refusal):
+            meant = replace(instruction, text=plan.offer, confirmed=plan.refusal)
+            recorded = asyncio.run(session.drive(meant, place, start_seed, bounds))
     closing = None if auditor is None else auditor.close()
     if closing is not None:
         recorded = with_head(recorded, closing)
@@ -127,22 +131,16 @@ def drive(
         teller.wrote(save_trip(save, recorded))
         if browser:
             typer.launch((save / "trip.html").resolve().as_uri())
-    if recorded.trip.outcome not in _DONE or (closing is not None and not closing.complete):
+    answered = recorded.trip.plan.intent == ANSWERED
+    if (recorded.trip.outcome not in _DONE and not answered) or (closing is not None and not closing.complete):
         raise typer.Exit(FAILED)
 
 
-def asked_back(instruction: Instruction) -> Instruction:
-    """What is wished once the car's question is answered: somebody in distress is asked, where there is a terminal."""
+def asking() -> bool:
+    """Whether somebody is there to answer a question."""
     import sys
-    from dataclasses import replace
 
-    from chauffeur.drive.emergency import QUESTION
-    from chauffeur.language.emergency import SAFE_STOP_WISH, read_emergency
-
-    found = read_emergency(instruction.text)
-    if found is None or found.kind != "ask" or not (sys.stdin.isatty() and sys.stdout.isatty()):
-        return instruction
-    return replace(instruction, text=SAFE_STOP_WISH) if typer.confirm(QUESTION, default=True) else instruction
+    return sys.stdin.isatty() and sys.stdout.isatty()
 
 
 def save_trip(folder: Path, recorded: RecordedTrip) -> list[Path]:

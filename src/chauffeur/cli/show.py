@@ -26,8 +26,10 @@ from chauffeur.concept import (
     Program,
     Scenario,
     Thoughts,
+    Trip,
     Verdict,
 )
+from chauffeur.drive.answering import ANSWERED
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.payload import policy_words
@@ -77,6 +79,11 @@ class Quiet:
         sign, label, tone = words.trip_words(trip, timed=True)
         line = Text(f"{sign} {label}", _STYLES[tone])
         self.console.print(line.append(" (simulated drive)", style="dim not bold"))
+        if not recorded.frames:
+            self._why(trip.causes.detail)
+
+    def _why(self, detail: str) -> None:
+        self.console.print(plain(detail))
 
     def wrote(self, paths: list[Path]) -> None:
         """Files of the trip."""
@@ -148,11 +155,22 @@ class Teller(Quiet):
         super().end(recorded)
         trip = recorded.trip
         shielded = words.shield_words([change for frame in recorded.frames for change in frame.interventions])
-        for told in (*words.cause_words(trip.causes), words.end_words(trip), shielded):
+        for told in (*self._why_not(trip), words.end_words(trip), shielded):
             if told:
                 self.console.print(Padding(plain(self._units(told)), (0, 0, 0, 2)))
         self.console.print()
         self.console.print(columns(self._rows(recorded)))
+
+    def _why_not(self, trip: Trip) -> tuple[str, ...]:
+        """What went wrong; of a wish that was declined the reason and what would do, each once."""
+        causes = words.cause_words(trip.causes)
+        if not trip.causes.refused:
+            return causes
+        remedies = (verdict.remedy for verdict in trip.verdicts if verdict.stops and verdict.remedy)
+        return tuple(dict.fromkeys((*(cause for cause in causes if cause != words.DECLINED), *remedies)))
+
+    def _why(self, detail: str) -> None:
+        """Told below, in the passenger's units."""
 
     def _rows(self, recorded: RecordedTrip) -> Iterator[tuple[str, RenderableType]]:
         trip = recorded.trip
@@ -160,7 +178,7 @@ class Teller(Quiet):
         yield "Road", plain(recorded.scenario.title or recorded.scenario.id)
         if trip.history.items:
             yield "Memory", history_words(trip.history)
-        if trip.plan.policy is None:
+        if trip.plan.policy is None or trip.outcome == "refused":
             return
         yield "Thoughts", plain(self._units(trip.plan.thoughts.text.strip()) or "(no reasoning given)")
         yield trip.plan.policy.kind.replace("_", " ").capitalize(), self._program(trip.plan)
@@ -265,6 +283,10 @@ class FullTeller(Teller):
     def _units(self, text: str) -> str:
         return text
 
+    def _why_not(self, trip: Trip) -> tuple[str, ...]:
+        """Why a wish was declined was told with its plan or its checks."""
+        return () if trip.causes.refused else words.cause_words(trip.causes)
+
     def _rows(self, recorded: RecordedTrip) -> Iterator[tuple[str, RenderableType]]:
         """Scores and provenance; the letters have been told."""
         trip = recorded.trip
@@ -286,7 +308,8 @@ class FullTeller(Teller):
 
     def _plan(self, plan: Plan) -> None:
         if plan.refusal:
-            self._letter("R", Text.assemble(("Declined: ", "bold yellow"), plain(plan.refusal)))
+            head = {ANSWERED: "Answer: ", "ask": "Asks: "}.get(plan.intent, "Declined: ")
+            self._letter("R", Text.assemble((head, "bold yellow"), plain(plan.refusal)))
             return
         self._thoughts(plan.thoughts, plan.intent)
         if isinstance(plan.policy, Program):

@@ -23,11 +23,13 @@ class Instruction:
         text: The words, stripped.
         person: Whose words they are; `NOBODY` when unknown.
         source: How they came in.
+        confirmed: The question of the car that the person has answered with yes; empty for none.
     """
 
     text: str
     person: PersonId = NOBODY
     source: Literal["text", "speech", "benchmark"] = "text"
+    confirmed: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,6 +325,7 @@ class Plan:
         thoughts: R.
         policy: P; None when the planner declined (see `refusal`) or gave nothing usable.
         refusal: Why there is no policy, in words for the person: not understood, impossible, off topic.
+        offer: Where `refusal` is a question: the wish that a yes stands for; empty where a yes answers nothing.
         intent: Short tag of what was understood, e.g. `overtake.left`; empty when the planner has none.
         settings: Numbers the policy relies on, e.g. (("target_speed_mps", 28.0),).
         planner: Planner id, e.g. `onboard`.
@@ -335,6 +338,7 @@ class Plan:
     thoughts: Thoughts
     policy: Policy | None
     refusal: str = ""
+    offer: str = ""
     intent: str = ""
     settings: tuple[tuple[str, float], ...] = ()
     planner: str = ""

@@ -95,7 +95,14 @@ def planned_for(text: str, snapshot: Snapshot) -> Plan | None:
         case "safe_stop":
             return _plan(f"There is no shoulder here. {STOPPING}", _STOP_PROGRAM, "stop", 0.0)
         case "ask":
-            return Plan(Thoughts(f"“{found.words}”: {QUESTION}"), None, ASKED, "ask", planner=EMERGENCY_PLANNER)
+            return Plan(
+                Thoughts(f"“{found.words}”: {QUESTION}"),
+                None,
+                ASKED,
+                intent="ask",
+                planner=EMERGENCY_PLANNER,
+                offer=SAFE_STOP_WISH,
+            )
         case "no_stop":
             speed = round(max(snapshot.ego.speed_mps, least_speed_mps(snapshot) or 0.0), 2)
             return _plan(GOING_ON, _GO_ON_PROGRAM.format(speed=speed), "speed.keep", speed)

@@ -30,6 +30,7 @@ from chauffeur.concept import (
     Trip,
     Verdict,
 )
+from chauffeur.drive.answering import plan_or_answer
 from chauffeur.drive.emergency import check_told_not_to, not_checked, planned_for
 from chauffeur.planners.base import Planner
 from chauffeur.safety.screening import screen_request
@@ -70,7 +71,7 @@ async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, s
     request, screened = screen_request(PlanRequest(I, C, S, H, limits=limits))  # words are data
     stages.tell("screened", screened)
     own = planned_for(I.text, snapshot)  # emergency words are no planner's to decide
-    plan = own or await stages.planner.plan(request)  # R, P
+    plan = own or await plan_or_answer(stages.planner, request)  # R, P
     stages.tell("RP", plan)
 
     V = not_checked(plan) if own else checked(I, plan, snapshot, limits, stages)  # noqa: N806

@@ -50,6 +50,7 @@ from chauffeur.safety.alignment import check_alignment, check_driven
 from chauffeur.safety.base import Check
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
 from chauffeur.safety.shield import SHIELD_VERSION, Shield
+from chauffeur.safety.words import reasons_once
 from chauffeur.worlds.base import World
 
 MAX_WISH_CHARACTERS = 2000
@@ -295,8 +296,7 @@ def declined(plan: Plan, verdicts: tuple[Verdict, ...]) -> str:
     """Why a plan is not driven, in words; empty when it may be."""
     if plan.refusal:
         return plan.refusal
-    failed = [verdict.reason for verdict in verdicts if verdict.stops]
-    return " ".join(failed)
+    return reasons_once(verdicts)
 
 
 def make_trip(

@@ -10,6 +10,7 @@ from typing import Final, Literal
 
 from chauffeur.concept import Causes, Command, Feedback, Intervention, Mark, Metric, Outcome, Trip, Verdict
 from chauffeur.concept.units import kmh, mph
+from chauffeur.drive.answering import ANSWERED
 from chauffeur.safety.alignment import ALIGNMENT_CHECK, DRIVEN_CHECK
 
 Tone = Literal["good", "bad", "neutral"]
@@ -95,6 +96,9 @@ def passenger_units(text: str, unit: Pace = "km/h") -> str:
     return _LENGTH.sub(lambda match: f"{float(match[1]):.0f} m", told)
 
 
+_UNDRIVEN: Final = {ANSWERED: "Answered, nothing driven", "ask": "Asked back, nothing driven"}
+
+
 def trip_words(trip: Trip, *, timed: bool = False) -> tuple[str, str, Tone]:
     """How a trip ended: mark, label and tone. No tick where the person was told something that is not so.
 
@@ -102,6 +106,8 @@ def trip_words(trip: Trip, *, timed: bool = False) -> tuple[str, str, Tone]:
         trip: The trip.
         timed: Whether the label says after how long, where anything was driven.
     """
+    if trip.plan.refusal and trip.plan.intent in _UNDRIVEN:
+        return "■", _UNDRIVEN[trip.plan.intent], "neutral"
     label, tone = outcome_words(trip.outcome)
     if timed and trip.duration_s:
         label = f"{label} after {trip.duration_s:.0f} s"
@@ -189,6 +195,9 @@ _DOUBTS: Final = {
 }
 
 
+DECLINED: Final = "The wish was declined."
+
+
 def cause_words(causes: Causes) -> tuple[str, ...]:
     """Every cause that holds, in words; empty when nothing went wrong."""
     words = [
@@ -196,7 +205,7 @@ def cause_words(causes: Causes) -> tuple[str, ...]:
         for holds, text in (
             (causes.policy_failed, "The program was rejected, or failed while it ran."),
             (causes.infra_failed, "Endpoint, sandbox or machine failed; this says nothing about the plan."),
-            (causes.refused, "The wish was declined."),
+            (causes.refused, DECLINED),
             (causes.fallback_used, "The autopilot drove on without the program."),
         )
         if holds

@@ -39,6 +39,9 @@ _SIMPLE: dict[str, tuple[Dimension, float]] = {
     **dict.fromkeys(("mph", "mi/h", "miles/hour", "m.p.h"), ("speed", _MPH)),
     **dict.fromkeys(("knot", "knots"), ("speed", units.MPS_PER_KNOT)),
     **dict.fromkeys(("m", "meter", "meters", "metre", "metres"), ("distance", 1.0)),
+    **dict.fromkeys(("cm", "centimeter", "centimeters", "centimetre", "centimetres"), ("distance", 0.01)),
+    **dict.fromkeys(("mm", "millimeter", "millimeters", "millimetre", "millimetres"), ("distance", 0.001)),
+    **dict.fromkeys(("inch", "inches"), ("distance", units.M_PER_FOOT / 12.0)),
     **dict.fromkeys(("ft", "foot", "feet"), ("distance", units.M_PER_FOOT)),
     **dict.fromkeys(("yd", "yds", "yard", "yards"), ("distance", units.M_PER_YARD)),
     **dict.fromkeys(("km", "kms", "kilometer", "kilometers", "kilometre", "kilometres"), ("distance", units.M_PER_KM)),
@@ -119,6 +122,12 @@ def read_quantities(text: str) -> tuple[Quantity, ...]:
     return tuple(mark_quantities(tokens_of(text))[1])
 
 
+def number_of(tokens: list[str]) -> list[str]:
+    """The number with which the tokens of a quantity begin, without its unit."""
+    found = _number(tokens, 0)
+    return tokens if found is None else tokens[: found[1]]
+
+
 def measured(text: str) -> tuple[tuple[str, float], ...]:
     """(dimension, SI value) of every speed, distance and time span in a text; other numbers are left out."""
     if text.isascii() and _COUNTS.search(text.lower()) is None:
@@ -142,7 +151,7 @@ def _quantity(tokens: list[str], i: int) -> tuple[Quantity, int] | None:
         k += 1
         if k < len(tokens) - 1 and tokens[k] == "of":
             k += 1
-    unit = _unit(tokens, k)
+    unit = unit_of(tokens, k)
     if unit is not None:
         dimension, factor, end = unit
         return Quantity(value * factor, dimension, " ".join(tokens[i:end]), inner), end
@@ -151,7 +160,8 @@ def _quantity(tokens: list[str], i: int) -> tuple[Quantity, int] | None:
     return Quantity(value, "bare", " ".join(tokens[i:j])), j
 
 
-def _unit(tokens: list[str], k: int) -> tuple[Dimension, float, int] | None:
+def unit_of(tokens: list[str], k: int) -> tuple[Dimension, float, int] | None:
+    """The unit at token k as (dimension, factor to SI, index after it); None where there is none."""
     if k >= len(tokens):
         return None
     first = tokens[k]
@@ -212,15 +222,15 @@ def _after_article(tokens: list[str], i: int) -> tuple[float, int, bool] | None:
     if following == "hundred":
         words = _spelled(["one", *tokens[i + 1 :]], 0)
         return None if words is None else (words[0], i + words[1], True)
-    if following in _ONE_MEANS_UNIT and _unit(tokens, i + 1) is not None:
+    if following in _ONE_MEANS_UNIT and unit_of(tokens, i + 1) is not None:
         return 1.0, i + 1, False
     return None
 
 
 def _tail(tokens: list[str], value: float, j: int, *, sure: bool) -> tuple[float, int, bool]:
     """Adds "point five" and "and a half" behind a number."""
-    if j + 1 < len(tokens) and tokens[j] == "point" and tokens[j + 1] in _ONES:
-        digit = _ONES[tokens[j + 1]]
+    if j + 1 < len(tokens) and tokens[j] == "point" and (tokens[j + 1] in _ONES or tokens[j + 1].isdecimal()):
+        digit = _ONES.get(tokens[j + 1], _digits(tokens[j + 1]) or 0.0)
         return value + (digit / 10.0 if digit < 10 else digit / 100.0), j + 2, True
     if tokens[j : j + 3] == ["and", "a", "half"]:
         return value + 0.5, j + 3, True

@@ -29,18 +29,22 @@ _CONTRACTIONS = (
     (r"\b(\w+)in'(?=\s|$)", r"\1ing"),
     (r"'s\b|'", " "),
 )
-_GLUED_UNIT = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)(?=[a-z%])")
+_GLUED_UNIT = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)(?=(?:[ms]|[a-z]{2,})(?![a-z0-9])|[a-z]+/|%)")
+"""A unit is a letter only where it is that of metres or seconds: `12b` is an exit, and `5o` nothing."""
 _UNIT_FORMS = (
+    (r"\bm\.p\.h\b\.?", "mph"),
     (r"\bmiles\s*/\s*h(?:ou)?r?\b", "mph"),
     (r"\bm\s*/\s*s(?:ec)?\b", "m/s"),
     (r"\b(?:km|k)\s*/\s*h(?:r|our)?\b", "km/h"),
     (r"\bmet(?:er|re)s?\s*/\s*s(?:ec(?:ond)?)?\b", "m/s"),
     (r"\bkilomet(?:er|re)s?\s*/\s*h(?:our)?\b", "km/h"),
 )
-_TOKEN = re.compile(r"m/s|km/h|mi/h|\d+(?:\.\d+)?|[a-z]+|%|[.,;:!?]")
+_TOKEN = re.compile(r"m/s|km/h|mi/h|[a-z]+\d\w*|\d+[a-z]\w*|\d+(?:\.\d+)?|[a-z]+|%|[.,;:!?]")
+"""Letters and digits that touch are one word and no number: A1, 12b, l00."""
 
 _MINUS = re.compile(r"(?<![\w.])[-−](?=\d)")
 _NUMBER_COMMA = re.compile(r"(?<=\d),(?=\d{3}\b)")
+_NO_NOUGHT = re.compile(r"(?<![\w.])\.(?=\d)")
 _DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d{1,2}\b)")
 _CONTRACT = tuple((re.compile(pattern), by) for pattern, by in _CONTRACTIONS)
 _UNITS = tuple((re.compile(pattern), by) for pattern, by in _UNIT_FORMS)
@@ -61,11 +65,16 @@ def plain(text: str) -> str:
     text = text.replace("’", "'").replace("‘", "'").replace("`", "'").replace("…", " . ").replace("—", " , ")
     text = _MINUS.sub("minus ", text)
     text = "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
-    text = _DECIMAL_COMMA.sub(".", _NUMBER_COMMA.sub("", text))
+    text = _NO_NOUGHT.sub("0.", _DECIMAL_COMMA.sub(".", _NUMBER_COMMA.sub("", text)))
     for pattern, by in (*_CONTRACT, *_UNITS):
         text = pattern.sub(by, text)
-    text = _GLUED_UNIT.sub(r"\1 ", text)
+    text = split_units(text)
     return text.replace("-", " ").replace("–", " ")
+
+
+def split_units(text: str) -> str:
+    """The text with a space between a number and the unit that touches it; names such as A1 and 12b stay whole."""
+    return _GLUED_UNIT.sub(r"\1 ", text.lower())
 
 
 def tokens_of(text: str) -> list[str]:

@@ -15,7 +15,7 @@ from itertools import pairwise
 from chauffeur.concept import ActionMatrix, Limits, Parameters, Plan, Program, Snapshot, Trajectory, Verdict
 from chauffeur.concept.units import M_PER_CAR_LENGTH
 from chauffeur.safety.reading import ApiUse, Reading, read_program
-from chauffeur.safety.words import speed_words
+from chauffeur.safety.words import IN_A_HELPER, speed_words
 
 PARAMETERS_CHECK = "parameters-v1"
 
@@ -83,7 +83,7 @@ def _policy_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]:
             for use in read_program(library).uses:
                 for fault in _use_faults(use, road, limits):
                     # Lines are counted in the program; a helper is known by its reason alone.
-                    yield replace(fault, reason=f"{fault.reason} (In a helper function.)", line=None)
+                    yield replace(fault, reason=f"{fault.reason} {IN_A_HELPER}", line=None)
         case Parameters() as values:
             yield from _speed_faults("target speed", _number(values.target_speed_mps), road, limits)
             if values.lane in _SIDES:

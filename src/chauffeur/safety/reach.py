@@ -24,7 +24,7 @@ from chauffeur.programs.catalogue import APIS, Param
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.loops import MAX_BARE_RANGE
 from chauffeur.programs.verify import CallSite, Circumstances, LoopReport, Note, Value, Verification, verify
-from chauffeur.safety.words import speed_words
+from chauffeur.safety.words import IN_A_HELPER, speed_words
 
 REACH_CHECK: Final = "reach-v1"
 
@@ -215,4 +215,4 @@ def _doubt(site: CallSite, reason: str) -> _Finding:
 
 def _helper(place: CallSite | LoopReport | Note) -> str:
     """Lines are counted in the program; a helper is known by its reason alone."""
-    return " (In a helper function.)" if place.in_library else ""
+    return f" {IN_A_HELPER}" if place.in_library else ""

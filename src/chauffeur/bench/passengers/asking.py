@@ -28,6 +28,8 @@ class PassengerRequests:
     async def request(self, item: Item, context: Context) -> PlanRequest:
         """See Requests."""
         request = await self._plain.request(item, context)
+        # A passenger could answer, so a planner may ask; the question counts as one.
+        request = replace(request, instruction=replace(request.instruction, source="text"))
         past = self._past.get(item.task, ())
         remembered = (
             _remembered(f"{item.task}_h{place}", place, one, context) for place, one in enumerate(past, start=1)

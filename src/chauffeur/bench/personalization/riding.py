@@ -106,7 +106,7 @@ async def ride(
         return make_trip(request, plan, verdicts, scenario, seed, None, refusal, shielded=True)
 
     stages = Stages(world, describe, memory, _system, planner, check_drive, execute, _silent)
-    trip = await drive(Instruction(words, person), scene, scene.seed, limits, stages)
+    trip = await drive(Instruction(words, person, source="benchmark"), scene, scene.seed, limits, stages)
     trace, refused = felt[-1]
     return Ride(trip, trace, refused)
 

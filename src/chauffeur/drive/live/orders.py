@@ -41,12 +41,14 @@ class Request:
         text: The person's words.
         person: Who says it.
         turn: Counts how often it was asked for; more than once where a plan was stale or the planner died.
+        confirmed: The car's question to which these words are the person's yes; empty for none.
     """
 
     wish: str
     text: str
     person: str = NOBODY
     turn: int = 1
+    confirmed: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +103,7 @@ class Event:
         text: In words, for the person.
         trip, tick: When.
         again: Whether asking once more may help.
+        offer: Where the text is a question: the wish that a yes stands for, empty for none.
     """
 
     kind: EventKind
@@ -109,6 +112,7 @@ class Event:
     trip: int = 0
     tick: int = 0
     again: bool = True
+    offer: str = ""
 
 
 @dataclass(frozen=True, slots=True)

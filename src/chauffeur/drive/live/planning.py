@@ -15,6 +15,7 @@ from typing import Final
 
 from chauffeur.concept import ChauffeurError, History, PersonId, Plan, PlanRequest
 from chauffeur.describe.services.sources import Sources, SourceSettings
+from chauffeur.drive.answering import plan_or_answer
 from chauffeur.drive.emergency import NO_SHOULDER, check_told_not_to, planned_for
 from chauffeur.drive.live.messages import MessageError
 from chauffeur.drive.live.mirror import Mirror
@@ -135,7 +136,8 @@ class Planning:
             self._tell("unplanned", request.wish, f"The planner failed: {type(error).__name__}: {error}")
             return
         if order.plan.refusal or order.plan.policy is None:
-            self._tell("declined", request.wish, order.plan.refusal or "The planner gave no program.")
+            words = order.plan.refusal or "The planner gave no program."
+            self._tell("declined", request.wish, words, offer=order.plan.offer)
             return
         try:
             self._rings.orders.write(encode(order))
@@ -149,13 +151,13 @@ class Planning:
         self._mirror.follow()
         snapshot, limits = self._mirror.world.snapshot(), self._mirror.limits
         scene = Scene.of(self._mirror.trip, snapshot)
-        instruction = parse_wish(request.text, PersonId(request.person))
+        instruction = replace(parse_wish(request.text, PersonId(request.person)), confirmed=request.confirmed)
         context = (await describing(self._sources))(snapshot)
         history = self._memory.recall(instruction.person, instruction, context, _RECALLED)
         system = build_system_message(self._setting, limits=limits)
         asked, _ = screen_request(PlanRequest(instruction, context, system, history, limits=limits))
         own = planned_for(request.text, snapshot)  # emergency words are no planner's to decide
-        plan: Plan = own or await self._planner.plan(asked)
+        plan: Plan = own or await plan_or_answer(self._planner, asked)
         if own is not None and own.intent == "stop":  # only control may stand in a lane, and it was not told to
             plan = replace(own, policy=None, refusal=NO_SHOULDER)
         forbidden = () if own else check_told_not_to(request.text, plan, snapshot)
@@ -181,6 +183,7 @@ class Planning:
     def _say(self, text: str) -> None:
         self._tell("said", "" if self._request is None else self._request.wish, text)
 
-    def _tell(self, kind: EventKind, wish: str, text: str, *, again: bool = True) -> None:
-        event = Event(kind, wish, text[:MOST_SAID], self._mirror.trip, self._mirror.tick, again)
+    def _tell(self, kind: EventKind, wish: str, text: str, *, again: bool = True, offer: str = "") -> None:
+        offer = offer if len(text) + len(offer) <= MOST_SAID else ""  # half a wish is none
+        event = Event(kind, wish, text[:MOST_SAID], self._mirror.trip, self._mirror.tick, again, offer)
         self._rings.events.write(encode(event))

@@ -47,6 +47,7 @@ from chauffeur.drive.parameters import HEADWAY_S, TURNS, ParametersDriver, Parki
 from chauffeur.programs import Budget, ProgramExecutor, Sandbox, starting_wishes
 from chauffeur.safety.base import Check
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
+from chauffeur.safety.words import reasons_once
 from chauffeur.worlds.base import EGO
 
 LIVE_BUDGET: Final = Budget(turn_s=0.1, tick_s=0.2, grace_s=0.05, start_s=1.0)
@@ -219,9 +220,8 @@ class Policy:
             self._tell("refused", order.wish, plan.refusal or "The plan is neither a program nor parameters.")
             return
         verdicts = run_checks(plan, snapshot, self._mirror.limits, self._checks)
-        failed = [verdict.reason for verdict in verdicts if verdict.stops]
-        if failed:
-            self._tell("refused", order.wish, " ".join(failed))
+        if failed := reasons_once(verdicts):
+            self._tell("refused", order.wish, failed)
             return
         try:
             by = self._ready(plan.policy, snapshot)

@@ -166,13 +166,19 @@ class Runtime:
 
     # For whoever drives -----------------------------------------------------------------------------------------------
 
-    def ask(self, text: str, person: str = NOBODY) -> str:
+    def ask(self, text: str, person: str = NOBODY, *, confirmed: str = "") -> str:
         """Hand a wish to the planner; returns its id. What becomes of it is told by events.
 
         A stop at once is no planner's to decide: the car is brought to a stand, whoever asks.
+
+        Args:
+            text: The words.
+            person: Whose they are.
+            confirmed: The car's question to which they are the yes.
         """
         wish = self.next_wish
-        interaction = self.interactions[wish] = Interaction(Request(wish, text, person), since_s=time.monotonic())
+        request = Request(wish, text, person, confirmed=confirmed)
+        interaction = self.interactions[wish] = Interaction(request, since_s=time.monotonic())
         if stop_wanted(read_emergency(text)):
             self.halt()
             self._close(interaction, Event("interrupted", wish, STOPPING))

@@ -42,6 +42,7 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.describe.services.sources import Sources
+from chauffeur.drive.answering import plan_or_answer
 from chauffeur.drive.auditing import FLUSH_TIMEOUT_S
 from chauffeur.drive.emergency import check_told_not_to
 from chauffeur.drive.onroad.books import RoadBooks
@@ -66,6 +67,8 @@ from chauffeur.planners.talk2drive.planner import system_text
 from chauffeur.planners.talk2drive.style import LOOK_AHEAD
 from chauffeur.safety.audit.writer import utc_now
 from chauffeur.safety.screening import screen_request
+from chauffeur.safety.words import reasons_once
+from chauffeur.speech.answers import answer_in
 from chauffeur.worlds.ros import Published, VehicleError, VehicleInterface, VehicleState
 from chauffeur.worlds.ros.autoware_ai import AutowareAi, PlannedSpeed
 from chauffeur.worlds.ros.settings import VehicleSettings
@@ -169,6 +172,7 @@ class OnRoad:
         self._turn = asyncio.Lock()
         self._count = self._newest = 0
         self._making: asyncio.Task[_Made] | None = None
+        self._offered: Plan | None = None
         self._asked: Parameters | None = None
         self._handed: tuple[int, Published] | None = None
         self._unconfirmed: tuple[int, Published] | None = None
@@ -279,7 +283,7 @@ class OnRoad:
     ) -> tuple[Answer, PlanRequest | None]:
         """The answer, and what was planned for, if anything was."""
         try:
-            instruction = replace(parse_wish(text, self._person), source=source)
+            instruction = replace(self._meant(text), source=source)
         except InstructionError as error:
             return Answer(number, text[:MAX_WISH_CHARACTERS], "declined", str(error)), None
         answer = Answer(number, instruction.text, "declined", ENGAGING_WORDS)
@@ -304,6 +308,13 @@ class OnRoad:
         if made.status is None:
             answer = await self._apply(number, answer)
         return answer, made.request
+
+    def _meant(self, text: str) -> Instruction:
+        """The wish, or the one that the car asked about, where the words are a yes to that. Raises InstructionError."""
+        plan, self._offered = self._offered, None
+        if plan is not None and answer_in(text):
+            return replace(parse_wish(plan.offer, self._person), confirmed=plan.refusal)
+        return parse_wish(text, self._person)
 
     async def _made(self, number: int, instruction: Instruction) -> _Made:
         """What the wish comes to, unless a newer one comes first. A stop gives way to nothing."""
@@ -347,6 +358,7 @@ class OnRoad:
         self._book(lambda books: books.verdicts(number, verdicts))
         self._say("verdicts", " ".join(one.reason for one in verdicts), number, verdicts)
         made = _Made(request, plan, verdicts)
+        self._offered = plan if plan.offer else None
         if plan.policy is None and not verdicts[0].stops:
             words = plan.refusal or "The planner gave no parameters."
             return replace(made, status="declined", words=f"{words} {counted_from(seen)}".rstrip())
@@ -359,7 +371,7 @@ class OnRoad:
 
     async def _plan(self, request: PlanRequest) -> Plan | str:
         """R and P, or why there are none."""
-        task = asyncio.ensure_future(self._planner.plan(request))
+        task = asyncio.ensure_future(plan_or_answer(self._planner, request))
         try:
             done, _ = await asyncio.wait({task}, timeout=PLAN_WITHIN_S)
             if task.cancelled():
@@ -577,4 +589,4 @@ def _unreachable(state: VehicleState) -> str:
 
 def _reasons(verdicts: tuple[Verdict, ...]) -> str:
     """Why a plan must not be driven, with what would help; empty when it may."""
-    return " ".join(f"{one.reason} {one.remedy}".strip() for one in verdicts if one.stops)
+    return reasons_once(verdicts, remedies=True)

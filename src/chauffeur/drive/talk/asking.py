@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import Final
@@ -10,8 +11,13 @@ from chauffeur.concept import Instruction, InstructionError, PersonId
 from chauffeur.drive.live.books import Books
 from chauffeur.drive.live.supervisor import Runtime
 from chauffeur.drive.session import MAX_WISH_CHARACTERS, parse_wish
+from chauffeur.speech.answers import answer_in
 
 OVER: Final = "The drive was over before it came to this."
+NOT_MEANT: Final = "Then I do not."
+ANSWER_WITHIN_S: Final = 20.0
+"""A question of the car is answered by a yes for so long: nobody knows after that what it meant."""
+_NO_OFFER: Final = ("", "", -1.0)
 UNKEPT: Final = "The audit log could not be written in time; the wish is asked all the same."
 
 
@@ -43,24 +49,45 @@ class Asking:
         self._person, self._books = person, books
         self._waiting: list[tuple[Words, Instruction]] = []
         self._keeping: tuple[Words, Instruction, Future[bool]] | None = None
+        self._offered = _NO_OFFER
 
     @property
     def busy(self) -> bool:
         """Whether a wish waits to be handed on."""
         return self._keeping is not None or bool(self._waiting)
 
-    def put(self, words: Words) -> None:
-        """A wish, to be handed on when it is its turn.
+    def offer(self, question: str, wish: str) -> None:
+        """The car has asked; a yes that comes in time is this wish."""
+        self._offered = (question, wish, time.monotonic() + ANSWER_WITHIN_S)
+
+    @property
+    def offering(self) -> bool:
+        """Whether the car has asked, and waits for the answer."""
+        return time.monotonic() <= self._offered[2]
+
+    def put(self, words: Words) -> str:
+        """A wish, or the answer to the car's question, to be handed on when it is its turn.
+
+        Returns:
+            What there is to tell: that what was asked about is not done; else nothing.
 
         Raises:
             InstructionError: It is none. It stands in the books all the same.
         """
+        answer = answer_in(words.text) if self.offering else None
+        (question, offered, _), self._offered = self._offered, _NO_OFFER
+        if answer is False:
+            self.pass_over(words.text, "not_asked", NOT_MEANT)
+            return NOT_MEANT
+        text, confirmed = (offered, question) if answer else (words.text, "")
+        words = replace(words, text=text)
         try:
-            instruction = parse_wish(words.text, self._person)
+            instruction = replace(parse_wish(text, self._person), confirmed=confirmed)
         except InstructionError as error:
             self.pass_over(words.text, "refused", str(error))
             raise
         self._waiting.append((words, replace(instruction, source="speech" if words.spoken else "text")))
+        return ""
 
     def look(self, runtime: Runtime) -> tuple[tuple[str, Words] | None, str]:
         """Hand the next wish on, if it may be: its id and words, and what there is to tell."""
@@ -99,4 +126,4 @@ class Asking:
             self._books.answer("", kind, why)
 
     def _hand_on(self, runtime: Runtime, instruction: Instruction) -> str:
-        return runtime.ask(instruction.text, instruction.person)
+        return runtime.ask(instruction.text, instruction.person, confirmed=instruction.confirmed)

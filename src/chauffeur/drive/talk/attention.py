@@ -65,11 +65,16 @@ class Attention:
         self._question: _Question | None = None
         self._button = ""
         self._refused_sound = self._muted = False
+        self._expects_until_s = -1.0
 
     @property
     def question(self) -> HeardWords | None:
         """What the person is asked about; None where nothing is."""
         return None if self._question is None else self._question.shown
+
+    @property
+    def _asks(self) -> bool:
+        return self._question is not None or time.monotonic() <= self._expects_until_s
 
     @property
     def engine(self) -> tuple[str, bool]:
@@ -124,6 +129,9 @@ class Attention:
                     self._say(Note(news.text, trouble=True))
                 case HeardAt():
                     self._understand(news)
+        if self._question is None and 0.0 < self._expects_until_s < time.monotonic():
+            self._expects_until_s = -1.0
+            self._ear.expect_answer(False)
 
     def confirm(self, yes: bool, answer: Words) -> None:
         """Yes or no to what was heard; nothing where nothing was asked.
@@ -139,6 +147,12 @@ class Attention:
         if yes:
             words = replace(answer, text=question.heard.text, spoken=True)
             self._act(question.heard.hotword or "command", words)
+
+    def expect(self, within_s: float) -> None:
+        """For so long a yes or no may come without a hotword: the car has asked something, and acts on it itself."""
+        if self._ear is not None:
+            self._expects_until_s = time.monotonic() + within_s
+            self._ear.expect_answer(True)
 
     def offer(self, question: str, wish: str) -> None:
         """The car's own question: a yes wishes what it offers.
@@ -198,7 +212,7 @@ class Attention:
         words = Words(heard.text, True, at.ended_s, wait_s, heard.timing.recognise_s)
         understood = heard.status == "heard"
         # With a button held, yes comes as a command.
-        answers = understood and (heard.hotword is None or (self._question is not None and heard.hotword == "command"))
+        answers = understood and (heard.hotword is None or (self._asks and heard.hotword == "command"))
         answer = answer_in(heard.text) if answers else None
         at_once = stop_wanted(read_emergency(heard.text)) if understood else False  # a stop is not asked back
         asks = understood and heard.to_confirm and answer is None and not at_once
@@ -215,7 +229,9 @@ class Attention:
         if answer is None and (understood or heard.again):
             self.withdraw()  # something newer was said, or what was asked about was a part of this
         self._say(shown)
-        if answer is not None:
+        if answer is not None and self._question is None and self._asks:
+            self._act("command", words)
+        elif answer is not None:
             self.confirm(answer, words)
         elif asks:
             self._ask_back(shown, heard)

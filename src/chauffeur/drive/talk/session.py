@@ -24,7 +24,7 @@ from chauffeur.drive.live.remembering import trip_of
 from chauffeur.drive.live.settings import Settings, ring
 from chauffeur.drive.live.supervisor import Interaction, Replaced, Runtime
 from chauffeur.drive.session import make_world
-from chauffeur.drive.talk.asking import OVER, Asking, Words
+from chauffeur.drive.talk.asking import ANSWER_WITHIN_S, OVER, Asking, Words
 from chauffeur.drive.talk.attention import Attention
 from chauffeur.drive.talk.conversations import Conversations
 from chauffeur.drive.talk.hearing import Engine
@@ -304,7 +304,8 @@ class Talk:
         if self._runtime is not None and self._runtime.taken_over:
             self._say(Note(f"You have the wheel; give it back before you wish for something: “{words.text}”."))
             return
-        self._asking.put(words)
+        if note := self._asking.put(words):
+            self._say(Note(note))
 
     def _act_on(self, hotword: str, words: Words) -> None:
         """What was heard and is meant."""
@@ -437,6 +438,9 @@ class Talk:
         self._say(conversation)
         if event.kind in ("said", "declined", "refused"):
             self._speak(event.text)
+        if event.offer:
+            self._asking.offer(event.text, event.offer)
+            self._attention.expect(ANSWER_WITHIN_S)
         if interaction is not None and interaction.answer is event:
             self._closed(interaction)
 

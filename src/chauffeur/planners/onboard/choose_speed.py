@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from chauffeur.planners.arbitration import PACES, within_mood
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.meaning import BIT, MUCH, Amount, Meaning
 from chauffeur.planners.onboard.options import (
@@ -136,12 +137,10 @@ def choose_style(meaning: Meaning, options: Options) -> Chosen | Declined:
     share, headway, words = _STYLES[meaning.variant]
     wanted = options.speed * share + options.leaning.speed_mps
     if share > 1.0:
-        # In a hurry at the limit already, the gap is all that can be gained; never slower than now for a hurry
-        target = max(
-            min(wanted, options.own_cap_mps), min(options.speed, options.cap_mps) + min(0.0, options.leaning.speed_mps)
-        )
+        target = min(wanted, options.own_cap_mps)  # in a hurry at the limit already, the gap is all that can be gained
     else:
-        target = min(max(wanted, _SLOWEST_SHARE * options.sign_mps), options.speed, options.own_cap_mps)
+        target = min(max(wanted, _SLOWEST_SHARE * options.sign_mps), options.own_cap_mps)
+    target = within_mood(target, PACES[meaning.variant], options.speed, options.cap_mps)
     headway = min(options.headway(headway + options.leaning.headway_s), API_MAX_HEADWAY_S)
     headway = max(headway, options.headway(0.8))
     does = f"{words}: {speed_words(target)} and {number(headway)} s behind others"

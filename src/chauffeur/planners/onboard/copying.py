@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.language.quantities import Quantity, read_quantities
+from chauffeur.language.tokens import split_units
 from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, UNITS, Kind, Number, Step, plain
 
-_DIGITS: Final = re.compile(r"\d+(?:\.\d+)?")
+_DIGITS: Final = re.compile(r"(?<![^\W_])\d+(?:\.\d+)?(?![^\W_])")
 _CLOSE: Final = 0.011
 _ROUND: Final = 0.01
 _MEASURES: Final[tuple[Kind, ...]] = ("speed", "distance", "time")
@@ -39,7 +40,7 @@ def unnamed(wish: str, history: Sequence[str], steps: Sequence[Step]) -> Number 
 
 def named(wish: str, history: Sequence[str]) -> tuple[str, ...]:
     """Every number that a program may take over from the words, in any unit in which it is a round one."""
-    found = {number for text in (wish, *history) for number in _DIGITS.findall(text)}
+    found = {number for text in (wish, *history) for number in _DIGITS.findall(split_units(text))}
     for quantity in read_quantities(wish):
         units = [si for kind, si, _ in UNITS.values() if kind == quantity.dimension]
         found |= {plain(round(value, 2)) for si in (1.0, *units) if _round(value := quantity.value / si)}
@@ -74,7 +75,9 @@ class _Said:
     def of(cls, wish: str, history: Sequence[str]) -> _Said:
         quantities = read_quantities(wish)
         measured = [q for q in quantities if q.dimension in _MEASURES]
-        digits = Counter(_DIGITS.findall(wish)) - Counter(d for q in measured for d in _DIGITS.findall(q.said))
+        digits = Counter(_DIGITS.findall(split_units(wish))) - Counter(
+            d for q in measured for d in _DIGITS.findall(q.said)
+        )
         remembered = [float(number) for text in history for number in _DIGITS.findall(text)]
         bare = [q.value for q in quantities if q.dimension == "bare"]
         return cls(quantities, (*map(float, digits), *remembered, *bare))

@@ -292,6 +292,12 @@ def tell(steps: Sequence[Step]) -> str:
     return f"I {', then I '.join(parts)}."
 
 
+def shall_i(steps: Sequence[Step]) -> str:
+    """The question whether to do what some steps do."""
+    guess = tell(steps).removeprefix("I ").removesuffix(".").replace(", then I ", ", then ")
+    return f"Shall I {guess}?"
+
+
 def read(source: str) -> tuple[Step, ...]:
     """The steps of a program of the dialect.
 

@@ -11,6 +11,7 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
+from chauffeur.planners.arbitration import pace_of
 from chauffeur.planners.onboard.copying import unnamed
 from chauffeur.planners.onboard.dialect import Step
 from chauffeur.planners.onboard.meaning import Meaning, NotUnderstood, Reading
@@ -24,6 +25,7 @@ _SERVICE: Final = re.compile(
     re.IGNORECASE,
 )
 """How a sentence begins that asks for something else than driving."""
+NOT_THE_NUMBER: Final = "I am not sure about the number"
 _WHICH_SIDE: Final = "Do you mean left or right?"
 
 
@@ -37,7 +39,7 @@ def doubt(wish: str, history: Sequence[str], steps: Sequence[Step]) -> str:
     """
     strange = unnamed(wish, history, steps)
     if strange is not None:
-        return f"I am not sure about the number: did you mean {strange.value:g}?"
+        return f"{NOT_THE_NUMBER}: did you mean {strange.value:g}?"
     reading = understand(wish)
     if isinstance(reading, NotUnderstood):
         if reading.why == "off_topic" and _SERVICE.match(wish):
@@ -46,16 +48,6 @@ def doubt(wish: str, history: Sequence[str], steps: Sequence[Step]) -> str:
         sided = any(step.meaning.direction in _SIDES for step in steps)
         return _WHICH_SIDE if reading.why == "ambiguous" and both and sided else ""
     return _contradiction(wish, reading, steps)
-
-
-_PACES: Final = {"hurry": 1, "sporty": 1, "relax": -1, "careful": -1, "comfort": -1, "eco": -1}
-
-
-def _pace(meaning: Meaning) -> int:
-    """+1 for what makes the drive quicker, -1 for what makes it calmer, 0 for the rest."""
-    if meaning.manoeuvre == "style":
-        return _PACES.get(meaning.variant, 0)
-    return meaning.change if meaning.manoeuvre == "speed" else 0
 
 
 def _outvoted(wish: str, ruled: Meaning, pace: int) -> bool:
@@ -79,7 +71,7 @@ def _contradiction(wish: str, reading: Reading, steps: Sequence[Step]) -> str:
         written = step.meaning
         if step.number is not None and step.number.factor != 1.0:
             continue  # "a bit slower than last time" may still be faster than now
-        if _pace(ruled) * _pace(written) < 0 and not _outvoted(wish, ruled, _pace(written)):
+        if pace_of(ruled) * pace_of(written) < 0 and not _outvoted(wish, ruled, pace_of(written)):
             return "Shall I drive faster or slower?"
         if ruled.manoeuvre != written.manoeuvre:
             continue

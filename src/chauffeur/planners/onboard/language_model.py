@@ -7,27 +7,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any, Final
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Situation, Usage
+from chauffeur.planners.arbitration import UNSURE_WORDS, Wish, agreed, asked, question_about
 from chauffeur.planners.base import OnText, Planner, declined
 from chauffeur.planners.onboard.copying import named, taken_over, unnamed
 from chauffeur.planners.onboard.dangers import danger
-from chauffeur.planners.onboard.dialect import Step, tell
+from chauffeur.planners.onboard.dialect import Step, shall_i
 from chauffeur.planners.onboard.dialect import write as program_of
 from chauffeur.planners.onboard.doubts import ENGLISH_ONLY, foreign
 from chauffeur.planners.onboard.engine import Engine, Written
-from chauffeur.planners.onboard.guard import doubt
+from chauffeur.planners.onboard.guard import NOT_THE_NUMBER, doubt
 from chauffeur.planners.onboard.link import Linked, link
 from chauffeur.planners.onboard.options import Declined
 from chauffeur.planners.onboard.personal import Leaning, corrections_of, leaning_of
 from chauffeur.planners.onboard.prompt import history_words, prompt
 from chauffeur.planners.onboard.reply import Reply, read_reply
 from chauffeur.planners.onboard.thoughts import thoughts_of
+from chauffeur.planners.onboard.understand import meanings_said
 
 SHIPPED: Final = Path(__file__).parent / "weights"
 """The model that comes with the package."""
@@ -49,6 +51,7 @@ def answer(
     constrained: bool = True,
     guarded: bool = True,
     on_text: OnText | None = None,
+    confirmed: str = "",
 ) -> tuple[Reply, Written]:
     """What the model says to a wish after the guard has looked at it: steps, a question, or a refusal.
 
@@ -60,6 +63,7 @@ def answer(
         constrained: Whether decoding holds to the grammar.
         guarded: Whether the guard looks on.
         on_text: Gets each piece of text as the model writes it.
+        confirmed: A question that was answered with yes, and is not asked again.
 
     Raises:
         ProgramError: What it wrote is no reply; only without the grammar.
@@ -88,9 +92,8 @@ def answer(
         reply, written = write(text, only_program=True, measures=numbers)
     question = doubt(wish, history, reply.steps)
     if not question and written.sure < UNSURE:
-        guess = tell(reply.steps).removeprefix("I ").removesuffix(".").replace(", then I ", ", then ")
-        question = f"I am not sure what you want. Shall I {guess}?"
-    return (Reply(question=question), written) if question else (reply, written)
+        question = f"{UNSURE_WORDS} {shall_i(reply.steps)}"
+    return (Reply(question=question), written) if question and question != confirmed else (reply, written)
 
 
 def _with_said_numbers(reply: Reply, wish: str, history: Sequence[str]) -> Reply:
@@ -107,6 +110,7 @@ class Settled:
     """A wish understood and fitted to the road, not yet a policy.
 
     Attributes:
+        wish: The words, without those that were taken back.
         source: The model's program.
         steps: What it does, as written.
         linked: Its skills with their numbers.
@@ -115,12 +119,29 @@ class Settled:
         written: What the network wrote.
     """
 
+    wish: str
     source: str
     steps: tuple[Step, ...]
     linked: Linked
     used: tuple[Leaning, ...]
     situation: Situation
     written: Written
+
+    @property
+    def witnessed(self) -> bool:
+        """Whether the rules read the same, or the number comes from what was done for this person before."""
+        remembered = unnamed(self.wish, (), self.steps) is not None
+        return remembered or agreed(meanings_said(self.wish), self.linked.choice.intent)
+
+    def question(self, request: PlanRequest) -> str:
+        """What to ask before this is driven; empty where nothing is."""
+        return question_about(
+            request,
+            shall_i(self.steps),
+            witnessed=self.witnessed,
+            choice=self.linked.choice,
+            sure=self.written.sure,
+        )
 
 
 class LanguageModelPlanner:
@@ -192,10 +213,17 @@ class LanguageModelPlanner:
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; what is not understood, not possible or not to be done is declined in words."""
         begun = time.perf_counter()
+        if request.context.situation.world == "parking":  # a program has no way into a spot; parameters have
+            from chauffeur.planners.talk2drive.embedded import EmbeddedParameters
+
+            return await EmbeddedParameters(self).plan(request)
         settled = self.settle(request, begun)
         if isinstance(settled, Plan):
             return settled
-        linked, used = settled.linked, settled.used
+        linked, used, wish = settled.linked, settled.used, settled.wish
+        if asks := settled.question(request):
+            plan = asked(self, asks, begun, offer=wish, raw=settled.written.text)
+            return replace(plan, usage=usage_of(settled.written))
         return Plan(
             thoughts=thoughts_of(linked.reading, linked.choice, settled.situation, used),
             policy=Program(settled.source, library=linked.library),
@@ -217,10 +245,15 @@ class LanguageModelPlanner:
             shown: Whether the model is shown the history; not where it is plain what is meant. How the person likes it
                 counts either way.
         """
-        wish = request.instruction.text
         situation = request.context.situation
-        if foreign(wish):  # the model would make something of it
+        if foreign(request.instruction.text):  # the model would make something of it
             return declined(self, ENGLISH_ONLY, begun, intent="ask")
+        if self._guarded and (reason := danger(request.instruction.text)):  # whatever of it was taken back
+            return declined(self, reason, begun, intent="refuse")
+        ready = Wish.of(self, request.instruction, begun)
+        if ready.declined is not None:
+            return ready.declined
+        wish, confirmed = ready.instruction.text, ready.instruction.confirmed
         history = history_words(request.history, self._steps_of) if self._history and shown else ()
         text = prompt(situation, history, wish)
         try:
@@ -232,20 +265,22 @@ class LanguageModelPlanner:
                 constrained=self._constrained,
                 guarded=self._guarded,
                 on_text=self._on_text,
+                confirmed=confirmed,
             )
         except ProgramError as error:
             return declined(self, "I did not understand that.", begun, intent="ask", raw=str(error))
         if not reply.steps:
             words = reply.question or reply.refusal
             intent = "ask" if reply.question else "refuse"
-            return declined(self, words, begun, intent=intent, usage=usage_of(written), raw=written.text)
+            plan = declined(self, words, begun, intent=intent, usage=usage_of(written), raw=written.text)
+            return replace(plan, offer=wish) if reply.question.startswith((UNSURE_WORDS, NOT_THE_NUMBER)) else plan
         leaning = partial(leaning_of, request.history, corrections=corrections_of(request.rounds))
         linked = link(reply.steps, situation, request.limits, leaning)
         if isinstance(linked, Declined):
             intent = "+".join(step.meaning.family for step in reply.steps)
             return declined(self, linked.words, begun, intent=intent, usage=usage_of(written), raw=written.text)
         used = tuple(leaning(step.meaning.family) for step in reply.steps)
-        return Settled(reply.source, reply.steps, linked, used, situation, written)
+        return Settled(wish, reply.source, reply.steps, linked, used, situation, written)
 
     def _steps_of(self, wish: str) -> tuple[Step, ...]:
         """What an earlier wish asked for, for trips that were driven by another planner; empty when that is unclear."""

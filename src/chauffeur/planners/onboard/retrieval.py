@@ -6,8 +6,11 @@ import time
 from functools import partial
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program
+from chauffeur.planners.arbitration import Wish, asked, slow_words, unanswered
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.choose import choose
+from chauffeur.planners.onboard.dangers import danger
+from chauffeur.planners.onboard.doubts import CAN_DO
 from chauffeur.planners.onboard.exemplars import program_of
 from chauffeur.planners.onboard.meaning import NotUnderstood
 from chauffeur.planners.onboard.options import Declined
@@ -42,7 +45,12 @@ class RetrievalPlanner:
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; a wish that is not understood or not possible is declined in words."""
         begun = time.perf_counter()
-        reading = understand(request.instruction.text)
+        ready = Wish.of(self, request.instruction, begun)
+        if ready.declined is not None and not danger(request.instruction.text):
+            return ready.declined
+        reading = understand(ready.instruction.text)
+        if reason := danger(request.instruction.text):  # whatever of it was taken back
+            reading = NotUnderstood("unsupported", f"{reason} {CAN_DO}")
         if isinstance(reading, NotUnderstood):
             return declined(self, reading.words, begun, raw=reading.why)
         corrections = corrections_of(request.rounds)
@@ -52,6 +60,10 @@ class RetrievalPlanner:
             intent = "+".join(step.family for step in reading.steps)
             return declined(self, choice.words, begun, intent=intent)
         used = [leaning(step.family) for step in reading.steps]
+        if why := slow_words(choice.steps, request.context.situation, request.limits):
+            does = ", then ".join(step.does for step in choice.steps)
+            if question := unanswered(request.instruction, f"{why} Shall I {does}?"):
+                return asked(self, question, begun, offer=ready.instruction.text)
         source = program_of([step.filled for step in choice.steps])
         return Plan(
             thoughts=thoughts_of(reading, choice, request.context.situation, used),

@@ -48,6 +48,12 @@ def understand(text: str) -> Reading | NotUnderstood:
     return Reading(tuple(fused))
 
 
+def meanings_said(text: str) -> tuple[Meaning, ...]:
+    """What the rules find in a wish; nothing where they do not understand it."""
+    reading = understand(text)
+    return () if isinstance(reading, NotUnderstood) else reading.steps
+
+
 def _gathered(clauses: list[Clause]) -> list[Clause]:
     """Clauses that say nothing alone ("at the crossroad", "by 15 metres") joined to the neighbour they belong to."""
     out: list[Clause] = []

@@ -13,9 +13,17 @@ from typing import Final, Literal
 
 from chauffeur.concept import History, Limits, Parameters, Plan, PlanRequest, Situation, Thoughts
 from chauffeur.language import measured
-from chauffeur.language.corrections import last_said
 from chauffeur.language.sorter import load_sorter, negated
 from chauffeur.memory.conflicts import conflicts_in
+from chauffeur.planners.arbitration import (
+    SURE,
+    Said,
+    Wish,
+    asked,
+    intent_pace,
+    unanswered,
+    within_mood,
+)
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import Step
@@ -26,6 +34,7 @@ from chauffeur.planners.onboard.moods import EASE, HURRY
 from chauffeur.planners.onboard.options import Chosen, Declined, speed_words
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.thoughts import thoughts_of
+from chauffeur.planners.onboard.understand import meanings_said
 from chauffeur.planners.talk2drive.habits import SIGN_SETTING, kind_of, pace_of, speed_for
 from chauffeur.planners.talk2drive.hints import WEIGHTS, Hint, goes_with, hint_of
 from chauffeur.planners.talk2drive.lanes import eased_mps, fitting_mps, mood_lane, passing_mps, unsaid_turn
@@ -81,7 +90,10 @@ _TAKEN: Final[dict[str, str]] = {
     "faster": "I take it that this is too slow for you.",
     "slower": "I take it that this is too fast for you.",
 }
+_ANY_SPOT: Final = "nearest"
+"""Read where nothing of the words says which spot."""
 _PACES: Final = ("speed.increase", "speed.decrease")
+_PACE_OF_HINT: Final = {"pass": 1, "hurry": 1, "faster": 1, "go": 1, "calm": -1, "slower": -1}
 _AT_ONCE: Final = "With these parameters I can only do things at once. Tell me when it is time."
 _LONGEST_GAP_M: Final = 150.0
 """No gap to keep is longer: so far ahead a vehicle counts as one to follow."""
@@ -111,25 +123,50 @@ class EmbeddedParameters:
         said, situation = request.instruction.text, request.context.situation
         if foreign(said) or danger(said):  # which the model's own reading refuses, whatever of it was taken back
             return self._as_read(self._model.settle(_compared(request), begun), request, begun)
-        wish = last_said(said)
-        request = replace(request, instruction=replace(request.instruction, text=wish))
+        ready = Wish.of(self, request.instruction, begun)
+        if ready.declined is not None:
+            return ready.declined
+        wish = ready.instruction.text
+        request = replace(request, instruction=ready.instruction)
         settled = self._model.settle(_compared(request), begun)
-        if situation.world == "parking" and (spot := named_spot(wish)):
-            return self._park(spot, request, begun)
         reads = () if isinstance(settled, Plan) else tuple(map(kind_of, settled.linked.choice.intent.split("+")))
         hint = hint_of(wish, situation, request.history, reads[0] if reads else "")
+        if situation.world == "parking" and (spot := _spot_read(wish, settled, hint)):
+            return self._park(spot, request, begun)
         if hint is not None and self._overrules(hint, settled, reads, wish, situation.world):
-            return self._as_meant(hint, request, begun)
-        return self._as_read(settled, request, begun)
+            return self._or_asked(self._as_meant(hint, request, begun), hint, request, begun)
+        alike = hint is not None and any(goes_with(read, hint.kind) for read in reads)
+        return self._as_read(settled, request, begun) if alike else self._asked_first(settled, request, begun)
+
+    def _asked_first(self, settled: Settled | Plan, request: PlanRequest, begun: float) -> Plan:
+        """The wish as its words were read, or the question whether they were read rightly."""
+        plan = self._as_read(settled, request, begun)
+        if isinstance(settled, Plan) or plan.policy is None:
+            return plan
+        asks = settled.question(request)
+        return asked(self, asks, begun, offer=settled.wish, raw=plan.raw) if asks else plan
+
+    def _or_asked(self, plan: Plan, hint: Hint, request: PlanRequest, begun: float) -> Plan:
+        """What a hint was taken for, or, where that is not sure, the question whether it is meant."""
+        if plan.policy is None or hint.outright or hint.because or hint.share >= _SURER or hint.kind not in _TAKEN:
+            return plan
+        question = unanswered(request.instruction, f"{_TAKEN[hint.kind]} Is that right?")
+        return asked(self, question, begun, offer=request.instruction.text) if question else plan
 
     def _overrules(self, hint: Hint, settled: Settled | Plan, reads: Sequence[str], wish: str, world: str) -> bool:
         """Whether what words hint at counts for more than how they were read."""
         amounts = measured(wish)
         if hint.kind == "else" or _asks_an_amount(amounts, settled, world):
             return False
+        meanings = meanings_said(wish)
+        pace = _PACE_OF_HINT.get(hint.kind, 0)
+        if not hint.outright and Said.of(meanings).contradicts(side="right" if hint.kind == "right" else "", pace=pace):
+            return False
         if isinstance(settled, Plan):
             sure = _SURER if _forbidden(settled) and hint.kind in _BRISK else _SURE
             return hint.kind != "none" and hint.share >= sure
+        if not hint.outright and settled.written.sure >= SURE and settled.witnessed:
+            return any(goes_with(read, hint.kind) for read in reads) and hint.kind == "go"
         if any(dimension == "time" for dimension, _ in amounts) and any(map(_in_time, settled.steps)):
             return False
         if any(goes_with(read, hint.kind) for read in reads):
@@ -234,6 +271,16 @@ class EmbeddedParameters:
         )
 
 
+def _spot_read(wish: str, settled: Settled | Plan, hint: Hint | None) -> str:
+    """The spot of the lot that a wish means, unless it is read as something else to do there; empty for none."""
+    if spot := named_spot(wish):
+        return spot
+    reads = settled.intent != "refuse" if isinstance(settled, Plan) else _parks(settled.linked.choice.intent)
+    place = place_of(wish) if reads else ""
+    meant = "" if hint is None else hint.kind.partition("park.")[2]
+    return meant or place if place == _ANY_SPOT else place
+
+
 def _compared(request: PlanRequest) -> PlanRequest:
     """The same request with only those trips that memory found alike, which are what the model is shown."""
     return replace(request, history=History(tuple(item for item in request.history.items if item.similarity >= 0.0)))
@@ -264,6 +311,15 @@ def _forbidden(declined: Plan) -> bool:
 
 def _at_pace(found: Parameters, intent: str, request: PlanRequest) -> tuple[Parameters, tuple[str, ...]]:
     """Parameters at the speed this person likes for such wishes, and why in words."""
+    found, why = _liked(found, intent, request)
+    situation = request.context.situation
+    most = request.limits.most_mps(situation.speed_limit_mps)
+    speed = within_mood(found.target_speed_mps, intent_pace(intent), situation.speed_mps, most)
+    return (found, why) if speed == found.target_speed_mps else (replace(found, target_speed_mps=round(speed, 2)), ())
+
+
+def _liked(found: Parameters, intent: str, request: PlanRequest) -> tuple[Parameters, tuple[str, ...]]:
+    """Parameters at the speed this person likes, whatever we drive now."""
     situation = request.context.situation
     sign = situation.speed_limit_mps
     if found.target_speed_mps == 0.0 or sign <= 0.0:

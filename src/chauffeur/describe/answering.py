@@ -1,0 +1,137 @@
+"""Answers to questions about the situation, read off C: no model guesses, and an answer never changes the drive.
+
+What C does not hold is not made up: a question it leaves open gets an honest "I don't know".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Final
+
+from chauffeur.concept import Situation
+from chauffeur.concept.units import kmh, mph
+from chauffeur.describe.road import SIGHT_M, ordinal
+from chauffeur.language.tokens import words_of
+
+DONT_KNOW: Final = "I don't know that. I can tell our speed, the limit, our lane and who is ahead."
+
+_MAY: Final = r"(?:may|can|could|should|must)"
+_WE: Final = r"(?:i|we|you|one)"
+_ASKS: Final = re.compile(
+    r"^(?:(?:please|hey|ok|so|and|well|excuse me|sorry) ?,? ?)*"
+    r"(?:(?:can|could|would|will) you (?:please )?tell (?:me|us) |(?:do|did) you (?:happen to )?know |"
+    r"tell (?:me|us) |i wonder )?"
+    r"(?:whats?|which|how (?:fast|far|many|much|long|old|big|tall|close|late)|where|when|who|whose|"
+    r"is there|are there|is it)\b"
+)
+"""How a question begins that wants to know something; not one that asks for something, complains or proposes."""
+_PROPOSES: Final = re.compile(
+    r"^what (?:about|if|are you (?:doing|waiting)|the|a|do you think you)\b|\bhow about\b|"
+    r"\bwhat is (?:taking|the (?:hold|matter|point|rush))\b|^when (?:you|we|he|she|it|there|the)\b"
+)
+_THEIRS: Final = (
+    r"(?:he|she|they|him|her|it|"
+    r"(?:the|that|this) (?:\w+ )?(?:car|vehicle|truck|van|lorry|bus|one|guy|driver|front|lead)\b.*)"
+)
+_AHEAD: Final = r"(?:ahead|in front|before us|front|lead)"
+
+
+def _speed(speed_mps: float) -> str:
+    return f"{kmh(speed_mps):.0f} km/h ({mph(speed_mps):.0f} mph)"
+
+
+def _own_speed(situation: Situation) -> str:
+    return f"We are driving at {_speed(situation.speed_mps)}."
+
+
+def _limit(situation: Situation) -> str:
+    return f"The speed limit here is {_speed(situation.speed_limit_mps)}."
+
+
+def _front(situation: Situation) -> str:
+    front = situation.front
+    if front is None:
+        return f"Nobody is ahead of us in our lane within {SIGHT_M:.0f} m."
+    return f"The car ahead is {front.distance_m:.0f} m away, centre to centre, and drives at {_speed(front.speed_mps)}."
+
+
+def _lane(situation: Situation) -> str:
+    count = situation.lane_count
+    if count == 1:
+        return "There is one lane in our direction."
+    place = "leftmost" if situation.lane_index == 0 else "rightmost" if situation.lane_index == count - 1 else ""
+    where = f"the {place}" if place else f"the {ordinal(situation.lane_index + 1)} from the left"
+    also = " The rightmost is an emergency lane." if situation.emergency_lane else ""
+    return f"We are in {where} of {count} lanes.{also}"
+
+
+def _stop_sign(situation: Situation) -> str:
+    at = situation.stop_sign_m
+    return "No stop sign is ahead that I see." if at is None else f"A stop sign is ahead in {at:.0f} m."
+
+
+def _turns(situation: Situation) -> str:
+    if not situation.turns:
+        return "No junction is ahead that I know of."
+    return f"At the next junction we can go {' or '.join(situation.turns)}."
+
+
+def _of_scene(name: str) -> Callable[[Situation], str]:
+    return lambda situation: dict(situation.scene).get(name, "")
+
+
+_TOPICS: Final[tuple[tuple[re.Pattern[str], Callable[[Situation], str]], ...]] = tuple(
+    (re.compile("|".join(patterns)), answer)
+    for patterns, answer in (
+        ((r"\b(?:weather|raining|rain|snowing|foggy|forecast)\b(?! tomorrow)",), _of_scene("weather")),
+        ((r"\btraffic (?:like|ahead|rules?)\b|\btraffic$",), _of_scene("traffic")),
+        (
+            (r"\b(?:which|what) (?:road|street|highway|motorway) (?:is this|are we|am i)\b", r"^where are we\b"),
+            _of_scene("road"),
+        ),
+        (
+            (
+                rf"\blimit\b|\bmaximum speed\b|\bhow fast (?:{_MAY}|{_WE} {_MAY})\b",
+                rf"\bhow fast (?:am|are|is) {_WE} allowed\b",
+            ),
+            _limit,
+        ),
+        ((rf"\bhow fast (?:is|are|was|does|do) {_THEIRS}", rf"\bspeed of (?:the|that) \w+ {_AHEAD}\b"), _front),
+        (
+            (
+                r"\bhow fast (?:am|are|is|do) (?:i|we|you|it|this)\b",
+                r"\b(?:our|my|your|current) speed\b|\bspeed (?:are|am|is) (?:we|i|it|this)\b|\bthe speed$",
+            ),
+            _own_speed,
+        ),
+        ((r"\bstop sign\b",), _stop_sign),
+        ((r"\b(?:which|what) lane\b|\bhow many lanes\b",), _lane),
+        (
+            (rf"\b(?:which way|where) {_MAY} {_WE} (?:turn|go)\b", r"\b(?:junction|crossing|intersection)\b"),
+            _turns,
+        ),
+        (
+            (
+                rf"\bhow (?:far|close|much (?:room|space|distance))\b.*\b{_AHEAD}\b|\b(?:distance|gap|headway)\b",
+                rf"\b(?:any(?:one|body)|some(?:one|body)|nobody|who|what|car|vehicle)\b.*\b{_AHEAD}\b",
+                r"^how (?:far|close) (?:away )?(?:is|are) (?:he|she|they|it)\b",
+            ),
+            _front,
+        ),
+    )
+)
+
+
+def asks_to_know(text: str) -> bool:
+    """Whether words ask for knowledge and for nothing to be done."""
+    words = words_of(text).rstrip(" ?.!")
+    return _ASKS.match(words) is not None and _PROPOSES.search(words) is None and not re.search(r"[.,;!?]", words)
+
+
+def answer_to(text: str, situation: Situation) -> str:
+    """What C says to a question about it; empty where it is no such question, or C does not hold the answer."""
+    if not asks_to_know(text):
+        return ""
+    words = words_of(text).rstrip(" ?.!")
+    return next((said for pattern, answer in _TOPICS if pattern.search(words) and (said := answer(situation))), "")

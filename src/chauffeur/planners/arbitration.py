@@ -1,0 +1,179 @@
+"""Who is right where several readings of the same words differ, and when the car asks before it drives.
+
+What was said outright is certain: a side, a number, a pace. No learned reading outweighs it. Of a thing that was said
+and taken back the last counts. A reading is driven if it is sure, or if the rules, which know nothing of the network,
+read the same; anything else, a stop in the lane and a crawl among faster traffic are asked about first, in one question
+that a yes answers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, Literal, Self
+
+from chauffeur.concept import Instruction, Limits, Plan, PlanRequest, Situation
+from chauffeur.language.corrections import last_said
+from chauffeur.language.slips import slip_in
+from chauffeur.planners.base import Planner, declined
+
+if TYPE_CHECKING:
+    from chauffeur.planners.onboard.choose import Choice
+    from chauffeur.planners.onboard.meaning import Meaning
+    from chauffeur.planners.onboard.options import Chosen
+
+SURE: Final = 0.95
+"""From this probability of its least sure choice the network's reading needs no second one that agrees. Read off the
+hand-written wishes of even number (`bench passengers`), checked on the others: see `benchmarks/RESULTS.md`."""
+
+SLOW_SHARE: Final = 0.5
+"""Of the traffic's speed; whoever drives slower than that among others is asked whether they mean it."""
+_TRAFFIC_MPS: Final = 14.0
+"""Only from this speed of the traffic, about 50 km/h: in a lot, or up to a stop sign, a low speed endangers nobody."""
+_CREEP_MPS: Final = 5.0
+"""Below this speed of the traffic a stop endangers nobody: a parking lot, a jam."""
+
+UNSURE_WORDS: Final = "I am not sure what you want."
+_STANDS: Final = "We would stand in the way of others."
+_CRAWLS: Final = "That is less than half the speed of the traffic here."
+
+_OUTRIGHT: Final = 1.0
+"""Score of a meaning from which it is a verb with its object; below it is a lone word: "a lorry from the right"."""
+
+PACES: Final = {"hurry": 1, "sporty": 1, "relax": -1, "careful": -1, "comfort": -1, "eco": -1}
+"""Moods that quicken (1) or calm (-1) the drive."""
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What words say outright, whatever else they may mean.
+
+    Attributes:
+        sides: Left and right, as far as named for something to do.
+        pace: 1 for faster, -1 for slower, 0 for neither or both.
+    """
+
+    sides: frozenset[str]
+    pace: Literal[-1, 0, 1]
+
+    @classmethod
+    def of(cls, meanings: Sequence[Meaning]) -> Self:
+        """What the rules found in the words; they know nothing of any network."""
+        plain = [m for m in meanings if m.score >= _OUTRIGHT]
+        sides = frozenset(m.direction for m in plain if m.direction in ("left", "right"))
+        return cls(sides, _sign(m.change for m in plain if m.manoeuvre == "speed"))
+
+    def contradicts(self, *, side: str, pace: int) -> bool:
+        """Whether a reading that goes to a side (empty for none) at a pace (sign) drops or denies what was said."""
+        if self.sides and side not in self.sides:
+            return True
+        return self.pace not in (0, pace)
+
+
+def pace_of(meaning: Meaning) -> int:
+    """+1 for what makes the drive quicker, -1 for what makes it calmer, 0 for the rest."""
+    if meaning.manoeuvre == "style":
+        return PACES.get(meaning.variant, 0)
+    return meaning.change if meaning.manoeuvre == "speed" else 0
+
+
+def within_mood(speed_mps: float, pace: int, now_mps: float, most_mps: float) -> float:
+    """A set-point for a mood, m/s: one for a calmer drive is never above the present speed, one for a quicker drive
+    never below, but for the limits."""
+    if pace < 0:
+        return min(speed_mps, now_mps)
+    return max(speed_mps, min(now_mps, most_mps)) if pace > 0 else speed_mps
+
+
+def intent_pace(intent: str) -> int:
+    """The pace that the tag of a wish without a number asks for."""
+    kinds = {"speed.increase": 1, "speed.decrease": -1, **{f"style.{mood}": sign for mood, sign in PACES.items()}}
+    return _sign(kinds.get(part, 0) for part in intent.split("+"))
+
+
+def agreed(meanings: Sequence[Meaning], intent: str) -> bool:
+    """Whether the rules read the same things to do, in the same order, as a network did."""
+    return bool(meanings) and "+".join(m.family for m in meanings) == intent
+
+
+def question_about(
+    request: PlanRequest,
+    shall_i: str,
+    *,
+    witnessed: bool,
+    choice: Choice,
+    sure: float,
+) -> str:
+    """What to ask before a reading is driven; empty where nothing is, or where nobody is there to answer.
+
+    Args:
+        request: The words with what the person has answered already, where we are, and the limits.
+        shall_i: The question whether to do what was read.
+        witnessed: Whether something that knows nothing of the network says the same.
+        choice: What would be driven.
+        sure: Probability of the network's least sure choice.
+    """
+    if sure < SURE and not witnessed:
+        return unanswered(request.instruction, f"{UNSURE_WORDS} {shall_i}")
+    why = slow_words(choice.steps, request.context.situation, request.limits)
+    return unanswered(request.instruction, f"{why} {shall_i}") if why else ""
+
+
+def unanswered(instruction: Instruction, question: str) -> str:
+    """The question; empty where the person has answered it with yes, and in a benchmark, where nobody can."""
+    return "" if instruction.source == "benchmark" or question == instruction.confirmed else question
+
+
+def slow_words(steps: Iterable[Chosen], situation: Situation, limits: Limits) -> str:
+    """Why a plan endangers those behind us: it stops in the lane, or crawls; empty where it does neither."""
+    for step in steps:
+        if step.intent.startswith("pull_over"):
+            continue  # to a stand, but not in anybody's way
+        target = 0.0 if step.intent == "stop" else dict(step.settings).get("target_speed_mps")
+        if target is not None and (why := slow_speed_words(target, situation, limits)):
+            return why
+    return ""
+
+
+def slow_speed_words(target_mps: float, situation: Situation, limits: Limits) -> str:
+    """The same for one set-point; who may not drive as fast as the traffic is not asked about that."""
+    front = 0.0 if situation.front is None else situation.front.speed_mps
+    most_mps = min(situation.speed_limit_mps, limits.most_mps(situation.speed_limit_mps))
+    traffic_mps = min(most_mps, max(situation.speed_mps, front))
+    if target_mps == 0.0:
+        return _STANDS if traffic_mps > _CREEP_MPS else ""
+    crawls = traffic_mps >= _TRAFFIC_MPS and target_mps < SLOW_SHARE * traffic_mps
+    return _CRAWLS if crawls else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """Words made ready for a planner.
+
+    Attributes:
+        instruction: With what is left once the person has corrected themselves.
+        declined: The plan that asks about a number; None where all numbers are clean.
+    """
+
+    instruction: Instruction
+    declined: Plan | None = None
+
+    @classmethod
+    def of(cls, planner: Planner, instruction: Instruction, begun: float) -> Self:
+        """Take back what was taken back, and see that every number is one."""
+        text = last_said(instruction.text)
+        slip = slip_in(text)
+        if slip is not None:
+            return cls(instruction, asked(planner, slip.question, begun, offer=slip.corrected))
+        return cls(replace(instruction, text=text))
+
+
+def asked(planner: Planner, question: str, begun: float, *, offer: str = "", raw: str = "") -> Plan:
+    """A plan that drives nothing yet and asks; `offer` is the wish that a yes stands for."""
+    plan = declined(planner, question, begun, intent="ask", raw=raw)
+    return replace(plan, offer=offer)
+
+
+def _sign(changes: Iterable[int]) -> Literal[-1, 0, 1]:
+    found = {change for change in changes if change}
+    return 0 if len(found) != 1 else 1 if found.pop() > 0 else -1
