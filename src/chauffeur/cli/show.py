@@ -166,6 +166,8 @@ class Teller(Quiet):
         causes = words.cause_words(trip.causes)
         if not trip.causes.refused:
             return causes
+        if trip.plan.policy is None:
+            return tuple(cause for cause in causes if cause != words.DECLINED)
         remedies = (verdict.remedy for verdict in trip.verdicts if verdict.stops and verdict.remedy)
         return tuple(dict.fromkeys((*(cause for cause in causes if cause != words.DECLINED), *remedies)))
 
