@@ -56,10 +56,13 @@ class Stages:
     tell: Callable[[str, object], None]
 
 
-async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, stages: Stages) -> Trip:  # noqa: E741, N803
-    """One wish, from the words to the remembered trip."""
-    snapshot = stages.world.reset(scenario, seed)
-
+def ask(
+    I: Instruction,  # noqa: E741, N803
+    snapshot: Snapshot,
+    limits: Limits,
+    stages: Stages,
+) -> PlanRequest:
+    """Everything the planner is given for a wish in a situation."""
     C = stages.describe(snapshot)  # noqa: N806
     H = stages.memory.recall(I.person, I, C, 3)  # noqa: N806
     S = stages.system(limits)  # noqa: N806
@@ -68,6 +71,14 @@ async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, s
 
     request, screened = screen_request(PlanRequest(I, C, S, H, limits=limits))  # words are data
     stages.tell("screened", screened)
+    return request
+
+
+async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, stages: Stages) -> Trip:  # noqa: E741, N803
+    """One wish, from the words to the remembered trip."""
+    snapshot = stages.world.reset(scenario, seed)
+
+    request = ask(I, snapshot, limits, stages)
     plan = await stages.planner.plan(request)  # R, P
     stages.tell("RP", plan)
 
