@@ -102,7 +102,7 @@ def drive(
     if print_prompt:
         from chauffeur.cli.prompts import show_prompt
 
-        session.tell = lambda letter, value: None
+        session.tell = Quiet(console).tell
         show_prompt(console, session.planner, asyncio.run(session.request(instruction, place, start_seed, bounds)))
         return
     with ExitStack() as stack:

@@ -31,6 +31,8 @@ def show_prompt(console: Console, planner: Planner, request: PlanRequest) -> Non
     note(f"POST {prompt.url}")
     note(json.dumps(prompt.parameters, ensure_ascii=False))
     for message in prompt.messages:
-        note(f"----- {message['role']}: {len(message['content']):,} characters, about {tokens_about([message]):,} tokens")
+        note(
+            f"----- {message['role']}: {len(message['content']):,} characters, about {tokens_about([message]):,} tokens"
+        )
         console.print(plain(message["content"]), soft_wrap=True)
     note(f"----- {len(prompt.messages)} turns, about {tokens_about(prompt.messages):,} tokens")

@@ -78,9 +78,7 @@ def was_cut(messages: Sequence[Mapping[str, Any]], counted: int) -> bool:
     return 0 < counted < _characters(messages) / _CUT_CHARS_PER_TOKEN
 
 
-def too_small(
-    url: str, shortage: Shortage, messages: Sequence[Mapping[str, Any]], answer_tokens: int
-) -> EndpointError:
+def too_small(url: str, shortage: Shortage, messages: Sequence[Mapping[str, Any]], answer_tokens: int) -> EndpointError:
     """The failure, with the numbers and what to do.
 
     Args:
@@ -100,8 +98,8 @@ def too_small(
         f"S is about {system:,}, and at least {LEAST_ANSWER_TOKENS} for the answer; the context {size}.",
         hint=(
             f"Start the server with a context of {enough:,} tokens or more (llama.cpp: -c {enough}; vLLM: "
-            f"--max-model-len {enough}; Ollama: OLLAMA_CONTEXT_LENGTH={enough}), or use --setting zero-shot, whose S is "
-            "the shortest."
+            f"--max-model-len {enough}; Ollama: OLLAMA_CONTEXT_LENGTH={enough}), or use --setting zero-shot, whose S "
+            "is the shortest."
         ),
     )
 

@@ -111,12 +111,14 @@ class Endpoint:
             try:
                 async with asyncio.timeout(self._timeout_s):
                     completion = await self._exchange(client, body, on_text)
-                if was_cut(messages, completion.prompt_tokens):
-                    self._tell_once(
-                        f"{self._address.url} counted {completion.prompt_tokens:,} tokens of a prompt that has more: its "
-                        "context may be too small, and the prompt cut without a word (Ollama: OLLAMA_CONTEXT_LENGTH=8192)"
-                    )
-                return completion
+                self._check_read(messages, completion)
+            except _EmptyStreamError:
+                if (
+                    not self._turned
+                ):  # llama-cpp-python ends a stream without a word where a whole reply says what is wrong
+                    self._turned, self._stream = True, False
+                    continue
+                failure = garbage(self._address.url, "an empty stream")
             except EndpointError as error:
                 failure = error
             except TimeoutError:
@@ -137,6 +139,8 @@ class Endpoint:
                     continue
                 else:
                     failure = from_sdk(error, self._address.url, self._model, self._key_variable(), self._scrub)
+            else:
+                return completion
             # Raised here, outside the handlers: the SDK's exception holds the request with the key in its headers.
             raise failure
 
@@ -214,6 +218,14 @@ class Endpoint:
             return True
         return False
 
+    def _check_read(self, messages: list[Message], completion: Completion) -> None:
+        """Say so where the server cannot have read the whole prompt."""
+        if was_cut(messages, completion.prompt_tokens):
+            self._tell_once(
+                f"{self._address.url} counted {completion.prompt_tokens:,} tokens of a prompt that has more: its "
+                "context may be too small, and the prompt cut without a word (Ollama: OLLAMA_CONTEXT_LENGTH=8192)"
+            )
+
     def _tell_once(self, what: str) -> None:
         if what not in self._told:
             self._told.add(what)
@@ -240,7 +252,7 @@ class Endpoint:
                 if tally.full:
                     break
         if not tally.chunks:
-            raise garbage(self._address.url, "an empty stream")
+            raise _EmptyStreamError
         if not tally.finish:
             raise truncated(self._address.url)
         return self._finished(tally)
@@ -274,6 +286,10 @@ class Endpoint:
             completion_tokens=tally.completion_tokens,
             model=self._scrub(tally.model)[:_MODEL_CHARS],
         )
+
+
+class _EmptyStreamError(Exception):
+    """A stream that ended before its first piece."""
 
 
 class _Tally:

@@ -81,8 +81,8 @@ def timed_out(url: str, timeout_s: float) -> EndpointError:
         "timeout",
         f"{url} gave no complete reply within {timeout_s:g} s.",
         hint=(
-            f"Give it longer, e.g. {TIMEOUT_VARIABLE}={4.0 * timeout_s:g}; of a server that answers one request at a time "
-            "ask one at a time; or use a smaller model or a faster machine."
+            f"Give it longer, e.g. {TIMEOUT_VARIABLE}={4.0 * timeout_s:g}; ask a server of one slot one at a time; "
+            "or use a smaller model or a faster machine."
         ),
         retryable=True,
     )

@@ -38,7 +38,7 @@ def goal_of(request: PlanRequest) -> Goal:
     reading = understand(request.instruction.text)
     if not isinstance(reading, Reading):
         return NO_GOAL
-    choice = choose(reading, request.context.situation, request.limits, lambda family: Leaning())
+    choice = choose(reading, request.context.situation, request.limits, lambda _: Leaning())
     if isinstance(choice, Declined):
         return NO_GOAL
     named = all(step.amount is not None for step in reading.steps)
