@@ -90,8 +90,8 @@ CONTEXTS = {
         "This model's maximum context length is 2048 tokens. However, you requested 6643 tokens (2547 in the messages, "
         "4096 in the completion). Please reduce the length of the messages or completion."}),
     "vLLM, later": fails(400,
-        "'max_tokens' or 'max_completion_tokens' is too large: 4096. This model's maximum context length is 2048 tokens "
-        "and your request has 2547 input tokens (4096 > 2048 - 2547)."),
+        "'max_tokens' or 'max_completion_tokens' is too large: 4096. This model's maximum context length is 2048 "
+        "tokens and your request has 2547 input tokens (4096 > 2048 - 2547)."),
     "vLLM, now": fails(400,
         "You passed 2547 input tokens and requested 4096 output tokens. However, the model's context length is "
         "only 2048 tokens, resulting in a maximum input length of 0 tokens."),
