@@ -127,14 +127,20 @@ def _published(group: Group) -> bool:
 
 
 def _plot(table: ReportTable) -> str:
-    """The last column, which is the score, drawn: a line a run, and of the paper's the best and the human driver's."""
-    column = table.columns[-1]
-    if column.span is None:
+    """The last column with an axis, which is the score: a line a run, and of the paper's the best and the human's."""
+    place = max((place for place, column in enumerate(table.columns) if column.span is not None), default=None)
+    if place is None:
         return ""
+    column = table.columns[place]
+    assert column.span is not None
     own = [line for group in table.groups for line in group.lines if not line.published]
     printed = [line for group in table.groups for line in group.lines if line.published]
     models = [line for line in printed if "," in line.name]  # a language model and its setting
-    shown = [*own, *sorted(models, key=_score)[-1:], *(line for line in printed if line.name == "Human driver")]
+    shown = [
+        *own,
+        *sorted(models, key=lambda line: _value(line.cells[place]))[-1:],
+        *(line for line in printed if line.name == "Human driver"),
+    ]
     low, high = column.span
 
     def at(value: float) -> str:
@@ -144,7 +150,7 @@ def _plot(table: ReportTable) -> str:
     grid = "".join(f'<line class="grid" x1="{at(mark)}" x2="{at(mark)}" y1="0" y2="100%"/>' for mark in marks)
     rows: list[str] = []
     for line in shown:
-        cell = line.cells[-1]
+        cell = line.cells[place]
         if cell.interval is None or cell.interval.value is None:
             continue
         ends = tuple(at(end) for end in cell.ends) if cell.ends is not None else ()
@@ -168,9 +174,8 @@ def _plot(table: ReportTable) -> str:
     )
 
 
-def _score(line: Line) -> float:
-    interval = line.cells[-1].interval
-    return -math.inf if interval is None or interval.value is None else interval.value
+def _value(cell: Cell) -> float:
+    return -math.inf if cell.interval is None or cell.interval.value is None else cell.interval.value
 
 
 def _axis_marks(low: float, high: float) -> list[float]:
