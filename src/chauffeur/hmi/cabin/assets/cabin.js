@@ -97,7 +97,7 @@ function showPlace() {
   if (scene) write($('rung'), lost && !ended ? 'Last picture, no news since' : rungWords(scene));
   $('talk').hidden = !speaks(); // what cannot be used is not shown
   for (const row of document.querySelectorAll('.spoken')) row.hidden = !speaks();
-  for (const id of ['talk-command', 'talk-evaluate']) $(id).disabled = !able();
+  for (const id of ['talk-command', 'talk-evaluate']) $(id).disabled = !able() || !speaks();
   $('open-microphone').hidden = hears() && session.engine_remote; // sound leaves this machine only while a button is held
   $('open-microphone').disabled = !able();
   for (const button of document.querySelectorAll('.opinions button, #take-over, #as-opinion, .type .main')) button.disabled = Boolean(ended);
