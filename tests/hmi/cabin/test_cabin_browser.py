@@ -82,7 +82,7 @@ def test_keys_work_again_once_a_wish_was_sent(desk: Desk, drive: Drive) -> None:
         tab = desk.tab
         await opened(tab, drive)
         await tab.press("/")
-        await tab.type("Drive at 80 km/h.")
+        await tab.type("Drive at 70 km/h.")
         await tab.press("Enter")
         await tab.until("document.activeElement !== document.getElementById('wish')")
         await tab.press("/")
