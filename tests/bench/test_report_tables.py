@@ -100,14 +100,13 @@ def test_a_pair_says_what_flipped(two: tuple[Path, Path]) -> None:
     (flip,) = flips.flips
     assert (flip.sample, flip.gained, flip.lost, flips.left_out) == ("task1_s1", 2, 0, 0)
     assert (flip.first, flip.second) == ("not done after 20.0\u00a0s", "done as asked after 20.0\u00a0s")
-    assert any(line.subject == "b against a" and "completed 2 items" in line.text for line in report.headlines)
+    assert not any("against" in line.subject for line in report.headlines), "runs are compared by table"
 
 
 def test_equal_runs_differ_in_nothing(tmp_path: Path) -> None:
     report = _report(*(write_run(tmp_path / name, mixed(), planner=name) for name in "ab"))
     assert report.flips == ()
     assert _cell(report, "pairs", "A: a; B: b", "driving_score").text == "0.0"
-    assert any("the same driving score" in line.text for line in report.headlines)
 
 
 def test_with_many_runs_only_pairs_with_the_first_are_shown(tmp_path: Path) -> None:

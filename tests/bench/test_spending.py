@@ -133,14 +133,26 @@ def test_prices_are_read() -> None:
 
 
 def test_failures_that_pass_are_tried_again_and_paid_for_once() -> None:
-    timeout = EndpointError("timeout", "Too slow.", retryable=True)
+    broken = EndpointError("server", "It failed (500).", retryable=True)
     limit = EndpointError("rate_limit", "Slow down.", retryable=True)
-    model = Model(faults=[limit, limit, timeout, PlannerError("Hiccup.", retryable=True)])
+    model = Model(faults=[limit, limit, broken, PlannerError("Hiccup.", retryable=True)])
     answers, caller = _ask(model, Budget(), 1)
     assert answers[0].plan is not None
-    assert answers[0].bill.requests == 4, "two refusals, a time-out, an answer; a hiccup of its own is no request"
+    assert answers[0].bill.requests == 4, "two refusals, a failure, an answer; a hiccup of its own is no request"
     assert caller.spending.total == answers[0].bill
     assert caller.spending.in_flight == 0 == caller.gate.in_flight
+
+
+def test_a_request_that_was_alone_is_not_sent_again_after_a_time_out_and_one_beside_others_is_counted() -> None:
+    timeout = EndpointError("timeout", "Too slow.", retryable=True)
+    alone = Model(faults=[timeout])
+    answers, caller = _ask(alone, Budget(), 1)
+    assert (answers[0].plan, alone.asked, caller.repeated) == (None, 1, 0)
+    assert "Not asked again" in answers[0].error
+    several = Model(faults=[timeout])
+    answers, caller = _ask(several, Budget(), 3)
+    assert all(answer.plan is not None for answer in answers)
+    assert (several.asked, caller.repeated) == (4, 1)
 
 
 def test_a_plan_that_keeps_failing_is_given_up_and_the_others_go_on() -> None:

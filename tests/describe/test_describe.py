@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
-from chauffeur.concept import Lead, ScenarioError, Snapshot
-from chauffeur.describe import describe
+from chauffeur.concept import Lead, ScenarioError, Snapshot, VehicleState
+from chauffeur.describe import describe, describe_with_traffic
 from chauffeur.describe.road import ordinal
 
 Make = Callable[..., Snapshot]
@@ -104,3 +105,38 @@ def test_ordinals() -> None:
     assert [ordinal(n) for n in (1, 10, 11, 12, 13, 21, 22, 23, 24, 111)] == [
         "first", "tenth", "11th", "12th", "13th", "21st", "22nd", "23rd", "24th", "111th",
     ]  # fmt: skip
+
+
+def _car(number: int, x_m: float, index: int, speed_mps: float, heading_rad: float = 0.0) -> VehicleState:
+    return VehicleState(number, "car", x_m, 4.0 * (index - 1), heading_rad, speed_mps, 5.0, 2.0, ("c", "d", index))
+
+
+def test_the_traffic_behind_and_beside_is_told_for_a_drive_and_not_for_the_benchmark(highway: Make) -> None:
+    cars = (
+        _car(1, -30.0, 1, 33.0), _car(2, -60.0, 1, 20.0), _car(3, 40.0, 1, 20.0),
+        _car(4, 12.34, 0, 24.06), _car(5, -20.0, 0, 28.0), _car(6, 2.0, 2, 25.0), _car(7, 130.0, 0, 9.0),
+    )  # fmt: skip
+    snapshot = replace(highway(lanes=4, index=1), others=cars)
+    text = describe_with_traffic(snapshot).text
+    assert text == (
+        f"{describe(snapshot).text} The car behind me in my lane is 30.0 m away and drives at 33.0 m/s. "
+        "In the lane on my left the nearest cars are 12.3 m ahead at 24.1 m/s and 20.0 m behind at 28.0 m/s. "
+        "In the lane on my right a car is right beside me and drives at 25.0 m/s."
+    )
+    assert describe_with_traffic(snapshot).situation == describe(snapshot).situation
+
+
+def test_empty_lanes_lanes_that_are_not_there_and_the_shoulder_are_told(highway: Make) -> None:
+    text = describe_with_traffic(highway(lanes=2, index=0, emergency=True)).text
+    assert "no car behind me in my lane within 100 m. There is no lane on my left." in text
+    assert text.endswith("On my right is the emergency lane.")
+    assert describe_with_traffic(highway(lanes=2, index=1)).text.endswith(
+        "The lane on my left is free of cars for 100 m ahead and behind. There is no lane on my right."
+    )
+
+
+def test_a_car_on_another_segment_is_placed_beside_the_ego_and_oncoming_ones_are_left_out(highway: Make) -> None:
+    elsewhere = replace(_car(1, -50.0, 0, 30.0), lane=("b", "c", 0))
+    oncoming = _car(2, -20.0, 0, 30.0, heading_rad=3.14159)
+    text = describe_with_traffic(replace(highway(lanes=4, index=1), others=(elsewhere, oncoming))).text
+    assert "In the lane on my left the nearest car is 50.0 m behind at 30.0 m/s." in text

@@ -214,3 +214,16 @@ def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="report cannot be written"):
         write_report_page(tmp_path / "file" / "report.html", _report())
     assert write_report_page(tmp_path / "deep" / "report.html", _report()).read_text().startswith("<!doctype html>")
+
+
+def test_the_page_opens_with_its_table_and_one_plot_and_words_come_after() -> None:
+    text = render_report(_report())
+    table, plot, words = (text.index(part) for part in ("<table>", '<figure class="plot">', '<section id="words"'))
+    assert table < plot < words
+    assert text.count('<figure class="plot">') == 1
+
+
+def test_every_figure_carries_the_name_of_its_column_for_narrow_screens() -> None:
+    text = render_report(_report())
+    cells = re.findall(r"<td[^>]*>", text)
+    assert cells and all("data-head=" in cell for cell in cells)

@@ -21,7 +21,7 @@ def test_a_streamed_reply_becomes_a_plan_with_its_costs(server, bench):
     plan = bench.plan(model="m")
     assert plan.policy == Program(PROGRAM)
     assert plan.thoughts.text == "Hold 25 m/s."
-    assert plan.refusal == "" and plan.intent == ""
+    assert plan.refusal == "" and plan.intent == "speed.set"
     assert (plan.planner, plan.model) == ("openai/m", "served-1")
     assert plan.raw == REPLY
     assert (plan.usage.prompt_tokens, plan.usage.completion_tokens, plan.usage.requests) == (1000, 200, 1)

@@ -14,6 +14,7 @@ from server import DONE, PROGRAM, REPLY, body, chunk, events, fails, reset_after
 from chauffeur.concept import ConfigError, PlannerError, Program
 from chauffeur.planners.cache import ReplyCache
 from chauffeur.planners.llm_address import parse_address
+from chauffeur.planners.llm_endpoint import Sampling
 from chauffeur.planners.llm_errors import EndpointError, retry_after_s
 from chauffeur.planners.llm_retry import RetryPolicy
 
@@ -47,10 +48,10 @@ def test_404_names_the_model_and_how_to_list_them(server, bench):
 
 def test_403_400_and_501_are_final(server, bench):
     for status, kind in ((403, "forbidden"), (400, "bad_request"), (501, "bad_request")):
-        server.script(fails(status, "context length exceeded"))
+        server.script(fails(status, "the moon is full"))
         error = failure(bench)
         assert (error.kind, error.retryable) == (kind, False)
-        assert "context length exceeded" in error.message
+        assert "the moon is full" in error.message
     assert bench.waits == []
 
 
@@ -102,8 +103,17 @@ def test_no_first_byte_in_time(server, bench):
     server.script(silent(5.0))
     started = time.monotonic()
     error = failure(bench, timeout_s=0.15, retry=RetryPolicy(attempts=2))
-    assert (error.kind, error.retryable) == ("timeout", True)
+    assert (error.kind, error.retryable) == ("timeout", False)
+    assert "Not asked again" in error.message and "CHAUFFEUR_TIMEOUT_S=0.6" in error.hint
+    assert len(server.requests) == 1
     assert time.monotonic() - started < 2.0
+
+
+def test_what_may_come_out_otherwise_is_asked_again_after_a_time_out_and_that_is_said(server, bench, caplog):
+    server.script(silent(5.0))
+    error = failure(bench, timeout_s=0.1, retry=RetryPolicy(attempts=2), sampling=Sampling(temperature=0.7))
+    assert error.retryable and len(server.requests) == 2
+    assert "The request is sent again." in caplog.text
 
 
 def test_a_stream_that_drips_for_ever_is_bounded_as_a_whole(server, bench):
@@ -116,7 +126,7 @@ def test_a_stream_that_drips_for_ever_is_bounded_as_a_whole(server, bench):
 def test_a_plan_has_a_budget_for_everything_together(server, bench):
     server.script(silent(5.0))
     started = time.monotonic()
-    error = failure(bench, timeout_s=0.1, budget_s=0.25)
+    error = failure(bench, timeout_s=0.1, budget_s=0.25, sampling=Sampling(temperature=0.7))
     assert error.kind == "timeout" and "0.25 s" in error.message
     assert time.monotonic() - started < 2.0
 
@@ -163,7 +173,8 @@ def test_garbage_in_the_stream_is_a_typed_failure(server, bench, pieces):
     server.script(events(*pieces))
     error = failure(bench)
     assert error.kind in {"garbage", "truncated"} and error.retryable
-    assert len(server.requests) == 4
+    asked = [request for request in server.requests if request.body.get("stream")]
+    assert len(server.requests) == 4 + (len(asked) < 4), "an empty stream is asked for whole, once"
 
 
 @pytest.mark.parametrize(

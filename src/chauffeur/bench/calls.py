@@ -38,7 +38,7 @@ _SIGNALS: Final[dict[Kind, Signal]] = {
 }
 _WORKED: Final[frozenset[Kind]] = frozenset({"timeout", "truncated", "garbage", "broken"})
 _HOPELESS: Final[frozenset[Kind]] = frozenset(
-    {"no_key", "unauthorized", "forbidden", "not_found", "quota", "not_an_api"}
+    {"no_key", "unauthorized", "forbidden", "not_found", "quota", "not_an_api", "context"}
 )
 """The next call would fail the same way, whatever is asked."""
 
@@ -96,6 +96,7 @@ class Caller:
         price: For planners that do not know what they cost.
         patience: How often one plan is tried.
         halt: Set once nothing more is sent.
+        repeated: Calls sent again, word for word, after a time-out.
     """
 
     planner: Planner
@@ -105,6 +106,7 @@ class Caller:
     price: Price | None = None
     patience: Patience = field(default_factory=Patience)
     halt: Halt | None = None
+    repeated: int = 0
     _fruitless: int = 0
     _settled: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -129,6 +131,7 @@ class Caller:
             if not (outcome.retryable and again and _asked_s(outcome) <= TOO_LONG_S):
                 self._given_up(outcome)
                 return Answer(None, last, bill)
+            self.repeated += isinstance(outcome, EndpointError) and outcome.kind == "timeout"
             if not refused:
                 wait_s = min(self.patience.cap_s, self.patience.base_s * 2.0 ** (failures - 1))
                 await asyncio.sleep(wait_s * float(self.rng.uniform(0.5, 1.0)))
@@ -168,6 +171,10 @@ class Caller:
             bill.add(self.spending.settled(outcome.usage))
         elif isinstance(outcome, EndpointError):
             signal = _SIGNALS.get(outcome.kind, "neither")
+            if (
+                outcome.kind == "timeout" and self.gate.in_flight == 1
+            ):  # with fewer beside it, it may be quicker; not so here
+                outcome = outcome.not_again("nothing else was asked beside it, so that it would take as long")
             asked_s = outcome.retry_after_s
             bill.add(self.spending.failed(1, worked=outcome.kind in _WORKED))
         else:

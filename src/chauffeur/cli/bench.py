@@ -39,6 +39,8 @@ Examples:
 
     chauffeur bench lampilot --data DbLv1 --planner onboard --out runs/big --shard 3/8
 
+    CHAUFFEUR_TIMEOUT_S=600 chauffeur bench lampilot --data DbLv1 --planner openai/local --concurrency 1
+
 The data set is LaMPilot's own (`DbLv1` in its public repository). Ctrl-C keeps what is done; the same command goes on.
 
 Exit codes: 0 done, 1 the endpoint or this machine gave up, 2 bad input, 3 the budget is used up, 130 Ctrl-C. Whatever
@@ -105,7 +107,13 @@ def lampilot(
     metrics: MetricsOption = "origin",
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
     concurrency: Annotated[
-        int, typer.Option(min=1, help="Planner calls in flight at most; fewer while refused.", rich_help_panel=_HOW)
+        int,
+        typer.Option(
+            min=1,
+            envvar="CHAUFFEUR_CONCURRENCY",
+            help="Planner calls in flight at most, fewer while refused; 1 for a server of one slot.",
+            rich_help_panel=_HOW,
+        ),
     ] = 16,
     max_usd: Annotated[
         float | None, typer.Option(min=0.0, help="Budget of the run in USD.", rich_help_panel=_HOW)
@@ -171,7 +179,9 @@ def passengers(
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/passengers-PLANNER.")] = None,
     setting: Annotated[str, typer.Option(help="Prompt for language models: `few-shot` or `zero-shot`.")] = "few-shot",
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
-    concurrency: Annotated[int, typer.Option(min=1, help="Planner calls in flight at most.")] = 16,
+    concurrency: Annotated[
+        int, typer.Option(min=1, envvar="CHAUFFEUR_CONCURRENCY", help="Planner calls in flight at most.")
+    ] = 16,
     workers: Annotated[int | None, typer.Option(min=1, help="Simulation processes; default one per core.")] = None,
 ) -> None:
     """Hand-written wishes with the right outcome each: driven, asked back about, or refused."""
@@ -273,6 +283,7 @@ def _drive(console: Console, run: LampilotRun, effort: Effort, metrics: str) -> 
 def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
     import chauffeur
     from chauffeur.bench.lampilot.report import answers_note, comparison_lines, family_lines
+    from chauffeur.planners.llm_errors import TIMEOUT_VARIABLE
 
     rated = [row for row, item in zip(rows, run.items, strict=True) if run.stages.asked(item)]
     if not rated:
@@ -300,6 +311,11 @@ def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
     spoiled = sum(bool(row["infra_failed"]) for row in rated)
     if spoiled:
         console.print(f"{spoiled} items failed for want of infrastructure; the same command tries them again.")
+    if run.repeated:
+        console.print(
+            f"{run.repeated} requests were sent again, word for word, after a time-out. A slow server wants a longer "
+            f"{TIMEOUT_VARIABLE} or a smaller --concurrency."
+        )
     console.print(f"Rows: {run.folder / 'results.jsonl'}", soft_wrap=True)
 
 

@@ -23,6 +23,12 @@ Examples:
 
     chauffeur drive "Speed up" --planner openai/qwen2.5 --base-url http://localhost:11434/v1
 
+    CHAUFFEUR_TIMEOUT_S=600 chauffeur drive "Speed up" --planner openai/local --base-url http://localhost:8080/v1
+
+--print-prompt shows what a model would be sent, offline and without a key. A slow server's time-out, token limit,
+attempts and repairs are set in the environment, for every command: CHAUFFEUR_TIMEOUT_S, CHAUFFEUR_MAX_TOKENS,
+CHAUFFEUR_ATTEMPTS, CHAUFFEUR_REPAIRS, CHAUFFEUR_BUDGET_S, CHAUFFEUR_TEMPERATURE.
+
 Exit code 1 says that the wish was refused or not done. Every drive is simulated.
 """
 
@@ -53,6 +59,9 @@ def drive(
     audit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
     ] = None,
+    print_prompt: Annotated[
+        bool, typer.Option("--print-prompt", help="Print what the planner's model would be sent, and stop there.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the outcome only.")] = False,
     full: Annotated[
         bool, typer.Option("--full", help="Print everything as it comes, in SI units: helpers, scores, provenance.")
@@ -104,6 +113,12 @@ def drive(
         setting=setting_named(setting),
     )
     start_seed = place.seed if seed is None else seed
+    if print_prompt:
+        from chauffeur.cli.prompts import show_prompt
+
+        session.tell = Quiet(console).tell
+        show_prompt(console, session.planner, asyncio.run(session.request(instruction, place, start_seed, bounds)))
+        return
     with ExitStack() as stack:
         auditor = None
         if audit is not None:  # before anything moves: a log that cannot be had is refused here

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from chauffeur.bench.report.build import Choices
+    from chauffeur.bench.report.model import ReportTable
 
 EXAMPLES = """
 Examples:
@@ -75,6 +76,9 @@ def report(
         written.append((name.removeprefix("report."), path_text(publish(folder / name, content, "report"))))
     if inspect is not None:
         written.append(("inspect", path_text(_write_log(inspect, runs[0], choices))))
+    for table in (made.table("scores"), made.table("pairs")):
+        if table is not None:
+            _show(console, table)
     console.print(plain(made.summary))
     for line in made.headlines:
         words = Text.assemble((plain(line.subject).plain, "bold"), ": ", plain(line.text))
@@ -84,6 +88,23 @@ def report(
     console.print(columns(written, indent=0))
     if browser:
         typer.launch(page.resolve().as_uri())
+
+
+def _show(console: Console, table: ReportTable) -> None:
+    """A table's own rows, without the paper's; intervals are in the files."""
+    from chauffeur.bench.report.tables import said
+    from chauffeur.cli.console import plain
+    from chauffeur.cli.tables import show_table
+
+    lines = [
+        [plain(said(line.name, line.labels)).plain, *(cell.text for cell in line.cells)]
+        for group in table.groups
+        for line in group.lines
+        if not line.published
+    ]
+    header = [table.first, *(f"{column.title} {column.unit}".strip() for column in table.columns)]
+    show_table(console, plain(table.caption), header, lines)
+    console.print()
 
 
 def _write_log(path: Path, folder: Path, choices: Choices) -> Path:

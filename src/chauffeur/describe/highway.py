@@ -16,8 +16,8 @@ from chauffeur.describe.road import (
 def describe_highway(snapshot: Snapshot) -> Context:
     """C of a highway snapshot.
 
-    Only the ego's own lane is described beyond its speed: what drives in the other lanes a program has to ask the
-    driving APIs for, as in the benchmark.
+    Only the ego's own lane is described beyond its speed, as in the benchmark; what drives behind and in the other
+    lanes is told by `describe_with_traffic`.
 
     Raises:
         ScenarioError: The ego is on no lane of the road.

@@ -58,10 +58,13 @@ class Stages:
     tell: Callable[[str, object], None]
 
 
-async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, stages: Stages) -> Trip:  # noqa: E741, N803
-    """One wish, from the words to the remembered trip."""
-    snapshot = stages.world.reset(scenario, seed)
-
+def ask(
+    I: Instruction,  # noqa: E741, N803
+    snapshot: Snapshot,
+    limits: Limits,
+    stages: Stages,
+) -> PlanRequest:
+    """Everything the planner is given for a wish in a situation."""
     C = stages.describe(snapshot)  # noqa: N806
     H = stages.memory.recall(I.person, I, C, 3)  # noqa: N806
     S = stages.system(limits)  # noqa: N806
@@ -70,11 +73,20 @@ async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, s
 
     request, screened = screen_request(PlanRequest(I, C, S, H, limits=limits))  # words are data
     stages.tell("screened", screened)
+    return request
+
+
+async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, stages: Stages) -> Trip:  # noqa: E741, N803
+    """One wish, from the words to the remembered trip."""
+    snapshot = stages.world.reset(scenario, seed)
+
+    request = ask(I, snapshot, limits, stages)
     own = planned_for(I.text, snapshot)  # emergency words are no planner's to decide
     plan = own or await plan_or_answer(stages.planner, request)  # R, P
     stages.tell("RP", plan)
 
-    V = not_checked(plan) if own else checked(I, plan, snapshot, limits, stages)  # noqa: N806
+    forbidden = check_told_not_to(I.text, plan, snapshot)  # by the person, in words
+    V = not_checked(plan) if own else (*stages.check(plan, snapshot, limits), *forbidden)  # noqa: N806
     stages.tell("V", V)
 
     trip = stages.execute(request, plan, V, scenario, seed)  # drives P only if no verdict stops it
@@ -82,14 +94,3 @@ async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, s
 
     stages.memory.remember(trip, None)  # H + (I, C, P, R); F joins when the person speaks
     return trip
-
-
-def checked(
-    I: Instruction,  # noqa: E741, N803
-    plan: Plan,
-    snapshot: Snapshot,
-    limits: Limits,
-    stages: Stages,
-) -> tuple[Verdict, ...]:
-    """What stands between a planner's plan and the vehicle: the checks, and what the person has forbidden in words."""
-    return (*stages.check(plan, snapshot, limits), *check_told_not_to(I.text, plan, snapshot))

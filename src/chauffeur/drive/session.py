@@ -37,7 +37,7 @@ from chauffeur.concept.registry import load_plugin
 from chauffeur.describe.services.sources import SourceSettings
 from chauffeur.drive.effects import effect_of
 from chauffeur.drive.episode import Episode, Referee, run_episode
-from chauffeur.drive.loop import Memory, Stages, drive
+from chauffeur.drive.loop import Memory, Stages, ask, drive
 from chauffeur.drive.parameters import drive_parameters, shield_for
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.surroundings import describing, opened
@@ -136,8 +136,27 @@ class Session:
             ChauffeurError: No plan could be had, or the scenario cannot be set up. The simulated car has not moved.
         """
         self._episode = None  # a wish that is refused must not be filed with the drive before it
-        world = make_world(scenario)
-        stages = Stages(
+        trip = await drive(wish, scenario, seed, limits, await self._stages(make_world(scenario)))
+        episode = self._episode
+        return RecordedTrip(
+            trip=trip,
+            frames=() if episode is None else episode.frames,
+            scenario=scenario,
+            system=self._system,
+            final=None if episode is None else episode.final,
+        )
+
+    async def request(self, wish: Instruction, scenario: Scenario, seed: int, limits: Limits) -> PlanRequest:
+        """What `drive` would ask the planner. Nobody is asked and nothing is driven.
+
+        Raises:
+            ChauffeurError: The scenario cannot be set up.
+        """
+        stages = await self._stages(make_world(scenario))
+        return ask(wish, stages.world.reset(scenario, seed), limits, stages)
+
+    async def _stages(self, world: World) -> Stages:
+        return Stages(
             world=world,
             describe=await self._describing(),
             memory=TolerantMemory(self.memory, partial(self.tell, "memory")),
@@ -146,15 +165,6 @@ class Session:
             check=check_drive,
             execute=partial(self._execute, world),
             tell=self.tell,
-        )
-        trip = await drive(wish, scenario, seed, limits, stages)
-        episode = self._episode
-        return RecordedTrip(
-            trip=trip,
-            frames=() if episode is None else episode.frames,
-            scenario=scenario,
-            system=self._system,
-            final=None if episode is None else episode.final,
         )
 
     async def _describing(self) -> Callable[[Snapshot], Context]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from chauffeur.concept import Context, Snapshot
-from chauffeur.describe import describe
+from chauffeur.describe import describe_with_traffic
 from chauffeur.describe.services.sourced import FOR_SIMULATED, with_sources
 from chauffeur.describe.services.sources import Sources, SourceSettings
 from chauffeur.memory.files import data_home
@@ -41,6 +41,6 @@ async def describing(sources: Sources | None) -> Callable[[Snapshot], Context]:
     Without sources, of what is seen alone.
     """
     if sources is None:
-        return describe
+        return describe_with_traffic
     found = await sources.look()
-    return lambda snapshot: with_sources(describe(snapshot), found, sources.place_words(), FOR_SIMULATED)
+    return lambda snapshot: with_sources(describe_with_traffic(snapshot), found, sources.place_words(), FOR_SIMULATED)

@@ -7,7 +7,9 @@ style, by hash.
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from chauffeur.bench.report.model import (
@@ -17,6 +19,7 @@ from chauffeur.bench.report.model import (
     Failure,
     FlipList,
     Gallery,
+    Group,
     Line,
     Report,
     ReportTable,
@@ -39,6 +42,8 @@ _KEY = (
     "The amber car is the one that was driven; the line behind it is its way so far. Pictures go from left to right, "
     "and the marks on the curves are their moments."
 )
+_FIRST = ("scores", "pairs")
+"""Tables that the page opens with; words and the rest come after them."""
 _BAD = ("collision", "off_road", "failure", "timeout")
 
 
@@ -58,8 +63,11 @@ def write_report_page(path: Path, report: Report) -> Path:
 def render_report(report: Report) -> str:
     """The page of a report as text."""
     style = "\n".join(asset(name) for name in _STYLES)
+    first = [table for table in report.tables if table.id in _FIRST]
     sections = [
-        *((table.id, table.title, _section(table)) for table in report.tables),
+        *((table.id, table.title, _section(table)) for table in first),
+        ("words", "In words", _in_words(report)),
+        *((table.id, table.title, _section(table)) for table in report.tables if table not in first),
         *([("flips", "Items that went differently", _flips(report.flips))] if report.flips else []),
         ("failures", "Failures", _galleries(report.galleries)),
         ("method", "How the figures were made", _method(report)),
@@ -74,7 +82,6 @@ def render_report(report: Report) -> str:
             "subtitle": _text(report.subtitle) + _labels(report.labels),
             "simulated": _text(words.SIMULATED.replace("drive", "drives")),
             "ruler": _text(f"Ruler {report.ruler}"),
-            "headlines": _headlines(report),
             "warnings": "".join(f'<p class="notice">{_text(warning)}</p>' for warning in report.warnings),
             "nav": "".join(f'<a href="#{name}">{_text(title)}</a>' for name, title, _ in sections),
             "symbols": SYMBOLS,
@@ -87,17 +94,95 @@ def _text(text: str) -> str:
     return html.escape(printable(text))
 
 
-def _headlines(report: Report) -> str:
+def _in_words(report: Report) -> str:
     items = "".join(f"<li><b>{_text(line.subject)}:</b> {_text(line.text)}</li>" for line in report.headlines)
-    return f'<p class="first">{_text(report.summary)}</p><ul class="headlines">{items}</ul>'
+    return (
+        f'<section id="words" class="card">{_heading("In words")}'
+        f'<p class="first">{_text(report.summary)}</p><ul class="headlines">{items}</ul></section>'
+    )
 
 
 def _section(table: ReportTable) -> str:
     lead = f"<p>{_text(table.lead)}</p>" if table.lead else ""
+    # What the paper printed is for looking up: unfolded, its rows would bury those that the report is about.
+    own = tuple(group for group in table.groups if not _published(group))
+    printed = tuple(group for group in table.groups if _published(group))
+    shown = _table(replace(table, groups=own or printed))
+    if own and printed:
+        shown += _plot(table) + "".join(
+            f"<details><summary>{_text(group.heading)}</summary>"
+            f"{_table(replace(table, groups=(replace(group, heading=''),), title=group.heading))}</details>"
+            for group in printed
+        )
+    elif table.id == "scores":
+        shown += _plot(table)
     return (
         f'<section id="{table.id}" class="card">{_heading(table.title, simulated=table.simulated)}{lead}'
-        f"{_table(table)}{_notes(table.notes)}{_legend(table.columns)}</section>"
+        f"{shown}{_notes(table.notes)}{_legend(table.columns)}</section>"
     )
+
+
+def _published(group: Group) -> bool:
+    return any(line.published for line in group.lines)
+
+
+def _plot(table: ReportTable) -> str:
+    """The last column with an axis, which is the score: a line a run, and of the paper's the best and the human's."""
+    place = max((place for place, column in enumerate(table.columns) if column.span is not None), default=None)
+    if place is None:
+        return ""
+    column = table.columns[place]
+    assert column.span is not None
+    own = [line for group in table.groups for line in group.lines if not line.published]
+    printed = [line for group in table.groups for line in group.lines if line.published]
+    models = [line for line in printed if "," in line.name]  # a language model and its setting
+    shown = [
+        *own,
+        *sorted(models, key=lambda line: _value(line.cells[place]))[-1:],
+        *(line for line in printed if line.name == "Human driver"),
+    ]
+    low, high = column.span
+
+    def at(value: float) -> str:
+        return f"{100.0 * (min(max(value, low), high) - low) / (high - low):.2f}%"
+
+    marks = _axis_marks(low, high)
+    grid = "".join(f'<line class="grid" x1="{at(mark)}" x2="{at(mark)}" y1="0" y2="100%"/>' for mark in marks)
+    rows: list[str] = []
+    for line in shown:
+        cell = line.cells[place]
+        if cell.interval is None or cell.interval.value is None:
+            continue
+        ends = tuple(at(end) for end in cell.ends) if cell.ends is not None else ()
+        whisker = f'<line class="range" x1="{ends[0]}" x2="{ends[1]}" y1="50%" y2="50%"/>' if ends else ""
+        value = at(cell.interval.value)
+        kind, name = ("printed", f"paper: {line.name}") if line.published else ("own", line.name)
+        rows.append(
+            f'<li class="{kind}"><span class="who">{_name(name, line.labels)}</span>'
+            f'<svg aria-hidden="true">{grid}{whisker}<circle class="value" cx="{value}" cy="50%" r="5"/></svg>'
+            f"<b>{_text(cell.text)}</b></li>"
+        )
+    numbers = "".join(f'<text x="{at(mark)}" y="1em" text-anchor="middle">{number(mark, 0)}</text>' for mark in marks)
+    caption = f"{column.title}, {column.unit}; bars are 95 % intervals." if column.unit else column.title
+    if any(line.published for line in shown):
+        caption += (
+            " Of the paper's rows, measured by its authors on other items, its best language model and its human."
+        )
+    return (
+        f'<figure class="plot"><figcaption>{_text(caption)}</figcaption><ol>{"".join(rows)}'
+        f'<li class="axis" aria-hidden="true"><svg>{numbers}</svg></li></ol></figure>'
+    )
+
+
+def _value(cell: Cell) -> float:
+    return -math.inf if cell.interval is None or cell.interval.value is None else cell.interval.value
+
+
+def _axis_marks(low: float, high: float) -> list[float]:
+    """Round numbers on an axis, some five of them."""
+    step = next((step for step in (5.0, 10.0, 20.0, 25.0, 50.0, 100.0) if (high - low) / step <= 6.0), 200.0)
+    first = math.ceil(low / step)
+    return [step * place for place in range(first, math.floor(high / step) + 1)]
 
 
 def _heading(title: str, *, simulated: bool = True) -> str:
@@ -133,8 +218,16 @@ def _head(column: Column) -> str:
 
 
 def _row(line: Line, columns: Sequence[Column]) -> str:
-    cells = "".join(f"<td>{_cell(cell, column)}</td>" for cell, column in zip(line.cells, columns, strict=True))
+    cells = "".join(
+        f"<td {_column_head(column)}>{_cell(cell, column)}</td>"
+        for cell, column in zip(line.cells, columns, strict=True)
+    )
     return f'<tr><th scope="row">{_name(line.name, line.labels)}</th>{cells}</tr>'
+
+
+def _column_head(column: Column) -> str:
+    """What a cell is, said in it where the screen is too narrow for columns."""
+    return f'data-head="{_text(f"{column.title} {column.unit}".strip())}"'
 
 
 def _name(name: str, labels: Sequence[str]) -> str:
@@ -196,9 +289,10 @@ def _flips(flips: Sequence[FlipList]) -> str:
 def _flip_list(pair: FlipList) -> str:
     rows = "".join(
         f'<tr><th scope="row">{_text(flip.sample)}<small>{_text(flip.family)}</small></th>'
-        f"<td><b>{flip.lost}</b></td><td><b>{flip.gained}</b></td>"
-        f'<td class="words">“{_text(flip.command)}”</td>'
-        f'<td class="words">{_text(flip.first)}</td><td class="words">{_text(flip.second)}</td></tr>'
+        f'<td data-head="Only A"><b>{flip.lost}</b></td><td data-head="Only B"><b>{flip.gained}</b></td>'
+        f'<td class="words" data-head="One of the commands">“{_text(flip.command)}”</td>'
+        f'<td class="words" data-head="A">{_text(flip.first)}</td>'
+        f'<td class="words" data-head="B">{_text(flip.second)}</td></tr>'
         for flip in pair.flips
     )
     lost, gained = (sum(getattr(flip, name) for flip in pair.flips) for name in ("lost", "gained"))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from chauffeur.concept import Plan, PlanRequest, Thoughts, Usage
 from chauffeur.planners.prompts import Message
@@ -57,6 +57,30 @@ def declined(
         usage=usage or Usage(),
         raw=raw,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Prompt:
+    """What a planner sends its model first.
+
+    Attributes:
+        url: Where to.
+        messages: The conversation, word for word.
+        parameters: Everything else in the request's body.
+    """
+
+    url: str
+    messages: Sequence[Message]
+    parameters: Mapping[str, Any]
+
+
+@runtime_checkable
+class Prompting(Protocol):
+    """A planner that sends a prompt."""
+
+    def prompt(self, request: PlanRequest) -> Prompt:
+        """What would be sent first for a request; nobody is asked."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

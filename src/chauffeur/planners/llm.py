@@ -9,19 +9,22 @@ import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from chauffeur.concept import ConfigError, InstructionError, Plan, PlanRequest, Program, Thoughts, Usage
 from chauffeur.concept.addresses import Address
-from chauffeur.planners.base import OnText, Prose
+from chauffeur.planners.base import OnText, Prompt, Prose
 from chauffeur.planners.cache import Completion, ReplyCache, default_cache_dir, endpoint_key
 from chauffeur.planners.llm_address import parse_address
 from chauffeur.planners.llm_endpoint import Endpoint, Sampling
-from chauffeur.planners.llm_errors import timed_out
+from chauffeur.planners.llm_errors import EndpointError, timed_out
 from chauffeur.planners.llm_reply import MAX_REPLY_CHARS, Reply, read_reply, without_thinking
 from chauffeur.planners.llm_retry import RetryPolicy, with_retries
+from chauffeur.planners.llm_settings import settings_from
 from chauffeur.planners.pricing import cost_usd
 from chauffeur.planners.prompts import Message, build_messages, repair_turns
+from chauffeur.planners.wish_goal import NO_GOAL, goal_of
+from chauffeur.safety.envelope import policy_findings
 
 if TYPE_CHECKING:
     import numpy as np
@@ -116,13 +119,13 @@ class LlmPlanner:
         argument: str,
         *,
         base_url: str | None = None,
-        temperature: float | None = 0.0,
+        temperature: float | Literal["server"] | None = None,
         seed: int | None = None,
-        max_tokens: int = 4096,
-        timeout_s: float = 60.0,
-        attempts: int = 4,
-        repairs: int = 1,
-        budget_s: float = 180.0,
+        max_tokens: int | None = None,
+        timeout_s: float | None = None,
+        attempts: int | None = None,
+        repairs: int | None = None,
+        budget_s: float | None = None,
         cache: bool = True,
         cache_dir: str | Path | None = None,
         stream: bool = True,
@@ -134,13 +137,14 @@ class LlmPlanner:
         Args:
             argument: Model id.
             base_url: Address of the endpoint; default CHAUFFEUR_BASE_URL, OPENAI_BASE_URL, then OpenAI's own.
-            temperature: 0..2; None leaves it to the server.
+            temperature: As `LlmSettings` has it, as the five after it; None takes it from the environment, else as it
+                stands. `server` leaves it to the server.
             seed: For servers that take one; also seeds the jitter of retries.
-            max_tokens: Most tokens the model may write.
-            timeout_s: For one whole reply.
-            attempts: Requests at most per answer.
-            repairs: How often the model may correct an answer the gate refused; 0 for a single shot.
-            budget_s: For a whole plan, retries, waits and repairs included.
+            max_tokens: See `LlmSettings`.
+            timeout_s: See `LlmSettings`.
+            attempts: See `LlmSettings`.
+            repairs: See `LlmSettings`.
+            budget_s: See `LlmSettings`.
             cache: Whether to keep replies on disk and use kept ones.
             cache_dir: Where; default is the user's cache folder.
             stream: Ask for the reply piece by piece.
@@ -153,16 +157,17 @@ class LlmPlanner:
         model = argument.strip()
         if not model:
             raise ConfigError("The openai planner needs a model.", hint="Write for example openai/gpt-4o.")
-        for name, value, fits in (
-            ("temperature", temperature, temperature is None or 0.0 <= temperature <= 2.0),
-            ("max_tokens", max_tokens, max_tokens > 0),
-            ("timeout_s", timeout_s, timeout_s > 0.0),
-            ("attempts", attempts, attempts > 0),
-            ("repairs", repairs, 0 <= repairs <= 5),
-            ("budget_s", budget_s, budget_s > 0.0),
-        ):
-            if not fits:
-                raise ConfigError(f"{name} = {value} is out of range.")
+        how = settings_from(
+            os.environ,
+            {
+                "temperature": temperature,
+                "max_tokens": max_tokens,
+                "timeout_s": timeout_s,
+                "attempts": attempts,
+                "repairs": repairs,
+                "budget_s": budget_s,
+            },
+        )
         import numpy as np
 
         root = Path(cache_dir) if cache_dir is not None else default_cache_dir()
@@ -170,11 +175,11 @@ class LlmPlanner:
             model,
             parse_address(base_url, os.environ),
             rng=np.random.default_rng(seed),
-            sampling=Sampling(temperature=temperature, seed=seed, max_tokens=max_tokens),
-            timeout_s=timeout_s,
-            retry=RetryPolicy(attempts=attempts),
-            repairs=repairs,
-            budget_s=budget_s,
+            sampling=Sampling(temperature=how.temperature, seed=seed, max_tokens=how.max_tokens),
+            timeout_s=how.timeout_s,
+            retry=RetryPolicy(attempts=how.attempts),
+            repairs=how.repairs,
+            budget_s=how.plan_s,
             cache=ReplyCache(root) if cache else None,
             gate=gate,
             on_text=on_text,
@@ -204,15 +209,18 @@ class LlmPlanner:
         bill = _Bill()
         try:
             async with asyncio.timeout(self._budget_s):
-                completion, reply = await self._converse(build_messages(request), request.system.library, bill)
+                completion, reply = await self._converse(request, bill)
         except TimeoutError:
             raise timed_out(self._address.url, self._budget_s) from None
+        policy = _program(reply.source, request.system.library) if reply.source is not None else None
+        goal = NO_GOAL if policy is None else goal_of(request)
         return Plan(
             thoughts=Thoughts(reply.thoughts),
             # A program that the gate still refuses is handed on: the checks of the loop refuse it on the record.
-            policy=_program(reply.source, request.system.library) if reply.source is not None else None,
+            policy=policy,
             refusal=reply.refusal or (f"The model gave no usable program: {reply.problem}." if reply.problem else ""),
-            intent=INTENT_DECLINED if reply.refusal else INTENT_UNUSABLE if reply.problem else "",
+            intent=INTENT_DECLINED if reply.refusal else INTENT_UNUSABLE if reply.problem else goal.intent,
+            settings=goal.settings,
             planner=self.id,
             model=completion.model or self._model,
             usage=self._usage(bill),
@@ -236,29 +244,41 @@ class LlmPlanner:
         whole = completion.finish not in _CUT
         return Prose(text, whole, completion.model or self._model, self._usage(bill))
 
+    def prompt(self, request: PlanRequest) -> Prompt:
+        """What would be sent first for a request. Asks nobody, needs no key."""
+        body = self._endpoint.body(build_messages(request), self._sampling)
+        messages: list[Message] = body.pop("messages")
+        return Prompt(f"{self._address.url}/chat/completions", messages, body)
+
     async def close(self) -> None:
         """Close the connections to the endpoint."""
         await self._endpoint.close()
 
-    async def _converse(self, messages: list[Message], library: str, bill: _Bill) -> tuple[Completion, Reply]:
-        completion, reply, findings = await self._answer(messages, library, bill)
+    async def _converse(self, request: PlanRequest, bill: _Bill) -> tuple[Completion, Reply]:
+        messages = build_messages(request)
+        completion, reply, findings = await self._answer(messages, request, bill)
         for _ in range(self._repairs):
             if not findings:
                 break
             _log.info("%s: asking for a repair: %s", self.id, "; ".join(findings))
             messages = [*messages, *repair_turns(completion.text, findings)]
-            completion, reply, findings = await self._answer(messages, library, bill)
+            completion, reply, findings = await self._answer(messages, request, bill)
         return completion, reply
 
-    async def _answer(self, messages: list[Message], library: str, bill: _Bill) -> tuple[Completion, Reply, list[str]]:
+    async def _answer(
+        self, messages: list[Message], request: PlanRequest, bill: _Bill
+    ) -> tuple[Completion, Reply, list[str]]:
         completion = await self._complete(messages, bill)
         reply = read_reply(completion.text, cut=completion.finish in _CUT)
         if reply.problem:
             return completion, reply, [reply.problem]
-        return completion, reply, self._findings(reply.source, library) if reply.source is not None else []
+        return completion, reply, self._findings(reply.source, request) if reply.source is not None else []
 
-    def _findings(self, source: str, library: str) -> list[str]:
-        return program_findings(source, library) if self._gate is None else self._gate(source)
+    def _findings(self, source: str, request: PlanRequest) -> list[str]:
+        """What the checks find in a program: not of the language; else numbers and moves that road or limits forbid."""
+        library = request.system.library
+        found = program_findings(source, library) if self._gate is None else self._gate(source)
+        return found or policy_findings(_program(source, library), request.context.situation, request.limits)
 
     async def _complete(self, messages: list[Message], bill: _Bill) -> Completion:
         bill.answers += 1
@@ -274,7 +294,15 @@ class LlmPlanner:
         async def attempt() -> Completion:
             bill.requests += 1
             number = bill.requests
-            return await self._endpoint.complete(messages, self._sampling, lambda text: self._show(text, number))
+            try:
+                return await self._endpoint.complete(messages, self._sampling, lambda text: self._show(text, number))
+            except EndpointError as error:
+                if error.kind != "timeout" or self._retry.attempts == 1:
+                    raise
+                if self._sampling.temperature == 0.0:
+                    raise error.not_again("the same request at temperature 0 would take as long") from None
+                _log.warning("%s The request is sent again.", error.message)
+                raise
 
         completion = await with_retries(attempt, self._retry, self._rng, self._sleep)
         bill.prompt_tokens += completion.prompt_tokens

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, cast
 
 from chauffeur.concept.addresses import Address, read_key
 from chauffeur.planners.cache import Completion
 from chauffeur.planners.llm_address import PLACEHOLDER_KEY
+from chauffeur.planners.llm_context import LEAST_ANSWER_TOKENS, shortage_in, too_small, was_cut
 from chauffeur.planners.llm_errors import (
     KEY_VARIABLES,
     EndpointError,
@@ -32,6 +34,10 @@ _log = logging.getLogger(__name__)
 
 _CONNECT_S = 10.0
 _MODEL_CHARS = 200
+_MAX_BODY_BYTES = 64_000_000
+"""Longest reply read in one piece."""
+_DISLIKES = frozenset({400, 422})
+"""How servers answer a parameter that they do not take; 501 where it is streaming."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +68,8 @@ class Endpoint:
         model: Model to ask for.
         timeout_s: For one whole reply, from request to last word.
         max_chars: Longest reply read; the rest is not fetched.
-        stream: Ask for the reply piece by piece; off for gateways that cannot.
+        stream: Ask for the reply piece by piece. How the server answers decides how it is read: one that sends whole
+            replies only, or streams only, is understood either way.
         environ: Where the key is read from.
     """
 
@@ -84,6 +91,8 @@ class Endpoint:
         self._environ = environ
         self._client: tuple[asyncio.AbstractEventLoop, AsyncOpenAI] | None = None
         self._renamed: dict[str, str | None] = {}
+        self._turned = False
+        self._told: set[str] = set()
 
     async def complete(self, messages: list[Message], sampling: Sampling, on_text: Callable[[str], None]) -> Completion:
         """One reply.
@@ -98,18 +107,40 @@ class Endpoint:
         """
         client = self._connect()
         while True:
-            body = self._body(messages, sampling)
+            body = self.body(messages, sampling)
             try:
                 async with asyncio.timeout(self._timeout_s):
-                    return await self._exchange(client, body, on_text)
+                    completion = await self._exchange(client, body, on_text)
+                self._check_read(messages, completion)
+            except _EmptyStreamError:
+                if (
+                    not self._turned
+                ):  # llama-cpp-python ends a stream without a word where a whole reply says what is wrong
+                    self._turned, self._stream = True, False
+                    continue
+                failure = garbage(self._address.url, "an empty stream")
             except EndpointError as error:
                 failure = error
             except TimeoutError:
                 failure = timed_out(self._address.url, self._timeout_s)
             except Exception as error:  # noqa: BLE001 - the SDK lets through whatever the stack below it raises
-                if self._adapt(body, error):
+                # Before adapting: the words of a context that is too small name `max_tokens`, too.
+                shortage = shortage_in(error)
+                if shortage is not None:
+                    room = shortage.room()
+                    if LEAST_ANSWER_TOKENS <= room < sampling.max_tokens:
+                        sampling = replace(sampling, max_tokens=room)
+                        self._tell_once(
+                            f"the context of {self._address.url} leaves the answer {room:,} tokens, fewer than allowed"
+                        )
+                        continue
+                    failure = too_small(self._address.url, shortage, messages, sampling.max_tokens)
+                elif self._adapt(body, error):
                     continue
-                failure = from_sdk(error, self._address.url, self._model, self._key_variable(), self._scrub)
+                else:
+                    failure = from_sdk(error, self._address.url, self._model, self._key_variable(), self._scrub)
+            else:
+                return completion
             # Raised here, outside the handlers: the SDK's exception holds the request with the key in its headers.
             raise failure
 
@@ -149,7 +180,8 @@ class Endpoint:
         found = self._found_key()
         return text.replace(found[0], "***") if found else text
 
-    def _body(self, messages: list[Message], sampling: Sampling) -> dict[str, Any]:
+    def body(self, messages: list[Message], sampling: Sampling) -> dict[str, Any]:
+        """What is sent for a conversation, key and headers aside."""
         body: dict[str, Any] = {"model": self._model, "messages": messages, **sampling.parameters()}
         if self._stream:
             body |= {"stream": True, "stream_options": {"include_usage": True}}
@@ -163,10 +195,10 @@ class Endpoint:
     def _adapt(self, body: dict[str, Any], error: Exception) -> bool:
         """Whether the server only disliked an optional parameter, which is renamed or left out from now on.
 
-        Reasoning models take `max_completion_tokens` and no temperature; older servers know no stream options.
+        Reasoning models take `max_completion_tokens` and no temperature; older servers know no stream options; some
+        stream only, some never do.
         """
-        if getattr(error, "status_code", None) not in {400, 422}:
-            return False
+        status = getattr(error, "status_code", None)
         said = f"{getattr(error, 'param', '')} {getattr(error, 'message', '')}"
         for name, other in (
             ("max_tokens", "max_completion_tokens"),
@@ -174,40 +206,72 @@ class Endpoint:
             ("seed", None),
             ("stream_options", None),
         ):
-            if name in said and name in body:
+            if status in _DISLIKES and name in said and name in body:
                 self._renamed[name] = other
                 instead = f"using {other}" if other else "left out"
-                _log.warning("%s does not take %r; %s", self._address.url, name, instead)
+                self._tell_once(f"{self._address.url} does not take {name!r}; {instead}")
                 return True
+        if (status in _DISLIKES or status == 501) and "stream" in said.lower() and not self._turned:
+            self._turned = True
+            self._stream = not self._stream
+            self._tell_once(f"{self._address.url} {'streams only' if self._stream else 'does not stream'}")
+            return True
         return False
 
+    def _check_read(self, messages: list[Message], completion: Completion) -> None:
+        """Say so where the server cannot have read the whole prompt."""
+        if was_cut(messages, completion.prompt_tokens):
+            self._tell_once(
+                f"{self._address.url} counted {completion.prompt_tokens:,} tokens of a prompt that has more: its "
+                "context may be too small, and the prompt cut without a word (Ollama: OLLAMA_CONTEXT_LENGTH=8192)"
+            )
+
+    def _tell_once(self, what: str) -> None:
+        if what not in self._told:
+            self._told.add(what)
+            _log.warning("%s", what)
+
     async def _exchange(self, client: AsyncOpenAI, body: dict[str, Any], on_text: Callable[[str], None]) -> Completion:
+        from openai import AsyncStream
+        from openai.types.chat import ChatCompletionChunk
+
         # The parameters are adapted at run time, so the SDK's overloads cannot be told apart here.
-        create: Any = client.chat.completions.create
-        answer = await create(**body)
-        return await self._read_stream(answer, on_text) if self._stream else self._read_whole(answer, on_text)
+        create: Any = client.chat.completions.with_streaming_response.create
+        async with create(**body) as response:
+            content_type = str(response.headers.get("content-type", ""))
+            if content_type.startswith("text/event-stream"):
+                stream = AsyncStream(cast_to=ChatCompletionChunk, response=response.http_response, client=client)
+                return await self._read_stream(stream, on_text)
+            return await self._read_whole(response, content_type, on_text)
 
     async def _read_stream(self, stream: Any, on_text: Callable[[str], None]) -> Completion:
-        content_type = str(stream.response.headers.get("content-type", ""))
         tally = _Tally(self._max_chars)
         async with stream:
-            if not content_type.startswith("text/event-stream"):
-                raise not_an_api(self._address.url, content_type)
             async for chunk in stream:
                 on_text(tally.add(chunk))
                 if tally.full:
                     break
         if not tally.chunks:
-            raise garbage(self._address.url, "an empty stream")
+            raise _EmptyStreamError
         if not tally.finish:
             raise truncated(self._address.url)
         return self._finished(tally)
 
-    def _read_whole(self, answer: Any, on_text: Callable[[str], None]) -> Completion:
-        if isinstance(answer, str):
-            raise not_an_api(self._address.url, "a page of text")
+    async def _read_whole(self, response: Any, content_type: str, on_text: Callable[[str], None]) -> Completion:
+        from openai.types.chat import ChatCompletion
+
+        data = bytearray()
+        async for piece in response.iter_bytes():
+            data += piece
+            if len(data) > _MAX_BODY_BYTES:
+                raise garbage(self._address.url, f"more than {_MAX_BODY_BYTES // 1_000_000} MB")
+        if "json" not in content_type and not data.lstrip().startswith(b"{"):
+            raise not_an_api(self._address.url, content_type)
+        answer = json.loads(data)
+        if not isinstance(answer, dict):
+            raise garbage(self._address.url, "no object")
         tally = _Tally(self._max_chars)
-        on_text(tally.add(answer))
+        on_text(tally.add(ChatCompletion.construct(**cast("dict[str, Any]", answer))))
         if not tally.chunks:
             raise garbage(self._address.url, "no choices in it")
         return self._finished(tally)
@@ -222,6 +286,10 @@ class Endpoint:
             completion_tokens=tally.completion_tokens,
             model=self._scrub(tally.model)[:_MODEL_CHARS],
         )
+
+
+class _EmptyStreamError(Exception):
+    """A stream that ended before its first piece."""
 
 
 class _Tally:

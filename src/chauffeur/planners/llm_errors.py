@@ -17,6 +17,7 @@ Kind = Literal[
     "forbidden",
     "not_found",
     "bad_request",
+    "context",
     "rate_limit",
     "quota",
     "server",
@@ -30,6 +31,7 @@ Kind = Literal[
 ]
 
 KEY_VARIABLES = ("CHAUFFEUR_API_KEY", "OPENAI_API_KEY")
+TIMEOUT_VARIABLE = "CHAUFFEUR_TIMEOUT_S"
 
 _RETRYABLE_STATUS = frozenset({408, 409, 425, 429})
 _MESSAGE_CHARS = 300
@@ -49,6 +51,10 @@ class EndpointError(PlannerError):
         super().__init__(message, hint=hint, retryable=retryable)
         self.kind: Kind = kind
         self.retry_after_s = retry_after_s
+
+    def not_again(self, why: str) -> EndpointError:
+        """The same failure, for which nothing more is asked, and why not."""
+        return EndpointError(self.kind, f"{self.message} Not asked again: {why}.", hint=self.hint)
 
     def after(self, attempts: int, next_wait_s: float | None = None) -> EndpointError:
         """The same failure, with how often it was tried and, if that is why we stop, how long the wait would be."""
@@ -74,7 +80,10 @@ def timed_out(url: str, timeout_s: float) -> EndpointError:
     return EndpointError(
         "timeout",
         f"{url} gave no complete reply within {timeout_s:g} s.",
-        hint="Give it longer with --timeout, or use a smaller or nearer model.",
+        hint=(
+            f"Give it longer, e.g. {TIMEOUT_VARIABLE}={4.0 * timeout_s:g}; ask a server of one slot one at a time; "
+            "or use a smaller model or a faster machine."
+        ),
         retryable=True,
     )
 
@@ -165,6 +174,8 @@ def _from_status(
 
 def _from_transport(error: Exception, url: str, scrub: Callable[[str], str]) -> EndpointError:
     chain = _chain(error)
+    if any(type(cause).__name__ in ("ConnectTimeout", "PoolTimeout") for cause in chain):
+        return EndpointError("unreachable", f"{url} takes no connection.", hint="Try later.", retryable=True)
     if any(isinstance(cause, TimeoutError) or "Timeout" in type(cause).__name__ for cause in chain):
         return EndpointError("timeout", f"{url} did not answer in time.", hint="Try later.", retryable=True)
     if any(isinstance(cause, socket.gaierror) for cause in chain):

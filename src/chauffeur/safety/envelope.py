@@ -12,7 +12,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from chauffeur.concept import ActionMatrix, Limits, Parameters, Plan, Program, Snapshot, Trajectory, Verdict
+from chauffeur.concept import (
+    ActionMatrix,
+    Limits,
+    Parameters,
+    Plan,
+    Policy,
+    Program,
+    Situation,
+    Snapshot,
+    Thoughts,
+    Trajectory,
+    Verdict,
+)
 from chauffeur.concept.units import M_PER_CAR_LENGTH
 from chauffeur.safety.reading import ApiUse, Reading, read_program
 from chauffeur.safety.words import IN_A_HELPER, speed_words
@@ -58,6 +70,19 @@ def check_parameters(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:
     faults.sort(key=lambda fault: math.inf if fault.line is None else fault.line)
     reasons = list(dict.fromkeys(fault.reason for fault in faults))
     return Verdict(PARAMETERS_CHECK, False, " ".join(reasons), faults[0].line, faults[0].remedy)
+
+
+def policy_findings(policy: Policy, situation: Situation, limits: Limits) -> list[str]:
+    """What `check_parameters` will find in a policy, for a planner that can still mend it: line, reason and remedy."""
+    following = situation.front.speed_mps if situation.front is not None else situation.speed_mps
+    road = _Road(
+        situation.world, situation.lane_count, situation.lane_index, situation.speed_limit_mps, max(following, 0.0)
+    )
+    found = (
+        f"{'' if fault.line is None else f'line {fault.line}: '}{fault.reason} {fault.remedy}"
+        for fault in _policy_faults(Plan(Thoughts(""), policy), road, limits)
+    )
+    return list(dict.fromkeys(found))
 
 
 def _road(snapshot: Snapshot) -> _Road:

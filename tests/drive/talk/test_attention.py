@@ -7,9 +7,15 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import cast
 
 import pytest
 
+from chauffeur.concept import MissingExtraError
+from chauffeur.drive.talk.attention import Attention
+from chauffeur.drive.talk.hearing import Engine
+from chauffeur.drive.talk.messages import Listening, Note, Said
+from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.voice import Voice
 from chauffeur.speech.say import can_speak
 
@@ -79,6 +85,28 @@ def test_an_unplugged_microphone_is_told_and_screens_are_listened_to_then(tmp_pa
     acted, notes = done.stdout.strip().splitlines()[-2:]
     assert acted == "[]"
     assert "its own microphone" in notes and "may have been unplugged" in notes
+
+
+def test_without_the_speech_extra_a_page_starts_and_says_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "pocketsphinx.py").write_text("raise ImportError('not installed')\n")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(tmp_path), *sys.path)))
+    said: list[Said] = []
+    attention = Attention(Engine(), None, None, said.append, lambda hotword, words: None)
+    attention.start()
+    try:
+        attention.introduce()
+    finally:
+        attention.close()
+    assert attention.engine == ("", False)
+    listening = next(each for each in said if isinstance(each, Listening))
+    note = next(each for each in said if isinstance(each, Note))
+    assert listening.state == "off" and "Speech is off" in listening.why and "speech" in note.text
+
+    heard = Attention(Engine(), cast("Sound", object()), None, said.append, lambda hotword, words: None)
+    with pytest.raises(MissingExtraError):  # where this machine's own microphone was asked for
+        heard.start()
 
 
 def test_the_car_speaks_beside_everything_else() -> None:

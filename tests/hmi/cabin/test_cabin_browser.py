@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ from chauffeur.drive.talk.messages import (
     Evaluate,
     Hand,
     HowWasIt,
+    Listening,
     MemoryEntry,
     MemoryOrder,
     MemoryState,
@@ -71,6 +73,38 @@ def test_a_typed_wish_is_shown_from_thought_to_set_point(desk: Desk, drive: Driv
         await tab.until("document.querySelector('.wish').innerText.includes('That was good.')")
         assert "That was good." in [told.text for told in drive.told if isinstance(told, Evaluate)]
         assert not tab.troubles
+
+    desk.run(check())
+
+
+def test_keys_work_again_once_a_wish_was_sent(desk: Desk, drive: Drive) -> None:
+    async def check() -> None:
+        tab = desk.tab
+        await opened(tab, drive)
+        await tab.press("/")
+        await tab.type("Drive at 70 km/h.")
+        await tab.press("Enter")
+        await tab.until("document.activeElement !== document.getElementById('wish')")
+        await tab.press("/")
+        await tab.until("document.activeElement === document.getElementById('wish')")
+        assert await tab.value("document.getElementById('wish').value") == ""
+
+    desk.run(check())
+
+
+@pytest.mark.parametrize("size", [TABLET, PHONE], ids=["tablet", "phone"])
+def test_what_cannot_be_used_is_not_shown(desk: Desk, size: tuple[int, int]) -> None:
+    why = "Speech is off: pocketsphinx is not installed."
+
+    async def check() -> None:
+        tab = desk.tab
+        with Cabin() as cabin:
+            cabin.tell(replace(SESSION, engine=""))
+            cabin.tell(Listening("off", why=why))
+            await tab.open(cabin.url, size)
+            await tab.until(f"document.getElementById('heard-words').textContent.includes({json.dumps(why)})")
+            assert await tab.value("document.getElementById('talk').hidden")
+            assert await tab.value("[...document.querySelectorAll('.spoken')].every((row) => row.hidden)")
 
     desk.run(check())
 

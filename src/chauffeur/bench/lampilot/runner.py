@@ -99,6 +99,7 @@ class LampilotRun:
         self.folder = folder
         self.config = config
         self.halt: Halt | None = None
+        self.repeated = 0
         self._planner = planner
         self._requests = requests or _plain(config)
         labels: tuple[str, ...] = (*getattr(planner, "labels", ()), *getattr(requests, "labels", ()))
@@ -175,7 +176,7 @@ class LampilotRun:
             engine.close(now=not whole)
             if broken.done() and not broken.cancelled():
                 broken.exception()  # it has been raised by whoever waited for it
-            self.halt = None if caller is None else caller.halt
+            self.halt, self.repeated = (None, 0) if caller is None else (caller.halt, caller.repeated)
             try:
                 scribe.close()
             finally:

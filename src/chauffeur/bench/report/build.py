@@ -155,8 +155,6 @@ def _headlines(runs: Sequence[Run], by_id: dict[str, ReportTable], how: Sampling
     for run, line in zip(runs, lines, strict=True):
         families = by_id["families"] if len(runs) == 1 else tables.family_table([run], how)
         found.append(headlines.result_words(run, line, families.groups[0].lines))
-    if "pairs" in by_id:
-        found.extend(headlines.pair_words(pairs.pairs_of(runs), by_id["pairs"]))
     found.append(headlines.paper_words(lines, runs[0].ruler))
     return tuple(found)
 

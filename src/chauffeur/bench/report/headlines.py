@@ -1,4 +1,4 @@
-"""What came out, in plain sentences for someone who reads nothing else."""
+"""What came out, a plain sentence or two a run; how runs compare is for a table to say."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from chauffeur.bench.lampilot.metrics import ORIGIN, ruler_named
 from chauffeur.bench.lampilot.paper import TABLE_IV, PaperRow, items_behind
 from chauffeur.bench.lampilot.report import answers_note
-from chauffeur.bench.report.model import SIMULATED, Cell, Headline, Line, ReportTable
+from chauffeur.bench.report.model import SIMULATED, Cell, Headline, Line
 from chauffeur.bench.report.runs import Run
 from chauffeur.bench.report.tables import name_with_labels, number, said
 
@@ -89,32 +89,6 @@ def paper_words(lines: Sequence[Line], ruler: str) -> Headline:
 
 def _against(score: float, other: float) -> str:
     return "above" if score > other else "below" if score < other else "level with"
-
-
-def pair_words(runs: Sequence[tuple[Run, Run]], pairs: ReportTable) -> tuple[Headline, ...]:
-    """How runs differ on the same items, one headline a pair, the better one first. `pairs` has a line for each."""
-    found: list[Headline] = []
-    places = {column.key: place for place, column in enumerate(pairs.columns)}
-    for (first, second), line in zip(runs, pairs.groups[0].lines, strict=True):
-        a, b = first.name, second.name
-        gap = line.cells[places["driving_score"]]
-        more = {a: line.cells[places["only_first"]].text, b: line.cells[places["only_second"]].text}
-        difference = _value(gap)
-        better, other = (b, a) if difference > 0 else (a, b)
-        if difference == 0.0:
-            text = "the same driving score"
-        else:
-            text = f"driving score {number(abs(difference), 1)} points higher"
-        if gap.ends is not None:
-            low, high = sorted(abs(end) for end in gap.ends)
-            text += (
-                " (the 95 % interval of the difference holds 0, so the order is open)"
-                if gap.ends[0] <= 0.0 <= gap.ends[1]
-                else f" (95 % interval {number(low, 1)} to {number(high, 1)})"
-            )
-        text += f"; it completed {more[better]} items that {other} did not, {other} {more[other]} that it did not."
-        found.append(Headline(said(f"{better} against {other}", line.labels), text))
-    return tuple(found)
 
 
 def machine_words(run: Run) -> str:

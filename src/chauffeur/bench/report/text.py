@@ -14,11 +14,14 @@ def render_markdown(report: Report) -> str:
     parts = [f"# {escape(report.title)}", f"{escape(report.subtitle)}; {SIMULATED}."]
     if report.labels:
         parts.append("Said of these runs: " + "; ".join(escape(label) for label in report.labels) + ".")
-    parts.append(escape(report.summary))
-    parts.append("\n".join(f"- **{escape(line.subject)}:** {escape(line.text)}" for line in report.headlines))
     parts.extend(f"> {escape(text)}" for text in report.warnings)
+    after = "scores" if report.table("pairs") is None else "pairs"
     for table in report.tables:
         parts.extend(_table(table))
+        if table.id == after:
+            parts.append("## In words")
+            parts.append(escape(report.summary))
+            parts.append("\n".join(f"- **{escape(line.subject)}:** {escape(line.text)}" for line in report.headlines))
     if report.flips:
         parts.append("## Items that went differently")
         parts.extend(part for flips in report.flips for part in _flips(flips))

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
+from chauffeur.concept import MissingExtraError
 from chauffeur.drive.emergency import stop_wanted
 from chauffeur.drive.talk.asking import Words
 from chauffeur.drive.talk.ear import Ear, Ears, HeardAt, Trouble
@@ -64,6 +65,7 @@ class Attention:
         self._sound, self._voice, self._say, self._act = sound, voice, say, act
         self._question: _Question | None = None
         self._button = ""
+        self._missing = ""
         self._refused_sound = self._muted = False
         self._expects_until_s = -1.0
 
@@ -82,9 +84,20 @@ class Attention:
         return ("", False) if self._ear is None else (self._ear.name, self._ear.remote)
 
     def start(self) -> None:
-        """Begin. Raises ChauffeurError: the engine cannot be had."""
-        if self._ear is not None:
+        """Begin. Where sound would come from a screen, and the engine is not installed, one types instead.
+
+        Raises:
+            ChauffeurError: The engine cannot be had.
+        """
+        if self._ear is None:
+            return
+        try:
             self._ear.__enter__()
+        except MissingExtraError as error:
+            if self._sound is not None:  # this machine's microphone was asked for
+                raise
+            self._ear = None
+            self._missing = f"Speech is off: {error.message} {error.hint}".strip()
 
     def close(self) -> None:
         """Listen no more."""
@@ -93,8 +106,10 @@ class Attention:
 
     def introduce(self) -> None:
         """Tell how listening stands."""
-        off = "There is no speech engine." if self._ear is None else ""
+        off = self._missing or "There is no speech engine."
         self._say(Listening("off", why=off) if self._ear is None else Listening(self._ear.state))
+        if self._missing:
+            self._say(Note(self._missing))
 
     def take_sound(self, chunk: bytes) -> None:
         """Sound of a screen; passed over where this machine has a microphone of its own."""

@@ -8,6 +8,7 @@ is not among the parameters.
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept import (
@@ -23,11 +24,13 @@ from chauffeur.concept import (
 )
 from chauffeur.concept.units import kmh
 from chauffeur.memory.conflicts import conflicts_in
-from chauffeur.planners.base import OnText, Planner, Prose, Writer, declined
+from chauffeur.planners.base import OnText, Planner, Prompt, Prompting, Prose, Writer, declined
 from chauffeur.planners.prompts import Message, data_block, repair_turns, wish_turn
 from chauffeur.planners.prompts.system import fill, template
 from chauffeur.planners.talk2drive.answer import Answer, read_answer
 from chauffeur.planners.talk2drive.style import DISTANCE_M, RATIO_S
+from chauffeur.planners.wish_goal import goal_of
+from chauffeur.safety.envelope import policy_findings
 
 PROMPT_VERSION: Final = "talk2drive-prompt-v2"
 
@@ -101,28 +104,49 @@ class Talk2DrivePlanner:
         prose = await self._writer.write(messages)
         usage, answer = prose.usage, read_answer(prose.text, whole=prose.whole)
         for _ in range(self._repairs):
-            if not answer.problem:
+            findings = _findings(answer, request)
+            if not findings:
                 break
-            messages = [*messages, *repair_turns(prose.text, [answer.problem], ask=_ASK_AGAIN)]
+            messages = [*messages, *repair_turns(prose.text, findings, ask=_ASK_AGAIN)]
             prose = await self._writer.write(messages)
             usage, answer = _sum(usage, prose.usage), read_answer(prose.text, whole=prose.whole)
-        return self._plan(answer, prose, usage, begun)
+        return self._plan(request, answer, prose, usage, begun)
 
-    def _plan(self, answer: Answer, prose: Prose, usage: Usage, begun: float) -> Plan:
+    def prompt(self, request: PlanRequest) -> Prompt:
+        """What would be sent first for a request; nobody is asked.
+
+        Raises:
+            ConfigError: The model behind it does not say.
+        """
+        if not isinstance(self._writer, Prompting):
+            raise ConfigError(f"{self._name} does not say what it would send.")
+        return replace(self._writer.prompt(request), messages=messages_for(request))
+
+    def _plan(self, request: PlanRequest, answer: Answer, prose: Prose, usage: Usage, begun: float) -> Plan:
         if answer.parameters is None:
             words = answer.refusal or f"The model gave no usable parameters: {answer.problem}."
             intent = "declined" if answer.refusal else "unusable"
             return declined(self, words, begun, intent=intent, usage=usage, raw=prose.text)
+        goal = goal_of(request)
+        speed = {"target_speed_mps": round(answer.parameters.target_speed_mps, 3)}
         return Plan(
             thoughts=Thoughts(answer.thoughts),
             policy=answer.parameters,
+            intent=goal.intent,
             planner=self.id,
             model=prose.model,
-            settings=(("target_speed_mps", round(answer.parameters.target_speed_mps, 3)),),
+            settings=tuple((speed | dict(goal.settings)).items()),
             latency_s=time.perf_counter() - begun,
             usage=usage,
             raw=prose.text,
         )
+
+
+def _findings(answer: Answer, request: PlanRequest) -> list[str]:
+    """What the model may mend: an answer that cannot be read, or parameters that road or limits forbid."""
+    if answer.parameters is None:
+        return [answer.problem] if answer.problem else []
+    return policy_findings(answer.parameters, request.context.situation, request.limits)
 
 
 def messages_for(request: PlanRequest) -> list[Message]:

@@ -11,7 +11,7 @@ import { NOT_HEARD, kmh, rungWords } from './words.js';
 
 const SILENCE_MS = 2500;
 const WORDS_EVERY_MS = 1000;
-const HINT = 'Hold the button and say what you want, or type it.';
+const hint = () => (speaks() ? 'Hold the button and say what you want, or type it.' : ['Type what you want.', whyMute()].filter(Boolean).join(' '));
 
 const road = makeScene($('road'));
 const conversation = makeConversation();
@@ -31,6 +31,9 @@ let wordsAt = 0;
 const mine = () => place.wheel === 'mine';
 const able = () => connection === 'open' && mine() && !ended;
 const hears = () => Boolean(session && session.engine);
+/* Whether this screen can be spoken to: a browser gives microphones only to pages on its own machine or over https. */
+const speaks = () => hears() && Boolean(navigator.mediaDevices);
+const whyMute = () => (!session ? '' : !hears() ? listening.why : 'To speak, open the page on the car’s own machine or over https.');
 
 /* What a message does. */
 const does = {
@@ -92,8 +95,11 @@ function showPlace() {
   showBanner(lost);
   document.body.classList.toggle('lost', lost && !ended);
   if (scene) write($('rung'), lost && !ended ? 'Last picture, no news since' : rungWords(scene));
-  for (const id of ['talk-command', 'talk-evaluate']) $(id).disabled = !able() || !hears();
-  $('open-microphone').disabled = !able() || !hears() || session.engine_remote;
+  $('talk').hidden = !speaks(); // what cannot be used is not shown
+  for (const row of document.querySelectorAll('.spoken')) row.hidden = !speaks();
+  for (const id of ['talk-command', 'talk-evaluate']) $(id).disabled = !able() || !speaks();
+  $('open-microphone').hidden = hears() && session.engine_remote; // sound leaves this machine only while a button is held
+  $('open-microphone').disabled = !able();
   for (const button of document.querySelectorAll('.opinions button, #take-over, #as-opinion, .type .main')) button.disabled = Boolean(ended);
   $('stop').disabled = Boolean(ended);
 }
@@ -116,12 +122,13 @@ function showSession() {
   document.body.classList.toggle('real', !simulated);
   write($('where'), session.title || session.scenario);
   $('limits').replaceChildren(...session.limits.map((text) => make('li', { text })));
-  const engine = session.engine ? `${session.engine}${session.engine_remote ? ', elsewhere: sound leaves this machine' : ', on this machine'}` : 'none; type your wishes';
+  const engine = session.engine ? `${session.engine}${session.engine_remote ? ', elsewhere: sound leaves this machine' : ', on this machine'}` : 'nothing; type your wishes';
   const pairs = [
     ['Vehicle', simulated ? 'simulated' : session.vehicle], ['Place', session.scenario], ['Seed of its traffic', session.seed], ['Planner', session.planner],
     ['Listens with', engine], ['Person', session.person || 'nobody’s memory is used'], ['Control periods', `${Math.round(1 / session.dt_s)} a second`], ['Missed periods', '–'],
   ];
   $('session').replaceChildren(...pairs.flatMap(([name, value]) => [make('dt', { text: name }), make('dd', { text: String(value), id: name === 'Missed periods' ? 'missed' : null })]));
+  if (!talking && !question) write($('heard-words'), hint());
   if (!session.person) memory.told({ person: '', private: false, retention_days: null, count: 0, newest: [] });
   showMicrophone(false);
 }
@@ -185,9 +192,9 @@ function showHeard() {
     write($('heard-words'), words);
   } else if (!talking && $('heard').className === 'heard busy') {
     $('heard').className = 'heard';
-    write($('heard-words'), HINT);
+    write($('heard-words'), hint());
   }
-  if (listening.why) write($('heard-words'), listening.why);
+  if (!question && !talking && (listening.why || !speaks())) write($('heard-words'), speaks() ? listening.why : hint());
 }
 
 /* Speaking. */
@@ -270,8 +277,7 @@ async function toggleMicrophone() {
 
 function showMicrophone(on) {
   $('open-microphone').setAttribute('aria-pressed', String(on));
-  const remote = session && session.engine_remote;
-  write($('open-microphone').querySelector('.label'), !hears() ? 'No speech engine' : remote ? 'Only while held: sound leaves this machine' : on ? 'Microphone on: begin with “command”' : 'Microphone off');
+  write($('open-microphone').querySelector('.label'), on ? 'Microphone on: begin with “command”' : 'Microphone off');
 }
 
 function closeMicrophone() {
@@ -288,7 +294,10 @@ function send(asOpinion) {
     return;
   }
   const sent = asOpinion ? say('evaluate', { text, wish: conversation.asked() }) : say('say', { text });
-  if (sent) $('wish').value = '';
+  if (sent) {
+    $('wish').value = '';
+    $('wish').blur(); // the keys are the page's again; "/" comes back
+  }
   if (sent && asOpinion) conversation.askFor(null);
 }
 
@@ -307,7 +316,7 @@ function takeOver() {
 }
 
 const hands = makeHands({
-  press: (which) => { if (able() && hears()) press(which); },
+  press: (which) => { if (able() && speaks()) press(which); },
   release,
   driving: () => Boolean(scene && scene.taken_over),
   shortcuts: () => $('shortcuts').checked,

@@ -1,0 +1,45 @@
+"""What a wish asks for, in the terms that a drive is judged by: for planners whose model does not say it.
+
+A language model writes a program and no intent, so its drives would have no goal where the on-board planner's have one.
+The wish is read by the same rules for all of them. The goal judges and never drives: where the rules do not understand
+a wish, or the road does not allow it as they read it, there is none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from chauffeur.concept import PlanRequest
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """See `Plan.intent` and `Plan.settings`."""
+
+    intent: str = ""
+    settings: tuple[tuple[str, float], ...] = ()
+
+
+NO_GOAL: Final = Goal()
+
+
+def goal_of(request: PlanRequest) -> Goal:
+    """The goal of a request; `NO_GOAL` where none can be told.
+
+    Only numbers that the person named are in it: how much faster "faster" is, is the planner's to choose.
+    """
+    from chauffeur.planners.onboard.choose import choose
+    from chauffeur.planners.onboard.meaning import Reading
+    from chauffeur.planners.onboard.options import Declined
+    from chauffeur.planners.onboard.personal import Leaning
+    from chauffeur.planners.onboard.understand import understand
+
+    reading = understand(request.instruction.text)
+    if not isinstance(reading, Reading):
+        return NO_GOAL
+    choice = choose(reading, request.context.situation, request.limits, lambda _: Leaning())
+    if isinstance(choice, Declined):
+        return NO_GOAL
+    named = all(step.amount is not None for step in reading.steps)
+    return Goal(choice.intent, choice.settings(()) if named else ())
