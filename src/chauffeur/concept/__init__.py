@@ -45,6 +45,8 @@ from chauffeur.concept.nouns import (
     Verdict,
 )
 from chauffeur.concept.scene import (
+    STOP_ZONE_M,
+    STOPPED_MPS,
     Command,
     LaneId,
     LaneView,
@@ -53,12 +55,15 @@ from chauffeur.concept.scene import (
     Turn,
     VehicleState,
     Wishes,
+    stops_at_sign,
 )
 from chauffeur.concept.trace import ApiCall, Frame, Intervention, ProgramState
 
 __all__ = [
     "LAMPILOT_LIMITS",
     "NOBODY",
+    "STOPPED_MPS",
+    "STOP_ZONE_M",
     "ActionMatrix",
     "Alignment",
     "ApiCall",
@@ -109,4 +114,5 @@ __all__ = [
     "VehicleState",
     "Verdict",
     "Wishes",
+    "stops_at_sign",
 ]

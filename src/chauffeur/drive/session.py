@@ -12,6 +12,7 @@ from importlib.metadata import version
 from typing import Any
 
 from chauffeur.concept import (
+    STOP_ZONE_M,
     Causes,
     Context,
     Feedback,
@@ -246,7 +247,15 @@ def drive_policy(
     match policy:
         case Program():
             return drive_program(
-                world, policy.source, referee, max_s, watch, library=policy.library, sandbox=sandbox, shield=shield
+                world,
+                policy.source,
+                referee,
+                max_s,
+                watch,
+                library=policy.library,
+                sandbox=sandbox,
+                shield=shield,
+                limits=limits,
             )
         case Parameters():
             return drive_parameters(world, policy, referee, max_s=max_s, limits=limits, shield=shield, watch=watch)
@@ -267,16 +276,21 @@ def drive_program(
     library: str = "",
     sandbox: Sandbox | None = None,
     shield: Shield | None = None,
+    limits: Limits | None = None,
+    stop_zone_m: float = STOP_ZONE_M,
 ) -> Episode:
     """Run a checked program, with the helper functions it may call, on a world just reset.
 
     Simulated time waits for the program, so its budgets are wide: how busy the machine is must not change a trip.
     `sandbox` lends one that is open already; otherwise one is opened for this drive. `shield` has the last word on
-    every command; LaMPilot's own rules know none.
+    every command, `limits` bound the set-points, and a stop within `stop_zone_m` of its sign serves it; LaMPilot's own
+    rules know neither shield nor bounds.
     """
-    with ProgramExecutor(budget=UNHURRIED, library=library, sandbox=sandbox) as executor:
+    with ProgramExecutor(budget=UNHURRIED, library=library, sandbox=sandbox, stop_zone_m=stop_zone_m) as executor:
         executor.start(source, world)
-        return run_episode(world, executor, referee, max_s=max_s, record=record, watch=watch, shield=shield)
+        return run_episode(
+            world, executor, referee, max_s=max_s, record=record, watch=watch, shield=shield, limits=limits
+        )
 
 
 def drive_without_program(world: World, referee: Referee | None, max_s: float, **options: Any) -> Episode:
@@ -314,6 +328,8 @@ def make_trip(
     record = provenance(plan, scenario, seed, request.limits)
     if shielded:
         record = (*record, ("shield", SHIELD_VERSION))
+    if episode is not None and episode.bounded:
+        record = (*record, ("bounded", dict(episode.bounded)))
     if episode is None:
         failed = unusable(plan, verdicts)
         causes = Causes(refused=not failed, policy_failed=failed, detail=refusal)

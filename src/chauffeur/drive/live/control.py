@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import Command, Parameters, Snapshot, Wishes
-from chauffeur.drive.actuate import Actuated, actuate
+from chauffeur.drive.actuate import Actuated, actuate, set_points
 from chauffeur.drive.live.ladder import Ladder
 from chauffeur.drive.live.messages import MessageError, Observation, Report, Rung, Steered, Wish
 from chauffeur.drive.live.realtime import Ticker
@@ -26,7 +26,6 @@ from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.wheel import Wheel, pressed
 from chauffeur.drive.parameters import LotShield, ParametersDriver, shield_for
-from chauffeur.safety.bounds import bounded
 from chauffeur.safety.shield import Shield, foresight
 from chauffeur.worlds.base import Driver, MirroredWorld
 
@@ -123,7 +122,7 @@ class Control:
                 break
             snapshot = self._world.snapshot()
             ladder_wishes = self._ladder.choose(float(period), None, math.inf, snapshot)[1]
-            wishes, _ = bounded(ladder_wishes, start.limits, self._limit_mps(ladder_wishes, snapshot))
+            wishes, _ = set_points(self._world, snapshot, ladder_wishes, start.limits)
             if period < WARM_UP_PERIODS // 2:
                 settled = driver.settle(wishes)
                 command = driver.command(settled)
@@ -165,7 +164,7 @@ class Control:
             if not self._wheel.taken:
                 age_s = self._hear(start)
             rung, wishes = self._choose(at_s, age_s, snapshot)
-            wishes, clipped = bounded(wishes, start.limits, self._limit_mps(wishes, snapshot))
+            wishes, clipped = set_points(self._world, snapshot, wishes, start.limits)
             done, settled, told = self._act(rung, snapshot, wishes)
             wishes = wishes if self._pursuit is None else settled
             said += told
@@ -314,12 +313,6 @@ class Control:
             return "hold", self._held  # nobody has wished anything yet
         expired = wish is not None and self._clock_ns() > wish.expires_ns
         return self._ladder.choose(at_s, wish, age_s, snapshot, expired=expired)
-
-    def _limit_mps(self, wishes: Wishes, snapshot: Snapshot) -> float:
-        """The speed limit where the car is; in a lane change, the higher one of both."""
-        lanes = [lane for lane in (snapshot.ego.lane, wishes.target_lane) if lane is not None]
-        limits = [self._world.perception().speed_limit(lane) for lane in lanes]
-        return max(limits, default=math.inf)
 
     def _act(self, rung: Rung, snapshot: Snapshot, wishes: Wishes) -> tuple[Actuated, Wishes, tuple[str, ...]]:
         """Drive a period; returns what was done, the wishes as they were driven, and what there is to tell."""
