@@ -108,7 +108,7 @@ class Snapshot:
 STOPPED_MPS: Final = 1.0
 """Slower than this a car has stopped at a stop sign: LaMPilot's own bound for letting it go on."""
 STOP_ZONE_M: Final = 8.0
-"""A stop farther before its sign, from the car's centre, is none at it. LaMPilot's autopilot stops 3 to 5 m before it."""
+"""A stop farther before its sign, from the car's centre, is none at it."""
 
 
 def stops_at_sign(speed_mps: float, ahead_m: float, *, zone_m: float = STOP_ZONE_M) -> bool:
