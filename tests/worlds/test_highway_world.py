@@ -214,7 +214,7 @@ def test_lampilots_draws_are_driven_as_they_are() -> None:
     unfit = []
     for seed in range(25):
         snapshot = HighwayWorld().reset(asis, seed)
-        if fit_to_begin((snapshot.ego, *snapshot.others)):
+        if fit_to_begin((snapshot.ego, *snapshot.others, *snapshot.objects)):
             assert HighwayWorld().reset(scenario, seed).others == snapshot.others, "a fit draw is kept"
         else:
             unfit.append(seed)

@@ -99,6 +99,7 @@ class Drive:
         program: State of the program at the end.
         seconds: Simulated time driven.
         interventions: Control periods in which the shield changed the command.
+        bounded: Set-points that were brought within the limits before the driver was given them, one a control period.
         over_limit_mps: Most by which a target speed that the driver was given exceeded what the limits allow; 0 for
             none.
         below_zero_mps: Most by which one was negative.
@@ -121,6 +122,7 @@ class Drive:
     program: str
     seconds: float
     interventions: int
+    bounded: int
     over_limit_mps: float
     below_zero_mps: float
     short_headway_s: float
@@ -157,6 +159,7 @@ def describe_drive(episode: Episode, limits: Limits) -> Drive:
         program=frames[-1].program if frames else "none",
         seconds=episode.duration_s,
         interventions=episode.interventions,
+        bounded=sum(count for _, count in episode.bounded),
         over_limit_mps=_most(target - _allowed(frame, limits) for frame, target in zip(given, targets, strict=True)),
         below_zero_mps=_most(-target for target in targets),
         short_headway_s=_most(limits.min_time_headway_s - headway for headway in headways),

@@ -8,6 +8,7 @@ from itertools import combinations
 from typing import Final
 
 from chauffeur.concept import VehicleState
+from chauffeur.worlds.base import EGO
 
 _ROOM_M: Final = 2.0
 """Clear way between two cars, one behind the other; IDM's own at a stand."""
@@ -45,7 +46,8 @@ def _bound_to_meet(one: VehicleState, other: VehicleState) -> bool:
     if abs(across) > (one.width_m + other.width_m) / 2.0 + _SIDE_M:
         return False
     rear, front = (one, other) if along >= 0.0 else (other, one)
-    closing = max(0.0, rear.speed_mps - max(0.0, front.speed_mps))
+    merges = front.kind == "obstacle" and rear.id != EGO  # the traffic leaves a lane that ends before it does
+    closing = 0.0 if merges else max(0.0, rear.speed_mps - max(0.0, front.speed_mps))
     needed = _ROOM_M + closing * _RESPONSE_S + closing**2 / (2.0 * _BRAKING_MPS2)
     return abs(along) - (one.length_m + other.length_m) / 2.0 < needed
 
