@@ -90,7 +90,9 @@ class Wishing:
 HANDS: Final[tuple[Kind, ...]] = ("throttle", "saboteur", "drifter", "creeper")
 DRIFTS_RAD: Final = 0.3
 """The wheel of a drifter or creeper is off by so much at most, for seconds on end."""
-CREEPS_MPS: Final = 1.5
+CREEPS_MPS: Final = 2.0
+CREEPS_FROM_M: Final = 15.0
+"""Where a creeper begins to creep: before the stop sign, and all over the crossing."""
 
 
 class Pressing:
@@ -115,7 +117,9 @@ class Pressing:
         if self._kind in ("drifter", "creeper"):
             if self._rng.random() < 0.05:  # every two seconds another way off
                 self._off_rad = float(self._rng.uniform(-DRIFTS_RAD, DRIFTS_RAD))
-            slow = self._kind == "creeper" and self._world.snapshot().ego.speed_mps > CREEPS_MPS
+            now = self._world.snapshot()
+            there = now.stop_sign_m is None or now.stop_sign_m < CREEPS_FROM_M
+            slow = self._kind == "creeper" and there and now.ego.speed_mps > CREEPS_MPS
             return Command(-2.0 if slow else float(self._rng.uniform(0.0, 5.0)), steering + self._off_rad)
         return Command(5.0, steering + 0.15 * float(self._rng.standard_normal()))
 

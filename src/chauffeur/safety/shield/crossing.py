@@ -72,6 +72,8 @@ _LOST: Final = _Care(after_s=1.0, merge_s=1.5, side_m=0.6, room_m=4.5, turn_rad=
 """The same for a car that got off its way: it needs room to get back to it."""
 _LAST: Final = _Care(after_s=0.2, merge_s=0.6, side_m=0.2, room_m=math.inf, turn_rad=math.inf)
 """What is left where that is gone, because others or tyres did what was not foreseen."""
+_STAYING: Final = replace(_LAST, room_m=_DUE.room_m)
+"""The same on the road."""
 _BESIDE: Final = replace(_LAST, side_m=0.05)
 """To stand beside somebody's way without touching it."""
 
@@ -444,7 +446,9 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
     trials = [(trial, plan) for trial, plans in begun for plan in plans]
     troubles = [outlook.trouble_s(trial, way, plan, _LAST) for trial, plan in trials]
     latest = max(troubles)
-    best, _ = trials[troubles.index(latest)]
+    # Of those that keep clear of the others as long, the one that stays on its way longest: a light hand may be too light.
+    tied = [trial for trial, trouble in zip(trials, troubles, strict=True) if trouble == latest]
+    best, _ = max(tied, key=lambda trial: outlook.trouble_s(trial[0], way, trial[1], _STAYING))
     if latest < math.inf:  # rather stand close by somebody's way than drive into it
         for law in range(foresight.LAWS):
             trial = Command(least, outlook.wheel_rad(law, way, least))
