@@ -446,7 +446,7 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
     trials = [(trial, plan) for trial, plans in begun for plan in plans]
     troubles = [outlook.trouble_s(trial, way, plan, _LAST) for trial, plan in trials]
     latest = max(troubles)
-    # Of those that keep clear of the others as long, the one that stays on its way longest: a light hand may be too light.
+    # Of those that keep clear of others as long, the one longest on its way: a light hand may be too light.
     tied = [trial for trial, trouble in zip(trials, troubles, strict=True) if trouble == latest]
     best, _ = max(tied, key=lambda trial: outlook.trouble_s(trial[0], way, trial[1], _STAYING))
     if latest < math.inf:  # rather stand close by somebody's way than drive into it
