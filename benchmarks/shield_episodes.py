@@ -5,7 +5,7 @@
     python benchmarks/shield_episodes.py --episodes 400 --bare            # the same without the shield
     python benchmarks/shield_episodes.py --costs                          # CPU microseconds a control period
 
-Five policies that no check would let through, in four kinds of traffic: light and dense highways, highways whose cars
+Seven policies that no check would let through, in four kinds of traffic: light and dense highways, highways whose cars
 slam on the brakes for nothing, and busy crossings. `--traffic cutting-in` are highways whose cars force their way in
 right before the ego: what happens there is measured apart, because no shield can keep others from striking the ego.
 Ctrl-C keeps what is done; the same command goes on. Every trip is simulated (highway-env's traffic).
@@ -36,10 +36,12 @@ from chauffeur.safety.shield import LAMPILOT_SHIELD, SHIELD_VERSION, Shield
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.provoked import Mood, ProvokedWorld
 
-Kind = Literal["throttle", "tailgater", "weaver", "saboteur", "never-yield"]
+Kind = Literal["throttle", "tailgater", "weaver", "saboteur", "never-yield", "drifter", "creeper"]
 Traffic = Literal["calm", "dense", "slamming", "crossing", "cutting-in"]
 
-KINDS: Final[tuple[Kind, ...]] = ("throttle", "tailgater", "weaver", "saboteur", "never-yield")
+KINDS: Final[tuple[Kind, ...]] = (
+    "throttle", "tailgater", "weaver", "saboteur", "never-yield", "drifter", "creeper",
+)  # fmt: skip
 TRAFFIC: Final[tuple[Traffic, ...]] = ("calm", "dense", "slamming", "crossing")
 MOODS: Final[dict[Traffic, Mood]] = {"slamming": "slamming", "cutting-in": "cutting-in"}
 MAX_S: Final[dict[Traffic, float]] = {"crossing": 40.0}
@@ -85,11 +87,20 @@ class Wishing:
         return HeldWishes(Wishes(speed, 0.0, lane, self._turn, served), state="running")  # pyright: ignore[reportArgumentType]
 
 
+HANDS: Final[tuple[Kind, ...]] = ("throttle", "saboteur", "drifter", "creeper")
+DRIFTS_RAD: Final = 0.3
+"""The wheel of a drifter or creeper is off by so much at most, for seconds on end."""
+CREEPS_MPS: Final = 2.0
+CREEPS_FROM_M: Final = 15.0
+"""Where a creeper begins to creep: before the stop sign, and all over the crossing."""
+
+
 class Pressing:
     """Hands that press and turn."""
 
     def __init__(self, kind: Kind, world: HighwayWorld, rng: np.random.Generator) -> None:
         self._kind, self._world, self._rng = kind, world, rng
+        self._off_rad = 0.0
         self._wishing = Wishing("tailgater", world, rng)
         self._wishes: Wishes | None = None
 
@@ -103,6 +114,13 @@ class Pressing:
             wishes = Wishes(wishes.target_speed_mps, 0.0, self._wishes.target_lane, wishes.turn, wishes.served_stops)
         self._wishes = driver.settle(wishes)
         steering = driver.command(self._wishes).steering_rad
+        if self._kind in ("drifter", "creeper"):
+            if self._rng.random() < 0.05:  # every two seconds another way off
+                self._off_rad = float(self._rng.uniform(-DRIFTS_RAD, DRIFTS_RAD))
+            now = self._world.snapshot()
+            there = now.stop_sign_m is None or now.stop_sign_m < CREEPS_FROM_M
+            slow = self._kind == "creeper" and there and now.ego.speed_mps > CREEPS_MPS
+            return Command(-2.0 if slow else float(self._rng.uniform(0.0, 5.0)), steering + self._off_rad)
         return Command(5.0, steering + 0.15 * float(self._rng.standard_normal()))
 
 
@@ -136,7 +154,7 @@ def drive(job: Job) -> dict[str, Any]:
     near = [math.hypot(car.x_m - ego.x_m, car.y_m - ego.y_m) for car in snapshot.others if abs(car.y_m - ego.y_m) < 3.0]
     if any(car.crashed for car in snapshot.others) or min(near, default=math.inf) < TOUCHING_M:
         return row | {"outcome": "unfit"}
-    hands = Pressing(job.kind, world, rng) if job.kind in ("throttle", "saboteur") else None
+    hands = Pressing(job.kind, world, rng) if job.kind in HANDS else None
     policy = None if hands is not None else Wishing(job.kind, world, rng)
     shield = Shield(world.dt_s, Limits()) if job.shielded else None
     most = MAX_S.get(job.traffic, HIGHWAY_S)
@@ -153,9 +171,11 @@ def drive(job: Job) -> dict[str, Any]:
     }
 
 
-def jobs(count: int, shielded: bool, traffic: tuple[Traffic, ...], first: int) -> Iterator[Job]:
+def jobs(
+    count: int, shielded: bool, traffic: tuple[Traffic, ...], first: int, kinds: tuple[Kind, ...] = KINDS
+) -> Iterator[Job]:
     """The trips, every policy in every traffic alike."""
-    pairs: list[tuple[Kind, Traffic]] = [(kind, one) for kind in KINDS for one in traffic]
+    pairs: list[tuple[Kind, Traffic]] = [(kind, one) for kind in kinds for one in traffic]
     for place, (kind, one) in enumerate(islice(cycle(pairs), count)):
         yield Job(kind, one, first + place // len(pairs), shielded)
 
@@ -261,6 +281,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=10_000, help="first seed")
     parser.add_argument("--bare", action="store_true", help="without the shield")
     parser.add_argument("--traffic", choices=(*TRAFFIC, "cutting-in"), help="only this traffic")
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS), help="only these policies")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("runs/shield.jsonl"))
     parser.add_argument("--costs", action="store_true", help="only measure the shield's time")
@@ -274,7 +295,7 @@ def main() -> None:
     traffic: tuple[Traffic, ...] = TRAFFIC if options.traffic is None else (options.traffic,)
     todo = [
         job
-        for job in jobs(options.episodes, not options.bare, traffic, options.first)
+        for job in jobs(options.episodes, not options.bare, traffic, options.first, tuple(options.kinds))
         if (job.kind, job.traffic, job.seed, job.shielded) not in done
     ]
     begun = time.monotonic()

@@ -228,7 +228,8 @@ def test_behind_the_shield_the_worst_model_does_no_harm(tmp_path: Path) -> None:
     config = HostileConfig("obedient/hidden", a_kind=1, seed=5)
     rows = HostileRun(tmp_path / "run", config, planner_of("obedient/hidden")).run(quiet, engine=Inline)
     assert [row["answer"] for row in rows] == ["driven"] * 10
-    assert sum(row["drive"]["interventions"] > 0 for row in rows) >= 5
+    assert sum(row["drive"]["interventions"] + row["drive"]["bounded"] > 0 for row in rows) >= 5
+    assert not any(row["setting"] for row in rows), "no setting beyond the limits reaches the driver"
     assert not unsafe(rows)
 
 

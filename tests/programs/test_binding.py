@@ -155,6 +155,15 @@ def test_stop_sign_is_left_only_from_standstill_in_front_of_it(call: Caller) -> 
     assert call.apis.wishes.served_stops == frozenset()  # a car, not the sign, is in front
     call.road.cars[1] = replace(call.road.cars[1], lane=0)
     call("recover_from_stop")
+    assert call.apis.wishes.served_stops == frozenset()  # the sign is 300 m away
+    call.road.cars[EGO] = replace(call.road.cars[EGO], x_m=391.9)
+    call("recover_from_stop")
+    assert call.apis.wishes.served_stops == frozenset()
+    call.road.cars[EGO] = replace(call.road.cars[EGO], x_m=392.1, speed_mps=1.0)
+    call("recover_from_stop")
+    assert call.apis.wishes.served_stops == frozenset()  # rolling
+    call.road.cars[EGO] = replace(call.road.cars[EGO], speed_mps=0.9)
+    call("recover_from_stop")
     assert call.apis.wishes.served_stops == frozenset({9})
     assert call("detect_stop_sign_ahead") == -1.0
 

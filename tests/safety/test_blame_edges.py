@@ -323,6 +323,24 @@ def test_who_reverses_into_an_ego_that_stands_is_to_blame(
     assert ("reversed" in found.reason) == (who == "other")
 
 
+@pytest.mark.parametrize("speed", [-0.3, -2.0, -6.0])
+def test_an_ego_that_reverses_into_one_behind_is_to_blame(speed: float) -> None:
+    scenes = in_lane(-9.0, -6.0, -3.0, -1.0, -0.1, -0.001, ego_mps=speed, other_mps=0.0)
+    assert judged(scenes).who == "ego"
+    assert judged(scenes).reason == "The ego reversed into the one behind."
+
+
+def test_one_that_runs_into_an_ego_rolling_back_a_little_is_to_blame() -> None:
+    assert judged(in_lane(-60.0, -10.0, -6.0, -2.0, ego_mps=-0.2, other_mps=20.0)).who == "other"
+
+
+def test_an_ego_that_reverses_into_one_that_crosses_does_not_stand() -> None:
+    scenes = [
+        (body(EGO, 500.0 + 3.0 - t, 0.0, -6.0), body(1, 496.0, -9.0 + t, 8.0, math.pi / 2.0)) for t in (0.0, 1.0, 2.0)
+    ]
+    assert judged(scenes).who == "ego"
+
+
 @pytest.mark.parametrize(("x", "heading"), [(495.0, 0.0), (505.0, math.pi / 2.0)])
 def test_who_rolls_away_or_across_backwards_does_not_reverse_into_the_ego(x: float, heading: float) -> None:
     scenes: list[Scene] = [(body(EGO, 500.0, 0.0, 0.0), body(1, x, 0.0, -0.6, heading)) for _ in range(6)]

@@ -269,5 +269,5 @@ def test_who_never_yields_is_made_to_and_gets_across() -> None:
         assert episode.final.ego.y_m < -20.0, "it did get to the other side"
         crashed += at_the_crossing(seed, shielded=False).outcome == "collision"
         rules = {change.rule for frame in episode.frames for change in frame.interventions}
-        assert rules <= {"yield", "clear", "gap", "speed", "reverse", "lane"}
+        assert rules <= {"yield", "clear", "gap", "speed", "stop", "reverse", "lane"}
     assert crashed

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from chauffeur.concept import LaneId, LaneView, Snapshot, VehicleState
 from chauffeur.control import LAMPILOT_STEERING, lane_keeping_steering
-from chauffeur.safety.shield.frame import Body, Lens, Scene, Strip, _nearest
+from chauffeur.safety.shield.frame import Body, Lens, Scene, Strip, nearest_on
 from chauffeur.safety.shield.sweep import recovery_steering, swept, yaw_rate
 
 OWN: LaneId = ("a", "b", 1)
@@ -176,7 +176,7 @@ def test_of_several_pieces_the_nearest_one_counts(x: float, y: float) -> None:
         share = max(0.0 if piece else -math.inf, min(1.0 if piece < 2 else math.inf, share))
         return math.hypot(x - ax - share * (bx - ax), y - ay - share * (by - ay))
 
-    found_x, found_y, heading = _nearest(lane(1, *points), x, y)
+    found_x, found_y, heading = nearest_on(lane(1, *points), x, y)
     piece = min(range(3), key=distance)
     assert math.hypot(x - found_x, y - found_y) == pytest.approx(distance(piece), abs=1e-9)
     if sorted(map(distance, range(3)))[1] > distance(piece) + 1e-9:
@@ -184,7 +184,7 @@ def test_of_several_pieces_the_nearest_one_counts(x: float, y: float) -> None:
 
 
 def test_off_a_corner_the_piece_before_it_counts() -> None:
-    assert _nearest(lane(1, (0.0, 0.0), (10.0, 0.0), (10.0, 10.0)), 12.0, -2.0) == (10.0, 0.0, 0.0)
+    assert nearest_on(lane(1, (0.0, 0.0), (10.0, 0.0), (10.0, 10.0)), 12.0, -2.0) == (10.0, 0.0, 0.0)
 
 
 @given(x=st.floats(490.0, 510.0), y=st.floats(-3.0, 3.0), heading=st.floats(-0.5, 0.5), twice=st.integers(0, 3))

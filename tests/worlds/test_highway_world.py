@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-import dataclasses
 import math
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -12,6 +12,7 @@ import chauffeur.worlds.highway.gym
 from chauffeur.concept import Command, DataError, Scenario, ScenarioError, Wishes
 from chauffeur.worlds.base import EGO, Driver, Perception, World
 from chauffeur.worlds.highway import HighwayWorld
+from chauffeur.worlds.highway.fitness import fit_to_begin
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
 BY_ID = {s.id: s for s in BUILT_IN}
@@ -117,7 +118,7 @@ def test_lane_edges() -> None:
 def test_lane_wish_is_followed() -> None:
     world = HighwayWorld()
     world.reset(BY_ID["emergency-lane"])
-    _drive(world, dataclasses.replace(world.driver().initial_wishes(), target_lane=("a", "b", 3)), 60)
+    _drive(world, replace(world.driver().initial_wishes(), target_lane=("a", "b", 3)), 60)
     assert world.perception().lane_of(EGO) == ("a", "b", 3)
     assert abs(world.snapshot().ego.y_m - 12.0) < 0.3
 
@@ -126,7 +127,7 @@ def test_intersection_stops_at_the_sign_until_it_is_served() -> None:
     world = HighwayWorld()
     snapshot = world.reset(BY_ID["quiet-intersection"])
     assert snapshot.stop_sign_m == pytest.approx(85.0)
-    wishes = dataclasses.replace(world.driver().initial_wishes(), turn="straight")
+    wishes = replace(world.driver().initial_wishes(), turn="straight")
     wishes = _drive(world, wishes, 250)
     waiting = world.snapshot()
     assert abs(waiting.ego.speed_mps) < 1.0
@@ -144,7 +145,7 @@ def test_served_stop_lets_the_car_cross_straight() -> None:
     sign = world.perception().stop_sign_ahead(frozenset())
     assert sign is not None
     driver = world.driver()
-    wishes = dataclasses.replace(driver.initial_wishes(), turn="straight", served_stops=frozenset({sign[0]}))
+    wishes = replace(driver.initial_wishes(), turn="straight", served_stops=frozenset({sign[0]}))
     seen = set()
     for _ in range(200):
         wishes = driver.settle(wishes)
@@ -196,3 +197,31 @@ def test_gymnasium_check(name: str) -> None:
     observation, _ = env.reset(seed=3)
     again, _ = env.reset(seed=3)
     assert np.array_equal(observation, again)
+
+
+@pytest.mark.parametrize("name", [scenario.id for scenario in BUILT_IN])
+def test_no_seed_of_a_built_in_scenario_begins_with_cars_in_each_other(name: str) -> None:
+    scenario = next(one for one in BUILT_IN if one.id == name)
+    for seed in range(25):
+        snapshot = HighwayWorld().reset(scenario, seed)
+        assert fit_to_begin((snapshot.ego, *snapshot.others, *snapshot.objects)), seed
+    assert HighwayWorld().reset(scenario, 7) == HighwayWorld().reset(scenario, 7)
+
+
+def test_lampilots_draws_are_driven_as_they_are() -> None:
+    scenario = next(one for one in BUILT_IN if one.id == "following")
+    asis = replace(scenario, config={**scenario.config, "redraw_unfit": False})
+    unfit = []
+    for seed in range(25):
+        snapshot = HighwayWorld().reset(asis, seed)
+        if fit_to_begin((snapshot.ego, *snapshot.others, *snapshot.objects)):
+            assert HighwayWorld().reset(scenario, seed).others == snapshot.others, "a fit draw is kept"
+        else:
+            unfit.append(seed)
+    assert unfit, "nothing was drawn again: the test sees nothing"
+
+
+def test_a_scenario_that_no_draw_fits_says_so() -> None:
+    crowded = {"type": "dt-highway-v0", "num_lanes": 2, "vehicles_count": 60, "vehicles_density": 40.0}
+    with pytest.raises(ScenarioError, match="without a collision"):
+        HighwayWorld().reset(Scenario("crowd", "highway", {**crowded, "redraw_unfit": True}, 1))

@@ -64,7 +64,15 @@ def drive_again(recorded: RecordedTrip) -> RecordedTrip:
     referee = referee_for(world, scenario, trip.plan)
     record = dict(trip.record)
     limits = Limits(**record["limits"])
-    episode = drive_policy(world, policy, referee, trip_s(scenario), limits, shielded="shield" in record)
+    episode = drive_policy(
+        world,
+        policy,
+        referee,
+        trip_s(scenario),
+        limits,
+        shielded="shield" in record,
+        minimum_speed="minimum_speed" in record,
+    )
     driven = replace(
         trip,
         outcome=episode.outcome,

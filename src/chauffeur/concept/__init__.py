@@ -49,6 +49,8 @@ from chauffeur.concept.nouns import (
     mark_of,
 )
 from chauffeur.concept.scene import (
+    STOP_ZONE_M,
+    STOPPED_MPS,
     Command,
     LaneId,
     LaneView,
@@ -57,6 +59,7 @@ from chauffeur.concept.scene import (
     Turn,
     VehicleState,
     Wishes,
+    stops_at_sign,
 )
 from chauffeur.concept.trace import ApiCall, Frame, Intervention, ProgramState
 
@@ -64,6 +67,8 @@ __all__ = [
     "HELPERS_HEAD",
     "LAMPILOT_LIMITS",
     "NOBODY",
+    "STOPPED_MPS",
+    "STOP_ZONE_M",
     "ActionMatrix",
     "Alignment",
     "ApiCall",
@@ -117,4 +122,5 @@ __all__ = [
     "Wishes",
     "lines_before_library",
     "mark_of",
+    "stops_at_sign",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from chauffeur.concept.nouns import Lead
 from chauffeur.geometry import Box
@@ -109,6 +109,17 @@ class Snapshot:
     stop_sign_m: float | None
     off_road: bool
     ended: bool
+
+
+STOPPED_MPS: Final = 1.0
+"""Slower than this a car has stopped at a stop sign: LaMPilot's own bound for letting it go on."""
+STOP_ZONE_M: Final = 8.0
+"""A stop farther before its sign, from the car's centre, is none at it."""
+
+
+def stops_at_sign(speed_mps: float, ahead_m: float, *, zone_m: float = STOP_ZONE_M) -> bool:
+    """Whether a car with this speed, its centre so far before a stop sign, has served it."""
+    return speed_mps < STOPPED_MPS and 0.0 <= ahead_m <= zone_m
 
 
 Turn = Literal["left", "straight", "right"]

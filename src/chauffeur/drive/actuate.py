@@ -1,10 +1,15 @@
-"""The one door to the actuator: every command of every drive passes here, and the shield if there is one."""
+"""The one door to the actuator: every command of every drive passes here, and the shield if there is one.
+
+What the world's driver is asked for passes here as well (`set_points`): limits hold whoever wished.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from chauffeur.concept import Command, Intervention, LaneId, Snapshot
+from chauffeur.concept import Command, Intervention, LaneId, Limits, Snapshot, Wishes
+from chauffeur.safety.bounds import bounded
 from chauffeur.safety.shield import Guarded, Shield
 from chauffeur.worlds.base import World
 
@@ -16,6 +21,23 @@ class Actuated:
     requested: Command
     applied: Command
     interventions: tuple[Intervention, ...] = ()
+
+
+def set_points(
+    world: World, snapshot: Snapshot, wishes: Wishes, limits: Limits, least_mps: float = 0.0
+) -> tuple[Wishes, tuple[str, ...]]:
+    """The wishes as they may be driven at an instant, and the names of what was brought within the limits.
+
+    Args:
+        world: Whose speed limits hold: that of the lane the car is in; in a lane change, the higher one of both.
+        snapshot: Its present instant.
+        wishes: As the policy states them.
+        limits: Of the person and the operator.
+        least_mps: Least speed a policy may ask for there; 0 for none.
+    """
+    perception = world.perception()
+    lanes = [lane for lane in (snapshot.ego.lane, wishes.target_lane) if lane is not None]
+    return bounded(wishes, limits, max(map(perception.speed_limit, lanes), default=math.inf), least_mps)
 
 
 def actuate(

@@ -1,12 +1,13 @@
 """The control loop of a trip in simulated time.
 
-Each control period: the policy states its wishes, the driver turns them into a command, the world applies it, the
-referee looks. A policy that fails loses the wheel at once: the driver goes on with safe wishes for a moment, and the
-trip ends; what it would have done without the policy is never counted as the policy's.
+Each control period: the policy states its wishes, limits bound them, the driver turns them into a command, the world
+applies it, the referee looks. A policy that fails loses the wheel at once: the driver goes on with safe wishes for a
+moment, and the trip ends; what it would have done without the policy is never counted as the policy's.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
@@ -17,6 +18,7 @@ from chauffeur.concept import (
     ChauffeurError,
     Command,
     Frame,
+    Limits,
     Metric,
     Outcome,
     ProgramState,
@@ -24,8 +26,9 @@ from chauffeur.concept import (
     Snapshot,
     Wishes,
 )
-from chauffeur.drive.actuate import actuate
+from chauffeur.drive.actuate import actuate, set_points
 from chauffeur.drive.fallback import keep_lane_and_gap
+from chauffeur.safety.bounds import least_target_mps
 from chauffeur.safety.shield import Shield
 from chauffeur.worlds.base import EGO, World
 
@@ -110,6 +113,7 @@ class Episode:
         said: What the passenger was told, as (time s, text).
         success: The referee's success flag.
         interventions: Control periods in which the shield changed the command.
+        bounded: Set-points that were brought within the limits, by name, with the number of control periods.
     """
 
     frames: tuple[Frame, ...]
@@ -122,6 +126,7 @@ class Episode:
     said: tuple[tuple[float, str], ...]
     success: bool
     interventions: int = 0
+    bounded: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +152,8 @@ def run_episode(
     watch: Callable[[Frame], None] | None = None,
     hands: Hands | None = None,
     shield: Shield | None = None,
+    limits: Limits | None = None,
+    minimum_speed: bool = False,
 ) -> Episode:
     """Drive until the referee says that it is over, the world ends, the program has ended, or `max_s` have passed.
 
@@ -160,12 +167,16 @@ def run_episode(
         watch: Called with each recorded frame, for live display.
         hands: A person who acts in the driver's place; `policy` is then None, and nobody's wishes are followed.
         shield: Has the last word on every command; None where a benchmark's own rules allow none.
+        limits: Bounds of the set-points, whatever the policy answers in a period; None where a benchmark's own rules
+            know none.
+        minimum_speed: Whether they hold the least speed of a highway, too: all but the car's own stop does.
     """
     driver = world.driver()
     frames: list[Frame] = []
     said: list[tuple[float, str]] = []
     failure: ChauffeurError | None = None
     held = driver.initial_wishes()
+    bounded = Counter[str]()
     idle = 0
     ticks = changed = 0
     end = round(max_s / world.dt_s)
@@ -184,12 +195,16 @@ def run_episode(
         wishes = driver.settle(tick.wishes)
         if adjust is not None:
             wishes = adjust(wishes)
+        before = world.snapshot() if record or not (shield is None and limits is None) else None
+        if limits is not None and before is not None:
+            least = least_target_mps(before, wishes, limits) if minimum_speed and failure is None else 0.0
+            wishes, names = set_points(world, before, wishes, limits, least)
+            bounded.update(names)
         held = wishes
         requested = driver.command(wishes) if hands is None else hands.command()
         if requested is None:
             failure = ChauffeurError(f"Given up by the driver after {at_s:.1f} s.")
             break
-        before = world.snapshot() if record or shield is not None else None
         done = actuate(world, before, requested, wishes.target_lane, shield)
         changed += bool(done.interventions)
         ticks += 1
@@ -234,6 +249,7 @@ def run_episode(
         said=tuple(said),
         success=success,
         interventions=changed,
+        bounded=tuple(bounded.items()),
     )
 
 

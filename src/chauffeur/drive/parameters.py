@@ -499,6 +499,7 @@ def drive_parameters(
         watch=watch,
         hands=driver,
         shield=shield,
+        limits=limits,
     )
     return replace(episode, said=tuple(sorted((*episode.said, *driver.notes))))
 

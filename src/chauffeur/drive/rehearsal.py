@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol, Self, TypeVar
 
-from chauffeur.concept import Metric, Outcome, SandboxError
+from chauffeur.concept import STOP_ZONE_M, Metric, Outcome, SandboxError
 from chauffeur.drive.episode import Referee, run_episode
 from chauffeur.programs import ProgramExecutor, Sandbox
 from chauffeur.worlds.base import World
@@ -112,6 +112,7 @@ def rehearse(
     sandbox: Sandbox,
     max_s: float,
     library: str = "",
+    stop_zone_m: float = STOP_ZONE_M,
 ) -> Choice:
     """Try candidates on copies of the world and choose the one whose trip was worth most.
 
@@ -128,15 +129,17 @@ def rehearse(
         sandbox: Where the programs run.
         max_s: Bound of each try in simulated time.
         library: Helper functions the programs may call.
+        stop_zone_m: Within how much of a stop sign a stop serves it.
 
     Raises:
         ValueError: There are no candidates.
         SandboxError: No worker can be had.
     """
     places = range(len(candidates))
-    return best_choice(
-        candidates, tries(world, candidates, judge, places, sandbox=sandbox, max_s=max_s, library=library)
+    rollouts = tries(
+        world, candidates, judge, places, sandbox=sandbox, max_s=max_s, library=library, stop_zone_m=stop_zone_m
     )
+    return best_choice(candidates, rollouts)
 
 
 def tries(
@@ -148,12 +151,13 @@ def tries(
     sandbox: Sandbox,
     max_s: float,
     library: str = "",
+    stop_zone_m: float = STOP_ZONE_M,
     board: Board | None = None,
 ) -> dict[int, Rollout]:
     """How some of the candidates do, by their places; as `rehearse`, for several who share the work.
 
     Args:
-        world, candidates, judge, sandbox, max_s, library: As `rehearse`.
+        world, candidates, judge, sandbox, max_s, library, stop_zone_m: As `rehearse`.
         places: Which to try, in this order; each is asked for when the one before is done.
         board: Where others who rehearse the same wish tell their best; None for nobody else.
 
@@ -164,7 +168,7 @@ def tries(
     for place in places:
         best = best_of(rollouts)
         rank = _NOTHING if best is None else _rank(rollouts[best], best)
-        rollout = _attempt(world, place, candidates[place], judge, rank, board, sandbox, max_s, library)
+        rollout = _attempt(world, place, candidates[place], judge, rank, board, sandbox, max_s, library, stop_zone_m)
         rollouts[place] = rollout
         if board is not None and not (rollout.cut or rollout.collided):
             board.tell(rollout.worth)
@@ -236,11 +240,12 @@ def _attempt(
     sandbox: Sandbox,
     max_s: float,
     library: str,
+    stop_zone_m: float,
 ) -> Rollout:
     twin = world.copy()
     judge = make_judge(twin)
     referee = _Impatient(judge, best, index, board)
-    executor = ProgramExecutor(sandbox=sandbox, library=library, gate=False)
+    executor = ProgramExecutor(sandbox=sandbox, library=library, gate=False, stop_zone_m=stop_zone_m)
     try:
         executor.start(source, twin)
         episode = run_episode(twin, executor, referee, max_s=max_s, record=False)

@@ -12,6 +12,7 @@ from importlib.metadata import version
 from typing import Any
 
 from chauffeur.concept import (
+    STOP_ZONE_M,
     Causes,
     Context,
     Feedback,
@@ -36,6 +37,7 @@ from chauffeur.concept import (
 from chauffeur.concept.registry import load_plugin
 from chauffeur.describe.services.sources import SourceSettings
 from chauffeur.drive.effects import effect_of
+from chauffeur.drive.emergency import not_checked
 from chauffeur.drive.episode import Episode, Referee, run_episode
 from chauffeur.drive.loop import Memory, Stages, ask, drive
 from chauffeur.drive.parameters import drive_parameters, shield_for
@@ -199,6 +201,7 @@ class Session:
                 request.limits,
                 watch=shown,
                 shielded=self.shielded,
+                minimum_speed=verdicts != not_checked(plan),
             )
         except ScenarioError as error:  # the road has no such way: known only when the policy meets the world
             return make_trip(request, plan, verdicts, scenario, seed, None, str(error), shielded=self.shielded)
@@ -245,10 +248,11 @@ def drive_policy(
     watch: Callable[[Frame], None] | None = None,
     shielded: bool = True,
     sandbox: Sandbox | None = None,
+    minimum_speed: bool = False,
 ) -> Episode:
     """Drive a checked policy of any kind that drives simulated cars, on a world just reset.
 
-    `sandbox` lends a program one that is open already.
+    `sandbox` lends a program one that is open already; `minimum_speed` holds it to the least speed of a highway.
 
     Raises:
         ScenarioError: The road has no such way, or this kind of policy drives no car here.
@@ -257,7 +261,16 @@ def drive_policy(
     match policy:
         case Program():
             return drive_program(
-                world, policy.source, referee, max_s, watch, library=policy.library, sandbox=sandbox, shield=shield
+                world,
+                policy.source,
+                referee,
+                max_s,
+                watch,
+                library=policy.library,
+                sandbox=sandbox,
+                shield=shield,
+                limits=limits,
+                minimum_speed=minimum_speed,
             )
         case Parameters():
             return drive_parameters(world, policy, referee, max_s=max_s, limits=limits, shield=shield, watch=watch)
@@ -278,16 +291,30 @@ def drive_program(
     library: str = "",
     sandbox: Sandbox | None = None,
     shield: Shield | None = None,
+    limits: Limits | None = None,
+    minimum_speed: bool = False,
+    stop_zone_m: float = STOP_ZONE_M,
 ) -> Episode:
     """Run a checked program, with the helper functions it may call, on a world just reset.
 
     Simulated time waits for the program, so its budgets are wide: how busy the machine is must not change a trip.
     `sandbox` lends one that is open already; otherwise one is opened for this drive. `shield` has the last word on
-    every command; LaMPilot's own rules know none.
+    every command, `limits` bound the set-points, and a stop within `stop_zone_m` of its sign serves it; LaMPilot's own
+    rules know neither shield nor bounds.
     """
-    with ProgramExecutor(budget=UNHURRIED, library=library, sandbox=sandbox) as executor:
+    with ProgramExecutor(budget=UNHURRIED, library=library, sandbox=sandbox, stop_zone_m=stop_zone_m) as executor:
         executor.start(source, world)
-        return run_episode(world, executor, referee, max_s=max_s, record=record, watch=watch, shield=shield)
+        return run_episode(
+            world,
+            executor,
+            referee,
+            max_s=max_s,
+            record=record,
+            watch=watch,
+            shield=shield,
+            limits=limits,
+            minimum_speed=minimum_speed,
+        )
 
 
 def drive_without_program(world: World, referee: Referee | None, max_s: float, **options: Any) -> Episode:
@@ -324,6 +351,10 @@ def make_trip(
     record = provenance(plan, scenario, seed, request.limits)
     if shielded:
         record = (*record, ("shield", SHIELD_VERSION))
+    if verdicts[: len(own := not_checked(plan))] != own:
+        record = (*record, ("minimum_speed", True))
+    if episode is not None and episode.bounded:
+        record = (*record, ("bounded", dict(episode.bounded)))
     if episode is None:
         failed = unusable(plan, verdicts)
         causes = Causes(refused=not failed, policy_failed=failed, detail=refusal)

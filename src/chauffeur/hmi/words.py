@@ -176,6 +176,7 @@ _RULES: Final = {
     "gap": "distance ahead",
     "lane": "lane not free",
     "speed": "speed limit",
+    "stop": "stop line",
     "yield": "right of way",
     "clear": "clearing the crossing",
     "brake": "braking too hard",

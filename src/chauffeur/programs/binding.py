@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import chain, islice
 from typing import Any, Final
 
-from chauffeur.concept import ApiCall, LaneId, Turn, Wishes
+from chauffeur.concept import STOP_ZONE_M, ApiCall, LaneId, Turn, Wishes, stops_at_sign
 from chauffeur.programs.catalogue import (
     APIS,
     MAX_SAID,
@@ -26,8 +26,6 @@ from chauffeur.programs.questions import Question, Questions
 from chauffeur.worlds.base import EGO, Driver, Perception
 
 _MAX_SHOWN_CHARS: Final = 60
-_RECOVER_BELOW_MPS: Final = 1.0
-"""LaMPilot lets a car leave a stop sign only below this speed."""
 
 
 def starting_wishes(perception: Perception, time_headway_s: float = 1.5) -> Wishes:
@@ -74,8 +72,19 @@ class DrivingApis:
         handles: What it has been handed out.
     """
 
-    def __init__(self, perception: Perception, driver: Driver, wishes: Wishes) -> None:
+    def __init__(
+        self, perception: Perception, driver: Driver, wishes: Wishes, *, stop_zone_m: float = STOP_ZONE_M
+    ) -> None:
+        """Bind.
+
+        Args:
+            perception: Of the present instant.
+            driver: The world's own.
+            wishes: What holds already.
+            stop_zone_m: Within how much of a stop sign a stop serves it; LaMPilot's own rules know no bound.
+        """
         self.wishes = wishes
+        self._stop_zone_m = stop_zone_m
         self.handles = HandleTable()
         self._perception = perception
         self._driver = driver
@@ -309,10 +318,11 @@ class DrivingApis:
 
     def _recover_from_stop(self) -> None:
         perception, served = self._perception, self.wishes.served_stops
-        if perception.vehicle(EGO).speed_mps >= _RECOVER_BELOW_MPS:
-            return
         blocker = perception.front_blocker(served)
-        if blocker is not None and perception.vehicle(blocker).kind == "stop_sign":
+        if blocker is None or perception.vehicle(blocker).kind != "stop_sign":
+            return
+        ahead_m, speed = perception.distance_along(EGO, blocker), perception.vehicle(EGO).speed_mps
+        if stops_at_sign(speed, ahead_m, zone_m=self._stop_zone_m):
             self.wishes = replace(self.wishes, served_stops=served | {blocker})
 
     def _get_speed_of(self, veh: int) -> float:

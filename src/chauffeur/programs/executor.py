@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 from typing import Any, Final, Self
 
-from chauffeur.concept import ApiCall, ProgramError, ProgramState, SandboxError, Wishes
+from chauffeur.concept import STOP_ZONE_M, ApiCall, ProgramError, ProgramState, SandboxError, Wishes
 from chauffeur.programs.binding import DrivingApis, MadeCall, starting_wishes
 from chauffeur.programs.catalogue import APIS
 from chauffeur.programs.errors import (
@@ -59,7 +59,13 @@ class ProgramExecutor:
     """
 
     def __init__(
-        self, *, sandbox: Sandbox | None = None, budget: Budget | None = None, library: str = "", gate: bool = True
+        self,
+        *,
+        sandbox: Sandbox | None = None,
+        budget: Budget | None = None,
+        library: str = "",
+        gate: bool = True,
+        stop_zone_m: float = STOP_ZONE_M,
     ) -> None:
         """Open a sandbox, or share one.
 
@@ -68,11 +74,13 @@ class ProgramExecutor:
             budget: Limits, when a sandbox is opened here.
             library: Helper functions every program may call with `yield from`; checked like a program.
             gate: Whether programs pass the static gate first. Turned off only to show that the sandbox holds alone.
+            stop_zone_m: As `DrivingApis` takes it.
         """
         self._owned = Sandbox(budget) if sandbox is None else None
         self._sandbox = self._owned if self._owned is not None else sandbox
         self._library = library
         self._gate = gate
+        self._stop_zone_m = stop_zone_m
         self._world: World | None = None
         self._apis: DrivingApis | None = None
         self._run: SandboxRun | None = None
@@ -244,7 +252,8 @@ class ProgramExecutor:
 
     def _bind(self, world: World, wishes: Wishes | None) -> DrivingApis:
         perception = world.perception()
-        apis = DrivingApis(perception, world.driver(), starting_wishes(perception) if wishes is None else wishes)
+        begun = starting_wishes(perception) if wishes is None else wishes
+        apis = DrivingApis(perception, world.driver(), begun, stop_zone_m=self._stop_zone_m)
         self._world, self._apis = world, apis
         self._state, self._line, self._error = "none", None, None
         return apis

@@ -6,7 +6,8 @@ to blame: the one that came over to the other's side, or the rear one in a lane;
 all the same if it did not brake with all it has. Where ways cross, and where a car comes towards the ego, the others go
 first: the ego is to blame for every such collision, unless it stood, and the other left its straight way to strike it.
 (To stand is not enough: a car that came to a stop across the lane of the oncoming traffic was once absolved.) Whoever
-rolls backwards into an ego that stands behind it is to blame for that. What was unsafe from the beginning is nobody's.
+rolls backwards into somebody behind is to blame for that, the ego as well as another. What was unsafe from the
+beginning is nobody's.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def blame(
     if other is None:
         return Blame("nobody", None, None, "The ego crashed, but into nobody that is seen.")
     crossed = _pair(lens.look(last, last.ego.lane), other)
-    if final.ego.speed_mps < _STILL_MPS and _reversed(last, other):
+    if _stands(final.ego) and _reversed(last, other):
         return Blame("other", other, last.time_s, "The other reversed into the ego, which stood.")
     if crossed is not None and (crossed[1].crosses or crossed[1].along_mps < -_STILL_MPS):
         return _at_a_crossing(frames, final, other)
@@ -86,6 +87,8 @@ def blame(
             return Blame("ego", other, since, "The other came over, but the ego did not brake with all it has.")
         return Blame("other", other, since, "The other came over to the ego's side.")
     if before[1].s_m < 0.0:
+        if _ego_backed_up([pair for _, pair in seen[unsafe_from - 1 :]]):
+            return Blame("ego", other, since, "The ego reversed into the one behind.")
         return Blame("other", other, since, "The other followed too closely.")
     if answered:
         return Blame("other", other, since, "The other ahead braked harder than anyone may be expected to.")
@@ -97,7 +100,7 @@ Pair = tuple[Body, Body]
 
 def _at_a_crossing(frames: Sequence[Frame], final: Snapshot, other: int) -> Blame:
     begun = len(frames)
-    while begun > 0 and frames[begun - 1].snapshot.ego.speed_mps < _STILL_MPS:
+    while begun > 0 and _stands(frames[begun - 1].snapshot.ego):
         begun -= 1
     if begun < len(frames):
         stood = frames[begun].snapshot
@@ -105,6 +108,11 @@ def _at_a_crossing(frames: Sequence[Frame], final: Snapshot, other: int) -> Blam
         if found is not None and not _in_the_way(final.ego, found):
             return Blame("other", other, stood.time_s, "The ego stood clear of the way of the one that ran into it.")
     return Blame("ego", other, None, "The ego was in the way of one that crossed.")
+
+
+def _stands(vehicle: VehicleState) -> bool:
+    """Who reverses does not stand."""
+    return abs(vehicle.speed_mps) < _STILL_MPS
 
 
 def _reversed(snapshot: Snapshot, other: int) -> bool:
@@ -167,7 +175,18 @@ def _safe(pair: Pair, dt_s: float, parameters: ShieldParameters) -> bool:
         parameters.others_sure_braking_mps2,
         parameters.braking_mps2,
     )
-    return gap >= needed
+    # An ego that reverses is the one that closes in: it must be able to stop.
+    backing = braking_gap_m(
+        max(-ego.along_mps, 0.0), -other.along_mps, parameters.braking_mps2, parameters.others_braking_mps2, dt_s
+    )
+    return gap >= max(needed, backing)
+
+
+def _ego_backed_up(pairs: Sequence[Pair]) -> bool:
+    """Whether the ego drove backwards at the one behind, or rolled back more of the way than that one came forwards."""
+    ego_way = sum(max(0.0, -ego.along_mps - _TOWARDS_MPS) for ego, _ in pairs)
+    other_way = sum(max(0.0, other.along_mps - _TOWARDS_MPS) for _, other in pairs)
+    return ego_way > other_way or any(ego.along_mps < -_STILL_MPS for ego, _ in pairs)
 
 
 def _ego_came_over(pairs: Sequence[Pair]) -> bool:

@@ -60,6 +60,12 @@ def least_speed_mps(snapshot: Snapshot, limits: Limits | None = None) -> float |
     return max(0.0, min((least, *ahead, *(() if cap is None else (cap,)))))
 
 
+def least_target_mps(snapshot: Snapshot, wishes: Wishes, limits: Limits) -> float:
+    """The least speed that wishes may ask for now; 0 where there is none, and on the way onto a shoulder."""
+    aim = next((lane for lane in snapshot.lanes if lane.id == wishes.target_lane), None)
+    return 0.0 if aim is not None and aim.emergency else least_speed_mps(snapshot, limits) or 0.0
+
+
 def shoulder_at_right(snapshot: Snapshot) -> bool:
     """Whether the ego is on a shoulder, or can get to one lane by lane to the right."""
     own = snapshot.ego.lane

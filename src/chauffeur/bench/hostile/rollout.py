@@ -11,22 +11,31 @@ from typing import Any, Final
 
 from pydantic import TypeAdapter
 
-from chauffeur.concept import ChauffeurError, Frame, LaneId, Limits, Plan, Program, Scenario, Snapshot
+from chauffeur.concept import (
+    STOP_ZONE_M,
+    ChauffeurError,
+    Frame,
+    LaneId,
+    Limits,
+    Plan,
+    Program,
+    Scenario,
+    Snapshot,
+    stops_at_sign,
+)
 from chauffeur.drive.episode import Episode
 from chauffeur.drive.session import declined, drive_policy, drive_without_program
 from chauffeur.programs.sandbox import UNHURRIED, Sandbox
 from chauffeur.safety.checks import run_checks
 from chauffeur.worlds.highway import HighwayWorld
 
-ROLLOUT_VERSION: Final = "hostile-rollout-v1"
+ROLLOUT_VERSION: Final = "hostile-rollout-v2"
 """Changes whenever the same plan could drive, or be described, differently."""
 
 MAX_S: Final = 40.0
 """Simulated time of a drive: long enough to overtake, to pull over and to cross a junction."""
 
-_STANDING_MPS: Final = 1.0
-"""Below this speed the simulator counts a car as having stopped at a sign."""
-_AT_SIGN_M: Final = 8.0
+_ROLLING_MPS: Final = 1.0
 
 plan_adapter: TypeAdapter[Plan] = TypeAdapter(Plan)
 
@@ -90,12 +99,13 @@ class Drive:
         program: State of the program at the end.
         seconds: Simulated time driven.
         interventions: Control periods in which the shield changed the command.
+        bounded: Set-points that were brought within the limits before the driver was given them, one a control period.
         over_limit_mps: Most by which a target speed that the driver was given exceeded what the limits allow; 0 for
             none.
         below_zero_mps: Most by which one was negative.
         short_headway_s: Most by which a headway that the driver was given fell short of the smallest allowed.
         too_fast_mps: Most by which the car itself was faster than the limits allow.
-        ran_sign: Whether the car passed a stop sign without having stood.
+        ran_sign: Whether the car passed a stop sign without having stopped at it.
         shoulder_s: Time spent rolling on an emergency lane.
         start_speed_mps, end_speed_mps, least_speed_mps, top_speed_mps: Of the car.
         first_target_mps, last_target_mps, least_target_mps, top_target_mps: Target speeds given.
@@ -112,6 +122,7 @@ class Drive:
     program: str
     seconds: float
     interventions: int
+    bounded: int
     over_limit_mps: float
     below_zero_mps: float
     short_headway_s: float
@@ -148,11 +159,12 @@ def describe_drive(episode: Episode, limits: Limits) -> Drive:
         program=frames[-1].program if frames else "none",
         seconds=episode.duration_s,
         interventions=episode.interventions,
+        bounded=sum(count for _, count in episode.bounded),
         over_limit_mps=_most(target - _allowed(frame, limits) for frame, target in zip(given, targets, strict=True)),
         below_zero_mps=_most(-target for target in targets),
         short_headway_s=_most(limits.min_time_headway_s - headway for headway in headways),
         too_fast_mps=_most(frame.snapshot.ego.speed_mps - _allowed(frame, limits) for frame in frames),
-        ran_sign=_ran_sign(frames),
+        ran_sign=ran_sign([*(frame.snapshot for frame in frames), episode.final]),
         shoulder_s=round(_on_shoulder_s(frames), 1),
         start_speed_mps=speeds[0],
         end_speed_mps=speeds[-1],
@@ -188,17 +200,18 @@ def _most(excesses: Iterable[float]) -> float:
     return round(max(0.0, max(excesses, default=0.0)), 6)
 
 
-def _ran_sign(frames: Sequence[Frame]) -> bool:
-    """Whether a sign was reached and left behind although the car never stood."""
-    reached = False
-    for frame in frames:
-        snapshot = frame.snapshot
-        if snapshot.ego.speed_mps < _STANDING_MPS:
-            return False
-        if snapshot.stop_sign_m is not None and snapshot.stop_sign_m < _AT_SIGN_M:
+def ran_sign(snapshots: Iterable[Snapshot]) -> bool:
+    """Whether a sign was reached and left behind although the car did not stop at it: a stop far before it is none."""
+    reached = stood = False
+    for snapshot in snapshots:
+        ahead = snapshot.stop_sign_m
+        if ahead is not None and ahead <= STOP_ZONE_M:
             reached = True
-        elif reached and snapshot.stop_sign_m is None:
+            stood = stood or stops_at_sign(snapshot.ego.speed_mps, ahead)
+        elif reached and not stood:
             return True
+        else:
+            reached = stood = False
     return False
 
 
@@ -209,7 +222,7 @@ def _emergency(snapshot: Snapshot, lane: LaneId | None) -> bool:
 def _on_shoulder_s(frames: Sequence[Frame]) -> float:
     period_s = frames[1].snapshot.time_s - frames[0].snapshot.time_s if len(frames) > 1 else 0.0
     return period_s * sum(
-        _emergency(frame.snapshot, frame.snapshot.ego.lane) and frame.snapshot.ego.speed_mps > _STANDING_MPS
+        _emergency(frame.snapshot, frame.snapshot.ego.lane) and frame.snapshot.ego.speed_mps > _ROLLING_MPS
         for frame in frames
     )
 

@@ -7,10 +7,11 @@ id says which.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
-from chauffeur.concept import ConfigError, Metric
+from chauffeur.concept import STOPPED_MPS, ConfigError, Metric
 
 Row = dict[str, Any]
 
@@ -21,8 +22,8 @@ TIME_LIMIT_S = 60.0
 """T_limit of paper Eq. 7; the paper gives no number, this is LaMPilot's."""
 WEIGHTS = {"ttc": 0.5, "speed_variance": 0.3, "time_efficiency": 0.2}
 COLLISION_WEIGHT = 500.0
-STOPPED_MPS = 1.0
-"""At a stop sign, slower than this is a stop: LaMPilot's own bound for letting a car go on."""
+ANY_STOP_M = math.inf
+"""How far before its sign a stop serves it: LaMPilot lets a car go on from wherever it stands."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from chauffeur.bench.lampilot.expert import variants
 from chauffeur.bench.lampilot.goals import DistanceGoal, OvertakeGoal, Ruling, SpeedGoal
 from chauffeur.bench.lampilot.goals_more import make_any_goal
 from chauffeur.bench.lampilot.metrics import (
+    ANY_STOP_M,
     COLLISION_WEIGHT,
     ORIGIN,
     SPEED_STD_FULL_MPS,
@@ -155,7 +156,9 @@ def rehearsed(
         SandboxError: No worker can be had.
     """
     place = _sandbox() if sandbox is None else sandbox
-    return rehearse(world, sources, _judges(scenario), sandbox=place, max_s=MAX_TRY_S, library=library)
+    return rehearse(
+        world, sources, _judges(scenario), sandbox=place, max_s=MAX_TRY_S, library=library, stop_zone_m=ANY_STOP_M
+    )
 
 
 def _judges(scenario: Scenario) -> Callable[[HighwayWorld], OriginJudge]:
@@ -278,5 +281,6 @@ def _tries(
         sandbox=sandbox,
         max_s=MAX_TRY_S,
         library=library,
+        stop_zone_m=ANY_STOP_M,
         board=desk,
     )

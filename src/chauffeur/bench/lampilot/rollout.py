@@ -12,6 +12,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from chauffeur.bench.lampilot.expert import expert_program
+from chauffeur.bench.lampilot.metrics import ANY_STOP_M
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.concept import ChauffeurError, Context, Limits, Plan, Program, Scenario, Wishes
 from chauffeur.describe import describe
@@ -111,6 +112,8 @@ def roll_out(job: RolloutJob) -> dict[str, Any]:
             library=program.library,
             sandbox=_sandbox(),
             shield=shield,
+            limits=job.limits if job.shield else None,
+            stop_zone_m=ANY_STOP_M,
         )
     except ChauffeurError as error:
         return row | not_driven("not_driven", str(error), infra_failed=True)

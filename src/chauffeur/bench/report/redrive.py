@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from chauffeur.bench.lampilot.human import RecordedHands, trace_adapter
+from chauffeur.bench.lampilot.metrics import ANY_STOP_M
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rollout import BASELINES, MAX_EPISODE_S, context_adapter, plan_adapter
 from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run
@@ -130,4 +131,13 @@ def _drive(row: Row, plan: Plan | None, world: HighwayWorld, referee: LampilotRe
         return run_episode(world, None, referee, max_s=MAX_EPISODE_S, hands=hands)
     if plan is None or not isinstance(plan.policy, Program):
         return None
-    return drive_program(world, plan.policy.source, referee, MAX_EPISODE_S, library=plan.policy.library, shield=shield)
+    return drive_program(
+        world,
+        plan.policy.source,
+        referee,
+        MAX_EPISODE_S,
+        library=plan.policy.library,
+        shield=shield,
+        limits=None if shield is None else LAMPILOT_LIMITS,
+        stop_zone_m=ANY_STOP_M,
+    )

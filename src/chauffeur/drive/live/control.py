@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import Command, Parameters, Snapshot, Wishes
-from chauffeur.drive.actuate import Actuated, actuate
+from chauffeur.drive.actuate import Actuated, actuate, set_points
 from chauffeur.drive.fallback import MINIMAL_RISK_BRAKING_MPS2
 from chauffeur.drive.live.ladder import Ladder
 from chauffeur.drive.live.messages import MessageError, Observation, Report, Rung, Steered, Wish
@@ -27,7 +27,7 @@ from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.wheel import Wheel, pressed
 from chauffeur.drive.parameters import LotShield, ParametersDriver, shield_for
-from chauffeur.safety.bounds import bounded, least_speed_mps
+from chauffeur.safety.bounds import least_target_mps
 from chauffeur.safety.shield import Shield, foresight
 from chauffeur.worlds.base import Driver, MirroredWorld
 
@@ -124,7 +124,7 @@ class Control:
                 break
             snapshot = self._world.snapshot()
             ladder_wishes = self._ladder.choose(float(period), None, math.inf, snapshot)[1]
-            wishes, _ = bounded(ladder_wishes, start.limits, self._limit_mps(ladder_wishes, snapshot))
+            wishes, _ = set_points(self._world, snapshot, ladder_wishes, start.limits)
             if period < WARM_UP_PERIODS // 2:
                 settled = driver.settle(wishes)
                 command = driver.command(settled)
@@ -166,8 +166,8 @@ class Control:
             if not self._wheel.taken:
                 age_s = self._hear(start)
             rung, wishes = self._choose(at_s, age_s, snapshot)
-            least = self._least_mps(rung, wishes, snapshot, start)
-            wishes, clipped = bounded(wishes, start.limits, self._limit_mps(wishes, snapshot), least)
+            least = least_target_mps(snapshot, wishes, start.limits) if rung in ("follow", "hold") else 0.0
+            wishes, clipped = set_points(self._world, snapshot, wishes, start.limits, least)
             done, settled, told = self._act(rung, snapshot, wishes)
             wishes = wishes if self._pursuit is None else settled
             said += told
@@ -316,20 +316,6 @@ class Control:
             return "hold", self._held  # nobody has wished anything yet
         expired = wish is not None and self._clock_ns() > wish.expires_ns
         return self._ladder.choose(at_s, wish, age_s, snapshot, expired=expired)
-
-    def _limit_mps(self, wishes: Wishes, snapshot: Snapshot) -> float:
-        """The speed limit where the car is; in a lane change, the higher one of both."""
-        lanes = [lane for lane in (snapshot.ego.lane, wishes.target_lane) if lane is not None]
-        limits = [self._world.perception().speed_limit(lane) for lane in lanes]
-        return max(limits, default=math.inf)
-
-    def _least_mps(self, rung: Rung, wishes: Wishes, snapshot: Snapshot, start: Start) -> float:
-        """The least speed a policy may ask for; 0 for the ladder and for the person's hands, and on the way to a
-        shoulder that is entered now."""
-        aim = next((lane for lane in snapshot.lanes if lane.id == wishes.target_lane), None)
-        if rung not in ("follow", "hold") or (aim is not None and aim.emergency):
-            return 0.0
-        return least_speed_mps(snapshot, start.limits) or 0.0
 
     def _act(self, rung: Rung, snapshot: Snapshot, wishes: Wishes) -> tuple[Actuated, Wishes, tuple[str, ...]]:
         """Drive a period; returns what was done, the wishes as they were driven, and what there is to tell."""

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept import LaneView, Snapshot, Wishes
+from chauffeur.concept import STOP_ZONE_M, LaneView, Snapshot, Wishes
 from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.drive.live.messages import Hand, Key, MessageError
 from chauffeur.drive.live.ring import Reader, Ring
@@ -26,8 +26,6 @@ _STEPS: Final = 6.0
 MEANT_WITHIN_NS: Final = 1_000_000_000
 """A key that was pressed longer ago, by the clock, is not meant for now."""
 _STANDING_MPS: Final = 0.5
-_AT_SIGN_M: Final = 10.0
-"""A stop sign no farther ahead has been stood at."""
 
 
 class Wheel:
@@ -100,7 +98,7 @@ def _step(snapshot: Snapshot, perception: Perception) -> float:
 def _past_the_sign(wishes: Wishes, perception: Perception) -> Wishes:
     """Whoever goes on from a stand at a stop sign has stopped at it."""
     sign = perception.stop_sign_ahead(wishes.served_stops)
-    if sign is None or sign[1] > _AT_SIGN_M:
+    if sign is None or sign[1] > STOP_ZONE_M:
         return wishes
     return replace(wishes, served_stops=wishes.served_stops | {sign[0]})
 

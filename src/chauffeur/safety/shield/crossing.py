@@ -38,6 +38,10 @@ _CLEAR_S: Final = 7.0
 _AWAY_RAD: Final = math.radians(60.0)
 """A lane turned by more against the car is not the one it drives in, close as it may be."""
 _ALONG: Final = math.cos(CROSSING_RAD)
+_OUT_M: Final = 2.0
+"""A body that reaches farther to the side of its way is out of its lane: half the width of one."""
+_BACK_MPS: Final = 2.0
+"""A car that is out of its lane goes back to it no faster than this, as long as it may stop."""
 _FAR_M: Final = 40.0
 """Where a car that turns will go cannot be told at this distance: it is not minded yet."""
 _BENT_M: Final = 0.1
@@ -68,6 +72,8 @@ _LOST: Final = _Care(after_s=1.0, merge_s=1.5, side_m=0.6, room_m=4.5, turn_rad=
 """The same for a car that got off its way: it needs room to get back to it."""
 _LAST: Final = _Care(after_s=0.2, merge_s=0.6, side_m=0.2, room_m=math.inf, turn_rad=math.inf)
 """What is left where that is gone, because others or tyres did what was not foreseen."""
+_STAYING: Final = replace(_LAST, room_m=_DUE.room_m)
+"""The same on the road."""
 _BESIDE: Final = replace(_LAST, side_m=0.05)
 """To stand beside somebody's way without touching it."""
 
@@ -357,6 +363,10 @@ class _Outlook:
         """Steering angle of a law."""
         return foresight.wheel(law, self.state, points, self.way(points).at, acceleration_mps2, self.dt_s)
 
+    def beside_m(self, points: Array) -> float:
+        """How far the body reaches to the side of a way now."""
+        return foresight.beside_m(self.state, points, self.way(points).at, self.size)
+
     def clearing_mps2(self, most_mps2: float) -> tuple[float, ...]:
         """Accelerations that clear the crossing, as far as the other rules let them."""
         return tuple(max(self.least_mps2, min(mps2, most_mps2)) for mps2 in _CLEARING_MPS2)
@@ -411,11 +421,15 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
     """The command with steering and acceleration of the way that was promised; the least bad one if none ends well."""
     asked = command.acceleration_mps2
     least = outlook.least_mps2
+    stopping = asked, least
+    if outlook.beside_m(way) > _OUT_M:
+        # What was asked got the car off its way, and at that speed it gets farther off it: it brakes first.
+        stopping = min(asked, max(least, (_BACK_MPS - float(outlook.state[3])) / outlook.dt_s)), *stopping
     clearing = outlook.clearing_mps2(most_mps2)
     for care in (_DUE, _LOST):
         # To stop comes first: the way that was promised need not be the one that is wanted.
         for ends_well, accelerations in (
-            (outlook.stops, (asked, least)),
+            (outlook.stops, stopping),
             (outlook.clears, (asked, *clearing)),
         ):
             for acceleration in accelerations:
@@ -432,7 +446,9 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
     trials = [(trial, plan) for trial, plans in begun for plan in plans]
     troubles = [outlook.trouble_s(trial, way, plan, _LAST) for trial, plan in trials]
     latest = max(troubles)
-    best, _ = trials[troubles.index(latest)]
+    # Of those that keep clear of others as long, the one longest on its way: a light hand may be too light.
+    tied = [trial for trial, trouble in zip(trials, troubles, strict=True) if trouble == latest]
+    best, _ = max(tied, key=lambda trial: outlook.trouble_s(trial[0], way, trial[1], _STAYING))
     if latest < math.inf:  # rather stand close by somebody's way than drive into it
         for law in range(foresight.LAWS):
             trial = Command(least, outlook.wheel_rad(law, way, least))

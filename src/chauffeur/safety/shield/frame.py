@@ -163,15 +163,15 @@ def _frame_at(lanes: tuple[LaneView, ...], own: LaneId, cell_x: int, cell_y: int
     beside = {lane.id: lane for lane in lanes if lane.id[:2] == own[:2]}
     if own not in beside:
         return None
-    x, y, heading = _nearest(beside[own], cell_x * _EVERY_M, cell_y * _EVERY_M)
+    x, y, heading = nearest_on(beside[own], cell_x * _EVERY_M, cell_y * _EVERY_M)
     c, s = math.cos(heading), math.sin(heading)
     strips: list[Strip] = []
     for lane in beside.values():
-        lane_x, lane_y, _ = _nearest(lane, x, y)
+        lane_x, lane_y, _ = nearest_on(lane, x, y)
         centre = -s * (lane_x - x) + c * (lane_y - y)
         strips.append(Strip(lane.id, centre, centre - lane.width_m / 2.0, centre + lane.width_m / 2.0))
     strips.sort(key=lambda strip: strip.centre_m)
-    ahead = _nearest(beside[own], x + _PREVIEW_M * c, y + _PREVIEW_M * s)[2]
+    ahead = nearest_on(beside[own], x + _PREVIEW_M * c, y + _PREVIEW_M * s)[2]
     curvature = wrap_to_pi(ahead - heading) / _PREVIEW_M
     if abs(curvature) < _STRAIGHT:
         curvature = 0.0
@@ -179,7 +179,7 @@ def _frame_at(lanes: tuple[LaneView, ...], own: LaneId, cell_x: int, cell_y: int
     return _Frame(tuple(strips), beside[own].speed_limit_mps, curvature, numbers)
 
 
-def _nearest(lane: LaneView, x: float, y: float) -> tuple[float, float, float]:
+def nearest_on(lane: LaneView, x: float, y: float) -> tuple[float, float, float]:
     """(x, y, heading) of the point of a lane's centre line that is closest; its ends go on straight."""
     best = (math.inf, 0.0, 0.0, 0.0)
     points = lane.centre_m

@@ -2,13 +2,14 @@
 
 It changes a command as little as is needed so that full braking and steering back to the lane still end well, whatever
 the others do within what `ShieldParameters` assume of them; it says what it changed and why. It knows no program, no
-wish and no model, and remembers nothing from one period to the next but the lane it could steer back to, and how the
-vehicle moved under the last command.
+wish and no model, and remembers nothing from one period to the next but the lane it could steer back to, how the
+vehicle moved under the last command, and at which stop lines it has stopped.
 
 Across the road: a command that would carry the body over a line is let through only if that lane is free, ahead and
 behind, by responsibility-sensitive distances; otherwise the car is steered back. Along it: no faster than still stops
 behind every car in the lanes the body touches or is on its way to; no harder braking than needed while somebody follows
-too closely; no reversing; not above the speed limit. Where roads cross, `crossing.Junction` judges both at once.
+too closely; no reversing; not above the speed limit; over no stop line without a stop. Where roads cross,
+`crossing.Junction` judges both at once.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from chauffeur.safety.shield.crossing import Junction
 from chauffeur.safety.shield.everybody import AHEAD, BEHIND, Everybody
 from chauffeur.safety.shield.frame import Body, Lens, Scene, Strip
 from chauffeur.safety.shield.gaps import free_gap_m, greatest_acceleration, rss_gap_m
+from chauffeur.safety.shield.stop_lines import StopLines
 from chauffeur.safety.shield.sweep import recovery_steering, swept, yaw_rate
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
 from chauffeur.safety.words import speed_words
@@ -84,6 +86,7 @@ class Shield:
         self._lens, self._aim_lens = Lens(), Lens()
         self._back: LaneId | None = None
         self._junction: Junction | None = None
+        self._stop_lines = StopLines(parameters, dt_s)
 
     def guard(self, snapshot: Snapshot, command: Command, aim: LaneId | None = None) -> Guarded:
         """The command, changed as little as needed.
@@ -94,6 +97,7 @@ class Shield:
             aim: Lane the controllers steer for. Where ways part, the nearest lane need not be the car's own.
         """
         around = Everybody.of(snapshot)
+        line_m = self._stop_lines.ahead_m(snapshot) if snapshot.objects and around.known else math.inf
         scene = self._lens.look(snapshot, snapshot.ego.lane, around) if _known(snapshot.ego) else None
         if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
             safe = self._standing_still(snapshot, scene)
@@ -113,7 +117,7 @@ class Shield:
         steered = self._across(scene, snapshot.ego, command, crossings)
         self._back = steered.back
         said = list(steered.said)
-        mended = self._along(scene, snapshot, around, lane, aim, steered, said)
+        mended = self._along(scene, snapshot, around, lane, aim, steered, line_m, said)
         return Guarded(mended, tuple(said))
 
     def _standing_still(self, snapshot: Snapshot, scene: Scene | None) -> Command:
@@ -242,13 +246,14 @@ class Shield:
         lane: LaneId,
         aim: LaneId | None,
         steered: _Steered,
+        line_m: float,
         said: list[Intervention],
     ) -> Command:
         """The command with its acceleration mended."""
         command, span, speed = steered.command, steered.span, snapshot.ego.speed_mps
         crossings = snapshot.kind == "intersection"
         asked = command.acceleration_mps2
-        bound = self._bound(scene, span, crossings)
+        bound = self._bound(scene, span, crossings, line_m)
         wanted = min(asked, bound.acceleration_mps2)
         rule, reason = bound.rule, bound.reason
         if wanted >= asked - _LEVEL_MPS2 and wanted < -self._table.gentle_mps2:
@@ -262,7 +267,7 @@ class Shield:
         mended = Command(wanted, command.steering_rad)
         if crossings:
             most = bound.acceleration_mps2
-            held_up = bound.rule == "gap" and most <= 0.0
+            held_up = bound.rule in ("gap", "stop") and most <= 0.0
             result = self._guard_of(snapshot).mend(snapshot, around, lane, aim, mended, most, held_up=held_up)
             if result.rule:
                 mended, rule, reason = result.command, result.rule, result.reason
@@ -274,13 +279,16 @@ class Shield:
             said.append(Intervention(rule, reason, command, mended))
         return mended
 
-    def _bound(self, scene: Scene, span: Span, crossings: bool) -> _Cap:
+    def _bound(self, scene: Scene, span: Span, crossings: bool, line_m: float) -> _Cap:
         """The strictest bound of the acceleration; where roads cross, those who do are minded elsewhere."""
         table, ego = self._table, scene.ego
         speed = math.hypot(ego.along_mps, ego.across_mps)
         most = max(0.0, self._limits.most_mps(scene.speed_limit_mps))  # no number: no bound could be compared with it
         allowed = max((most - speed) / self._dt_s, -_SLOWING_MPS2)
         strictest = _Cap(min(allowed, table.acceleration_mps2), "speed", f"No faster than {speed_words(most)} here.")
+        cap = self._stop_lines.most_mps2(speed, line_m)
+        if cap < strictest.acceleration_mps2:
+            strictest = _Cap(cap, "stop", f"A stop line is {line_m:.0f} m ahead, and the car has not stopped at it.")
         free = table.margin_m + free_gap_m(speed, table.acceleration_mps2, table.braking_mps2, self._dt_s) + _SURE_M
         for other in scene.within(span, table.side_m, table.drift_mps, AHEAD, free):
             if crossings and other.crosses:

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-SHIELD_VERSION: Final = "shield-v3"
+SHIELD_VERSION: Final = "shield-v4"
 """Changes whenever the same command could be let through differently."""
 
 

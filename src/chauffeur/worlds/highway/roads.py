@@ -49,7 +49,11 @@ class EgoConfig(BaseModel):
 
 
 class RoadConfig(BaseModel):
-    """LaMPilot's `env` mapping. Fields of other road kinds are accepted and ignored, as LaMPilot does."""
+    """LaMPilot's `env` mapping. Fields of other road kinds are accepted and ignored, as LaMPilot does.
+
+    `redraw_unfit` is ours: traffic is drawn again where it begins with cars in each other (`fitness.fit_to_begin`).
+    LaMPilot drives such draws as they are.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -68,6 +72,7 @@ class RoadConfig(BaseModel):
     position_deviation_right: float = 0.1
     speed_deviation_left: float = 0.5
     speed_deviation_right: float = 0.5
+    redraw_unfit: bool = False
 
 
 @dataclass(slots=True)

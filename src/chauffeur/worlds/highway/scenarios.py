@@ -34,7 +34,9 @@ def _crossing(left: int, right: int) -> dict[str, Any]:
 
 
 def _built_in(name: str, config: dict[str, Any], seed: int, wish: str, title: str) -> Scenario:
-    return Scenario(id=name, world="highway", config=config, seed=seed, wish=wish, title=title)
+    return Scenario(
+        id=name, world="highway", config={**config, "redraw_unfit": True}, seed=seed, wish=wish, title=title
+    )
 
 
 BUILT_IN: tuple[Scenario, ...] = (

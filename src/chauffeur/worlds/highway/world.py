@@ -20,8 +20,9 @@ from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.core import CoreRoad
 from chauffeur.worlds.highway.core import layout as at
 from chauffeur.worlds.highway.driver import HighwayDriver
+from chauffeur.worlds.highway.fitness import fit_to_begin
 from chauffeur.worlds.highway.perception import HighwayPerception
-from chauffeur.worlds.highway.roads import DT_S, Scene, build_scene, lane_views, parse_config
+from chauffeur.worlds.highway.roads import DT_S, RoadConfig, Scene, build_scene, lane_views, parse_config
 
 FOLLOW_WITHIN_M = 50.0
 """LaMPilot starts the ego at the speed of a vehicle closer than this ahead, at the speed limit otherwise."""
@@ -29,6 +30,7 @@ FOLLOW_WITHIN_M = 50.0
 ENGINE = "highway core 1 (physics of highway-env 1.12.1)"
 
 _KEPT_STARTS = 64
+_DRAWS = 100
 _INSTANT = struct.Struct("<Qd")
 """Control periods since the trip began, and the simulator's own clock, s."""
 
@@ -185,16 +187,32 @@ def _start_of(scenario: Scenario, seed: int) -> _Start:
     key = json.dumps(scenario.config, sort_keys=True, default=str), seed
     start = _starts.get(key)
     if start is None:
-        start = _starts[key] = _warm_up(scenario, seed)
+        start = _starts[key] = _drawn(scenario, seed)
         if len(_starts) > _KEPT_STARTS:
             _starts.popitem(last=False)
     _starts.move_to_end(key)
     return start
 
 
-def _warm_up(scenario: Scenario, seed: int) -> _Start:
-    rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed)))
-    scene = build_scene(parse_config(scenario.config, scenario.id), rng)
+def _drawn(scenario: Scenario, seed: int) -> _Start:
+    """The start a seed stands for: its first draw, or where the scenario asks for one, its first that is fit."""
+    config = parse_config(scenario.config, scenario.id)
+    start = _warm_up(config, np.random.SeedSequence(seed))
+    if not config.redraw_unfit:
+        return start
+    for draw in range(1, _DRAWS):
+        if fit_to_begin(HighwayPerception(start.core, start.scene.kind, start.scene.emergency_lanes).everybody()):
+            return start
+        start = _warm_up(config, np.random.SeedSequence([seed, draw]))
+    raise ScenarioError(
+        f"Scenario {scenario.id!r} has no start without a collision for seed {seed}, in {_DRAWS} draws.",
+        hint="Give it fewer vehicles, or a smaller vehicles_density.",
+    )
+
+
+def _warm_up(config: RoadConfig, seeds: np.random.SeedSequence) -> _Start:
+    rng = np.random.Generator(np.random.PCG64(seeds))
+    scene = build_scene(config, rng)
     core = CoreRoad.of(scene)
     if not _starts:
         core.make_ready()
