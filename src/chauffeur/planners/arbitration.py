@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from chauffeur.planners.onboard.options import Chosen
 
 SURE: Final = 0.95
-"""From this probability of its least sure choice the network's reading needs no second one that agrees. Chosen with the
-hand-written wishes of `bench passengers` in sight, so their figures are no held-out check: see `benchmarks/RESULTS.md`."""
+"""From this probability of its least sure choice the network's reading needs no second one that agrees. Chosen with
+the hand-written wishes of `bench passengers` in sight: their figures are no held-out check (`benchmarks/RESULTS.md`)."""
 
 SLOW_SHARE: Final = 0.5
 """Of the traffic's speed; whoever drives slower than that among others is asked whether they mean it."""
