@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 SURE: Final = 0.95
 """From this probability of its least sure choice the network's reading needs no second one that agrees. Chosen with
-the hand-written wishes of `bench passengers` in sight: their figures are no held-out check (`benchmarks/RESULTS.md`)."""
+the wishes of `bench passengers` in sight: their figures are no held-out check (see benchmarks/RESULTS.md)."""
 
 SLOW_SHARE: Final = 0.5
 """Of the traffic's speed; whoever drives slower than that among others is asked whether they mean it."""
