@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pty
 import re
+import select
 import subprocess
 import termios
 import time
@@ -14,6 +15,8 @@ from typing import Final
 
 WITHIN_S: Final = 180.0
 """For a busy machine."""
+_LOOK_S: Final = 1.0
+"""How often is looked whether the process still runs."""
 _MOVES: Final = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
 
 
@@ -22,9 +25,11 @@ def until(process: subprocess.Popen[bytes], screen: int, words: str) -> str:
     shown = b""
     deadline_s = time.monotonic() + WITHIN_S
     while words not in (plain := _MOVES.sub("", shown.decode(errors="replace"))):
-        assert time.monotonic() < deadline_s, plain
+        left_s = deadline_s - time.monotonic()
+        assert left_s > 0.0, plain
+        ready, _, _ = select.select([screen], [], [], min(left_s, _LOOK_S))
         try:
-            piece = os.read(screen, 65536)
+            piece = os.read(screen, 65536) if ready else b""
         except OSError:  # the other end of a terminal is gone
             piece = b""
         assert piece or process.poll() is None, plain
@@ -44,7 +49,12 @@ def at_a_terminal(command: Sequence[str]) -> Iterator[tuple[subprocess.Popen[byt
         stderr=theirs,
         env=os.environ | {"TERM": "xterm", "COLUMNS": "110", "LINES": "40"},
     )
-    yield process, ours
-    assert termios.tcgetattr(theirs) == before, "the terminal is as it was"
-    os.close(ours)
-    os.close(theirs)
+    try:
+        yield process, ours
+        assert termios.tcgetattr(theirs) == before, "the terminal is as it was"
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait(timeout=WITHIN_S)
+        os.close(ours)
+        os.close(theirs)

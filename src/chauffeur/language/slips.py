@@ -16,8 +16,8 @@ from chauffeur.language.quantities import ONES, TENS, Dimension, unit_of
 from chauffeur.language.tokens import tokens_of
 
 _NUMERAL: Final = re.compile(
-    r"(?:0|[1-9]\d*|[1-9]\d{0,2}(?:,\d{3})+)(?:\.\d+)?"  # 50, 28.5, 1,200, 1,234.5
-    r"|(?:0|[1-9]\d*),\d{1,2}"  # 1,5 as most of Europe writes it
+    r"(?:0|[1-9]\d{0,11}|[1-9]\d{0,2}(?:,\d{3}){1,3})(?:\.\d{1,9})?"  # 50, 28.5, 1,200, 1,234.5
+    r"|(?:0|[1-9]\d{0,11}),\d{1,2}"  # 1,5 as most of Europe writes it
     r"|\.\d+",
     re.ASCII,
 )
@@ -25,14 +25,14 @@ _THOUSANDS: Final = re.compile(r"([1-9]\d{0,2})\.(\d{3})", re.ASCII)
 """A thousand with a full stop, or three decimals: 1.000 m is either."""
 _LABEL: Final = re.compile(r"[a-z]{1,3}\d{1,4}[a-z]?|\d{1,4}[a-z]", re.ASCII)
 """Names of roads, exits and spots: A1, M25, 12b."""
-_ORDINAL: Final = re.compile(r"\d+(?:st|nd|rd|th|x)", re.ASCII)
+_ORDINAL: Final = re.compile(r"\d{1,6}(?:st|nd|rd|th|x)", re.ASCII)
 _LIKE_DIGITS: Final = str.maketrans("oli|sbz", "0111582")
 _LIKE_DIGITS_END: Final = re.compile(r"\d[oli|sbz]*$")
-_TYPED_FOR_DIGITS: Final = re.compile(r"[\d.,oli|]*[oli|][\d.,oli|]*")
+_TYPED_FOR_DIGITS: Final = re.compile(r"(?=[\d.,]{0,12}[oli|])[\d.,oli|]{1,24}")
 """Digits with letters that are typed for them, and no others: a bare `5o` is no name of an exit."""
 _ONLY_LETTERS_FOR_DIGITS: Final = re.compile(r"[oli|sbz]{2,}")
-_NUMBER_AND_REST: Final = re.compile(rf"(?P<number>{_NUMERAL.pattern})(?P<rest>[a-z].*)", re.ASCII)
-_UNIT_LETTERS: Final = re.compile(r"(?=[^aeiou]+$)[kmphftydcnsg]{2,6}")
+_NUMBER_AND_REST: Final = re.compile(rf"(?P<number>{_NUMERAL.pattern})(?P<rest>[a-z].{0, 40})", re.ASCII)
+_UNIT_LETTERS: Final = re.compile(r"[kmphftydcnsg]{2,6}")
 """What has no vowel and only letters of units is one that was mistyped: `mhp`, `kmg`."""
 _LONGEST_UNIT: Final = 20
 _MUCH: Final = frozenset(("thousand", "million"))

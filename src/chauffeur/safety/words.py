@@ -12,7 +12,7 @@ from chauffeur.concept.units import kmh
 IN_A_HELPER: Final = "(In a helper function.)"
 """Added for the model that repairs a program; the person has none."""
 _SENTENCE: Final = re.compile(r"(?<=[.!?])\s+(?=[A-Z(])")
-_BOTH_UNITS: Final = re.compile(r"(\d+(?:\.\d+)?(?:e[+-]?\d+)?) m/s \((-?\d+ km/h)\)")
+_BOTH_UNITS: Final = re.compile(r"(?<![\d.])(\d{1,9}(?:\.\d{1,9})?(?:e[+-]?\d{1,3})?) m/s \((-?\d{1,9} km/h)\)")
 
 
 def speed_words(speed_mps: float) -> str:
