@@ -27,7 +27,8 @@ _LEAST: Final = re.compile(r"[a-z]{3}", re.IGNORECASE)
 
 
 _ONLY_A_PART: Final = re.compile(
-    r"(?<=\w)\s{0,3}[,.;…-]{0,3}\s{1,3}(?:(?:uh|um|oh|er|ah|hmm|no|wait|nope|sorry|actually|rather|or rather|i mean|i meant|"
+    r"(?<=\w)\s{0,3}[,.;…-]{0,3}\s{1,3}"
+    r"(?:(?:uh|um|oh|er|ah|hmm|no|wait|nope|sorry|actually|rather|or rather|i mean|i meant|"
     r"make (?:that|it)|correction|scratch that|strike that)\b[\s,.;:…-]{0,4}){1,6}"
     r"(?P<part>(?:(?:to|the|at|on|a|go|of) ){0,4}[\w.,/%'-]{1,24}(?: [\w.,/%'-]{1,24}){0,5}?)"
     r"(?:[\s,.;-]{1,4}(?:i mean|i meant|please|sorry|thanks|rather|instead)){0,3}\s{0,3}[.,;!]{0,3}\s{0,3}$",

@@ -31,7 +31,7 @@ _LIKE_DIGITS_END: Final = re.compile(r"\d[oli|sbz]*$")
 _TYPED_FOR_DIGITS: Final = re.compile(r"(?=[\d.,]{0,12}[oli|])[\d.,oli|]{1,24}")
 """Digits with letters that are typed for them, and no others: a bare `5o` is no name of an exit."""
 _ONLY_LETTERS_FOR_DIGITS: Final = re.compile(r"[oli|sbz]{2,}")
-_NUMBER_AND_REST: Final = re.compile(rf"(?P<number>{_NUMERAL.pattern})(?P<rest>[a-z].{0, 40})", re.ASCII)
+_NUMBER_AND_REST: Final = re.compile(rf"(?P<number>{_NUMERAL.pattern})(?P<rest>[a-z].{{0,40}})", re.ASCII)
 _UNIT_LETTERS: Final = re.compile(r"[kmphftydcnsg]{2,6}")
 """What has no vowel and only letters of units is one that was mistyped: `mhp`, `kmg`."""
 _LONGEST_UNIT: Final = 20
