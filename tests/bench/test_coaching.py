@@ -291,7 +291,7 @@ def test_programs_of_a_shared_repository_are_checked_with_the_plan(
     ))  # fmt: skip
     coach.repository.commit(forged)
     (ended,) = coach.coach(items_named(dataset, ["left_lc_s1_c1"]))
-    assert ended.ending == "given_up" and "In a helper function" in ended.detail
+    assert ended.ending == "given_up" and "above the speed limit" in ended.detail
 
 
 def test_the_setting_and_the_repository_come_together(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from chauffeur import cli
 from chauffeur.cli import failures
 from chauffeur.cli.console import Screen, columns, echo, path_text, plain, stderr, stdout
 from chauffeur.cli.printable import PrintableFormatter, printable
-from chauffeur.cli.show import Teller
+from chauffeur.cli.show import FullTeller, Teller
 from chauffeur.concept import (
     NOBODY,
     ApiCall,
@@ -130,11 +130,11 @@ DRIVE = a_drive()
 PLACES = list(strings(DRIVE))
 
 
-def tell(drive: RecordedTrip, *, terminal: bool) -> str:
+def tell(drive: RecordedTrip, *, terminal: bool, screen: type[Teller] = Teller) -> str:
     out = io.StringIO()
     console = Screen(file=out, force_terminal=terminal, width=300, color_system="truecolor")
     trip = drive.trip
-    with Teller(console) as teller:
+    with screen(console) as teller:
         teller.begin(drive.scenario, trip.seed)
         for letter, value in (
             ("I", trip.instruction), ("C", trip.context), ("H", trip.history), ("P", trip.plan),
@@ -158,12 +158,13 @@ def test_fields_of_every_letter_are_tried() -> None:
     assert ("frames", 0, "said", 0) in PLACES
 
 
+@pytest.mark.parametrize("screen", [Teller, FullTeller])
 @pytest.mark.parametrize("terminal", [True, False])
-def test_no_field_of_a_drive_reaches_the_terminal_as_anything_but_text(terminal: bool) -> None:
+def test_no_field_of_a_drive_reaches_the_terminal_as_anything_but_text(terminal: bool, screen: type[Teller]) -> None:
     seen = 0
     for path in PLACES:
         try:
-            output = tell(put(DRIVE, path, EVIL), terminal=terminal)
+            output = tell(put(DRIVE, path, EVIL), terminal=terminal, screen=screen)
         except (ValueError, KeyError) as error:  # a field that must be a number, a time or a path
             pytest.fail(f"{path}: {error!r}")
         harmless(output)
@@ -172,7 +173,7 @@ def test_no_field_of_a_drive_reaches_the_terminal_as_anything_but_text(terminal:
 
 
 def test_an_intent_is_shown_and_does_nothing() -> None:
-    output = tell(put(DRIVE, ("trip", "plan", "intent"), EVIL), terminal=True)
+    output = tell(put(DRIVE, ("trip", "plan", "intent"), EVIL), terminal=True, screen=FullTeller)
     assert SHOWN in output
     assert "\x1b[2J" not in output
     assert "\x1b]" not in output

@@ -60,7 +60,7 @@ def test_a_drive_goes_on_without_it(vault: VaultMemory) -> None:
         max_s=2.0,
     )
     place = find("cruise")
-    recorded = asyncio.run(session.drive(Instruction("Slow down.", ANN), place, place.seed, Limits()))
+    recorded = asyncio.run(session.drive(Instruction("Speed up.", ANN), place, place.seed, Limits()))
     assert recorded.frames
     assert [str(value).split(":")[0] for letter, value in told if letter == "memory"] == [
         "Nothing is recalled of Ann",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -33,6 +33,7 @@ Exit code 1 says that the wish was refused or not done. Every drive is simulated
 """
 
 _DONE = ("success", "ended")
+_RESEARCH: Final = "Models and benchmarks"
 
 
 def drive(
@@ -52,15 +53,26 @@ def drive(
     person: Annotated[str, typer.Option("--as", help="Whose wish it is; their history is recalled and kept.")] = "",
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of the traffic; default the scenario's own.")] = None,
     save: Annotated[Path | None, typer.Option(help="Folder for recording, page and filmstrip.")] = None,
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
-    setting: Annotated[str, typer.Option(help="Prompt: `few-shot` or `zero-shot`.")] = "few-shot",
-    limits: Annotated[str, typer.Option(help="Bounds no plan may cross: `default` or `lampilot`.")] = "default",
-    data: Annotated[Path | None, typer.Option(help="LaMPilot's DbLv1 folder, for its own samples.")] = None,
+    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.", rich_help_panel=_RESEARCH)] = None,
+    setting: Annotated[
+        str, typer.Option(help="Prompt: `few-shot` or `zero-shot`.", rich_help_panel=_RESEARCH)
+    ] = "few-shot",
+    limits: Annotated[
+        str, typer.Option(help="Bounds no plan may cross: `default` or `lampilot`.", rich_help_panel=_RESEARCH)
+    ] = "default",
+    data: Annotated[
+        Path | None, typer.Option(help="LaMPilot's DbLv1 folder, for its own samples.", rich_help_panel=_RESEARCH)
+    ] = None,
     audit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
     ] = None,
     print_prompt: Annotated[
-        bool, typer.Option("--print-prompt", help="Print what the planner's model would be sent, and stop there.")
+        bool,
+        typer.Option(
+            "--print-prompt",
+            help="Print what the planner's model would be sent, and stop there.",
+            rich_help_panel=_RESEARCH,
+        ),
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the outcome only.")] = False,
     full: Annotated[

@@ -97,10 +97,8 @@ def talk(
     """Drive in real time and talk: it says what it thinks and what was checked, and remembers how you liked it."""
     from contextlib import ExitStack
 
-    from rich.console import Console
-
     from chauffeur.cli.audit import auditor_for, tell_closing
-    from chauffeur.cli.console import columns, plain, stdout
+    from chauffeur.cli.console import Screen, columns, plain, stdout
     from chauffeur.cli.control_figures import control_figures
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.interrupts import Interrupts
@@ -143,7 +141,7 @@ def talk(
     named = engine_named(engine)  # an unknown one is refused also where nobody listens
     ear = named if microphone or page else None
     console = stdout()
-    screen = TalkScreen(Console(quiet=True) if quiet else console)
+    screen = TalkScreen(Screen(quiet=True) if quiet else console)
     books = None
     with ExitStack() as stack:
         left = () if audit is None else unanswered(audit)

@@ -13,6 +13,7 @@ from chauffeur.cli.talk_screen import TalkScreen
 from chauffeur.cli.talk_typed import read_line
 from chauffeur.drive.talk.messages import Conversation, Said, Say, Stop
 from chauffeur.drive.talk.session import Talk
+from chauffeur.language.emergency import read_emergency
 
 if TYPE_CHECKING:
     from chauffeur.hmi.cabin import Cabin
@@ -122,7 +123,7 @@ class TalkDrive:
     def _hand_on(self, session: Talk) -> None:
         line = self._given.pop(0)
         told = read_line(line, taken_over=self._screen.taken_over)
-        self._handed_on += isinstance(told, Say)
+        self._handed_on += isinstance(told, Say) and read_emergency(told.text) is None  # those are answered at once
         self._line(session, line)
 
     def _give_up(self, session: Talk) -> None:

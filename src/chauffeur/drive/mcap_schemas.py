@@ -74,7 +74,11 @@ class Channel:
 
 
 INSTRUCTION = Channel(
-    "/instruction", "chauffeur.Instruction", _object(text=_text("I: the wish"), person=_text(), source=_text())
+    "/instruction",
+    "chauffeur.Instruction",
+    _object(
+        text=_text("I: the wish"), person=_text(), source=_text(), confirmed=_text("the question it is the yes to")
+    ),
 )
 CONTEXT = Channel("/context", "chauffeur.Context", _object(text=_text("C: the driving context"), situation=_ANY_OBJECT))
 SYSTEM = Channel(

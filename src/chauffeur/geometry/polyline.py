@@ -7,14 +7,15 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Self
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Final, Self
 
 from chauffeur.geometry.pose import Pose
 
-FloatArray = NDArray[np.float64]
+if TYPE_CHECKING:  # the command line says hello without NumPy
+    import numpy as np
+    from numpy.typing import NDArray
+
+    FloatArray = NDArray[np.float64]
 
 SAME_M: Final = 1e-6
 """Points that are closer together than this are one."""
@@ -56,16 +57,22 @@ class Polyline:
     @cached_property
     def points(self) -> FloatArray:
         """Its corners, (n, 2)."""
+        import numpy as np
+
         return np.array(self.points_m)
 
     @cached_property
     def stations(self) -> FloatArray:
         """Distance along it to each corner, (n,)."""
+        import numpy as np
+
         return np.array(self.stations_m)
 
     @cached_property
     def headings(self) -> FloatArray:
         """Heading of each leg, rad, (n - 1,)."""
+        import numpy as np
+
         return np.array([math.atan2(dy, dx) for dx, dy in np.diff(self.points, axis=0).tolist()])
 
     def at(self, station_m: float) -> Pose:
@@ -78,6 +85,8 @@ class Polyline:
 
     def poses(self, stations_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(x, y, heading), each (k,), at (k,) stations: `at` of all of them at once."""
+        import numpy as np
+
         leg = np.clip(np.searchsorted(self.stations, stations_m, side="right"), 1, len(self.stations) - 1) - 1
         here, step = self.points[leg], np.diff(self.points, axis=0)
         share = (stations_m - self.stations[leg]) / (self.stations[leg + 1] - self.stations[leg])
@@ -85,6 +94,8 @@ class Polyline:
 
     def every(self, step_m: float) -> FloatArray:
         """Stations from the first point on, so far apart, the last point included."""
+        import numpy as np
+
         count = max(2, math.ceil(self.length_m / step_m) + 1)
         return np.minimum(np.arange(count) * step_m, self.length_m)
 
@@ -132,6 +143,8 @@ class Polyline:
 
     def crossings(self, other: Polyline) -> list[tuple[float, float]]:
         """Where two polylines cross or touch: (own station, the other's), in the order of the own ones."""
+        import numpy as np
+
         a, b = self.points[:-1], np.diff(self.points, axis=0)
         c, d = other.points[:-1], np.diff(other.points, axis=0)
         across = b[:, None, 0] * d[None, :, 1] - b[:, None, 1] * d[None, :, 0]

@@ -10,12 +10,13 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Literal, NamedTuple
-
-import numpy as np
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from chauffeur.geometry.angles import wrap_to_pi
-from chauffeur.geometry.polyline import FloatArray, Polyline
+from chauffeur.geometry.polyline import Polyline
+
+if TYPE_CHECKING:
+    from chauffeur.geometry.polyline import FloatArray
 
 LaneId = str
 """Name of a lane: opaque, whoever wants to know something about it asks the graph."""
@@ -207,6 +208,8 @@ class RoadGraph:
     @cached_property
     def _legs(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Of every leg of every lane: (row of lane, station), start (x, y), direction and length (ux, uy, length)."""
+        import numpy as np
+
         rows: list[tuple[float, float]] = []
         starts: list[tuple[float, float]] = []
         ways: list[tuple[float, float, float]] = []
@@ -257,6 +260,8 @@ class RoadGraph:
         heading_rad: float | None,
         kinds: tuple[LaneKind, ...],
     ) -> LanePlace | None:
+        import numpy as np
+
         rows, starts, ways = self._legs
         chosen = np.arange(len(rows)) if legs is None else np.array(legs)
         if kinds:
