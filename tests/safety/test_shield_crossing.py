@@ -189,9 +189,11 @@ def episodes() -> ModuleType:
         ("saboteur", 22771),  # braked in the middle because it could still have cleared the crossing a period later
         ("saboteur", 22903),  # braked for its lead while it promised to be through
         ("throttle", 22033),  # stands close by somebody's way rather than drive into it
+        ("saboteur", 22266),  # off the road: of two ways to clear the crossing took the one with too light a hand
+        ("saboteur", 71375),  # off the road: crept farther and farther out of its lane
     ],
 )
-def test_what_once_ended_in_a_collision_does_not(episodes: ModuleType, kind: str, seed: int) -> None:
+def test_what_once_ended_badly_does_not(episodes: ModuleType, kind: str, seed: int) -> None:
     assert episodes.drive(episodes.Job(kind, "crossing", seed, True))["outcome"] == "ended"
 
 

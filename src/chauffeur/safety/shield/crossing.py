@@ -40,8 +40,8 @@ _AWAY_RAD: Final = math.radians(60.0)
 _ALONG: Final = math.cos(CROSSING_RAD)
 _OUT_M: Final = 2.0
 """A body that reaches farther to the side of its way is out of its lane: half the width of one."""
-_BACK_MPS: Final = 2.0
-"""A car that is out of its lane goes back to it no faster than this, as long as it may stop."""
+_MOVING_MPS: Final = 0.1
+"""Slower than this a car stands: what is asked may bring it back."""
 _FAR_M: Final = 40.0
 """Where a car that turns will go cannot be told at this distance: it is not minded yet."""
 _BENT_M: Final = 0.1
@@ -422,9 +422,8 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
     asked = command.acceleration_mps2
     least = outlook.least_mps2
     stopping = asked, least
-    if outlook.beside_m(way) > _OUT_M:
-        # What was asked got the car off its way, and at that speed it gets farther off it: it brakes first.
-        stopping = min(asked, max(least, (_BACK_MPS - float(outlook.state[3])) / outlook.dt_s)), *stopping
+    if outlook.state[3] > _MOVING_MPS and outlook.beside_m(way) > _OUT_M:
+        stopping = least, asked  # what was asked got the car out of its lane, and at that speed it gets farther out
     clearing = outlook.clearing_mps2(most_mps2)
     for care in (_DUE, _LOST):
         # To stop comes first: the way that was promised need not be the one that is wanted.
