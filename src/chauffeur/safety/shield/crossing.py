@@ -38,10 +38,6 @@ _CLEAR_S: Final = 7.0
 _AWAY_RAD: Final = math.radians(60.0)
 """A lane turned by more against the car is not the one it drives in, close as it may be."""
 _ALONG: Final = math.cos(CROSSING_RAD)
-_OUT_M: Final = 2.0
-"""A body that reaches farther to the side of its way is out of its lane: half the width of one."""
-_MOVING_MPS: Final = 0.1
-"""Slower than this a car stands: what is asked may bring it back."""
 _FAR_M: Final = 40.0
 """Where a car that turns will go cannot be told at this distance: it is not minded yet."""
 _BENT_M: Final = 0.1
@@ -363,10 +359,6 @@ class _Outlook:
         """Steering angle of a law."""
         return foresight.wheel(law, self.state, points, self.way(points).at, acceleration_mps2, self.dt_s)
 
-    def beside_m(self, points: Array) -> float:
-        """How far the body reaches to the side of a way now."""
-        return foresight.beside_m(self.state, points, self.way(points).at, self.size)
-
     def clearing_mps2(self, most_mps2: float) -> tuple[float, ...]:
         """Accelerations that clear the crossing, as far as the other rules let them."""
         return tuple(max(self.least_mps2, min(mps2, most_mps2)) for mps2 in _CLEARING_MPS2)
@@ -421,12 +413,11 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
     """The command with steering and acceleration of the way that was promised; the least bad one if none ends well."""
     asked = command.acceleration_mps2
     least = outlook.least_mps2
-    stopping = asked, least
-    if outlook.state[3] > _MOVING_MPS and outlook.beside_m(way) > _OUT_M:
-        stopping = least, asked  # what was asked got the car out of its lane, and at that speed it gets farther out
     clearing = outlook.clearing_mps2(most_mps2)
     for care in (_DUE, _LOST):
-        # To stop comes first: the way that was promised need not be the one that is wanted.
+        # To stop comes first: the way that was promised need not be the one that is wanted. With room to get farther
+        # off its way the car brakes before anything: at the speed that was asked for it would use that room.
+        stopping = (asked, least) if care is _DUE else (least, asked)
         for ends_well, accelerations in (
             (outlook.stops, stopping),
             (outlook.clears, (asked, *clearing)),
