@@ -207,6 +207,8 @@ def episodes() -> ModuleType:
         ("throttle", 22033),  # stands close by somebody's way rather than drive into it
         ("saboteur", 22266),  # off the road: of two ways to clear the crossing took the one with too light a hand
         ("saboteur", 71375),  # off the road: crept farther and farther out of its lane
+        ("saboteur", 90049),  # off the road: cleared the crossing on the side of its way that is farther off
+        ("drifter", 90052),  # off the road: was no farther off its way than before, and drove on
         ("throttle", 90142),  # braked where it had better have driven on, and stood in somebody's way
         ("throttle", 90166),
     ],

@@ -345,10 +345,10 @@ SCENES: dict[str, Scene] = {
         (car(1, -3.74, 4.0, 0.0, 8.0, ("ir1", "il3", 0)), car(2, 2.0, -11.0, -1.571, 4.0, STRAIGHT_ON)),
         GAS, STRAIGHT_ON, (-8.0, 0.0, "yield", STRAYS),
     ),
-    "far off its way it is steered back with the wheel that fits": (
+    "far off its way it brakes first, harder than was asked, and is steered back": (
         me(0.5, 8.8, -1.771, 6.0, STRAIGHT_ON),
         (car(1, -1.0, 41.0, -1.571, 4.0, APPROACH),),
-        BRAKE, ("il2", "o2", 0), (-5.0, 0.78, "lane", STRAYS),
+        BRAKE, ("il2", "o2", 0), (-8.0, 0.3, "lane", STRAYS),
     ),
     "inside, with somebody coming, the crossing is cleared": (
         me(2.0, 2.0, -1.571, 1.0, STRAIGHT_ON),

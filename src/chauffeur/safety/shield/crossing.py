@@ -38,6 +38,8 @@ _CLEAR_S: Final = 7.0
 _AWAY_RAD: Final = math.radians(60.0)
 """A lane turned by more against the car is not the one it drives in, close as it may be."""
 _ALONG: Final = math.cos(CROSSING_RAD)
+_MOVING_MPS: Final = 0.1
+"""Slower than this a car stands, and what is asked may bring it back."""
 _FAR_M: Final = 40.0
 """Where a car that turns will go cannot be told at this distance: it is not minded yet."""
 _BENT_M: Final = 0.1
@@ -359,6 +361,14 @@ class _Outlook:
         """Steering angle of a law."""
         return foresight.wheel(law, self.state, points, self.way(points).at, acceleration_mps2, self.dt_s)
 
+    def beside_m(self, points: Array) -> float:
+        """How far the body reaches to the side of a way now."""
+        return foresight.beside_m(self.state, points, self.way(points).at, self.size)
+
+    def stays_s(self, command: Command, way: Array) -> float:
+        """Time for which a plan to clear the crossing after a command keeps the car no farther off its way than now."""
+        return max(self.trouble_s(command, way, plan, _DUE) for plan in _CLEARS)
+
     def clearing_mps2(self, most_mps2: float) -> tuple[float, ...]:
         """Accelerations that clear the crossing, as far as the other rules let them."""
         return tuple(max(self.least_mps2, min(mps2, most_mps2)) for mps2 in _CLEARING_MPS2)
@@ -414,19 +424,27 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
     asked = command.acceleration_mps2
     least = outlook.least_mps2
     clearing = outlook.clearing_mps2(most_mps2)
+    strayed = outlook.state[3] > _MOVING_MPS and outlook.beside_m(way) > _DUE.room_m
     for care in (_DUE, _LOST):
-        # To stop comes first: the way that was promised need not be the one that is wanted. With room to get farther
-        # off its way the car brakes before anything: at the speed that was asked for it would use that room.
-        stopping = (asked, least) if care is _DUE else (least, asked)
+        # To stop comes first: the way that was promised need not be the one that is wanted. A car that is off its way,
+        # or is going to be, brakes before anything: at the speed that was asked for it gets farther off.
+        off = strayed or care is _LOST
         for ends_well, accelerations in (
-            (outlook.stops, stopping),
+            (outlook.stops, (least, asked) if off else (asked, least)),
             (outlook.clears, (asked, *clearing)),
         ):
-            for acceleration in accelerations:
-                for law in range(foresight.LAWS):
-                    trial = Command(acceleration, outlook.wheel_rad(law, way, acceleration))
-                    if ends_well(trial, [way], care) is not None:
-                        return Mended(trial, "lane", _STRAYS)
+            trials = (
+                Command(acceleration, outlook.wheel_rad(law, way, acceleration))
+                for acceleration in accelerations
+                for law in range(foresight.LAWS)
+            )
+            good = (trial for trial in trials if ends_well(trial, [way], care) is not None)
+            if off and ends_well == outlook.clears:
+                found = max(good, key=lambda trial: outlook.stays_s(trial, way), default=None)
+            else:
+                found = next(good, None)
+            if found is not None:
+                return Mended(found, "lane", _STRAYS)
     # Each begins with its own plan: to brake now, since it could still be cleared later, ends in the middle of it.
     begun = [
         (Command(acceleration, outlook.wheel_rad(law, way, acceleration)), plans)

@@ -378,6 +378,12 @@ def _beside_m(across: float, turned: float, size: tuple[float, float]) -> float:
     return abs(across) + abs(math.sin(turned)) * size[0] + abs(math.cos(turned)) * size[1]
 
 
+def beside_m(state: Array, way: Array, i: int, size: tuple[float, float]) -> float:
+    """How far the ego's body reaches to the side of a way, whose nearest point is `i`."""
+    across = _local(way, i, state[0], state[1])[1]
+    return float(_beside_m(across, state[2] - way[i, 2], size))
+
+
 @compiled
 def foresee(
     start: Array,
@@ -485,6 +491,7 @@ def warm_up() -> None:
     _, last, hold_m = stretch(way, at, size, others, 1.0)
     expected(np.zeros((1, 6)), np.zeros(0, dtype=np.int64), lanes, 1.0, 1.0)
     followed(state, others)
+    beside_m(state, way, at, size)
     for law in range(LAWS):
         wheel(law, state, way, at, -1.0, 0.1)
     foresee(
