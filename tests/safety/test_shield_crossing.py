@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -124,6 +125,21 @@ STRAIGHT: LaneId = ("ir0", "il2", 0)
 GAS, COAST = Command(5.0, 0.0), Command(0.0, 0.0)
 
 
+@pytest.mark.parametrize(
+    ("x", "y", "heading", "speed", "wheel"),
+    [(3.4, 28.7, -0.99, 7.4, 0.0), (3.7, 13.4, -1.11, 8.1, 0.59), (0.7, 37.6, -2.05, 7.8, -0.26)],
+)
+def test_a_car_that_is_going_to_leave_its_lane_brakes_before_anything(
+    road: Snapshot, x: float, y: float, heading: float, speed: float, wheel: float
+) -> None:
+    """It was steered back, but at the acceleration that was asked for: some ran out of road on the way."""
+    snapshot = at(road, y, speed, heading=heading)
+    strayed = replace(snapshot, ego=replace(snapshot.ego, x_m=x))
+    found = guarded(strayed, Command(2.0, wheel))
+    assert found.command.acceleration_mps2 == -8.0
+    assert [change.rule for change in found.interventions] == ["lane"]
+
+
 def test_with_nobody_there_nothing_is_changed(road: Snapshot) -> None:
     for command in (GAS, COAST, Command(-2.0, 0.0)):
         assert guarded(at(road, 16.0, 6.0), command, STRAIGHT) == Guarded(command)
@@ -189,9 +205,15 @@ def episodes() -> ModuleType:
         ("saboteur", 22771),  # braked in the middle because it could still have cleared the crossing a period later
         ("saboteur", 22903),  # braked for its lead while it promised to be through
         ("throttle", 22033),  # stands close by somebody's way rather than drive into it
+        ("saboteur", 22266),  # off the road: of two ways to clear the crossing took the one with too light a hand
+        ("saboteur", 71375),  # off the road: crept farther and farther out of its lane
+        ("saboteur", 90049),  # off the road: cleared the crossing on the side of its way that is farther off
+        ("drifter", 90052),  # off the road: was no farther off its way than before, and drove on
+        ("throttle", 90142),  # braked where it had better have driven on, and stood in somebody's way
+        ("throttle", 90166),
     ],
 )
-def test_what_once_ended_in_a_collision_does_not(episodes: ModuleType, kind: str, seed: int) -> None:
+def test_what_once_ended_badly_does_not(episodes: ModuleType, kind: str, seed: int) -> None:
     assert episodes.drive(episodes.Job(kind, "crossing", seed, True))["outcome"] == "ended"
 
 

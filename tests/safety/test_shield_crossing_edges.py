@@ -345,7 +345,7 @@ SCENES: dict[str, Scene] = {
         (car(1, -3.74, 4.0, 0.0, 8.0, ("ir1", "il3", 0)), car(2, 2.0, -11.0, -1.571, 4.0, STRAIGHT_ON)),
         GAS, STRAIGHT_ON, (-8.0, 0.0, "yield", STRAYS),
     ),
-    "out of its lane it slows first, harder than was asked, and is steered back": (
+    "far off its way it brakes first, harder than was asked, and is steered back": (
         me(0.5, 8.8, -1.771, 6.0, STRAIGHT_ON),
         (car(1, -1.0, 41.0, -1.571, 4.0, APPROACH),),
         BRAKE, ("il2", "o2", 0), (-8.0, 0.3, "lane", STRAYS),

@@ -38,10 +38,8 @@ _CLEAR_S: Final = 7.0
 _AWAY_RAD: Final = math.radians(60.0)
 """A lane turned by more against the car is not the one it drives in, close as it may be."""
 _ALONG: Final = math.cos(CROSSING_RAD)
-_OUT_M: Final = 2.0
-"""A body that reaches farther to the side of its way is out of its lane: half the width of one."""
-_BACK_MPS: Final = 2.0
-"""A car that is out of its lane goes back to it no faster than this, as long as it may stop."""
+_MOVING_MPS: Final = 0.1
+"""Slower than this a car stands, and what is asked may bring it back."""
 _FAR_M: Final = 40.0
 """Where a car that turns will go cannot be told at this distance: it is not minded yet."""
 _BENT_M: Final = 0.1
@@ -367,6 +365,10 @@ class _Outlook:
         """How far the body reaches to the side of a way now."""
         return foresight.beside_m(self.state, points, self.way(points).at, self.size)
 
+    def stays_s(self, command: Command, way: Array) -> float:
+        """Time for which a plan to clear the crossing after a command keeps the car no farther off its way than now."""
+        return max(self.trouble_s(command, way, plan, _DUE) for plan in _CLEARS)
+
     def clearing_mps2(self, most_mps2: float) -> tuple[float, ...]:
         """Accelerations that clear the crossing, as far as the other rules let them."""
         return tuple(max(self.least_mps2, min(mps2, most_mps2)) for mps2 in _CLEARING_MPS2)
@@ -421,22 +423,28 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
     """The command with steering and acceleration of the way that was promised; the least bad one if none ends well."""
     asked = command.acceleration_mps2
     least = outlook.least_mps2
-    stopping = asked, least
-    if outlook.beside_m(way) > _OUT_M:
-        # What was asked got the car off its way, and at that speed it gets farther off it: it brakes first.
-        stopping = min(asked, max(least, (_BACK_MPS - float(outlook.state[3])) / outlook.dt_s)), *stopping
     clearing = outlook.clearing_mps2(most_mps2)
+    strayed = outlook.state[3] > _MOVING_MPS and outlook.beside_m(way) > _DUE.room_m
     for care in (_DUE, _LOST):
-        # To stop comes first: the way that was promised need not be the one that is wanted.
+        # To stop comes first: the way that was promised need not be the one that is wanted. A car that is off its way,
+        # or is going to be, brakes before anything: at the speed that was asked for it gets farther off.
+        off = strayed or care is _LOST
         for ends_well, accelerations in (
-            (outlook.stops, stopping),
+            (outlook.stops, (least, asked) if off else (asked, least)),
             (outlook.clears, (asked, *clearing)),
         ):
-            for acceleration in accelerations:
-                for law in range(foresight.LAWS):
-                    trial = Command(acceleration, outlook.wheel_rad(law, way, acceleration))
-                    if ends_well(trial, [way], care) is not None:
-                        return Mended(trial, "lane", _STRAYS)
+            trials = (
+                Command(acceleration, outlook.wheel_rad(law, way, acceleration))
+                for acceleration in accelerations
+                for law in range(foresight.LAWS)
+            )
+            good = (trial for trial in trials if ends_well(trial, [way], care) is not None)
+            if off and ends_well == outlook.clears:
+                found = max(good, key=lambda trial: outlook.stays_s(trial, way), default=None)
+            else:
+                found = next(good, None)
+            if found is not None:
+                return Mended(found, "lane", _STRAYS)
     # Each begins with its own plan: to brake now, since it could still be cleared later, ends in the middle of it.
     begun = [
         (Command(acceleration, outlook.wheel_rad(law, way, acceleration)), plans)
