@@ -160,7 +160,7 @@ def test_a_pattern_that_is_not_linear_is_found(pattern: str) -> None:
     assert _growth(re.compile(pattern))[0] > FASTEST_GROWTH
 
 
-@pytest.mark.parametrize("pattern", [r"(?<!\d)\d+ m", r"\A\s*\w", r"(?:a |the ){1,6}b", r"\bstop\w*", r"[^,]+,"])
+@pytest.mark.parametrize("pattern", [r"(?<!\d)\d+ m", r"\A\s*\w", r"(?:a |the ){1,6}b", r"\bstop\w*"])
 def test_a_linear_pattern_passes(pattern: str) -> None:
     assert _growth(re.compile(pattern))[0] <= FASTEST_GROWTH
 

@@ -247,15 +247,17 @@ def test_what_the_checks_refuse_never_drives_and_goes_back_with_their_reason(
 ) -> None:
     fast = "def a():\n    set_target_speed(60)\n    while True:\n        yield autopilot()\n"
     server.script(
-        stream(reply(fast)), stream("REFUSE: I would rather not."), stream(reply(GO_LEFT)), stream(DESCRIPTION)
-    )
+        stream(reply(fast)), stream(reply(fast)),  # the planner's own repair turn is no better
+        stream("REFUSE: I would rather not."), stream(reply(GO_LEFT)), stream(DESCRIPTION),
+    )  # fmt: skip
     attempts: list[Attempt] = []
     coach = make_coach(tell=lambda event, value: attempts.append(value) if event == "attempt" else None)
     (ended,) = coach.coach(items_named(dataset, ["left_lc_s0_c0"]))
     assert (ended.ending, ended.rounds) == ("kept", 3)
     assert [a.recorded.frames == () for a in attempts] == [True, True, False]
     assert "above the speed limit" in said(server.requests[1])
-    assert "I would rather not." in said(server.requests[2]) and "it can be tried here" in said(server.requests[2])
+    assert "above the speed limit" in said(server.requests[2])
+    assert "I would rather not." in said(server.requests[3]) and "it can be tried here" in said(server.requests[3])
 
 
 @pytest.mark.server

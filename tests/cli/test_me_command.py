@@ -25,7 +25,7 @@ def run(*words: str, code: int = 0) -> str:
     return result.output
 
 
-def driven(wish: str = "Speed up a bit.") -> str:
+def driven(wish: str = "Turn right.") -> str:
     return run("drive", wish, "--as", "ana", "--planner", "keyword")
 
 
@@ -34,14 +34,14 @@ def test_a_profile_from_the_first_trip_to_its_end(home: Path, tmp_path: Path) ->
     driven()
     run("feedback", "A bit too slow.", "--as", "ana")
     shown = run("me", "show", "--as", "ana")
-    assert "Speed up a bit." in shown
+    assert "Turn right." in shown
     assert "A bit too slow." in shown
     assert "1 trips in all" in shown
     assert "for 90 days" in shown
-    assert "Speed up" not in run("me", "show", "--as", "ben"), "nobody reads another person's profile"
+    assert "Turn right" not in run("me", "show", "--as", "ben"), "nobody reads another person's profile"
     run("me", "export", "--as", "ana", "--out", str(tmp_path / "ana.json"))
     assert json.loads((tmp_path / "ana.json").read_text())["trips"][0]["feedback"][0]["text"] == "A bit too slow."
-    assert "Forgotten: “Speed up a bit.”" in run("me", "forget-last", "--as", "ana")
+    assert "Forgotten: “Turn right.”" in run("me", "forget-last", "--as", "ana")
     assert "Nothing is remembered of ana." in run("me", "forget-last", "--as", "ana")
     assert "Erased: the profile of ana." in run("me", "erase", "--as", "ana", "--yes")
     assert "There was no profile of ana." in run("me", "erase", "--as", "ana", "--yes")
@@ -51,19 +51,19 @@ def test_a_profile_from_the_first_trip_to_its_end(home: Path, tmp_path: Path) ->
 def test_to_erase_is_asked_first(home: Path) -> None:
     driven()
     assert CliRunner().invoke(app, ["me", "erase", "--as", "ana"], input="n\n").exit_code != 0
-    assert "Speed up a bit." in run("me", "show", "--as", "ana")
+    assert "Turn right." in run("me", "show", "--as", "ana")
 
 
 def test_privacy_mode_is_seen_wherever_somebody_drives(home: Path) -> None:
     assert "Privacy mode" not in driven()
     run("me", "privacy", "on")
-    assert "Privacy mode: nothing of this drive is kept in the profile of ana." in driven("Speed up.")
+    assert "Privacy mode: nothing of this drive is kept in the profile of ana." in driven("Turn left.")
     shown = run("me", "show", "--as", "ana")
     assert "Privacy mode is on" in shown
-    assert "Speed up." not in shown
+    assert "Turn left." not in shown
     run("me", "privacy", "off")
-    driven("Speed up.")
-    assert "Speed up." in run("me", "show", "--as", "ana")
+    driven("Turn left.")
+    assert "Turn left." in run("me", "show", "--as", "ana")
 
 
 def test_settings_that_are_none_are_refused_and_broken_ones_can_be_set_again(home: Path) -> None:

@@ -59,8 +59,8 @@ def test_a_drive_goes_on_without_it(vault: VaultMemory) -> None:
         tell=lambda letter, value: told.append((letter, value)),
         max_s=2.0,
     )
-    place = find("cruise")
-    recorded = asyncio.run(session.drive(Instruction("Speed up.", ANN), place, place.seed, Limits()))
+    place = find("intersection")
+    recorded = asyncio.run(session.drive(Instruction("Turn right.", ANN), place, place.seed, Limits()))
     assert recorded.frames
     assert [str(value).split(":")[0] for letter, value in told if letter == "memory"] == [
         "Nothing is recalled of Ann",

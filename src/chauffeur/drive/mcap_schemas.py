@@ -76,9 +76,7 @@ class Channel:
 INSTRUCTION = Channel(
     "/instruction",
     "chauffeur.Instruction",
-    _object(
-        text=_text("I: the wish"), person=_text(), source=_text(), confirmed=_text("the question it is the yes to")
-    ),
+    _object(text=_text("I: the wish"), person=_text(), source=_text(), confirmed=_text("question it is the yes to")),
 )
 CONTEXT = Channel("/context", "chauffeur.Context", _object(text=_text("C: the driving context"), situation=_ANY_OBJECT))
 SYSTEM = Channel(
@@ -96,6 +94,7 @@ PLAN = Channel(
         thoughts=_object(text=_text("R: the reasoning")),
         policy={"type": ["object", "null"], "description": "P: the policy"},
         refusal=_text(),
+        offer=_text("the wish that a yes stands for, where the refusal is a question"),
         intent=_text(),
         settings=_SETTINGS,
         planner=_text(),
