@@ -207,7 +207,7 @@ def test_a_drive_by_lines_stops(tmp_path: Path) -> None:
             stdin=lines, capture_output=True, text=True, timeout=WITHIN_S, check=False,
         )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "Stopped after" in done.stdout
+    assert "The car stands; the drive is over." in done.stdout
 
 
 # A vehicle ------------------------------------------------------------------------------------------------------------

@@ -122,7 +122,7 @@ class TalkDrive:
 
     def _hand_on(self, session: Talk) -> None:
         line = self._given.pop(0)
-        told = read_line(line, taken_over=self._screen.taken_over)
+        told = read_line(line, taken_over=session.taken_over)
         self._handed_on += isinstance(told, Say) and read_emergency(told.text) is None  # those are answered at once
         self._line(session, line)
 
@@ -132,7 +132,7 @@ class TalkDrive:
             self._hand_on(session)
 
     def _line(self, session: Talk, line: str) -> None:
-        told = read_line(line, taken_over=self._screen.taken_over)
+        told = read_line(line, taken_over=session.taken_over)
         if told is None:
             self._screen.help()
         elif isinstance(told, str):

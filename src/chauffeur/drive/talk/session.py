@@ -176,6 +176,11 @@ class Talk:
         return self._runtime is not None and self._runtime.driving
 
     @property
+    def taken_over(self) -> bool:
+        """Whether the person has the wheel: as it was told, which may be before any picture shows it."""
+        return self._runtime is not None and self._runtime.taken_over
+
+    @property
     def stopping(self) -> bool:
         """Whether the car is brought to a stand."""
         return self._stopping
