@@ -2,9 +2,9 @@
 
     python benchmarks/passengers_answered.py [--planner retrieval]
 
-A planner that is not sure of a reading says it back as a question ("Shall I drive slower?"), and drives after a yes. Here
-every such question is answered with yes, as a person would whose wish it names; a drive that then misses the wish counts
-as wrong, as it does without a question. Judged like `chauffeur bench passengers`, over the wishes that are to be driven.
+A planner that is not sure of a reading says it back as a question ("Shall I drive slower?"), and drives after a yes.
+Here every such question is answered with yes, as a person would whose wish it names; a drive that then misses the wish
+counts as wrong, as it does without a question. Judged like `chauffeur bench passengers`, over the wishes to be driven.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="chauffeur-passengers-") as folder:
         config = RunConfig(name, "few-shot", data.sha256, items=0, seed=0, asked="passengers")
         run = LampilotRun(Path(folder) / "run", data, config, planner, requests=requests)
-        rows = [row for row in run.run(lambda standing: None, Effort(workers=1)) if not row["to_refuse"]]
+        rows = [row for row in run.run(lambda _: None, Effort(workers=1)) if not row["to_refuse"]]
     asked = set(planner.offers)
     right = {True: 0, False: 0}
     for row in rows:
