@@ -157,6 +157,7 @@ FIGURES = {
         r"(\d+) % right outcomes on 417",
         r"417 wishes of passengers: right outcome \| \d+ \(\*\*([\d.]+) %",
     ),
+    "right after a yes": (r"(\d+) % with one yes", r"with one yes to the question \| \d+ \(\*\*([\d.]+) %"),
     "of the rules": (
         r"`retrieval`: (\d+) %\)",
         r"417 wishes of passengers: right outcome .*?\| \d+ \(([\d.]+) %\) \| 85 %",

@@ -127,6 +127,17 @@ def test_a_sorter_does_not_outweigh_a_side_or_a_pace_that_was_said(planners: dic
     assert slower.policy is None or dict(slower.settings)["target_speed_mps"] < LEFT.speed_mps
 
 
+def test_a_sorter_is_believed_where_it_goes_the_way_that_was_said(planners: dict[str, Planner]) -> None:
+    """Who overtakes goes left, and who lets others go first slows down: neither denies the words."""
+    crossing = Situation("intersection", 8.0, 11.0, 1, 0, False, None, None)
+    for wish, situation, intent in (
+        ("You could take the left lane, nobody is there, and this van is dreaming.", BEHIND, "overtake"),
+        ("Slow down a bit, they got here before us.", crossing, "yield"),
+    ):
+        found = plan(planners["talk2drive"], wish, situation)
+        assert found.policy is not None and found.intent.startswith(intent), (wish, found.intent)
+
+
 def test_said_outright_is_a_verb_with_its_object() -> None:
     assert Said.of(meanings_said("Move over to the right.")).contradicts(side="", pace=1)
     assert not Said.of(meanings_said("Move over to the right.")).contradicts(side="right", pace=-1)

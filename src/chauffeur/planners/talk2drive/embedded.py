@@ -93,7 +93,9 @@ _TAKEN: Final[dict[str, str]] = {
 _ANY_SPOT: Final = "nearest"
 """Read where nothing of the words says which spot."""
 _PACES: Final = ("speed.increase", "speed.decrease")
-_PACE_OF_HINT: Final = {"pass": 1, "hurry": 1, "faster": 1, "go": 1, "calm": -1, "slower": -1}
+_PACE_OF_HINT: Final = {"pass": 1, "hurry": 1, "faster": 1, "go": 1, "calm": -1, "slower": -1, "yield": -1}
+_SIDE_OF_HINT: Final = {"right": "right", "pass": "left"}
+"""Where a hint leads, and at what pace: words that say the same do not contradict it."""
 _AT_ONCE: Final = "With these parameters I can only do things at once. Tell me when it is time."
 _LONGEST_GAP_M: Final = 150.0
 """No gap to keep is longer: so far ahead a vehicle counts as one to follow."""
@@ -159,8 +161,8 @@ class EmbeddedParameters:
         if hint.kind == "else" or _asks_an_amount(amounts, settled, world):
             return False
         meanings = meanings_said(wish)
-        pace = _PACE_OF_HINT.get(hint.kind, 0)
-        if not hint.outright and Said.of(meanings).contradicts(side="right" if hint.kind == "right" else "", pace=pace):
+        side, pace = _SIDE_OF_HINT.get(hint.kind, ""), _PACE_OF_HINT.get(hint.kind, 0)
+        if not hint.outright and Said.of(meanings).contradicts(side=side, pace=pace):
             return False
         if isinstance(settled, Plan):
             sure = _SURER if _forbidden(settled) and hint.kind in _BRISK else _SURE
