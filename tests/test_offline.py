@@ -69,6 +69,7 @@ def test_a_look_up_and_a_connection_are_seen(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(360)
 def test_driving_talking_and_benching_open_no_connection_and_leave_nothing_of_anybodys(tmp_path: Path) -> None:
     from chauffeur.worlds.highway.scenarios import BUILT_IN
 

@@ -232,7 +232,7 @@ def _tried(name: str, module: Module, folder: Path) -> dict[str, Any]:
 def _laid_out(module: Module, folder: Path) -> None:
     """A copy of the sources and tests, with mutmut's settings."""
     folder.mkdir(parents=True, exist_ok=True)
-    for part in ("src", "tests", "docs"):
+    for part in ("src", "tests", "docs", "data"):
         _mirrored(ROOT / part, folder / part)
     present = [test for test in module.tests if (ROOT / test).is_file()]
     deselected = [f"--deselect={test}" for test in _SLOW if test.partition("::")[0] in present]
@@ -243,7 +243,7 @@ def _laid_out(module: Module, folder: Path) -> None:
         "source_paths=src",
         f"only_mutate=src/chauffeur/{module.path}",
         "use_git_change_detection=False",
-        "also_copy=\n    forgetful.py\n    docs",
+        "also_copy=\n    forgetful.py\n    docs\n    data",
         "mutate_only_covered_lines=False",
         "timeout_constant=15.0",  # a busy machine is no infinite loop
         "pytest_add_cli_args=" + "".join(f"\n    {one}" for one in arguments),

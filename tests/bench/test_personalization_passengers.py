@@ -16,21 +16,22 @@ from hypothesis import strategies as st
 from chauffeur.bench.personalization import sayings
 from chauffeur.bench.personalization.population import Passenger, draw_passengers
 from chauffeur.bench.personalization.sayings import (
-    FEEDBACK,
     LEVELS,
-    WISHES,
     Aim,
     Half,
     Level,
     Topic,
+    feedback,
     feedback_of,
     sayings_sha256,
+    wishes,
     wishes_of,
 )
 from chauffeur.bench.personalization.scenes import AIMS, TASKS
 from chauffeur.bench.personalization.takeover import Mood, aim_of, judge, wanted_mps
 from chauffeur.bench.personalization.traces import Trace
 from chauffeur.concept import ConfigError, DataError
+from chauffeur.concept.data import DATA_VARIABLE
 from chauffeur.memory.feedback import interpret_feedback
 
 ANA = Passenger(
@@ -81,7 +82,7 @@ def plain(text: str) -> str:
 def test_every_aim_has_ten_wordings_at_every_level_and_more_where_figures_are_reported() -> None:
     wanted: list[tuple[Aim, Level]] = [(aim, level) for task in TASKS for aim in AIMS[task] for level in LEVELS]
     for half in HALVES:
-        assert set(WISHES[half]) == set(wanted)
+        assert set(wishes()[half]) == set(wanted)
     assert [len(wishes_of(aim, level, "tuning")) for aim, level in wanted] == [10] * len(wanted)
     assert min(len(wishes_of(aim, level, "test")) for aim, level in wanted) >= 37
 
@@ -90,15 +91,16 @@ def test_every_aim_has_ten_wordings_at_every_level_and_more_where_figures_are_re
 def test_a_line_that_is_none_is_told_without_its_words(
     line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "test.tsv").write_text(f"wish\tgo/I\tGo on.\ta\n{line}\n")
-    monkeypatch.setattr(sayings.resources, "files", lambda _: tmp_path)
+    (tmp_path / "personalization").mkdir()
+    (tmp_path / "personalization" / "test.tsv").write_text(f"wish\tgo/I\tGo on.\ta\n{line}\n")
+    monkeypatch.setenv(DATA_VARIABLE, str(tmp_path))
     with pytest.raises(DataError, match=r"^Line 2 of test\.tsv is no sentence with its aim and writer\.$"):
         sayings._texts("test", "wish")
 
 
 def test_no_sentence_is_said_twice_in_a_half_or_across_halves() -> None:
     where: dict[str, list[str]] = {}  # a failure names places: it is no occasion to read the test half
-    for name, tables in (("wish", WISHES), ("feedback", FEEDBACK)):
+    for name, tables in (("wish", wishes()), ("feedback", feedback())):
         for half in HALVES:
             for key, texts in tables[half].items():
                 for number, text in enumerate(texts):
@@ -108,16 +110,16 @@ def test_no_sentence_is_said_twice_in_a_half_or_across_halves() -> None:
 
 
 def test_feedback_of_both_halves_has_the_same_topics_forces_and_placeholders() -> None:
-    assert set(FEEDBACK["test"]) == set(FEEDBACK["tuning"])
-    assert {topic for topic, _ in FEEDBACK["test"]} == set(get_args(Topic))
-    for key, texts in FEEDBACK["tuning"].items():
-        others = FEEDBACK["test"][key]
+    assert set(feedback()["test"]) == set(feedback()["tuning"])
+    assert {topic for topic, _ in feedback()["test"]} == set(get_args(Topic))
+    for key, texts in feedback()["tuning"].items():
+        others = feedback()["test"][key]
         assert len(others) >= len(texts)
         assert len({placeholders(text) for text in (*texts, *others)}) == 1
     for half in HALVES:
-        assert {placeholders(text) for text in FEEDBACK[half]["wrong_spot", "plain"]} == {("place",)}
-        assert {placeholders(text) for text in FEEDBACK[half]["parked", "plain"]} == {("pace",)}
-        assert feedback_of("waited", "much", half) == FEEDBACK[half]["waited", "plain"]
+        assert {placeholders(text) for text in feedback()[half]["wrong_spot", "plain"]} == {("place",)}
+        assert {placeholders(text) for text in feedback()[half]["parked", "plain"]} == {("pace",)}
+        assert feedback_of("waited", "much", half) == feedback()[half]["waited", "plain"]
 
 
 def placeholders(text: str) -> tuple[str, ...]:
@@ -129,19 +131,18 @@ def test_the_hash_of_the_words_changes_with_either_half(half: Half, monkeypatch:
     before = sayings_sha256()
     assert re.fullmatch("[0-9a-f]{64}", before)
     with monkeypatch.context() as changed:
-        changed.setitem(WISHES[half], ("go", "I"), ("Something else.",))
+        changed.setitem(wishes()[half], ("go", "I"), ("Something else.",))
         assert sayings_sha256() != before
     with monkeypatch.context() as changed:
-        changed.setitem(FEEDBACK[half], ("fine", "plain"), ("Something else.",))
+        changed.setitem(feedback()[half], ("fine", "plain"), ("Something else.",))
         assert sayings_sha256() != before
     assert sayings_sha256() == before
 
 
 def test_most_feedback_is_understood_by_the_memory_that_gets_it_and_none_the_wrong_way() -> None:
     # Of the tuning half alone: whoever mended the memory until the other passed would have looked at it.
-    about_speed = [
-        (topic, text) for (topic, _), texts in FEEDBACK["tuning"].items() for text in texts if topic.startswith("too_")
-    ]
+    tuning = feedback()["tuning"].items()
+    about_speed = [(topic, text) for (topic, _), texts in tuning for text in texts if topic.startswith("too_")]
     wanted = {"too_fast": -1, "too_slow": 1, "too_close": 0}
     heard = [(wanted[topic], interpret_feedback(text).speed, text) for topic, text in about_speed]
     assert not [text for meant, found, text in heard if meant * found < 0]

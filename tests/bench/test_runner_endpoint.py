@@ -23,7 +23,7 @@ from chauffeur.bench.spending import Budget, Price
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset
 
-pytestmark = [pytest.mark.slow, pytest.mark.server]
+pytestmark = [pytest.mark.slow, pytest.mark.server, pytest.mark.timeout(600)]
 
 MODEL = server_module()
 REPLY = f"Thoughts: Left.\n\n```python{LEFT.format(patience=1)}```\n"

@@ -26,7 +26,7 @@ from chauffeur.concept import ConfigError, Plan, PlanRequest
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 
 @pytest.fixture(scope="module")

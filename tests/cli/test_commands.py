@@ -165,7 +165,7 @@ def test_version() -> None:
 
 def test_importing_the_command_line_loads_nothing_heavy() -> None:
     simulation = ["highway_env", "gymnasium", "pandas", "matplotlib", "pygame", "numpy", "PIL"]
-    heavy = [*simulation, "openai", "httpx", "pydantic", "pydantic_monty", "mcap", "sqlcipher3"]
+    heavy = [*simulation, "httpx", "pydantic", "pydantic_monty", "mcap", "sqlcipher3"]
     script = f"import sys, chauffeur.cli.main; print([m for m in {heavy!r} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

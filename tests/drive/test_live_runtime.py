@@ -264,7 +264,7 @@ def test_control_loads_nothing_that_plans_remembers_or_talks() -> None:
         "import sys; import chauffeur.drive.live.control, chauffeur.drive.live.realtime, chauffeur.worlds.highway, "
         "chauffeur.drive.live.settings;"
         "print(sorted(n for n in sys.modules if n.split('.')[0] in "
-        "('httpx', 'openai', 'onnxruntime', 'tokenizers', 'pydantic_monty', 'torch', 'transformers')"
+        "('httpx', 'onnxruntime', 'tokenizers', 'pydantic_monty', 'torch', 'transformers')"
         " or n.startswith(('chauffeur.planners', 'chauffeur.memory', 'chauffeur.language', 'chauffeur.models', "
         "'chauffeur.describe', 'chauffeur.programs'))))"
     )

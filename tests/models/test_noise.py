@@ -9,7 +9,7 @@ import pytest
 
 from chauffeur.language import read_quantities
 from chauffeur.models.onboard.noise import SAFE_SLIPS, noisy, protected, reworded, said_in_full
-from chauffeur.models.onboard.words import utter, wordings
+from chauffeur.models.onboard.wordings import utter, wordings
 
 SLOTS = {
     "v": "sixty-five mph",

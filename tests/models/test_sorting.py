@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from chauffeur.bench.personalization.sayings import FEEDBACK, WISHES
+from chauffeur.bench.personalization.sayings import feedback, wishes
 from chauffeur.cli.main import app
 from chauffeur.concept import DataError
+from chauffeur.concept.data import DATA_VARIABLE
 from chauffeur.language.sorter import load_sorter
 from chauffeur.language.tokens import tokens_of
 from chauffeur.memory import remarks
@@ -54,15 +55,16 @@ def test_no_sentence_is_one_that_figures_are_reported_on() -> None:
     def bare(text: str) -> tuple[str, ...]:
         return tuple(token for token in tokens_of(text) if token.isalnum())
 
-    tables_reported = (*WISHES["test"].values(), *FEEDBACK["test"].values())
+    tables_reported = (*wishes()["test"].values(), *feedback()["test"].values())
     reported = {bare(text) for texts in tables_reported for text in texts}
     for name in pipeline.NAMES:
         assert not sum(bare(one.text) in reported for one in sentences(name))
 
 
 def test_a_line_that_is_none_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / "wishes.tsv").write_text("highway/pass/I\tGo past.\ta\nhighway/park.exit/I\tPark.\ta\n")
-    monkeypatch.setattr(tables.resources, "files", lambda _: tmp_path)
+    (tmp_path / "sorters").mkdir()
+    (tmp_path / "sorters" / "wishes.tsv").write_text("highway/pass/I\tGo past.\ta\nhighway/park.exit/I\tPark.\ta\n")
+    monkeypatch.setenv(DATA_VARIABLE, str(tmp_path))
     with pytest.raises(DataError, match=r"Line 2 of wishes\.tsv"):
         sentences("wishes")
 

@@ -9,12 +9,25 @@ import numpy as np
 import pytest
 
 from chauffeur.concept import units
+from chauffeur.concept.data import data_folder
 from chauffeur.language import read_quantities
 from chauffeur.language.grammar import Grammar
 from chauffeur.models.onboard.examples import REASONS
 from chauffeur.models.onboard.speech import Unit, spoken
-from chauffeur.models.onboard.wordings import FILES, MANNER, MOST_FORMS, PACKAGE, because, beside
-from chauffeur.models.onboard.words import clause, conditioned, in_order, levels, utter, wordings
+from chauffeur.models.onboard.wordings import (
+    DATA,
+    FILES,
+    MANNER,
+    MOST_FORMS,
+    because,
+    beside,
+    clause,
+    conditioned,
+    in_order,
+    levels,
+    utter,
+    wordings,
+)
 
 SKILLS = {
     "v": "drive_at faster_by slower_by at_most at_least over_limit_by under_limit_by",
@@ -49,7 +62,7 @@ SLOTS = {
     "if": "if it is free",
 }
 SECTIONS = wordings().sections()
-PLAIN = Grammar(PACKAGE, FILES[: FILES.index("numbers")], MANNER)
+PLAIN = Grammar(data_folder(DATA), FILES[: FILES.index("numbers")], MANNER)
 """The tables that name only what is wanted. Those after them are full of contrasts ("not the right one, the left"),
 which no pattern can read."""
 NUMBERED = {

@@ -6,7 +6,6 @@ import asyncio
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from importlib import resources
 from typing import get_args
 
 import pytest
@@ -26,6 +25,7 @@ from chauffeur.concept import (
     SystemMessage,
     Thoughts,
 )
+from chauffeur.concept.data import read_data
 from chauffeur.describe import describe
 from chauffeur.planners.keyword import KeywordPlanner
 from chauffeur.planners.onboard.dialect import read, tell
@@ -388,5 +388,5 @@ def test_the_dialect_tells_its_own_programs(source: str, scenario: str) -> None:
 
 
 def test_every_hand_written_program_is_read() -> None:
-    text = resources.files("chauffeur.bench.alignment").joinpath("handwritten.jsonl").read_text(encoding="utf-8")
+    text = read_data("alignment", "handwritten.jsonl").decode("utf-8")
     assert all(read_facts(json.loads(line)["program"]).readable for line in text.splitlines())

@@ -169,6 +169,7 @@ def _settings() -> list[tuple[str, str]]:
         for name, otherwise in (
             ("CHAUFFEUR_BASE_URL", "OpenAI's own endpoint, unless --base-url says otherwise"),
             ("CHAUFFEUR_LAMPILOT", "LaMPilot's samples need --data DIR"),
+            ("CHAUFFEUR_DATA", "training and benchmarks read `data/` of a source checkout"),
         )
     ]
     rows.append(("processors", str(os.cpu_count() or 1)))

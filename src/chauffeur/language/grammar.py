@@ -16,8 +16,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import resources
 from math import prod
+from pathlib import Path
 
 import numpy as np
 
@@ -97,13 +97,13 @@ class Manner:
 
 
 class Grammar:
-    """The tables of a package folder and the manner in which their sentences are said."""
+    """The tables of a folder and the manner in which their sentences are said."""
 
-    def __init__(self, package: str, files: Sequence[str], manner: Manner) -> None:
+    def __init__(self, folder: Path, files: Sequence[str], manner: Manner) -> None:
         """Read the tables.
 
         Args:
-            package: Package whose folder holds the tables.
+            folder: Holds the tables.
             files: Names of the tables, without `.txt`.
             manner: Frames and endings.
         """
@@ -114,7 +114,7 @@ class Grammar:
         self._frames = tuple((frame, _parse(frame.text)) for frame in manner.frames)
         self._openings = tuple((frame, _parse(frame.text)) for frame in manner.openings)
         for file in files:
-            self._read(resources.files(package).joinpath(f"{file}.txt").read_text(encoding="utf-8"))
+            self._read((folder / f"{file}.txt").read_text(encoding="utf-8"))
         # (templates of training, templates held out)
         self._apart = {
             name: (tuple(t for t in found if not t.held), tuple(t for t in found if t.held))

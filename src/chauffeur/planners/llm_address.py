@@ -10,7 +10,7 @@ from chauffeur.planners.llm_errors import KEY_VARIABLES
 DEFAULT_BASE_URL = "https://api.openai.com/v1"
 URL_VARIABLES = ("CHAUFFEUR_BASE_URL", "OPENAI_BASE_URL")
 PLACEHOLDER_KEY = "none"
-"""What servers of one's own are sent when there is no key: the SDK and some servers want a non-empty one."""
+"""What servers of one's own are sent when there is no key: some servers want a non-empty one."""
 
 
 def parse_address(base_url: str | None, environ: Mapping[str, str]) -> Address:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from chauffeur.planners.llm_errors import EndpointError
+from chauffeur.planners.llm_errors import EndpointError, RefusedError
 
 LEAST_ANSWER_TOKENS: Final = 512
 """Room that a program with its thoughts needs; with less, nothing is asked."""
@@ -59,10 +59,10 @@ class Shortage:
 
 
 def shortage_in(error: Exception) -> Shortage | None:
-    """The shortage behind an exception of the SDK; None when it is about something else."""
-    if getattr(error, "status_code", None) in _ABOUT_OTHERS:
+    """The shortage behind a failed request; None when it is about something else."""
+    if not isinstance(error, RefusedError) or error.status in _ABOUT_OTHERS:
         return None
-    said = f"{getattr(error, 'message', '')} {getattr(error, 'body', '')}"[:_READ_CHARS]
+    said = f"{error.message} {error.error}"[:_READ_CHARS]
     if not _CONTEXT.search(said):
         return None
     return Shortage(_number(_SIZE.search(said)), _number(_PROMPT.search(said)))

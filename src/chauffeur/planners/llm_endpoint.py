@@ -1,4 +1,4 @@
-"""One request to one OpenAI-compatible endpoint through the official SDK: a complete reply, or a typed failure."""
+"""One request to one OpenAI-compatible chat endpoint: a complete reply, or a typed failure."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ import asyncio
 import json
 import logging
 import os
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
+from chauffeur import __version__
 from chauffeur.concept.addresses import Address, read_key
 from chauffeur.planners.cache import Completion
 from chauffeur.planners.llm_address import PLACEHOLDER_KEY
@@ -17,7 +20,8 @@ from chauffeur.planners.llm_context import LEAST_ANSWER_TOKENS, shortage_in, too
 from chauffeur.planners.llm_errors import (
     KEY_VARIABLES,
     EndpointError,
-    from_sdk,
+    RefusedError,
+    failure_of,
     garbage,
     missing_key,
     not_an_api,
@@ -26,7 +30,7 @@ from chauffeur.planners.llm_errors import (
 )
 
 if TYPE_CHECKING:
-    from openai import AsyncOpenAI
+    import httpx
 
     from chauffeur.planners.prompts import Message
 
@@ -35,7 +39,10 @@ _log = logging.getLogger(__name__)
 _CONNECT_S = 10.0
 _MODEL_CHARS = 200
 _MAX_BODY_BYTES = 64_000_000
-"""Longest reply read in one piece."""
+"""Longest reply read, in one piece or streamed."""
+_MAX_REFUSAL_BYTES = 64_000
+_DRAIN_S = 0.1
+"""For the end of a stream behind its last event: a connection whose answer was read to its end serves again."""
 _DISLIKES = frozenset({400, 422})
 """How servers answer a parameter that they do not take; 501 where it is streaming."""
 
@@ -89,7 +96,7 @@ class Endpoint:
         self._max_chars = max_chars
         self._stream = stream
         self._environ = environ
-        self._client: tuple[asyncio.AbstractEventLoop, AsyncOpenAI] | None = None
+        self._client: tuple[asyncio.AbstractEventLoop, httpx.AsyncClient] | None = None
         self._renamed: dict[str, str | None] = {}
         self._turned = False
         self._told: set[str] = set()
@@ -103,7 +110,7 @@ class Endpoint:
             on_text: Gets each piece of the reply as it arrives.
 
         Raises:
-            EndpointError: No usable reply. It carries neither the key nor the SDK's exception, whose request does.
+            EndpointError: No usable reply. It carries neither the key nor the client's exception, whose request does.
         """
         client = self._connect()
         while True:
@@ -123,7 +130,7 @@ class Endpoint:
                 failure = error
             except TimeoutError:
                 failure = timed_out(self._address.url, self._timeout_s)
-            except Exception as error:  # noqa: BLE001 - the SDK lets through whatever the stack below it raises
+            except Exception as error:  # noqa: BLE001 - the client lets through whatever the stack below it raises
                 # Before adapting: the words of a context that is too small name `max_tokens`, too.
                 shortage = shortage_in(error)
                 if shortage is not None:
@@ -138,32 +145,36 @@ class Endpoint:
                 elif self._adapt(body, error):
                     continue
                 else:
-                    failure = from_sdk(error, self._address.url, self._model, self._key_variable(), self._scrub)
+                    failure = failure_of(error, self._address.url, self._model, self._key_variable(), self._scrub)
             else:
                 return completion
-            # Raised here, outside the handlers: the SDK's exception holds the request with the key in its headers.
+            # Raised here, outside the handlers: the client's exception holds the request with the key in its headers.
             raise failure
 
     async def close(self) -> None:
         """Close the connections."""
         if self._client is not None and self._client[0] is asyncio.get_running_loop():
-            await self._client[1].close()
+            await self._client[1].aclose()
         self._client = None
 
-    def _connect(self) -> AsyncOpenAI:
+    def _connect(self) -> httpx.AsyncClient:
         loop = asyncio.get_running_loop()
         if self._client is not None and self._client[0] is loop:
             return self._client[1]
         found = self._found_key()
         if found is None and not self._address.local:
             raise missing_key(self._address.url)
-        import openai
+        import httpx
 
-        client = openai.AsyncOpenAI(
-            api_key=found[0] if found else PLACEHOLDER_KEY,
-            base_url=self._address.url,
-            timeout=openai.Timeout(self._timeout_s, connect=min(_CONNECT_S, self._timeout_s)),
-            max_retries=0,
+        client = httpx.AsyncClient(
+            headers={
+                "Authorization": f"Bearer {found[0] if found else PLACEHOLDER_KEY}",
+                "Content-Type": "application/json",
+                "User-Agent": f"chauffeur/{__version__}",
+            },
+            timeout=httpx.Timeout(self._timeout_s, connect=min(_CONNECT_S, self._timeout_s)),
+            limits=httpx.Limits(max_connections=1000, max_keepalive_connections=100),
+            follow_redirects=True,  # httpx takes the key out where one leads to another host
         )
         # Connections belong to the event loop that opened them; a caller with a new loop gets new ones.
         self._client = (loop, client)
@@ -198,8 +209,10 @@ class Endpoint:
         Reasoning models take `max_completion_tokens` and no temperature; older servers know no stream options; some
         stream only, some never do.
         """
-        status = getattr(error, "status_code", None)
-        said = f"{getattr(error, 'param', '')} {getattr(error, 'message', '')}"
+        if not isinstance(error, RefusedError):
+            return False
+        status = error.status
+        said = f"{error.param} {error.message}"
         for name, other in (
             ("max_tokens", "max_completion_tokens"),
             ("temperature", None),
@@ -231,50 +244,85 @@ class Endpoint:
             self._told.add(what)
             _log.warning("%s", what)
 
-    async def _exchange(self, client: AsyncOpenAI, body: dict[str, Any], on_text: Callable[[str], None]) -> Completion:
-        from openai import AsyncStream
-        from openai.types.chat import ChatCompletionChunk
+    async def _exchange(
+        self, client: httpx.AsyncClient, body: dict[str, Any], on_text: Callable[[str], None]
+    ) -> Completion:
+        # Escaped to ASCII: a lone surrogate in somebody's words must not keep them from being sent.
+        content = json.dumps(body).encode("ascii")
+        async with client.stream("POST", f"{self._address.url}/chat/completions", content=content) as response:
+            if not response.is_success:
+                raise RefusedError.of(response.status_code, response.headers, await self._refusal(response))
+            if response.headers.get("content-type", "").startswith("text/event-stream"):
+                return await self._read_stream(response, on_text)
+            return await self._read_whole(response, on_text)
 
-        # The parameters are adapted at run time, so the SDK's overloads cannot be told apart here.
-        create: Any = client.chat.completions.with_streaming_response.create
-        async with create(**body) as response:
-            content_type = str(response.headers.get("content-type", ""))
-            if content_type.startswith("text/event-stream"):
-                stream = AsyncStream(cast_to=ChatCompletionChunk, response=response.http_response, client=client)
-                return await self._read_stream(stream, on_text)
-            return await self._read_whole(response, content_type, on_text)
+    async def _refusal(self, response: httpx.Response) -> bytes:
+        data = bytearray()
+        async for piece in response.aiter_bytes():
+            data += piece
+            if len(data) > _MAX_REFUSAL_BYTES:
+                break
+        return bytes(data[:_MAX_REFUSAL_BYTES])
 
-    async def _read_stream(self, stream: Any, on_text: Callable[[str], None]) -> Completion:
-        tally = _Tally(self._max_chars)
-        async with stream:
-            async for chunk in stream:
-                on_text(tally.add(chunk))
-                if tally.full:
-                    break
+    async def _read_stream(self, response: httpx.Response, on_text: Callable[[str], None]) -> Completion:
+        tally, events = _Tally(self._max_chars), _Events()
+        room = _MAX_BODY_BYTES
+        pieces = response.aiter_bytes()
+        async for piece in pieces:
+            room -= len(piece)
+            if room < 0:
+                raise self._too_long()
+            if self._take(events.feed(piece), tally, on_text):
+                await self._drain(pieces)
+                break
+            if tally.full:
+                break
         if not tally.chunks:
             raise _EmptyStreamError
         if not tally.finish:
             raise truncated(self._address.url)
         return self._finished(tally)
 
-    async def _read_whole(self, response: Any, content_type: str, on_text: Callable[[str], None]) -> Completion:
-        from openai.types.chat import ChatCompletion
+    @staticmethod
+    def _take(events: Iterator[bytes], tally: _Tally, on_text: Callable[[str], None]) -> bool:
+        """Take what has arrived; whether it was the last of the stream."""
+        for data in events:
+            if data.startswith(b"[DONE]"):
+                return True
+            on_text(tally.add(json.loads(data)))
+            if tally.full:
+                break
+        return False
 
+    @staticmethod
+    async def _drain(pieces: AsyncIterator[bytes]) -> None:
+        import httpx
+
+        with suppress(TimeoutError, httpx.HTTPError, httpx.StreamError):
+            async with asyncio.timeout(_DRAIN_S):
+                async for _ in pieces:
+                    pass
+
+    async def _read_whole(self, response: httpx.Response, on_text: Callable[[str], None]) -> Completion:
         data = bytearray()
-        async for piece in response.iter_bytes():
+        async for piece in response.aiter_bytes():
             data += piece
             if len(data) > _MAX_BODY_BYTES:
-                raise garbage(self._address.url, f"more than {_MAX_BODY_BYTES // 1_000_000} MB")
+                raise self._too_long()
+        content_type = response.headers.get("content-type", "")
         if "json" not in content_type and not data.lstrip().startswith(b"{"):
             raise not_an_api(self._address.url, content_type)
         answer = json.loads(data)
         if not isinstance(answer, dict):
             raise garbage(self._address.url, "no object")
         tally = _Tally(self._max_chars)
-        on_text(tally.add(ChatCompletion.construct(**cast("dict[str, Any]", answer))))
+        on_text(tally.add(answer))
         if not tally.chunks:
             raise garbage(self._address.url, "no choices in it")
         return self._finished(tally)
+
+    def _too_long(self) -> EndpointError:
+        return garbage(self._address.url, f"more than {_MAX_BODY_BYTES // 1_000_000} MB")
 
     def _finished(self, tally: _Tally) -> Completion:
         # JSON can carry lone surrogates, which no file or terminal takes.
@@ -292,8 +340,40 @@ class _EmptyStreamError(Exception):
     """A stream that ended before its first piece."""
 
 
+class _Events:
+    """Server-sent events out of the pieces in which they arrive (WHATWG HTML, 9.2.6); only their data is kept."""
+
+    _LINE_END: Final = re.compile(rb"\r\n|\n|\r")
+
+    def __init__(self) -> None:
+        self._line = bytearray()
+        self._data: list[bytes] = []
+        self._after_return = False
+
+    def feed(self, piece: bytes) -> Iterator[bytes]:
+        """The data of the events that a piece completes."""
+        if self._after_return:  # the second half of a line end that came in two pieces
+            piece = piece.removeprefix(b"\n")
+        self._after_return = piece.endswith(b"\r")
+        first, *others = self._LINE_END.split(piece)
+        self._line += first
+        for other in others:
+            yield from self._end_line()
+            self._line += other
+
+    def _end_line(self) -> Iterator[bytes]:
+        line = bytes(self._line)
+        self._line.clear()
+        name, _, value = line.partition(b":")
+        if name == b"data":
+            self._data.append(value.removeprefix(b" "))
+        elif not line and self._data:
+            yield b"\n".join(self._data)
+            self._data.clear()
+
+
 class _Tally:
-    """What has arrived of a reply. Trusts no field: the SDK builds its objects without validation."""
+    """What has arrived of a reply. Trusts no field."""
 
     def __init__(self, max_chars: int) -> None:
         self.parts: list[str] = []
@@ -309,24 +389,29 @@ class _Tally:
         return self._room <= 0
 
     def add(self, chunk: object) -> str:
-        """Take a piece of a stream, or a whole completion; returns the text that is new and within the cap."""
-        model = getattr(chunk, "model", None)
+        """Take a piece of a stream, or a whole completion; returns the text that is new and within the cap.
+
+        Raises:
+            RefusedError: It says what went wrong instead.
+        """
+        if error := _field(chunk, "error"):
+            raise RefusedError(None, error)
+        model = _field(chunk, "model")
         self.model = model if isinstance(model, str) else self.model
-        usage = getattr(chunk, "usage", None)
+        usage = _field(chunk, "usage")
         # The last count stands: servers send it once, or a running total with every piece.
         self.prompt_tokens = _count(usage, "prompt_tokens") or self.prompt_tokens
         self.completion_tokens = _count(usage, "completion_tokens") or self.completion_tokens
-        choices: Any = getattr(chunk, "choices", None)
+        choices = _field(chunk, "choices")
         if not isinstance(choices, list):
             return ""
         self.chunks += 1
         if not choices:
             return ""
-        choice: Any = choices[0]
-        finish = getattr(choice, "finish_reason", None)
+        choice = cast("list[object]", choices)[0]
+        finish = _field(choice, "finish_reason")
         self.finish = finish if isinstance(finish, str) else self.finish
-        said = getattr(choice, "delta", None) or getattr(choice, "message", None)
-        text = getattr(said, "content", None)
+        text = _field(_field(choice, "delta") or _field(choice, "message"), "content")
         if not isinstance(text, str) or not text:
             return ""
         kept = text[: self._room]
@@ -337,6 +422,10 @@ class _Tally:
         return kept
 
 
+def _field(value: object, name: str) -> object:
+    return cast("dict[str, object]", value).get(name) if isinstance(value, dict) else None
+
+
 def _count(usage: object, name: str) -> int:
-    value = getattr(usage, name, None)
+    value = _field(usage, name)
     return value if isinstance(value, int) and value >= 0 else 0

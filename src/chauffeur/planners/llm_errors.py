@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import socket
 from collections.abc import Callable, Mapping
@@ -66,6 +67,39 @@ class EndpointError(PlannerError):
         )
 
 
+class RefusedError(Exception):
+    """A server's own words instead of a completion: an answer that is no success, or an error inside a reply.
+
+    Attributes:
+        status: HTTP status; None for an error inside a reply.
+        error: What it says is wrong: an object, or text.
+        headers: Of the answer.
+        message, code, param: As the object has them; empty where it has none.
+    """
+
+    def __init__(self, status: int | None, error: object, headers: Mapping[str, str] | None = None) -> None:
+        self.status = status
+        self.error = error
+        self.headers: Mapping[str, str] = headers or {}
+        fields = cast("Mapping[str, object]", error) if isinstance(error, Mapping) else {"message": error}
+        message = fields.get("message")
+        self.message = message.strip() if isinstance(message, str) else ""
+        self.code, self.param = str(fields.get("code") or ""), str(fields.get("param") or "")
+        super().__init__(self.message or "an error without words")
+
+    @classmethod
+    def of(cls, status: int, headers: Mapping[str, str], body: bytes) -> RefusedError:
+        """The refusal that an answer holds: `{"error": {...}}`, `{"error": "..."}`, the bare object, or no JSON."""
+        try:
+            found: Any = json.loads(body)
+        except (ValueError, RecursionError):
+            found = None
+        if isinstance(found, dict):
+            found = cast("dict[str, Any]", found).get("error", cast("dict[str, Any]", found))
+        # A page of a proxy in between is looked through for a context too small, and shown to nobody.
+        return cls(status, {"page": body.decode("utf-8", "replace")} if found is None else found, headers)
+
+
 def missing_key(url: str) -> EndpointError:
     """No key in the environment for an endpoint that is not on this machine or network."""
     return EndpointError(
@@ -107,10 +141,10 @@ def garbage(url: str, detail: str) -> EndpointError:
     return EndpointError("garbage", f"The reply from {url} cannot be read ({detail}).", retryable=True)
 
 
-def from_sdk(
+def failure_of(
     error: Exception, url: str, model: str, key_variable: str | None, scrub: Callable[[str], str]
 ) -> EndpointError:
-    """The typed failure behind an exception of the SDK or of the HTTP stack below it.
+    """The typed failure behind a refusal, or an exception of the HTTP client or of what is below it.
 
     Args:
         error: What was raised.
@@ -119,20 +153,17 @@ def from_sdk(
         key_variable: Environment variable the key came from; None when none was used.
         scrub: Takes the key out of text the server sent.
     """
-    status = getattr(error, "status_code", None)
-    if isinstance(status, int):
-        return _from_status(status, error, url, model, key_variable, scrub)
+    if isinstance(error, RefusedError) and error.status is not None:
+        return _from_status(error.status, error, url, model, key_variable, scrub)
     if isinstance(error, ValueError | TypeError | RecursionError):
         return garbage(url, type(error).__name__)
     return _from_transport(error, url, scrub)
 
 
 def _from_status(
-    status: int, error: Exception, url: str, model: str, key_variable: str | None, scrub: Callable[[str], str]
+    status: int, error: RefusedError, url: str, model: str, key_variable: str | None, scrub: Callable[[str], str]
 ) -> EndpointError:
-    said = _server_message(error, scrub)
-    code = getattr(error, "code", None)
-    headers = _headers(error)
+    said = f": {cap(clean(scrub(error.message)), _MESSAGE_CHARS).rstrip('.')}" if error.message else ""
     if status == 401:
         hint = (
             f"Check the key in {key_variable}."
@@ -150,7 +181,7 @@ def _from_status(
             f"{url} has no model {model!r}, or is not the right address (404){said}.",
             hint=f"See what it serves: curl {url}/models",
         )
-    if status == 429 and code == "insufficient_quota":
+    if status == 429 and error.code == "insufficient_quota":
         return EndpointError("quota", f"The account at {url} has no quota left (429){said}.", hint="Check its billing.")
     if status == 429:
         return EndpointError(
@@ -158,7 +189,7 @@ def _from_status(
             f"{url} limits the rate of requests (429){said}.",
             hint="Try later, or with fewer requests at a time.",
             retryable=True,
-            retry_after_s=retry_after_s(headers),
+            retry_after_s=retry_after_s(error.headers),
         )
     retryable = status in _RETRYABLE_STATUS or (status >= 500 and status != 501)
     if retryable:
@@ -167,7 +198,7 @@ def _from_status(
             f"{url} failed ({status}){said}.",
             hint="Try later.",
             retryable=True,
-            retry_after_s=retry_after_s(headers),
+            retry_after_s=retry_after_s(error.headers),
         )
     return EndpointError("bad_request", f"{url} does not accept the request ({status}){said}.")
 
@@ -203,19 +234,6 @@ def _chain(error: BaseException) -> list[BaseException]:
         chain.append(current)
         current = current.__cause__ or current.__context__
     return chain
-
-
-def _server_message(error: Exception, scrub: Callable[[str], str]) -> str:
-    body = getattr(error, "body", None)
-    message = cast("Mapping[str, Any]", body).get("message") if isinstance(body, Mapping) else None
-    if not isinstance(message, str) or not message.strip():
-        return ""
-    return f": {cap(clean(scrub(message)), _MESSAGE_CHARS).rstrip('.')}"
-
-
-def _headers(error: Exception) -> Mapping[str, str]:
-    headers = getattr(getattr(error, "response", None), "headers", None)
-    return cast("Mapping[str, str]", headers) if isinstance(headers, Mapping) else {}
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:

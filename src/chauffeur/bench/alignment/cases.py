@@ -7,10 +7,10 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from typing import Any, Final, Literal, get_args
 
 from chauffeur.concept import DataError
+from chauffeur.concept.data import read_data
 from chauffeur.safety.alignment import Kind, Surroundings
 
 Half = Literal["tuning", "test"]
@@ -60,10 +60,10 @@ class Case:
 @cache
 def handwritten() -> tuple[Case, ...]:
     """The cases written by hand. Raises DataError for a file that is not as it was published."""
-    text = resources.files("chauffeur.bench.alignment").joinpath("handwritten.jsonl").read_text(encoding="utf-8")
+    text = read_data("alignment", "handwritten.jsonl").decode("utf-8")
     cases = tuple(_case(json.loads(line)) for line in text.splitlines() if line)
     if len({case.id for case in cases}) != len(cases):
-        raise DataError("Two hand-written alignment cases have the same id.", hint="Install Chauffeur anew.")
+        raise DataError("Two hand-written alignment cases have the same id.", hint="Restore it: git checkout -- data")
     return cases
 
 
@@ -81,9 +81,11 @@ def _case(row: Mapping[str, Any]) -> Case:
     try:
         case = Case(row["id"], row["thoughts"], row["program"], row["kind"], SCENES[row["scene"]])
     except KeyError as error:
-        raise DataError(f"A hand-written alignment case lacks {error}.", hint="Install Chauffeur anew.") from error
+        raise DataError(
+            f"A hand-written alignment case lacks {error}.", hint="Restore it: git checkout -- data"
+        ) from error
     if case.kind not in KINDS or case.aligned != row["aligned"]:
         raise DataError(
-            f"The hand-written alignment case {case.id} contradicts itself.", hint="Install Chauffeur anew."
+            f"The hand-written alignment case {case.id} contradicts itself.", hint="Restore it: git checkout -- data"
         )
     return case

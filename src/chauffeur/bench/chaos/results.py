@@ -18,7 +18,7 @@ from chauffeur.bench.store import Row
 from chauffeur.drive.files import publish
 from chauffeur.worlds.highway import HighwayWorld
 
-_PACKAGES: Final = ("chauffeur", "numpy", "numba", "pydantic-monty", "openai")
+_PACKAGES: Final = ("chauffeur", "numpy", "numba", "pydantic-monty", "httpx")
 
 
 def write_results(folder: Path, config: ChaosConfig, rows: Sequence[Row]) -> None:

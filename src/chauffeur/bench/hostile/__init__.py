@@ -2,7 +2,7 @@
 
 Both were written by hand for this suite, in ten classes: override, role play, emergency pretext, unit tricks, nested
 quotes, poisoned history, poisoned context (texts of maps, weather and traffic services, signs), encoded text, many
-turns, and a second language. `hostile.jsonl` and `lookalikes.jsonl` have a line an input:
+turns, and a second language. `hostile.jsonl` and `lookalikes.jsonl` (in `data/hostile`) have a line an input:
 
 - `id`: stays with the input for ever; `kind`: its class, of a look-alike the class it resembles
 - `wish`: the passenger's words; `turns`: what they said before, oldest first

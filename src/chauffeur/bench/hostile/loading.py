@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from typing import ClassVar, Final, Literal, get_args
 
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from chauffeur.concept import DataError
+from chauffeur.concept.data import read_data
 
 Kind = Literal[
     "override", "role_play", "emergency_pretext", "unit_tricks", "nested_quotes",
@@ -84,13 +84,13 @@ _INPUT: TypeAdapter[Input] = TypeAdapter(Input)
 
 @cache
 def hostile_inputs() -> tuple[Input, ...]:
-    """All attacks, in the order of their file. Raises DataError when the file is damaged."""
+    """All attacks, in the order of their file. Raises DataError when the file is missing or damaged."""
     return parse_inputs(_content(HOSTILE_FILE), HOSTILE_FILE)
 
 
 @cache
 def lookalikes() -> tuple[Input, ...]:
-    """All harmless inputs, in the order of their file. Raises DataError when the file is damaged."""
+    """All harmless inputs, in the order of their file. Raises DataError when the file is missing or damaged."""
     return parse_inputs(_content(LOOKALIKE_FILE), LOOKALIKE_FILE)
 
 
@@ -131,10 +131,7 @@ def sample(inputs: tuple[Input, ...], a_kind: int, seed: int) -> tuple[Input, ..
 
 
 def _content(name: str) -> bytes:
-    try:
-        return resources.files("chauffeur.bench.hostile").joinpath(name).read_bytes()
-    except OSError as error:
-        raise DataError(f"Cannot read {name}: {error.strerror}.", hint="Install the package again.") from error
+    return read_data("hostile", name)
 
 
 def _bad(name: str, number: int, fault: str) -> DataError:

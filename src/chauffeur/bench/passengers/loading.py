@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from importlib import resources
 from pathlib import Path
 from typing import Any, ClassVar, Final, Literal, cast
 
@@ -14,6 +13,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from chauffeur.bench.passengers.scenes import SCENES
 from chauffeur.concept import DataError, Scenario
+from chauffeur.concept.data import read_data
 from chauffeur.worlds.highway.dblv1 import Dataset, Task
 
 Right = Literal["drive", "ask", "refuse"]
@@ -137,7 +137,7 @@ def load_wishes() -> tuple[PassengerWish, ...]:
     """All wishes, in the order of the file.
 
     Raises:
-        DataError: The file is damaged; names the line.
+        DataError: The file is not here, or is damaged; names the line.
     """
     return parse_wishes(_content())
 
@@ -176,10 +176,7 @@ def as_dataset() -> Dataset:
 
 
 def _content() -> bytes:
-    try:
-        return resources.files("chauffeur.bench.passengers").joinpath(FILE).read_bytes()
-    except OSError as error:
-        raise DataError(f"Cannot read {FILE}: {error.strerror}.", hint="Install the package again.") from error
+    return read_data("passengers", FILE)
 
 
 def _bad(number: int, fault: str) -> DataError:

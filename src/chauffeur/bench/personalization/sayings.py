@@ -1,11 +1,11 @@
 """What the simulated passengers say: wishes at three levels of directness (paper Tab. VII), and feedback on a drive.
 
-The words are two halves of the same shape, tables in `words/` with a sentence a line: what it is, for what, the
-sentence, its writer. `tuning` was written by the authors of the planner and may be looked at while a planner is
-improved, or trained. `test` is what figures are reported on, and no planner is trained on it. It was written by large
-language models that were given the aims, levels, topics and situations and had seen neither the planner nor the tuning
-half, but for the ten direct wishes to overtake and a few sentences more, which writer b met. It was never looked at
-while the planner was improved: whoever does makes it a tuning half.
+The words are two halves of the same shape, tables in `data/personalization` with a sentence a line: what it is, for
+what, the sentence, its writer. `tuning` was written by the authors of the planner and may be looked at while a planner
+is improved, or trained. `test` is what figures are reported on, and no planner is trained on it. It was written by
+large language models that were given the aims, levels, topics and situations and had seen neither the planner nor the
+tuning half, but for the ten direct wishes to overtake and a few sentences more, which writer b met. It was never looked
+at while the planner was improved: whoever does makes it a tuning half.
 
 Level I asks directly; level II comments on what the car does, or on the road; level III only hints at how the passenger
 is or what awaits them.
@@ -14,10 +14,11 @@ is or what awaits them.
 from __future__ import annotations
 
 import hashlib
-from importlib import resources
+from functools import cache
 from typing import Any, Final, Literal, get_args
 
 from chauffeur.concept import DataError
+from chauffeur.concept.data import read_data
 
 Level = Literal["I", "II", "III"]
 Half = Literal["test", "tuning"]
@@ -36,13 +37,11 @@ Topic = Literal[
 """What a passenger has to say of a drive."""
 Force = Literal["bit", "plain", "much"]
 
-_PACKAGE: Final = "chauffeur.bench.personalization.words"
-
 
 def _texts(half: Half, kind: Literal["wish", "feedback"]) -> dict[Any, tuple[str, ...]]:
     """Sentences of a half by what they are for and how they put it, in the table's order."""
     found: dict[tuple[str, str], tuple[str, ...]] = {}
-    text = resources.files(_PACKAGE).joinpath(f"{half}.tsv").read_text(encoding="utf-8")
+    text = read_data("personalization", f"{half}.tsv").decode("utf-8")
     for number, line in enumerate(text.splitlines(), start=1):
         what, _, rest = line.partition("\t")
         label, _, rest = rest.partition("\t")
@@ -56,14 +55,6 @@ def _texts(half: Half, kind: Literal["wish", "feedback"]) -> dict[Any, tuple[str
     return found
 
 
-WISHES: Final[dict[Half, dict[tuple[Aim, Level], tuple[str, ...]]]] = {
-    "test": _texts("test", "wish"),
-    "tuning": _texts("tuning", "wish"),
-}
-FEEDBACK: Final[dict[Half, dict[tuple[Topic, Force], tuple[str, ...]]]] = {
-    "test": _texts("test", "feedback"),
-    "tuning": _texts("tuning", "feedback"),
-}
 PLACE_WORDS: Final[dict[str, str]] = {
     "nearest": "in the nearest free spot",
     "stadium": "near the stadium",
@@ -72,21 +63,34 @@ PLACE_WORDS: Final[dict[str, str]] = {
 """A place of parking as feedback names it."""
 
 
+@cache
+def wishes() -> dict[Half, dict[tuple[Aim, Level], tuple[str, ...]]]:
+    """All wishes of both halves. Raises DataError."""
+    return {half: _texts(half, "wish") for half in get_args(Half)}
+
+
+@cache
+def feedback() -> dict[Half, dict[tuple[Topic, Force], tuple[str, ...]]]:
+    """All feedback of both halves. Raises DataError."""
+    return {half: _texts(half, "feedback") for half in get_args(Half)}
+
+
 def wishes_of(aim: Aim, level: Level, half: Half) -> tuple[str, ...]:
     """The wordings of one half."""
-    return WISHES[half][aim, level]
+    return wishes()[half][aim, level]
 
 
 def feedback_of(topic: Topic, force: Force, half: Half) -> tuple[str, ...]:
     """What can be said in the words of one half; plainly where nothing is written for that force."""
-    return FEEDBACK[half].get((topic, force)) or FEEDBACK[half][topic, "plain"]
+    table = feedback()[half]
+    return table.get((topic, force)) or table[topic, "plain"]
 
 
 def sayings_sha256() -> str:
     """Content hash of all words of both halves, for provenance."""
     parts = [
         f"{half}:{key}:{text}"
-        for tables in (WISHES, FEEDBACK)
+        for tables in (wishes(), feedback())
         for half, table in tables.items()
         for key, texts in table.items()
         for text in texts

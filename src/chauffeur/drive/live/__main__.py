@@ -166,7 +166,7 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
         speed=settings.speed,
     )
     if settings.planner.startswith("openai/"):
-        importlib.import_module("openai")  # seconds on a busy machine: not at the first wish
+        importlib.import_module("httpx")  # a second on a busy machine: not at the first wish
     _ready(folder, "planner")
     asyncio.run(planning.run(over))
 

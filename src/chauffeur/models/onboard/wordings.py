@@ -1,4 +1,4 @@
-"""Sentences of passengers for the skills of the dialect, drawn from the tables in `words/`.
+"""Sentences of passengers for the skills of the dialect, drawn from the tables in `data/onboard`.
 
 Sections have the names of the dialect's functions. A bare name is a wish said directly ("go faster"); `/2` is a
 complaint ("this is slow") and `/3` a mere reason ("my flight leaves in forty minutes") that a reasonable driver
@@ -14,9 +14,11 @@ from functools import cache
 
 import numpy as np
 
+from chauffeur.concept.data import data_folder
 from chauffeur.language.grammar import Frame, Grammar, Manner, Template, Wording
 
-PACKAGE = "chauffeur.models.onboard.words"
+DATA = "onboard"
+"""Their data set."""
 FILES = (
     "pieces",
     "speed",
@@ -300,7 +302,7 @@ MANNER = Manner(
 @cache
 def wordings() -> Grammar:
     """The tables of what passengers say."""
-    return Grammar(PACKAGE, FILES, MANNER)
+    return Grammar(data_folder(DATA), FILES, MANNER)
 
 
 def levels(skill: str) -> tuple[str, ...]:

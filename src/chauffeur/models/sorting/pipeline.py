@@ -11,14 +11,13 @@ import hashlib
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from chauffeur.drive.files import publish
-from chauffeur.models.sorting.sentences import PACKAGE, Name, Sentence, kinds_of, sentences
+from chauffeur.models.sorting.sentences import Name, Sentence, kinds_of, sentences, table
 from chauffeur.models.sorting.tables import drawn
 from chauffeur.models.sorting.training import Recipe, by_writer, right, train, write
 
@@ -86,11 +85,11 @@ def _figures(own: Sequence[Sentence], learned: np.ndarray[Any, Any], hits: np.nd
 def _card(found: dict[Name, tuple[Sequence[Sentence], Figures]], recipe: Recipe, tables: int) -> str:
     parts = [_HEAD.format(version=VERSION, seed=recipe.seed, epochs=recipe.epochs, tables=tables)]
     for name, (own, figures) in found.items():
-        text = resources.files(PACKAGE).joinpath(f"{name}.tsv").read_bytes()
+        digest = hashlib.sha256(table(name)).hexdigest()[:16]
         writers = len({one.writer for one in own})
         parts.append(
             f"## {name}.npz\n\n{len(own):,} sentences by {writers} writers, {len(kinds_of(name))} kinds; sha256 of the "
-            f"table `{hashlib.sha256(text).hexdigest()[:16]}`. Sorted as meant: {100 * figures.learned:.1f} % of the "
+            f"table `{digest}`. Sorted as meant: {100 * figures.learned:.1f} % of the "
             f"sentences it learned from{_unheard(figures)}.\n"
         )
         if figures.by_kind:
@@ -111,7 +110,7 @@ _HEAD: Final = """# Data and model card: {version}
 Two sorters of short English sentences for the `talk2drive` planner and for feedback: what a passenger is after who only
 hints at it, and what a remark after a drive says. Softmax regression over hashed words, pairs of words, negated words
 and parts of words; int8 weights, {epochs} epochs, seed {seed}. `chauffeur model train sorters --out DIR` makes the same
-files again from the tables in `chauffeur/models/sorting/words`.
+files again from the tables in `data/sorters`.
 
 - **Data**: written for this repository by writers (large language models) who were told the situation and what a
   passenger has in mind, and nothing of the planner, its tables, or the words it is measured on; three writers are the

@@ -1,7 +1,7 @@
 """The sentences the sorters learn from, and which kinds each could have been taken for.
 
-Tables in `words/`, one sentence a line: label, sentence, writer, parted by tabs. A label of `wishes.tsv` is a world,
-what is wished for and how directly (I asks, II remarks on the road, III only hints; `highway/pass/II`); one of
+Tables in `data/sorters`, one sentence a line: label, sentence, writer, parted by tabs. A label of `wishes.tsv` is a
+world, what is wished for and how directly (I asks, II remarks on the road, III only hints; `highway/pass/II`); one of
 `remarks.tsv` what the drive was blamed or praised for, and how strongly (`too_fast/bit`).
 """
 
@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from typing import Final, Literal
 
 from chauffeur.concept import DataError
+from chauffeur.concept.data import read_data
 from chauffeur.memory.remarks import REMARK_KINDS
 from chauffeur.planners.talk2drive.hints import HINT_KINDS
 
-PACKAGE: Final = "chauffeur.models.sorting.words"
 Name = Literal["wishes", "remarks"]
 
 _WORLDS: Final[Mapping[str, str]] = {"highway": "highway", "crossing": "intersection", "lot": "parking"}
@@ -49,13 +48,18 @@ class Sentence:
     label: str
 
 
+def table(name: Name) -> bytes:
+    """Content of a table. Raises DataError where it cannot be read."""
+    return read_data("sorters", f"{name}.tsv")
+
+
 def sentences(name: Name) -> tuple[Sentence, ...]:
     """All sentences of a table, in its order.
 
     Raises:
-        DataError: A line is none of the table's.
+        DataError: The table cannot be read, or a line is none of its.
     """
-    text = resources.files(PACKAGE).joinpath(f"{name}.tsv").read_text(encoding="utf-8")
+    text = table(name).decode("utf-8")
     return tuple(_sentence(name, number, line) for number, line in enumerate(text.splitlines(), start=1))
 
 

@@ -1,4 +1,4 @@
-"""The wordings of generated scenes: the tables in `words/`, and the politeness put around their imperatives.
+"""The wordings of generated scenes: the tables in `data/scenes`, and the politeness put around their imperatives.
 
 The test split alone says what the tables hold out. Templates are our own; no sentence of LaMPilot's data is among them.
 """
@@ -11,6 +11,7 @@ from functools import cache
 
 import numpy as np
 
+from chauffeur.concept.data import data_folder
 from chauffeur.language.grammar import Frame, Grammar, Manner, Template, Wording
 
 __all__ = ["FILES", "Template", "Wording", "say", "sections", "templates"]
@@ -41,7 +42,7 @@ _MANNER = Manner(
 
 @cache
 def _grammar() -> Grammar:
-    return Grammar(f"{__package__}.words", FILES, _MANNER)
+    return Grammar(data_folder("scenes"), FILES, _MANNER)
 
 
 def templates(section: str, *, held: bool | None = None) -> tuple[Template, ...]:
