@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from chauffeur.bench.engine import Work
+from chauffeur.bench.kernel.engine import Work
+from chauffeur.bench.kernel.shards import Shard
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.personalization import figures, report
 from chauffeur.bench.personalization.runner import StudyConfig, StudyRun
 from chauffeur.bench.personalization.study import ARMS, StudyJob, do_job, sit
-from chauffeur.bench.shards import Shard
-from chauffeur.bench.store import Row
 from chauffeur.concept import ConfigError
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from small_run import Inline
 
-from chauffeur.bench.calls import Patience
+from chauffeur.bench.kernel.calls import Patience
+from chauffeur.bench.kernel.standing import Standing
 from chauffeur.bench.lampilot.report import comparison_lines, family_lines, markdown, summarise
 from chauffeur.bench.lampilot.runner import Effort, LampilotRun, RunConfig, choose_items
-from chauffeur.bench.standing import Standing
 from chauffeur.concept import (
     ConfigError,
     Context,

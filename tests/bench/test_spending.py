@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from virtual import run_virtually
 
-from chauffeur.bench.calls import FRUITLESS, Answer, Caller, Patience
-from chauffeur.bench.pace import Gate, Window
-from chauffeur.bench.spending import Bill, Budget, Price, Room, Spending
+from chauffeur.bench.kernel.calls import FRUITLESS, Answer, Caller, Patience
+from chauffeur.bench.kernel.pace import Gate, Window
+from chauffeur.bench.kernel.spending import Bill, Budget, Price, Room, Spending
 from chauffeur.concept import (
     ConfigError,
     Context,

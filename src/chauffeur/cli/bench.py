@@ -15,8 +15,8 @@ from chauffeur.concept import LAMPILOT_LIMITS, ConfigError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from chauffeur.bench.kernel.store import Row
     from chauffeur.bench.lampilot.runner import Effort, LampilotRun
-    from chauffeur.bench.store import Row
     from chauffeur.planners.base import Planner
 
 UNFINISHED: Final = 3
@@ -142,10 +142,10 @@ def lampilot(
     ] = None,
 ) -> None:
     """LaMPilot-Bench (paper Tab. IV): completion, collisions and scores of a planner that follows instructions."""
+    from chauffeur.bench.kernel.shards import WHOLE, Shard
     from chauffeur.bench.lampilot.policy_aid import HUMAN_FEEDBACK, aid_for
     from chauffeur.bench.lampilot.runner import RunConfig
     from chauffeur.bench.lampilot.scenes import annotated
-    from chauffeur.bench.shards import WHOLE, Shard
     from chauffeur.cli.console import stdout
     from chauffeur.cli.parts import setting_named
     from chauffeur.concept.registry import load_plugin
@@ -233,9 +233,9 @@ def _effort(
 ) -> Effort:
     from functools import partial
 
-    from chauffeur.bench.engine import LocalEngine
+    from chauffeur.bench.kernel.engine import LocalEngine
+    from chauffeur.bench.kernel.spending import Budget, Price
     from chauffeur.bench.lampilot.runner import Effort
-    from chauffeur.bench.spending import Budget, Price
     from chauffeur.cli.parts import needs
 
     if ray is not None and workers is not None:
@@ -243,7 +243,7 @@ def _effort(
     engine: Any = LocalEngine
     if ray is not None:
         needs("cluster", "A Ray cluster", "ray")
-        from chauffeur.bench.cluster import RayEngine
+        from chauffeur.bench.kernel.cluster import RayEngine
 
         engine = partial(RayEngine, ray)
     return Effort(

@@ -12,8 +12,8 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from chauffeur.bench.kernel.store import Row
     from chauffeur.bench.personalization.runner import StudyRun
-    from chauffeur.bench.store import Row
 
 EXAMPLES = """
 Examples:
@@ -44,9 +44,9 @@ def personalization(
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
 ) -> None:
     """Takeover rates of simulated passengers (paper Tab. VIII, IX, X): keywords, Talk2Drive, and with memory."""
+    from chauffeur.bench.kernel.shards import WHOLE, Shard
     from chauffeur.bench.personalization.report import markdown
     from chauffeur.bench.personalization.runner import StudyConfig, StudyRun
-    from chauffeur.bench.shards import WHOLE, Shard
     from chauffeur.cli.console import stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.concept import ConfigError

@@ -18,18 +18,18 @@ from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.bench.calls import Caller, Halt, Patience
-from chauffeur.bench.engine import Engine, EngineError, LocalEngine, first_error
 from chauffeur.bench.hostile.asking import HostileRequests
 from chauffeur.bench.hostile.judging import RULER, served, verdict_of
 from chauffeur.bench.hostile.loading import Input, data_sha256, hostile_inputs, lookalikes, sample
 from chauffeur.bench.hostile.obedient import ObedientPlanner
 from chauffeur.bench.hostile.rollout import ROLLOUT_VERSION, DriveJob, roll_out
 from chauffeur.bench.hostile.scenes import scene_of
-from chauffeur.bench.pace import Gate, Window
-from chauffeur.bench.spending import Bill, Budget, Spending
-from chauffeur.bench.standing import Speedometer, Standing
-from chauffeur.bench.store import Row, RowStore, freeze, sole_writer
+from chauffeur.bench.kernel.calls import Caller, Halt, Patience
+from chauffeur.bench.kernel.engine import Engine, EngineError, LocalEngine, first_error
+from chauffeur.bench.kernel.pace import Gate, Window
+from chauffeur.bench.kernel.spending import Bill, Budget, Spending
+from chauffeur.bench.kernel.standing import Speedometer, Standing
+from chauffeur.bench.kernel.store import Row, RowStore, freeze, sole_writer
 from chauffeur.concept import ChauffeurError, Context, Limits, Plan, PlanRequest, Scenario
 from chauffeur.describe import describe
 from chauffeur.drive.files import publish

@@ -15,8 +15,8 @@ from typing import Any, Literal, Self
 
 import numpy as np
 
-from chauffeur.bench.shards import WHOLE, Shard
-from chauffeur.bench.store import freeze
+from chauffeur.bench.kernel.shards import WHOLE, Shard
+from chauffeur.bench.kernel.store import freeze
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, DataError, Limits, Scenario
 from chauffeur.drive.session import scenario_hash
 from chauffeur.planners.prompts import Setting

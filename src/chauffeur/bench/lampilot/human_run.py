@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from chauffeur.bench.kernel.shards import WHOLE
+from chauffeur.bench.kernel.store import Row, RowStore, another_run
 from chauffeur.bench.lampilot.frozen import Frozen
 from chauffeur.bench.lampilot.human import (
     BROKEN_OFF,
@@ -27,8 +29,6 @@ from chauffeur.bench.lampilot.human import (
 from chauffeur.bench.lampilot.metrics import ORIGIN
 from chauffeur.bench.lampilot.results import Stages, publish_results, results
 from chauffeur.bench.lampilot.rollout import ROLLOUT_VERSION
-from chauffeur.bench.shards import WHOLE
-from chauffeur.bench.store import Row, RowStore, another_run
 from chauffeur.concept import LAMPILOT_LIMITS, ChauffeurError, ConfigError, DataError
 from chauffeur.describe import describe
 from chauffeur.drive.files import publish

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from chauffeur.bench.kernel.shards import WHOLE
+from chauffeur.bench.kernel.store import Row, RowStore, sole_writer
 from chauffeur.bench.lampilot.frozen import Frozen
 from chauffeur.bench.lampilot.metrics import ruler_named
 from chauffeur.bench.lampilot.results import Stages, publish_results, results
-from chauffeur.bench.shards import WHOLE
-from chauffeur.bench.store import Row, RowStore, sole_writer
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.worlds.highway.dblv1 import Item
 

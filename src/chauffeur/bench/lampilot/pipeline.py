@@ -13,15 +13,15 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
-from chauffeur.bench.calls import Caller
-from chauffeur.bench.engine import Engine, EngineError
+from chauffeur.bench.kernel.calls import Caller
+from chauffeur.bench.kernel.engine import Engine, EngineError
+from chauffeur.bench.kernel.spending import Bill
+from chauffeur.bench.kernel.standing import Speedometer, Standing
+from chauffeur.bench.kernel.store import Row, Scribe
 from chauffeur.bench.lampilot.asking import Requests
 from chauffeur.bench.lampilot.metrics import points
 from chauffeur.bench.lampilot.results import Stages
 from chauffeur.bench.lampilot.rollout import RolloutJob, context_adapter, describe_sample, not_driven, roll_out
-from chauffeur.bench.spending import Bill
-from chauffeur.bench.standing import Speedometer, Standing
-from chauffeur.bench.store import Row, Scribe
 from chauffeur.concept import ChauffeurError, Context
 from chauffeur.worlds.highway.dblv1 import Item
 

@@ -8,11 +8,11 @@ from statistics import fmean
 
 import numpy as np
 
+from chauffeur.bench.kernel.stats import DRAWS, Array, Estimator, Interval, bootstrap, cluster_totals
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.families import FAMILIES
 from chauffeur.bench.lampilot.metrics import ORIGIN, Ruler, driving_score, ruler_named
 from chauffeur.bench.lampilot.paper import TABLE_IV, items_behind
-from chauffeur.bench.report.stats import DRAWS, Array, Estimator, Interval, bootstrap, cluster_totals
-from chauffeur.bench.store import Row
 
 
 @dataclass(frozen=True, slots=True)

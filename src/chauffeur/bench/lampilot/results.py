@@ -15,13 +15,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from chauffeur.bench.kernel.store import Row, RowStore
 from chauffeur.bench.lampilot.families import family_of
 from chauffeur.bench.lampilot.frozen import BENCH_VERSION, Frozen
 from chauffeur.bench.lampilot.goals_more import answered_rightly
 from chauffeur.bench.lampilot.metrics import points, ruler_named
 from chauffeur.bench.lampilot.report import answers_note, family_lines, markdown
 from chauffeur.bench.lampilot.rollout import BASELINES, REHEARSAL_SEED, ROLLOUT_VERSION, RolloutJob, not_driven
-from chauffeur.bench.store import Row, RowStore
 from chauffeur.drive.files import publish
 from chauffeur.safety.shield import SHIELD_VERSION
 from chauffeur.worlds.highway import HighwayWorld

@@ -17,18 +17,18 @@ from typing import Any
 
 import numpy as np
 
-from chauffeur.bench.calls import Caller, Halt, Patience
-from chauffeur.bench.engine import Engine, LocalEngine, first_error
+from chauffeur.bench.kernel.calls import Caller, Halt, Patience
+from chauffeur.bench.kernel.engine import Engine, LocalEngine, first_error
+from chauffeur.bench.kernel.pace import Gate, Window
+from chauffeur.bench.kernel.shards import WHOLE, Shard
+from chauffeur.bench.kernel.spending import Bill, Budget, Price, Spending
+from chauffeur.bench.kernel.store import Row, Scribe, sole_writer
 from chauffeur.bench.lampilot.asking import PlainRequests, Requests
 from chauffeur.bench.lampilot.frozen import BENCH_VERSION, Frozen, RunConfig, choose_items
 from chauffeur.bench.lampilot.metrics import ruler_named
 from chauffeur.bench.lampilot.pipeline import Pipeline, Watch
 from chauffeur.bench.lampilot.results import Stages, publish_results, results
 from chauffeur.bench.lampilot.rollout import BASELINES
-from chauffeur.bench.pace import Gate, Window
-from chauffeur.bench.shards import WHOLE, Shard
-from chauffeur.bench.spending import Bill, Budget, Price, Spending
-from chauffeur.bench.store import Row, Scribe, sole_writer
 from chauffeur.concept import ChauffeurError, ConfigError
 from chauffeur.drive.rehearsal import label
 from chauffeur.planners.base import Planner

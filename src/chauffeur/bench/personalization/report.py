@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
+from chauffeur.bench.kernel.stats import Interval
 from chauffeur.bench.personalization import figures
 from chauffeur.bench.personalization.figures import Compared, Performance
 from chauffeur.bench.personalization.scenes import TASK_WORDS
-from chauffeur.bench.report.stats import Interval
 
 Rows = Sequence[Mapping[str, Any]]
 Table = tuple[str, Sequence[str], list[list[str]]]

@@ -13,14 +13,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
-from chauffeur.bench.engine import Engine, LocalEngine, WorkerLostError, first_error
+from chauffeur.bench.kernel.engine import Engine, LocalEngine, WorkerLostError, first_error
+from chauffeur.bench.kernel.shards import WHOLE, Shard
+from chauffeur.bench.kernel.standing import Speedometer, Standing
+from chauffeur.bench.kernel.store import Row, RowStore, freeze, sole_writer
 from chauffeur.bench.personalization.population import draw_passengers
 from chauffeur.bench.personalization.sayings import Half, sayings_sha256
 from chauffeur.bench.personalization.scenes import TASKS, scenes_of
 from chauffeur.bench.personalization.study import BENCH_VERSION, StudyJob, do_job, versions
-from chauffeur.bench.shards import WHOLE, Shard
-from chauffeur.bench.standing import Speedometer, Standing
-from chauffeur.bench.store import Row, RowStore, freeze, sole_writer
 from chauffeur.concept import ChauffeurError, ConfigError
 from chauffeur.drive.files import publish
 from chauffeur.drive.session import scenario_hash

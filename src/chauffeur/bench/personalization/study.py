@@ -17,6 +17,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.personalization.baseline import KeywordParameters
 from chauffeur.bench.personalization.population import POPULATION_VERSION, draw_passengers
 from chauffeur.bench.personalization.riding import RIDE_VERSION, ReadOnly, Ride, ride, ride_policy, usual
@@ -31,7 +32,6 @@ from chauffeur.bench.personalization.takeover import (
     wanted_mps,
 )
 from chauffeur.bench.personalization.traces import TRACE_VERSION, Trace
-from chauffeur.bench.store import Row
 from chauffeur.concept import NOBODY, Limits, Parameters, PersonId, Scenario
 from chauffeur.drive.session import Forgetful, make_world
 from chauffeur.memory.feedback import interpret_feedback

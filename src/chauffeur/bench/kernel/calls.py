@@ -7,8 +7,8 @@ import logging
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
-from chauffeur.bench.pace import Gate, Signal
-from chauffeur.bench.spending import Bill, Price, Room, Spending
+from chauffeur.bench.kernel.pace import Gate, Signal
+from chauffeur.bench.kernel.spending import Bill, Price, Room, Spending
 from chauffeur.concept import ChauffeurError, Plan, PlannerError, PlanRequest
 from chauffeur.planners.base import Planner
 from chauffeur.planners.llm_errors import EndpointError, Kind
