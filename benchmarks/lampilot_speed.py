@@ -31,9 +31,9 @@ from pathlib import Path
 from typing import Any
 
 from chauffeur.bench.kernel.engine import LocalEngine
+from chauffeur.bench.kernel.report import markdown
 from chauffeur.bench.kernel.store import Row, RowStore
 from chauffeur.bench.lampilot import rollout
-from chauffeur.bench.lampilot.report import markdown
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
 from chauffeur.worlds.highway import HighwayWorld
 from highway_oracle import ReferenceWorld

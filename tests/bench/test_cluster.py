@@ -19,7 +19,7 @@ from small_run import FAST, finish, make_data, make_run, outcome, recorded
 
 from chauffeur.bench.kernel.cluster import RayEngine
 from chauffeur.bench.kernel.engine import WorkerLostError
-from chauffeur.bench.lampilot.runner import Effort
+from chauffeur.bench.kernel.run import Effort
 from chauffeur.concept import ConfigError, MissingExtraError
 
 pytestmark = [

@@ -20,8 +20,8 @@ import pytest
 from small_run import COMMANDS, FAST, SEEDS, Inline, finish, make_data, make_run, outcome, quiet, recorded
 
 from chauffeur.bench.kernel.engine import LocalEngine, QueuedJob
+from chauffeur.bench.kernel.run import Effort
 from chauffeur.bench.kernel.store import RowStore
-from chauffeur.bench.lampilot.runner import Effort
 from chauffeur.concept import ConfigError, Plan, PlanRequest
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset
