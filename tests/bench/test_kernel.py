@@ -23,7 +23,6 @@ from chauffeur.bench.kernel.report import fill
 from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.bench.kernel.shards import Shard
 from chauffeur.bench.lampilot import lampilot
-from chauffeur.bench.personalization.benchmark import StudyBenchmark, StudyConfig
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, PlannerError
 from chauffeur.concept.registry import plugin_names
@@ -116,7 +115,6 @@ def test_the_built_in_benchmarks_and_the_example_conform(stranger: ModuleType, t
         HostileBenchmark(HostileConfig("keyword", a_kind=1)),
         lampilot(str(data.path), "keyword"),
         lampilot(str(data.path), "idm"),
-        StudyBenchmark(StudyConfig(passengers=1, trips=0)),
     ):
         assert faults(bench) == [], bench.id
 

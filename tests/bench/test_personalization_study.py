@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from small_run import quiet
 
+from chauffeur.bench.kernel.conformance import faults
 from chauffeur.bench.kernel.engine import Work
 from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.bench.kernel.shards import Shard
@@ -113,6 +114,10 @@ def test_a_run_goes_on_where_it_stopped_and_refuses_another_configuration(tmp_pa
     text = report.markdown(rows, "T")
     assert "Simulated passengers" in text
     assert "2 simulated passengers" in text
+
+
+def test_it_conforms() -> None:
+    assert faults(_Quick(StudyConfig(passengers=1, seed=5, half="tuning", trips=1))) == []
 
 
 def test_shards_share_the_work(tmp_path: Path) -> None:

@@ -61,7 +61,7 @@ class _TripFields(TypedDict):
     takeover: bool
     topic: str
     at_s: float | None
-    force: int
+    force: str
     deviation: float
     statistics: dict[str, float | None]
     planner: str
