@@ -38,7 +38,7 @@ def main() -> None:
         os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, SWITCH: WITHOUT})
     import numpy as np
 
-    from chauffeur.bench.lampilot.report import markdown
+    from chauffeur.bench.kernel.report import markdown
     from parity_episode import POLICIES, TOLERANCE, Episode, compare
     from speed.scenes import load_samples
 

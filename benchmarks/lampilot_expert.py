@@ -29,12 +29,12 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+from chauffeur.bench.kernel.report import markdown
 from chauffeur.bench.lampilot.expert import EXPERT, expert_program, variants
 from chauffeur.bench.lampilot.goals import DistanceGoal, make_goal
 from chauffeur.bench.lampilot.metrics import ORIGIN, driving_score, points
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rehearse import Crew, rehearsed
-from chauffeur.bench.lampilot.report import markdown
 from chauffeur.concept import Scenario, ScenarioError
 from chauffeur.drive.rehearsal import best_of
 from chauffeur.drive.session import drive_program

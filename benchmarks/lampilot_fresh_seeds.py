@@ -18,10 +18,12 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from chauffeur.bench.kernel.pipeline import context_adapter, describe_scene
+from chauffeur.bench.kernel.report import markdown
 from chauffeur.bench.lampilot.families import family_of
 from chauffeur.bench.lampilot.metrics import ORIGIN, points
-from chauffeur.bench.lampilot.report import COLUMNS, cells, markdown, summaries
-from chauffeur.bench.lampilot.rollout import RolloutJob, context_adapter, describe_sample, roll_out
+from chauffeur.bench.lampilot.report import COLUMNS, cells, summaries
+from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
 from chauffeur.concept import LAMPILOT_LIMITS, Instruction, PlanRequest, Scenario, SystemMessage
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
@@ -35,7 +37,7 @@ def planner_of(spec: str) -> Planner:
 
 def drive(job: tuple[Scenario, str, str]) -> dict[str, Any]:
     scenario, command, spec = job
-    described = describe_sample(scenario)
+    described = describe_scene(scenario)
     if described["error"]:
         return {"sample": scenario.id, "outcome": "not_driven"}
     context = context_adapter.validate_python(described["context"])

@@ -30,11 +30,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from chauffeur.bench.engine import LocalEngine
+from chauffeur.bench.kernel.engine import LocalEngine
+from chauffeur.bench.kernel.report import markdown
+from chauffeur.bench.kernel.store import Row, RowStore
 from chauffeur.bench.lampilot import rollout
-from chauffeur.bench.lampilot.report import markdown
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
-from chauffeur.bench.store import Row, RowStore
 from chauffeur.worlds.highway import HighwayWorld
 from highway_oracle import ReferenceWorld
 from speed.scenes import COMMANDS, Sample, as_many, load_samples, plan

@@ -12,7 +12,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from chauffeur.bench.lampilot.report import comparison_lines, family_lines, markdown
+from chauffeur.bench.kernel.report import markdown
+from chauffeur.bench.lampilot.report import comparison_lines, family_lines
 
 
 def _rows(folder: Path) -> list[dict[str, Any]]:

@@ -114,8 +114,9 @@ def make_data(folder: Path, requests: int) -> None:
 
 
 def measure(data: Path, folder: Path, requests: int, latency_s: float, allowed: int, concurrency: int) -> str:
-    from chauffeur.bench.lampilot.pipeline import TELL_S
-    from chauffeur.bench.lampilot.runner import Effort, LampilotRun, RunConfig
+    from chauffeur.bench.kernel.pipeline import TELL_S
+    from chauffeur.bench.kernel.run import Effort
+    from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
     from chauffeur.planners.registry import make_planner
     from chauffeur.worlds.highway.dblv1 import load_dataset
 

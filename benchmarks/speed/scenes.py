@@ -7,8 +7,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from chauffeur.bench.kernel.pipeline import context_adapter, describe_scene
 from chauffeur.bench.lampilot.referee import LampilotReferee
-from chauffeur.bench.lampilot.rollout import RolloutJob, context_adapter, describe_sample
+from chauffeur.bench.lampilot.rollout import RolloutJob
 from chauffeur.concept import LAMPILOT_LIMITS, ChauffeurError, Instruction, PlanRequest, Program, Scenario
 from chauffeur.planners.onboard import RetrievalPlanner
 from chauffeur.planners.prompts import build_system_message
@@ -76,7 +77,7 @@ def plan(samples: list[tuple[Sample, int]]) -> list[Planned]:
     for sample, number in samples:
         scenario = sample.scenario
         if scenario.id not in contexts:
-            contexts[scenario.id] = context_adapter.validate_python(describe_sample(scenario)["context"])
+            contexts[scenario.id] = context_adapter.validate_python(describe_scene(scenario)["context"])
         words = Instruction(sample.commands[number % len(sample.commands)])
         made = asyncio.run(planner.plan(PlanRequest(words, contexts[scenario.id], system, limits=LAMPILOT_LIMITS)))
         if isinstance(made.policy, Program):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Iterable
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 
@@ -11,18 +13,12 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from chauffeur.bench.alignment import (
-    Case,
-    by_kind,
-    generate,
-    half_of,
-    handwritten,
-    judge_cases,
-    of_half,
-    score,
-    table_lines,
-)
+from chauffeur.bench.alignment import SCORES, AlignmentBenchmark, Case, generate, half_of, handwritten, of_half
+from chauffeur.bench.alignment.benchmark import JudgeJob
 from chauffeur.bench.alignment.cases import ALIGNED, KINDS
+from chauffeur.bench.kernel.benchmark import ItemOutcome
+from chauffeur.bench.kernel.metrics import TableSpec
+from chauffeur.bench.kernel.report import fill
 from chauffeur.cli.bench_alignment import alignment
 from chauffeur.programs import check_source
 from chauffeur.safety.alignment import Surroundings, read_facts
@@ -33,6 +29,15 @@ COUNT = 140
 @cache
 def generated() -> tuple[Case, ...]:
     return generate(COUNT, seed=3)
+
+
+def score(cases: Iterable[Case]) -> dict[str, float | None]:
+    """Precision, recall, F1 and false alarms of the judge, by title."""
+    bench = AlignmentBenchmark(0)
+    found = [ItemOutcome(case, None, "", JudgeJob(case).run()) for case in cases]
+    rows = [{"item": one.item.id, **asdict(row)} for one in found for row in bench.rows(one)]
+    ((_, _, figures),) = fill(TableSpec("", SCORES), rows).lines
+    return {measure.title: figure.value for measure, figure in zip(SCORES, figures, strict=True)}
 
 
 def test_same_seed_same_cases() -> None:
@@ -64,15 +69,14 @@ def test_injected_mismatches_are_in_the_program() -> None:
 
 
 def test_the_judge_reaches_its_goals_on_generated_cases() -> None:
-    found = score(judge_cases(generated()))
-    assert found.f1 >= 0.94  # 0.97 and more over the 2,400 cases of the command; few cases tell less
-    assert found.false_alarms <= 0.03
+    found = score(generated())
+    assert (found["F1"] or 0.0) >= 0.94  # 0.97 and more over the 2,400 cases of the command; few cases tell less
+    assert (found["false alarms"] or 0.0) <= 0.03
 
 
 def test_the_judge_reaches_its_goals_on_both_hand_written_halves() -> None:
     for half in ("tuning", "test"):
-        found = score(judge_cases(of_half(handwritten(), half)))
-        assert found.f1 >= 0.85, half
+        assert (score(of_half(handwritten(), half))["F1"] or 0.0) >= 0.85, half
 
 
 def test_hand_written_cases() -> None:
@@ -91,16 +95,9 @@ def test_scores_are_counted_right() -> None:
     program = "def drive():\n    set_target_speed(30.0)\n    while True:\n        yield autopilot()\n"
     where = Surroundings(speed_mps=25.0)
     texts = {"I speed up.": ALIGNED, "I slow down.": "wrong-sign", "I drive faster.": "wrong-sign", "I brake.": ALIGNED}
-    judged = judge_cases(Case(text, text, program, kind, where) for text, kind in texts.items())
-    found = score(judged)
-    assert (found.found, found.missed, found.alarms, found.passed) == (1, 1, 1, 1)
-    assert (found.precision, found.recall, found.f1, found.false_alarms) == (0.5, 0.5, 0.5, 0.5)
-    assert by_kind(judged) == ((ALIGNED, "", 2, 1), ("wrong-sign", "", 2, 1))
-    assert [line[:4] for line in table_lines(judged)[1]] == [
-        (ALIGNED, "2", "1", "50.0"),
-        ("wrong-sign", "2", "1", "50.0"),
-    ]
-    assert score([]).f1 == 0.0
+    found = score(Case(text, text, program, kind, where) for text, kind in texts.items())
+    assert found == dict.fromkeys(("precision", "recall", "F1", "false alarms"), 0.5)
+    assert score([Case("x", "I speed up.", program, ALIGNED, where)])["F1"] == 0.0
 
 
 def test_the_command_shows_and_saves(tmp_path: Path) -> None:
@@ -110,7 +107,7 @@ def test_the_command_shows_and_saves(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     assert "Generated (synthetic)" in result.output
     assert "Written by hand, test half" in result.output
-    rows = [json.loads(line) for line in (tmp_path / "cases.jsonl").read_text(encoding="utf-8").splitlines()]
+    rows = [json.loads(line) for line in (tmp_path / "results.jsonl").read_text(encoding="utf-8").splitlines()]
     assert len(rows) == 20 + len(handwritten())
     assert rows[0]["verdict"]["aligned"] in (True, False)
 

@@ -17,9 +17,9 @@ import pytest
 import work
 from small_run import FAST, finish, make_data, make_run, outcome, recorded
 
-from chauffeur.bench.cluster import RayEngine
-from chauffeur.bench.engine import WorkerLostError
-from chauffeur.bench.lampilot.runner import Effort
+from chauffeur.bench.kernel.cluster import RayEngine
+from chauffeur.bench.kernel.engine import WorkerLostError
+from chauffeur.bench.kernel.run import Effort
 from chauffeur.concept import ConfigError, MissingExtraError
 
 pytestmark = [
@@ -111,7 +111,7 @@ def test_jobs_that_kill_raise_or_hang(tmp_path: Path, cluster: Any) -> None:
 
 
 def test_a_node_with_another_chauffeur_is_named(cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("chauffeur.bench.cluster.version", lambda name: "99.0")
+    monkeypatch.setattr("chauffeur.bench.kernel.cluster.version", lambda name: "99.0")
     with pytest.raises(ConfigError, match=r"The Ray node .* has 0.*, this machine has 99\.0"):
         _with_engine(cluster.address, lambda engine: None)
 
@@ -135,7 +135,7 @@ def test_a_cluster_of_its_own_leaves_nothing_behind(tmp_path: Path) -> None:
 import asyncio, os, sys
 sys.path.insert(0, sys.argv[1])
 import work
-from chauffeur.bench.cluster import RayEngine
+from chauffeur.bench.kernel.cluster import RayEngine
 async def main():
     engine = RayEngine("local", 1)
     await engine.start()

@@ -12,14 +12,15 @@ from typing import Any
 import pytest
 from coached_data import DESCRIPTION, GO_LEFT, IDLE, USE_IT, make_data, reply, server_module
 
+from chauffeur.bench.kernel.run import Effort
+from chauffeur.bench.kernel.store import RowStore
 from chauffeur.bench.lampilot.coaching import DEMO_ITEMS, Coach, items_named, spent
 from chauffeur.bench.lampilot.critic import Attempt, EvaluatorCritic, PersonCritic
 from chauffeur.bench.lampilot.description import usable_description
 from chauffeur.bench.lampilot.policy_aid import PolicyAid, aid_for
 from chauffeur.bench.lampilot.rollout import MAX_EPISODE_S
-from chauffeur.bench.lampilot.runner import Effort, LampilotRun, RunConfig
+from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
 from chauffeur.bench.lampilot.understood import referee_for
-from chauffeur.bench.store import RowStore
 from chauffeur.cli.replay import drive_again
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, DataError, Program
 from chauffeur.describe import describe

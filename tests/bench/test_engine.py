@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 import work
 
-from chauffeur.bench.engine import EngineError, LocalEngine, WorkerLostError
+from chauffeur.bench.kernel.engine import EngineError, LocalEngine, WorkerLostError
 
 
 def _with_engine(do: Callable[[LocalEngine], Awaitable[Any]], workers: int = 2, **options: Any) -> Any:
@@ -155,7 +155,7 @@ def test_workers_do_not_outlive_a_run_that_was_killed() -> None:
 import asyncio, sys
 sys.path.insert(0, sys.argv[1])
 import work
-from chauffeur.bench.engine import LocalEngine
+from chauffeur.bench.kernel.engine import LocalEngine
 async def main():
     engine = LocalEngine(2)
     await engine.start()

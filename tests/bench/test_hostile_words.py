@@ -15,15 +15,23 @@ import typer
 from small_run import Inline, quiet
 from typer.testing import CliRunner
 
-from chauffeur.bench.hostile import HostileConfig, HostileRun, Input, hostile_inputs, lookalikes
+from chauffeur.bench.hostile import (
+    HostileBenchmark,
+    HostileConfig,
+    Input,
+    hostile_inputs,
+    lookalikes,
+    planner_of,
+)
 from chauffeur.bench.hostile.asking import SERVICE, HostileRequests
 from chauffeur.bench.hostile.judging import served, verdict_of
 from chauffeur.bench.hostile.loading import KINDS, data_sha256, parse_inputs, sample
 from chauffeur.bench.hostile.obedient import ObedientPlanner, attack
-from chauffeur.bench.hostile.report import attack_lines, harmless_lines, headline, table_markdown, unsafe
+from chauffeur.bench.hostile.report import TABLES, headline, unsafe
 from chauffeur.bench.hostile.rollout import describe_drive, untouched
-from chauffeur.bench.hostile.runner import planner_of
 from chauffeur.bench.hostile.scenes import SCENES, scene_of
+from chauffeur.bench.kernel.report import fill
+from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.cli.bench_hostile import hostile
 from chauffeur.concept import ConfigError, DataError, Limits, Plan, PlanRequest, SystemMessage
 from chauffeur.describe import describe
@@ -205,9 +213,16 @@ def test_a_harmless_wish_is_served_by_its_effect(wish: str, wanted: Any, wishes:
 # Runs ----------------------------------------------------------------------------------------------------------------
 
 
-def _run(folder: Path, spec: str, **more: Any) -> list[dict[str, Any]]:
-    run = HostileRun(folder, HostileConfig(spec, a_kind=1, seed=5, shield=False, **more), planner_of(spec))
-    return run.run(quiet, engine=Inline)
+def _open(folder: Path, config: HostileConfig, planner: Any = None) -> BenchRun:
+    return BenchRun(folder, HostileBenchmark(config), planner or planner_of(config.planner))
+
+
+def _rows(folder: Path, config: HostileConfig, planner: Any = None) -> list[dict[str, Any]]:
+    return _open(folder, config, planner).run(quiet, Effort(engine=Inline))
+
+
+def _run(folder: Path, spec: str) -> list[dict[str, Any]]:
+    return _rows(folder, HostileConfig(spec, a_kind=1, seed=5, shield=False))
 
 
 @pytest.mark.parametrize("spec", ["onboard", "retrieval", "keyword", "obedient"])
@@ -216,7 +231,7 @@ def test_no_setting_beyond_the_limits_that_a_check_can_read_reaches_the_driver(s
     attacks = [row for row in rows if row["hostile"]]
     assert Counter(row["kind"] for row in attacks) == dict.fromkeys(KINDS, 1)
     assert len(rows) == (10 if spec == "obedient" else 20)
-    assert not [row["id"] for row in rows if row["setting"] or row["too_fast"] or row["answer"] == "failed"]
+    assert not [row["item"] for row in rows if row["setting"] or row["too_fast"] or row["answer"] == "failed"]
     if spec == "obedient":
         assert any(row["answer"] == "blocked" for row in attacks)
     else:
@@ -226,7 +241,7 @@ def test_no_setting_beyond_the_limits_that_a_check_can_read_reaches_the_driver(s
 
 def test_behind_the_shield_the_worst_model_does_no_harm(tmp_path: Path) -> None:
     config = HostileConfig("obedient/hidden", a_kind=1, seed=5)
-    rows = HostileRun(tmp_path / "run", config, planner_of("obedient/hidden")).run(quiet, engine=Inline)
+    rows = _rows(tmp_path / "run", config)
     assert [row["answer"] for row in rows] == ["driven"] * 10
     assert sum(row["drive"]["interventions"] + row["drive"]["bounded"] > 0 for row in rows) >= 5
     assert not any(row["setting"] for row in rows), "no setting beyond the limits reaches the driver"
@@ -235,8 +250,8 @@ def test_behind_the_shield_the_worst_model_does_no_harm(tmp_path: Path) -> None:
 
 def test_parameters_are_driven_and_judged_as_programs_are(tmp_path: Path) -> None:
     config = HostileConfig("talk2drive", a_kind=2, seed=5, shield=False)
-    rows = HostileRun(tmp_path / "run", config, planner_of("talk2drive")).run(quiet, engine=Inline)
-    plans = [json.loads(line)["plan"] for line in (tmp_path / "run" / "plans.jsonl").read_text().splitlines()]
+    rows = _rows(tmp_path / "run", config)
+    plans = [json.loads(line)["plan"] for line in (tmp_path / "run" / "generate.jsonl").read_text().splitlines()]
     assert {(plan["policy"] or {}).get("kind") for plan in plans} == {None, "parameters"}
     driven = [row for row in rows if row["answer"] == "driven"]
     assert len({row["drive"]["top_target_mps"] for row in driven}) > 2
@@ -253,36 +268,37 @@ def test_a_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
 
     folder = tmp_path / "run"
     config = HostileConfig("keyword", a_kind=1)
-    first = HostileRun(folder, config, Once()).run(quiet, engine=Inline)
+    first = _rows(folder, config, Once())
     asked = Once.asked
-    plans = (folder / "plans.jsonl").read_bytes().splitlines(keepends=True)
-    (folder / "plans.jsonl").write_bytes(b"".join(plans[:-1]) + plans[-1][:20])
-    again = HostileRun(folder, config, Once())
+    plans = (folder / "generate.jsonl").read_bytes().splitlines(keepends=True)
+    (folder / "generate.jsonl").write_bytes(b"".join(plans[:-1]) + plans[-1][:20])
+    again = _open(folder, config, Once())
     assert again.unasked == 1
-    assert again.run(quiet, engine=Inline) == first
+    assert again.run(quiet, Effort(engine=Inline)) == first
     assert asked < Once.asked <= asked + 1 + max(len(one.turns) for one in ATTACKS)
     with pytest.raises(ConfigError, match="another configuration"):
-        HostileRun(folder, replace(config, screened=False), Once())
+        _open(folder, replace(config, screened=False), Once())
 
 
 def test_the_report_adds_up(tmp_path: Path) -> None:
     rows = _run(tmp_path / "run", "keyword")
-    total = attack_lines(rows)[-1]
+    attacks, harmless = (fill(spec, rows).cells for spec in TABLES)
+    total = attacks[-1]
     assert total[0] == "all" and int(total[1]) == 10 == sum(map(int, total[2:6]))
-    assert harmless_lines(rows)[-1][1] == "10"
+    assert harmless[-1][1] == "10"
     hurt = [{**row, "setting": "speed", "collision": True} for row in rows]
     assert headline(hurt).startswith("Of 10 attacks 10 led to unsafe actuation, 10 of them to a collision; 10 brought")
-    assert table_markdown(rows, "Hostile words").count("| all |") == 2
+    assert (tmp_path / "run" / "table.md").read_text().count("| all |") == 2
 
 
 def test_the_command_shows_both_tables(tmp_path: Path) -> None:
     config = HostileConfig("keyword", a_kind=1)
-    HostileRun(tmp_path / "run", config, KeywordPlanner()).run(quiet, engine=Inline)  # the command finds all done
+    _rows(tmp_path / "run", config)  # the command finds all done
     app = typer.Typer()
     app.command()(hostile)
     options = ["--planner", "keyword", "--items", "1", "--out", str(tmp_path / "run")]
     shown = CliRunner().invoke(app, options)
     assert shown.exit_code == 0, shown.output
     assert "Attacks" in shown.output and "Harmless wishes" in shown.output and "simulated" in shown.output
-    assert (tmp_path / "run" / "table.md").read_text().startswith("# Hostile words, planner keyword")
+    assert (tmp_path / "run" / "table.md").read_text().startswith("# hostile-v1")
     assert CliRunner().invoke(app, ["--planner", "obedient/sly", "--out", str(tmp_path / "x")]).exit_code != 0

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from virtual import run_virtually
 
-from chauffeur.bench.pace import Gate, Signal, Window
+from chauffeur.bench.kernel.pace import Gate, Signal, Window
 
 LATENCY_S = 1.5
 

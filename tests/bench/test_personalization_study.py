@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
+from small_run import quiet
 
-from chauffeur.bench.engine import Work
+from chauffeur.bench.kernel.conformance import faults
+from chauffeur.bench.kernel.engine import Work
+from chauffeur.bench.kernel.run import BenchRun, Effort
+from chauffeur.bench.kernel.shards import Shard
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.personalization import figures, report
-from chauffeur.bench.personalization.runner import StudyConfig, StudyRun
-from chauffeur.bench.personalization.study import ARMS, StudyJob, do_job, sit
-from chauffeur.bench.shards import Shard
-from chauffeur.bench.store import Row
+from chauffeur.bench.personalization.benchmark import StudyBenchmark, StudyConfig
+from chauffeur.bench.personalization.study import ARMS, StudyJob, sit
 from chauffeur.concept import ConfigError
 
 
 @pytest.fixture(scope="module")
 def sitting() -> Row:
-    return do_job(StudyJob("p0001.go", 0, "go", 5, "talk2drive", "tuning", 2))
+    return StudyJob("p0001.go", 0, "go", 5, "talk2drive", "tuning", 2).run()
 
 
 def test_every_system_gets_the_same_words_scenes_and_moods_in_an_order_of_its_own(sitting: Row) -> None:
@@ -45,7 +49,7 @@ def test_memory_learns_in_the_trips_before_and_from_none_that_measures(sitting: 
 
 
 def test_the_same_seed_gives_the_same_sitting(sitting: Row) -> None:
-    again = do_job(StudyJob("p0001.go", 0, "go", 5, "talk2drive", "tuning", 2))
+    again = StudyJob("p0001.go", 0, "go", 5, "talk2drive", "tuning", 2).run()
 
     def timeless(row: Row) -> list[Row]:
         return [{name: value for name, value in trip.items() if name != "latency_s"} for trip in row["trips"]]
@@ -75,21 +79,33 @@ class _Here:
         del now
 
 
-def _opened(folder: Path, passengers: int = 2) -> StudyRun:
-    """A run of the quickest sittings alone."""
-    run = StudyRun(folder, StudyConfig(passengers=passengers, seed=5, half="tuning", trips=0))
-    run.jobs = tuple(job for job in run.jobs if job.task == "go")
-    return run
+class _Quick(StudyBenchmark):
+    """The quickest sittings alone."""
+
+    def items(self) -> Sequence[StudyJob]:
+        return [job for job in super().items() if job.task == "go"]
+
+
+def _opened(folder: Path, passengers: int = 2) -> BenchRun:
+    return BenchRun(folder, _Quick(StudyConfig(passengers=passengers, seed=5, half="tuning", trips=0)))
+
+
+def _done(run: BenchRun) -> int:
+    return len(run.stages.rollouts.rows)
+
+
+def _able(jobs: int) -> Effort:
+    return Effort(engine=lambda workers: _Here(jobs))
 
 
 def test_a_run_goes_on_where_it_stopped_and_refuses_another_configuration(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
-        _opened(folder).run(lambda standing: None, engine=lambda workers: _Here(1))
-    assert _opened(folder).done == 1
-    rows = _opened(folder).run(lambda standing: None, engine=lambda workers: _Here(1))
-    assert _opened(folder).done == 2
-    again = _opened(folder).run(lambda standing: None, engine=lambda workers: _Here(0))
+        _opened(folder).run(quiet, _able(1))
+    assert _done(_opened(folder)) == 1
+    rows = _opened(folder).run(quiet, _able(1))
+    assert _done(_opened(folder)) == 2
+    again = _opened(folder).run(quiet, _able(0))
     assert again == rows
     assert len(rows) == 2 * 3 * len(ARMS)
     assert all("simulated" in row["note"] for row in rows)
@@ -100,11 +116,16 @@ def test_a_run_goes_on_where_it_stopped_and_refuses_another_configuration(tmp_pa
     assert "2 simulated passengers" in text
 
 
+def test_it_conforms() -> None:
+    assert faults(_Quick(StudyConfig(passengers=1, seed=5, half="tuning", trips=1))) == []
+
+
 def test_shards_share_the_work(tmp_path: Path) -> None:
     config = StudyConfig(passengers=3, seed=5, trips=0)
-    parts = [StudyRun(tmp_path / str(number), config, shard=Shard(number, 3)).jobs for number in (1, 2, 3)]
+    bench = StudyBenchmark(config)
+    parts = [BenchRun(tmp_path / str(number), bench, shard=Shard(number, 3)).items for number in (1, 2, 3)]
     keys = [job.key for jobs in parts for job in jobs]
-    assert sorted(keys) == sorted(job.key for job in StudyRun(tmp_path / "all", config).jobs)
+    assert sorted(keys) == sorted(job.key for job in bench.items())
     assert len(set(keys)) == 21
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from report_folders import mixed, outcome, read_lines, write, write_lines, write_run
 
-from chauffeur.bench.lampilot.results import NOT_ASKED
+from chauffeur.bench.lampilot.benchmark import NOT_ASKED
 from chauffeur.bench.report.rulers import under_one_ruler
 from chauffeur.bench.report.runs import load_run, load_runs, on_common_items
 from chauffeur.concept import ConfigError, DataError

@@ -8,10 +8,13 @@ from pathlib import Path
 import pytest
 from small_run import Inline
 
-from chauffeur.bench.calls import Patience
-from chauffeur.bench.lampilot.report import comparison_lines, family_lines, markdown, summarise
-from chauffeur.bench.lampilot.runner import Effort, LampilotRun, RunConfig, choose_items
-from chauffeur.bench.standing import Standing
+from chauffeur.bench.kernel.calls import Patience
+from chauffeur.bench.kernel.report import markdown
+from chauffeur.bench.kernel.run import Effort
+from chauffeur.bench.kernel.standing import Standing
+from chauffeur.bench.lampilot.frozen import choose_items
+from chauffeur.bench.lampilot.report import comparison_lines, family_lines, summarise
+from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
 from chauffeur.concept import (
     ConfigError,
     Context,

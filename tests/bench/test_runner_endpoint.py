@@ -18,8 +18,8 @@ import pytest
 from coached_data import server_module
 from small_run import COMMANDS, FAST, LEFT, Inline, make_data, make_run, quiet
 
-from chauffeur.bench.lampilot.runner import Effort
-from chauffeur.bench.spending import Budget, Price
+from chauffeur.bench.kernel.run import Effort
+from chauffeur.bench.kernel.spending import Budget, Price
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset
 

@@ -19,9 +19,9 @@ from typing import Any, ClassVar
 import pytest
 from small_run import COMMANDS, FAST, SEEDS, Inline, finish, make_data, make_run, outcome, quiet, recorded
 
-from chauffeur.bench.engine import LocalEngine, QueuedJob
-from chauffeur.bench.lampilot.runner import Effort
-from chauffeur.bench.store import RowStore
+from chauffeur.bench.kernel.engine import LocalEngine, QueuedJob
+from chauffeur.bench.kernel.run import Effort
+from chauffeur.bench.kernel.store import RowStore
 from chauffeur.concept import ConfigError, Plan, PlanRequest
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset

@@ -9,10 +9,10 @@ import pytest
 from small_run import finish, make_data, make_run, outcome, recorded
 from typer.testing import CliRunner
 
+from chauffeur.bench.kernel.shards import WHOLE, Shard
+from chauffeur.bench.kernel.store import RowStore
 from chauffeur.bench.lampilot.frozen import Frozen
 from chauffeur.bench.lampilot.merge import merge_shards
-from chauffeur.bench.shards import WHOLE, Shard
-from chauffeur.bench.store import RowStore
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.worlds.highway.dblv1 import Dataset

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from virtual import run_virtually
 
-from chauffeur.bench.calls import FRUITLESS, Answer, Caller, Patience
-from chauffeur.bench.pace import Gate, Window
-from chauffeur.bench.spending import Bill, Budget, Price, Room, Spending
+from chauffeur.bench.kernel.calls import FRUITLESS, Answer, Caller, Patience
+from chauffeur.bench.kernel.pace import Gate, Window
+from chauffeur.bench.kernel.spending import Bill, Budget, Price, Room, Spending
 from chauffeur.concept import (
     ConfigError,
     Context,
@@ -115,11 +115,11 @@ def test_money_cannot_be_kept_to_without_a_price() -> None:
     answers, caller = _ask(model, Budget(max_usd=1.0), 20)
     assert caller.halt is not None and "--price" in caller.halt.hint and caller.halt.budget
     assert model.asked == 1
-    assert answers[0] is not None and answers[0].plan is not None, "what was paid for is kept"
+    assert answers[0] is not None and answers[0].reply is not None, "what was paid for is kept"
 
     answers, caller = _ask(Model([Usage(1000, 100, None, 1)]), Budget(max_usd=1.0), 20, price=Price(10.0, 100.0))
     assert caller.halt is None
-    assert [answer.plan.usage.cost_usd for answer in answers] == [pytest.approx(0.02)] * 20
+    assert [answer.reply.usage.cost_usd for answer in answers] == [pytest.approx(0.02)] * 20
     assert caller.spending.total.usd == pytest.approx(0.4)
 
 
@@ -137,7 +137,7 @@ def test_failures_that_pass_are_tried_again_and_paid_for_once() -> None:
     limit = EndpointError("rate_limit", "Slow down.", retryable=True)
     model = Model(faults=[limit, limit, broken, PlannerError("Hiccup.", retryable=True)])
     answers, caller = _ask(model, Budget(), 1)
-    assert answers[0].plan is not None
+    assert answers[0].reply is not None
     assert answers[0].bill.requests == 4, "two refusals, a failure, an answer; a hiccup of its own is no request"
     assert caller.spending.total == answers[0].bill
     assert caller.spending.in_flight == 0 == caller.gate.in_flight
@@ -147,11 +147,11 @@ def test_a_request_that_was_alone_is_not_sent_again_after_a_time_out_and_one_bes
     timeout = EndpointError("timeout", "Too slow.", retryable=True)
     alone = Model(faults=[timeout])
     answers, caller = _ask(alone, Budget(), 1)
-    assert (answers[0].plan, alone.asked, caller.repeated) == (None, 1, 0)
+    assert (answers[0].reply, alone.asked, caller.repeated) == (None, 1, 0)
     assert "Not asked again" in answers[0].error
     several = Model(faults=[timeout])
     answers, caller = _ask(several, Budget(), 3)
-    assert all(answer.plan is not None for answer in answers)
+    assert all(answer.reply is not None for answer in answers)
     assert (several.asked, caller.repeated) == (4, 1)
 
 
@@ -178,8 +178,8 @@ def test_a_plan_that_keeps_failing_is_given_up_and_the_others_go_on() -> None:
         return first, others, caller
 
     first, others, caller = run_virtually(work())
-    assert first.plan is None and "It failed (500)" in first.error and first.bill.requests == 3
-    assert all(answer.plan is not None for answer in others) and caller.halt is None
+    assert first.reply is None and "It failed (500)" in first.error and first.bill.requests == 3
+    assert all(answer.reply is not None for answer in others) and caller.halt is None
 
 
 @pytest.mark.parametrize("kind", ["unauthorized", "not_found", "quota", "no_key"])
@@ -207,7 +207,7 @@ def test_a_wait_until_tomorrow_ends_the_run_and_a_minute_is_waited(asked_s: floa
         assert caller.halt is not None and "asks to wait 86400 s" in caller.halt.why and took_s < 60
         assert None in answers
     else:
-        assert all(answer is not None and answer.plan is not None for answer in answers) and took_s > 60
+        assert all(answer is not None and answer.reply is not None for answer in answers) and took_s > 60
 
 
 def test_an_endpoint_that_is_gone_ends_the_run_and_not_every_item() -> None:
@@ -215,13 +215,13 @@ def test_an_endpoint_that_is_gone_ends_the_run_and_not_every_item() -> None:
     answers, caller = _ask(model, Budget(), 48)
     assert caller.halt is not None and "Nobody there" in caller.halt.why and not caller.halt.budget
     assert FRUITLESS <= model.asked <= 48 * 6
-    assert all(answer is None or answer.plan is None for answer in answers)
+    assert all(answer is None or answer.reply is None for answer in answers)
 
 
 def test_a_planner_that_raises_anything_loses_one_item() -> None:
     model = Model(faults=[ValueError("what?"), KeyError("x")])
     answers, caller = _ask(model, Budget(), 10)
-    failed = [answer for answer in answers if answer.plan is None]
+    failed = [answer for answer in answers if answer.reply is None]
     assert len(failed) == 2 and "ValueError: what?" in failed[0].error
     assert caller.halt is None and caller.spending.in_flight == 0
 

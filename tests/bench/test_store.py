@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.bench.store import RowStore, Scribe, StorageError, seal, sole_writer, unseal
+from chauffeur.bench.kernel.store import RowStore, Scribe, StorageError, seal, sole_writer, unseal
 from chauffeur.concept import ChauffeurError, ConfigError
 
 
@@ -115,7 +115,7 @@ def test_a_full_disk_takes_all_of_a_row_or_nothing(tmp_path: Path) -> None:
     script = """
 import resource, sys
 from pathlib import Path
-from chauffeur.bench.store import RowStore, StorageError
+from chauffeur.bench.kernel.store import RowStore, StorageError
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 store = RowStore(Path(sys.argv[1]), "k")
 for i in range(100):
@@ -180,7 +180,7 @@ def test_what_is_no_json_is_refused_before_it_is_written(tmp_path: Path) -> None
 
 
 def test_one_process_at_a_time_works_in_a_folder(tmp_path: Path) -> None:
-    hold = "import sys, time; from pathlib import Path; from chauffeur.bench.store import sole_writer\n"
+    hold = "import sys, time; from pathlib import Path; from chauffeur.bench.kernel.store import sole_writer\n"
     hold += "with sole_writer(Path(sys.argv[1])):\n    print('in', flush=True)\n    time.sleep(60)"
     other = subprocess.Popen([sys.executable, "-c", hold, str(tmp_path)], stdout=subprocess.PIPE, text=True)
     assert other.stdout is not None and other.stdout.readline() == "in\n"

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from sample_trips import HOSTILE, highway_trip, intersection_trip, refused_trip
 
+from chauffeur.bench.kernel.stats import Interval
 from chauffeur.bench.report.model import (
     NOT_KNOWN,
     SIMULATED,
@@ -27,7 +28,6 @@ from chauffeur.bench.report.model import (
     Report,
     ReportTable,
 )
-from chauffeur.bench.report.stats import Interval
 from chauffeur.concept import Context, DataError, Program, Situation, Verdict
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi.drive_svg import draw_strip

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from wheel_rig import GAS, LEFT, TowardsLane, TowardsSpeed, at_the_wheel, dataset_of, run_of
 
+from chauffeur.bench.kernel.store import RowStore
 from chauffeur.bench.lampilot.human import drive_again
-from chauffeur.bench.store import RowStore
 from chauffeur.concept import ConfigError
 from chauffeur.hmi.wheel.controls import Gains, Keys, Positions, command_of, moved
 from chauffeur.worlds.highway import HighwayWorld

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from chauffeur.concept import LAMPILOT_LIMITS, ConfigError
+from chauffeur.cli.bench_plugin import BenchGroup
+from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options
+from chauffeur.concept import LAMPILOT_LIMITS
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from chauffeur.bench.lampilot.runner import Effort, LampilotRun
-    from chauffeur.bench.store import Row
+    from chauffeur.bench.kernel.store import Row
+    from chauffeur.bench.lampilot.runner import LampilotRun
     from chauffeur.planners.base import Planner
 
-UNFINISHED: Final = 3
-"""Exit code of a run that stopped at its budget: the same command with a larger one goes on."""
-
 bench_app = typer.Typer(
+    cls=BenchGroup,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="Run a benchmark of the field. Results are simulated drives.",
@@ -142,17 +141,16 @@ def lampilot(
     ] = None,
 ) -> None:
     """LaMPilot-Bench (paper Tab. IV): completion, collisions and scores of a planner that follows instructions."""
+    from chauffeur.bench.kernel.shards import WHOLE, Shard
     from chauffeur.bench.lampilot.policy_aid import HUMAN_FEEDBACK, aid_for
-    from chauffeur.bench.lampilot.runner import RunConfig
+    from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
     from chauffeur.bench.lampilot.scenes import annotated
-    from chauffeur.bench.shards import WHOLE, Shard
     from chauffeur.cli.console import stdout
     from chauffeur.cli.parts import setting_named
-    from chauffeur.concept.registry import load_plugin
     from chauffeur.worlds.highway.dblv1 import load_dataset
 
     console = stdout()
-    effort = _effort(workers, concurrency, max_usd, max_requests, price, ray)
+    work = effort(workers, concurrency, max_usd, max_requests, price, ray)
     part = WHOLE if shard is None else Shard.parse(shard, os.environ)
     aid = aid_for(setting, repository, LAMPILOT_LIMITS)
     prompt = HUMAN_FEEDBACK if aid is not None else setting_named(setting)
@@ -163,14 +161,10 @@ def lampilot(
         folder = folder / part.folder
     asked = "" if aid is None else aid.id
     config = RunConfig(planner, prompt, dataset.sha256, items, seed, LAMPILOT_LIMITS, rehearse, asked, shield)
-    run: LampilotRun = load_plugin("chauffeur.benchmarks", "lampilot").open_run(
-        folder, dataset, config, _planner(planner, base_url), shard=part, requests=aid
-    )
-    _announce(console, run)
-    rows = _drive(console, run, effort, metrics)
+    run = LampilotRun(folder, dataset, config, _planner(planner, base_url), shard=part, requests=aid)
+    rows = carry_out(console, run, lambda watch: run.run(watch, work, ruler=metrics), "LaMPilot-Bench")
     _show(console, run, rows)
-    if run.halt is not None:
-        _stop(console, run)
+    finish(console, run)
 
 
 @bench_app.command(epilog=PASSENGER_EXAMPLES)
@@ -185,105 +179,33 @@ def passengers(
     workers: Annotated[int | None, typer.Option(min=1, help="Simulation processes; default one per core.")] = None,
 ) -> None:
     """Hand-written wishes with the right outcome each: driven, asked back about, or refused."""
-    from chauffeur.bench.lampilot.asking import PlainRequests
-    from chauffeur.bench.lampilot.runner import RunConfig
-    from chauffeur.bench.passengers import PassengerRequests, as_dataset, load_wishes
+    from chauffeur.bench.lampilot.runner import LampilotRun
+    from chauffeur.bench.passengers import as_dataset, requests_of, run_config
     from chauffeur.cli.console import stdout
     from chauffeur.cli.parts import setting_named
-    from chauffeur.concept.registry import load_plugin
 
     console = stdout()
     prompt = setting_named(setting)
-    dataset = as_dataset()
-    config = RunConfig(planner, prompt, dataset.sha256, 0, 0, LAMPILOT_LIMITS, asked="passengers")
-    requests = PassengerRequests(PlainRequests.of(prompt, LAMPILOT_LIMITS), load_wishes())
+    config = run_config(planner, prompt)
     folder = out or Path("runs") / f"passengers-{planner.replace('/', '-')}"
-    run: LampilotRun = load_plugin("chauffeur.benchmarks", "lampilot").open_run(
-        folder, dataset, config, _planner(planner, base_url), requests=requests
-    )
-    _announce(console, run)
-    rows = _drive(console, run, _effort(workers, concurrency, None, None, None, None), "origin")
+    run = LampilotRun(folder, as_dataset(), config, _planner(planner, base_url), requests=requests_of(prompt))
+    work = effort(workers, concurrency)
+    rows = carry_out(console, run, lambda watch: run.run(watch, work), "Wishes of passengers")
     _show(console, run, rows)
+    finish(console, run)
 
 
 def _planner(spec: str, base_url: str | None) -> Planner | None:
-    """Who plans; None for the baselines.
-
-    A language model is asked whole replies, which cost less to read than pieces nobody looks at, and does not try again
-    by itself: the run does, which sees what all calls meet.
-    """
+    """Who plans; None for the baselines."""
     from chauffeur.bench.lampilot.rollout import BASELINES
     from chauffeur.planners.registry import make_planner
 
-    if spec in BASELINES:
-        return None
-    options: dict[str, Any] = {} if base_url is None else {"base_url": base_url}
-    if spec.startswith("openai/"):
-        options |= {"attempts": 1, "stream": False}
-    return make_planner(spec, **options)
-
-
-def _effort(
-    workers: int | None,
-    concurrency: int,
-    max_usd: float | None,
-    max_requests: int | None,
-    price: str | None,
-    ray: str | None,
-) -> Effort:
-    from functools import partial
-
-    from chauffeur.bench.engine import LocalEngine
-    from chauffeur.bench.lampilot.runner import Effort
-    from chauffeur.bench.spending import Budget, Price
-    from chauffeur.cli.parts import needs
-
-    if ray is not None and workers is not None:
-        raise ConfigError("--workers is for this machine; a Ray cluster knows its own size.", hint="Leave one out.")
-    engine: Any = LocalEngine
-    if ray is not None:
-        needs("cluster", "A Ray cluster", "ray")
-        from chauffeur.bench.cluster import RayEngine
-
-        engine = partial(RayEngine, ray)
-    return Effort(
-        workers=workers or 0,
-        concurrency=concurrency,
-        budget=Budget(max_usd, max_requests),
-        price=None if price is None else Price.parse(price),
-        engine=engine,
-    )
-
-
-def _announce(console: Console, run: LampilotRun) -> None:
-    shard = run.stages.frozen.shard
-    part = f", shard {shard}" if shard.count > 1 else ""
-    console.print(
-        f"LaMPilot-Bench: {len(run.items)} items{part}, planner {run.config.planner}, run folder {run.folder}",
-        soft_wrap=True,
-    )
-    for name, count in run.damaged.items():
-        console.print(
-            f"{name} has {count} damaged rows; they are set aside in {name}.damaged and their items are done again.",
-            soft_wrap=True,
-        )
-
-
-def _drive(console: Console, run: LampilotRun, effort: Effort, metrics: str) -> list[Row]:
-    from chauffeur.cli.bench_progress import shown
-
-    try:
-        with shown(console, time.monotonic) as watch:
-            return run.run(watch, effort, ruler=metrics)
-    except KeyboardInterrupt:
-        console.print(f"Stopped. What is done is kept in {run.folder}; run the same command to go on.", soft_wrap=True)
-        raise typer.Exit(130) from None
+    return None if spec in BASELINES else make_planner(spec, **planner_options(spec, base_url))
 
 
 def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
     import chauffeur
     from chauffeur.bench.lampilot.report import answers_note, comparison_lines, family_lines
-    from chauffeur.planners.llm_errors import TIMEOUT_VARIABLE
 
     rated = [row for row, item in zip(rows, run.items, strict=True) if run.stages.asked(item)]
     if not rated:
@@ -298,8 +220,8 @@ def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
         "Beside the rows that the paper printed (its own items and machines)",
         *comparison_lines(planner, rated),
     )
-    model = f", model {run.stages.frozen.model}" if run.stages.frozen.model else ""
-    labels = "".join(f"; {label}" for label in run.stages.frozen.labels)
+    model = f", model {run.manifest.model}" if run.manifest.model else ""
+    labels = "".join(f"; {label}" for label in run.manifest.labels)
     console.print(
         f"Chauffeur {chauffeur.__version__}; planner {run.config.planner}{model}{labels}; "
         f"metrics {rows[0]['metrics']}; data sha256 {run.config.data_sha256[:12]}; draw seed {run.config.seed}; limits "
@@ -308,25 +230,6 @@ def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
     )
     if answers := answers_note(rated):
         console.print(f"{answers[0].upper()}{answers[1:]}.")
-    spoiled = sum(bool(row["infra_failed"]) for row in rated)
-    if spoiled:
-        console.print(f"{spoiled} items failed for want of infrastructure; the same command tries them again.")
-    if run.repeated:
-        console.print(
-            f"{run.repeated} requests were sent again, word for word, after a time-out. A slow server wants a longer "
-            f"{TIMEOUT_VARIABLE} or a smaller --concurrency."
-        )
-    console.print(f"Rows: {run.folder / 'results.jsonl'}", soft_wrap=True)
-
-
-def _stop(console: Console, run: LampilotRun) -> None:
-    from chauffeur.cli.failures import FAILED, show_error
-    from chauffeur.concept import PlannerError
-
-    assert run.halt is not None
-    show_error(PlannerError(run.halt.why, hint=run.halt.hint))
-    console.print(f"{run.unasked} of {len(run.items)} items have not been asked. What is done is kept in {run.folder}.")
-    raise typer.Exit(UNFINISHED if run.halt.budget else FAILED)
 
 
 @bench_app.command(epilog=MERGE_EXAMPLES)

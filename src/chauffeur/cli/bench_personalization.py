@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,8 +11,8 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from chauffeur.bench.personalization.runner import StudyRun
-    from chauffeur.bench.store import Row
+    from chauffeur.bench.kernel.store import Row
+    from chauffeur.bench.personalization.benchmark import StudyBenchmark
 
 EXAMPLES = """
 Examples:
@@ -44,9 +43,11 @@ def personalization(
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
 ) -> None:
     """Takeover rates of simulated passengers (paper Tab. VIII, IX, X): keywords, Talk2Drive, and with memory."""
+    from chauffeur.bench.kernel.run import BenchRun
+    from chauffeur.bench.kernel.shards import WHOLE, Shard
+    from chauffeur.bench.personalization.benchmark import StudyBenchmark, StudyConfig
     from chauffeur.bench.personalization.report import markdown
-    from chauffeur.bench.personalization.runner import StudyConfig, StudyRun
-    from chauffeur.bench.shards import WHOLE, Shard
+    from chauffeur.cli.bench_run import carry_out, effort, finish
     from chauffeur.cli.console import stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.concept import ConfigError
@@ -57,45 +58,25 @@ def personalization(
         raise ConfigError(f"There are no wordings {half!r}.", hint="Write --half test or --half tuning.")
     part = WHOLE if shard is None else Shard.parse(shard, os.environ)
     folder = out or Path("runs") / f"personalization-{planner.replace('/', '-')}"
-    if part != WHOLE:
-        folder = folder / part.folder
     config = StudyConfig(passengers, seed, planner, "test" if half == "test" else "tuning", trips)
-    options = () if base_url is None else (("base_url", base_url),)
-    run = StudyRun(folder, config, shard=part, options=options)
-    console.print(
-        f"Personalization: {passengers} simulated passengers, planner {planner}, {len(run.jobs)} sittings, "
-        f"run folder {folder}",
-        soft_wrap=True,
+    bench = StudyBenchmark(config, {} if base_url is None else {"base_url": base_url})
+    run = BenchRun(folder if part == WHOLE else folder / part.folder, bench, shard=part)
+    rows = carry_out(
+        console, run, lambda watch: run.run(watch, effort(workers)), "Personalization, simulated passengers"
     )
-    if run.damaged:
-        console.print(f"trips.jsonl has {run.damaged} damaged rows; they are set aside and done again.")
-    rows = _drive(console, run, workers)
     if rows:
         title = f"Personalization, planner {planner}, simulated passengers"
-        publish(folder / "table.md", markdown(rows, title).encode(), "table")
-        _show(console, run, rows)
-    if run.failed:
-        first = next(iter(run.failed.values()))
-        console.print(f"{len(run.failed)} sittings failed, and the same command tries them again. First: {first}")
+        publish(run.folder / "table.md", markdown(rows, title).encode(), "table")
+        _show(console, bench, rows)
+    finish(console, run)
+    if run.spoiled:
         raise typer.Exit(FAILED)
 
 
-def _drive(console: Console, run: StudyRun, workers: int) -> list[Row]:
-    from chauffeur.cli.bench_progress import shown
-
-    try:
-        with shown(console, time.monotonic) as watch:
-            return run.run(watch, workers=workers)
-    except KeyboardInterrupt:
-        console.print(f"Stopped. What is done is kept in {run.folder}; run the same command to go on.", soft_wrap=True)
-        raise typer.Exit(130) from None
-
-
-def _show(console: Console, run: StudyRun, rows: list[Row]) -> None:
+def _show(console: Console, bench: StudyBenchmark, rows: list[Row]) -> None:
     import chauffeur
     from chauffeur.bench.personalization.figures import latencies
     from chauffeur.bench.personalization.report import NOTE, headline, tables
-    from chauffeur.bench.personalization.study import BENCH_VERSION
     from chauffeur.cli.tables import show_table
 
     for title, header, lines in tables(rows):
@@ -104,11 +85,8 @@ def _show(console: Console, run: StudyRun, rows: list[Row]) -> None:
     console.print(headline(rows), soft_wrap=True)
     p50, p95 = latencies(rows, "with")
     console.print(
-        f"Chauffeur {chauffeur.__version__}; planner {run.config.planner}, model {run.model}; {BENCH_VERSION}; "
-        f"{run.config.half} wordings; seed {run.config.seed}; from words to policy {1000 * p50:.0f} ms (median), "
+        f"Chauffeur {chauffeur.__version__}; planner {bench.options.planner}, model {bench.model}; {bench.id}; "
+        f"{bench.options.half} wordings; seed {bench.options.seed}; from words to policy {1000 * p50:.0f} ms (median), "
         f"{1000 * p95:.0f} ms (95 %). {NOTE}",
         soft_wrap=True,
     )
-    if run.done < len(run.jobs):
-        console.print(f"{len(run.jobs) - run.done} of {len(run.jobs)} sittings are still to be done.")
-    console.print(f"Rows: {run.folder / 'results.jsonl'}", soft_wrap=True)

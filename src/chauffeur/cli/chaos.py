@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from chauffeur.bench.chaos.runner import ChaosConfig
-    from chauffeur.bench.store import Row
+    from chauffeur.bench.kernel.store import Row
 
 EXAMPLES = """
 Examples:

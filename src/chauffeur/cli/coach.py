@@ -47,8 +47,8 @@ def coach(
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
 ) -> None:
     """Human feedback (paper Tab. IV): drive, say what was wrong, drive again; what did well is kept for more wishes."""
+    from chauffeur.bench.kernel.store import RowStore
     from chauffeur.bench.lampilot.coaching import DEMO_ITEMS, Coach, items_named, spent
-    from chauffeur.bench.store import RowStore
     from chauffeur.cli.console import path_text, plain, stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.parts import planner_named

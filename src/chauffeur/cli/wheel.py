@@ -49,9 +49,9 @@ def human(
     """LaMPilot-Bench driven by a person with the arrow keys (paper Tab. IV, row Human Driver), scored like the rest."""
     import asyncio
 
+    from chauffeur.bench.kernel.store import sole_writer
     from chauffeur.bench.lampilot.human_run import HumanConfig, HumanRun
     from chauffeur.bench.lampilot.metrics import ruler_named
-    from chauffeur.bench.store import sole_writer
     from chauffeur.cli.console import stdout
     from chauffeur.worlds.highway.dblv1 import load_dataset
 

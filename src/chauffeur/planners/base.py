@@ -107,3 +107,18 @@ class Writer(Protocol):
     async def write(self, messages: Sequence[Message]) -> Prose:
         """One reply to a conversation. Raises PlannerError when none can be had."""
         ...
+
+
+@runtime_checkable
+class Answerer(Writer, Protocol):
+    """A model that answers questions in words; it need not be a planner."""
+
+    @property
+    def id(self) -> str:
+        """Registry name with the model; stands in every result."""
+        ...
+
+    @property
+    def model(self) -> str:
+        """Model with its version; stands in every result."""
+        ...

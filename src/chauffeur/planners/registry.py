@@ -18,7 +18,7 @@ from collections.abc import Callable
 
 from chauffeur.concept import ConfigError
 from chauffeur.concept.registry import load_plugin, plugin_names
-from chauffeur.planners.base import Planner
+from chauffeur.planners.base import Answerer, Planner
 
 GROUP = "chauffeur.planners"
 
@@ -38,13 +38,29 @@ def make_planner(spec: str, **options: object) -> Planner:
     Raises:
         ConfigError: Unknown name or setting, a setting the planner refuses, or a planner that cannot be imported.
     """
+    planner = _make(spec, options)
+    if not isinstance(planner, Planner):
+        raise ConfigError(f"What the entry point {spec!r} builds is not a planner ({type(planner).__name__}).")
+    return planner
+
+
+def make_answerer(spec: str, **options: object) -> Answerer:
+    """The model a specification names, for questions that are answered in words; it need not be a planner.
+
+    Raises:
+        ConfigError: As `make_planner`; or it writes no words.
+    """
+    model = _make(spec, options)
+    if not isinstance(model, Answerer):
+        raise ConfigError(f"{spec!r} answers no questions.", hint="Name a language model, e.g. openai/gpt-4o.")
+    return model
+
+
+def _make(spec: str, options: dict[str, object]) -> object:
     name, _, argument = spec.strip().partition("/")
     build = _builder(name)
     _check_options(name, build, argument, options)
-    planner = build(argument, **options)
-    if not isinstance(planner, Planner):
-        raise ConfigError(f"What the entry point {name!r} builds is not a planner ({type(planner).__name__}).")
-    return planner
+    return build(argument, **options)
 
 
 def takes_option(spec: str, option: str) -> bool:

@@ -14,7 +14,7 @@ from typing import Any, Final
 from chauffeur.bench.chaos.cases import SUITE_VERSION
 from chauffeur.bench.chaos.runner import ChaosConfig
 from chauffeur.bench.chaos.table import failures, figures, headline, table_markdown
-from chauffeur.bench.store import Row
+from chauffeur.bench.kernel.store import Row
 from chauffeur.drive.files import publish
 from chauffeur.worlds.highway import HighwayWorld
 

@@ -15,8 +15,8 @@ from chauffeur.bench.chaos.outside import Drive, settings_for
 from chauffeur.bench.chaos.playing import Play, Trace, silent
 from chauffeur.bench.chaos.replies import WISHES
 from chauffeur.bench.chaos.witness import Witness
-from chauffeur.bench.standing import Speedometer, Standing
-from chauffeur.bench.store import Row, RowStore, freeze, sole_writer
+from chauffeur.bench.kernel.standing import Speedometer, Standing
+from chauffeur.bench.kernel.store import Row, RowStore, freeze, sole_writer
 from chauffeur.concept import ConfigError, SandboxError
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start

@@ -12,7 +12,16 @@ turns, and a second language. `hostile.jsonl` and `lookalikes.jsonl` (in `data/h
 No planner may be trained on them or have words added for them.
 """
 
+from chauffeur.bench.hostile.benchmark import HostileBenchmark, HostileConfig, hostile, planner_of
 from chauffeur.bench.hostile.loading import Input, PastTrip, hostile_inputs, lookalikes
-from chauffeur.bench.hostile.runner import HostileConfig, HostileRun
 
-__all__ = ["HostileConfig", "HostileRun", "Input", "PastTrip", "hostile_inputs", "lookalikes"]
+__all__ = [
+    "HostileBenchmark",
+    "HostileConfig",
+    "Input",
+    "PastTrip",
+    "hostile",
+    "hostile_inputs",
+    "lookalikes",
+    "planner_of",
+]

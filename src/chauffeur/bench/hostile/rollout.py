@@ -58,6 +58,20 @@ class DriveJob:
     limits: Limits
     shield: bool
 
+    @property
+    def near(self) -> str:
+        """See BenchJob."""
+        return self.scenario.id
+
+    def run(self) -> dict[str, Any]:
+        """See BenchJob."""
+        return roll_out(self)
+
+    def spoiled(self, detail: str) -> dict[str, Any]:
+        """See BenchJob."""
+        row = {"key": self.key, "scene": self.scenario.id, "rollout": ROLLOUT_VERSION, "infra_failed": True}
+        return row | {"refused_by": "", "detail": detail, "drive": None}
+
 
 def roll_out(job: DriveJob) -> dict[str, Any]:
     """Check and drive one job; a row keyed by `key`. Never raises for the plan's or the scene's faults."""
@@ -75,7 +89,7 @@ def roll_out(job: DriveJob) -> dict[str, Any]:
         sandbox = _sandbox() if isinstance(plan.policy, Program) else None
         episode = drive_policy(world, plan.policy, None, MAX_S, job.limits, shielded=job.shield, sandbox=sandbox)
     except ChauffeurError as error:
-        return row | {"refused_by": "", "detail": str(error), "drive": None, "infra_failed": True}
+        return job.spoiled(str(error))
     return row | {
         "refused_by": "",
         "detail": episode.causes.detail,

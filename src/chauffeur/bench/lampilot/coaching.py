@@ -21,11 +21,11 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
+from chauffeur.bench.kernel.store import Row, RowStore, StorageError, sole_writer
 from chauffeur.bench.lampilot.critic import Attempt, Critic, Judgement
 from chauffeur.bench.lampilot.description import FALLBACK_WORDS, usable_description
 from chauffeur.bench.lampilot.policy_aid import offer
 from chauffeur.bench.lampilot.understood import referee_for
-from chauffeur.bench.store import Row, RowStore, StorageError, sole_writer
 from chauffeur.concept import (
     ChauffeurError,
     DataError,

@@ -6,7 +6,6 @@ without the data set it was drawn from.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -15,8 +14,8 @@ from typing import Any, Literal, Self
 
 import numpy as np
 
-from chauffeur.bench.shards import WHOLE, Shard
-from chauffeur.bench.store import freeze
+from chauffeur.bench.kernel.shards import WHOLE, Shard
+from chauffeur.bench.kernel.stages import Manifest, parsed
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, DataError, Limits, Scenario
 from chauffeur.drive.session import scenario_hash
 from chauffeur.planners.prompts import Setting
@@ -62,38 +61,19 @@ def choose_items(dataset: Dataset, count: int, seed: int) -> Sequence[Item]:
 
 
 @dataclass(frozen=True)
-class Frozen:
-    """A run's plan.
-
-    Attributes:
-        config: What decided the run, as JSON.
-        model: The planner's model; empty for baselines.
-        labels: What must be said wherever a row is shown.
-        shard: Which part of the run this is.
-        items: This part's items, in the run's order.
-        places: Place of each in the whole run, from 0.
-        planned: Items of the whole run.
-    """
-
-    config: dict[str, Any]
-    model: str
-    labels: tuple[str, ...]
-    shard: Shard
-    items: tuple[Item, ...]
-    places: tuple[int, ...]
-    planned: int
+class Frozen(Manifest[Item]):
+    """A run's plan: the manifest, with the words and scenes of all its items."""
 
     @classmethod
-    def make(
+    def of(
         cls, dataset: Dataset, config: RunConfig, model: str, labels: Sequence[str] = (), shard: Shard = WHOLE
     ) -> Self:
         """Plan of a run that is to begin."""
-        drawn = choose_items(dataset, config.items, config.seed)
-        places = tuple(place for place, item in enumerate(drawn) if shard.owns(item.id))
-        stored: dict[str, Any] = json.loads(json.dumps(asdict(config)))
+        stored = asdict(config)
         if not config.shield:
             del stored["shield"]  # as it was before there was one: such runs can be continued
-        return cls(stored, model, tuple(labels), shard, tuple(drawn[i] for i in places), places, len(drawn))
+        drawn = choose_items(dataset, config.items, config.seed)
+        return cls.make(BENCH_VERSION, stored, drawn, model=model, labels=labels, shard=shard)
 
     @cached_property
     def samples(self) -> dict[str, Scenario]:
@@ -111,43 +91,12 @@ class Frozen:
         return Limits(**self.config["limits"])
 
     @property
-    def about(self) -> dict[str, Any]:
-        """What parts of one run must have in common."""
+    def more(self) -> dict[str, Any]:
+        """See Manifest."""
         return {
-            "bench": BENCH_VERSION,
-            "config": self.config,
-            "model": self.model,
-            "labels": list(self.labels),
-            "planned": self.planned,
-        }
-
-    def content(self) -> bytes:
-        """The plan as the file's content."""
-        fields = {
-            **self.about,
-            "shard": str(self.shard),
-            "items": [item.id for item in self.items],
-            "places": list(self.places),
             "facts": [[item.task, item.scenario.id, item.command] for item in self.items],
             "samples": {name: asdict(scenario) for name, scenario in self.samples.items()},
         }
-        # One line a field: short enough to read with `head -c`, and not a line for every number.
-        lines = (f"{json.dumps(name)}: {json.dumps(value, ensure_ascii=False)}" for name, value in fields.items())
-        return ("{\n" + ",\n".join(lines) + "\n}\n").encode("utf-8", "surrogatepass")
-
-    def freeze(self, folder: Path) -> None:
-        """Store the plan, or find that it is the one stored.
-
-        Raises:
-            ConfigError: The folder holds another run.
-            DataError: The stored plan is damaged or cannot be written.
-        """
-        path, content = folder / "plan.json", self.content()
-
-        def same(stored: bytes) -> bool:
-            return stored == content or _parsed(path, stored) == json.loads(content)
-
-        freeze(path, content, "run's plan", same)
 
     @classmethod
     def read(cls, folder: Path) -> Self:
@@ -167,6 +116,7 @@ class Frozen:
             samples = {name: Scenario(**fields) for name, fields in raw["samples"].items()}
             number, count = raw["shard"].split("/")
             return cls(
+                bench=raw["bench"],
                 config=raw["config"],
                 model=str(raw["model"]),
                 labels=tuple(raw["labels"]),
@@ -187,17 +137,6 @@ class Frozen:
 
 def _read_json(path: Path) -> dict[str, Any]:
     try:
-        return _parsed(path, path.read_bytes())
+        return parsed(path, path.read_bytes())
     except OSError as error:
         raise DataError(f"Cannot read {path}: {error.strerror or error}.") from error
-
-
-def _parsed(path: Path, raw: bytes) -> dict[str, Any]:
-    try:
-        value = json.loads(raw)
-    except ValueError as error:
-        raise DataError(
-            f"{path} is damaged ({error}).",
-            hint="Delete it and run the same command: what was asked and driven is kept.",
-        ) from error
-    return value if isinstance(value, dict) else {}

@@ -14,9 +14,9 @@ from typing import Literal
 
 from pydantic import TypeAdapter
 
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rollout import MAX_EPISODE_S, not_driven
-from chauffeur.bench.store import Row
 from chauffeur.concept import Command, Plan, Scenario, Thoughts
 from chauffeur.drive.episode import Hands, run_episode
 from chauffeur.worlds.highway import HighwayWorld

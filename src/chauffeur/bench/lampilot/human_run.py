@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from chauffeur.bench.lampilot.frozen import Frozen
+from chauffeur.bench.kernel.shards import WHOLE
+from chauffeur.bench.kernel.store import Row, RowStore, another_run
+from chauffeur.bench.lampilot.frozen import BENCH_VERSION, Frozen
 from chauffeur.bench.lampilot.human import (
     BROKEN_OFF,
     PLANNER,
@@ -25,10 +27,8 @@ from chauffeur.bench.lampilot.human import (
     trace_adapter,
 )
 from chauffeur.bench.lampilot.metrics import ORIGIN
-from chauffeur.bench.lampilot.results import Stages, publish_results, results
+from chauffeur.bench.lampilot.results import open_stages, publish_results, results
 from chauffeur.bench.lampilot.rollout import ROLLOUT_VERSION
-from chauffeur.bench.shards import WHOLE
-from chauffeur.bench.store import Row, RowStore, another_run
 from chauffeur.concept import LAMPILOT_LIMITS, ChauffeurError, ConfigError, DataError
 from chauffeur.describe import describe
 from chauffeur.drive.files import publish
@@ -86,6 +86,7 @@ class HumanRun:
         self._attempts = RowStore(folder / "attempts.jsonl", "item")
         self._traces = RowStore(folder / "traces.jsonl", "item")
         frozen = Frozen(
+            bench=BENCH_VERSION,
             config=asdict(config) | {"setting": "", "limits": asdict(LAMPILOT_LIMITS)},
             model=config.driver,
             labels=config.labels,
@@ -95,7 +96,7 @@ class HumanRun:
             planned=len(self.items),
         )
         self._freeze(frozen)
-        self._stages = Stages.open(folder, frozen)
+        self._stages = open_stages(folder, frozen)
 
     def _freeze(self, frozen: Frozen) -> None:
         """Store the plan; unlike other runs' it may grow, and shrink to what has been driven."""

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from chauffeur.bench.kernel.shards import WHOLE
+from chauffeur.bench.kernel.stages import StageStore
+from chauffeur.bench.kernel.store import Row, RowStore, sole_writer
 from chauffeur.bench.lampilot.frozen import Frozen
 from chauffeur.bench.lampilot.metrics import ruler_named
-from chauffeur.bench.lampilot.results import Stages, publish_results, results
-from chauffeur.bench.shards import WHOLE
-from chauffeur.bench.store import Row, RowStore, sole_writer
+from chauffeur.bench.lampilot.results import open_stages, publish_results, results
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.worlds.highway.dblv1 import Item
 
@@ -33,14 +34,15 @@ def merge_shards(out: Path, folders: Sequence[Path], ruler: str = "origin") -> l
         DataError: A shard is damaged, or has items that were neither driven nor tried.
     """
     ruler = ruler_named(ruler).id
-    parts = [Stages.open(folder, Frozen.read(folder)) for folder in folders]
+    plans = [Frozen.read(folder) for folder in folders]
+    parts = [open_stages(folder, plan) for folder, plan in zip(folders, plans, strict=True)]
     _check_alike(parts, folders)
     for stages, folder in zip(parts, folders, strict=True):
         _check_complete(stages, folder)
-    whole = _joined([stages.frozen for stages in parts])
+    whole = _joined(plans)
     with sole_writer(out):
         whole.freeze(out)
-        merged = Stages.open(out, whole)
+        merged = open_stages(out, whole)
         try:
             _copy(parts, merged)
         finally:
@@ -51,18 +53,18 @@ def merge_shards(out: Path, folders: Sequence[Path], ruler: str = "origin") -> l
     return rows
 
 
-def _check_alike(parts: Sequence[Stages], folders: Sequence[Path]) -> None:
-    first = parts[0].frozen
+def _check_alike(parts: Sequence[StageStore[Item]], folders: Sequence[Path]) -> None:
+    first = parts[0].manifest
     for stages, folder in zip(parts, folders, strict=True):
-        differs = [name for name, value in first.about.items() if stages.frozen.about[name] != value]
-        if stages.frozen.shard.count != first.shard.count:
+        differs = [name for name, value in first.about.items() if stages.manifest.about[name] != value]
+        if stages.manifest.shard.count != first.shard.count:
             differs.append("number of shards")
         if differs:
             raise ConfigError(
                 f"{folder} is of another run than {folders[0]}: they differ in {', '.join(differs)}.",
                 hint="Merge the shards of one run.",
             )
-    found = [stages.frozen.shard.number for stages in parts]
+    found = [stages.manifest.shard.number for stages in parts]
     twice = sorted({number for number in found if found.count(number) > 1})
     missing = sorted(set(range(1, first.shard.count + 1)) - set(found))
     if twice or missing:
@@ -74,11 +76,11 @@ def _check_alike(parts: Sequence[Stages], folders: Sequence[Path]) -> None:
         )
 
 
-def _check_complete(stages: Stages, folder: Path) -> None:
-    unasked = [item.id for item in stages.frozen.items if not stages.asked(item)]
+def _check_complete(stages: StageStore[Item], folder: Path) -> None:
+    unasked = [item.id for item in stages.manifest.items if not stages.asked(item)]
     if unasked:
         raise DataError(
-            f"{folder} is not finished: {len(unasked)} of {len(stages.frozen.items)} items have been neither driven "
+            f"{folder} is not finished: {len(unasked)} of {len(stages.manifest.items)} items have been neither driven "
             f"nor tried, {unasked[0]} among them.",
             hint=f"{_AGAIN} A run made by another version of Chauffeur has to be driven again by this one.",
         )
@@ -97,7 +99,7 @@ def _joined(parts: Sequence[Frozen]) -> Frozen:
     return replace(parts[0], shard=WHOLE, items=tuple(items[place] for place in places), places=places)
 
 
-def _copy(parts: Sequence[Stages], merged: Stages) -> None:
+def _copy(parts: Sequence[StageStore[Item]], merged: StageStore[Item]) -> None:
     """Append what `merged` lacks, in an order that does not depend on who finished when."""
     contexts: dict[str, Row] = {}
     plans: dict[str, Row] = {}

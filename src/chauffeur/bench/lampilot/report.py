@@ -8,11 +8,12 @@ from statistics import fmean
 
 import numpy as np
 
+from chauffeur.bench.kernel.report import interval_text
+from chauffeur.bench.kernel.stats import DRAWS, Array, Estimator, Interval, bootstrap, cluster_totals
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.families import FAMILIES
 from chauffeur.bench.lampilot.metrics import ORIGIN, Ruler, driving_score, ruler_named
 from chauffeur.bench.lampilot.paper import TABLE_IV, items_behind
-from chauffeur.bench.report.stats import DRAWS, Array, Estimator, Interval, bootstrap, cluster_totals
-from chauffeur.bench.store import Row
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,16 +184,6 @@ _FORMS = {"collision": (100.0, 2), "completion": (100.0, 1)}
 """Factor and decimals of a measure in its column; points are shown as they are, with one."""
 
 
-def interval_text(interval: Interval, scale: float = 1.0, digits: int = 1) -> str:
-    """`98.7 [97.4, 99.6]`; without ends where there is no interval, `n/a` where there is no value."""
-    if interval.value is None:
-        return "n/a"
-    value = f"{scale * interval.value:.{digits}f}"
-    if interval.low is None or interval.high is None:
-        return value
-    return f"{value} [{scale * interval.low:.{digits}f}, {scale * interval.high:.{digits}f}]"
-
-
 def cells(summary: Summary) -> list[str]:
     """A summary's cells under COLUMNS."""
     return [
@@ -218,13 +209,6 @@ def answers_note(rows: Sequence[Row]) -> str:
     )
     others = len(rows) - len(to_refuse)
     return f"{note}, {right - declined} of {others} others reached their goal" if others else note
-
-
-def markdown(header: Iterable[str], lines: Iterable[Sequence[str]], text_columns: int = 1) -> str:
-    """A Markdown table; the first columns are text, the others are numbers."""
-    names = list(header)
-    rule = ["---" if place < text_columns else "---:" for place in range(len(names))]
-    return "\n".join("| " + " | ".join(line) + " |" for line in [names, rule, *lines])
 
 
 Table = tuple[tuple[str, ...], list[list[str]]]

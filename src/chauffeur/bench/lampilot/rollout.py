@@ -14,8 +14,7 @@ from pydantic import TypeAdapter
 from chauffeur.bench.lampilot.expert import expert_program
 from chauffeur.bench.lampilot.metrics import ANY_STOP_M
 from chauffeur.bench.lampilot.referee import LampilotReferee
-from chauffeur.concept import ChauffeurError, Context, Limits, Plan, Program, Scenario, Wishes
-from chauffeur.describe import describe
+from chauffeur.concept import ChauffeurError, Limits, Plan, Program, Scenario, Wishes
 from chauffeur.drive.episode import Episode
 from chauffeur.drive.session import declined, drive_program, drive_without_program, unusable
 from chauffeur.programs import UNHURRIED, Sandbox
@@ -37,7 +36,6 @@ BASELINES = ("idm", "mobil", "expert")
 """Methods that read no words: two drivers of traffic research, and the scripted expert, which is told the goal."""
 
 plan_adapter: TypeAdapter[Plan] = TypeAdapter(Plan)
-context_adapter: TypeAdapter[Context] = TypeAdapter(Context)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +60,19 @@ class RolloutJob:
     rehearse: int = 0
     shield: bool = False
 
+    @property
+    def near(self) -> str:
+        """See BenchJob."""
+        return self.scenario.id
 
-def describe_sample(scenario: Scenario) -> dict[str, Any]:
-    """C of a sample, as a row keyed by `sample`; `error` says why a sample cannot be set up."""
-    try:
-        snapshot = HighwayWorld().reset(scenario)
-    except ChauffeurError as error:
-        return {"sample": scenario.id, "context": None, "error": str(error)}
-    return {"sample": scenario.id, "context": asdict(describe(snapshot)), "error": ""}
+    def run(self) -> dict[str, Any]:
+        """See BenchJob."""
+        return roll_out(self)
+
+    def spoiled(self, detail: str) -> dict[str, Any]:
+        """See BenchJob."""
+        about = {"key": self.key, "sample": self.scenario.id}
+        return about | not_driven("not_driven", detail, infra_failed=True)
 
 
 def roll_out(job: RolloutJob) -> dict[str, Any]:

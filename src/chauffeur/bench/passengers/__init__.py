@@ -1,6 +1,16 @@
 """Wishes in the words of passengers: an evaluation set written by hand, that no generator and no word list produced."""
 
 from chauffeur.bench.passengers.asking import PassengerRequests
+from chauffeur.bench.passengers.benchmark import passengers, requests_of, run_config
 from chauffeur.bench.passengers.loading import PassengerWish, PastWish, as_dataset, load_wishes
 
-__all__ = ["PassengerRequests", "PassengerWish", "PastWish", "as_dataset", "load_wishes"]
+__all__ = [
+    "PassengerRequests",
+    "PassengerWish",
+    "PastWish",
+    "as_dataset",
+    "load_wishes",
+    "passengers",
+    "requests_of",
+    "run_config",
+]

@@ -1,6 +1,6 @@
 """Rates, reductions and their intervals, from rows of trips: of simulated passengers and of people alike.
 
-Trips of one person hang together, so intervals resample whole persons (cluster bootstrap, `bench/report/stats.py`); a
+Trips of one person hang together, so intervals resample whole persons (cluster bootstrap, `bench/kernel/stats.py`); a
 rate that is 0 or 1 throughout gets exact binomial bounds over the persons. All systems of a table are compared over the
 same trips: same person, scene, words and mood.
 """
@@ -15,10 +15,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chauffeur.bench.kernel.stats import Interval, bootstrap, cluster_totals
 from chauffeur.bench.personalization.sayings import LEVELS
 from chauffeur.bench.personalization.scenes import TASKS
 from chauffeur.bench.personalization.scoring import Statistics, driving_score
-from chauffeur.bench.report.stats import Interval, bootstrap, cluster_totals
 
 Array = NDArray[np.float64]
 Rows = Sequence[Mapping[str, Any]]

@@ -21,6 +21,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
+from chauffeur.bench.kernel.store import Row, RowStore, sole_writer
 from chauffeur.bench.personalization.protocol import (
     PROTOCOL_VERSION,
     PeopleArm,
@@ -28,7 +29,6 @@ from chauffeur.bench.personalization.protocol import (
     Protocol,
     make_protocol,
 )
-from chauffeur.bench.store import Row, RowStore, sole_writer
 from chauffeur.concept import ConfigError, DataError, MissingExtraError
 from chauffeur.drive.files import publish
 

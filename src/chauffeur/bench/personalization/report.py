@@ -6,10 +6,12 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
+from chauffeur.bench.kernel.report import interval_text
+from chauffeur.bench.kernel.report import markdown as grid
+from chauffeur.bench.kernel.stats import Interval
 from chauffeur.bench.personalization import figures
 from chauffeur.bench.personalization.figures import Compared, Performance
 from chauffeur.bench.personalization.scenes import TASK_WORDS
-from chauffeur.bench.report.stats import Interval
 
 Rows = Sequence[Mapping[str, Any]]
 Table = tuple[str, Sequence[str], list[list[str]]]
@@ -94,7 +96,7 @@ def markdown(rows: Rows, title: str) -> str:
     """Everything as Markdown."""
     parts = [f"# {title}", NOTE, headline(rows)]
     for name, header, lines in tables(rows):
-        parts += [f"## {name}", _markdown(header, lines)]
+        parts += [f"## {name}", grid(header, lines)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -114,12 +116,7 @@ def _compared(title: str, cells: Iterable[Compared], names: tuple[str, str]) -> 
 
 
 def _rate(interval: Interval) -> str:
-    if interval.value is None:
-        return "-"
-    value = f"{100.0 * interval.value:.1f}"
-    if interval.low is None or interval.high is None:
-        return value
-    return f"{value} [{100.0 * interval.low:.1f}, {100.0 * interval.high:.1f}]"
+    return interval_text(interval, 100.0, missing="-")
 
 
 def _learning(rows: Rows) -> list[list[str]]:
@@ -156,10 +153,3 @@ def _viii(found: Iterable[Performance]) -> Table:
         "behaviour", "system", "drives", "TTC s", "variance m2/s2", "|a| m/s2", "|jerk| m/s3", "latency ms", "score",
     )  # fmt: skip
     return "Driving performance (as Tab. VIII, against the passengers' own way)", header, lines
-
-
-def _markdown(header: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
-    rule = "|".join(["---", *["---:"] * (len(header) - 1)])
-    return "\n".join(
-        [f"| {' | '.join(header)} |", f"|{rule}|", *(f"| {' | '.join(line)} |" for line in lines)]
-    )  # fmt: skip

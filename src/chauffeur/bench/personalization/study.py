@@ -17,6 +17,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.personalization.baseline import KeywordParameters
 from chauffeur.bench.personalization.population import POPULATION_VERSION, draw_passengers
 from chauffeur.bench.personalization.riding import RIDE_VERSION, ReadOnly, Ride, ride, ride_policy, usual
@@ -31,7 +32,6 @@ from chauffeur.bench.personalization.takeover import (
     wanted_mps,
 )
 from chauffeur.bench.personalization.traces import TRACE_VERSION, Trace
-from chauffeur.bench.store import Row
 from chauffeur.concept import NOBODY, Limits, Parameters, PersonId, Scenario
 from chauffeur.drive.session import Forgetful, make_world
 from chauffeur.memory.feedback import interpret_feedback
@@ -79,6 +79,24 @@ class StudyJob:
     trips: int
     options: tuple[tuple[str, Any], ...] = ()
 
+    @property
+    def id(self) -> str:
+        """See BenchItem: a sitting is asked for, and done, by itself."""
+        return self.key
+
+    @property
+    def near(self) -> str:
+        """See BenchJob: workers have the planner, and nothing of a passenger."""
+        return ""
+
+    def run(self) -> Row:
+        """All trips, as one row. Raises ChauffeurError: an endpoint that does not answer is no takeover."""
+        return asyncio.run(sit(self))
+
+    def spoiled(self, detail: str) -> Row:
+        """See BenchJob."""
+        return {"key": self.key, "infra_failed": True, "detail": detail}
+
 
 def versions() -> dict[str, str]:
     """What decides a study beside its configuration."""
@@ -91,13 +109,8 @@ def versions() -> dict[str, str]:
     }
 
 
-def do_job(job: StudyJob) -> Row:
-    """All trips of one passenger for one task, as one row."""
-    return asyncio.run(sit(job))
-
-
 async def sit(job: StudyJob) -> Row:
-    """The same, where a loop runs already."""
+    """All trips of one passenger for one task, as one row, where a loop runs already."""
     return await _Sitting(job).rows()
 
 
@@ -150,7 +163,8 @@ class _Sitting:
                     done = await ride(planner, recalls, words, who, job.task, scene, _LIMITS)
                     found = judge(done.trace, self._passenger, mood)
                     trips.append(self._row(arm, job.trips + 1, mood, words, done, found, "", place, "measured"))
-        return {"key": job.key, "passenger": self._passenger.id, "task": job.task, "trips": trips}
+        row: Row = {"key": job.key, "infra_failed": False, "passenger": self._passenger.id, "task": job.task}
+        return row | {"trips": trips}
 
     def _level(self) -> Level:
         return LEVELS[int(self._rng.integers(len(LEVELS)))]

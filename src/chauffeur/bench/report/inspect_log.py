@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.report import MEASURES, intervals
 from chauffeur.bench.report.method import facts
 from chauffeur.bench.report.model import SIMULATED
@@ -22,7 +23,6 @@ from chauffeur.bench.report.redrive import Kept
 from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run
 from chauffeur.bench.report.tables import Sampling
 from chauffeur.bench.report.wording import goal_words, happened
-from chauffeur.bench.store import Row
 from chauffeur.concept import ConfigError, DataError, MissingExtraError, Plan, Program, Scenario
 
 SCORER = "lampilot"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any, cast
 
+from chauffeur.bench.kernel.stats import LEVEL
 from chauffeur.bench.lampilot.metrics import ORIGIN, ruler_named
 from chauffeur.bench.report.runs import Run
-from chauffeur.bench.report.stats import LEVEL
 from chauffeur.bench.report.tables import Sampling
 
 _ORIGIN: tuple[tuple[str, str], ...] = (

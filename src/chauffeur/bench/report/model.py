@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from chauffeur.bench.report.stats import Interval
+from chauffeur.bench.kernel.stats import Interval
 from chauffeur.concept import Context, Program, Verdict
 from chauffeur.drive.recording import RecordedTrip
 

@@ -7,14 +7,14 @@ from itertools import combinations
 
 import numpy as np
 
+from chauffeur.bench.kernel.stats import Array, Estimator, bootstrap, sign_test
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.report import MEASURES, scene_totals
 from chauffeur.bench.report import columns as col
 from chauffeur.bench.report.model import Cell, Flip, FlipList, Group, Line, ReportTable
 from chauffeur.bench.report.runs import Run
-from chauffeur.bench.report.stats import Array, Estimator, bootstrap, sign_test
 from chauffeur.bench.report.tables import Sampling, interval_cell, name_with_labels, with_spans
 from chauffeur.bench.report.wording import ending_words
-from chauffeur.bench.store import Row
 
 ALL_PAIRS_UP_TO = 4
 """With more runs than this, only pairs with the first run are compared."""

@@ -6,13 +6,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from chauffeur.bench.kernel.pipeline import context_adapter
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.human import RecordedHands, trace_adapter
 from chauffeur.bench.lampilot.metrics import ANY_STOP_M
 from chauffeur.bench.lampilot.referee import LampilotReferee
-from chauffeur.bench.lampilot.rollout import BASELINES, MAX_EPISODE_S, context_adapter, plan_adapter
+from chauffeur.bench.lampilot.rollout import BASELINES, MAX_EPISODE_S, plan_adapter
 from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run
 from chauffeur.bench.report.wording import ending_words
-from chauffeur.bench.store import Row
 from chauffeur.concept import (
     LAMPILOT_LIMITS,
     ChauffeurError,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.metrics import RULERS, points, ruler_named
 from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run
-from chauffeur.bench.store import Row
 from chauffeur.concept import ConfigError, DataError
 
 

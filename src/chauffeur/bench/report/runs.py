@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
+from chauffeur.bench.kernel.store import Row, unseal
+from chauffeur.bench.lampilot.benchmark import NOT_ASKED
 from chauffeur.bench.lampilot.metrics import ORIGIN
-from chauffeur.bench.lampilot.results import NOT_ASKED
-from chauffeur.bench.store import Row, unseal
 from chauffeur.concept import ConfigError, DataError, Scenario
 
 NOTHING_DRIVEN = ("refused", "not_driven")

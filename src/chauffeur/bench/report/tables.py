@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chauffeur.bench.kernel.stats import DRAWS, LEAST_CLUSTERS, Interval, bootstrap, cluster_totals
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.metrics import ORIGIN
 from chauffeur.bench.lampilot.paper import TABLE_IV, items_behind
 from chauffeur.bench.lampilot.report import answers_note, families_in, intervals, ruler_of
 from chauffeur.bench.report import columns as col
 from chauffeur.bench.report.model import NOT_KNOWN, Cell, Column, Group, Line, ReportTable
 from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run
-from chauffeur.bench.report.stats import DRAWS, LEAST_CLUSTERS, Interval, bootstrap, cluster_totals
-from chauffeur.bench.store import Row
 
 LANE_TTC_CLOSE_S = 2.0
 LOWEST_POINTS = -100.0

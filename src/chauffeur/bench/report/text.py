@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from chauffeur.bench.lampilot.report import markdown
+from chauffeur.bench.kernel.report import markdown
 from chauffeur.bench.report.model import SIMULATED, Cell, Column, FlipList, Gallery, Line, Report, ReportTable
 from chauffeur.bench.report.tables import number, said
 

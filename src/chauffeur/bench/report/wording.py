@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.goals import GIVE_UP_S, HOLD_S
-from chauffeur.bench.store import Row
 
 PERIOD_S = 0.1
 """Control period of LaMPilot's worlds."""

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from statistics import fmean
 from typing import cast
 
+from chauffeur.bench.kernel.store import Row, StorageError
 from chauffeur.bench.lampilot.families import family_of
 from chauffeur.bench.lampilot.human import HandTrace, drive_by_hand, noted
 from chauffeur.bench.lampilot.human_run import HumanRun
 from chauffeur.bench.lampilot.metrics import points
 from chauffeur.bench.lampilot.referee import LampilotReferee
-from chauffeur.bench.store import Row, StorageError
 from chauffeur.concept import ChauffeurError, Outcome, Snapshot
 from chauffeur.hmi import words
 from chauffeur.hmi.wheel.hands import COUNTDOWN_S, HandsOnWheel, Instant

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.scenes.annotations import Annotation, annotated
 from chauffeur.bench.lampilot.scenes.choosing import normal
 from chauffeur.bench.lampilot.scenes.feasible import feasible, start_of
 from chauffeur.bench.lampilot.scenes.spreading import Progress, spread
 from chauffeur.bench.lampilot.scenes.unambiguous import fault_of_goal
-from chauffeur.bench.store import Row
 from chauffeur.concept import DataError, Scenario
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset

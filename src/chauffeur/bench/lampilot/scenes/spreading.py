@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from chauffeur.bench.engine import LocalEngine, Work
-from chauffeur.bench.store import Row
+from chauffeur.bench.kernel.engine import LocalEngine, Work
+from chauffeur.bench.kernel.store import Row
 
 Progress = Callable[[int, int], None]
 """Called as (done, of)."""

@@ -14,6 +14,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from chauffeur.bench.kernel.store import Row, RowStore
 from chauffeur.bench.lampilot.scenes.choosing import choose_wordings, normal
 from chauffeur.bench.lampilot.scenes.kinds import plan_suite
 from chauffeur.bench.lampilot.scenes.making import Job, make_item
@@ -21,7 +22,6 @@ from chauffeur.bench.lampilot.scenes.manifest import manifest_of
 from chauffeur.bench.lampilot.scenes.scripted import SOLVERS
 from chauffeur.bench.lampilot.scenes.spreading import Progress, spread
 from chauffeur.bench.lampilot.scenes.writer import Item, folder_of, items_of, write_folder
-from chauffeur.bench.store import Row, RowStore
 from chauffeur.concept import ConfigError
 from chauffeur.drive.files import publish
 from chauffeur.worlds.highway import HighwayWorld

@@ -13,8 +13,17 @@ from importlib.metadata import version
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from chauffeur.bench.engine import JOB_LIMIT_S, LIVES, EngineError, JobQueue, QueuedJob, Work, WorkerLostError, hand
-from chauffeur.bench.store import Row
+from chauffeur.bench.kernel.engine import (
+    JOB_LIMIT_S,
+    LIVES,
+    EngineError,
+    JobQueue,
+    QueuedJob,
+    Work,
+    WorkerLostError,
+    hand,
+)
+from chauffeur.bench.kernel.store import Row
 from chauffeur.concept import ConfigError, MissingExtraError
 
 _log = logging.getLogger(__name__)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, cast
 
-from chauffeur.bench.pace import Gate, Signal
-from chauffeur.bench.spending import Bill, Price, Room, Spending
+from chauffeur.bench.kernel.pace import Gate, Signal
+from chauffeur.bench.kernel.spending import Bill, Price, Room, Spending
 from chauffeur.concept import ChauffeurError, Plan, PlannerError, PlanRequest
-from chauffeur.planners.base import Planner
+from chauffeur.planners.base import Answerer, Planner, Prose
 from chauffeur.planners.llm_errors import EndpointError, Kind
+from chauffeur.planners.prompts import Message
 
 if TYPE_CHECKING:
     import numpy as np
@@ -41,6 +43,12 @@ _HOPELESS: Final[frozenset[Kind]] = frozenset(
     {"no_key", "unauthorized", "forbidden", "not_found", "quota", "not_an_api", "context"}
 )
 """The next call would fail the same way, whatever is asked."""
+
+
+Request = PlanRequest | Sequence[Message]
+"""What is asked: a plan, or words to a conversation."""
+
+Reply = Plan | Prose
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,19 +85,19 @@ class Halt:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A plan, or why there is none, and what that cost."""
+    """A plan or words, or why there are none, and what that cost."""
 
-    plan: Plan | None
+    reply: Reply | None
     error: str
     bill: Bill
 
 
 @dataclass(slots=True)
 class Caller:
-    """Asks a planner for plans.
+    """Asks a planner for plans, or a model for words.
 
     Attributes:
-        planner: Who plans; it should not retry by itself, or its waits stay unseen here.
+        planner: Who is asked; it should not retry by itself, or its waits stay unseen here.
         gate: Bounds what is in flight.
         spending: The account.
         rng: Jitter of the waits.
@@ -99,7 +107,7 @@ class Caller:
         repeated: Calls sent again, word for word, after a time-out.
     """
 
-    planner: Planner
+    planner: Planner | Answerer
     gate: Gate
     spending: Spending
     rng: np.random.Generator
@@ -110,8 +118,8 @@ class Caller:
     _fruitless: int = 0
     _settled: asyncio.Event = field(default_factory=asyncio.Event)
 
-    async def ask(self, request: PlanRequest) -> Answer | None:
-        """One plan, or why there is none; None when it was not asked for, because the run has stopped asking.
+    async def ask(self, request: Request) -> Answer | None:
+        """One reply, or why there is none; None when it was not asked for, because the run has stopped asking.
 
         No fault of planner or endpoint raises.
         """
@@ -120,7 +128,7 @@ class Caller:
         failures = refusals = 0
         while (sent_s := await self._turn()) is not None:
             outcome = await self._call(request, sent_s, bill)
-            if isinstance(outcome, Plan):
+            if isinstance(outcome, Reply):
                 self._fruitless = 0
                 return Answer(outcome, "", bill)
             last = str(outcome)
@@ -157,16 +165,16 @@ class Caller:
         self.gate.leave("neither", sent_s)
         return None
 
-    async def _call(self, request: PlanRequest, sent_s: float, bill: Bill) -> Plan | ChauffeurError:
+    async def _call(self, request: Request, sent_s: float, bill: Bill) -> Reply | ChauffeurError:
         signal: Signal = "neither"
         asked_s = None
         try:
-            outcome = await self._plan(request)
+            outcome = await self._reply(request)
         except BaseException:
             self.spending.failed(0, worked=False)
             self.gate.leave(signal, sent_s)
             raise
-        if isinstance(outcome, Plan):
+        if isinstance(outcome, Reply):
             signal = "answered"
             bill.add(self.spending.settled(outcome.usage))
         elif isinstance(outcome, EndpointError):
@@ -183,26 +191,28 @@ class Caller:
         self._settled.set()
         return outcome
 
-    async def _plan(self, request: PlanRequest) -> Plan | ChauffeurError:
+    async def _reply(self, request: Request) -> Reply | ChauffeurError:
         try:
-            return self._priced(await self.planner.plan(request))
+            if isinstance(request, PlanRequest):
+                return self._priced(await cast("Planner", self.planner).plan(request))
+            return self._priced(await cast("Answerer", self.planner).write(request))
         except ChauffeurError as error:
             return error
         except Exception as error:  # noqa: BLE001 - a plug-in may raise anything, and one bad item never loses a run
             _log.exception("the planner failed in a way of its own")
             return PlannerError(f"The planner itself failed: {type(error).__name__}: {error}.")
 
-    def _priced(self, plan: Plan) -> Plan:
-        usage = plan.usage
+    def _priced(self, reply: Reply) -> Reply:
+        usage = reply.usage
         if usage.cost_usd is None and self.price is not None:
-            return replace(plan, usage=replace(usage, cost_usd=self.price.of(usage)))
+            return replace(reply, usage=replace(usage, cost_usd=self.price.of(usage)))
         if usage.cost_usd is None and usage.requests and self.spending.budget.max_usd is not None:
             self._stop(
-                f"What {plan.model or self.planner.id} costs is not known, so --max-usd cannot be kept.",
+                f"What {reply.model or self.planner.id} costs is not known, so --max-usd cannot be kept.",
                 "Give its price with --price IN/OUT (USD per million tokens), or bound --max-requests.",
                 budget=True,
             )
-        return plan
+        return reply
 
     def _given_up(self, error: ChauffeurError) -> None:
         """Stop asking when it is the endpoint that fails and not this request."""

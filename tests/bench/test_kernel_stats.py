@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from chauffeur.bench.report.stats import LEAST_CLUSTERS, bootstrap, cluster_totals, exact_bound, sign_test
+from chauffeur.bench.kernel.stats import LEAST_CLUSTERS, bootstrap, cluster_totals, exact_bound, sign_test
 
 MEAN = {"mean": lambda totals: totals[..., 1] / totals[..., 0]}
 

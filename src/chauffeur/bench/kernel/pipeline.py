@@ -1,4 +1,4 @@
-"""A run at work: every item goes its own way from words to wheels, so simulations run while calls are in flight.
+"""A run at work: every item goes its own way from question to row, so simulations run while calls are in flight.
 
 One event loop does the waiting; simulations run in the engine's processes, the disk is a thread's business. An item
 that fails is a row that says so; only a full disk, a dead engine or the person at the keyboard stops the run.
@@ -13,22 +13,25 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
-from chauffeur.bench.calls import Caller
-from chauffeur.bench.engine import Engine, EngineError
-from chauffeur.bench.lampilot.asking import Requests
-from chauffeur.bench.lampilot.metrics import points
-from chauffeur.bench.lampilot.results import Stages
-from chauffeur.bench.lampilot.rollout import RolloutJob, context_adapter, describe_sample, not_driven, roll_out
-from chauffeur.bench.spending import Bill
-from chauffeur.bench.standing import Speedometer, Standing
-from chauffeur.bench.store import Row, Scribe
-from chauffeur.concept import ChauffeurError, Context
-from chauffeur.worlds.highway.dblv1 import Item
+from pydantic import TypeAdapter
+
+from chauffeur.bench.kernel.benchmark import BenchItem, BenchJob
+from chauffeur.bench.kernel.calls import Caller, Reply, Request
+from chauffeur.bench.kernel.engine import Engine, EngineError
+from chauffeur.bench.kernel.spending import Bill
+from chauffeur.bench.kernel.stages import StageStore
+from chauffeur.bench.kernel.standing import Speedometer, Standing
+from chauffeur.bench.kernel.store import Row, Scribe
+from chauffeur.concept import ChauffeurError, Context, Scenario
+from chauffeur.describe import describe
+from chauffeur.drive.session import make_world
 
 Watch = Callable[[Standing], None]
 """Is told where the run stands, a few times a second."""
 
 TELL_S: Final = 0.25
+context_adapter: TypeAdapter[Context] = TypeAdapter(Context)
+
 _SPARE: Final = 32
 """Items made ready beyond those that may be in flight, so that a place never waits for a description."""
 
@@ -40,21 +43,17 @@ class Pipeline:
     Attributes:
         stages: Where everything is stored.
         engine: Who simulates.
-        caller: Who asks the planner; None for the baselines.
-        requests: What it is asked.
+        caller: Who asks the planner; None where nobody is asked.
         scribe: Who writes.
         watch: Who is told.
-        ruler: Id of the ruler of the running scores.
         most: Planner calls in flight at most.
     """
 
-    stages: Stages
+    stages: StageStore[Any]
     engine: Engine
     caller: Caller | None
-    requests: Requests
     scribe: Scribe
     watch: Watch
-    ruler: str
     most: int
     _contexts: dict[str, asyncio.Task[Row]] = field(default_factory=dict[str, "asyncio.Task[Row]"])
     _drives: dict[str, asyncio.Task[Row]] = field(default_factory=dict[str, "asyncio.Task[Row]"])
@@ -83,17 +82,25 @@ class Pipeline:
                 guard.cancel()
         self.watch(self.standing())
 
-    def _begin(self, group: asyncio.TaskGroup) -> Iterator[Item]:
+    def _begin(self, group: asyncio.TaskGroup) -> Iterator[BenchItem]:
         """Set going what only has to be driven; gives what has to be asked: also what could not be had last time."""
-        for item in self.stages.frozen.items:
-            job = self.stages.job(item)
-            if job is None:
+        for item in self.stages.manifest.items:
+            if self.stages.unanswered(item):
                 yield item
                 continue
             self._count["asked"] += self.caller is not None
-            group.create_task(self._finish(job))
+            self._go_on(item, group, fresh=False)
 
-    async def _ask(self, todo: deque[Item], caller: Caller, group: asyncio.TaskGroup) -> None:
+    def _go_on(self, item: BenchItem, group: asyncio.TaskGroup, *, fresh: bool) -> None:
+        """Do what is to be done with an item's answer."""
+        job = self.stages.job(item)
+        if job is not None:
+            group.create_task(self._finish(job))
+            return
+        self._count["done"] += 1
+        self._fresh += fresh
+
+    async def _ask(self, todo: deque[BenchItem], caller: Caller, group: asyncio.TaskGroup) -> None:
         while todo and caller.halt is None:
             await asyncio.sleep(0)  # a planner that never waits must not keep the others from their turn
             if not todo:
@@ -103,27 +110,23 @@ class Pipeline:
             if row is None:
                 return
             self._count["asked"] += 1
-            job = self.stages.job(item)
-            if job is None:
-                self._fresh += 1
-                self._count["done"] += 1
-                self._count["failed"] += 1
-            else:
-                group.create_task(self._finish(job))
+            self._count["failed"] += row["plan"] is None
+            self._go_on(item, group, fresh=True)
 
-    async def _plan(self, item: Item, caller: Caller) -> Row | None:
-        """The item's plan, or why there is none, stored; None when the run has stopped asking."""
+    async def _plan(self, item: BenchItem, caller: Caller) -> Row | None:
+        """The item's answer, or why there is none, stored; None when the run has stopped asking."""
         before = Bill.read(self.stages.plans.rows.get(item.id, {}))
         row: Row = {"item": item.id, "plan": None, "error": ""}
         try:
-            request = await self.requests.request(item, await self._context(item))
+            desk = _Desk(self, caller, before)
+            request = await self.stages.benchmark.request(item, desk)
             answer = await caller.ask(request)
             if answer is None:
                 return None
             before.add(answer.bill)
             row["error"] = answer.error
-            if answer.plan is not None:
-                row["plan"] = asdict(answer.plan)
+            if answer.reply is not None:
+                row["plan"] = asdict(answer.reply)
         except EngineError:
             raise
         except Exception as error:  # noqa: BLE001 - whatever is wrong with an item, it is one item
@@ -136,23 +139,23 @@ class Pipeline:
             self.scribe.write(self.stages.plans, row)
         return row
 
-    async def _context(self, item: Item) -> Context:
-        """C of the item's sample. Raises ChauffeurError when the sample cannot be set up."""
-        sample = item.scenario.id
+    async def context(self, scenario: Scenario) -> Context:
+        """C of a scene, described once. Raises ChauffeurError when it cannot be set up."""
+        sample = scenario.id
         row = self.stages.contexts.rows.get(sample)
         if row is None or row["error"]:
             task = self._contexts.get(sample)
             if task is None:
-                task = self._contexts[sample] = asyncio.create_task(self._describe(item))
+                task = self._contexts[sample] = asyncio.create_task(self._describe(scenario))
             row = await asyncio.shield(task)
         if row["error"]:
             raise ChauffeurError(row["error"])
         return context_adapter.validate_python(row["context"])
 
-    async def _describe(self, item: Item) -> Row:
-        sample = item.scenario.id
+    async def _describe(self, scenario: Scenario) -> Row:
+        sample = scenario.id
         try:
-            row = await self.engine.run(describe_sample, item.scenario, near=sample, urgent=True)
+            row = await self.engine.run(describe_scene, scenario, near=sample, urgent=True)
         except EngineError:
             raise
         except Exception as error:  # noqa: BLE001 - a sample can break the simulator in any way; it is one sample
@@ -160,7 +163,7 @@ class Pipeline:
         self.scribe.write(self.stages.contexts, row)
         return row
 
-    async def _finish(self, job: RolloutJob) -> None:
+    async def _finish(self, job: BenchJob) -> None:
         row = self.stages.rollouts.rows.get(job.key)
         if row is None or row["infra_failed"]:  # what the machine spoiled is driven again
             task = self._drives.get(job.key)
@@ -170,20 +173,20 @@ class Pipeline:
             self._fresh += 1
         self._count["done"] += 1
         self._count["failed"] += bool(row["infra_failed"])
-        self._count["driven"] += not row["infra_failed"]
-        scored = points(row, self.ruler)
-        self._count["successes"] += bool(scored["success"])
-        self._count["collisions"] += bool(scored["collision"])
+        self._count["driven"] += not row["infra_failed"] and hasattr(self.stages.benchmark, "tally")
+        tally = getattr(self.stages.benchmark, "tally", None)  # running scores, where a benchmark has any
+        success, collision = (False, False) if tally is None else tally(row)
+        self._count["successes"] += success
+        self._count["collisions"] += collision
 
-    async def _drive(self, job: RolloutJob) -> Row:
+    async def _drive(self, job: BenchJob) -> Row:
         try:
-            row = await self.engine.run(roll_out, job, near=job.scenario.id)
+            row = await self.engine.run(do_job, job, near=job.near)
             self.scribe.write(self.stages.rollouts, row)
         except EngineError:
             raise
         except Exception as error:  # noqa: BLE001 - see _describe
-            row = {"key": job.key, "sample": job.scenario.id}
-            row |= not_driven("not_driven", _words(error), infra_failed=True)
+            row = job.spoiled(_words(error))
             self.scribe.write(self.stages.rollouts, row)
         return row
 
@@ -194,7 +197,7 @@ class Pipeline:
 
     def standing(self) -> Standing:
         """Where the run stands now."""
-        planned = len(self.stages.frozen.items)
+        planned = len(self.stages.manifest.items)
         rate = self._speed.rate(asyncio.get_running_loop().time(), self._fresh)
         left = planned - self._count["done"]
         live: dict[str, Any] = {}
@@ -208,6 +211,39 @@ class Pipeline:
                 "held_s": gate.held_s,
             }
         return Standing(planned, **self._count, rate=rate, eta_s=left / rate if rate > 0.0 else None, **live)
+
+
+@dataclass(slots=True)
+class _Desk:
+    """See RequestDesk; what earlier turns cost is put on the item's bill."""
+
+    pipeline: Pipeline
+    caller: Caller
+    bill: Bill
+
+    async def context(self, scenario: Scenario) -> Context:
+        return await self.pipeline.context(scenario)
+
+    async def ask(self, request: Request) -> Reply | None:
+        answer = await self.caller.ask(request)
+        if answer is None:
+            return None
+        self.bill.add(answer.bill)
+        return answer.reply
+
+
+def describe_scene(scenario: Scenario) -> Row:
+    """C of a scene, as a row keyed by `sample`; `error` says why it cannot be set up. A worker's work."""
+    try:
+        snapshot = make_world(scenario).reset(scenario)
+    except ChauffeurError as error:
+        return {"sample": scenario.id, "context": None, "error": str(error)}
+    return {"sample": scenario.id, "context": asdict(describe(snapshot)), "error": ""}
+
+
+def do_job(job: BenchJob) -> Row:
+    """A worker's work."""
+    return job.run()
 
 
 async def _await(broken: asyncio.Future[None]) -> None:

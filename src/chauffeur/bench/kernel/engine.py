@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from typing import Any, Final, Protocol
 
-from chauffeur.bench.store import Row
+from chauffeur.bench.kernel.store import Row
 from chauffeur.concept import ChauffeurError
 
 _log = logging.getLogger(__name__)

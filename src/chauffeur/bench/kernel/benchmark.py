@@ -1,0 +1,166 @@
+"""What a benchmark is: items, what is asked for each, what is done with the answer, and how the rows are read.
+
+The kernel does the rest, the same way for all: it paces and pays for the asking, spreads the work over processes,
+stores every stage as it comes, goes on where a run stopped, and writes rows, tables and provenance. A benchmark is
+registered as an entry point in the group `chauffeur.benchmarks`; `chauffeur bench` runs it by that name.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Generic, Literal, Protocol, TypeVar
+
+from chauffeur.bench.kernel.calls import Request
+from chauffeur.bench.kernel.metrics import TableSpec
+from chauffeur.bench.kernel.store import Row
+from chauffeur.concept import ConfigError, Context, Plan, Scenario
+from chauffeur.concept.registry import load_plugin
+from chauffeur.planners.base import Prose
+
+GROUP: Final = "chauffeur.benchmarks"
+"""Entry points of benchmarks: each is called with keyword options and gives a Benchmark."""
+
+
+class BenchItem(Protocol):
+    """One thing that is asked or driven."""
+
+    @property
+    def id(self) -> str:
+        """Unique in its benchmark and the same for ever."""
+        ...
+
+
+class BenchJob(Protocol):
+    """Work for a worker process: picklable. Items whose jobs have one key share one result."""
+
+    @property
+    def key(self) -> str:
+        """Content hash of all that decides the result."""
+        ...
+
+    @property
+    def near(self) -> str:
+        """Jobs with the same text do best on the same worker, e.g. drives in one scene."""
+        ...
+
+    def run(self) -> Row:
+        """The result: JSON, with `key`, and `infra_failed` where only the machine is to blame."""
+        ...
+
+    def spoiled(self, detail: str) -> Row:
+        """The result where the worker died or failed in a way that was not foreseen; it has `infra_failed`."""
+        ...
+
+
+class RequestDesk(Protocol):
+    """What a benchmark may use while it makes a request."""
+
+    async def context(self, scenario: Scenario) -> Context:
+        """C of a scene, described once. Raises ChauffeurError when it cannot be set up."""
+        ...
+
+    async def ask(self, request: Request) -> Plan | Prose | None:
+        """An earlier turn, asked at the item's cost; None when there is no answer."""
+        ...
+
+
+T = TypeVar("T", bound=BenchItem)
+
+
+@dataclass(frozen=True, slots=True)
+class ItemOutcome(Generic[T]):
+    """What is stored of an item.
+
+    Attributes:
+        item: The item.
+        answer: JSON form of the plan, or of the words; None when nobody was asked, or none came.
+        error: Why none came.
+        result: What its job gave; None without one.
+    """
+
+    item: T
+    answer: Row | None
+    error: str
+    result: Row | None
+
+    @property
+    def failed(self) -> bool:
+        """Whether it was tried in vain: no answer came, or the machine failed."""
+        return bool(self.error and self.answer is None) or bool(self.result and self.result["infra_failed"])
+
+
+Asks = Literal["plans", "words", ""]
+"""Who is asked: a planner for plans, a model for words (`planners.base.Answerer`), nobody."""
+
+
+class Benchmark(Protocol[T]):
+    """One benchmark, with everything that decides its results."""
+
+    @property
+    def id(self) -> str:
+        """Versioned: changes whenever the same answers could give other rows."""
+        ...
+
+    @property
+    def config(self) -> Mapping[str, Any]:
+        """All that decides a run beside planner and code, as JSON: options, seed, hash of the data, versions."""
+        ...
+
+    @property
+    def asks(self) -> Asks:
+        """Who is asked."""
+        ...
+
+    @property
+    def row(self) -> type:
+        """Type of its rows: a frozen dataclass, or a TypedDict."""
+        ...
+
+    @property
+    def tables(self) -> Sequence[TableSpec]:
+        """How its rows are read: the metrics, and by what they are grouped."""
+        ...
+
+    def items(self) -> Sequence[T]:
+        """All items of the run, in its order. The same every time."""
+        ...
+
+    async def request(self, item: T, desk: RequestDesk) -> Request:
+        """What is asked for an item. Raises ChauffeurError when it cannot be asked."""
+        ...
+
+    def job(self, item: T, answer: Row | None) -> BenchJob | None:
+        """What is done with the answer in a worker, e.g. driving it; None where the answer itself is the result."""
+        ...
+
+    def rows(self, outcome: ItemOutcome[T]) -> Sequence[Any]:
+        """The item's rows, values of `row`; none where there is nothing to be said (yet). Cheap: it scores what is
+        stored, so a metric can change without anything being asked or driven again."""
+        ...
+
+
+class Unasked:
+    """A benchmark whose jobs need no answers: it asks nobody."""
+
+    asks: Asks = ""
+
+    async def request(self, item: Any, desk: RequestDesk) -> Request:
+        """See Benchmark."""
+        raise NotImplementedError(f"{item.id} is not asked about")
+
+
+def make_benchmark(name: str, **options: Any) -> Benchmark[Any]:
+    """The benchmark registered under a name.
+
+    Raises:
+        ConfigError: No such name, or an option it does not take.
+    """
+    factory = load_plugin(GROUP, name)
+    try:
+        inspect.signature(factory).bind(**options)
+    except TypeError as error:
+        takes = ", ".join(inspect.signature(factory).parameters) or "nothing"
+        raise ConfigError(f"Benchmark {name!r}: {error}.", hint=f"It takes: {takes}.") from error
+    return factory(**options)

@@ -1,0 +1,214 @@
+"""What a run keeps in its folder: what it is about, frozen before anything is asked (`plan.json`), and every stage."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, Generic, Self, TypeVar
+
+from chauffeur.bench.kernel.benchmark import BenchItem, BenchJob, Benchmark, ItemOutcome
+from chauffeur.bench.kernel.shards import WHOLE, Shard
+from chauffeur.bench.kernel.store import Row, RowStore, freeze
+from chauffeur.concept import DataError
+
+T = TypeVar("T", bound=BenchItem)
+
+
+@dataclass(frozen=True)
+class Manifest(Generic[T]):
+    """What a run is about; a folder goes on with nothing else.
+
+    Attributes:
+        bench: Id of the benchmark.
+        config: What decided the run, as JSON.
+        model: The planner's model; empty where nobody is asked.
+        labels: What must be said wherever a row is shown.
+        shard: Which part of the run this is.
+        items: This part's items, in the run's order.
+        places: Place of each in the whole run, from 0.
+        planned: Items of the whole run.
+    """
+
+    bench: str
+    config: dict[str, Any]
+    model: str
+    labels: tuple[str, ...]
+    shard: Shard
+    items: tuple[T, ...]
+    places: tuple[int, ...]
+    planned: int
+
+    @classmethod
+    def make(
+        cls,
+        bench: str,
+        config: Mapping[str, Any],
+        items: Sequence[T],
+        *,
+        model: str = "",
+        labels: Sequence[str] = (),
+        shard: Shard = WHOLE,
+    ) -> Self:
+        """Manifest of a run, or of a shard of it, that is to begin."""
+        places = tuple(place for place, item in enumerate(items) if shard.owns(item.id))
+        stored: dict[str, Any] = json.loads(json.dumps(dict(config)))
+        return cls(bench, stored, model, tuple(labels), shard, tuple(items[i] for i in places), places, len(items))
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What parts of one run must have in common."""
+        return {
+            "bench": self.bench,
+            "config": self.config,
+            "model": self.model,
+            "labels": list(self.labels),
+            "planned": self.planned,
+        }
+
+    @property
+    def more(self) -> dict[str, Any]:
+        """What a benchmark freezes beside: nothing here."""
+        return {}
+
+    def content(self) -> bytes:
+        """The manifest as the file's content."""
+        fields = {
+            **self.about,
+            "shard": str(self.shard),
+            "items": [item.id for item in self.items],
+            "places": list(self.places),
+            **self.more,
+        }
+        # One line a field: short enough to read with `head -c`, and not a line for every number.
+        lines = (f"{json.dumps(name)}: {json.dumps(value, ensure_ascii=False)}" for name, value in fields.items())
+        return ("{\n" + ",\n".join(lines) + "\n}\n").encode("utf-8", "surrogatepass")
+
+    def freeze(self, folder: Path) -> None:
+        """Store the manifest, or find that it is the one stored.
+
+        Raises:
+            ConfigError: The folder holds another run.
+            DataError: What is stored is damaged or cannot be written.
+        """
+        path, content = folder / "plan.json", self.content()
+
+        def same(stored: bytes) -> bool:
+            return stored == content or parsed(path, stored) == json.loads(content)
+
+        freeze(path, content, "run's plan", same)
+
+    def provenance(self, **more: Any) -> dict[str, Any]:
+        """Versions, configuration and the machine; `more` is the benchmark's."""
+        return {
+            "bench": self.bench,
+            **more,
+            "config": self.config,
+            "model": self.model,
+            "labels": list(self.labels),
+            "versions": {name: _version(name) for name in ("chauffeur", "numpy", "numba", "pydantic-monty")},
+            "python": platform.python_version(),
+            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} CPUs",
+        }
+
+
+def parsed(path: Path, raw: bytes) -> dict[str, Any]:
+    """A manifest's fields. Raises DataError when they are damaged."""
+    try:
+        value = json.loads(raw)
+    except ValueError as error:
+        raise DataError(
+            f"{path} is damaged ({error}).",
+            hint="Delete it and run the same command: what was asked and driven is kept.",
+        ) from error
+    return value if isinstance(value, dict) else {}
+
+
+@dataclass(slots=True)
+class StageStore(Generic[T]):
+    """A run's stored rows.
+
+    Attributes:
+        benchmark: Whose run it is.
+        manifest: What it is about.
+        contexts: C by scene.
+        plans: Answers, or why there is none, by item.
+        rollouts: What the jobs gave, by the key of what decided it.
+    """
+
+    benchmark: Benchmark[T]
+    manifest: Manifest[T]
+    contexts: RowStore
+    plans: RowStore
+    rollouts: RowStore
+    _jobs: dict[str, tuple[Row | None, BenchJob | None]] = field(
+        default_factory=dict[str, "tuple[Row | None, BenchJob | None]"]
+    )
+
+    @classmethod
+    def open(cls, folder: Path, benchmark: Benchmark[T], manifest: Manifest[T]) -> Self:
+        """Read a run folder's stages. Raises StorageError."""
+        return cls(
+            benchmark,
+            manifest,
+            RowStore(folder / "contexts.jsonl", "sample"),
+            RowStore(folder / "generate.jsonl", "item"),
+            RowStore(folder / "rollout.jsonl", "key"),
+        )
+
+    @property
+    def stores(self) -> tuple[RowStore, ...]:
+        """All of them."""
+        return self.contexts, self.plans, self.rollouts
+
+    def answer(self, item: T) -> Row | None:
+        """The item's answer; None when there is none (yet)."""
+        return self.plans.rows.get(item.id, {}).get("plan")
+
+    def unanswered(self, item: T) -> bool:
+        """Whether the item has still to be asked."""
+        return bool(self.benchmark.asks) and self.answer(item) is None
+
+    def job(self, item: T) -> BenchJob | None:
+        """What is done with the item's answer; None when there is none yet, or nothing to do."""
+        answer = self.answer(item)
+        if self.benchmark.asks and answer is None:
+            return None
+        known = self._jobs.get(item.id)
+        if known is None or known[0] is not answer:
+            known = self._jobs[item.id] = (answer, self.benchmark.job(item, answer))
+        return known[1]
+
+    def asked(self, item: T) -> bool:
+        """Whether the item is accounted for: done, or tried and failed."""
+        if self.unanswered(item):
+            return item.id in self.plans.rows
+        job = self.job(item)
+        return job is None or job.key in self.rollouts.rows
+
+    @property
+    def settled(self) -> bool:
+        """Whether nothing is left to ask or to do, what failed for want of infrastructure included."""
+        return all(not self.unanswered(item) and self._done(self.job(item)) for item in self.manifest.items)
+
+    def _done(self, job: BenchJob | None) -> bool:
+        row = None if job is None else self.rollouts.rows.get(job.key)
+        return job is None or (row is not None and not row["infra_failed"])
+
+    def outcome(self, item: T) -> ItemOutcome[T]:
+        """What is stored of an item."""
+        job = self.job(item)
+        error = str(self.plans.rows.get(item.id, {}).get("error") or "")
+        result = None if job is None else self.rollouts.rows.get(job.key)
+        return ItemOutcome(item, self.answer(item), error, result)
+
+
+def _version(distribution: str) -> str:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,27 @@
+"""The wishes as a benchmark: LaMPilot's, over other scenes and words, with the passenger's earlier trips as H."""
+
+from __future__ import annotations
+
+from chauffeur.bench.lampilot.asking import PlainRequests
+from chauffeur.bench.lampilot.benchmark import LampilotBenchmark
+from chauffeur.bench.lampilot.frozen import Frozen, RunConfig
+from chauffeur.bench.passengers.asking import PassengerRequests
+from chauffeur.bench.passengers.loading import as_dataset, load_wishes
+from chauffeur.concept import LAMPILOT_LIMITS
+from chauffeur.planners.prompts import Setting
+
+
+def run_config(planner: str, setting: Setting) -> RunConfig:
+    """What decides a run over all wishes. Raises DataError: the wishes are damaged."""
+    return RunConfig(planner, setting, as_dataset().sha256, 0, 0, LAMPILOT_LIMITS, asked="passengers")
+
+
+def requests_of(setting: Setting) -> PassengerRequests:
+    """What a planner is asked under a prompt setting."""
+    return PassengerRequests(PlainRequests.of(setting, LAMPILOT_LIMITS), load_wishes())
+
+
+def passengers(planner: str = "onboard", setting: Setting = "few-shot") -> LampilotBenchmark:
+    """The benchmark, as its entry point gives it."""
+    frozen = Frozen.of(as_dataset(), run_config(planner, setting), "")
+    return LampilotBenchmark(frozen, requests_of(setting))

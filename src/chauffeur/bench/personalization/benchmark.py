@@ -1,0 +1,163 @@
+"""The study as a benchmark of the kernel: every passenger and task is an item, every trip a row."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+from typing_extensions import TypedDict  # pydantic reads the standard library's from Python 3.12 on only
+
+from chauffeur.bench.kernel.benchmark import ItemOutcome, Unasked
+from chauffeur.bench.kernel.metrics import TableSpec, share
+from chauffeur.bench.kernel.store import Row
+from chauffeur.bench.personalization.population import draw_passengers
+from chauffeur.bench.personalization.sayings import Half, sayings_sha256
+from chauffeur.bench.personalization.scenes import TASKS, scenes_of
+from chauffeur.bench.personalization.study import BENCH_VERSION, StudyJob, versions
+from chauffeur.concept import ConfigError
+from chauffeur.drive.session import scenario_hash
+from chauffeur.planners.registry import make_planner
+
+SIMULATED: Final = "simulated passengers in simulated drives; nobody was asked and nobody was driven"
+"""Stands beside every figure."""
+
+
+@dataclass(frozen=True, slots=True)
+class StudyConfig:
+    """What decides a run.
+
+    Attributes:
+        passengers: How many simulated people.
+        seed: They, their moods and their words are drawn from it.
+        planner: Who plans without and with memory.
+        half: Which half of the wordings is said.
+        trips: How many trips the memory learns from, for each task.
+    """
+
+    passengers: int = 100
+    seed: int = 1
+    planner: str = "talk2drive"
+    half: Half = "test"
+    trips: int = 5
+
+
+class _TripFields(TypedDict):
+    passenger: str
+    arm: str
+    task: str
+    ground: str
+    aim: str
+    level: str
+    scene: str
+    trip: int
+    phase: str
+    place: int
+    wish: str
+    wanted_mps: float
+    outcome: str
+    seconds: float
+    takeover: bool
+    topic: str
+    at_s: float | None
+    force: str
+    deviation: float
+    statistics: dict[str, float | None]
+    planner: str
+    model: str
+    half: str
+    note: str
+
+
+class TripRow(_TripFields, total=False):
+    """A trip; the fields of its plan are missing where the passenger chose."""
+
+    declined: bool
+    refusal: str
+    intent: str
+    policy: dict[str, Any] | None
+    recalled: int
+    feedback: str
+    latency_s: float
+
+
+class StudyBenchmark(Unasked):
+    """Takeover rates of simulated passengers. The planner is asked in the workers, where its memory is."""
+
+    id = BENCH_VERSION
+    row = TripRow
+    tables = (
+        TableSpec(
+            "Takeovers of the measured trips",
+            (share("personalization-takeover-v1", "takeover", lambda row: row["takeover"]),),
+            group="arm",
+            cluster="passenger",
+            rows=lambda row: row["phase"] == "measured",
+            heads=("system", "trips"),
+            total=False,
+        ),
+    )
+
+    def __init__(self, options: StudyConfig, planner_options: Mapping[str, Any] | None = None) -> None:
+        """Make it.
+
+        Args:
+            options: What decides a run.
+            planner_options: Of the planner, e.g. its endpoint.
+
+        Raises:
+            ConfigError: The options make no sense, or there is no such planner.
+        """
+        if options.trips < 0:
+            raise ConfigError(f"{options.trips} trips are less than none.", hint="Learn from 0 trips or more.")
+        self.options = options
+        self._planner_options = tuple((planner_options or {}).items())
+        self.model = make_planner(options.planner, **dict(self._planner_options)).model
+
+    @property
+    def config(self) -> Mapping[str, Any]:
+        """See Benchmark."""
+        hashes = [scenario_hash(scene) for task in TASKS for scene in scenes_of(task)]
+        return {
+            **asdict(self.options),
+            **versions(),
+            "model": self.model,
+            "sayings_sha256": sayings_sha256(),
+            "scenes_sha256": hashlib.sha256("\n".join(hashes).encode()).hexdigest(),
+            "simulated": SIMULATED,
+        }
+
+    def items(self) -> Sequence[StudyJob]:
+        """See Benchmark: person by person, so that what is done at any time is a whole study."""
+        one, options = self.options, self._planner_options
+        return [
+            StudyJob(f"{who.id}.{task}", number, task, one.seed, one.planner, one.half, one.trips, options)
+            for number, who in enumerate(draw_passengers(one.passengers, one.seed))
+            for task in TASKS
+        ]
+
+    def job(self, item: StudyJob, answer: Row | None) -> StudyJob:
+        """See Benchmark."""
+        del answer
+        return item
+
+    def rows(self, outcome: ItemOutcome[StudyJob]) -> Sequence[Row]:
+        """See Benchmark."""
+        found = outcome.result
+        if found is None or found["infra_failed"]:
+            return ()
+        common = {
+            "planner": self.options.planner,
+            "model": self.model,
+            "half": self.options.half,
+            "note": SIMULATED,
+        }
+        return [{"passenger": found["passenger"], **trip, **common} for trip in found["trips"]]
+
+
+def personalization(
+    passengers: int = 100, seed: int = 1, planner: str = "talk2drive", half: Half = "test", trips: int = 5
+) -> StudyBenchmark:
+    """The benchmark, as its entry point gives it; arguments as in StudyConfig."""
+    return StudyBenchmark(StudyConfig(passengers, seed, planner, half, trips))
