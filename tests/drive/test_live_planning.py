@@ -10,7 +10,7 @@ import pytest
 from live_bench import OVERTAKE, Bench
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
-from chauffeur.describe import describe
+from chauffeur.describe import describe_with_traffic
 from chauffeur.drive.live import planning as module
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.orders import Event, Order, Request, encode, read_brief, read_event, read_order
@@ -127,7 +127,7 @@ def test_what_a_plan_was_made_of_is_left_for_the_books(rig: Rig) -> None:
     assert message is not None
     brief = read_brief(message.payload)
     assert (brief.wish, brief.instruction.text, brief.trip, brief.tick) == ("w1", "decline", 1, 1)
-    assert brief.context == describe(rig.bench.world.snapshot())
+    assert brief.context == describe_with_traffic(rig.bench.world.snapshot())
     assert (brief.history.items, brief.plan.refusal) == ((), "Cars cannot fly.")
 
 

@@ -218,7 +218,7 @@ def test_benign_programs_are_foreseen(name: str) -> None:
 
 PLANNED = [
     ("overtake", "Overtake the car in front of you."),
-    ("following", "Get much closer to the car ahead."),
+    ("following", "Follow the car ahead at 30 m."),
     ("following", "Leave a bit more room to the car ahead."),
     ("cruise", "Slow down to 90 km/h."),
     ("left-lane", "Move over to the right lane."),

@@ -21,7 +21,7 @@ from chauffeur.bench.kernel.store import Row
 from chauffeur.concept import ChauffeurError, Context, Plan, PlanRequest, Scenario, Thoughts, Usage
 from chauffeur.planners.base import Prose
 
-_VERSIONED: Final = re.compile(r".+-v\d+")
+_VERSIONED: Final = re.compile(r"[\w./-]{1,80}-v\d{1,4}")
 _REFUSED: Final = Plan(Thoughts("No."), None, refusal="No.", planner="conformance", model="conformance")
 
 
