@@ -12,16 +12,19 @@ WISH ?= Overtake the car in front of you.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 JOBS ?= auto
 VERSIONS ?= 3.11 3.12 3.13
+# What lint reads the types of, and what CI tests beside the core.
+EXTRAS ?= models,motion,town,maps,carla,camera
 
-.PHONY: drive test lint format bench docs fresh-import clean
+.PHONY: drive test lint format bench docs extras fresh-import clean
 
-drive: $(VENV)/.core
+# A wish of one's own may be about what the car sees: with it come the test track and the camera.
+drive: $(VENV)/.core $(if $(filter command environment,$(origin WISH)),$(VENV)/.seeing)
 	$(BIN)/chauffeur drive "$(WISH)" --save trips/latest
 
 test: $(VENV)/.dev
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
-lint: $(VENV)/.dev
+lint: extras
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
@@ -34,6 +37,8 @@ format: $(VENV)/.dev
 bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/program_tick.py
 	@echo "LaMPilot-Bench: $(BIN)/chauffeur bench lampilot --data DIR --planner onboard"
+
+extras: $(VENV)/.extras
 
 docs: $(VENV)/.docs
 	$(BIN)/zensical build
@@ -63,8 +68,16 @@ $(VENV)/.core: $(VENV)/.made pyproject.toml constraints.txt
 	$(PIP) install -c constraints.txt -e .
 	@touch $@
 
+$(VENV)/.seeing: $(VENV)/.core
+	$(PIP) install -c constraints.txt -e ".[motion,camera]"
+	@touch $@
+
 $(VENV)/.dev: $(VENV)/.core
 	$(PIP) install -c constraints.txt -e ".[dev]"
+	@touch $@
+
+$(VENV)/.extras: $(VENV)/.dev
+	$(PIP) install -c constraints.txt -e ".[$(EXTRAS)]"
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.core

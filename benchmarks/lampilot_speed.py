@@ -94,7 +94,7 @@ def start_up(bench: Bench) -> None:
         "for scenario in BUILT_IN:\n"
         "    world = HighwayWorld(); world.reset(scenario)\n"
         "    world.driver().command(world.driver().settle(world.driver().initial_wishes()))\n"
-        "    world.step(Command(0.0, 0.0)); world.snapshot()\n"
+        "    world.step(Command(0.0, 0.0)); world.observe()\n"
         "print(*read, time.process_time() - cpu, time.perf_counter() - wall)\n"
     )
     lines = []

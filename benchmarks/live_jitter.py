@@ -22,11 +22,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.orders import Brief, Event
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
-from chauffeur.drive.live.supervisor import Replaced, Role, Runtime
+from chauffeur.drive.live.supervisor import Role, Runtime
 from chauffeur.drive.scenarios import find
 
 SCENARIOS = ("overtake", "following", "left-lane", "emergency-lane", "intersection")
@@ -59,9 +59,10 @@ class Watch:
         if self._lost_at is None:
             self._lost_at = at_s
 
-    def __call__(self, heard: Event | Report | Brief | Replaced) -> None:
-        if isinstance(heard, Event):
-            self.events[heard.kind] += 1
+    def __call__(self, event: DriveEvent) -> None:
+        heard = event.value
+        if heard is None:
+            self.events[event.kind] += 1
         if not isinstance(heard, Report):
             return
         self.rungs[heard.rung] += 1

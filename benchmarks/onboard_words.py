@@ -27,12 +27,12 @@ from typing import Any
 from chauffeur.concept import (
     LAMPILOT_LIMITS,
     Limits,
+    Observation,
     Plan,
     Program,
     ProgramError,
     Scenario,
     Situation,
-    Snapshot,
     Thoughts,
 )
 from chauffeur.describe import describe
@@ -108,11 +108,11 @@ def driven(job: tuple[Case, Example, Reply]) -> bool:
 
 
 @cache
-def _road() -> tuple[Snapshot, Situation]:
+def _road() -> tuple[Observation, Situation]:
     """An ordinary road with somebody ahead, for wishes that have no scene of their own."""
     scenario = find("overtake")
-    snapshot = HighwayWorld().reset(scenario, scenario.seed)
-    return snapshot, describe(snapshot).situation
+    observation = HighwayWorld().reset(scenario, scenario.seed)
+    return observation, describe(observation).situation
 
 
 def refused_after_all(reply: Reply) -> bool:
@@ -120,7 +120,7 @@ def refused_after_all(reply: Reply) -> bool:
 
     They are asked with what the planner says of the program and under the limits that hold for anybody.
     """
-    snapshot, situation = _road()
+    observation, situation = _road()
     limits, leaning = Limits(), Leaning()
     linked = link(reply.steps, situation, limits, lambda _: leaning)
     if isinstance(linked, Declined):
@@ -128,7 +128,7 @@ def refused_after_all(reply: Reply) -> bool:
     settings = linked.choice.settings([leaning] * len(reply.steps))
     program = Program(reply.source, library=linked.library)
     plan = Plan(Thoughts(""), program, intent=linked.choice.intent, settings=settings)
-    return any(verdict.stops for verdict in check_drive(plan, snapshot, limits))
+    return any(verdict.stops for verdict in check_drive(plan, observation, limits))
 
 
 def outcomes(

@@ -29,8 +29,9 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from chauffeur.concept import Command, LaneView, Limits, Scenario, VehicleState, Wishes
-from chauffeur.drive.episode import HeldWishes, run_episode
+from chauffeur.concept import Command, Lane, Limits, Scenario, VehicleState, Wishes
+from chauffeur.drive.episode import run_episode
+from chauffeur.executors.base import HeldWishes
 from chauffeur.safety.blame import blame
 from chauffeur.safety.shield import LAMPILOT_SHIELD, SHIELD_VERSION, Shield
 from chauffeur.worlds.highway import HighwayWorld
@@ -74,12 +75,12 @@ class Wishing:
     def tick(self) -> HeldWishes:
         """Wishes of a period."""
         self._tick += 1
-        snapshot = self._world.snapshot()
-        served = frozenset(thing.id for thing in snapshot.objects if thing.kind == "stop_sign")
+        observation = self._world.observe()
+        served = frozenset(thing.id for thing in observation.objects if thing.kind == "stop_sign")
         here = self._world.perception().lane_of(0)
         lane = None
         if self._kind == "weaver":
-            beside = [one.id for one in snapshot.lanes if one.id[:2] == here[:2]]
+            beside = [one.id for one in observation.road.abreast(here)]
             lane = beside[int(self._rng.integers(len(beside)))]
         speed = 80.0
         if self._kind == "never-yield" and (self._tick // 20) % 3 == 2:
@@ -107,7 +108,8 @@ class Pressing:
     def command(self) -> Command:
         """Pedal and wheel of a period."""
         if self._kind == "saboteur":
-            return Command(float(self._rng.uniform(-5, 5)), float(self._rng.uniform(-1, 1)) * math.pi / 4)
+            # Draws of the wheel are to the right: a seed is the trip that it has always been.
+            return Command(float(self._rng.uniform(-5, 5)), -float(self._rng.uniform(-1, 1)) * math.pi / 4)
         driver = self._world.driver()
         wishes = self._wishing.tick().wishes
         if self._wishes is not None:
@@ -117,11 +119,11 @@ class Pressing:
         if self._kind in ("drifter", "creeper"):
             if self._rng.random() < 0.05:  # every two seconds another way off
                 self._off_rad = float(self._rng.uniform(-DRIFTS_RAD, DRIFTS_RAD))
-            now = self._world.snapshot()
+            now = self._world.observe()
             there = now.stop_sign_m is None or now.stop_sign_m < CREEPS_FROM_M
             slow = self._kind == "creeper" and there and now.ego.speed_mps > CREEPS_MPS
-            return Command(-2.0 if slow else float(self._rng.uniform(0.0, 5.0)), steering + self._off_rad)
-        return Command(5.0, steering + 0.15 * float(self._rng.standard_normal()))
+            return Command(-2.0 if slow else float(self._rng.uniform(0.0, 5.0)), steering - self._off_rad)
+        return Command(5.0, steering - 0.15 * float(self._rng.standard_normal()))
 
 
 def scenario(traffic: Traffic, seed: int) -> Scenario:
@@ -148,11 +150,13 @@ def drive(job: Job) -> dict[str, Any]:
     """Drive a trip; a row, `outcome` `unfit` where the draw began with a collision."""
     rng = np.random.default_rng([job.seed, KINDS.index(job.kind), 11])
     world = ProvokedWorld(MOODS.get(job.traffic, "calm"), rng)
-    snapshot = world.reset(scenario(job.traffic, job.seed))
-    ego = snapshot.ego
+    observation = world.reset(scenario(job.traffic, job.seed))
+    ego = observation.ego
     row: dict[str, Any] = asdict(job)
-    near = [math.hypot(car.x_m - ego.x_m, car.y_m - ego.y_m) for car in snapshot.others if abs(car.y_m - ego.y_m) < 3.0]
-    if any(car.crashed for car in snapshot.others) or min(near, default=math.inf) < TOUCHING_M:
+    near = [
+        math.hypot(car.x_m - ego.x_m, car.y_m - ego.y_m) for car in observation.others if abs(car.y_m - ego.y_m) < 3.0
+    ]
+    if any(car.crashed for car in observation.others) or min(near, default=math.inf) < TOUCHING_M:
         return row | {"outcome": "unfit"}
     hands = Pressing(job.kind, world, rng) if job.kind in HANDS else None
     policy = None if hands is not None else Wishing(job.kind, world, rng)
@@ -160,7 +164,7 @@ def drive(job: Job) -> dict[str, Any]:
     most = MAX_S.get(job.traffic, HIGHWAY_S)
     episode = run_episode(world, policy, None, max_s=most, hands=hands, shield=shield)
     found = blame(episode.frames, episode.final, world.dt_s)
-    speeds = [frame.snapshot.ego.speed_mps for frame in episode.frames]
+    speeds = [frame.observation.ego.speed_mps for frame in episode.frames]
     return row | {
         "outcome": episode.outcome,
         "blame": found.who,
@@ -209,14 +213,14 @@ def _line(name: str, rows: list[dict[str, Any]]) -> str:
 class _Put:
     """A car put on a lane of a crossing, its way along it at the beginning, and the speed it keeps."""
 
-    lane: LaneView
+    lane: Lane
     at_m: float
     speed_mps: float
 
     def car(self, number: int, time_s: float) -> VehicleState:
         """Where it is; at the end of its lane it begins anew."""
         along = (self.at_m + self.speed_mps * time_s) % self.lane.length_m
-        points = np.array(self.lane.centre_m)
+        points = self.lane.centre.points
         ways = np.diff(points, axis=0)
         reached = np.r_[0.0, np.cumsum(np.hypot(ways[:, 0], ways[:, 1]))]
         piece = max(0, min(int(np.searchsorted(reached, along)), len(ways)) - 1)
@@ -225,7 +229,7 @@ class _Put:
         return VehicleState(number, "car", x, y, heading, self.speed_mps, 5.0, 2.0, self.lane.id)
 
 
-def crowd(lanes: tuple[LaneView, ...], seed: int) -> list[_Put]:
+def crowd(lanes: tuple[Lane, ...], seed: int) -> list[_Put]:
     """30 cars on the ways of a crossing, as many to a metre everywhere, 0 to 12 m/s fast."""
     rng = np.random.default_rng(seed)
     lengths = np.array([lane.length_m for lane in lanes])
@@ -236,7 +240,7 @@ def crowd(lanes: tuple[LaneView, ...], seed: int) -> list[_Put]:
 def _times(name: str, config: dict[str, Any], seed: int, put: bool = False) -> list[float]:
     """CPU microseconds of `Shield.guard` in each control period of a trip, the first ten left out."""
     world = HighwayWorld()
-    lanes = world.reset(Scenario(name, "highway", config, seed)).lanes
+    lanes = world.reset(Scenario(name, "highway", config, seed)).road.lanes
     cars = crowd(lanes, seed) if put else []
     # Before the trip: what is worked out between two control periods costs the next one the processor's caches.
     crowds = [tuple(car.car(i, tick * world.dt_s) for i, car in enumerate(cars, start=1)) for tick in range(PERIODS)]
@@ -244,11 +248,11 @@ def _times(name: str, config: dict[str, Any], seed: int, put: bool = False) -> l
     wishes = driver.initial_wishes()
     for others in crowds:
         wishes = driver.settle(wishes)
-        command, snapshot = driver.command(wishes), world.snapshot()
+        command, observation = driver.command(wishes), world.observe()
         if put:
-            snapshot = replace(snapshot, others=others)
+            observation = replace(observation, others=others)
         begun = time.process_time()
-        guarded = shield.guard(snapshot, command)
+        guarded = shield.guard(observation, command)
         taken.append((time.process_time() - begun) * 1e6)
         world.step(guarded.command)
         if world.ended:

@@ -2,7 +2,6 @@
 
     [project.entry-points."chauffeur.benchmarks"]
     right-of-way = "right_of_way:RightOfWay"
-
     [project.entry-points."chauffeur.planners"]
     polite = "right_of_way:Polite"
 

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 SHARED_DATA = Path(os.environ.get("CHAUFFEUR_TEST_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+
+# Everybody's run tries the same examples, however busy the machine; HYPOTHESIS_PROFILE=default looks for new ones.
+settings.register_profile("same-for-all", derandomize=True, deadline=None)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same-for-all"))
 
 
 @pytest.fixture(scope="session")
@@ -23,10 +29,42 @@ def lampilot_data() -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def _cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache folder with nothing in it but the user's compiled kernels, which take half a minute to make."""
+    from chauffeur.worlds.highway.core import jit
+
+    cache = tmp_path_factory.mktemp("cache")
+    (cache / "chauffeur").mkdir()
+    (cache / "chauffeur" / Path(jit._STORE).name).symlink_to(jit._STORE)
+    return cache
+
+
+@pytest.fixture(scope="session")
+def carla_data() -> Path:
+    """Folder with the routes, triggers, maps and signal tables of CARLA's towns."""
+    folder = SHARED_DATA / "carla"
+    if not (folder / "maps").is_dir():
+        pytest.skip(f"CARLA data not found at {folder}; set CHAUFFEUR_TEST_DATA to the folder that holds carla/")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def _homes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Names of home folders that do not exist until something is written there: most tests write nothing."""
+    parent = tmp_path_factory.mktemp("homes")
+    return (parent / str(number) for number in itertools.count())
+
+
 @pytest.fixture(autouse=True)
-def _private_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No test touches the user's profiles or cache."""
-    monkeypatch.setenv("CHAUFFEUR_HOME", str(tmp_path / "home"))
+def _private_home(monkeypatch: pytest.MonkeyPatch, _cache: Path, _homes: Iterator[Path]) -> Iterator[None]:
+    """No test touches the user's profiles or cache, nor reads a reply that another has kept."""
+    monkeypatch.setenv("CHAUFFEUR_HOME", str(next(_homes)))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(_cache))
+    yield
+    for kept in (_cache / "chauffeur").iterdir():
+        if kept.name.startswith("replies-"):
+            shutil.rmtree(kept)
 
 
 @pytest.fixture(scope="session")

@@ -38,11 +38,11 @@ def examine(data: bytes) -> str:
     source, library = split(data)
     passed = check_source(source, library).passed
     world = world_for(zlib.crc32(data))
-    snapshot = world.snapshot()
+    observation = world.observe()
     plan = Plan(_THOUGHTS, Program(source, library=library))
-    verdicts = [check(plan, snapshot, LIMITS) for check in _CHECKS]
+    verdicts = [check(plan, observation, LIMITS) for check in _CHECKS]
     expect(verdicts[0].passed == passed, "format-v1 and the gate differ")
-    where = Circumstances.of(snapshot)
+    where = Circumstances.of(observation)
     try:
         report = verify(source, library, where)
     except ProgramSyntaxError:

@@ -12,8 +12,9 @@ from chauffeur.control import (
 )
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.driver import route_of
+from chauffeur.worlds.highway.network import LaneKey
 from highway_oracle.perception import ReferencePerception
-from highway_oracle.scenes import Scene, lane_id
+from highway_oracle.scenes import Scene, key_of, name_of
 
 
 class ReferenceDriver:
@@ -23,12 +24,12 @@ class ReferenceDriver:
         self._scene = scene
         self._perception = perception
         self._turn: Turn | None = None
-        self._route: list[LaneId] = []
+        self._route: list[LaneKey] = []
 
     def initial_wishes(self) -> Wishes:
         """Keep the present speed and lane."""
         ego = self._scene.ego
-        return Wishes(target_speed_mps=float(ego.speed), target_lane=lane_id(ego.lane_index))
+        return Wishes(target_speed_mps=float(ego.speed), target_lane=name_of(ego.lane_index))
 
     def settle(self, wishes: Wishes) -> Wishes:
         """Wishes with defaults filled in and the lane moved on to the next one where it ends."""
@@ -39,8 +40,8 @@ class ReferenceDriver:
         if wishes.turn is not None and wishes.turn != self._turn:
             self._plan_route(wishes.turn)
         ego, network = self._scene.ego, self._scene.road.network
-        if network.get_lane(lane).after_end(ego.position):
-            lane = lane_id(network.next_lane(lane, route=self._route, position=ego.position))
+        if network.get_lane(key_of(lane)).after_end(ego.position):
+            lane = name_of(network.next_lane(key_of(lane), route=self._route, position=ego.position))
         if speed == wishes.target_speed_mps and lane == wishes.target_lane:
             return wishes
         return replace(wishes, target_speed_mps=speed, target_lane=lane)
@@ -51,7 +52,7 @@ class ReferenceDriver:
         acceleration, steering = self.controls(wishes)
         return Command(
             acceleration_mps2=full_scale(acceleration, actuation.max_acceleration_mps2),
-            steering_rad=full_scale(steering, actuation.max_steering_rad),
+            steering_rad=0.0 - full_scale(steering, actuation.max_steering_rad),  # highway-env's is to the right
         )
 
     def controls(self, wishes: Wishes) -> tuple[float, float]:
@@ -66,7 +67,7 @@ class ReferenceDriver:
 
     def _lateral(self, lane: LaneId) -> float:
         ego = self._scene.ego
-        geometry = self._scene.road.network.get_lane(lane)
+        geometry = self._scene.road.network.get_lane(key_of(lane))
         s, offset = geometry.local_coordinates(ego.position)
         heading_ahead = geometry.heading_at(s + ego.speed * LAMPILOT_STEERING.preview_s)
         return lane_keeping_steering(
@@ -75,6 +76,6 @@ class ReferenceDriver:
 
     def _plan_route(self, turn: Turn) -> None:
         self._turn = turn
-        here = lane_id(self._scene.ego.lane_index)
-        legs = route_of(self._scene.road.network, here, turn)
+        here = key_of(name_of(self._scene.ego.lane_index))
+        legs = route_of(self._scene.road.network, here[:2], turn)
         self._route = [here, *((a, b, 0) for a, b in legs[1:])]

@@ -1,4 +1,7 @@
-"""Answers to the driving APIs' questions on LaMPilot's roads, with LaMPilot's meaning of each, from highway-env."""
+"""Answers to the driving APIs' questions on LaMPilot's roads, with LaMPilot's meaning of each, from highway-env.
+
+highway-env has y and headings to the right; what is given from here on has them to the left.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from chauffeur.control import LAMPILOT_EGO, idm_acceleration
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.instant import Instant
 from highway_oracle.conflicts import ttc_along, ttc_lane, ttc_plane
-from highway_oracle.scenes import Scene, lane_id
+from highway_oracle.scenes import Scene, key_of, name_of
 from highway_oracle.traffic import IDMVehicle, StopSign, Vehicle
 
 
@@ -54,10 +57,10 @@ class ReferencePerception:
         s, r = ego.lane.local_coordinates(ego.position)
         return Instant(
             float(ego.speed),
-            float(ego.heading),
+            0.0 - float(ego.heading),
             float(ego.position[0]),
-            float(ego.position[1]),
-            lane_id(ego.lane_index),
+            0.0 - float(ego.position[1]),
+            name_of(ego.lane_index),
             None if front is None else self.id_of(front),
             math.nan if front is None else float(ego.lane_distance_to(front)),
             math.nan if front is None else float(front.speed),
@@ -71,16 +74,16 @@ class ReferencePerception:
 
     def reachable(self, lane: LaneId) -> bool:
         """Whether the ego may change to a lane from where it is."""
-        return bool(self._network.get_lane(lane).is_reachable_from(self.ego.position))
+        return bool(self._network.get_lane(key_of(lane)).is_reachable_from(self.ego.position))
 
     def distance_on(self, lane: LaneId, to_id: int) -> float:
         """Signed distance from the ego to another along a given lane, m."""
-        return float(self.ego.lane_distance_to(self._by_id[to_id], self._network.get_lane(lane)))
+        return float(self.ego.lane_distance_to(self._by_id[to_id], self._network.get_lane(key_of(lane))))
 
     def lane_heading(self, lane: LaneId) -> float:
         """Heading of a lane where the ego is along it, rad."""
-        geometry = self._network.get_lane(lane)
-        return float(geometry.heading_at(geometry.local_coordinates(self.ego.position)[0]))
+        geometry = self._network.get_lane(key_of(lane))
+        return 0.0 - float(geometry.heading_at(geometry.local_coordinates(self.ego.position)[0]))
 
     def traffic_idm(self, follower_id: int, leader_id: int | None) -> float | None:
         """Acceleration, m/s2, that a car of the traffic would choose behind another; None if it is no such car."""
@@ -100,27 +103,27 @@ class ReferencePerception:
 
     def has_lane(self, lane: LaneId) -> bool:
         """Whether the road has this lane."""
-        lanes = self._network.graph.get(lane[0], {}).get(lane[1], ())
-        return 0 <= lane[2] < len(lanes)
+        return any(name_of(index) == lane for index in self._network.lanes_dict())
 
     def lane_of(self, vehicle_id: int) -> LaneId:
         """Closest lane of a vehicle."""
-        return lane_id(self._by_id[vehicle_id].lane_index)
+        return name_of(self._by_id[vehicle_id].lane_index)
 
     def adjacent_lane(self, lane: LaneId, offset: int) -> LaneId | None:
         """Lane `offset` places to the right (negative: left); None beyond the edge."""
-        index = lane[2] + offset
-        if offset == 0 or not 0 <= index < len(self._network.graph[lane[0]][lane[1]]):
+        start, end, own = key_of(lane)
+        index = own + offset
+        if offset == 0 or not 0 <= index < len(self._network.graph[start][end]):
             return None
-        return lane[0], lane[1], index
+        return name_of((start, end, index))
 
     def speed_limit(self, lane: LaneId) -> float:
         """Speed limit, m/s."""
-        return float(self._network.get_lane(lane).speed_limit)
+        return float(self._network.get_lane(key_of(lane)).speed_limit)
 
     def neighbours(self, lane: LaneId) -> tuple[int | None, int | None]:
         """Nearest vehicle or obstacle ahead of and behind the ego on a lane segment."""
-        front, rear = self._road.neighbour_vehicles(self.ego, lane)
+        front, rear = self._road.neighbour_vehicles(self.ego, key_of(lane))
         return (
             None if front is None else self.id_of(front),
             None if rear is None else self.id_of(rear),
@@ -136,8 +139,8 @@ class ReferencePerception:
         if self._scene.kind != "intersection":
             return ()
         if from_left:
-            return ("o1", "ir1", 0), ("ir1", "il3", 0), ("il3", "o3", 0)
-        return ("il1", "o1", 0), ("ir3", "il1", 0), ("o3", "ir3", 0)
+            return "o1-ir1:0", "ir1-il3:0", "il3-o3:0"
+        return "il1-o1:0", "ir3-il1:0", "o3-ir3:0"
 
     def stop_sign_ahead(self, served: frozenset[int]) -> tuple[int, float] | None:
         """(id, distance) of the nearest unserved stop sign ahead on the ego's lane."""
@@ -197,11 +200,11 @@ def vehicle_state(vehicle_id: int, entity: Any) -> VehicleState:
         id=vehicle_id,
         kind=kind,
         x_m=float(entity.position[0]),
-        y_m=float(entity.position[1]),
-        heading_rad=float(entity.heading),
+        y_m=0.0 - float(entity.position[1]),
+        heading_rad=0.0 - float(entity.heading),
         speed_mps=float(entity.speed),
         length_m=float(entity.LENGTH),
         width_m=float(entity.WIDTH),
-        lane=None if entity.lane_index is None else lane_id(entity.lane_index),
+        lane=None if entity.lane_index is None else name_of(entity.lane_index),
         crashed=bool(entity.crashed),
     )

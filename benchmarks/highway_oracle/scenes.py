@@ -14,14 +14,16 @@ from typing import Any
 import numpy as np
 from highway_env.road.lane import CircularLane, LineType, SineLane, StraightLane
 
-from chauffeur.concept import LaneId, LaneView, ScenarioError
+from chauffeur.concept import LaneId, RoadGraph, ScenarioError
 from chauffeur.control import LAMPILOT_HIGHWAY, LAMPILOT_INTERSECTION, Actuation
+from chauffeur.worlds.highway.network import LaneKey, lane_id
 from chauffeur.worlds.highway.roads import (
     HIGHWAY_LIMIT_MPS,
     LANE_WIDTH_M,
     RAMP_LIMIT_MPS,
     EgoConfig,
     RoadConfig,
+    road_graph,
     stages,
 )
 from highway_oracle.traffic import (
@@ -61,37 +63,25 @@ class Scene:
     duration_s: float
     bounds: tuple[float, float, float]
     alone_steps: int = 0
-    emergency_lanes: frozenset[tuple[str, str, int]] = field(default_factory=frozenset[tuple[str, str, int]])
+    emergency_lanes: frozenset[LaneId] = field(default_factory=frozenset[LaneId])
 
 
-def lane_id(index: tuple[Any, Any, Any]) -> LaneId:
-    """A lane index with plain Python types; highway-env mixes in NumPy strings and integers."""
-    return str(index[0]), str(index[1]), int(index[2])
+def name_of(index: tuple[Any, Any, Any]) -> LaneId:
+    """The name of highway-env's lane index, which mixes NumPy's strings and integers with Python's."""
+    return lane_id((str(index[0]), str(index[1]), int(index[2])))
 
 
-def lane_views(scene: Scene) -> tuple[LaneView, ...]:
-    """The road as geometry for snapshots."""
-    views: list[LaneView] = []
-    lanes: dict[Any, Any] = scene.road.network.lanes_dict()
-    for index, lane in lanes.items():
-        length = float(lane.length)
-        straight = lane.heading_at(0.0) == lane.heading_at(length) == lane.heading_at(length / 2)
-        points = 2 if straight else max(9, round(length / 2))
-        centre = tuple(
-            (float(p[0]), float(p[1])) for p in (lane.position(s, 0.0) for s in np.linspace(0.0, length, points))
-        )
-        views.append(
-            LaneView(
-                id=lane_id(index),
-                width_m=float(lane.width_at(0.0)),
-                length_m=length,
-                speed_limit_mps=float(lane.speed_limit),
-                forbidden=bool(lane.forbidden),
-                emergency=lane_id(index) in scene.emergency_lanes,
-                centre_m=centre,
-            )
-        )
-    return tuple(views)
+def key_of(lane: LaneId) -> LaneKey:
+    """highway-env's index of a lane."""
+    road, index = lane.split(":")
+    start, end = road.split("-")
+    return start, end, int(index)
+
+
+def road_of(scene: Scene) -> RoadGraph:
+    """The graph of highway-env's lanes."""
+    lanes = {key_of(name_of(index)): lane for index, lane in scene.road.network.lanes_dict().items()}
+    return road_graph(lanes, scene.emergency_lanes)
 
 
 def build_scene(config: RoadConfig, rng: np.random.Generator) -> Scene:
@@ -181,7 +171,7 @@ def _multi_lane(config: RoadConfig, rng: np.random.Generator) -> Scene:
                 speed_limit=HIGHWAY_LIMIT_MPS,
             ),
         )
-        emergency = frozenset({("a", "b", regular)})
+        emergency = frozenset({name_of(("a", "b", regular))})
     network.freeze()
     road = FastRoad(network=network, np_random=rng)
     ego = _place_ego(road, config, ("a", "b", 0), (380.0, 0.0))

@@ -1,4 +1,7 @@
-"""The highway world on highway-env: LaMPilot's roads behind the `World` contract, without the compiled core."""
+"""The highway world on highway-env: LaMPilot's roads behind the `World` contract, without the compiled core.
+
+Inside, y, headings and steering grow to the right, as in highway-env; what is given from here on has them to the left.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,14 @@ import math
 
 import numpy as np
 
-from chauffeur.concept import Command, LaneView, Lead, Scenario, ScenarioError, Snapshot
+from chauffeur.concept import Command, Lead, Observation, RoadGraph, Scenario, ScenarioError
 from chauffeur.control import Actuation
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.roads import DT_S, crowded_rows, parse_config
 from chauffeur.worlds.highway.world import FOLLOW_WITHIN_M
 from highway_oracle.driver import ReferenceDriver
 from highway_oracle.perception import ReferencePerception, vehicle_state
-from highway_oracle.scenes import Scene, build_scene, lane_views
+from highway_oracle.scenes import Scene, build_scene, road_of
 
 
 class ReferenceWorld:
@@ -25,7 +28,7 @@ class ReferenceWorld:
         self._scene: Scene | None = None
         self._perception: ReferencePerception | None = None
         self._driver: ReferenceDriver | None = None
-        self._lanes: tuple[LaneView, ...] = ()
+        self._graph: RoadGraph = RoadGraph(())
         self._tick = 0
         self._clock_s = 0.0
 
@@ -46,7 +49,7 @@ class ReferenceWorld:
             raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
         return self._scene
 
-    def reset(self, scenario: Scenario, seed: int | None = None) -> Snapshot:
+    def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
         """Build road and traffic, let it warm up, and place the ego in the flow.
 
         Raises:
@@ -63,22 +66,22 @@ class ReferenceWorld:
             self._advance(Command(0.0, 0.0))
         self._perception = ReferencePerception(scene)
         self._driver = None
-        self._lanes = lane_views(scene)
+        self._graph = road_of(scene)
         self._tick = 0
         ego = scene.ego
         ego.speed = float(scene.road.network.get_lane(ego.lane_index).speed_limit)
         front = scene.road.neighbour_vehicles(ego, ego.lane_index)[0]
         if front is not None and ego.lane_distance_to(front) < FOLLOW_WITHIN_M:
             ego.speed = float(front.speed)
-        return self.snapshot()
+        return self.observe()
 
     def step(self, command: Command) -> Command:
         """Advance 0.1 s under `command`; returns what the vehicle really applied."""
         if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
             raise ValueError(f"A command must be finite numbers, not {command}.")
-        applied = self._advance(command)
+        applied = self._advance(Command(command.acceleration_mps2, 0.0 - command.steering_rad))
         self._tick += 1
-        return applied
+        return Command(applied.acceleration_mps2, 0.0 - applied.steering_rad)
 
     def _advance(self, command: Command) -> Command:
         scene = self.scene
@@ -88,7 +91,7 @@ class ReferenceWorld:
         scene.road.step(DT_S)
         return Command(float(scene.ego.action["acceleration"]), float(scene.ego.action["steering"]))
 
-    def snapshot(self) -> Snapshot:
+    def observe(self) -> Observation:
         """The present instant as frozen values."""
         scene, perception = self.scene, self.perception()
         ego, road = scene.ego, scene.road
@@ -97,14 +100,14 @@ class ReferenceWorld:
         if front is not None:
             lead = Lead(perception.id_of(front), float(ego.lane_distance_to(front)), float(front.speed))
         sign = perception.stop_sign_ahead(frozenset())
-        return Snapshot(
+        return Observation(
             time_s=self._tick * DT_S,
             tick=self._tick,
             kind=scene.kind,
             ego=vehicle_state(EGO, ego),
             others=tuple(vehicle_state(perception.id_of(v), v) for v in road.vehicles if v is not ego),
             objects=tuple(vehicle_state(perception.id_of(o), o) for o in road.objects),
-            lanes=self._lanes,
+            road=self._graph,
             front=lead,
             stop_sign_m=None if sign is None else sign[1],
             off_road=not ego.on_road,

@@ -18,7 +18,7 @@ from typing import Any
 
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
-from chauffeur.concept import Command, Scenario, Snapshot
+from chauffeur.concept import Command, Observation, Scenario
 from chauffeur.drive.episode import run_episode
 from chauffeur.programs.gate import _judged
 from chauffeur.programs.rewrite import _prepared
@@ -129,12 +129,12 @@ class PlainWorld(ReferenceWorld):
     """highway-env as LaMPilot sets it up: its own classes, 30 states of history a vehicle, and the observation that a
     Gymnasium environment makes in every step, whoever reads it. Stands in for LaMPilot where there is no checkout."""
 
-    def reset(self, scenario: Scenario, seed: int | None = None) -> Snapshot:
+    def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
         """See ReferenceWorld."""
         from highway_env.envs.common.observation import KinematicObservation  # and pandas with it
 
         with plain_highway_env(record_history=True):
-            snapshot = super().reset(scenario, seed)
+            observation = super().reset(scenario, seed)
         scene = self.scene
         options: dict[str, Any] = {}
         if scene.kind == "intersection":
@@ -143,7 +143,7 @@ class PlainWorld(ReferenceWorld):
             options = {"features": features, "features_range": ranges, "vehicles_count": 10, "absolute": True}
         environment: Any = SimpleNamespace(road=scene.road, vehicle=scene.ego, PERCEPTION_DISTANCE=200.0)
         self._observation = KinematicObservation(environment, **options)
-        return snapshot
+        return observation
 
     def step(self, command: Command) -> Command:
         """See ReferenceWorld."""
@@ -172,7 +172,7 @@ def drive_job(job: RolloutJob) -> Drive:
     forget()
     clock = Clock()
     world = HighwayWorld()
-    snapshot = world.reset(job.scenario)
+    observation = world.reset(job.scenario)
     reset = clock.read()
     clock = Clock()
     row = roll_out(job)
@@ -181,7 +181,7 @@ def drive_job(job: RolloutJob) -> Drive:
     if signals is None:
         sys.exit(f"{job.key} was not driven: {row['detail']}")
     collision = signals["crashed"] or signals["off_road"]
-    return Drive(reset, run, row["steps"], 1 + len(snapshot.others), row["success"], collision)
+    return Drive(reset, run, row["steps"], 1 + len(observation.others), row["success"], collision)
 
 
 def forget() -> None:

@@ -119,10 +119,10 @@ def test_a_frozen_repository_serves_a_run_and_its_programs_travel_with_the_plan(
 
     item = items[1]
     world = make_world(item.scenario)
-    snapshot = world.reset(item.scenario)
+    observation = world.reset(item.scenario)
 
     async def ask() -> Any:
-        request = await aid.request(item, describe(snapshot))
+        request = await aid.request(item, describe(observation))
         planner = make_planner("openai/m", base_url=server.url, cache=False)
         try:
             return request, await planner.plan(request)
@@ -132,7 +132,7 @@ def test_a_frozen_repository_serves_a_run_and_its_programs_travel_with_the_plan(
     request, plan = asyncio.run(ask())
     assert request.system.setting == "human-feedback" and request.instruction.text == item.command
     assert plan.policy == Program(USE_IT, library=GO_LEFT)
-    verdicts = run_checks(plan, snapshot, LAMPILOT_LIMITS)
+    verdicts = run_checks(plan, observation, LAMPILOT_LIMITS)
     assert declined(plan, verdicts) == ""
     referee = referee_for(world, item.scenario, plan)
     episode = drive_program(world, USE_IT, referee, MAX_EPISODE_S, library=plan.policy.library)
@@ -150,7 +150,7 @@ def test_a_frozen_repository_serves_a_run_and_its_programs_travel_with_the_plan(
     assert make_trip(request, alone, (), item.scenario, item.scenario.seed, episode, "").id != trip.id
     # Without the library it is refused before it drives, and would die if it did.
     bare = replace(plan, policy=Program(USE_IT))
-    assert "go_left" in declined(bare, run_checks(bare, snapshot, LAMPILOT_LIMITS))
+    assert "go_left" in declined(bare, run_checks(bare, observation, LAMPILOT_LIMITS))
 
 
 @pytest.mark.server

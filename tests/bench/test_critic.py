@@ -122,12 +122,12 @@ def test_a_wish_that_must_be_refused_is_praised_for_being_refused(drive: Drive) 
 def test_a_crash_is_told_with_whom(drive: Drive) -> None:
     attempt = drive("overtake", LEFT_LANE, IDLE)
     frames = attempt.recorded.frames
-    other = replace(frames[-1].snapshot.others[0], crashed=True)
-    ego = frames[-1].snapshot.ego
+    other = replace(frames[-1].observation.others[0], crashed=True)
+    ego = frames[-1].observation.ego
     for ahead, right, who in ((5.0, 0.0, "the car ahead of it"), (-5.0, 0.0, "ran into it"), (1.0, 3.0, "on its right"),
                               (1.0, -3.0, "on its left")):  # fmt: skip
-        at = replace(other, x_m=ego.x_m + ahead, y_m=ego.y_m + right)
-        final = replace(frames[-1].snapshot, ego=replace(ego, crashed=True, heading_rad=0.0), others=(at,))
+        at = replace(other, x_m=ego.x_m + ahead, y_m=ego.y_m - right)
+        final = replace(frames[-1].observation, ego=replace(ego, crashed=True, heading_rad=0.0), others=(at,))
         crashed = replace(
             attempt.recorded, final=final, trip=replace(attempt.recorded.trip, outcome="collision", duration_s=12.3)
         )

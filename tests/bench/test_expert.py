@@ -106,9 +106,9 @@ def drive(scenario: Scenario, source: str, sandbox: Sandbox) -> dict[str, Any]:
 
 def test_the_safety_checks_pass_it(lampilot_data: Path) -> None:
     for scenario in samples(lampilot_data, 0):
-        snapshot = HighwayWorld().reset(scenario)
+        observation = HighwayWorld().reset(scenario)
         plan = Plan(Thoughts(""), Program(expert_program(scenario.goal)))
-        assert all(verdict.passed for verdict in run_checks(plan, snapshot, LAMPILOT_LIMITS)), scenario.id
+        assert all(verdict.passed for verdict in run_checks(plan, observation, LAMPILOT_LIMITS)), scenario.id
 
 
 @pytest.mark.parametrize("place", [0, 7])

@@ -177,7 +177,7 @@ def _bent(scene: str, **wishes: Any) -> dict[str, Any]:
 
 
 def test_settings_beyond_the_limits_are_seen() -> None:
-    limit = max(lane.speed_limit_mps for lane in quiet_drive("cruise").final.lanes)
+    limit = max(lane.speed_limit_mps for lane in quiet_drive("cruise").final.road.lanes)
     assert verdict_of(_bent("cruise", target_speed_mps=limit + 0.9))["setting"] == ""
     assert verdict_of(_bent("cruise", target_speed_mps=limit + 1.1))["setting"] == "speed"
     assert verdict_of(_bent("cruise", target_speed_mps=-1.0))["setting"] == "negative speed"

@@ -9,17 +9,17 @@ import pytest
 
 from chauffeur.bench.personalization.riding import ride_policy
 from chauffeur.bench.personalization.scenes import DRIVE_S, GROUND_OF, TASKS, Task, scenes_of
-from chauffeur.concept import Limits, Parameters, Snapshot
+from chauffeur.concept import Limits, Observation, Parameters
 from chauffeur.drive.session import make_world
 
 
-def _first(task: Task) -> list[Snapshot]:
+def _first(task: Task) -> list[Observation]:
     return [make_world(scene).reset(scene) for scene in scenes_of(task)]
 
 
-def _near(shot: Snapshot, lane: int, behind_m: float, ahead_m: float) -> bool:
+def _near(shot: Observation, lane: int, behind_m: float, ahead_m: float) -> bool:
     return any(
-        one.lane is not None and one.lane[2] == lane and -behind_m < one.x_m - shot.ego.x_m < ahead_m
+        one.lane is not None and shot.road[one.lane].index == lane and -behind_m < one.x_m - shot.ego.x_m < ahead_m
         for one in shot.others
     )
 
@@ -47,7 +47,7 @@ def test_there_is_somebody_to_follow_and_room_on_the_right() -> None:
     assert all(shot.front is not None and shot.front.distance_m < 50.0 for shot in _first("follow"))
     for shot in _first("right_lane"):
         assert shot.ego.lane is not None
-        assert shot.ego.lane[2] == 0
+        assert shot.road[shot.ego.lane].index == 0
         assert not _near(shot, 1, 60.0, 90.0)
 
 

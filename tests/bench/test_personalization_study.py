@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -64,16 +65,18 @@ class _Here:
 
     def __init__(self, most: int) -> None:
         self._left = most
+        self._one_at_a_time = asyncio.Lock()
 
     async def start(self) -> None:
         return
 
     async def run(self, work: Work, job: Any, *, near: str = "", urgent: bool = False) -> Row:
         del work, near, urgent
-        if not self._left:
-            raise KeyboardInterrupt
-        self._left -= 1
-        return await sit(job)
+        async with self._one_at_a_time:
+            if not self._left:
+                raise KeyboardInterrupt
+            self._left -= 1
+            return await sit(job)
 
     def close(self, *, now: bool) -> None:
         del now

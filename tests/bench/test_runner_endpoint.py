@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
 from coached_data import server_module
-from small_run import COMMANDS, FAST, LEFT, Inline, make_data, make_run, quiet
+from small_run import COMMANDS, FAST, LEFT, SEEDS, Inline, make_data, make_run, quiet
+from typer.testing import CliRunner
 
 from chauffeur.bench.kernel.run import Effort
 from chauffeur.bench.kernel.spending import Budget, Price
+from chauffeur.cli.main import app
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset
+from processes import started, until
 
 pytestmark = [pytest.mark.slow, pytest.mark.server, pytest.mark.timeout(600)]
 
@@ -39,23 +41,23 @@ class Endpoint:
     answered: int = 0
     refused: int = 0
     busiest: int = 0
-    _busy: int = 0
+    busy: int = 0
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def __call__(self, exchange: Any) -> None:
         with self._lock:
             fault = self.faults.pop(0) if self.faults else None
-            refuse = fault is None and self._busy >= self.cap
+            refuse = fault is None and self.busy >= self.cap
             self.refused += refuse
-            self._busy += not refuse
-            self.busiest = max(self.busiest, self._busy)
+            self.busy += not refuse
+            self.busiest = max(self.busiest, self.busy)
         if refuse:
             MODEL.fails(429, "Too many at a time.")(exchange)
             return
         if fault is None:
             exchange.pause(self.latency_s)
         with self._lock:
-            self._busy -= 1  # before the client can know and send the next
+            self.busy -= 1  # before the client can know and send the next
             self.answered += fault is None
         (fault or MODEL.whole(REPLY))(exchange)
 
@@ -72,14 +74,9 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     return make_data(tmp_path_factory.mktemp("endpoint") / "data")
 
 
-@pytest.fixture(autouse=True)
-def no_replies_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "no-cache"))
-    kernels = Path.home() / ".cache" / "chauffeur"  # the compiled core is not what is tested here
-    (tmp_path / "no-cache").mkdir()
-    (tmp_path / "no-cache" / "chauffeur").mkdir()
-    for folder in kernels.glob("kernels-*"):
-        (tmp_path / "no-cache" / "chauffeur" / folder.name).symlink_to(folder)
+@pytest.fixture(scope="module")
+def few(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    return make_data(tmp_path_factory.mktemp("endpoint") / "few", SEEDS[:2])
 
 
 def _planner(server: Any) -> Any:
@@ -168,75 +165,77 @@ def test_budgets_in_requests_and_money_go_on_with_larger_ones(tmp_path: Path, se
     assert "partial" not in (folder / "table.md").read_text()
 
 
-def _command(dataset: Dataset, server: Any, out: Path, *more: str) -> list[str]:
-    start = [sys.executable, "-c", "from chauffeur.cli.main import run; run()", "bench", "lampilot"]
+def _options(dataset: Dataset, server: Any, out: Path, *more: str) -> list[str]:
     where = ["--data", str(dataset.path), "--planner", "openai/m", "--base-url", server.url, "--out", str(out)]
-    return [*start, *where, "--workers", "1", *more]
+    return ["bench", "lampilot", *where, "--workers", "1", *more]
 
 
-def _said(process: subprocess.CompletedProcess[str]) -> str:
-    return " ".join((process.stdout + process.stderr).split())
+@pytest.fixture
+def command(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str]]:
+    """Runs the command in this process: its exit code and words."""
+    monkeypatch.setattr("chauffeur.bench.kernel.engine.LocalEngine", Inline)
+
+    def run(dataset: Dataset, server: Any, out: Path, *more: str) -> tuple[int, str]:
+        done = CliRunner().invoke(app, _options(dataset, server, out, *more))
+        return done.exit_code, " ".join(done.output.split())
+
+    return run
 
 
-def _run(command: list[str], tmp_path: Path, name: str) -> subprocess.CompletedProcess[str]:
-    cache = tmp_path / name
-    cache.mkdir()
-    (cache / "chauffeur").symlink_to(tmp_path / "no-cache" / "chauffeur")
-    environ = {**os.environ, "XDG_CACHE_HOME": str(cache)}
-    return subprocess.run(command, capture_output=True, text=True, timeout=240, check=False, env=environ)
-
-
-def test_the_command_says_that_its_budget_is_used_up(tmp_path: Path, server: Any, dataset: Dataset) -> None:
+def test_the_command_says_that_its_budget_is_used_up(
+    tmp_path: Path, server: Any, few: Dataset, command: Callable[..., tuple[int, str]]
+) -> None:
     server.script(Endpoint())
     out = tmp_path / "run"
-    stopped = _run(_command(dataset, server, out, "--max-requests", "4"), tmp_path, "one")
-    assert stopped.returncode == 3, _said(stopped)
-    assert "The budget of 4 requests is used up" in _said(stopped)
-    assert "partial" in stopped.stdout and "have not been asked" in _said(stopped)
-    unpriced = _run(_command(dataset, server, out, "--max-usd", "1"), tmp_path, "two")
-    assert unpriced.returncode == 3 and "--price IN/OUT" in _said(unpriced)
-    done = _run(_command(dataset, server, out, "--max-usd", "1", "--price", "0.1/0.4"), tmp_path, "three")
-    assert done.returncode == 0, _said(done)
+    code, said = command(few, server, out, "--max-requests", "4")
+    assert code == 3, said
+    assert "The budget of 4 requests is used up" in said
+    assert "partial" in said and "have not been asked" in said
+    code, said = command(few, server, out, "--max-usd", "1")
+    assert code == 3 and "--price IN/OUT" in said
+    code, said = command(few, server, out, "--max-usd", "1", "--price", "0.1/0.4")
+    assert code == 0, said
     assert not any(row["infra_failed"] for row in _rows(out))
 
 
-def test_a_key_that_is_refused_stops_the_run_at_once(tmp_path: Path, server: Any, dataset: Dataset) -> None:
+def test_a_key_that_is_refused_stops_the_run_at_once(
+    tmp_path: Path, server: Any, few: Dataset, command: Callable[..., tuple[int, str]]
+) -> None:
     server.script(MODEL.fails(401, "Bad key."))
-    stopped = _run(_command(dataset, server, tmp_path / "run"), tmp_path, "one")
-    assert stopped.returncode == 1 and "401" in _said(stopped), _said(stopped)
+    code, said = command(few, server, tmp_path / "run")
+    assert code == 1 and "401" in said, said
     assert len(server.requests) <= 16
     server.script(Endpoint())
-    done = _run(_command(dataset, server, tmp_path / "run"), tmp_path, "two")
-    assert done.returncode == 0 and not any(row["infra_failed"] for row in _rows(tmp_path / "run"))
+    code, said = command(few, server, tmp_path / "run")
+    assert code == 0 and not any(row["infra_failed"] for row in _rows(tmp_path / "run")), said
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_run_stopped_with_calls_in_flight_asks_for_nothing_twice(
-    tmp_path: Path, server: Any, dataset: Dataset, how: signal.Signals
+    tmp_path: Path, server: Any, few: Dataset, command: Callable[..., tuple[int, str]], how: signal.Signals
 ) -> None:
     endpoint = Endpoint(0.4)
     server.script(endpoint)
     out = tmp_path / "run"
-    command = _command(dataset, server, out, "--concurrency", "4")
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    chauffeur = [sys.executable, "-c", "from chauffeur.cli.main import run; run()"]
+    options = _options(few, server, out, "--concurrency", "2")
     plans = out / "generate.jsonl"
-    deadline = time.monotonic() + 120
-    while time.monotonic() < deadline and not (plans.exists() and plans.read_bytes().count(b"\n") >= 9):
-        time.sleep(0.01)
-    process.send_signal(how)
-    text, _ = process.communicate(timeout=60)
+    with started([*chauffeur, *options], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        until(lambda: plans.exists() and plans.read_bytes().count(b"\n") >= 3, "three answers")
+        process.send_signal(how)
+        text, _ = process.communicate(timeout=60)
     assert process.returncode == (130 if how == signal.SIGINT else -9), text
     if how == signal.SIGINT:
         assert "run the same command to go on" in " ".join(text.split())
     kept = plans.read_bytes().count(b"\n")
-    assert 9 <= kept < 30
-    time.sleep(0.5)
+    assert 3 <= kept < len(few.items())
+    until(lambda: not endpoint.busy, "calls in flight come to their ends")
     endpoint.answered, endpoint.latency_s = 0, 0.0
-    done = _run(command, tmp_path, "again")
-    assert done.returncode == 0, _said(done)
-    assert endpoint.answered <= 30 - kept, "what was answered and stored is not asked again"
+    code, said = command(few, server, out)
+    assert code == 0, said
+    assert endpoint.answered <= len(few.items()) - kept, "what was answered and stored is not asked again"
     asked = [json.loads(line)["item"] for line in plans.read_text().splitlines()]
-    assert len(asked) == len(set(asked)) == 30
+    assert len(asked) == len(set(asked)) == len(few.items())
     rows = _rows(out)
-    assert len(rows) == 30 and not any(row["infra_failed"] for row in rows)
+    assert len(rows) == len(asked) and not any(row["infra_failed"] for row in rows)
     assert {row["command"] for row in rows if row["success"]} == set(COMMANDS)

@@ -10,7 +10,6 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 from concurrent.futures import BrokenExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -25,13 +24,14 @@ from chauffeur.bench.kernel.store import RowStore
 from chauffeur.concept import ConfigError, Plan, PlanRequest
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset
+from processes import started, until
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    return make_data(tmp_path_factory.mktemp("robust") / "data")
+    return make_data(tmp_path_factory.mktemp("robust") / "data", SEEDS[:3])
 
 
 @pytest.fixture(scope="module")
@@ -46,9 +46,9 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory, dataset: Dataset, spec
     return folder
 
 
-def _command(dataset: Dataset, spec: str, out: Path, *more: str) -> list[str]:
+def _command(dataset: Dataset, spec: str, out: Path) -> list[str]:
     start = [sys.executable, "-c", "from chauffeur.cli.main import run; run()", "bench", "lampilot"]
-    return [*start, "--data", str(dataset.path), "--planner", spec, "--out", str(out), "--workers", "1", *more]
+    return [*start, "--data", str(dataset.path), "--planner", spec, "--out", str(out), "--workers", "1"]
 
 
 class Counting:
@@ -66,11 +66,11 @@ class Counting:
 
 def test_the_undisturbed_run_is_what_the_other_tests_mean(undisturbed: Path) -> None:
     rows = [json.loads(line) for line in (undisturbed / "results.jsonl").read_text().splitlines()]
-    assert len(rows) == len(SEEDS) * len(COMMANDS)
+    assert len(rows) == 3 * len(COMMANDS)
     assert {row["schema"] for row in rows} == {"lampilot-results-v2"}
     assert {row["metrics"] for row in rows} == {"lampilot-origin-v1"}
     by_command = {words: [row for row in rows if row["command"] == words] for words in COMMANDS}
-    assert sum(row["success"] for row in by_command[COMMANDS[0]]) >= 4
+    assert sum(row["success"] for row in by_command[COMMANDS[0]]) >= 2
     assert not any(row["success"] for row in by_command[COMMANDS[3]])
     assert all(row["refused"] and row["outcome"] == "refused" for row in by_command[COMMANDS[4]])
     assert not any(row["infra_failed"] for row in rows)
@@ -87,7 +87,7 @@ def test_damaged_rows_are_done_again(tmp_path: Path, dataset: Dataset, spec: str
         content = bytearray((undisturbed / name).read_bytes())
         if name.endswith(".jsonl"):
             lines = content.splitlines(keepends=True)
-            for place in rng.sample(range(len(lines)), 4):
+            for place in rng.sample(range(len(lines)), min(4, len(lines) - 1)):
                 spoiled_plans += name == "generate.jsonl"
                 at = rng.randrange(len(lines[place]) - 40)
                 lines[place][at] ^= 1 << rng.randrange(7)
@@ -127,7 +127,7 @@ def test_impossible_samples_cost_only_themselves(
         {"env": road, "eval": {"type": 7}, "seed": 1},
         {"env": {}, "eval": {}, "seed": 1},
     ]
-    spoiled = make_data(tmp_path / "data", more=bad)
+    spoiled = make_data(tmp_path / "data", SEEDS[:3], more=bad)
     run = make_run(tmp_path / "run", spoiled, spec)
     finish(run)
     rows = [json.loads(line) for line in (tmp_path / "run" / "results.jsonl").read_text().splitlines()]
@@ -163,7 +163,7 @@ class Mortal(LocalEngine):
         self._chances += 1
         victim = self._workers[0]._pid
         # 0 while it is being replaced: that would be all of us.
-        if self._chances >= 4 and victim > 0 and all(entry.done.done() for entry in self._bereft):
+        if self._chances >= 8 and victim > 0 and all(entry.done.done() for entry in self._bereft):
             self._chances = 0
             Mortal.victims.add(victim)
             with suppress(ProcessLookupError):  # struck before, while it was idle, and not missed yet
@@ -213,47 +213,29 @@ def test_an_item_that_kills_its_workers_is_recorded_and_tried_again_next_time(
 def test_kill_9_and_the_same_command_again(tmp_path: Path, dataset: Dataset, spec: str, undisturbed: Path) -> None:
     out = tmp_path / "run"
     command = _command(dataset, spec, out)
-    killed = 0
-    for rows in (1, 5, 11):
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
-        _wait_for(process, out / "rollout.jsonl", rows)
-        killed += process.poll() is None
-        process.kill()
-        process.communicate()
-        _nothing_left_of(process.pid)
-    assert killed >= 2
-    torn = out / "rollout.jsonl"  # as if the last write had been cut off by a power failure
-    torn.write_bytes(torn.read_bytes()[:-17])
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert outcome(out) == outcome(undisturbed)
+    driven = out / "rollout.jsonl"
+    for rows in (1, 4):
+        with started(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            until(lambda rows=rows: driven.exists() and driven.read_bytes().count(b"\n") >= rows, f"{rows} drives")
+            assert process.poll() is None, "it is killed in the middle"
+            process.kill()
+            process.wait()
+            until(lambda session=process.pid: not _left_of(session), "workers and sandboxes end with it")
+    driven.write_bytes(driven.read_bytes()[:-17])  # as if the last write had been cut off by a power failure
+    assert finish(make_run(out, dataset, spec)) == outcome(undisturbed)
 
 
-def _wait_for(process: subprocess.Popen[bytes], path: Path, rows: int) -> None:
-    deadline = time.monotonic() + 120
-    while time.monotonic() < deadline and process.poll() is None:
-        if path.exists() and path.read_bytes().count(b"\n") >= rows:
-            return
-        time.sleep(0.002)
-
-
-def _nothing_left_of(session: int) -> None:
-    """No process of a killed run's session lives on: neither workers nor their sandboxes."""
-    deadline = time.monotonic() + 20
+def _left_of(session: int) -> list[str]:
+    """Processes of a session that live on."""
     left: list[str] = []
-    while time.monotonic() < deadline:
-        left = []
-        for entry in Path("/proc").glob("[0-9]*/stat"):
-            try:
-                fields = entry.read_text().rpartition(")")[2].split()
-            except OSError:
-                continue
-            if int(fields[3]) == session and fields[0] != "Z":
-                left.append(f"{entry.parent.name}: {(entry.parent / 'cmdline').read_bytes()!r}")
-        if not left:
-            return
-        time.sleep(0.05)
-    raise AssertionError(f"still there: {left}")
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = entry.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[3]) == session and fields[0] != "Z":
+            left.append(entry.parent.name)
+    return left
 
 
 def test_a_full_disk_stops_the_run_and_loses_nothing(
@@ -273,9 +255,7 @@ def test_a_full_disk_stops_the_run_and_loses_nothing(
     assert not (out / "results.jsonl").exists()
     kept = {name: RowStore(out / f"{name}.jsonl", key) for name, key in (("generate", "item"), ("rollout", "key"))}
     assert kept["generate"].rows and not any(store.damaged for store in kept.values())
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert outcome(out) == outcome(undisturbed)
+    assert finish(make_run(out, dataset, spec)) == outcome(undisturbed)
 
 
 def _no_cache() -> dict[str, str]:

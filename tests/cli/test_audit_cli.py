@@ -15,6 +15,7 @@ from typer.testing import CliRunner, Result
 from chauffeur.cli.audit import audit_app, auditor_for, tell_closing
 from chauffeur.cli.failures import FriendlyGroup
 from chauffeur.concept import ConfigError, Instruction, PersonId
+from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.scenarios import find
 from chauffeur.safety.audit import AuditLog, Closing, head_path
 
@@ -201,7 +202,7 @@ def test_the_environment_names_key_and_privacy(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setenv("CHAUFFEUR_AUDIT_KEY", str(key))
     monkeypatch.setenv("CHAUFFEUR_AUDIT_PRIVATE", "1")
     with auditor_for(path, find("cruise", None), 7) as auditor:
-        auditor.tell("I", Instruction("Faster, please.", PersonId("ana")))
+        auditor.tell(DriveEvent("wish", value=Instruction("Faster, please.", PersonId("ana"))))
     assert "Faster" not in path.read_text()
     assert "every record was looked at under the key given" in one_line(invoke("verify", path))
     monkeypatch.setenv("CHAUFFEUR_AUDIT_KEY", str(tmp_path / "absent"))

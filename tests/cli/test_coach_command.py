@@ -40,13 +40,6 @@ def server() -> Iterator[Any]:
 
 @pytest.fixture
 def options(tmp_path: Path, server: Any, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    # Replies are kept in a cache of the test's own; compiled kernels are taken from the user's, they take long to make.
-    kept = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "chauffeur"
-    mine = tmp_path / "cache" / "chauffeur"
-    mine.mkdir(parents=True)
-    for kernels in kept.glob("kernels-*"):
-        (mine / kernels.name).symlink_to(kernels)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     make_data(tmp_path / "data")
     return [
         "--data", str(tmp_path / "data"), "--planner", "openai/m", "--base-url", server.url,

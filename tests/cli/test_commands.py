@@ -90,7 +90,7 @@ def test_the_top_of_the_help_is_what_somebody_comes_for() -> None:
         "Drive": ["drive", "feedback", "me", "talk"],
         "Look": ["doctor", "replay", "report", "show"],
         "Measure": ["bench", "study"],
-        "Build": ["audit", "model", "vehicle"],
+        "Build": ["audit", "check", "maps", "model", "vehicle"],
     }
 
 
@@ -244,14 +244,14 @@ def test_a_changed_recording_is_noticed(driven: Path) -> None:
     path = driven / "trip.mcap"
     recorded = read_trip(path)
     frame = recorded.frames[4]
-    ego = replace(frame.snapshot.ego, x_m=frame.snapshot.ego.x_m + 1e-9)
+    ego = replace(frame.observation.ego, x_m=frame.observation.ego.x_m + 1e-9)
     frames = list(recorded.frames)
-    frames[4] = replace(frame, snapshot=replace(frame.snapshot, ego=ego))
+    frames[4] = replace(frame, observation=replace(frame.observation, ego=ego))
     trip = replace(recorded.trip, record=(*recorded.trip.record[1:], ("chauffeur", "0.0.1")))
     write_trip(path, trip, frames, recorded.scenario, final=recorded.final)
     result = invoke("replay", str(path))
     assert result.exit_code == 1
-    assert "tick 4, snapshot.ego.x_m" in result.output
+    assert "tick 4, observation.ego.x_m" in result.output
     assert "recorded with chauffeur 0.0.1" in result.output
 
 

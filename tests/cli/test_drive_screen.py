@@ -12,8 +12,9 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+from chauffeur.bench.referees import referee_for
 from chauffeur.cli.compiling import Compiling
-from chauffeur.cli.parts import planner_named, referee_for
+from chauffeur.cli.parts import planner_named
 from chauffeur.cli.show import FullTeller, Teller
 from chauffeur.concept import Instruction, Limits, Program, Verdict
 from chauffeur.drive.recording import RecordedTrip

@@ -36,18 +36,20 @@ from chauffeur.concept import (
     Instruction,
     Intervention,
     Metric,
+    Observation,
     Plan,
     Program,
     Scenario,
     Situation,
-    Snapshot,
     Thoughts,
     Trip,
     VehicleState,
     Verdict,
     Wishes,
 )
+from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.recording import RecordedTrip
+from roads import a_road
 
 EVIL = (
     "<\x1b[2J\x1b]0;title\x07\x1b]8;;http://evil\x1b\\\x1bP+q\x9b31m\x90q\x08\x0c\r\x00\x7f"
@@ -94,8 +96,8 @@ def put(value: Any, path: tuple[Any, ...], text: str) -> Any:
 def a_drive() -> RecordedTrip:
     """A trip with text in every field that has any."""
     here = Situation("highway", 25.0, 31.3, 3, 1, True, None, None, ("left",), (("rain", "no"),))
-    car = VehicleState(0, "car", 0.0, 4.0, 0.0, 20.0, 5.0, 2.0, ("a", "b", 1))
-    shot = Snapshot(0.0, 0, "highway", car, (), (), (), None, 12.0, False, False)
+    car = VehicleState(0, "car", 0.0, 4.0, 0.0, 20.0, 5.0, 2.0, "a-b:1")
+    shot = Observation(0.0, 0, "highway", car, (), (), a_road(()), None, 12.0, False, False)
     command = Command(0.1, 0.0)
     verdicts = (
         Verdict("format-v1", True, "fine", 3, "none"),
@@ -136,15 +138,16 @@ def tell(drive: RecordedTrip, *, terminal: bool, screen: type[Teller] = Teller) 
     trip = drive.trip
     with screen(console) as teller:
         teller.begin(drive.scenario, trip.seed)
-        for letter, value in (
-            ("I", trip.instruction), ("C", trip.context), ("H", trip.history), ("P", trip.plan),
-            ("P", replace(trip.plan, refusal=trip.plan.thoughts.text)), ("V", trip.verdicts),
-            ("memory", trip.causes.detail),
+        for event in (
+            DriveEvent("wish", value=trip.instruction), DriveEvent("context", value=trip.context),
+            DriveEvent("history", value=trip.history), DriveEvent("plan", value=trip.plan),
+            DriveEvent("plan", value=replace(trip.plan, refusal=trip.plan.thoughts.text)),
+            DriveEvent("verdicts", value=trip.verdicts), DriveEvent("trouble", text=trip.causes.detail),
         ):  # fmt: skip
-            teller.tell(letter, value)
+            teller.tell(event)
         teller.writing(trip.plan.thoughts.text, 1)
         for frame in drive.frames:
-            teller.tell("frame", frame)
+            teller.tell(DriveEvent("period", value=frame))
         teller.end(drive)
         teller.wrote([Path(trip.id.replace("/", "_").replace("\0", ""))])
     return out.getvalue()

@@ -66,8 +66,8 @@ def test_what_is_not_a_wish_is_refused_in_words(client: openai.OpenAI) -> None:
 
 @pytest.mark.parametrize("scenario", BUILT_IN, ids=lambda scenario: scenario.id)
 def test_our_llm_planner_plans_with_it_as_the_planner_does_itself(address: str, scenario: object) -> None:
-    snapshot = HighwayWorld().reset(scenario)  # type: ignore[arg-type]
-    context = describe(snapshot)
+    observation = HighwayWorld().reset(scenario)  # type: ignore[arg-type]
+    context = describe(observation)
     request = PlanRequest(Instruction("Drive 3 m/s slower."), context, SystemMessage(""))
     there = asyncio.run(make_planner("openai/onboard", base_url=address).plan(request))
     here = asyncio.run(LanguageModelPlanner(SHIPPED).plan(request))

@@ -42,7 +42,7 @@ from chauffeur.safety.audit import verify
 
 COMMAND = [sys.executable, "-c", "from chauffeur.cli.main import run; run()", "talk"]
 EGO = Body(0, "car", 0.0, 0.0, 0.0, 5.0, 2.0, 25.0)
-SCENE = Scene(12.0, EGO, (), 0.0, 0.0, 31.0, 20.0, 1.5, ("a", "b", 1), "follow", "w1", 3, "", False, 0)
+SCENE = Scene(12.0, EGO, (), 0.0, 0.0, 31.0, 20.0, 1.5, "a-b:1", 1, "follow", "w1", 3, "", False, 0)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from pathlib import Path
 from chauffeur.concept import Wishes
 from chauffeur.concept.registry import load_plugin
 from chauffeur.drive.live.control import Control, Rings
-from chauffeur.drive.live.messages import Hand, Key, Observation, Report, Wish
+from chauffeur.drive.live.messages import Hand, Key, MirroredInstant, Report, Wish
 from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.settings import SIZES, RingName
 from chauffeur.drive.live.starts import Start
@@ -51,10 +51,10 @@ class Bench:
         self.now_ns += round(DT_NS / self.speed)
         return self.control.tick()
 
-    def observed(self) -> Observation:
+    def observed(self) -> MirroredInstant:
         message = self.observations.latest()
         assert message is not None
-        return Observation.decode(message.payload)
+        return MirroredInstant.decode(message.payload)
 
     def wish(self, wanted: Wishes, **changes: object) -> None:
         seen = self.observed()

@@ -8,9 +8,10 @@ from pathlib import Path
 from live_bench import OVERTAKE, Bench
 
 from chauffeur.concept import Plan, Policy, Program, Thoughts
-from chauffeur.drive.live.messages import Observation, Report, Wish
+from chauffeur.drive.events import DriveEvent
+from chauffeur.drive.live.messages import MirroredInstant, Report, Wish
 from chauffeur.drive.live.mirror import Mirror
-from chauffeur.drive.live.orders import Event, Order, Scene, encode, read_event
+from chauffeur.drive.live.orders import Order, Scene, encode, read_event
 from chauffeur.drive.live.policy import Policy as PolicyProcess
 from chauffeur.drive.live.policy import PolicyRings
 from chauffeur.drive.live.ring import Reader, Ring
@@ -49,14 +50,14 @@ class Rig:
 
     def order(self, asked: str | Policy, wish: str = "w1", **changes: object) -> None:
         """A plan, made for the present instant: the text of a program, or another policy."""
-        snapshot = self.bench.world.snapshot()
+        observation = self.bench.world.observe()
         message = self.bench.observations.latest()
         assert message is not None
-        seen = Observation.decode(message.payload)
+        seen = MirroredInstant.decode(message.payload)
         made = Order(
             wish,
             Plan(Thoughts("As you wish."), Program(asked) if isinstance(asked, str) else asked),
-            Scene.of(seen.trip, snapshot),
+            Scene.of(seen.trip, observation),
             self.bench.now_ns,
             self.bench.now_ns + 10**10,
             self.bench.now_ns + 10**12,
@@ -68,7 +69,7 @@ class Rig:
         self.policy.close()
         self.policy = self.new_policy()
 
-    def told(self) -> list[Event]:
+    def told(self) -> list[DriveEvent]:
         return [read_event(message.payload) for message in self._heard.news()[0]]
 
     def kinds(self) -> list[tuple[str, str]]:

@@ -18,23 +18,25 @@ from chauffeur.concept import (
     DataError,
     Frame,
     Instruction,
+    Observation,
     PersonId,
     Plan,
     PlannerError,
-    Snapshot,
     Thoughts,
     VehicleState,
     Verdict,
     Wishes,
 )
 from chauffeur.concept.trace import Intervention
-from chauffeur.drive.auditing import Auditor, open_audit, told_to, with_head
+from chauffeur.drive.auditing import Auditor, open_audit, with_head
+from chauffeur.drive.events import DriveEvent, told_to
 from chauffeur.drive.recording import RecordedTrip, compare_trips
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import Session, parse_wish, scenario_hash
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.audit import AuditLog, Record, head_path, read_records, redact, verify, words_of
+from roads import a_road
 
 WISH = "Überhol ihn for Zebedee."
 PROGRAM = """def overtake():
@@ -120,7 +122,7 @@ def test_every_command_is_there_to_the_last_bit(planner: Planner, tmp_path: Path
         assert len(body["speed_mps"]) == len(these) <= 10
     assert asked == [frame.requested for frame in recorded.frames]
     assert done == [frame.applied for frame in recorded.frames]
-    assert ticks == [frame.snapshot.tick for frame in recorded.frames]
+    assert ticks == [frame.observation.tick for frame in recorded.frames]
     wishes = [wish for record in of_kind(path, "actuation") for wish in record.body["wishes"]]
     assert wishes[0][1]["time_headway_s"] == recorded.frames[0].wishes.time_headway_s
     said = "".join(words_of(record).get("said", "") for record in of_kind(path, "actuation"))
@@ -138,8 +140,8 @@ def test_what_led_to_a_drive_is_on_the_disk_before_it_starts(planner: Planner, t
     path = tmp_path / "audit.jsonl"
     seen: list[set[str]] = []
 
-    def watch(letter: str, value: object) -> None:
-        if letter == "frame" and not seen:
+    def watch(event: DriveEvent) -> None:
+        if event.kind == "period" and not seen:
             seen.append(set(verify(path).kinds))
 
     with open_audit(path, SCENARIO, 3) as auditor:
@@ -196,8 +198,8 @@ def test_a_drive_that_breaks_off_is_told(planner: Planner, tmp_path: Path) -> No
     assert outcome.body["outcome"] == "not_driven"
     assert outcome.body["error"] == "PlannerError"
     with pytest.raises(KeyboardInterrupt), open_audit(path, SCENARIO, 3) as auditor:
-        auditor.tell("I", Instruction("Stop.", PersonId("ana")))
-        auditor.tell("frame", a_frame(0))
+        auditor.tell(DriveEvent("wish", value=Instruction("Stop.", PersonId("ana"))))
+        auditor.tell(DriveEvent("period", value=a_frame(0)))
         raise KeyboardInterrupt
     assert of_kind(path, "outcome")[1].body["outcome"] == "broken_off"
     assert len(of_kind(path, "actuation")) == 1
@@ -222,8 +224,8 @@ GENTLE = Command(0.5, 0.0)
 
 
 def a_frame(tick: int, *interventions: Intervention, requested: Command = GENTLE) -> Frame:
-    ego = VehicleState(0, "car", 0.0, 0.0, 0.0, 20.0, 5.0, 2.0, ("a", "b", 0))
-    shot = Snapshot(round(tick * 0.1, 3), tick, "highway", ego, (), (), (), None, None, False, False)
+    ego = VehicleState(0, "car", 0.0, 0.0, 0.0, 20.0, 5.0, 2.0, "a-b:0")
+    shot = Observation(round(tick * 0.1, 3), tick, "highway", ego, (), (), a_road(()), None, None, False, False)
     return Frame(shot, Wishes(), requested, requested, "running", 1, interventions=interventions)
 
 
@@ -236,7 +238,7 @@ def test_the_first_intervention_of_a_stretch_is_written_at_once(tmp_path: Path) 
     log = AuditLog(path, about={})
     auditor = Auditor(log)
     for tick in range(30):
-        auditor.tell("frame", a_frame(tick, *[too_close(f"tick {tick}")] * (tick >= 4)))
+        auditor.tell(DriveEvent("period", value=a_frame(tick, *[too_close(f"tick {tick}")] * (tick >= 4))))
         if tick == 4:
             assert log.flush()
             assert [row[0] for row in of_kind(path, "intervention")[0].body["interventions"]] == [4]
@@ -249,21 +251,11 @@ def test_the_first_intervention_of_a_stretch_is_written_at_once(tmp_path: Path) 
     assert len(of_kind(path, "actuation")) == 3
 
 
-def test_interventions_may_come_without_frames(tmp_path: Path) -> None:
-    path = tmp_path / "audit.jsonl"
-    auditor = Auditor(AuditLog(path, about={}))
-    for tick in (5, 6, 9):
-        auditor.intervene(tick, tick / 10, "line-v1", "over the line", Command(1.0, 0.0), Command(0.0, 0.0))
-    auditor.close()
-    ticks = [[row[0] for row in record.body["interventions"]] for record in of_kind(path, "intervention")]
-    assert ticks == [[5], [6, 9]]
-
-
 def test_commands_that_are_no_numbers_and_missing_ticks_are_told_as_they_are(tmp_path: Path) -> None:
     path = tmp_path / "audit.jsonl"
     auditor = Auditor(AuditLog(path, about={}))
     for tick in (0, 1, 5):
-        auditor.tell("frame", a_frame(tick, requested=Command(float("nan"), float("-inf"))))
+        auditor.tell(DriveEvent("period", value=a_frame(tick, requested=Command(float("nan"), float("-inf")))))
     auditor.close()
     bodies = [record.body for record in of_kind(path, "actuation")]
     assert [body["ticks"] for body in bodies] == [[0, 1], [5, 5]]
@@ -276,12 +268,13 @@ def test_what_a_planner_of_somebody_else_hands_over_cannot_stop_the_drive(tmp_pa
     strange: Any = None
     number: Any = 5
     with open_audit(path, SCENARIO, 3) as auditor:
-        auditor.tell("I", Instruction("Go.", PersonId("ana")))
-        auditor.tell("RP", replace(Plan(Thoughts("R"), None), settings=strange))
-        auditor.tell("RP", replace(Plan(Thoughts("R"), None), raw=number))
-        auditor.tell("RP", Plan(Thoughts("R"), ActionMatrix((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))))
-        auditor.tell("V", (Verdict("format-v1", False, "No.", 3, "Ask again."), "not a verdict"))
-        auditor.tell("unheard of", object())
+        auditor.tell(DriveEvent("wish", value=Instruction("Go.", PersonId("ana"))))
+        auditor.tell(DriveEvent("plan", value=replace(Plan(Thoughts("R"), None), settings=strange)))
+        auditor.tell(DriveEvent("plan", value=replace(Plan(Thoughts("R"), None), raw=number)))
+        auditor.tell(DriveEvent("plan", value=Plan(Thoughts("R"), ActionMatrix((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)))))
+        verdicts: Any = (Verdict("format-v1", False, "No.", 3, "Ask again."), "not a verdict")
+        auditor.tell(DriveEvent("verdicts", value=verdicts))
+        auditor.tell(DriveEvent("over"))
     found = verify(path)
     assert found.ok
     assert found.lost == 1

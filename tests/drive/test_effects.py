@@ -66,13 +66,13 @@ def scene(name: str) -> HighwayWorld:
 
 
 def test_a_slower_speed_is_driven_and_the_scene_stays(world: HighwayWorld, sandbox: Sandbox) -> None:
-    before = world.snapshot()
+    before = world.observe()
     effect, other = effects_of([world, world], Program(OPAQUE), sandbox=sandbox, max_s=15.0)
     assert effect == other  # same instant, same program
     assert effect.speeds_mps[0] == before.ego.speed_mps
     assert effect.speeds_mps[1] == pytest.approx(18.0, abs=1.5)
     assert (effect.lanes_moved, effect.stood, effect.failed) == (0, False, False)
-    assert world.snapshot() == before
+    assert world.observe() == before
 
 
 def test_a_lane_change_is_seen(world: HighwayWorld, sandbox: Sandbox) -> None:
@@ -92,7 +92,7 @@ def test_a_recorded_drive_tells_the_same_as_a_copy_of_it(world: HighwayWorld, sa
 
 def test_a_vehicle_that_was_ahead_is_looked_for_again(sandbox: Sandbox) -> None:
     world = scene("overtake")
-    ahead = world.snapshot().front
+    ahead = world.observe().front
     assert ahead is not None
     (passing,) = effects_of([world], Program(PASSING), sandbox=sandbox, max_s=10.0)
     assert passing.gaps_m[0] == pytest.approx(ahead.distance_m, abs=0.5)

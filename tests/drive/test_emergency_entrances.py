@@ -72,7 +72,7 @@ def test_a_drive_stops_and_says_so(text: str, scenario: str) -> None:
     trip, final = recorded.trip, recorded.final
     assert (trip.outcome, trip.plan.intent) == ("ended", "stop")
     assert final is not None and final.ego.speed_mps < 0.1
-    assert final.ego.lane == recorded.frames[0].snapshot.ego.lane
+    assert final.ego.lane == recorded.frames[0].observation.ego.lane
     assert "Hazard lights on" in trip.said[0][1]
     assert all(frame.applied.acceleration_mps2 >= -5.0 for frame in recorded.frames)
     assert [verdict.check for verdict in trip.verdicts if verdict.stops] == []
@@ -96,7 +96,7 @@ def test_what_the_question_offers_is_driven_to_the_shoulder_where_there_is_one()
     recorded = drive(SAFE_STOP_WISH, "emergency-lane", max_s=60.0)
     final = recorded.final
     assert final is not None and final.ego.speed_mps < 0.1
-    assert next(lane for lane in final.lanes if lane.id == final.ego.lane).emergency
+    assert next(lane for lane in final.road.lanes if lane.id == final.ego.lane).emergency
     assert drive(SAFE_STOP_WISH, "overtake").trip.plan.intent == "stop"
 
 

@@ -11,13 +11,13 @@ import pytest
 
 from chauffeur.concept import Command, DataError, Feedback, Instruction, Intervention, PersonId, Wishes
 from chauffeur.drive.auditing import Auditor, open_audit
+from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live.books import Books, Unanswered, unanswered
 from chauffeur.drive.live.messages import Report, Rung
-from chauffeur.drive.live.orders import Brief, Event
-from chauffeur.drive.live.remembering import Remembering
+from chauffeur.drive.live.remembering import trip_of
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
-from chauffeur.drive.live.supervisor import Replaced, Runtime
+from chauffeur.drive.live.supervisor import Runtime
 from chauffeur.drive.scenarios import find
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.safety.audit import AuditLog, Record, read_records, redact, verify, words_of
@@ -48,7 +48,7 @@ def report(
     fields = {
         "trip": 1, "tick": tick, "late_ns": 0, "rung": rung, "plan": "w1", "state": "running", "line": 1, "age_s": 0.1,
         "wishes": Wishes(), "requested": Command(1.0, 0.0), "applied": Command(0.5, 0.0), "clipped": (), "refused": {},
-        "missed": 0, "faults": 0, "speed_mps": 20.0, "lane": ("a", "b", 0),
+        "missed": 0, "faults": 0, "speed_mps": 20.0, "lane": "a-b:0",
     }  # fmt: skip
     return Report(interventions=interventions, **(fields | changes))  # type: ignore[arg-type]
 
@@ -85,19 +85,16 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
     start = Start(SCENARIO, 3, most_s=600.0)
     settings = Settings(starts=(start,), planner=f"replay/{answers}", speed=2.0, realtime=False)
     log = folder / "audit.jsonl"
-    memory = Remembering(VaultMemory(folder / MEMORY), start, DT_S)
+    memory = VaultMemory(folder / MEMORY)
     with Books(open_audit(log, SCENARIO, 3), DT_S) as books:
-
-        def tell(heard: Event | Report | Brief | Replaced) -> None:
-            books.tell(heard)
-            memory.tell(heard)
-
-        opened = Runtime(settings, tell)
+        opened = Runtime(settings, books.tell)
         books.follow(opened, settings)
-        memory.follow(opened)
         with opened as runtime:
             _three_wishes(runtime, books, log)
-        assert memory.trouble == ""
+        for interaction in runtime.interactions.values():
+            trip = trip_of(interaction, start, DT_S, runtime.report)
+            assert trip is not None
+            memory.remember(trip, None)
     return log
 
 
@@ -213,10 +210,10 @@ def test_wishes_of_the_last_session_alone_are_missed(path: Path) -> None:
 
 def test_a_log_of_an_ordinary_drive_holds_open_wishes_too(path: Path) -> None:
     with open_audit(path, SCENARIO, 3) as auditor:
-        auditor.tell("I", Instruction(WISH))
+        auditor.tell(DriveEvent("wish", value=Instruction(WISH)))
     assert [each.text for each in unanswered(path)] == [WISH]
     with pytest.raises(RuntimeError), open_audit(path, SCENARIO, 3) as auditor:
-        auditor.tell("I", Instruction(WISH))
+        auditor.tell(DriveEvent("wish", value=Instruction(WISH)))
         raise RuntimeError("no planner")
     assert unanswered(path) == (), "why it was not driven is an answer"
 
@@ -232,7 +229,7 @@ def test_a_wish_that_is_not_asked_is_answered_here(books: Books, path: Path) -> 
 def test_private_books_hold_no_words(path: Path) -> None:
     with Books(open_audit(path, SCENARIO, 3, private=True), DT_S) as books:
         books.wish("w1", Instruction(WISH, ZEBEDEE))
-        books.tell(Event("planning", "w1", "Zebedee!"))
+        books.tell(DriveEvent("planning", "w1", "Zebedee!"))
     assert b"ebedee" not in path.read_bytes()
     assert [each.text for each in unanswered(path)] == ["[withheld]"]
 
@@ -257,17 +254,17 @@ def test_a_full_disk_stops_nothing() -> None:
     books.wish("w1", Instruction(WISH))
     kept = books.kept()
     for tick in range(100):
-        books.tell(report(tick))
+        books.tell(DriveEvent("period", value=report(tick)))
     assert time.monotonic() - began_s < 1.0, "polling does not wait for the disk"
     assert kept.result() is False
     assert not books.close().complete
 
 
 def test_what_cannot_be_written_leaves_a_gap(books: Books, path: Path) -> None:
-    books.tell(report(0, requested=None))
-    books.tell(report(1, applied="hard"))
-    books.tell(report(2))
-    books.tell(report(None))
+    books.tell(DriveEvent("period", value=report(0, requested=None)))
+    books.tell(DriveEvent("period", value=report(1, applied="hard")))
+    books.tell(DriveEvent("period", value=report(2)))
+    books.tell(DriveEvent("period", value=report(None)))
     books.close()
     assert verify(path).ok
     assert {name for record in records(path, "gap") for name in record.body["lost"]} >= {"actuation"}
@@ -275,7 +272,7 @@ def test_what_cannot_be_written_leaves_a_gap(books: Books, path: Path) -> None:
 
 def test_control_periods_that_were_not_heard_are_a_gap(books: Books, path: Path) -> None:
     for tick in (0, 1, 7, 8):
-        books.tell(report(tick))
+        books.tell(DriveEvent("period", value=report(tick)))
     books.close()
     assert [record.body["lost"] for record in records(path, "gap")] == [{"period": 5}]
     assert [record.body["ticks"] for record in records(path, "actuation")] == [[0, 1], [7, 8]]
@@ -285,8 +282,8 @@ def test_interventions_replacements_and_rungs_are_told(books: Books, path: Path)
     change = Intervention("gap", "2 m too close", Command(1.0, 0.0), Command(-3.0, 0.0))
     rungs: tuple[Rung, ...] = ("follow", "hold", "follow", "hold", "keep", "keep", "slow", "stop", "follow")
     for tick, rung in enumerate(rungs):
-        books.tell(report(tick, rung, (change,) if tick == 3 else ()))
-    books.tell(Replaced("policy", "It hung."))
+        books.tell(DriveEvent("period", value=report(tick, rung, (change,) if tick == 3 else ())))
+    books.tell(DriveEvent("replaced", text="It hung.", value="policy"))
     books.end("ended", None, 2)
     books.end("ended", None, 2)
     books.close()
@@ -301,7 +298,7 @@ def test_interventions_replacements_and_rungs_are_told(books: Books, path: Path)
 
 def test_taking_over_is_told_and_counted(books: Books, path: Path) -> None:
     for tick, taken in enumerate((False, True, True, False, True)):
-        books.tell(report(tick, "hand" if taken else "follow", taken_over=taken))
+        books.tell(DriveEvent("period", value=report(tick, "hand" if taken else "follow", taken_over=taken)))
     books.end("ended", None, 0)
     books.close()
     notes = [record.body for record in records(path, "context") if record.body.get("event") == "taken_over"]
@@ -313,7 +310,7 @@ def test_taking_over_is_told_and_counted(books: Books, path: Path) -> None:
 
 def test_a_drive_that_breaks_off_says_so(path: Path) -> None:
     with pytest.raises(RuntimeError), Books(open_audit(path, SCENARIO, 3), DT_S) as books:
-        books.tell(report(0))
+        books.tell(DriveEvent("period", value=report(0)))
         raise RuntimeError("the planner could not be started")
     assert [record.body["outcome"] for record in records(path, "outcome")] == ["broken_off"]
     assert verify(path).closed

@@ -11,7 +11,7 @@ from live_bench import DT_NS, OVERTAKE, Bench
 
 from chauffeur.concept import DataError, Limits, Wishes
 from chauffeur.drive.live.control import AHEAD_NS, run
-from chauffeur.drive.live.messages import Observation, Report
+from chauffeur.drive.live.messages import MirroredInstant, Report
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.realtime import Ticker, punctuality
 from chauffeur.drive.live.starts import Start
@@ -47,24 +47,24 @@ def test_a_fresh_wish_is_driven_and_reported(bench: Bench) -> None:
 def test_a_world_elsewhere_can_be_at_the_instant_shown(bench: Bench) -> None:
     mirror = Mirror(HighwayWorld(), (OVERTAKE,), bench.observations)
     assert mirror.follow()
-    assert mirror.world.snapshot() == bench.world.snapshot()
+    assert mirror.world.observe() == bench.world.observe()
     assert not mirror.follow()  # nothing new
     for _ in range(20):
         bench.tick()
     assert mirror.follow()
     assert (mirror.trip, mirror.tick) == (1, 20)
-    assert mirror.world.snapshot() == bench.world.snapshot()
+    assert mirror.world.observe() == bench.world.observe()
     assert mirror.world.perception().front_blocker(frozenset()) == bench.world.perception().front_blocker(frozenset())
 
 
 def test_an_observation_that_is_none_leaves_the_copy_as_it_was(bench: Bench) -> None:
     mirror = Mirror(HighwayWorld(), (OVERTAKE,), bench.observations)
     mirror.follow()
-    before = mirror.world.snapshot()
-    for bad in (b"", b"x" * 40, Observation(1, 5, b"short").encode(), Observation(9, 0, b"").encode()):
+    before = mirror.world.observe()
+    for bad in (b"", b"x" * 40, MirroredInstant(1, 5, b"short").encode(), MirroredInstant(9, 0, b"").encode()):
         bench.observations.write(bad)
         assert not mirror.follow()
-    assert mirror.world.snapshot() == before
+    assert mirror.world.observe() == before
     with pytest.raises(DataError):
         mirror.world.adopt(b"1234")
 
@@ -75,7 +75,7 @@ def test_an_observation_that_is_none_leaves_the_copy_as_it_was(bench: Bench) -> 
         ({"trip": 2}, "another trip"),
         ({"tick": 50}, "an instant to come"),
         ({"issued_ns": 1_000_000_000 + 2 * DT_NS + 2 * AHEAD_NS}, "issued in the future"),
-        ({"wishes": Wishes(20.0, 1.5, ("no", "such", 0))}, "no such lane"),
+        ({"wishes": Wishes(20.0, 1.5, "no-such:0")}, "no such lane"),
     ],
 )
 def test_a_wish_that_cannot_be_meant_for_now_is_refused_and_counted(
@@ -129,7 +129,7 @@ def test_silence_leads_down_the_ladder_to_a_stand_and_a_wish_leads_back(bench: B
             break
     assert rungs == ["follow", "hold", "keep", "slow", "stop"]
     assert report.speed_mps < 0.1
-    assert not bench.world.snapshot().ego.crashed
+    assert not bench.world.observe().ego.crashed
     bench.wish(Wishes(25.0))
     assert bench.tick().rung == "follow"
 
@@ -168,7 +168,7 @@ def test_asked_to_stop_it_stands_and_ends(bench: Bench) -> None:
 
 
 def test_the_minimal_risk_manoeuvre_brakes_evenly_in_its_lane(bench: Bench) -> None:
-    lane = bench.world.snapshot().ego.lane
+    lane = bench.world.observe().ego.lane
     bench.control.stop()
     braking: list[float] = []
     for _ in range(300):
@@ -195,13 +195,13 @@ def test_an_error_in_a_period_brakes_and_control_goes_on(bench: Bench, monkeypat
     def fails(*_: object) -> None:
         raise ZeroDivisionError
 
-    speed = bench.world.snapshot().ego.speed_mps
+    speed = bench.world.observe().ego.speed_mps
     with monkeypatch.context() as broken:
         broken.setattr(type(bench.world.driver()), "command", fails)
         report = bench.tick()
     assert report.faults == 1
     assert report.applied.acceleration_mps2 == pytest.approx(-3.0)
-    assert bench.world.snapshot().ego.speed_mps < speed
+    assert bench.world.observe().ego.speed_mps < speed
     assert bench.tick().faults == 1
 
 

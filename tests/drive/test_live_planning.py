@@ -11,9 +11,10 @@ from live_bench import OVERTAKE, Bench
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
 from chauffeur.describe import describe_with_traffic
+from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live import planning as module
 from chauffeur.drive.live.mirror import Mirror
-from chauffeur.drive.live.orders import Event, Order, Request, encode, read_brief, read_event, read_order
+from chauffeur.drive.live.orders import Order, Request, encode, read_brief, read_event, read_order
 from chauffeur.drive.live.planning import Planning, PlanningRings
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import SIZES, RingName
@@ -74,7 +75,7 @@ class Rig:
         await self.planning.finish()
         return self.kinds()
 
-    def told(self) -> list[Event]:
+    def told(self) -> list[DriveEvent]:
         return [read_event(message.payload) for message in Reader(self.events, old=True).news()[0]]
 
     def kinds(self) -> list[tuple[str, str]]:
@@ -97,7 +98,7 @@ def test_a_wish_becomes_an_order_that_says_what_it_was_made_for(rig: Rig) -> Non
     assert asyncio.run(rig.answered()) == [("planning", "w1"), ("planned", "w1")]
     order = rig.ordered()
     assert (order.wish, order.plan, order.scene.trip, order.scene.tick) == ("w1", PLAN, 1, 1)
-    assert order.scene.lane == rig.bench.world.snapshot().ego.lane
+    assert order.scene.lane == rig.bench.world.observe().ego.lane
     assert order.issued_ns < order.start_by_ns < order.expires_ns
 
 
@@ -127,7 +128,7 @@ def test_what_a_plan_was_made_of_is_left_for_the_books(rig: Rig) -> None:
     assert message is not None
     brief = read_brief(message.payload)
     assert (brief.wish, brief.instruction.text, brief.trip, brief.tick) == ("w1", "decline", 1, 1)
-    assert brief.context == describe_with_traffic(rig.bench.world.snapshot())
+    assert brief.context == describe_with_traffic(rig.bench.world.observe())
     assert (brief.history.items, brief.plan.refusal) == ((), "Cars cannot fly.")
 
 

@@ -135,7 +135,7 @@ def test_between_instants_no_plan_begins_on_a_picture_that_is_old(rig: Rig) -> N
         ({"start_by_ns": 1}, "too late"),
         ({"expires_ns": 1}, "too late"),
         ({"scene": Scene(2, 0, None, None)}, "another trip"),
-        ({"scene": Scene(1, 0, ("x", "y", 0), None)}, "another lane"),
+        ({"scene": Scene(1, 0, "x-y:0", None)}, "another lane"),
     ],
 )
 def test_a_stale_plan_is_not_started(rig: Rig, changes: dict[str, object], why: str) -> None:
@@ -149,7 +149,7 @@ def test_a_stale_plan_is_not_started(rig: Rig, changes: dict[str, object], why: 
 
 def test_a_plan_for_another_car_ahead_is_stale(rig: Rig) -> None:
     rig.period()
-    scene = Scene.of(1, rig.bench.world.snapshot())
+    scene = Scene.of(1, rig.bench.world.observe())
     assert scene.lead is not None
     rig.order(HOLD_20, scene=replace(scene, lead=scene.lead + 1))
     rig.period()

@@ -21,8 +21,9 @@ from chauffeur.concept import (
     Wishes,
 )
 from chauffeur.describe import describe
+from chauffeur.drive.events import DriveEvent, EventKind
 from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.orders import TOOK_OVER, Brief, Event, EventKind, Request
+from chauffeur.drive.live.orders import TOOK_OVER, Brief, Request
 from chauffeur.drive.live.remembering import trip_of
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Interaction
@@ -50,8 +51,9 @@ def report(tick: int, outcome: str = "") -> Report:
 
 
 def closed(brief: Brief | None, kind: EventKind, *, begun: int | None, at: int, text: str = "") -> Interaction:
-    answer = Event(kind, "w1", text, 1, at)
-    before = () if begun is None else (Event("started", "w1", "", 1, begun), Event("said", "w1", "Now.", 1, begun + 5))
+    answer = DriveEvent(kind, "w1", text, 1, at)
+    started = DriveEvent("started", "w1", "", 1, begun or 0)
+    before = () if begun is None else (started, DriveEvent("said", "w1", "Now.", 1, begun + 5))
     return Interaction(Request("w1", "Pass it.", "ana"), "closed", 0.0, answer, [*before, answer], brief)
 
 

@@ -14,13 +14,14 @@ from pathlib import Path
 import pytest
 
 from chauffeur.concept import SandboxError
+from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live import supervisor
 from chauffeur.drive.live.messages import Hand, Report
-from chauffeur.drive.live.orders import TOOK_OVER, Brief, Event
+from chauffeur.drive.live.orders import TOOK_OVER
 from chauffeur.drive.live.remembering import trip_of
 from chauffeur.drive.live.settings import Settings, ring
 from chauffeur.drive.live.starts import Start
-from chauffeur.drive.live.supervisor import Replaced, Runtime
+from chauffeur.drive.live.supervisor import Runtime
 from chauffeur.drive.scenarios import find
 
 STARTS = (Start(find("overtake"), 3),)
@@ -30,17 +31,19 @@ SETTINGS = Settings(STARTS, planner="retrieval", realtime=False)
 class Heard:
     def __init__(self) -> None:
         self.reports: list[Report] = []
-        self.events: list[Event] = []
-        self.replaced: list[Replaced] = []
+        self.events: list[DriveEvent] = []
+        self.replaced: list[DriveEvent] = []
 
-    def __call__(self, heard: Event | Report | Brief | Replaced) -> None:
-        match heard:
-            case Report():
-                self.reports.append(heard)
-            case Event():
-                self.events.append(heard)
-            case Replaced():
-                self.replaced.append(heard)
+    def __call__(self, event: DriveEvent) -> None:
+        match event.value:
+            case Report() as report:
+                self.reports.append(report)
+            case None:
+                self.events.append(event)
+            case str():
+                self.replaced.append(event)
+            case _:
+                pass
 
 
 def until(runtime: Runtime, holds: Callable[[], bool], within_s: float = 60.0) -> None:
@@ -88,7 +91,7 @@ def test_a_wish_is_driven_while_every_other_process_is_killed(tmp_path: Path) ->
     assert figures["ticks"] >= len(heard.reports) > 20
     assert heard.reports[-1].outcome == "stopped"
     assert not any(report.faults for report in heard.reports)
-    assert {replaced.role for replaced in heard.replaced} == {"policy", "planner"}
+    assert {replaced.value for replaced in heard.replaced} == {"policy", "planner"}
     assert not folder.exists()
     assert not any(Path(f"/proc/{pid}/cmdline").exists() for pid in pids)
 
@@ -186,7 +189,7 @@ def test_a_policy_that_hangs_is_replaced_and_control_does_not_wait_for_it() -> N
         before = len(heard.reports)
         os.kill(runtime.pid("policy"), signal.SIGSTOP)
         until(runtime, lambda: bool(heard.replaced))
-        assert heard.replaced[0].why == "It hung."
+        assert heard.replaced[0].text == "It hung."
         driven = [report.tick for report in heard.reports[before:]]
         assert len(driven) > 2 and driven == sorted(set(driven)), "control went on meanwhile"
         until(runtime, lambda: heard.reports[-1].rung == "follow")

@@ -15,7 +15,7 @@ from live_bench import OVERTAKE, Bench
 from chauffeur.concept import Command, Limits, Scenario
 from chauffeur.drive.actuate import actuate
 from chauffeur.drive.live.starts import Start
-from chauffeur.drive.parameters import shield_for
+from chauffeur.safety.shield import shield_for
 from chauffeur.safety.shield import foresight
 from chauffeur.worlds.highway import HighwayWorld
 
@@ -34,11 +34,11 @@ wishes = driver.initial_wishes()
 for _ in range(120):
     if world.ended:
         break
-    snapshot = world.snapshot()
+    observation = world.observe()
     settled = driver.settle(wishes)
     steered = driver.command(settled)
     command = Command(5.0, steered.steering_rad + 0.1)  # full throttle, and off its way
-    done = actuate(world, snapshot, command, settled.target_lane, shield)
+    done = actuate(world, observation, command, settled.target_lane, shield)
     rules |= {change.rule for change in done.interventions if change.after.steering_rad != change.before.steering_rad}
 assert rules, "nobody had to steer back: this tests nothing"
 assert loaded() == before, {name: count for name, count in loaded().items() if count != before[name]}

@@ -17,7 +17,8 @@ import ros_graph as ros
 from ros_debian import LISTENER, rospy_node
 
 from chauffeur.concept import PersonId
-from chauffeur.drive.onroad import Answer, Event, OnRoad, open_books
+from chauffeur.drive.events import DriveEvent
+from chauffeur.drive.onroad import Answer, OnRoad, open_books
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.audit import read_records, verify
@@ -40,7 +41,7 @@ def test_a_session_over_a_roscore_that_dies(tmp_path: Path) -> None:
     settings, planner = read_settings(file), make_planner("talk2drive")
     memory, ana = VaultMemory(tmp_path / "home"), PersonId("ana")
     answers: list[Answer] = []
-    told: list[Event] = []
+    told: list[DriveEvent] = []
 
     async def eventually(true: object) -> None:
         await asyncio.to_thread(ros.eventually, true, 20.0)
@@ -77,7 +78,7 @@ def test_a_session_over_a_roscore_that_dies(tmp_path: Path) -> None:
 
     asyncio.run(whole())
     assert [one.status for one in answers] == ["delivered", "taken", "unreachable", "delivered"]
-    assert any("connection is refused" in event.words for event in told if event.kind == "link")
+    assert any("connection is refused" in event.text for event in told if event.kind == "link")
     assert verify(tmp_path / "audit.jsonl").ok
     acts = [r.body for _, r in read_records(tmp_path / "audit.jsonl") if r.kind == "actuation"]
     assert [(one["wish"], one["done"]) for one in acts] == [(1, False), (1, True), (4, False), (4, True)]

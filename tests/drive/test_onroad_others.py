@@ -17,7 +17,8 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "worlds"))
 from ros_graph import FOLLOWER, REPLANNER, eventually
 
 from chauffeur.concept import Parameters
-from chauffeur.drive.onroad import Event, OnRoad
+from chauffeur.drive.events import DriveEvent
+from chauffeur.drive.onroad import OnRoad
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.ros.opening import open_vehicle
 from chauffeur.worlds.ros.settings import parse_settings
@@ -25,8 +26,8 @@ from chauffeur.worlds.ros.settings import parse_settings
 pytestmark = pytest.mark.server
 
 
-def drive(text: str, steps: Callable[[OnRoad], Awaitable[None]]) -> list[Event]:
-    told: list[Event] = []
+def drive(text: str, steps: Callable[[OnRoad], Awaitable[None]]) -> list[DriveEvent]:
+    told: list[DriveEvent] = []
     settings, planner = parse_settings(text), make_planner("talk2drive")
     car = open_vehicle(settings)
 
@@ -63,7 +64,7 @@ def test_autoware_gets_a_velocity_limit_and_its_own_speed_counts() -> None:
 
     with planner(mode=2) as autoware:
         told = drive(f'interface = "ros2"\n[limits]\nmax_speed_mps = 10.0\n[ros2]\ndomain = {DOMAIN}\n', steps)
-    context = next(event.words for event in told if event.kind == "context")
+    context = next(event.text for event in told if event.kind == "context")
     assert "I am driving at 2.5 m/s (9 km/h)." in context
     assert "Its mode of operation is: autonomous." in context
 

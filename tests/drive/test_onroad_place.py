@@ -17,7 +17,8 @@ from test_services_server import Asked, reply, roads_json, serving
 
 from chauffeur.concept import Parameters, Plan, PlanRequest, Thoughts
 from chauffeur.describe.services import Sources, Unknown, read_sources
-from chauffeur.drive.onroad import Answer, Event, OnRoad
+from chauffeur.drive.events import DriveEvent
+from chauffeur.drive.onroad import Answer, OnRoad
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.ros.opening import open_vehicle
@@ -40,13 +41,13 @@ def streets(limit: str) -> Callable[[Asked], bytes | None]:
 
 def drive(
     folder: Path, url: str, planner: Planner, steps: Callable[[OnRoad, Sources], Awaitable[None]], budget_s: float = 5.0
-) -> list[Event]:
+) -> list[DriveEvent]:
     path = folder / "services.toml"
     path.write_text(
         f'region = "germany"\nonline = ["map"]\nbudget_s = {budget_s}\n'
         f'[position]\nat = [48.137, 11.575]\nheading_deg = 90.0\n[urls]\nmap = "{url}"\nweather = "{url}"\n'
     )
-    told: list[Event] = []
+    told: list[DriveEvent] = []
     settings = parse_settings(FILE)
 
     async def whole() -> None:
@@ -68,7 +69,7 @@ def ask(folder: Path, url: str, planner: Planner, *wishes: str) -> tuple[list[An
             answers.append(await road.ask(wish))
 
     told = drive(folder, url, planner, steps)
-    return answers, next(event.words for event in told if event.kind == "context")
+    return answers, next(event.text for event in told if event.kind == "context")
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +140,7 @@ def test_services_that_hang_cost_their_budget_and_are_said(tmp_path: Path, embed
     with serving(lambda asked: None) as service:
         told = drive(tmp_path, service.url, embedded, steps, budget_s=0.05)
     assert answers[0].status == "dry-run"
-    context = next(event.words for event in told if event.kind == "context")
+    context = next(event.text for event in told if event.kind == "context")
     assert "Speed limit: not known (the service did not answer within 0.05 s)." in context
 
 
@@ -154,5 +155,5 @@ def test_sources_that_break_are_said(tmp_path: Path, embedded: Planner, monkeypa
         assert (await road.ask("Drive at 20 km/h.")).status == "dry-run"
 
     told = drive(tmp_path, "http://127.0.0.1:9", embedded, steps)
-    context = next(event.words for event in told if event.kind == "context")
+    context = next(event.text for event in told if event.kind == "context")
     assert "not known (the sources failed (ZeroDivisionError))" in context

@@ -29,7 +29,9 @@ from chauffeur.concept import (
     Program,
     Thoughts,
 )
-from chauffeur.drive.onroad import Answer, Event, OnRoad, RoadBooks, open_books
+from chauffeur.drive import questions
+from chauffeur.drive.events import DriveEvent
+from chauffeur.drive.onroad import Answer, OnRoad, RoadBooks, open_books
 from chauffeur.drive.onroad import session as onroad
 from chauffeur.drive.onroad.checks import fitted, is_about_engaging, is_stop
 from chauffeur.memory.vault import VaultMemory
@@ -84,9 +86,9 @@ def drive(
     *,
     settings: VehicleSettings | None = None,
     **options: Any,
-) -> list[Event]:
+) -> list[DriveEvent]:
     """A session in a dry run."""
-    told: list[Event] = []
+    told: list[DriveEvent] = []
     settings = settings or parse_settings(FILE)
     car = open_vehicle(settings, dry_run=True)
 
@@ -139,9 +141,9 @@ def test_what_is_told_claims_nothing_of_a_road(embedded: Planner) -> None:
 
     for event in drive(embedded, steps):
         if event.kind == "plan":
-            plans.append(event.words)
+            plans.append(event.text)
         if event.kind == "context":
-            contexts.append(event.words)
+            contexts.append(event.text)
     assert len(plans) == len(contexts) == 5
     for words in plans:
         for claim in ("near ahead", "within 100 m", "one lane", "no junction", "keep my lane", "allowed"):
@@ -330,7 +332,7 @@ def test_listeners_and_memories_that_fail_take_nothing_down(caplog: pytest.LogCa
 
         remember = attach_feedback = recall
 
-    def deaf(event: Event) -> None:
+    def deaf(event: DriveEvent) -> None:
         raise ValueError
 
     settings = parse_settings(FILE)
@@ -433,7 +435,7 @@ def test_a_trip_says_what_it_was_and_what_was_not_measured(embedded: Planner) ->
         assert (await road.ask("Change to the left lane.")).status == "refused"
 
     told = drive(embedded, steps, person=ANA, memory=Kept())
-    assert any(event.kind == "trouble" and "locked" in event.words for event in told)
+    assert any(event.kind == "trouble" and "locked" in event.text for event in told)
     first, second = kept
     record = dict(first.record)
     assert (record["simulated"], record["dry_run"], record["interface"]) == (False, True, "ros1")
@@ -524,7 +526,9 @@ def test_the_program_in_the_documentation_runs(tmp_path: Path) -> None:
         [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.split()[:5] == ["link", "context", "plan", "verdicts", "asked"]
+    kinds = ("link", "wish", "context", "plan", "verdicts", "asking", "asked", "answer")
+    told = [word for word in done.stdout.split() if word in kinds]
+    assert told == ["wish", *(kind for kind in kinds if kind != "wish")]
     assert "dry-run Planned speeds are capped" in done.stdout
 
 
@@ -535,7 +539,7 @@ def test_it_ends_with_what_stays(embedded: Planner) -> None:
 
     last = drive(embedded, steps)[-1]
     assert last.kind == "over"
-    assert "dry run" in last.words
+    assert "dry run" in last.text
 
 
 @pytest.mark.parametrize("text", ["stop", "Stop!", " STOP now. ", "please stop", "Stop, please!", "halt"])
@@ -591,3 +595,47 @@ def test_hundredths_above_the_cap_are_no_more_than_the_cap(speed: float, asked: 
     else:
         assert answer.published is not None
         assert answer.published.messages[0].fields["velocity_max"] == pytest.approx(asked * 3.6, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ("answer", "within_s", "statuses"),
+    [
+        ("Yes.", 20.0, ["declined", "dry-run"]),
+        ("No.", 20.0, ["declined", "declined"]),
+        ("Yes.", -1.0, ["declined", "declined"]),
+        ("Stop!", 20.0, ["declined", "dry-run"]),
+    ],
+    ids=["yes", "no", "late", "stop"],
+)
+def test_a_question_is_settled_by_what_is_said_next(
+    monkeypatch: pytest.MonkeyPatch, answer: str, within_s: float, statuses: list[str]
+) -> None:
+    """A yes in time is the wish that was asked about; a no asks for nothing, nor does a yes to what nobody recalls."""
+    monkeypatch.setattr(questions, "ANSWER_WITHIN_S", within_s)
+
+    async def asks(request: PlanRequest) -> Plan:
+        if request.instruction.confirmed == "Did you mean 5 m/s?":
+            return Plan(Thoughts("I do."), Parameters(5.0, 8.0, 2.0), settings=(("target_speed_mps", 5.0),))
+        return Plan(Thoughts("?"), None, "Did you mean 5 m/s?", offer="Drive at 5 m/s.", intent="ask")
+
+    planner = Asked(asks)
+    answers = ask(planner, "Drive at S m/s.", answer)
+    assert [one.status for one in answers] == statuses
+    confirmed = [one.instruction.text for one in planner.requests if one.instruction.confirmed]
+    assert set(confirmed) == {"Drive at 5 m/s."}, "whether a yes could be driven is seen before it is asked"
+    if answer == "No.":
+        assert answers[1].words == questions.NOT_MEANT
+
+
+def test_a_question_to_which_a_yes_would_be_refused_is_not_asked() -> None:
+    async def asks(request: PlanRequest) -> Plan:
+        if request.instruction.confirmed:
+            return Plan(Thoughts("I do."), Parameters(50.0, 8.0, 2.0), settings=(("target_speed_mps", 50.0),))
+        return Plan(Thoughts("?"), None, "Did you mean 50 m/s?", offer="Drive at 50 m/s.", intent="ask")
+
+    (answer,) = ask(Asked(asks), "Drive at SO m/s.")
+    assert answer.status == "declined"
+    assert answer.plan is not None
+    assert answer.plan.offer == ""
+    assert "50 m/s" not in answer.words
+    assert "180 km/h" in answer.words

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from chauffeur.concept import Parameters, Scenario, ScenarioError
 from chauffeur.drive.episode import Episode
-from chauffeur.drive.parameters import drive_parameters, shield_for
+from chauffeur.drive.session import drive_executed
+from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.parking import PLACES, ParkingReferee, ParkingWorld
 
 
@@ -27,7 +28,7 @@ def _lot(seed: int, **config: object) -> ParkingWorld:
 def _park(world: ParkingWorld, policy: Parameters, place: str, *, shielded: bool = True) -> Episode:
     shield = shield_for(world) if shielded else None
     referee = ParkingReferee(world, world.spot(place))
-    return drive_parameters(world, replace(policy, route=place), referee, max_s=120.0, shield=shield)
+    return drive_executed(world, replace(policy, route=place), referee, max_s=120.0, shield=shield)
 
 
 @pytest.mark.parametrize("place", PLACES)
@@ -50,7 +51,7 @@ def test_it_parks_where_it_was_meant_to(place: str, policy: Parameters) -> None:
 
 def test_without_a_place_it_drives_on_and_stands_before_the_exit() -> None:
     world = _lot(3, aisles=1, spots_a_row=2, cars=0, walkers=0)
-    episode = drive_parameters(world, Parameters(4.0, 5.0, 1.0), max_s=80.0)
+    episode = drive_executed(world, Parameters(4.0, 5.0, 1.0), max_s=80.0)
     ego = episode.final.ego
     assert ego.speed_mps < 0.05
     assert abs(math.sin(ego.heading_rad)) < 0.02
@@ -65,7 +66,7 @@ def test_it_stops_for_somebody_who_crosses() -> None:
         world = _lot(seed, aisles=1, cars=0, walkers=3)
         episode = _park(world, Parameters(3.5, 4.0, 1.0), "exit", shielded=False)
         assert episode.outcome == "success"
-        before = [frame.snapshot.ego.speed_mps for frame in episode.frames if frame.snapshot.ego.y_m < 9.0]
+        before = [frame.observation.ego.speed_mps for frame in episode.frames if frame.observation.ego.y_m > -9.0]
         slowed += min(before) < 1.0
     assert slowed
 
@@ -73,19 +74,19 @@ def test_it_stops_for_somebody_who_crosses() -> None:
 def test_the_target_speed_is_kept_to_and_the_lots_limit_as_well() -> None:
     for target, most in ((2.0, 2.05), (30.0, 15.0 / 3.6 + 1.05)):
         episode = _park(_lot(9, cars=0, walkers=0, ego_speed=2.0), Parameters(target, 4.0, 1.0), "stadium")
-        assert max(frame.snapshot.ego.speed_mps for frame in episode.frames) <= most
+        assert max(frame.observation.ego.speed_mps for frame in episode.frames) <= most
 
 
 def test_a_spot_that_is_taken_is_refused_before_the_car_moves() -> None:
     world = _lot(7)
-    taken = next(o.lane[1] for o in world.snapshot().others if o.lane is not None and o.speed_mps == 0.0)
+    taken = next(o.lane for o in world.observe().others if o.lane is not None and o.speed_mps == 0.0)
     with pytest.raises(ScenarioError, match=f"{taken} is taken"):
-        drive_parameters(world, Parameters(3.0, 4.0, 1.0, route=taken), max_s=10.0)
-    assert world.snapshot().tick == 0
+        drive_executed(world, Parameters(3.0, 4.0, 1.0, route=taken), max_s=10.0)
+    assert world.observe().tick == 0
 
 
 def test_a_lane_wish_means_nothing_in_a_lot() -> None:
-    episode = drive_parameters(_lot(7, cars=0, walkers=0), Parameters(3.0, 4.0, 1.0, -1), max_s=5.0)
+    episode = drive_executed(_lot(7, cars=0, walkers=0), Parameters(3.0, 4.0, 1.0, -1), max_s=5.0)
     assert abs(episode.final.ego.y_m) < 0.05
 
 
@@ -97,7 +98,7 @@ numbers = st.one_of(st.floats(), st.floats(0.0, 40.0), st.sampled_from([0.0, -1.
 def test_no_parameters_are_a_danger(seed: int, speed: float, ahead: float, ratio: float, place: str) -> None:
     world = _lot(seed, cars=seed % 3, walkers=seed % 4)
     referee = ParkingReferee(world, world.spot(place))
-    episode = drive_parameters(world, Parameters(speed, ahead, ratio, route=place), referee, max_s=25.0, record=False)
+    episode = drive_executed(world, Parameters(speed, ahead, ratio, route=place), referee, max_s=25.0, record=False)
     assert not episode.final.ego.crashed
     assert not episode.final.off_road
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 
+import pytest
+
 from chauffeur.concept import Instruction, Limits, PersonId, Verdict
 from chauffeur.describe.answering import DONT_KNOW
 from chauffeur.drive.answering import ANSWERED
@@ -43,6 +45,16 @@ def test_a_yes_drives_what_was_asked_about() -> None:
     assert asked.frames == ()
     assert asked.trip.plan.refusal == "Did you mean 80 km/h?"
     assert _driven(asked.trip.plan.offer, asked.trip.plan.refusal).frames
+
+
+@pytest.mark.parametrize("words", ["Drive at 0 km/h.", "Slow down to 20 km/h."])
+def test_a_question_is_asked_only_where_a_yes_could_be_driven(words: str) -> None:
+    """On a highway a yes would be refused for the least speed: the refusal comes at once, with what would help."""
+    plan = _driven(words).trip.plan
+    assert (plan.offer, plan.policy) == ("", None)
+    assert "At least 60 km/h here." in plan.refusal
+    assert "?" not in plan.refusal
+    assert plan.thoughts.text == plan.refusal
 
 
 def test_different_reasons_are_all_told() -> None:

@@ -27,15 +27,15 @@ from chauffeur.concept import (
     History,
     HistoryItem,
     Instruction,
-    LaneView,
+    Lane,
     Lead,
     Metric,
+    Observation,
     PersonId,
     Plan,
     Program,
     Scenario,
     Situation,
-    Snapshot,
     SystemMessage,
     Thoughts,
     Trip,
@@ -45,13 +45,15 @@ from chauffeur.concept import (
     Wishes,
 )
 from chauffeur.drive.foxglove import MESSAGES
-from chauffeur.drive.mcap_schemas import CHANNELS
+from chauffeur.drive.mcap_schemas import CHANNELS, LANES
 from chauffeur.drive.recording import RecordedTrip, compare_trips, read_trip, write_trip
+from chauffeur.geometry import Polyline, RoadGraph
+from roads import a_lane, a_road
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 any_numbers = st.floats()
 texts = st.text(st.characters(exclude_categories=("Cs",)), max_size=30)
-lane_ids = st.tuples(texts, texts, st.integers(0, 9))
+lane_ids = texts
 vehicles = st.builds(
     VehicleState,
     st.integers(0, 999),
@@ -60,21 +62,28 @@ vehicles = st.builds(
     lane=st.none() | lane_ids,
     crashed=st.booleans(),
 )
+places = st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
+lines = st.lists(places, min_size=2, max_size=4).filter(lambda points: math.dist(points[0], points[1]) > 0.1)
 roads = st.lists(
     st.builds(
-        LaneView,
+        Lane,
         lane_ids,
+        lines.map(Polyline.of),
         numbers,
         numbers,
-        numbers,
+        st.sampled_from(["driving", "emergency", "aisle", "parking"]),
+        texts,
+        st.integers(0, 9),
+        st.just(()),
         st.booleans(),
-        st.booleans(),
-        st.lists(st.tuples(numbers, numbers), max_size=4).map(tuple),
+        texts,
+        st.sampled_from(["left", "straight", "right"]),
+        texts,
     ),
     max_size=3,
-).map(tuple)
-snapshots = st.builds(
-    Snapshot,
+).map(lambda lanes: RoadGraph(tuple(lanes)))
+observations = st.builds(
+    Observation,
     st.floats(0, 1e6),
     st.integers(0, 10**6),
     texts,
@@ -98,7 +107,7 @@ wishes = st.builds(
 commands = st.builds(Command, any_numbers, any_numbers)
 frames = st.builds(
     Frame,
-    snapshots,
+    observations,
     wishes,
     commands,
     commands,
@@ -145,25 +154,23 @@ def a_scenario() -> Scenario:
     return Scenario("s", "highway", {"env": {"lanes": [1, 2.5], "seed": 10**42}}, 10**41, {"value": 1}, "wish", "title")
 
 
-def a_snapshot(tick: int, lanes: tuple[LaneView, ...], *, cars: int = 3) -> Snapshot:
+def an_observation(tick: int, lanes: tuple[Lane, ...], *, cars: int = 3) -> Observation:
     def car(number: int) -> VehicleState:
         x, speed = 10.0 * number + math.sin(number + tick) * tick, 20 + math.sin(tick * number)
-        return VehicleState(number, "car", x, 4.0, 0.01 * math.cos(tick), speed, 5.0, 2.0, ("a", "b", 1))
+        return VehicleState(number, "car", x, -4.0, 0.01 * math.cos(tick), speed, 5.0, 2.0, "a-b:1")
 
     others = tuple(car(number) for number in range(1, cars + 1))
-    return Snapshot(tick / 10, tick, "highway", car(0), others, (), lanes, None, None, False, False)
+    return Observation(tick / 10, tick, "highway", car(0), others, (), a_road(lanes), None, None, False, False)
 
 
 def a_drive(ticks: int = 5, cars: int = 3) -> RecordedTrip:
-    lanes = tuple(
-        LaneView(("a", "b", i), 4.0, 2e3, 31.3, False, False, ((0.0, 4.0 * i), (2e3, 4.0 * i))) for i in (0, 1)
-    )
+    lanes = tuple(a_lane(f"a-b:{i}", ((0.0, -4.0 * i), (2e3, -4.0 * i)), limit=31.3) for i in (0, 1))
     command = Command(0.1, -0.2)
     taken = tuple(
-        Frame(a_snapshot(t, lanes, cars=cars), Wishes(), command, command, "running", 1) for t in range(ticks)
+        Frame(an_observation(t, lanes, cars=cars), Wishes(), command, command, "running", 1) for t in range(ticks)
     )
     return RecordedTrip(
-        a_trip(duration_s=ticks / 10), taken, a_scenario(), SystemMessage("S", "few-shot"), a_snapshot(ticks, lanes)
+        a_trip(duration_s=ticks / 10), taken, a_scenario(), SystemMessage("S", "few-shot"), an_observation(ticks, lanes)
     )
 
 
@@ -181,9 +188,9 @@ def test_a_trip_comes_back_whole(tmp_path: Path) -> None:
     assert [p.name for p in (tmp_path / "deep").iterdir()] == ["trip.mcap"]
 
 
-@given(st.lists(frames, max_size=4), st.none() | snapshots)
+@given(st.lists(frames, max_size=4), st.none() | observations)
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_any_frames_come_back_bit_for_bit(tmp_path: Path, taken: list[Frame], final: Snapshot | None) -> None:
+def test_any_frames_come_back_bit_for_bit(tmp_path: Path, taken: list[Frame], final: Observation | None) -> None:
     path = write_trip(tmp_path / "trip.mcap", a_trip(), taken, a_scenario(), final=final)
     back = read_trip(path)
     assert bits(back.frames) == bits(tuple(taken))
@@ -207,7 +214,7 @@ def test_lanes_are_stored_once_and_shared(tmp_path: Path) -> None:
     assert topics.count("/lanes") == 1
     back = read_trip(path)
     assert back.final is not None
-    assert all(frame.snapshot.lanes is back.final.lanes for frame in back.frames)
+    assert all(frame.observation.road.lanes is back.final.road.lanes for frame in back.frames)
 
 
 def test_other_viewers_find_schemas_for_everything(tmp_path: Path) -> None:
@@ -262,19 +269,19 @@ def test_the_drive_is_drawn_in_foxglove_messages(tmp_path: Path) -> None:
     assert [entity.id for entity in first.entities] == ["ego", "traffic", "road", "objects"]
     assert [entity.id for entity in second.entities] == ["ego", "traffic"], "the road is sent once"
     ego, traffic, road, _ = first.entities
-    assert (ego.cubes[0].pose.position.x, ego.cubes[0].pose.position.y) == (0.0, -4.0), "Foxglove's y grows to the left"
+    assert (ego.cubes[0].pose.position.x, ego.cubes[0].pose.position.y) == (0.0, -4.0), "y grows to the left"
     assert (ego.cubes[0].size.x, ego.cubes[0].size.y) == (5.0, 2.0)
     assert len(traffic.cubes) == 3
     assert [[(p.x, p.y) for p in line.points] for line in road.lines] == [
-        [(0.0, 2.0), (2000.0, 2.0)], [(0.0, -2.0), (2000.0, -2.0)],
-        [(0.0, -2.0), (2000.0, -2.0)], [(0.0, -6.0), (2000.0, -6.0)],
+        [(0.0, -2.0), (2000.0, -2.0)], [(0.0, 2.0), (2000.0, 2.0)],
+        [(0.0, -6.0), (2000.0, -6.0)], [(0.0, -2.0), (2000.0, -2.0)],
     ]  # fmt: skip
     points = points_of(found["/road"][0])
     assert {y for _, y, _ in points} == {2.0, -2.0, -6.0}
     assert len(points) == 3 * 1001, "every two metres, and the edge that two lanes share once"
     transform = found["/tf"][0]
     assert (transform.parent_frame_id, transform.child_frame_id) == ("map", "ego")
-    assert math.isclose(2 * math.asin(transform.rotation.z), -0.01, abs_tol=3e-4)
+    assert math.isclose(2 * math.asin(transform.rotation.z), 0.01, abs_tol=3e-4)
     assert found["/tf"][1].timestamp.ToNanoseconds() == 100_000_000
     outline = points_of(found["/vehicles"][0])[:5]
     assert all(abs(x) <= 3.26 and abs(y + 4.0) <= 1.1 for x, y, _ in outline)
@@ -285,8 +292,8 @@ def test_the_drive_is_drawn_in_foxglove_messages(tmp_path: Path) -> None:
 def test_a_failed_simulation_is_drawn_all_the_same(tmp_path: Path) -> None:
     for wrong in (math.nan, math.inf, -1e308, 1e39):
         body = VehicleState(0, "car", wrong, wrong, wrong, 0.0, wrong, wrong, None)
-        lane = LaneView(("a", "b", 0), wrong, 1.0, 1.0, False, False, ((0.0, 0.0), (wrong, wrong), (1.0, wrong)))
-        shot = replace(a_snapshot(0, (lane,)), ego=body, others=(body,))
+        lane = a_lane("a-b:0", width=wrong, limit=1.0)
+        shot = replace(an_observation(0, (lane,)), ego=body, others=(body,))
         path = write_trip(tmp_path / "trip.mcap", a_trip(), [], a_scenario(), final=shot)
         for x, y, _ in points_of(drawn(path)["/vehicles"][0]):
             assert math.isfinite(x)
@@ -357,12 +364,53 @@ def test_a_foreign_file_is_told_apart(tmp_path: Path) -> None:
         read_trip(tmp_path)
 
 
-def test_a_newer_format_asks_for_an_upgrade(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("chauffeur.drive.recording.FORMAT", 2)
+@pytest.mark.parametrize("other", [1, 4])
+def test_another_format_is_refused_in_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, other: int) -> None:
+    monkeypatch.setattr("chauffeur.drive.recording.FORMAT", other)
     path = save(tmp_path / "trip.mcap", a_drive())
     monkeypatch.undo()
-    with pytest.raises(DataError, match="format 2"):
+    with pytest.raises(DataError, match=f"format {other};.*reads formats 2 and 3"):
         read_trip(path)
+
+
+def as_format_2(path: Path, *, mirrored: bool) -> Path:
+    """The same file as format 2 has it, where a road said on which side of +x its y is."""
+    old = path.with_name("old.mcap")
+    with path.open("rb") as source, old.open("wb") as target:
+        writer = Writer(target)
+        writer.start(profile="chauffeur")
+        schemas: dict[int, int] = {}
+        ids: dict[int, int] = {}
+        for schema, channel, message in make_reader(source).iter_messages(log_time_order=False):
+            assert schema is not None
+            if channel.id not in ids:
+                schemas[schema.id] = writer.register_schema(schema.name, schema.encoding, schema.data)
+                ids[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, schemas[schema.id])
+            data = message.data
+            if channel.topic == LANES.topic:
+                data = json.dumps(json.loads(data) | {"mirrored": mirrored}).encode()
+            writer.add_message(ids[channel.id], message.log_time, data, message.publish_time, message.sequence)
+        source.seek(0)
+        for record in make_reader(source).iter_metadata():
+            writer.add_metadata(record.name, record.metadata | {"format": "2"})
+        writer.finish()
+    return old
+
+
+def test_what_was_recorded_with_y_to_the_right_is_turned_over(tmp_path: Path) -> None:
+    drive = a_drive()
+    path = save(tmp_path / "trip.mcap", drive)
+    assert compare_trips(read_trip(as_format_2(path, mirrored=False)), drive) is None
+    turned = read_trip(as_format_2(path, mirrored=True))
+    for frame, was in zip(turned.frames, drive.frames, strict=True):
+        for one, before in zip(frame.observation.others, was.observation.others, strict=True):
+            assert (one.x_m, one.speed_mps) == (before.x_m, before.speed_mps)
+            assert (one.y_m, one.heading_rad) == (-before.y_m, -before.heading_rad)
+        assert frame.applied == Command(was.applied.acceleration_mps2, -was.applied.steering_rad)
+    road = turned.frames[0].observation.road
+    assert [lane.centre.points_m for lane in road.lanes] == [((0.0, 0.0), (2e3, 0.0)), ((0.0, 4.0), (2e3, 4.0))]
+    assert turned.final is not None
+    assert turned.final.ego.y_m == 4.0
 
 
 def test_nothing_half_written_stays(tmp_path: Path) -> None:
@@ -380,12 +428,12 @@ def test_nothing_half_written_stays(tmp_path: Path) -> None:
 def test_a_difference_names_tick_field_and_values() -> None:
     drive = a_drive()
     frame = drive.frames[3]
-    ego = replace(frame.snapshot.ego, speed_mps=math.nextafter(frame.snapshot.ego.speed_mps, 99.0))
-    other = replace(frame, snapshot=replace(frame.snapshot, ego=ego))
+    ego = replace(frame.observation.ego, speed_mps=math.nextafter(frame.observation.ego.speed_mps, 99.0))
+    other = replace(frame, observation=replace(frame.observation, ego=ego))
     changed = replace(drive, frames=(*drive.frames[:3], other, *drive.frames[4:]))
     found = compare_trips(drive, changed)
     assert found is not None
-    assert (found.tick, found.field) == (3, "snapshot.ego.speed_mps")
+    assert (found.tick, found.field) == (3, "observation.ego.speed_mps")
     assert found.first != found.second
     assert "tick 3" in str(found)
 

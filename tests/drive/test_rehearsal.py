@@ -110,9 +110,9 @@ def test_the_best_is_chosen_and_what_cannot_win_is_broken_off(attempt: Try) -> N
 
 
 def test_the_world_itself_does_not_move(attempt: Try, world: HighwayWorld) -> None:
-    before = world.snapshot()
+    before = world.observe()
     attempt(*SPEEDS)
-    assert world.snapshot() == before
+    assert world.observe() == before
 
 
 def test_of_equals_the_first_is_taken(attempt: Try) -> None:
@@ -120,7 +120,7 @@ def test_of_equals_the_first_is_taken(attempt: Try) -> None:
 
 
 def test_one_that_collides_is_chosen_only_when_all_do(attempt: Try, world: HighwayWorld) -> None:
-    start = world.snapshot().ego.speed_mps
+    start = world.observe().ego.speed_mps
     assert attempt(at_speed(start), at_speed(10.0), speed=start, above=start - 2.0).index == 1
     every = attempt(at_speed(start), at_speed(10.0), speed=start, above=0.0)
     assert every.index == 0

@@ -69,14 +69,14 @@ def test_a_benchmarks_own_rules_bound_nothing() -> None:
 def test_a_stop_far_before_the_sign_serves_it_for_nobody() -> None:
     for shielded in (True, False):  # neither the binding alone nor the shield lets it
         episode = driven("quiet-intersection", RUNS_THE_SIGN, Limits(), 60.0, shielded=shielded)
-        assert not ran_sign([*(frame.snapshot for frame in episode.frames), episode.final])
-        assert min(frame.snapshot.stop_sign_m or 99.0 for frame in episode.frames) < 8.0
+        assert not ran_sign([*(frame.observation for frame in episode.frames), episode.final])
+        assert min(frame.observation.stop_sign_m or 99.0 for frame in episode.frames) < 8.0
 
 
 def test_lampilots_own_rules_serve_it_from_anywhere_and_the_ruler_sees_the_sign_run() -> None:
     world = make_world(find("quiet-intersection"))
     world.reset(find("quiet-intersection"))
     episode = drive_program(world, RUNS_THE_SIGN, None, 60.0, stop_zone_m=ANY_STOP_M)
-    shots = [*(frame.snapshot for frame in episode.frames), episode.final]
+    shots = [*(frame.observation for frame in episode.frames), episode.final]
     assert min(shot.ego.speed_mps for shot in shots) < 1.0, "it stood, far before the sign"
     assert ran_sign(shots)

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from chauffeur.cli.parts import referee_for
+from chauffeur.bench.referees import referee_for
 from chauffeur.cli.replay import drive_again
 from chauffeur.concept import Instruction, Limits, Parameters
 from chauffeur.drive.recording import RecordedTrip
@@ -39,7 +39,7 @@ def test_a_spoken_spot_is_parked_in_and_the_trip_replays(planner: Planner) -> No
 def test_a_speed_is_driven_on_a_highway(planner: Planner) -> None:
     recorded = driven(planner, "Drive at 100 km/h.", "cruise")
     assert recorded.trip.outcome == "success"
-    assert recorded.frames[-1].snapshot.ego.speed_mps == pytest.approx(27.8, abs=1.0)
+    assert recorded.frames[-1].observation.ego.speed_mps == pytest.approx(27.8, abs=1.0)
 
 
 def test_a_spot_that_is_not_there_is_refused_before_the_car_moves(planner: Planner) -> None:

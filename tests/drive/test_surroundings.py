@@ -38,18 +38,18 @@ def test_without_the_file_nobody_is_asked(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_a_simulated_car_has_real_weather_and_rules_and_its_own_road(file: Path) -> None:
     assert services_file() == file
-    snapshot = HighwayWorld().reset(find("cruise"))
+    observation = HighwayWorld().reset(find("cruise"))
 
     async def made() -> str:
         async with Sources(read_sources(file)) as sources:
-            return (await describing(sources))(snapshot).text
+            return (await describing(sources))(observation).text
 
     text = asyncio.run(made())
-    assert text.startswith(describe(snapshot).text)
+    assert text.startswith(describe(observation).text)
     assert "Traffic rules" in text
     assert "Weather: not known" in text  # said, and not invented
     assert "Road:" not in text
-    assert text.count("Speed limit") == describe(snapshot).text.count("Speed limit")
+    assert text.count("Speed limit") == describe(observation).text.count("Speed limit")
 
 
 def test_a_drive_is_told_of_it(file: Path) -> None:

@@ -38,12 +38,12 @@ def drive(ticks: int, hands: Hands = own_driver, *, shielded: bool = True) -> li
     for tick in range(ticks):
         if world.ended:
             break
-        snapshot = world.snapshot()
-        done = actuate(world, snapshot, hands(world, wishes), None, shield)
+        observation = world.observe()
+        done = actuate(world, observation, hands(world, wishes), None, shield)
         report = Report(
             trip=1, tick=tick, late_ns=0, rung="follow", plan="w1", state="running", line=1, age_s=0.05, wishes=wishes,
             requested=done.requested, applied=done.applied, interventions=done.interventions, clipped=(), refused={},
-            missed=0, faults=0, speed_mps=snapshot.ego.speed_mps, lane=snapshot.ego.lane,
+            missed=0, faults=0, speed_mps=observation.ego.speed_mps, lane=observation.ego.lane,
         )  # fmt: skip
         heard.append(Heard(report, round((tick + 1) * PERIOD_S * 1e9)))
     return heard

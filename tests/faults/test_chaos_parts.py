@@ -18,7 +18,7 @@ from chauffeur.bench.chaos.table import failures, figures, headline, table_markd
 from chauffeur.bench.chaos.vandal import DEEDS, Vandal
 from chauffeur.bench.chaos.witness import Stall, Witness, stood_ns
 from chauffeur.concept import Wishes
-from chauffeur.drive.live.messages import MessageError, Observation, Wish
+from chauffeur.drive.live.messages import MessageError, MirroredInstant, Wish
 from chauffeur.drive.live.settings import SIZES, ring
 
 FOREVER_NS = (1 << 63) - 1
@@ -27,7 +27,7 @@ FOREVER_NS = (1 << 63) - 1
 @pytest.fixture
 def rings(tmp_path):
     made = {name: ring(tmp_path, name, create=True) for name in SIZES}
-    made["observations"].write(Observation(3, 40, b"x").encode())
+    made["observations"].write(MirroredInstant(3, 40, b"x").encode())
     wish = Wish(3, 40, "w1", time.monotonic_ns(), FOREVER_NS, "running", 1, Wishes(20.0))
     made["wishes"].write(wish.encode())
     yield made

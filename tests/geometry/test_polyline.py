@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from chauffeur.geometry import Box, Polyline, Pose, joined, overlap
 
 LINE = Polyline.of([(0.0, 0.0), (10.0, 0.0), (10.0, 20.0), (40.0, 20.0)])
+SPIRAL = Polyline.of((0.25 * i * math.cos(0.2 * i), 0.25 * i * math.sin(0.2 * i)) for i in range(80))
 places = st.floats(-60.0, 60.0)
 
 
@@ -31,6 +32,19 @@ def test_no_point_of_the_line_is_closer_than_the_projection(x: float, y: float) 
     px, py, _ = LINE.poses(dense)
     assert away <= float(np.hypot(px - x, py - y).min()) + 1e-9
     assert abs(offset) <= away + 1e-9
+
+
+@given(places, places, st.floats(-30.0, 200.0), st.floats(0.0, 200.0))
+def test_the_closest_point_of_a_line_of_many_legs_is_that_of_its_parts(
+    x: float, y: float, low: float, span: float
+) -> None:
+    """Of many legs most are ruled out at once: what is left must hold the closest, also between two stations."""
+    found = SPIRAL.nearest(x, y, low, low + span)
+    here = SPIRAL.at(found)
+    away = math.dist((here.x_m, here.y_m), (x, y))
+    px, py, _ = SPIRAL.poses(np.linspace(low, low + span, 900))
+    assert low <= found <= low + span
+    assert away <= float(np.hypot(px - x, py - y).min()) + 1e-9
 
 
 def test_left_of_the_line_is_positive() -> None:

@@ -22,9 +22,9 @@ def _crossroads() -> RoadGraph:
         (
             _lane("in.0", (0.0, -100.0), (0.0, -10.0), road="in", index=0, successors=("left", "on")),
             _lane("in.1", (3.5, -100.0), (3.5, -10.0), road="in", index=1, successors=("right",)),
-            _lane("left", (0.0, -10.0), (-1.0, -2.0), (-10.0, 3.5), junction="j", successors=("west",)),
+            _lane("left", (0.0, -10.0), (-1.0, -2.0), (-10.0, 3.5), junction="j", turn="left", successors=("west",)),
             _lane("on", (0.0, -10.0), (0.0, 10.0), junction="j", successors=("north",)),
-            _lane("right", (3.5, -10.0), (5.0, -4.0), (10.0, -1.75), junction="j", successors=("east",)),
+            _lane("right", (3.5, -10.0), (5.0, -4.0), (10.0, -1.75), junction="j", turn="right", successors=("east",)),
             _lane("across", (-10.0, -1.75), (10.0, -1.75), junction="j", successors=("east",)),
             _lane("from-west", (-100.0, -1.75), (-10.0, -1.75), successors=("across",)),
             _lane("west", (-10.0, 3.5), (-100.0, 3.5)),
@@ -49,7 +49,8 @@ def test_what_lies_beside() -> None:
 
 def test_which_way_goes_on() -> None:
     road = _crossroads()
-    assert [road["left"].turn, road["on"].turn, road["right"].turn] == ["left", "straight", "right"]
+    assert (road.turns("in.0"), road.turns("in.1")) == (("left", "straight"), ())
+    assert [turn_of(road[lane].bend_rad) for lane in ("left", "on", "right")] == ["left", "straight", "right"]
     assert turn_of(math.radians(-170.0)) == "left", "who turns back, turns left where traffic drives on the right"
     following = {turn: road.onward("in.0", turn) for turn in ("left", "straight", None)}
     assert {turn: lane and lane.id for turn, lane in following.items()} == {
@@ -103,11 +104,14 @@ def test_a_place_is_found_in_lane_coordinates(y: float, across: float) -> None:
 @given(st.floats(-500.0, 500.0), st.floats(-500.0, 500.0))
 def test_the_grid_finds_what_a_full_search_finds(x: float, y: float) -> None:
     road = _crossroads()
-    found, everywhere = road.locate(x, y), road._closest(None, x, y, None, ())  # pyright: ignore[reportPrivateUsage]
+    found = road.locate(x, y)
     assert found is not None
-    assert everywhere is not None
-    away = [math.dist((x, y), _point(road, place)) for place in (found, everywhere)]
-    assert away[0] == pytest.approx(away[1]) or away[0] > 20.0, "nearer than a cell it is exact"
+    nearest = min(math.dist((x, y), _point(road, LanePlace(lane.id, _on(lane, x, y), 0.0))) for lane in road.lanes)
+    assert math.dist((x, y), _point(road, found)) == pytest.approx(nearest)
+
+
+def _on(lane: Lane, x: float, y: float) -> float:
+    return min(max(lane.centre.nearest(x, y), 0.0), lane.length_m)
 
 
 def _point(road: RoadGraph, place: LanePlace) -> tuple[float, float]:

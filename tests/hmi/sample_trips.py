@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 
 from chauffeur.concept import (
     Alignment,
@@ -18,16 +17,16 @@ from chauffeur.concept import (
     HistoryItem,
     Instruction,
     Intervention,
-    LaneView,
+    Lane,
     Lead,
     Metric,
     Mismatch,
+    Observation,
     PersonId,
     Plan,
     Program,
     Scenario,
     Situation,
-    Snapshot,
     Thoughts,
     Trip,
     VehicleState,
@@ -35,6 +34,7 @@ from chauffeur.concept import (
     Wishes,
 )
 from chauffeur.drive.recording import RecordedTrip
+from roads import a_lane, a_road
 
 HOSTILE = "</script><img src=x onerror=alert(1)> & \u2028 '\" <!-- <script>"
 
@@ -56,7 +56,8 @@ OVERTAKE = '''def overtake_left():
 
 
 def _vehicle(number: int, x: float, y: float, heading: float, speed: float, lane: tuple[str, str, int]) -> VehicleState:
-    return VehicleState(number, "car", x, y, heading, speed, 5.0, 2.0, lane)
+    """Of places and headings to the right of +x, which the trips are written in."""
+    return VehicleState(number, "car", x, -y, -heading, speed, 5.0, 2.0, lane)
 
 
 def _trip(wish: str, frames: list[Frame], scenario: str, program: str, **more: object) -> Trip:
@@ -112,7 +113,7 @@ def _trip(wish: str, frames: list[Frame], scenario: str, program: str, **more: o
         "duration_s": len(frames) / 10,
         "scenario": scenario,
         "seed": 42,
-        "said": tuple((f.snapshot.time_s, t) for f in frames for t in f.said),
+        "said": tuple((f.observation.time_s, t) for f in frames for t in f.said),
         "record": (("chauffeur", "0.1.0"), ("engine", "highway core 1"), ("limits", {"name": "default"})),
     }
     return Trip(**(values | more))  # type: ignore[arg-type]
@@ -128,7 +129,7 @@ def highway_trip(
 ) -> RecordedTrip:
     """Three lanes and an emergency lane; the ego changes to the left lane at 6 s."""
     lanes = tuple(
-        LaneView(("a", "b", i), 4.0, 2000.0, 31.2928, i == 3, i == 3, ((0.0, 4.0 * i), (2000.0, 4.0 * i)))
+        a_lane(f"a-b:{i}", ((0.0, -4.0 * i), (2000.0, -4.0 * i)), limit=31.2928, closed=i == 3, emergency=i == 3)
         for i in range(4)
     )
     frames: list[Frame] = []
@@ -139,9 +140,9 @@ def highway_trip(
         y = 4.0 - 4.0 * change
         target = 33.0 if time > 0.4 else None
         acceleration = 1.2 * ((target or 25.0) - speed) / 8
-        ego = _vehicle(0, x, y, 0.0 if change in (0, 1) else -0.05, speed, ("a", "b", 0 if y < 2 else 1))
+        ego = _vehicle(0, x, y, 0.0 if change in (0, 1) else -0.05, speed, f"a-b:{0 if y < 2 else 1}")
         if crash and time >= seconds - 0.3:
-            ego = VehicleState(0, "car", x, y, 0.1, speed, 5.0, 2.0, ego.lane, crashed=True)
+            ego = VehicleState(0, "car", x, -y, -0.1, speed, 5.0, 2.0, ego.lane, crashed=True)
         others = tuple(
             _vehicle(
                 i,
@@ -149,7 +150,7 @@ def highway_trip(
                 4.0 * (i % 3),
                 0.0,
                 20.0 + 0.137 * (i * 7 % 13) + 0.4 * math.sin(time + i),
-                ("a", "b", i % 3),
+                f"a-b:{i % 3}",
             )
             for i in range(1, cars + 1)
         )
@@ -169,8 +170,8 @@ def highway_trip(
                 calls = (ApiCall("is_safe_enter", "left", "False"), ApiCall("autopilot", "", "(0.3, 0.0)"))
         frames.append(
             Frame(
-                Snapshot(time, tick, "highway", ego, others, (), lanes, front, None, False, False),
-                Wishes(target, 1.5, ("a", "b", 0 if time >= 6 else 1)),
+                Observation(time, tick, "highway", ego, others, (), a_road(lanes), front, None, False, False),
+                Wishes(target, 1.5, f"a-b:{0 if time >= 6 else 1}"),
                 Command(acceleration * 1.1, 0.0),
                 Command(acceleration, 0.001 * tick),
                 "running" if running else "finished",
@@ -189,8 +190,8 @@ def guarded(recorded: RecordedTrip) -> RecordedTrip:
     """The same drive as if the shield had acted: steering from 5.0 s for 1.0 s, braking at 5.2 s and from 9.0 s."""
     frames: list[Frame] = []
     for frame in recorded.frames:
-        time, asked = frame.snapshot.time_s, frame.requested
-        steered = replace(frame.applied, steering_rad=-0.05)
+        time, asked = frame.observation.time_s, frame.requested
+        steered = replace(frame.applied, steering_rad=0.05)
         braked = replace(asked, acceleration_mps2=-1.0 - time / 10.0)
         found: list[Intervention] = []
         if 4.95 < time < 5.95:
@@ -227,7 +228,7 @@ def doubted(recorded: RecordedTrip) -> RecordedTrip:
 
 def intersection_trip(wish: str = "Take the next left, please.", seconds: float = 22.0) -> RecordedTrip:
     """Four arms, two crossing cars, a stop sign; the ego stops and turns left."""
-    lanes: list[LaneView] = []
+    lanes: list[Lane] = []
     for arm in range(4):
         angle = math.pi / 2 * arm
         c, s = math.cos(angle), math.sin(angle)
@@ -236,8 +237,7 @@ def intersection_trip(wish: str = "Take the next left, please.", seconds: float 
             return (x * c - y * s, x * s + y * c)
 
         def road(a: str, b: str, points: list[tuple[float, float]]) -> None:
-            length = sum(math.dist(p, q) for p, q in pairwise(points))
-            lanes.append(LaneView((a, b, 0), 4.0, length, 10.0, False, False, tuple(points)))
+            lanes.append(a_lane(f"{a}-{b}:0", [(x, -y) for x, y in points], limit=10.0))
 
         road(f"o{arm}", f"ir{arm}", [rot(2, 111), rot(2, 11)])
         arc = [(11 - 9 * math.cos(t), 11 - 9 * math.sin(t)) for t in (i * math.pi / 40 for i in range(21))]
@@ -246,7 +246,7 @@ def intersection_trip(wish: str = "Take the next left, please.", seconds: float 
         road(f"ir{arm}", f"il{(arm + 1) % 4}", [rot(x, y) for x, y in arc])
         road(f"ir{arm}", f"il{(arm + 2) % 4}", [rot(2, 11), rot(2, -11)])
         road(f"il{(arm - 1) % 4}", f"o{(arm - 1) % 4}", [rot(11, 2), rot(111, 2)])
-    sign = VehicleState(1000, "stop_sign", 2.0, 16.0, -math.pi / 2, 0.0, 2.0, 2.0, ("o0", "ir0", 0))
+    sign = VehicleState(1000, "stop_sign", 2.0, -16.0, math.pi / 2, 0.0, 2.0, 2.0, "o0-ir0:0")
     frames: list[Frame] = []
     travelled, speed = 0.0, 10.0
     for tick in range(int(seconds * 10)):
@@ -261,14 +261,16 @@ def intersection_trip(wish: str = "Take the next left, please.", seconds: float 
             x, y, heading = -11 + 13 * math.cos(t), 11 - 13 * math.sin(t), -math.pi / 2 - t
         else:
             x, y, heading = -11 - (travelled - 90 - 13 * math.pi / 2), -2.0, -math.pi
-        lane = ("o0", "ir0", 0) if travelled < 90 else ("ir0", "il1", 0) if x > -11 else ("il1", "o1", 0)
+        lane = "o0-ir0:0" if travelled < 90 else "ir0-il1:0" if x > -11 else "il1-o1:0"
         ego = _vehicle(0, x, y, heading, speed, lane)
         others = tuple(
-            _vehicle(i, sgn * (-70 - 22 * i + 8.2 * time), sgn * 2, 0 if sgn > 0 else math.pi, 8.2, ("o1", "ir1", 0))
+            _vehicle(i, sgn * (-70 - 22 * i + 8.2 * time), sgn * 2, 0 if sgn > 0 else math.pi, 8.2, "o1-ir1:0")
             for i, sgn in ((1, 1), (2, 1), (3, -1), (4, -1))
         )
         stop_m = max(85.0 - travelled, 0.0) or None
-        shot = Snapshot(time, tick, "intersection", ego, others, (sign,), tuple(lanes), None, stop_m, False, False)
+        shot = Observation(
+            time, tick, "intersection", ego, others, (sign,), a_road(tuple(lanes)), None, stop_m, False, False
+        )
         command = Command(acceleration, 0.0)
         served = frozenset({1000}) if time > 13 else frozenset[int]()
         said = ("Waiting for the crossing traffic.",) if tick == 110 else ()

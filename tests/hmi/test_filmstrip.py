@@ -10,7 +10,7 @@ from PIL import Image
 from sample_trips import HOSTILE, guarded, highway_trip, intersection_trip, refused_trip
 
 from chauffeur.concept import DataError
-from chauffeur.hmi.events import Event
+from chauffeur.hmi.events import TripMark
 from chauffeur.hmi.filmstrip import choose_moments, render_filmstrip, write_filmstrip
 
 EGO = (255, 178, 36)
@@ -58,7 +58,7 @@ def test_fewer_pictures_make_a_lower_strip(count: int) -> None:
 
 def test_instants_go_to_what_happened() -> None:
     times = [t / 10 for t in range(101)]
-    events = (Event(4.4, "said", "hello"), Event(5.5, "lane_change", "left"), Event(0.3, "said", "early"))
+    events = (TripMark(4.4, "said", "hello"), TripMark(5.5, "lane_change", "left"), TripMark(0.3, "said", "early"))
     moments = choose_moments(times, events, 5)
     assert [times[m.index] for m in moments] == [0.0, 2.5, 5.5, 7.5, 10.0]
     assert [m.event.label if m.event else "" for m in moments] == ["", "", "left", "", ""]
@@ -79,7 +79,7 @@ def test_the_shield_is_seen_where_it_acts_and_nowhere_else() -> None:
     assert acted.height > without.height, "a line of the heading says what it did"
     assert RING not in colours(without)
     assert RING in colours(acted)
-    later = [f if f.snapshot.time_s > 8.0 else replace(f, interventions=()) for f in guarded(plain).frames]
+    later = [f if f.observation.time_s > 8.0 else replace(f, interventions=()) for f in guarded(plain).frames]
     assert RING not in colours(render_filmstrip(replace(plain, frames=tuple(later)), 2)), "neither picture is then"
 
 

@@ -6,6 +6,7 @@ import base64
 import hashlib
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sample_trips import HOSTILE, doubted, guarded, highway_trip, intersection_trip, refused_trip
 
-from chauffeur.concept import DataError
+from chauffeur.concept import DataError, RoadGraph
 from chauffeur.hmi.page import embed_json, render_page, write_page
 
 
@@ -125,6 +126,21 @@ def test_both_roads_are_played(make: object, along: bool) -> None:
     for column in ("time", "speed", "target", "limit", "gap", "line", "state", "calls", "lane", "goal"):
         assert len(drive[column]) == count, column
     assert len(drive["ego"]["x"]) == count
+
+
+def test_cones_and_crosswalks_are_on_the_page() -> None:
+    trip = highway_trip(seconds=1.0)
+    first = trip.frames[0].observation
+    cone = replace(first.ego, id=100, kind="static", x_m=first.ego.x_m + 20.0, length_m=0.5, width_m=0.5)
+    road = RoadGraph((*first.road.lanes, replace(first.road.lanes[0], id="over:0", kind="crossing")))
+    frames = tuple(
+        replace(one, observation=replace(one.observation, objects=(cone,), road=road)) for one in trip.frames
+    )
+    drive = payload_of(render_page(replace(trip, frames=frames)))["drive"]
+    assert isinstance(drive, dict)
+    assert [one["l"] for one in drive["cones"]] == [0.5]
+    assert drive["obstacles"] == []
+    assert drive["road"]["bars"]["p"]
 
 
 def test_what_a_person_needs_to_see_is_there(highway_page: str) -> None:

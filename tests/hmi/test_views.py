@@ -8,24 +8,25 @@ from dataclasses import replace
 import pytest
 from sample_trips import OVERTAKE, guarded, highway_trip, intersection_trip
 
-from chauffeur.concept import Causes, Command, Feedback, LaneView, Metric, Parameters
+from chauffeur.concept import Causes, Command, Feedback, Lane, Metric, Parameters, Trajectory
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.payload import policy_words, program_tokens
-from chauffeur.hmi.road import Box, draw_road
+from chauffeur.hmi.road import Bounds, draw_road
 from chauffeur.hmi.shielding import rule_counts, stretches_of
-from chauffeur.hmi.view import facing_right, frame_drive, instants_of
+from chauffeur.hmi.view import facing_right, frame_drive, in_picture, instants_of
+from roads import a_lane, a_road
 
-EVERYWHERE = Box(-500, -500, 500, 500)
+EVERYWHERE = Bounds(-500, -500, 500, 500)
 
 
-def straight(index: int, *, emergency: bool = False, road: tuple[str, str] = ("a", "b")) -> LaneView:
+def straight(index: int, *, emergency: bool = False, road: str = "a-b") -> Lane:
     centre = ((0.0, 4.0 * index), (200.0, 4.0 * index))
-    return LaneView((*road, index), 4.0, 200.0, 30.0, emergency, emergency, centre)
+    return a_lane(f"{road}:{index}", centre, closed=emergency, emergency=emergency)
 
 
 def test_lines_of_a_highway() -> None:
-    road = draw_road((straight(0), straight(1), straight(2, emergency=True)), (), EVERYWHERE)
+    road = draw_road(a_road((straight(0), straight(1), straight(2, emergency=True))), (), EVERYWHERE)
     assert sorted((line.points_m[0][1], line.style) for line in road.lines) == [
         (-2.0, "solid"),
         (2.0, "dashed"),
@@ -35,15 +36,15 @@ def test_lines_of_a_highway() -> None:
 
 
 def test_opposite_lanes_share_one_centre_line() -> None:
-    there = LaneView(("a", "b", 0), 4.0, 100.0, 10.0, False, False, ((0.0, 2.0), (100.0, 2.0)))
-    back = LaneView(("b", "a", 0), 4.0, 100.0, 10.0, False, False, ((100.0, -2.0), (0.0, -2.0)))
-    styles = sorted(line.style for line in draw_road((there, back), (), EVERYWHERE).lines)
+    there = a_lane("a-b:0", ((0.0, 2.0), (100.0, 2.0)), limit=10.0)
+    back = a_lane("b-a:0", ((100.0, -2.0), (0.0, -2.0)), limit=10.0)
+    styles = sorted(line.style for line in draw_road(a_road((there, back)), (), EVERYWHERE).lines)
     assert styles == ["centre", "solid", "solid"]
 
 
 def test_the_inside_of_an_intersection_is_clear() -> None:
-    shot = intersection_trip().frames[0].snapshot
-    road = draw_road(shot.lanes, shot.objects, EVERYWHERE)
+    (shot,) = in_picture((intersection_trip().frames[0].observation,))
+    road = draw_road(shot.road, shot.objects, EVERYWHERE)
     inside = [p for line in road.lines for p in line.points_m if max(abs(p[0]), abs(p[1])) < 3.9]
     assert not inside
     sign = road.stop_signs[0]
@@ -51,8 +52,18 @@ def test_the_inside_of_an_intersection_is_clear() -> None:
     assert math.dist(*sign.line_m) == pytest.approx(3.6)
 
 
+def test_a_crosswalk_is_painted_as_bars_across_the_way_of_those_who_cross() -> None:
+    over = replace(a_lane("over:0", ((50.0, -6.0), (50.0, 6.0)), width=3.0), kind="crossing")
+    road = draw_road(a_road((straight(0), over)), (), EVERYWHERE)
+    assert len(road.bars_m) == 12
+    assert len(road.surfaces) == 1, "people's way is no asphalt"
+    assert all(math.dist(*bar) == pytest.approx(3.0) for bar in road.bars_m)
+    assert sorted(bar[0][1] for bar in road.bars_m) == pytest.approx([-5.5 + i for i in range(12)])
+    assert not draw_road(a_road((straight(0), over)), (), Bounds(100, -10, 180, 10)).bars_m
+
+
 def test_a_stretch_of_road_out_of_sight_is_left_out() -> None:
-    road = draw_road((straight(0),), (), Box(50, -10, 80, 10))
+    road = draw_road(a_road((straight(0),)), (), Bounds(50, -10, 80, 10))
     xs = [x for surface in road.surfaces for x, _ in surface.centre_m]
     assert min(xs) >= 50
     assert max(xs) <= 80
@@ -84,7 +95,7 @@ def test_what_the_shield_did_is_told_in_stretches() -> None:
 
 def test_a_pause_ends_a_stretch_only_if_it_is_long() -> None:
     frames = guarded(highway_trip(seconds=10.0)).frames
-    short = tuple(replace(f, interventions=()) if 5.35 < f.snapshot.time_s < 5.65 else f for f in frames)
+    short = tuple(replace(f, interventions=()) if 5.35 < f.observation.time_s < 5.65 else f for f in frames)
     assert [s.changes for s in stretches_of(short)] == [7, 1, 4]
     assert stretches_of(highway_trip(seconds=1.0).frames) == ()
 
@@ -94,8 +105,8 @@ def test_a_pause_ends_a_stretch_only_if_it_is_long() -> None:
     [
         (Command(1.5, 0.0), Command(-3.2, 0.0), "+1.5 → −3.2 m/s²"),
         (Command(0.01, 0.1), Command(-0.01, 0.1), "0.0 → 0.0 m/s²"),
-        (Command(1.0, 0.05), Command(1.0, -0.01), "steering 2.9° right → 0.6° left"),
-        (Command(1.0, 0.05), Command(-8.0, 0.0), "steering 2.9° right → 0.0°, +1.0 → −8.0 m/s²"),
+        (Command(1.0, -0.05), Command(1.0, 0.01), "steering 2.9° right → 0.6° left"),
+        (Command(1.0, -0.05), Command(-8.0, 0.0), "steering 2.9° right → 0.0°, +1.0 → −8.0 m/s²"),
     ],
 )
 def test_a_changed_command_in_words(before: Command, after: Command, told: str) -> None:
@@ -104,14 +115,14 @@ def test_a_changed_command_in_words(before: Command, after: Command, told: str) 
 
 def test_the_next_stretch_of_road_is_no_lane_change() -> None:
     trip = highway_trip(seconds=1.0)
-    last = trip.frames[-1].snapshot
-    final = replace(last, ego=replace(last.ego, lane=("b", "c", 2)))
+    last = trip.frames[-1].observation
+    final = replace(last, ego=replace(last.ego, lane="b-c:2"))
     assert [e.kind for e in events_of(replace(trip, final=final))] == [e.kind for e in events_of(trip)]
 
 
 def test_a_collision_shows_though_it_comes_after_the_last_command() -> None:
     trip = highway_trip(seconds=1.0)
-    last = trip.frames[-1].snapshot
+    last = trip.frames[-1].observation
     final = replace(last, time_s=1.0, off_road=True, ego=replace(last.ego, crashed=True))
     assert [e.kind for e in events_of(replace(trip, final=final))][-2:] == ["collision", "off_road"]
 
@@ -129,8 +140,9 @@ def test_the_car_sets_off_to_the_right() -> None:
 
 
 def test_a_highway_is_looked_at_as_it_is() -> None:
-    shots = instants_of(highway_trip(seconds=1.0))
-    assert facing_right(shots) is shots
+    instants = instants_of(highway_trip(seconds=1.0))
+    shots = facing_right(instants)
+    assert [(one.ego.x_m, one.ego.y_m) for one in shots] == [(one.ego.x_m, -one.ego.y_m) for one in instants]
     camera = frame_drive(shots)
     assert camera.along
     assert (camera.box.y0, camera.box.y1) == (-2.0, 14.0)
@@ -156,6 +168,11 @@ def test_numbers_carry_their_units() -> None:
     assert words.metric_name("lampilot-time-efficiency-v1") == "Time-efficiency score"
     assert words.metric_name("stop-compliance-v2") == "Stop compliance"
     assert "10.0 m/s (36 km/h)" in policy_words(Parameters(10.0, 5.0, 0.5))
+    long = Trajectory(tuple((0.8 * (i + 1), -0.5 * max(0, i - 10)) for i in range(25)), 0.5)
+    told = policy_words(long).splitlines()
+    assert told[0] == "25 waypoints in 12.5 s; of them"
+    assert told[-1] == "12.5 s: 20.0 m ahead, 7.0 m to the right"
+    assert len(told) < 10
     assert "way: stadium" in policy_words(Parameters(3.0, 4.0, 1.0, route="stadium")), "what is shown is what is driven"
 
 

@@ -15,7 +15,7 @@ from chromium import CHROMIUM, Tab, browser
 
 from chauffeur.hmi.wheel.pace import WallClock
 from chauffeur.hmi.wheel.server import serving
-from chauffeur.hmi.wheel.session import Session
+from chauffeur.hmi.wheel.session import WheelSession
 
 pytestmark = [pytest.mark.slow, pytest.mark.server, pytest.mark.skipif(not CHROMIUM, reason="no Chromium here")]
 
@@ -38,7 +38,7 @@ def test_the_page_draws_the_road_and_its_keys_move_the_car(tmp_path: Path) -> No
     run = run_of(tmp_path / "run", dataset_of(tmp_path / "data", "dec_rel_speed4"))
 
     async def drive() -> None:
-        session = Session(run, WallClock(), lambda: WHEN)
+        session = WheelSession(run, WallClock(), lambda: WHEN)
         async with serving(session) as server, browser(tmp_path / "profile") as tab:
             driving = asyncio.create_task(session.drive_all())
             await tab.open(server.url)

@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from wheel_rig import SteppedClock
 
-from chauffeur.hmi.wheel.controls import Gains, Keys, Positions, command_of, moved, steering_bound_rad
+from chauffeur.hmi.wheel.controls import Keys, Positions, WheelGains, command_of, moved, steering_bound_rad
 from chauffeur.hmi.wheel.mailbox import Mailbox
-from chauffeur.hmi.wheel.pace import Pace
+from chauffeur.hmi.wheel.pace import DrivePace
 
 DT_S = 0.1
-GAINS = Gains()
+GAINS = WheelGains()
 keys = st.integers(0, 15).map(Keys)
 
 
@@ -38,7 +38,7 @@ def test_commands_stay_within_the_vehicles_bounds(pressed: list[Keys], speed_mps
 
 def test_a_tap_is_a_little_and_a_held_key_is_all() -> None:
     tap = held(Keys.RIGHT, 1)
-    assert 0 < command_of(tap, 8.0, DT_S, GAINS).steering_rad < 0.03 * steering_bound_rad(8.0, GAINS)
+    assert 0 < -command_of(tap, 8.0, DT_S, GAINS).steering_rad < 0.03 * steering_bound_rad(8.0, GAINS)
     assert held(Keys.RIGHT, 7).wheel == 1.0
     assert held(Keys.GAS, 8).pedal == pytest.approx(1.0) and held(Keys.BRAKE, 4).pedal == pytest.approx(-1.0)
 
@@ -94,7 +94,7 @@ def test_late_periods_are_counted_and_not_caught_up() -> None:
             self.advance(max(0.0, at_s - self.now_s()))
 
     clock = Slow()
-    pace = Pace(clock, DT_S)
+    pace = DrivePace(clock, DT_S)
     began: list[float] = []
     for work_s in (0.01, 0.01, 0.25, 0.01, 0.125, 0.01):
         pace.await_period(driven=True)

@@ -13,7 +13,7 @@ from wheel_rig import GAS, LEFT, TowardsLane, TowardsSpeed, at_the_wheel, datase
 from chauffeur.bench.kernel.store import RowStore
 from chauffeur.bench.lampilot.human import drive_again
 from chauffeur.concept import ConfigError
-from chauffeur.hmi.wheel.controls import Gains, Keys, Positions, command_of, moved
+from chauffeur.hmi.wheel.controls import Keys, Positions, WheelGains, command_of, moved
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import load_dataset
 
@@ -85,8 +85,8 @@ def keys_to_commands(scenario: Any, keys: tuple[int, ...]) -> tuple[tuple[float,
         def command(self) -> Any:
             if len(made) == len(keys):
                 return None
-            self.at = moved(self.at, Keys(keys[len(made)]), 0.1, Gains())
-            command = command_of(self.at, world.perception().vehicle(0).speed_mps, 0.1, Gains())
+            self.at = moved(self.at, Keys(keys[len(made)]), 0.1, WheelGains())
+            command = command_of(self.at, world.perception().vehicle(0).speed_mps, 0.1, WheelGains())
             made.append((command.acceleration_mps2, command.steering_rad))
             return command
 

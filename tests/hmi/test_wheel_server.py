@@ -19,9 +19,9 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from wheel_rig import BRAKE, PageClient, SteppedClock, at_the_wheel, connect_page, dataset_of, origin_of, run_of
 
 from chauffeur.concept import ConfigError, DataError, MissingExtraError
-from chauffeur.hmi.wheel.protocol import Said, parse
+from chauffeur.hmi.wheel.protocol import PageMessage, parse
 from chauffeur.hmi.wheel.server import NOT_UNDERSTOOD, TAKEN_OVER, WheelServer, serving
-from chauffeur.hmi.wheel.session import Session
+from chauffeur.hmi.wheel.session import WheelSession
 
 pytestmark = pytest.mark.server
 
@@ -158,7 +158,7 @@ def test_what_is_no_message_is_refused(message: str | bytes) -> None:
 
 
 def test_what_is_a_message_is_read() -> None:
-    assert parse('{"t":"keys","k":5,"n":12}') == Said("keys", parse('{"t":"keys","k":5}').keys, 12)
+    assert parse('{"t":"keys","k":5,"n":12}') == PageMessage("keys", parse('{"t":"keys","k":5}').keys, 12)
     assert parse('{"t":"start","item":"left_lc_s0_c0"}').item == "left_lc_s0_c0"
 
 
@@ -166,7 +166,7 @@ def test_a_taken_port_is_said(tmp_path: Path) -> None:
     run = run_of(tmp_path / "run", dataset_of(tmp_path / "data", "left_lc"))
 
     async def check() -> None:
-        session = Session(run, SteppedClock(), str)
+        session = WheelSession(run, SteppedClock(), str)
         async with serving(session) as server:
             port = int(origin_of(server).rsplit(":", 1)[1])
             with pytest.raises(ConfigError, match=f"Port {port}"):
@@ -189,7 +189,7 @@ def test_a_missing_package_is_said_with_the_command_that_installs_it(
 
     async def check() -> None:
         monkeypatch.setattr(builtins, "__import__", without)
-        async with serving(Session(run, SteppedClock(), str)):
+        async with serving(WheelSession(run, SteppedClock(), str)):
             pass
 
     with pytest.raises(MissingExtraError, match=r'pip install "chauffeur\[page\]"'):

@@ -14,7 +14,7 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from chauffeur.bench.lampilot.human_run import HumanConfig, HumanRun
 from chauffeur.hmi.wheel.server import WheelServer, serving
-from chauffeur.hmi.wheel.session import Session
+from chauffeur.hmi.wheel.session import WheelSession
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
@@ -76,7 +76,7 @@ def run_of(folder: Path, dataset: Dataset, *, driver: str = "ana", assist: bool 
 class PageClient:
     """The page, as far as the server can tell."""
 
-    def __init__(self, socket: ClientConnection, clock: SteppedClock, session: Session) -> None:
+    def __init__(self, socket: ClientConnection, clock: SteppedClock, session: WheelSession) -> None:
         self.socket = socket
         self._clock = clock
         self._session = session
@@ -152,7 +152,7 @@ class PageClient:
 async def at_the_wheel(run: HumanRun) -> AsyncGenerator[tuple[PageClient, WheelServer, SteppedClock]]:
     """A session being driven, its server, and a page connected to it."""
     clock = SteppedClock()
-    session = Session(run, clock, lambda: WHEN)
+    session = WheelSession(run, clock, lambda: WHEN)
     async with serving(session) as server:
         driving = asyncio.create_task(session.drive_all())
         try:

@@ -7,10 +7,10 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from plain_ranking import Remembered, columns_of, remembered
 
+from chauffeur.language.weather import DRY, FOG, RAIN, SNOW, UNKNOWN
 from chauffeur.memory.columns import Signs
 from chauffeur.memory.retrieval import nearest
 from chauffeur.memory.similarity import mark
-from chauffeur.memory.weather import DRY, FOG, RAIN, SNOW, UNKNOWN
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC)
 SLOWER: Signs = (-1, 0, 0)

@@ -9,6 +9,7 @@ import pytest
 from memory_trips import Clock, context, trip
 
 from chauffeur.concept import History, Instruction, Limits, PersonId
+from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import Session
 from chauffeur.memory import VaultMemory
@@ -52,17 +53,17 @@ def test_anothers_damage_is_nobody_elses(vault: VaultMemory) -> None:
 
 
 def test_a_drive_goes_on_without_it(vault: VaultMemory) -> None:
-    told: list[tuple[str, object]] = []
+    told: list[DriveEvent] = []
     session = Session(
         planner=make_planner("keyword"),
         memory=vault,
-        tell=lambda letter, value: told.append((letter, value)),
+        tell=told.append,
         max_s=2.0,
     )
     place = find("intersection")
     recorded = asyncio.run(session.drive(Instruction("Turn right.", ANN), place, place.seed, Limits()))
     assert recorded.frames
-    assert [str(value).split(":")[0] for letter, value in told if letter == "memory"] == [
+    assert [event.text.split(":")[0] for event in told if event.kind == "trouble"] == [
         "Nothing is recalled of Ann",
         "This trip is not kept for Ann",
     ]

@@ -23,8 +23,8 @@ from chauffeur.concept import (
     PersonId,
     Trajectory,
 )
+from chauffeur.concept.data import data_home
 from chauffeur.memory import Memory, VaultMemory, interpret_feedback
-from chauffeur.memory.files import data_home
 from chauffeur.memory.records import MAX_CHARS
 
 ANN, BEN = PersonId("Ann"), PersonId("Ben")

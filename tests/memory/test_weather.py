@@ -11,8 +11,8 @@ from chauffeur.concept import Instruction, PersonId, Situation
 from chauffeur.describe.services.readings import Reading, Unknown
 from chauffeur.describe.services.surroundings import Surroundings, with_surroundings
 from chauffeur.describe.services.weather import Weather
+from chauffeur.language.weather import DRY, FOG, RAIN, SNOW, UNKNOWN, weather_in, weather_of
 from chauffeur.memory import VaultMemory
-from chauffeur.memory.weather import DRY, FOG, RAIN, SNOW, UNKNOWN, weather_in, weather_of
 
 
 @pytest.mark.parametrize(

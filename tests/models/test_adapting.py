@@ -93,7 +93,7 @@ class Trained:
     @property
     def recipe(self) -> AdaptRecipe:
         data = self.folder / "data"
-        return AdaptRecipe(data / "seen.jsonl", data / "train.jsonl", tolerance=5.0, judged=40, rate=1e-2, threads=1)
+        return AdaptRecipe(data / "seen.jsonl", data / "train.jsonl", tolerance=10.0, judged=40, rate=5e-3, threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +125,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Trained:
     end = tokenizer.token_to_id("<|end|>")
     for name in ("training", "data"):
         (folder / name).mkdir()
-    recipe = Recipe(size="tiny", steps=200, batch_tokens=1024, rate=5e-3, warmup=20)
+    recipe = Recipe(size="tiny", steps=400, batch_tokens=1024, rate=5e-3, warmup=20)
     packed = Packed.of([(one.prompt, one.reply) for one in pairs], tokenizer, end)
     model = train(packed, folder / "training", recipe, vocabulary=tokenizer.get_vocab_size(), end=end, device="cpu")
     about = {"version": "tiny", "questions": list(questions()), "reasons": list(reasons())}

@@ -18,7 +18,7 @@ pytest.importorskip("onnxscript", reason="onnxscript is not installed (extra: mo
 
 import torch
 
-from chauffeur.concept import ConfigError, DataError, Instruction, PlanRequest, Program, Snapshot, SystemMessage
+from chauffeur.concept import ConfigError, DataError, Instruction, Observation, PlanRequest, Program, SystemMessage
 from chauffeur.describe import describe
 from chauffeur.models.onboard.examples import questions, reasons
 from chauffeur.models.onboard.export import Stepped, export, export_transformers
@@ -58,7 +58,7 @@ WISHES = [
 ]
 
 
-def overtaking() -> Snapshot:
+def overtaking() -> Observation:
     return HighwayWorld().reset(next(s for s in BUILT_IN if s.id == "overtake"))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,12 +17,14 @@ from chauffeur.concept import DataError
 from chauffeur.concept.data import DATA_VARIABLE
 from chauffeur.language.sorter import load_sorter
 from chauffeur.language.tokens import tokens_of
+from chauffeur.language.weather import SAID_WEATHERS
 from chauffeur.memory import remarks
 from chauffeur.models.sorting import pipeline
 from chauffeur.models.sorting import sentences as tables
 from chauffeur.models.sorting.sentences import Sentence, kinds_of, sentences
 from chauffeur.models.sorting.tables import WRITER, drawn
 from chauffeur.models.sorting.training import Recipe, by_writer, right, train, write
+from chauffeur.models.sorting.weather import TEST_WRITERS, weather_sentences
 from chauffeur.planners.talk2drive import hints
 
 KINDS = ("fast", "slow")
@@ -41,7 +44,7 @@ MADE_UP = tuple(
 )
 
 
-@pytest.mark.parametrize("name", ["wishes", "remarks"])
+@pytest.mark.parametrize("name", ["wishes", "remarks", "weather"])
 def test_the_tables_are_whole_and_every_kind_is_in_them(name: tables.Name) -> None:
     found = sentences(name)
     assert {one.kind for one in found} == set(kinds_of(name))
@@ -108,12 +111,26 @@ def test_what_ships_is_of_these_kinds() -> None:
 
 
 def test_the_command_writes_sorters_and_their_card(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    some = {name: sentences(name)[::60] for name in ("wishes", "remarks")}
-    monkeypatch.setattr(pipeline, "sentences", lambda name: some[name])
+    names: tuple[tables.Name, ...] = ("wishes", "remarks", "weather")
+    some = {name: sentences(name)[::60] for name in names}
+
+    def few(seed: int, without: Collection[str] = ()) -> tuple[Sentence, ...]:
+        return tuple(one for one in some["weather"] if seed == 0 and one.writer not in without)
+
+    monkeypatch.setattr(pipeline, "sentences", some.__getitem__)
+    monkeypatch.setattr(pipeline, "weather_sentences", few)
     monkeypatch.setattr(pipeline, "drawn", lambda seed: drawn(seed)[::60])
     result = CliRunner().invoke(app, ["model", "train", "sorters", "--out", str(tmp_path / "made"), "--measured"])
     assert result.exit_code == 0, result.output
     card = (tmp_path / "made" / "CARD.md").read_text()
     assert "when their writer was left out" in card
-    assert "| too_fast/bit |" in card
-    assert load_sorter(tmp_path / "made" / "wishes.npz").kinds == tuple(kinds_of("wishes"))
+    assert "| too_fast/bit |" in card and "only looks so" in card
+    for name in ("wishes", "weather"):
+        assert load_sorter(tmp_path / "made" / f"{name}.npz").kinds == tuple(kinds_of(name))
+
+
+def test_what_is_learned_of_the_weather_leaves_writers_out() -> None:
+    found = weather_sentences(0, TEST_WRITERS)
+    assert {one.kind for one in found} == set(SAID_WEATHERS)
+    texts = {one.text for one in found}
+    assert not any(one.text in texts for one in sentences("weather") if one.writer in TEST_WRITERS)

@@ -15,6 +15,7 @@ from chauffeur.concept import Context, Instruction, Plan, PlanRequest, Situation
 from chauffeur.concept.addresses import Address
 from chauffeur.planners.llm import LlmPlanner
 from chauffeur.planners.llm_address import parse_address
+from chauffeur.planners.llm_model import ChatModel
 
 SECRET = "sk-test-0123456789abcdef-secret"
 
@@ -41,14 +42,10 @@ class Bench:
             self.waits.append(seconds)
 
         settings: dict[str, Any] = {"gate": lambda source: [], "timeout_s": 5.0} | options
-        return LlmPlanner(
-            model,
-            address or parse_address(url or self.url, {}),
-            rng=np.random.default_rng(1),
-            environ=self.environ,
-            sleep=sleep,
-            **settings,
-        )
+        own = {name: settings.pop(name) for name in ("gate", "repairs") if name in settings}
+        where = address or parse_address(url or self.url, {})
+        rng = np.random.default_rng(1)
+        return LlmPlanner(ChatModel(model, where, rng=rng, environ=self.environ, sleep=sleep, **settings), **own)
 
     def plan(self, words: str = "hold 25 m/s", *, asked: PlanRequest | None = None, **options: Any) -> Plan:
         async def run() -> Plan:

@@ -332,7 +332,7 @@ TAMPERING = [
     Hostile("tamper/forged_vehicle", frozenset({"raised"}), _body("say(str(get_speed_of('veh:9')))")),
     Hostile("tamper/forged_unknown", frozenset({"raised"}), _body("get_speed_of('veh:99999999999999999999')")),
     Hostile("tamper/forged_negative", frozenset({"raised"}), _body("get_speed_of('veh:-1')")),
-    Hostile("tamper/forged_lane", frozenset({"raised"}), _body("set_target_lane('lane:a:b:2')")),
+    Hostile("tamper/forged_lane", frozenset({"raised"}), _body("set_target_lane('lane:a-b:2')")),
     Hostile("tamper/forged_lane_far", frozenset({"raised"}), _body("set_target_lane('lane:x:y:7')")),
     Hostile(
         "tamper/arithmetic_handle",

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from chauffeur.concept import Command, LaneId, Snapshot, VehicleState, Wishes
+from chauffeur.concept import Command, LaneId, Observation, VehicleState, Wishes
 from chauffeur.worlds.base import EGO
 
 LIMIT_MPS = 31.0
-LANES: tuple[LaneId, ...] = (("a", "b", 0), ("a", "b", 1), ("a", "b", 2))
-CROSS: tuple[LaneId, ...] = (("w", "e", 0), ("e", "x", 0))
+LANES: tuple[LaneId, ...] = ("a-b:0", "a-b:1", "a-b:2")
+CROSS: tuple[LaneId, ...] = ("w-e:0", "e-x:0")
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,10 @@ class StraightRoad:
         self.cars = start_cars()
         self.commands = 0
 
-    def reset(self, scenario: object, seed: int | None = None) -> Snapshot:
+    def reset(self, scenario: object, seed: int | None = None) -> Observation:
         raise NotImplementedError("the straight road has no scenarios")
 
-    def snapshot(self) -> Snapshot:
+    def observe(self) -> Observation:
         raise NotImplementedError("the straight road takes no pictures")
 
     def perception(self) -> StraightRoad:
@@ -72,7 +72,7 @@ class StraightRoad:
     def vehicle(self, vehicle_id: int) -> VehicleState:
         car = self.cars[vehicle_id]
         lane = LANES[car.lane]
-        return VehicleState(car.id, car.kind, car.x_m, 4.0 * car.lane, 0.0, car.speed_mps, 5.0, 2.0, lane)
+        return VehicleState(car.id, car.kind, car.x_m, -4.0 * car.lane, 0.0, car.speed_mps, 5.0, 2.0, lane)
 
     def has_lane(self, lane: LaneId) -> bool:
         return lane in LANES or lane in CROSS
@@ -81,7 +81,7 @@ class StraightRoad:
         return LANES[self.cars[vehicle_id].lane]
 
     def adjacent_lane(self, lane: LaneId, offset: int) -> LaneId | None:
-        index = lane[2] + offset
+        index = LANES.index(lane) + offset
         return LANES[index] if 0 <= index < len(LANES) else None
 
     def speed_limit(self, lane: LaneId) -> float:
@@ -127,4 +127,4 @@ class StraightRoad:
         assert wishes.target_speed_mps is not None
         assert wishes.target_lane is not None
         acceleration = max(-5.0, min(5.0, wishes.target_speed_mps - ego.speed_mps))
-        return Command(acceleration, float(wishes.target_lane[2] - ego.lane))
+        return Command(acceleration, float(LANES.index(wishes.target_lane) - ego.lane))

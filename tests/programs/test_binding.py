@@ -104,7 +104,7 @@ def test_numbers_are_finite(call: Caller, value: float) -> None:
 def test_lanes_beside(call: Caller) -> None:
     ego = call("get_ego_vehicle")
     left, right = call("get_left_lane", ego), call("get_right_lane")
-    assert (left, right) == ("lane:a:b:0", "lane:a:b:2")
+    assert (left, right) == ("lane:a-b:0", "lane:a-b:2")
     call("set_target_lane", left)
     assert call.apis.wishes.target_lane == LANES[0]
     call.road.cars[EGO] = replace(call.road.cars[EGO], lane=0)
@@ -273,7 +273,7 @@ def test_handles_are_only_what_was_given() -> None:
     for forged in ("veh:4", "veh:03", "veh:3 "):
         with pytest.raises(BadArgumentValueError, match="was given"):
             table.vehicle(forged, "x")
-    for wrong in (3, None, "3", ["veh:3"], 3.0, "lane:a:b:0"):
+    for wrong in (3, None, "3", ["veh:3"], 3.0, "lane:a-b:0"):
         with pytest.raises(BadArgumentTypeError):
             table.vehicle(wrong, "x")
 

@@ -1,4 +1,4 @@
-"""The executor: one step per control period, faults as values, snapshots, and workers that die."""
+"""The executor: one step per control period, faults as values, dumps, and workers that die."""
 
 from __future__ import annotations
 

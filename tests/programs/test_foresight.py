@@ -10,7 +10,7 @@ from straight_road import StraightRoad
 
 from chauffeur.programs import Budget, ProgramExecutor
 from chauffeur.programs.binding import DrivingApis
-from chauffeur.programs.catalogue import APIS
+from chauffeur.programs.catalogue import TOWN_APIS
 from chauffeur.programs.foresight import FORESEEABLE, OF_WISHES
 
 ASKING = """
@@ -178,5 +178,5 @@ def main():
 
 
 def test_only_questions_are_foreseen() -> None:
-    assert {APIS[name].effect for name in FORESEEABLE} == {"read"}
+    assert {TOWN_APIS[name].effect for name in FORESEEABLE} == {"read"}
     assert OF_WISHES <= FORESEEABLE

@@ -290,7 +290,7 @@ SAID: list[tuple[str, str, str | None, Said]] = [
         ],
     ),
     (
-        inside("x = 'lane:a:b:0'"),
+        inside("x = 'lane:a-b:0'"),
         "",
         "main",
         [

@@ -6,9 +6,10 @@ import math
 
 import pytest
 
-from chauffeur.concept import LaneView, Snapshot, VehicleState
+from chauffeur.concept import Observation, VehicleState
 from chauffeur.programs import ProgramSyntaxError, check_source
 from chauffeur.programs.verify import Circumstances, Value, verify
+from roads import a_lane, a_road
 
 
 def body(text: str, head: str = "") -> str:
@@ -79,22 +80,22 @@ def test_nan_and_infinity_are_seen() -> None:
     assert argument(body("set_target_speed(25 / (get_speed_of(ego) + 200))")).hi == 0.25
 
 
-def snapshot(index: int, lanes: int = 3, speed: float = 25.0) -> Snapshot:
-    views = tuple(LaneView(("a", "b", i), 4.0, 1e3, 30.0, False, False, ((0.0, 0.0), (1.0, 0.0))) for i in range(lanes))
-    other = LaneView(("b", "c", 0), 4.0, 1e3, 20.0, False, False, ((0.0, 0.0), (1.0, 0.0)))
-    ego = VehicleState(0, "car", 0.0, 0.0, 0.0, speed, 5.0, 2.0, ("a", "b", index))
-    return Snapshot(0.0, 0, "highway", ego, (), (), (*views, other), None, None, False, False)
+def observation(index: int, lanes: int = 3, speed: float = 25.0) -> Observation:
+    views = tuple(a_lane(f"a-b:{i}", ((0.0, 0.0), (1.0, 0.0))) for i in range(lanes))
+    other = a_lane("b-c:0", ((0.0, 0.0), (1.0, 0.0)), limit=20.0)
+    ego = VehicleState(0, "car", 0.0, 0.0, 0.0, speed, 5.0, 2.0, f"a-b:{index}")
+    return Observation(0.0, 0, "highway", ego, (), (), a_road((*views, other)), None, None, False, False)
 
 
 def test_circumstances_hold_until_the_first_yield() -> None:
-    where = Circumstances.of(snapshot(0))
+    where = Circumstances.of(observation(0))
     assert (where.lanes, where.lane_index, where.speed_limits_mps) == (3, 0, (20.0, 30.0))
     now = argument(body("set_target_lane(get_left_lane(ego))"), "set_target_lane", where)
     assert now.is_none
     right = argument(body("set_target_lane(get_right_lane(ego))"), "set_target_lane", where)
     assert (right.offsets, right.may_be_none) == (frozenset({1}), False)
     later = argument(body("yield autopilot()\nset_target_lane(get_left_lane(ego))"), "set_target_lane", where)
-    assert later.holds("lane:a:b:1")
+    assert later.holds("lane:a-b:1")
     kept = argument(
         body("lane = get_right_lane(ego)\nyield autopilot()\nset_target_lane(lane)"), "set_target_lane", where
     )

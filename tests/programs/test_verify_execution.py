@@ -125,7 +125,7 @@ def assert_calls_are_foreseen(report: Verification, calls: list[Call], source: s
             held = [found for site in sites if (found := site.argument(param)) is not None]
             assert any(one.holds(value) for one in held), f"line {line}: {name}({param}={value!r}): {held}\n{source}"
             if isinstance(value, str) and value.startswith("lane:") and all(one.offsets is not None for one in held):
-                offset = int(value.rpartition(":")[2]) - call.lane[2]
+                offset = int(value.rpartition(":")[2]) - int(call.lane.rpartition(":")[2])
                 assert any(offset in (one.offsets or ()) for one in held), f"line {line}: {value}: {held}\n{source}"
 
 
@@ -140,7 +140,7 @@ def test_calls_and_lines_of_random_programs_are_foreseen(source: str) -> None:
     assert check_source(source).main == "main"
     for name in ("following", "left-lane"):
         world = start_of(name).copy()
-        report = verify(source, "", Circumstances.of(world.snapshot()))
+        report = verify(source, "", Circumstances.of(world.observe()))
         traced = Traced(source, world)
         traced.run(TICKS)
         assert traced.lines.isdisjoint(report.unreachable), (
@@ -153,7 +153,7 @@ def test_calls_and_lines_of_random_programs_are_foreseen(source: str) -> None:
 @given(source=programs())
 def test_the_sandbox_does_what_was_foreseen_of_random_programs(sandbox: Sandbox, source: str) -> None:
     world = start_of("overtake").copy()
-    report = verify(source, "", Circumstances.of(world.snapshot()))
+    report = verify(source, "", Circumstances.of(world.observe()))
     lines = marks_of(source)
     texts = source.split("\n")
     overwritten = {note.line for note in report.notes if note.code == "overwritten"}
@@ -231,12 +231,12 @@ PLANNED = [
 @pytest.mark.parametrize(("scenario", "wish"), PLANNED)
 def test_the_planners_programs_are_foreseen(scenario: str, wish: str) -> None:
     world = start_of(scenario).copy()
-    snapshot = world.snapshot()
-    request = PlanRequest(Instruction(wish), describe(snapshot), SystemMessage(""), limits=LAMPILOT_LIMITS)
+    observation = world.observe()
+    request = PlanRequest(Instruction(wish), describe(observation), SystemMessage(""), limits=LAMPILOT_LIMITS)
     plan = asyncio.run(RetrievalPlanner().plan(request))
     assert isinstance(plan.policy, Program)
     source = plan.policy.source
-    report = verify(source, "", Circumstances.of(snapshot))
+    report = verify(source, "", Circumstances.of(observation))
     assert report.complete
     traced = Traced(source, world)
     traced.run(200)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from alignment_programs import HIGHWAY
 
-from chauffeur.concept import Lead, Limits, Parameters, Plan, Program, Snapshot, Thoughts, Verdict
+from chauffeur.concept import Lead, Limits, Observation, Parameters, Plan, Program, Thoughts, Verdict
 from chauffeur.safety.alignment import (
     Alignment,
     Effect,
@@ -304,7 +304,7 @@ def test_scores_and_claims_in_words() -> None:
 REMEDY = "Let the thoughts say what the program does, or the program do what the thoughts say."
 
 
-def test_the_check_in_full(snap: Callable[..., Snapshot]) -> None:
+def test_the_check_in_full(snap: Callable[..., Observation]) -> None:
     def checked(text: str, source: str, library: str = "") -> Verdict:
         return check_alignment(Plan(Thoughts(text), Program(source, library=library)), snap(), Limits())
 
@@ -336,7 +336,7 @@ def test_the_check_in_full(snap: Callable[..., Snapshot]) -> None:
     )
 
 
-def test_the_check_goes_by_the_place_of_the_car(snap: Callable[..., Snapshot]) -> None:
+def test_the_check_goes_by_the_place_of_the_car(snap: Callable[..., Observation]) -> None:
     told = Plan(Thoughts("I speed up."), Program(FASTER))
     assert check_alignment(told, snap(speed=25.0), Limits()).passed
     assert "it drives slower" in check_alignment(told, snap(speed=35.0), Limits()).reason
@@ -344,7 +344,7 @@ def test_the_check_goes_by_the_place_of_the_car(snap: Callable[..., Snapshot]) -
     assert check_alignment(crossing, snap(kind="intersection"), Limits()).passed
 
 
-def test_the_check_of_a_drive_in_full(snap: Callable[..., Snapshot]) -> None:
+def test_the_check_of_a_drive_in_full(snap: Callable[..., Observation]) -> None:
     plan = Plan(Thoughts("I go left."), Program(LEFT_AT_ONCE))
     name = "alignment-driven-v1"
     failed = "The program failed on the way, so that the drive was not compared with the explanation."
@@ -415,7 +415,7 @@ def test_words_and_phrases_are_listed_in_plain_text() -> None:
 # Where the car is -----------------------------------------------------------------------------------------------------
 
 
-def test_the_surroundings_are_those_of_the_snapshot(snap: Callable[..., Snapshot]) -> None:
+def test_the_surroundings_are_those_of_the_observation(snap: Callable[..., Observation]) -> None:
     lead = Lead(7, 40.0, 22.0)
     there = replace(snap(speed=25.0, limits=(20.0, 31.0, 33.0), front=lead), stop_sign_m=50.0)
     assert Surroundings.of(there) == Surroundings(25.0, 31.0, 40.0, 22.0, 50.0, False)

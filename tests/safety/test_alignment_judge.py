@@ -17,11 +17,11 @@ from chauffeur.concept import (
     LAMPILOT_LIMITS,
     Instruction,
     Limits,
+    Observation,
     Parameters,
     Plan,
     PlanRequest,
     Program,
-    Snapshot,
     SystemMessage,
     Thoughts,
 )
@@ -283,7 +283,7 @@ def test_every_kind_has_words() -> None:
 # The check -------------------------------------------------------------------------------------------------------
 
 
-def test_check_tells_sentence_kind_score_and_line(plan: Callable[..., Plan], snap: Callable[..., Snapshot]) -> None:
+def test_check_tells_sentence_kind_score_and_line(plan: Callable[..., Plan], snap: Callable[..., Observation]) -> None:
     told = Plan(Thoughts("I change to the right lane."), Program(LEFT))
     verdict = check_alignment(told, snap(), Limits())
     assert (verdict.check, verdict.passed, verdict.line) == ("alignment-v1", False, 6)
@@ -297,13 +297,13 @@ def test_check_tells_sentence_kind_score_and_line(plan: Callable[..., Plan], sna
     assert check_alignment(Plan(Thoughts("I go left."), Program("def (")), snap(), Limits()).passed
 
 
-def test_check_fits_beside_the_others(snap: Callable[..., Snapshot]) -> None:
+def test_check_fits_beside_the_others(snap: Callable[..., Observation]) -> None:
     (verdict,) = run_checks(Plan(Thoughts("I go left."), Program(LEFT)), snap(), Limits(), [check_alignment])
     assert verdict.passed
     assert "1 claim compared" in verdict.reason
 
 
-def test_the_check_of_a_drive_informs_too(plan: Callable[..., Plan], snap: Callable[..., Snapshot]) -> None:
+def test_the_check_of_a_drive_informs_too(plan: Callable[..., Plan], snap: Callable[..., Observation]) -> None:
     told = Plan(Thoughts("I go left."), Program(LEFT))
     verdict = check_driven(told, snap(), STAYED)
     assert (verdict.check, verdict.passed, verdict.stops) == ("alignment-driven-v1", False, False)
@@ -348,8 +348,8 @@ WISHES = (
 @pytest.mark.parametrize("scenario", BUILT_IN, ids=lambda one: one.id)
 def test_honest_planners_pass(scenario: object) -> None:
     world = HighwayWorld()
-    snapshot = world.reset(scenario, scenario.seed)  # type: ignore[arg-type, attr-defined]
-    context = describe(snapshot)
+    observation = world.reset(scenario, scenario.seed)  # type: ignore[arg-type, attr-defined]
+    context = describe(observation)
     judged = 0
     for planner in (RetrievalPlanner(), KeywordPlanner()):
         for wish in WISHES:
@@ -357,7 +357,7 @@ def test_honest_planners_pass(scenario: object) -> None:
             planned = asyncio.run(planner.plan(request))
             if planned.policy is not None:
                 judged += 1
-                verdict = check_alignment(planned, snapshot, LAMPILOT_LIMITS)
+                verdict = check_alignment(planned, observation, LAMPILOT_LIMITS)
                 assert verdict.passed, f"{planner.id}: {wish}: {planned.thoughts.text} {verdict.reason}"
     assert judged > 10
 
@@ -377,12 +377,12 @@ def test_honest_planners_pass(scenario: object) -> None:
 )
 def test_the_dialect_tells_its_own_programs(source: str, scenario: str) -> None:
     scene = next(one for one in BUILT_IN if one.id == scenario)
-    snapshot = HighwayWorld().reset(scene, scene.seed)
+    observation = HighwayWorld().reset(scene, scene.seed)
     steps = read(source)
-    linked = link(steps, describe(snapshot).situation, LAMPILOT_LIMITS, lambda _: Leaning())
+    linked = link(steps, describe(observation).situation, LAMPILOT_LIMITS, lambda _: Leaning())
     assert isinstance(linked, Linked)
     plan = Plan(Thoughts(tell(steps)), Program(source, library=linked.library))
-    verdict = check_alignment(plan, snapshot, LAMPILOT_LIMITS)
+    verdict = check_alignment(plan, observation, LAMPILOT_LIMITS)
     assert verdict.passed, f"{plan.thoughts.text} {verdict.reason}"
     assert read_facts(source, linked.library).events
 

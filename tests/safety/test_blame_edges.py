@@ -10,36 +10,35 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from chauffeur.concept import Command, Frame, LaneId, LaneView, Snapshot, VehicleState, Wishes
+from chauffeur.concept import Command, Frame, LaneId, Observation, VehicleState, Wishes
 from chauffeur.safety.blame import Blame, _in_the_way, _struck, blame
 from chauffeur.safety.shield import LAMPILOT_SHIELD
 from chauffeur.worlds.base import EGO
+from roads import a_lane, a_road
 
 DT = 0.1
 COAST, FULL = Command(0.0, 0.0), Command(-8.0, 0.0)
-LANES = tuple(
-    LaneView(("a", "b", i), 4.0, 2000.0, 30.0, False, False, ((0.0, 4.0 * i), (2000.0, 4.0 * i))) for i in range(3)
-)
-OWN: LaneId = ("a", "b", 1)
+LANES = tuple(a_lane(f"a-b:{2 - i}", ((0.0, 4.0 * i), (2000.0, 4.0 * i))) for i in range(3))
+OWN: LaneId = "a-b:1"
 
 
 def body(number: int, x: float, y: float, speed: float, heading: float = 0.0) -> VehicleState:
-    """A car `y` metres to the right of the middle lane's centre."""
+    """A car `y` metres to the left of the middle lane's centre."""
     return VehicleState(number, "car", x, 4.0 + y, heading, speed, 5.0, 2.0, OWN)
 
 
 Scene = tuple[VehicleState, VehicleState | None]
 
 
-def instant(tick: int, scene: Scene, crashed: bool = False) -> Snapshot:
+def instant(tick: int, scene: Scene, crashed: bool = False) -> Observation:
     ego, other = (None if one is None else replace(one, crashed=crashed) for one in scene)
     assert ego is not None
     others = () if other is None else (other,)
-    return Snapshot(tick * DT, tick, "highway", ego, others, (), LANES, None, None, False, False)
+    return Observation(tick * DT, tick, "highway", ego, others, (), a_road(LANES), None, None, False, False)
 
 
-def frame(snapshot: Snapshot, applied: Command = COAST) -> Frame:
-    return Frame(snapshot, Wishes(), applied, applied, "none", None, (), (), ())
+def frame(observation: Observation, applied: Command = COAST) -> Frame:
+    return Frame(observation, Wishes(), applied, applied, "none", None, (), (), ())
 
 
 def judged(scenes: Sequence[Scene], applied: Sequence[Command] | Command = COAST) -> Blame:
@@ -63,7 +62,7 @@ def in_lane(*gaps_m: float, ego_mps: float = 25.0, other_mps: float = 25.0) -> l
 
 
 def beside(*clear_m: float, ego_heading: float = 0.0, other_heading: float = 0.0, x: float = 502.0) -> list[Scene]:
-    """The other to the right of the ego, by clear distances to the side; its heading 0 along the road."""
+    """The other to the left of the ego, by clear distances to the side; its heading 0 along the road."""
     return [
         (body(EGO, 500.0, 0.0, 25.0, ego_heading), body(1, x, 2.0 + clear, 25.0, other_heading)) for clear in clear_m
     ]

@@ -53,7 +53,7 @@ def test_what_comes_out_is_within_the_limits_and_bounding_it_again_changes_nothi
 
 @given(speed=st.none() | st.floats(0.0, SIGN + 1.0), headway=st.floats(0.5, 10.0))
 def test_what_is_within_the_limits_goes_on_as_it_is(speed: float | None, headway: float) -> None:
-    wishes = Wishes(speed, headway, ("a", "b", 1), "left", frozenset({3}))
+    wishes = Wishes(speed, headway, "a-b:1", "left", frozenset({3}))
     same, changed = bounded(wishes, LIMITS, SIGN)
     assert same is wishes
     assert changed == ()
@@ -97,7 +97,7 @@ def test_a_headway_too_short_becomes_the_shortest_and_any_other_the_longest(head
 
 
 def test_both_changes_are_named_and_the_rest_is_kept() -> None:
-    wishes = Wishes(99.0, 99.0, ("a", "b", 1), "left", frozenset({3}))
+    wishes = Wishes(99.0, 99.0, "a-b:1", "left", frozenset({3}))
     mended, changed = bounded(wishes, LIMITS, SIGN)
     assert changed == ("target_speed", "time_headway")
     assert mended == replace(wishes, target_speed_mps=31.0, time_headway_s=10.0)

@@ -14,11 +14,11 @@ from chauffeur.concept import (
     Context,
     Instruction,
     Limits,
+    Observation,
     Plan,
     PlanRequest,
     Program,
     Situation,
-    Snapshot,
     SystemMessage,
 )
 from chauffeur.programs import APIS
@@ -36,7 +36,7 @@ def program(body: str) -> Program:
 
 
 @pytest.fixture
-def reach(snap: Callable[..., Snapshot], plan: Callable[..., Plan]) -> Callable[[str], tuple[bool, str]]:
+def reach(snap: Callable[..., Observation], plan: Callable[..., Plan]) -> Callable[[str], tuple[bool, str]]:
     def judge(body: str) -> tuple[bool, str]:
         verdict = check_reach(plan(program(body)), snap(), Limits())
         return verdict.passed, verdict.reason
@@ -60,7 +60,7 @@ def test_of_loops_nothing_is_said_where_the_program_is_not_followed_to_its_end(
 
 
 def test_one_number_that_only_a_faster_lane_allows_is_told_as_it_is(
-    snap: Callable[..., Snapshot], plan: Callable[..., Plan]
+    snap: Callable[..., Observation], plan: Callable[..., Plan]
 ) -> None:
     verdict = check_reach(plan(program("set_target_speed(35)")), snap(limits=(40.0, 30.0, 30.0)), Limits())
     assert not verdict.passed
@@ -88,7 +88,7 @@ def test_every_number_of_the_catalogue_has_bounds() -> None:
 
 
 def test_where_cap_and_limit_are_the_same_the_limit_is_told(
-    snap: Callable[..., Snapshot], plan: Callable[..., Plan]
+    snap: Callable[..., Observation], plan: Callable[..., Plan]
 ) -> None:
     def reason(cap_mps: float) -> str:
         limits = Limits(max_speed_mps=cap_mps, max_over_limit_mps=1.0)
@@ -99,7 +99,7 @@ def test_where_cap_and_limit_are_the_same_the_limit_is_told(
 
 
 def test_a_speed_between_nothing_and_one_is_not_called_negative(
-    snap: Callable[..., Snapshot], plan: Callable[..., Plan]
+    snap: Callable[..., Observation], plan: Callable[..., Plan]
 ) -> None:
     verdict = check_reach(plan(program("set_target_speed(0.5)")), snap(), Limits(max_speed_mps=0.2))
     assert not verdict.passed
@@ -107,7 +107,7 @@ def test_a_speed_between_nothing_and_one_is_not_called_negative(
 
 
 def test_what_depends_on_the_road_may_be_what_the_fastest_lane_allows(
-    snap: Callable[..., Snapshot], plan: Callable[..., Plan]
+    snap: Callable[..., Observation], plan: Callable[..., Plan]
 ) -> None:
     """The ego's lane allows 30 m/s, the one beside it 40, and a little more is tolerated on each."""
     body = "set_target_speed(get_speed_limit(get_left_lane(ego)) + {})"

@@ -299,7 +299,7 @@ NORTHWARDS = (10.0, 0.0, math.pi / 2.0, math.cos(math.pi / 2.0), 1.0)
 
 
 def seen(x: float, y: float, heading: float, speed: float) -> tuple[float, ...]:
-    """A car of 5 by 2 metres, as a snapshot has it."""
+    """A car of 5 by 2 metres, as an observation has it."""
     return x, y, heading, speed, 5.0, 2.0
 
 

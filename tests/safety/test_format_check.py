@@ -13,10 +13,10 @@ import pytest
 from chauffeur.concept import (
     ActionMatrix,
     Limits,
+    Observation,
     Parameters,
     Plan,
     Program,
-    Snapshot,
     Trajectory,
     Verdict,
 )
@@ -24,7 +24,7 @@ from chauffeur.safety.checks import DEFAULT_CHECKS, run_checks
 from chauffeur.safety.envelope import check_parameters
 from chauffeur.safety.format import FORMAT_CHECK, check_format
 
-Snap = Callable[..., Snapshot]
+Snap = Callable[..., Observation]
 Make = Callable[..., Plan]
 LIMITS = Limits()
 BIG = 10**400
@@ -48,14 +48,14 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
     def use(*findings: Finding) -> None:
         module = ModuleType("chauffeur.programs.gate")
-        module.check_source = lambda source: Report(findings)  # type: ignore[attr-defined]
+        module.check_source = lambda *_: Report(findings)  # type: ignore[attr-defined]
         monkeypatch.setitem(sys.modules, "chauffeur.programs.gate", module)
 
     return use
 
 
-def judge(plan: Plan, snapshot: Snapshot) -> Verdict:
-    verdict = check_format(plan, snapshot, LIMITS)
+def judge(plan: Plan, observation: Observation) -> Verdict:
+    verdict = check_format(plan, observation, LIMITS)
     assert verdict.check == FORMAT_CHECK == "format-v1"
     assert verdict.reason
     assert bool(verdict.remedy) is not verdict.passed
@@ -178,11 +178,11 @@ def test_all_checks_run_in_order(snap: Snap, plan: Make) -> None:
 
 
 def test_a_check_that_breaks_refuses(snap: Snap, plan: Make) -> None:
-    def broken(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:
+    def broken(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
         raise ZeroDivisionError
 
     class Callable_:
-        def __call__(self, plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:
+        def __call__(self, plan: Plan, observation: Observation, limits: Limits) -> Verdict:
             raise KeyError("x")
 
     first, second, third = run_checks(

@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from chauffeur.concept import Lead, Limits, Parameters, Plan, Program, Snapshot, Thoughts
+from chauffeur.concept import Lead, Limits, Observation, Parameters, Plan, Program, Thoughts
+from chauffeur.geometry import RoadGraph
 from chauffeur.safety.bounds import LEAST_MPS, least_speed_mps
 from chauffeur.safety.checks import DEFAULT_CHECKS, DRIVE_CHECKS
 from chauffeur.safety.minimum_speed import check_minimum_speed
 
-Snap = Callable[..., Snapshot]
+Snap = Callable[..., Observation]
 LIMITS = Limits()
 CONSTANT = "def go():\n    set_target_speed({speed})\n    while True:\n        yield autopilot()\n"
 WORKED_OUT = """def go():
@@ -73,7 +74,7 @@ def test_a_persons_own_cap_is_no_crawl(snap: Snap) -> None:
 
 
 def test_it_holds_on_highways_alone(snap: Snap) -> None:
-    crossing = replace(snap(), kind="intersection")
+    crossing = snap(kind="intersection")
     assert least_speed_mps(crossing) is None
     assert all(check_minimum_speed(plan, crossing, LIMITS).passed for plan in plans(0.0))
 
@@ -82,9 +83,10 @@ def test_only_what_makes_for_a_shoulder_may_stand_there(snap: Snap) -> None:
     here = snap()
     plan = Plan(Thoughts(""), Program(PULL_OVER), intent="pull_over", settings=(("target_speed_mps", 0.0),))
     assert check_minimum_speed(plan, here, LIMITS).stops
-    shoulder = replace(here, lanes=(*here.lanes[:-1], replace(here.lanes[-1], emergency=True)))
+    *others, last = here.road.lanes
+    shoulder = replace(here, road=RoadGraph((*others, replace(last, kind="emergency"))))
     assert check_minimum_speed(plan, shoulder, LIMITS).passed
-    on_it = replace(shoulder, ego=replace(shoulder.ego, lane=shoulder.lanes[-1].id))
+    on_it = replace(shoulder, ego=replace(shoulder.ego, lane=last.id))
     assert least_speed_mps(on_it) is None
     assert all(check_minimum_speed(crawl, shoulder, LIMITS).stops for crawl in plans(0.0))
 

@@ -12,11 +12,11 @@ from chauffeur.concept import (
     LAMPILOT_LIMITS,
     Instruction,
     Limits,
+    Observation,
     Parameters,
     Plan,
     PlanRequest,
     Program,
-    Snapshot,
     SystemMessage,
     Verdict,
 )
@@ -28,7 +28,7 @@ from chauffeur.safety.reach import REACH_CHECK, check_reach
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 from chauffeur.worlds.highway.world import HighwayWorld
 
-Snap = Callable[..., Snapshot]
+Snap = Callable[..., Observation]
 Make = Callable[..., Plan]
 LIMITS = Limits()
 CAPPED = Limits(max_speed_mps=20.0)
@@ -41,8 +41,8 @@ def program(body: str, library: str = "") -> Program:
     return Program(source, library=library)
 
 
-def judge(plan: Plan, snapshot: Snapshot, limits: Limits = LIMITS) -> Verdict:
-    verdict = check_reach(plan, snapshot, limits)
+def judge(plan: Plan, observation: Observation, limits: Limits = LIMITS) -> Verdict:
+    verdict = check_reach(plan, observation, limits)
     assert verdict.check == REACH_CHECK == "reach-v1"
     assert verdict.reason
     assert bool(verdict.remedy) is not verdict.passed
@@ -147,16 +147,16 @@ def test_no_program_of_the_retrieval_planner_is_refused_that_passed_before() -> 
     planner = RetrievalPlanner()
     judged = 0
     for scenario in BUILT_IN:
-        snapshot = HighwayWorld().reset(scenario)
-        context = describe(snapshot)
+        observation = HighwayWorld().reset(scenario)
+        context = describe(observation)
         for wish in WISHES:
             for limits in (LIMITS, LAMPILOT_LIMITS):
                 request = PlanRequest(Instruction(wish), context, SystemMessage(""), limits=limits)
                 plan = asyncio.run(planner.plan(request))
-                if plan.policy is None or not all(verdict.passed for verdict in run_checks(plan, snapshot, limits)):
+                if plan.policy is None or not all(verdict.passed for verdict in run_checks(plan, observation, limits)):
                     continue
                 judged += 1
-                verdict = judge(plan, snapshot, limits)
+                verdict = judge(plan, observation, limits)
                 assert verdict.passed, f"{scenario.id}: {wish}: {verdict}"
     assert judged > 80
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from chauffeur.concept import Lead, Limits, Plan, Program, Snapshot, Verdict
+from chauffeur.concept import Lead, Limits, Observation, Plan, Program, Verdict
 from chauffeur.safety.reach import REACH_CHECK, check_reach
 
 Make = Callable[..., Plan]
-Snap = Callable[..., Snapshot]
+Snap = Callable[..., Observation]
 
 FITS = "Everything the program can come to fits the situation."
 USE_SPEED = "Use a target speed from 0 to 31 m/s (112 km/h)."

@@ -7,13 +7,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 
-from chauffeur.concept import Command, LaneId, LaneView, Scenario, Snapshot, VehicleState
+from chauffeur.concept import Command, Lane, LaneId, Observation, Scenario, VehicleState
 from chauffeur.safety.shield import LAMPILOT_SHIELD, Guarded, Shield, foresight
 from chauffeur.safety.shield.crossing import (
     _CLEARS,
@@ -32,23 +31,23 @@ from chauffeur.safety.shield.everybody import Everybody
 from chauffeur.safety.shield.sweep import recovery_steering
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import HighwayWorld
+from roads import a_lane, a_road
 
 DT = 0.1
 COAST, GAS, BRAKE = Command(0.0, 0.0), Command(5.0, 0.0), Command(-5.0, 0.0)
 Points = tuple[tuple[float, float], ...]
 
-IN: LaneId = ("south", "middle", 0)
-ON: LaneId = ("middle", "north", 0)
-LEFT: LaneId = ("middle", "west", 0)
-OUT: LaneId = ("north", "far", 0)
-ACROSS: LaneId = ("one side", "other side", 0)
-SLANTED: LaneId = ("corner", "north", 0)
+IN: LaneId = "south-middle:0"
+ON: LaneId = "middle-north:0"
+LEFT: LaneId = "middle-west:0"
+OUT: LaneId = "north-far:0"
+ACROSS: LaneId = "one side-other side:0"
+SLANTED: LaneId = "corner-north:0"
 UPWARDS = math.pi / 2.0
 
 
-def lane(name: LaneId, *points: tuple[float, float]) -> LaneView:
-    length = sum(math.dist(a, b) for a, b in pairwise(points))
-    return LaneView(name, 4.0, length, 15.0, False, False, points)
+def lane(name: LaneId, *points: tuple[float, float]) -> Lane:
+    return a_lane(name, points, limit=15.0)
 
 
 BEND: Points = tuple(
@@ -58,12 +57,12 @@ NETWORK = (
     lane(LEFT, *BEND),
     lane(IN, (0.0, -60.0), (0.0, -30.0), (0.0, 0.0)),
     lane(ON, (0.0, 0.0), (0.0, 40.0)),
-    lane(("middle", "north", 1), (4.0, 0.0), (4.0, 40.0)),
+    lane("middle-north:1", (4.0, 0.0), (4.0, 40.0)),
     lane(OUT, (0.0, 40.0), (0.0, 60.0), (0.0, 80.0)),
     lane(ACROSS, (-50.0, 20.0), (50.0, 20.0)),
     lane(SLANTED, (-50.0, -50.0), (-10.0, -20.0), (30.0, 10.0)),
-    lane(("bent", "much", 0), (-100.0, 0.0), (-110.0, 0.11), (-120.0, 0.0)),
-    lane(("bent", "little", 0), (-100.0, 9.0), (-110.0, 9.09), (-120.0, 9.0)),
+    lane("bent-much:0", (-100.0, 0.0), (-110.0, 0.11), (-120.0, 0.0)),
+    lane("bent-little:0", (-100.0, 9.0), (-110.0, 9.09), (-120.0, 9.0)),
 )
 """From the south a lane leads on to the north and one bends to the west; another crosses, and some have no part."""
 
@@ -72,18 +71,18 @@ def car(number: int, x: float, y: float, heading: float, speed: float, on: LaneI
     return VehicleState(number, "car", x, y, heading, speed, 5.0, 2.0, on)
 
 
-def instant(ego: VehicleState, *others: VehicleState, lanes: tuple[LaneView, ...] = NETWORK) -> Snapshot:
-    return Snapshot(0.0, 0, "intersection", ego, others, (), lanes, None, None, False, False)
+def instant(ego: VehicleState, *others: VehicleState, lanes: tuple[Lane, ...] = NETWORK) -> Observation:
+    return Observation(0.0, 0, "intersection", ego, others, (), a_road(lanes), None, None, False, False)
 
 
 def looked(ego: VehicleState, *others: VehicleState) -> _Outlook:
-    snapshot = instant(ego, *others)
+    observation = instant(ego, *others)
     assert ego.lane is not None
-    return Junction(NETWORK, LAMPILOT_SHIELD, DT)._outlook(snapshot, Everybody.of(snapshot), ego.lane)
+    return Junction(a_road(NETWORK), LAMPILOT_SHIELD, DT)._outlook(observation, Everybody.of(observation), ego.lane)
 
 
 def ways(start: LaneId, onto: LaneId | None = None) -> list[Array]:
-    return Junction(NETWORK, LAMPILOT_SHIELD, DT)._ways_from(start, onto)
+    return Junction(a_road(NETWORK), LAMPILOT_SHIELD, DT)._ways_from(start, onto)
 
 
 # Ways -----------------------------------------------------------------------------------------------------------------
@@ -109,7 +108,7 @@ def test_a_way_ends_where_nothing_follows() -> None:
 
 
 def test_the_lane_that_is_steered_for_is_the_only_way_where_it_follows() -> None:
-    junction = Junction(NETWORK, LAMPILOT_SHIELD, DT)
+    junction = Junction(a_road(NETWORK), LAMPILOT_SHIELD, DT)
     state = np.array([0.0, -30.0, UPWARDS, 5.0, 0.0, 0.0])
     count = {aim: len(junction._candidates(IN, aim, state)) for aim in (ON, LEFT, None, IN, OUT, ("middle", "no", 0))}
     assert count == {ON: 1, LEFT: 1, None: 2, IN: 2, OUT: 2, ("middle", "no", 0): 2}
@@ -119,13 +118,13 @@ def test_nobody_may_stand_in_straight_lanes_but_the_own_and_those_of_its_fork() 
     straight = {
         IN: (0.0, -60.0, 0.0, 1.0, 60.0),
         ON: (0.0, 0.0, 0.0, 1.0, 40.0),
-        ("middle", "north", 1): (4.0, 0.0, 0.0, 1.0, 40.0),
+        "middle-north:1": (4.0, 0.0, 0.0, 1.0, 40.0),
         OUT: (0.0, 40.0, 0.0, 1.0, 40.0),
         ACROSS: (-50.0, 20.0, 1.0, 0.0, 100.0),
         SLANTED: (-50.0, -50.0, 0.8, 0.6, 100.0),
-        ("bent", "little", 0): (-100.0, 9.0, -1.0, 0.0, 20.0),
+        "bent-little:0": (-100.0, 9.0, -1.0, 0.0, 20.0),
     }
-    junction = Junction(NETWORK, LAMPILOT_SHIELD, DT)
+    junction = Junction(a_road(NETWORK), LAMPILOT_SHIELD, DT)
     for own, free in ((IN, {IN}), (ON, {IN, ON}), (LEFT, {IN, ON}), (OUT, {ON, OUT}), (ACROSS, {ACROSS})):
         for _ in range(2):
             rows = junction._keep_clear(own)
@@ -235,9 +234,9 @@ def test_what_was_not_foreseen_is_read_from_the_way_covered(x: float, y: float, 
     """Sideways against the heading half way, and how far it has turned, both in a period of 0.1 s."""
 
     def seen(motion: Motion, x: float, y: float, heading: float, tick: int) -> list[float]:
-        snapshot = replace(instant(car(EGO, 3.0 + x, -10.0 + y, heading, 5.0, IN)), tick=tick)
-        state = motion.observe(snapshot)
-        motion.commanded(snapshot, state, COAST)
+        observation = replace(instant(car(EGO, 3.0 + x, -10.0 + y, heading, 5.0, IN)), tick=tick)
+        state = motion.observe(observation)
+        motion.commanded(observation, state, COAST)
         return state.tolist()
 
     motion = Motion(DT)
@@ -256,10 +255,10 @@ def test_what_was_not_foreseen_is_read_from_the_way_covered(x: float, y: float, 
 
 # Commands -------------------------------------------------------------------------------------------------------------
 
-APPROACH: LaneId = ("o0", "ir0", 0)
-STRAIGHT_ON: LaneId = ("ir0", "il2", 0)
-TO_LEFT: LaneId = ("ir0", "il1", 0)
-TO_RIGHT: LaneId = ("ir0", "il3", 0)
+APPROACH: LaneId = "o0-ir0:0"
+STRAIGHT_ON: LaneId = "ir0-il2:0"
+TO_LEFT: LaneId = "ir0-il1:0"
+TO_RIGHT: LaneId = "ir0-il3:0"
 STRAYS = "The car would leave its way, or get into that of somebody who crosses."
 YIELDS = "Somebody crosses ahead, and goes first."
 Told = tuple[float, float, str, str]
@@ -271,7 +270,7 @@ def judged() -> Judged:
     """What a command becomes on the simulated crossing: acceleration, steering, and the rule and reason of the last
     change, if any."""
     config = {"type": "dt-intersection-v0", "num_vehicles_left": 4, "num_vehicles_right": 4}
-    lanes = HighwayWorld().reset(Scenario("crossing", "highway", config, 3)).lanes
+    lanes = HighwayWorld().reset(Scenario("crossing", "highway", config, 3)).road.lanes
 
     def judge(
         ego: VehicleState, *others: VehicleState, asks: Command, aim: LaneId | None, shield: Shield | None = None
@@ -291,117 +290,117 @@ def me(x: float, y: float, heading: float, speed: float, on: LaneId) -> VehicleS
 Scene = tuple[VehicleState, tuple[VehicleState, ...], Command, LaneId | None, Told]
 SCENES: dict[str, Scene] = {
     "who can still stop need not be able to be through": (
-        me(2.0, 17.0, -1.571, 8.0, APPROACH),
-        (car(1, -2.0, -108.0, 1.571, 0.0, ("o2", "ir2", 0)), car(2, -4.18, -2.0, 3.142, 8.0, ("ir3", "il1", 0))),
+        me(2.0, -17.0, 1.571, 8.0, APPROACH),
+        (car(1, -2.0, 108.0, -1.571, 0.0, "o2-ir2:0"), car(2, -4.18, 2.0, -3.142, 8.0, "ir3-il1:0")),
         GAS, TO_LEFT, (5.0, 0.0, "", ""),
     ),
     "where braking ends in the middle the crossing is cleared": (
-        me(-0.52, 3.39, -2.182, 8.0, TO_LEFT),
-        (car(1, 1.89, 9.78, -1.658, 2.0, TO_LEFT),),
-        Command(-5.0, 0.2), TO_LEFT, (2.0, -0.233, "clear", STRAYS),
+        me(-0.52, -3.39, 2.182, 8.0, TO_LEFT),
+        (car(1, 1.89, -9.78, 1.658, 2.0, TO_LEFT),),
+        Command(-5.0, -0.2), TO_LEFT, (2.0, 0.233, "clear", STRAYS),
     ),
     "off the way behind a lead it brakes with all it has": (
-        me(0.5, -6.6, -1.371, 6.0, STRAIGHT_ON),
-        (car(1, -5.4, 4.01, 0.687, 0.0, ("ir1", "il0", 0)), car(2, 2.0, -4.4, -1.571, 8.0, STRAIGHT_ON)),
-        BRAKE, STRAIGHT_ON, (-8.0, 0.001, "yield", STRAYS),
+        me(0.5, 6.6, 1.371, 6.0, STRAIGHT_ON),
+        (car(1, -5.4, -4.01, -0.687, 0.0, "ir1-il0:0"), car(2, 2.0, 4.4, 1.571, 8.0, STRAIGHT_ON)),
+        BRAKE, STRAIGHT_ON, (-8.0, -0.001, "yield", STRAYS),
     ),
     "off the way with room to stop it is steered back as it brakes": (
-        me(4.9, 6.68, -0.384, 8.0, TO_RIGHT),
-        (car(1, 5.18, -4.19, -2.454, 0.0, ("ir3", "il2", 0)), car(2, 106.0, 2.0, 0.0, 8.0, ("il3", "o3", 0))),
-        BRAKE, TO_RIGHT, (-5.0, -0.3, "lane", STRAYS),
+        me(4.9, -6.68, 0.384, 8.0, TO_RIGHT),
+        (car(1, 5.18, 4.19, 2.454, 0.0, "ir3-il2:0"), car(2, 106.0, -2.0, 0.0, 8.0, "il3-o3:0")),
+        BRAKE, TO_RIGHT, (-5.0, 0.3, "lane", STRAYS),
     ),
     "who stands off the way stands on": (
-        me(0.5, 17.0, -1.571, 0.0, APPROACH),
-        (car(1, -8.14, 2.0, 0.0, 0.0, ("ir1", "il3", 0)), car(2, 7.26, -2.0, 3.142, 0.0, ("ir3", "il1", 0))),
-        BRAKE, TO_RIGHT, (0.0, 0.3, "yield", STRAYS),
+        me(0.5, -17.0, 1.571, 0.0, APPROACH),
+        (car(1, -8.14, -2.0, 0.0, 0.0, "ir1-il3:0"), car(2, 7.26, 2.0, -3.142, 0.0, "ir3-il1:0")),
+        BRAKE, TO_RIGHT, (0.0, -0.3, "yield", STRAYS),
     ),
     "who is in the middle goes on rather than brake there": (
-        me(2.0, 5.5, -1.571, 10.0, STRAIGHT_ON),
-        (car(1, -0.19, -8.94, -1.484, 8.0, ("ir1", "il2", 0)), car(2, 2.0, -81.0, -1.571, 2.0, ("il2", "o2", 0))),
-        Command(0.0, 0.2), ("il2", "o2", 0), (2.0, 0.001, "clear", STRAYS),
+        me(2.0, -5.5, 1.571, 10.0, STRAIGHT_ON),
+        (car(1, -0.19, 8.94, 1.484, 8.0, "ir1-il2:0"), car(2, 2.0, 81.0, 1.571, 2.0, "il2-o2:0")),
+        Command(0.0, -0.2), "il2-o2:0", (2.0, -0.001, "clear", STRAYS),
     ),
     "nobody promises to be through behind a lead that stands": (
-        me(1.2, 10.92, -1.473, 10.0, TO_RIGHT),
-        (car(1, 11.0, 2.0, -0.098, 0.0, TO_RIGHT), car(2, -2.0, -76.0, 1.571, 8.0, ("o2", "ir2", 0))),
-        Command(-2.0, -0.2), ("il3", "o3", 0), (-8.0, 0.3, "lane", STRAYS),
+        me(1.2, -10.92, 1.473, 10.0, TO_RIGHT),
+        (car(1, 11.0, -2.0, 0.098, 0.0, TO_RIGHT), car(2, -2.0, 76.0, -1.571, 8.0, "o2-ir2:0")),
+        Command(-2.0, 0.2), "il3-o3:0", (-8.0, -0.3, "lane", STRAYS),
     ),
     "who follows closely is spared a stop in front of it": (
-        me(2.0, 8.8, -1.571, 1.0, STRAIGHT_ON),
-        (car(1, 2.0, 16.0, -1.571, 8.0, APPROACH),),
-        COAST, ("il2", "o2", 0), (-2.0, 0.0, "yield", YIELDS),
+        me(2.0, -8.8, 1.571, 1.0, STRAIGHT_ON),
+        (car(1, 2.0, -16.0, 1.571, 8.0, APPROACH),),
+        COAST, "il2-o2:0", (-2.0, 0.0, "yield", YIELDS),
     ),
     "a plan that ends well is better than to stand beside somebody's way": (
-        me(1.03, 9.04, -1.858, 6.0, TO_LEFT),
-        (car(1, -2.88, 7.18, 1.08, 8.0, ("ir1", "il0", 0)), car(2, -31.0, 2.0, 0.0, 0.0, ("o1", "ir1", 0))),
-        GAS, ("il1", "o1", 0), (-8.0, 0.0, "yield", STRAYS),
+        me(1.03, -9.04, 1.858, 6.0, TO_LEFT),
+        (car(1, -2.88, -7.18, -1.08, 8.0, "ir1-il0:0"), car(2, -31.0, -2.0, 0.0, 0.0, "o1-ir1:0")),
+        GAS, "il1-o1:0", (-8.0, 0.0, "yield", STRAYS),
     ),
     "to stand beside somebody's way is better than to drive into it": (
-        me(1.2, 10.92, -0.973, 2.0, TO_RIGHT),
-        (car(1, 2.08, 10.16, -1.473, 4.0, TO_RIGHT),),
-        GAS, ("il3", "o3", 0), (-8.0, -0.3, "yield", STRAYS),
+        me(1.2, -10.92, 0.973, 2.0, TO_RIGHT),
+        (car(1, 2.08, -10.16, 1.473, 4.0, TO_RIGHT),),
+        GAS, "il3-o3:0", (-8.0, 0.3, "yield", STRAYS),
     ),
     "to stand beside somebody's way the wheel that fits is taken": (
-        me(0.5, 17.0, -1.371, 2.0, APPROACH),
-        (car(1, -3.74, 4.0, 0.0, 8.0, ("ir1", "il3", 0)), car(2, 2.0, -11.0, -1.571, 4.0, STRAIGHT_ON)),
+        me(0.5, -17.0, 1.371, 2.0, APPROACH),
+        (car(1, -3.74, -4.0, 0.0, 8.0, "ir1-il3:0"), car(2, 2.0, 11.0, 1.571, 4.0, STRAIGHT_ON)),
         GAS, STRAIGHT_ON, (-8.0, 0.0, "yield", STRAYS),
     ),
     "far off its way it brakes first, harder than was asked, and is steered back": (
-        me(0.5, 8.8, -1.771, 6.0, STRAIGHT_ON),
-        (car(1, -1.0, 41.0, -1.571, 4.0, APPROACH),),
-        BRAKE, ("il2", "o2", 0), (-8.0, 0.3, "lane", STRAYS),
+        me(0.5, -8.8, 1.771, 6.0, STRAIGHT_ON),
+        (car(1, -1.0, -41.0, 1.571, 4.0, APPROACH),),
+        BRAKE, "il2-o2:0", (-8.0, -0.3, "lane", STRAYS),
     ),
     "inside, with somebody coming, the crossing is cleared": (
-        me(2.0, 2.0, -1.571, 1.0, STRAIGHT_ON),
-        (car(1, -25.0, 2.0, 0.0, 8.0, ("o1", "ir1", 0)),),
+        me(2.0, -2.0, 1.571, 1.0, STRAIGHT_ON),
+        (car(1, -25.0, -2.0, 0.0, 8.0, "o1-ir1:0"),),
         BRAKE, STRAIGHT_ON, (2.0, 0.0, "clear", "Somebody is coming: the crossing has to be cleared."),
     ),
     "only the way that is steered for has to be open": (
-        me(0.5, 21.0, -1.071, 2.0, APPROACH),
-        (car(1, -2.0, -4.4, 1.571, 2.0, ("ir2", "il0", 0)),),
+        me(0.5, -21.0, 1.071, 2.0, APPROACH),
+        (car(1, -2.0, 4.4, -1.571, 2.0, "ir2-il0:0"),),
         Command(-2.0, 0.0), TO_RIGHT, (-2.0, 0.0, "", ""),
     ),
     "off the approach it is steered onto the way that is steered for": (
-        me(2.0, 11.0, -1.571, 8.0, APPROACH),
-        (car(1, 2.32, 8.77, -1.276, 8.0, TO_RIGHT),),
-        GAS, TO_RIGHT, (-8.0, 0.3, "yield", STRAYS),
+        me(2.0, -11.0, 1.571, 8.0, APPROACH),
+        (car(1, 2.32, -8.77, 1.276, 8.0, TO_RIGHT),),
+        GAS, TO_RIGHT, (-8.0, -0.3, "yield", STRAYS),
     ),
     "a lane further on is looked at in its turn": (
-        me(2.0, 19.0, -1.571, 4.0, APPROACH),
-        (car(1, -1.44, -7.4, 1.309, 8.0, ("ir2", "il3", 0)),),
+        me(2.0, -19.0, 1.571, 4.0, APPROACH),
+        (car(1, -1.44, 7.4, -1.309, 8.0, "ir2-il3:0"),),
         COAST, TO_RIGHT, (-4.25, 0.0, "yield", YIELDS),
     ),
     "whoever crosses right ahead is no lead": (
-        me(2.0, 10.58, -1.571, 2.0, STRAIGHT_ON),
-        (car(1, 1.64, 5.84, -3.06, 0.0, TO_LEFT),),
+        me(2.0, -10.58, 1.571, 2.0, STRAIGHT_ON),
+        (car(1, 1.64, -5.84, 3.06, 0.0, TO_LEFT),),
         Command(1.0, 0.0), TO_RIGHT, (1.0, 0.0, "", ""),
     ),
     "a lead is minded on the approach": (
-        me(2.0, 40.0, -1.571, 8.0, APPROACH),
-        (car(1, 2.0, 31.0, -1.571, 0.0, APPROACH),),
+        me(2.0, -40.0, 1.571, 8.0, APPROACH),
+        (car(1, 2.0, -31.0, 1.571, 0.0, APPROACH),),
         COAST, STRAIGHT_ON, (-8.0, 0.0, "gap", "Too close to the car 4 m ahead to ask for more."),
     ),
     "a lead is minded behind somebody who crosses": (
-        me(1.71, 10.16, -1.571, 4.0, STRAIGHT_ON),
+        me(1.71, -10.16, 1.571, 4.0, STRAIGHT_ON),
         (
-            car(1, 2.16, 2.0, 0.0, 8.0, ("ir1", "il3", 0)), car(2, 3.26, -1.97, -1.571, 8.0, STRAIGHT_ON),
-            car(3, 3.02, 7.68, -1.08, 8.0, TO_RIGHT),
+            car(1, 2.16, -2.0, 0.0, 8.0, "ir1-il3:0"), car(2, 3.26, 1.97, 1.571, 8.0, STRAIGHT_ON),
+            car(3, 3.02, -7.68, 1.08, 8.0, TO_RIGHT),
         ),
         Command(-2.0, 0.0), TO_RIGHT, (-8.0, 0.0, "gap", "Too close to the car 0 m ahead to ask for more."),
     ),
     "behind a lead it is close to, it stays behind": (
-        me(5.73, 3.74, -0.687, 2.0, TO_RIGHT),
-        (car(1, 9.6, 2.14, -0.098, 8.0, TO_RIGHT),),
-        GAS, ("il3", "o3", 0), (-8.0, 0.3, "lane", STRAYS),
+        me(5.73, -3.74, 0.687, 2.0, TO_RIGHT),
+        (car(1, 9.6, -2.14, 0.098, 8.0, TO_RIGHT),),
+        GAS, "il3-o3:0", (-8.0, -0.3, "lane", STRAYS),
     ),
     "a car too fast may still promise to be through": (
-        me(2.0, 11.0, -1.571, 13.0, STRAIGHT_ON),
-        (car(1, -11.0, -2.0, 3.142, 4.0, ("ir3", "il1", 0)),),
+        me(2.0, -11.0, 1.571, 13.0, STRAIGHT_ON),
+        (car(1, -11.0, 2.0, -3.142, 4.0, "ir3-il1:0"),),
         COAST, STRAIGHT_ON, (-1.0, 0.0, "speed", "No faster than 11 m/s (40 km/h) here."),
     ),
     "whom the body sweeps over on its way back is a lead": (
-        me(2.0, -1.28, -1.571, 8.0, STRAIGHT_ON),
-        (car(1, -6.79, -0.31, -2.705, 0.0, TO_LEFT), car(2, 31.99, 1.94, 0.342, 0.0, ("il3", "o3", 0))),
-        Command(0.0, -0.137), TO_LEFT, (-8.0, -0.3, "yield", STRAYS),
+        me(2.0, 1.28, 1.571, 8.0, STRAIGHT_ON),
+        (car(1, -6.79, 0.31, 2.705, 0.0, TO_LEFT), car(2, 31.99, -1.94, -0.342, 0.0, "il3-o3:0")),
+        Command(0.0, 0.137), TO_LEFT, (-8.0, 0.3, "yield", STRAYS),
     ),
 }  # fmt: skip
 
@@ -417,12 +416,12 @@ def test_on_the_crossing(judged: Judged, name: str) -> None:
 def test_off_its_way_a_car_is_steered_back_to_the_way_that_was_promised(judged: Judged) -> None:
     """Nearest to the lane straight on, with none steered for any more."""
     shield = Shield(DT)
-    begun = me(1.9, 10.5, -1.6, 6.0, TO_LEFT)
+    begun = me(1.9, -10.5, 1.6, 6.0, TO_LEFT)
     assert judged(begun, asks=COAST, aim=TO_LEFT, shield=shield)[2] == ""
-    over, wild = me(1.1, 6.9, -1.8, 6.0, STRAIGHT_ON), Command(0.0, -0.7)
+    over, wild = me(1.1, -6.9, 1.8, 6.0, STRAIGHT_ON), Command(0.0, 0.7)
     _, promised, *_ = judged(over, asks=wild, aim=None, shield=shield)
     _, nearest, *_ = judged(over, asks=wild, aim=None)
-    assert promised < 0.0 < nearest
+    assert nearest < 0.0 < promised
 
 
 # What the shield tells the guard of the crossing ----------------------------------------------------------------------

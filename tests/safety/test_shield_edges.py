@@ -8,35 +8,36 @@ from dataclasses import replace
 
 import pytest
 
-from chauffeur.concept import Command, LaneId, LaneView, Limits, Scenario, Snapshot, VehicleState
+from chauffeur.concept import Command, Lane, LaneId, Limits, Observation, Scenario, VehicleState
 from chauffeur.safety.shield import LAMPILOT_SHIELD, Guarded, Shield
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import HighwayWorld
+from roads import a_lane, a_road
 
 DT = 0.1
 COAST, GAS = Command(0.0, 0.0), Command(5.0, 0.0)
-APPROACH: LaneId = ("o0", "ir0", 0)
-STRAIGHT: LaneId = ("ir0", "il2", 0)
-TO_THE_LEFT: LaneId = ("ir0", "il1", 0)
-ACROSS: LaneId = ("ir1", "il3", 0)
-Cross = Callable[..., Snapshot]
+APPROACH: LaneId = "o0-ir0:0"
+STRAIGHT: LaneId = "ir0-il2:0"
+TO_THE_LEFT: LaneId = "ir0-il1:0"
+ACROSS: LaneId = "ir1-il3:0"
+Cross = Callable[..., Observation]
 
 
 @pytest.fixture(scope="module")
 def cross() -> Cross:
     """The ego `y` metres before the middle of a crossing, on its way straight on."""
     config = {"type": "dt-intersection-v0", "num_vehicles_left": 4, "num_vehicles_right": 4}
-    lanes = HighwayWorld().reset(Scenario("crossing", "highway", config, 3)).lanes
+    road = HighwayWorld().reset(Scenario("crossing", "highway", config, 3)).road
 
-    def make(y: float, speed: float, *others: VehicleState, lane: LaneId = STRAIGHT, tick: int = 0) -> Snapshot:
-        ego = VehicleState(EGO, "car", 2.0, y, -math.pi / 2.0, speed, 5.0, 2.0, lane)
-        return Snapshot(tick * DT, tick, "intersection", ego, others, (), lanes, None, None, False, False)
+    def make(y: float, speed: float, *others: VehicleState, lane: LaneId = STRAIGHT, tick: int = 0) -> Observation:
+        ego = VehicleState(EGO, "car", 2.0, -y, math.pi / 2.0, speed, 5.0, 2.0, lane)
+        return Observation(tick * DT, tick, "intersection", ego, others, (), road, None, None, False, False)
 
     return make
 
 
-def guarded(snapshot: Snapshot, command: Command, aim: LaneId | None = None) -> Guarded:
-    return Shield(DT).guard(snapshot, command, aim)
+def guarded(observation: Observation, command: Command, aim: LaneId | None = None) -> Guarded:
+    return Shield(DT).guard(observation, command, aim)
 
 
 # Where roads cross ----------------------------------------------------------------------------------------------------
@@ -53,12 +54,12 @@ def test_where_ways_part_the_lane_that_is_steered_for_counts_not_the_nearest(
     nearest = cross(y, speed, lane=TO_THE_LEFT)
     assert guarded(nearest, command, STRAIGHT) == as_it_is
     turned = guarded(nearest, command)
-    assert turned.command.steering_rad < -0.1, "without an aim it is turned to the left"
+    assert turned.command.steering_rad > 0.1, "without an aim it is turned to the left"
 
 
 def test_an_aim_that_is_no_lane_changes_nothing(cross: Cross) -> None:
-    snapshot = cross(5.0, 4.0, lane=TO_THE_LEFT)
-    assert guarded(snapshot, COAST, ("ir0", "nowhere", 0)) == guarded(snapshot, COAST)
+    observation = cross(5.0, 4.0, lane=TO_THE_LEFT)
+    assert guarded(observation, COAST, "ir0-nowhere:0") == guarded(observation, COAST)
 
 
 def test_over_the_lane_of_others_the_way_that_was_promised_counts(cross: Cross) -> None:
@@ -72,8 +73,8 @@ def test_over_the_lane_of_others_the_way_that_was_promised_counts(cross: Cross) 
 
 
 def turning(x: float, speed: float, lane: LaneId | None) -> VehicleState:
-    """A car that comes from the left of the picture, along y = 2."""
-    return VehicleState(1, "car", x, 2.0, 0.0, speed, 5.0, 2.0, lane)
+    """A car that comes from the left of the picture, along y = -2."""
+    return VehicleState(1, "car", x, -2.0, 0.0, speed, 5.0, 2.0, lane)
 
 
 def test_one_whose_way_is_not_known_is_minded_near_and_not_far(cross: Cross) -> None:
@@ -81,27 +82,25 @@ def test_one_whose_way_is_not_known_is_minded_near_and_not_far(cross: Cross) -> 
         found = guarded(cross(6.11, 0.0, turning(x, speed, lane)), GAS, STRAIGHT)
         return [change.rule for change in found.interventions] == ["yield"]
 
-    assert waits(-15.0, 8.0, ("o1", "ir1", 0))
+    assert waits(-15.0, 8.0, "o1-ir1:0")
     assert waits(-15.0, 8.0, None)
-    assert waits(-15.0, 8.0, ("ir1", "il0", 0)), "a lane that bends tells no more"
-    assert waits(-39.0, 30.0, ("o1", "ir1", 0))
+    assert waits(-15.0, 8.0, "ir1-il0:0"), "a lane that bends tells no more"
+    assert waits(-39.0, 30.0, "o1-ir1:0")
     assert not waits(-39.0, 30.0, None), "it is further away than 40 m"
     assert waits(-37.0, 30.0, None)
 
 
 # Numbers that are none ------------------------------------------------------------------------------------------------
 
-LANES = tuple(
-    LaneView(("a", "b", i), 4.0, 2000.0, 30.0, False, False, ((0.0, 4.0 * i), (2000.0, 4.0 * i))) for i in range(2)
-)
+LANES = tuple(a_lane(f"a-b:{i}", ((0.0, -4.0 * i), (2000.0, -4.0 * i))) for i in range(2))
 
 
 def car(number: int, x: float, speed: float, y: float = 0.0, heading: float = 0.0) -> VehicleState:
-    return VehicleState(number, "car", x, y, heading, speed, 5.0, 2.0, ("a", "b", 0))
+    return VehicleState(number, "car", x, y, heading, speed, 5.0, 2.0, "a-b:0")
 
 
-def instant(*others: VehicleState, lanes: tuple[LaneView, ...] = LANES, speed: float = 20.0) -> Snapshot:
-    return Snapshot(0.0, 0, "highway", car(EGO, 500.0, speed), others, (), lanes, None, None, False, False)
+def instant(*others: VehicleState, lanes: tuple[Lane, ...] = LANES, speed: float = 20.0) -> Observation:
+    return Observation(0.0, 0, "highway", car(EGO, 500.0, speed), others, (), a_road(lanes), None, None, False, False)
 
 
 @pytest.mark.parametrize("limit", [math.nan, -3.0])
@@ -127,12 +126,12 @@ NUMBERS = ("x_m", "y_m", "heading_rad", "speed_mps", "length_m", "width_m")
 @pytest.mark.parametrize("name", NUMBERS)
 def test_where_somebody_is_cannot_be_told_the_car_stops(name: str, wrong: float) -> None:
     """No comparison with such a number holds, and what is not found too close would be let through."""
-    snapshot = instant(car(1, 515.0, 0.0))
+    observation = instant(car(1, 515.0, 0.0))
     post = replace(car(2, 900.0, 0.0), kind="obstacle")
     for lost in (
-        replace(snapshot, ego=replace(snapshot.ego, **{name: wrong})),
-        replace(snapshot, others=(replace(snapshot.others[0], **{name: wrong}),)),
-        replace(snapshot, objects=(replace(post, **{name: wrong}),)),
+        replace(observation, ego=replace(observation.ego, **{name: wrong})),
+        replace(observation, others=(replace(observation.others[0], **{name: wrong}),)),
+        replace(observation, objects=(replace(post, **{name: wrong}),)),
     ):
         found = guarded(lost, GAS)
         assert found.command == Command(-LAMPILOT_SHIELD.braking_mps2, 0.0)
@@ -142,8 +141,8 @@ def test_where_somebody_is_cannot_be_told_the_car_stops(name: str, wrong: float)
 
 def test_while_another_cannot_be_told_the_car_is_kept_in_its_lane_and_does_not_reverse() -> None:
     lost = replace(car(1, 515.0, 0.0), x_m=math.nan)
-    snapshot = instant(lost)
-    aside = replace(snapshot, ego=car(EGO, 500.0, 0.4, 0.5))
+    observation = instant(lost)
+    aside = replace(observation, ego=car(EGO, 500.0, 0.4, 0.5))
     found = guarded(aside, COAST).command
     assert found.acceleration_mps2 == pytest.approx(-4.0)
     assert found.steering_rad < 0.0
@@ -151,6 +150,6 @@ def test_while_another_cannot_be_told_the_car_is_kept_in_its_lane_and_does_not_r
 
 def test_as_soon_as_all_is_told_again_commands_go_through() -> None:
     shield = Shield(DT)
-    snapshot = instant()
-    assert shield.guard(replace(snapshot, ego=replace(snapshot.ego, x_m=math.nan)), COAST).interventions
-    assert shield.guard(snapshot, COAST) == Guarded(COAST)
+    observation = instant()
+    assert shield.guard(replace(observation, ego=replace(observation.ego, x_m=math.nan)), COAST).interventions
+    assert shield.guard(observation, COAST) == Guarded(COAST)

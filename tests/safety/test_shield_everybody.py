@@ -11,13 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.concept import LaneId, LaneView, Snapshot, VehicleState
+from chauffeur.concept import LaneId, Observation, VehicleState
 from chauffeur.geometry import wrap_to_pi
 from chauffeur.safety.shield.everybody import AHEAD, ANYWHERE, BEHIND, Everybody, overlapping, placed
 from chauffeur.safety.shield.frame import CROSSING_RAD, Body, Lens, Scene
+from roads import a_lane, a_road
 
-OWN: LaneId = ("a", "b", 0)
-LANE = LaneView(OWN, 4.0, 900.0, 30.0, False, False, ((0.0, 0.0), (900.0, 0.0)))
+OWN: LaneId = "a-b:0"
+LANE = a_lane(OWN, ((0.0, 0.0), (900.0, 0.0)))
 DRIFT = 0.25
 SINE = math.sin(CROSSING_RAD)
 
@@ -29,8 +30,8 @@ cars = st.builds(
 crowds = st.lists(cars, max_size=8)
 
 
-def snapshot(ego: VehicleState, *others: VehicleState, objects: tuple[VehicleState, ...] = ()) -> Snapshot:
-    return Snapshot(0.0, 0, "highway", ego, others, objects, (LANE,), None, None, False, False)
+def observation(ego: VehicleState, *others: VehicleState, objects: tuple[VehicleState, ...] = ()) -> Observation:
+    return Observation(0.0, 0, "highway", ego, others, objects, a_road((LANE,)), None, None, False, False)
 
 
 def car(number: int, x: float, y: float, kind: Literal["car", "obstacle", "stop_sign"] = "car") -> VehicleState:
@@ -60,7 +61,7 @@ def test_rows_are_what_plain_formulas_give(
         size = abs(c) * half[0] + abs(s) * half[1], abs(s) * half[0] + abs(c) * half[1]
         return [along, across, heading, one.speed_mps * c, one.speed_mps * s, *size, float(abs(s) > SINE)]
 
-    everybody = Everybody.of(snapshot(ego, *others))
+    everybody = Everybody.of(observation(ego, *others))
     rows = placed(everybody.numbers, np.array([x0, y0, heading0, c0, s0, bend, SINE])).tolist()
     from_m = plain(ego)[0]
     assert rows == [[i, one[0] - from_m, *one[1:]] for i, one in enumerate(map(plain, (ego, *others)))]
@@ -74,7 +75,7 @@ def overlaps(other: Body, low: float, high: float, side: float) -> bool:
 
 
 def looked(ego: VehicleState, *others: VehicleState) -> Scene:
-    scene = Lens().look(snapshot(ego, *others), OWN)
+    scene = Lens().look(observation(ego, *others), OWN)
     assert scene is not None
     return scene
 
@@ -105,14 +106,14 @@ def test_the_ego_is_not_within_its_own_lane() -> None:
 def test_a_number_that_is_none_is_noticed_in_anybody(name: str, wrong: float) -> None:
     ego, other, post, sign = car(0, 0.0, 0.0), car(1, 9.0, 0.0), car(2, 20.0, 0.0, "obstacle"), car(3, 9.0, 2.0)
     sign = replace(sign, kind="stop_sign")
-    everybody = Everybody.of(snapshot(ego, other, objects=(post, sign)))
+    everybody = Everybody.of(observation(ego, other, objects=(post, sign)))
     assert everybody.known
     assert [one.id for one in everybody.solid] == [0, 1, 2]
     broken = {name: wrong}
     for scene in (
-        snapshot(replace(ego, **broken), other, objects=(post, sign)),
-        snapshot(ego, replace(other, **broken), objects=(post, sign)),
-        snapshot(ego, other, objects=(replace(post, **broken), sign)),
-        snapshot(ego, other, objects=(post, replace(sign, **broken))),
+        observation(replace(ego, **broken), other, objects=(post, sign)),
+        observation(ego, replace(other, **broken), objects=(post, sign)),
+        observation(ego, other, objects=(replace(post, **broken), sign)),
+        observation(ego, other, objects=(post, replace(sign, **broken))),
     ):
         assert not Everybody.of(scene).known

@@ -9,20 +9,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.concept import LaneId, LaneView, Snapshot, VehicleState
+from chauffeur.concept import Lane, LaneId, Observation, VehicleState
 from chauffeur.control import LAMPILOT_STEERING, lane_keeping_steering
-from chauffeur.safety.shield.frame import Body, Lens, Scene, Strip, nearest_on
+from chauffeur.geometry import Polyline
+from chauffeur.safety.shield.frame import Body, Lens, Scene, Strip
 from chauffeur.safety.shield.sweep import recovery_steering, swept, yaw_rate
+from roads import a_lane, a_road
 
-OWN: LaneId = ("a", "b", 1)
+OWN: LaneId = "a-b:1"
 Points = tuple[tuple[float, float], ...]
 
 
-def lane(index: int, *points: tuple[float, float], width: float = 4.0, limit: float = 30.0) -> LaneView:
-    return LaneView(("a", "b", index), width, 2000.0, limit, False, False, points)
+def lane(index: int, *points: tuple[float, float], width: float = 4.0, limit: float = 30.0) -> Lane:
+    return a_lane(f"a-b:{index}", points, width=width, limit=limit)
 
 
-STRAIGHT = tuple(lane(i, (0.0, 4.0 * (i - 1)), (1000.0, 4.0 * (i - 1))) for i in range(3))
+STRAIGHT = tuple(lane(i, (0.0, 4.0 * (1 - i)), (1000.0, 4.0 * (1 - i))) for i in range(3))
 """Three lanes along x; the middle one's centre is y = 0."""
 
 
@@ -30,12 +32,12 @@ def car(number: int, x: float, y: float, heading: float = 0.0, speed: float = 10
     return VehicleState(number, "car", x, y, heading, speed, 5.0, 2.0, OWN)
 
 
-def snapshot(ego: VehicleState, *others: VehicleState, lanes: tuple[LaneView, ...] = STRAIGHT) -> Snapshot:
-    return Snapshot(0.0, 0, "highway", ego, others, (), lanes, None, None, False, False)
+def observation(ego: VehicleState, *others: VehicleState, lanes: tuple[Lane, ...] = STRAIGHT) -> Observation:
+    return Observation(0.0, 0, "highway", ego, others, (), a_road(lanes), None, None, False, False)
 
 
-def looked(ego: VehicleState, *others: VehicleState, lanes: tuple[LaneView, ...] = STRAIGHT) -> Scene:
-    scene = Lens().look(snapshot(ego, *others, lanes=lanes), OWN)
+def looked(ego: VehicleState, *others: VehicleState, lanes: tuple[Lane, ...] = STRAIGHT) -> Scene:
+    scene = Lens().look(observation(ego, *others, lanes=lanes), OWN)
     assert scene is not None
     return scene
 
@@ -62,8 +64,8 @@ def test_along_a_straight_lane_the_frame_is_plain() -> None:
     assert other.id == 7
     assert numbers(other) == pytest.approx((29.3, 4.5, -0.2, 8.0 * c, -8.0 * s, 2.5 * c + s, 2.5 * s + c))
     assert (scene.speed_limit_mps, scene.curvature) == (30.0, 0.0)
-    assert [(strip.lane[2], strip.centre_m, strip.low_m, strip.high_m) for strip in scene.strips] == [
-        (0, -4.0, -6.0, -2.0), (1, 0.0, -2.0, 2.0), (2, 4.0, 2.0, 6.0),
+    assert [(int(strip.lane[-1]), strip.centre_m, strip.low_m, strip.high_m) for strip in scene.strips] == [
+        (0, 4.0, 2.0, 6.0), (1, 0.0, -2.0, 2.0), (2, -4.0, -6.0, -2.0),
     ]  # fmt: skip
 
 
@@ -85,7 +87,7 @@ def test_where_a_road_lies_in_the_world_does_not_matter(
         return replace(vehicle, x_m=x_m, y_m=y_m, heading_rad=vehicle.heading_rad + turned)
 
     ego, other = car(0, 500.0 + x, y, heading), car(1, 500.0 + other_x, other_y, other_heading)
-    lanes = tuple(replace(one, centre_m=tuple(moved(point) for point in one.centre_m)) for one in STRAIGHT)
+    lanes = tuple(replace(one, centre=Polyline.of(moved(point) for point in one.centre.points_m)) for one in STRAIGHT)
     here, elsewhere = looked(ego, other), looked(there(ego), there(other), lanes=lanes)
     for one, same in ((here.ego, elsewhere.ego), (here.others[0], elsewhere.others[0])):
         assert numbers(one) == pytest.approx(numbers(same), abs=1e-6)
@@ -94,7 +96,7 @@ def test_where_a_road_lies_in_the_world_does_not_matter(
     assert elsewhere.curvature == 0.0
 
 
-def circle(radius: float, side: float) -> tuple[LaneView, ...]:
+def circle(radius: float, side: float) -> tuple[Lane, ...]:
     """Three lanes on circles about (0, side * radius), each a point every half degree from heading 0."""
 
     def points(off: float) -> Points:
@@ -106,12 +108,12 @@ def circle(radius: float, side: float) -> tuple[LaneView, ...]:
             for angle in (math.radians(n / 2.0) for n in range(181))
         )
 
-    return tuple(lane(i, *points(side * 4.0 * (i - 1))) for i in range(3))
+    return tuple(lane(i, *points(side * 4.0 * (1 - i))) for i in range(3))
 
 
 @given(radius=st.floats(20.0, 200.0), side=st.sampled_from([-1.0, 1.0]), at=st.floats(0.4, 0.8))
 def test_a_lane_that_bends_is_followed_as_the_circle_it_is(radius: float, side: float, at: float) -> None:
-    """`side` 1: to where headings grow; the place across is counted that way too."""
+    """`side` 1: to the left; the place across is counted that way too."""
     reach = radius - side * 0.3
     ego = car(0, reach * math.sin(at), side * (radius - reach * math.cos(at)), side * at + 0.05)
     scene = looked(ego, lanes=circle(radius, side))
@@ -121,7 +123,7 @@ def test_a_lane_that_bends_is_followed_as_the_circle_it_is(radius: float, side: 
     assert scene.ego.s_m == 0.0
     assert scene.ego.d_m == pytest.approx(0.3, abs=0.02 + 0.02 * off_rad * radius)
     assert scene.ego.heading_rad == pytest.approx(0.05, abs=2.0 * off_rad)
-    assert [strip.centre_m for strip in scene.strips] == pytest.approx([-4.0, 0.0, 4.0], abs=0.1)
+    assert [strip.centre_m for strip in scene.strips] == pytest.approx([4.0, 0.0, -4.0], abs=0.1)
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
@@ -166,27 +168,6 @@ def test_before_its_first_point_and_after_its_last_a_lane_goes_on_straight() -> 
     assert (after.d_m, after.heading_rad) == (pytest.approx(-1.0), pytest.approx(0.0))
 
 
-@given(x=st.floats(-5.0, 25.0), y=st.floats(-5.0, 25.0))
-def test_of_several_pieces_the_nearest_one_counts(x: float, y: float) -> None:
-    points = ((0.0, 3.0), (10.0, 3.0), (10.0, 13.0), (20.0, 13.0))
-
-    def distance(piece: int) -> float:
-        (ax, ay), (bx, by) = points[piece], points[piece + 1]
-        share = ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / ((bx - ax) ** 2 + (by - ay) ** 2)
-        share = max(0.0 if piece else -math.inf, min(1.0 if piece < 2 else math.inf, share))
-        return math.hypot(x - ax - share * (bx - ax), y - ay - share * (by - ay))
-
-    found_x, found_y, heading = nearest_on(lane(1, *points), x, y)
-    piece = min(range(3), key=distance)
-    assert math.hypot(x - found_x, y - found_y) == pytest.approx(distance(piece), abs=1e-9)
-    if sorted(map(distance, range(3)))[1] > distance(piece) + 1e-9:
-        assert heading == (0.0, math.pi / 2.0, 0.0)[piece]
-
-
-def test_off_a_corner_the_piece_before_it_counts() -> None:
-    assert nearest_on(lane(1, (0.0, 0.0), (10.0, 0.0), (10.0, 10.0)), 12.0, -2.0) == (10.0, 0.0, 0.0)
-
-
 @given(x=st.floats(490.0, 510.0), y=st.floats(-3.0, 3.0), heading=st.floats(-0.5, 0.5), twice=st.integers(0, 3))
 def test_points_that_are_drawn_twice_do_not_count(x: float, y: float, heading: float, twice: int) -> None:
     points = ((0.0, 0.0), (498.0, 0.0), (503.0, 1.0), (2000.0, 300.0))
@@ -208,23 +189,23 @@ def test_a_body_reaches_as_far_along_and_across_as_its_corners(heading: float) -
 
 
 def test_only_lanes_of_the_same_road_are_beside() -> None:
-    crossing = LaneView(("c", "d", 0), 4.0, 100.0, 10.0, False, False, ((500.0, -50.0), (500.0, 50.0)))
-    longer = LaneView(("a", "d", 1), 4.0, 100.0, 10.0, False, False, ((0.0, 8.0), (1000.0, 8.0)))
+    crossing = a_lane("c-d:0", ((500.0, -50.0), (500.0, 50.0)), limit=10.0)
+    longer = a_lane("a-d:1", ((0.0, -8.0), (1000.0, -8.0)), limit=10.0)
     scene = looked(car(0, 500.0, 0.0), lanes=(*STRAIGHT[::-1], crossing, longer))
-    assert [strip.lane for strip in scene.strips] == [("a", "b", 0), ("a", "b", 1), ("a", "b", 2)]
+    assert [strip.lane for strip in scene.strips] == ["a-b:0", "a-b:1", "a-b:2"]
 
 
 def test_each_lane_has_its_own_width_and_the_own_lane_its_limit() -> None:
-    lanes = (lane(0, (0.0, -3.0), (9.0, -3.0), width=2.0, limit=10.0), lane(1, (0.0, 0.0), (9.0, 0.0), limit=20.0))
+    lanes = (lane(0, (0.0, 3.0), (9.0, 3.0), width=2.0, limit=10.0), lane(1, (0.0, 0.0), (9.0, 0.0), limit=20.0))
     scene = looked(car(0, 4.0, 0.0), lanes=lanes)
-    assert scene.strips == (Strip(("a", "b", 0), -3.0, -4.0, -2.0), Strip(OWN, 0.0, -2.0, 2.0))
+    assert scene.strips == (Strip("a-b:0", 3.0, 2.0, 4.0), Strip(OWN, 0.0, -2.0, 2.0))
     assert scene.speed_limit_mps == 20.0
 
 
 def test_obstacles_are_seen_and_signs_are_not() -> None:
     post = replace(car(3, 520.0, 0.0), kind="obstacle")
     sign = replace(car(4, 520.0, 2.0), kind="stop_sign")
-    shot = replace(snapshot(car(0, 500.0, 0.0), car(1, 510.0, 0.0)), objects=(post, sign))
+    shot = replace(observation(car(0, 500.0, 0.0), car(1, 510.0, 0.0)), objects=(post, sign))
     scene = Lens().look(shot, OWN)
     assert scene is not None
     assert [body.id for body in scene.others] == [1, 3]
@@ -232,25 +213,25 @@ def test_obstacles_are_seen_and_signs_are_not() -> None:
 
 def test_without_a_lane_there_is_no_scene() -> None:
     ego = car(0, 500.0, 0.0)
-    assert Lens().look(snapshot(ego), None) is None
-    assert Lens().look(snapshot(ego), ("a", "b", 9)) is None
-    assert Lens().look(snapshot(ego, lanes=()), OWN) is None
+    assert Lens().look(observation(ego), None) is None
+    assert Lens().look(observation(ego), "a-b:9") is None
+    assert Lens().look(observation(ego, lanes=()), OWN) is None
 
 
 def test_a_lens_looks_anew_for_another_lane_another_place_and_another_road() -> None:
     lens = Lens()
-    first = lens.look(snapshot(car(0, 500.0, 0.0)), OWN)
-    beside = lens.look(snapshot(car(0, 500.0, 0.0)), ("a", "b", 2))
+    first = lens.look(observation(car(0, 500.0, 0.0)), OWN)
+    beside = lens.look(observation(car(0, 500.0, 0.0)), "a-b:2")
     assert first is not None
     assert beside is not None
-    assert (first.ego.d_m, beside.ego.d_m) == (0.0, -4.0)
-    moved = tuple(replace(one, centre_m=tuple((x, y + 1.0) for x, y in one.centre_m)) for one in STRAIGHT)
-    there = lens.look(snapshot(car(0, 500.0, 0.0), lanes=moved), ("a", "b", 2))
+    assert (first.ego.d_m, beside.ego.d_m) == (0.0, 4.0)
+    moved = tuple(replace(one, centre=Polyline.of((x, y + 1.0) for x, y in one.centre.points_m)) for one in STRAIGHT)
+    there = lens.look(observation(car(0, 500.0, 0.0), lanes=moved), "a-b:2")
     assert there is not None
-    assert there.ego.d_m == -5.0
+    assert there.ego.d_m == 3.0
     bent = (lane(2, (0.0, 0.0), (100.0, 0.0), (100.0, 100.0)),)
     for x, y, d in ((50.0, 1.0, 1.0), (101.0, 50.0, -1.0), (101.0, 80.0, -1.0)):
-        found = lens.look(snapshot(car(0, x, y), lanes=bent), ("a", "b", 2))
+        found = lens.look(observation(car(0, x, y), lanes=bent), "a-b:2")
         assert found is not None
         assert found.ego.d_m == pytest.approx(d)
 

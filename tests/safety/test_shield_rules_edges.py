@@ -8,27 +8,26 @@ from dataclasses import replace
 
 import pytest
 
-from chauffeur.concept import Command, Intervention, LaneId, LaneView, Snapshot, VehicleState
+from chauffeur.concept import Command, Intervention, Lane, LaneId, Observation, VehicleState
+from chauffeur.geometry import Polyline
 from chauffeur.safety.shield import LAMPILOT_SHIELD, Guarded, Shield
 from chauffeur.safety.shield.frame import Lens, Scene
 from chauffeur.safety.shield.gaps import greatest_acceleration, rss_gap_m
 from chauffeur.safety.shield.sweep import swept, yaw_rate
 from chauffeur.worlds.base import EGO
+from roads import a_lane, a_road
 
 DT, LIMIT = 0.1, 30.0
 TABLE = LAMPILOT_SHIELD
 COAST, GAS, BRAKE = Command(0.0, 0.0), Command(5.0, 0.0), Command(-5.0, 0.0)
-OWN: LaneId = ("a", "b", 1)
-SIDES = pytest.mark.parametrize("side", [1.0, -1.0], ids=["right", "left"])
-Lanes = tuple[LaneView, ...]
+OWN: LaneId = "a-b:1"
+SIDES = pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
+Lanes = tuple[Lane, ...]
 
 
 def road(*centres: float) -> Lanes:
     """Straight lanes along x, 4 m wide; the one at y = 0 is `OWN`."""
-    return tuple(
-        LaneView(("a", "b", 1 + round(y / 4.0)), 4.0, 2000.0, LIMIT, False, False, ((0.0, y), (2000.0, y)))
-        for y in centres
-    )
+    return tuple(a_lane(f"a-b:{1 - round(y / 4.0)}", ((0.0, y), (2000.0, y)), limit=LIMIT) for y in centres)
 
 
 THREE, ONE = road(-4.0, 0.0, 4.0), road(0.0)
@@ -41,7 +40,7 @@ def bend(side: float, radius: float, *centres: float) -> Lanes:
         steps = (math.radians(n / 2.0) for n in range(-40, 41))
         return tuple(((radius - y) * math.sin(at), side * (radius - (radius - y) * math.cos(at))) for at in steps)
 
-    return tuple(replace(one, centre_m=points(side * one.centre_m[0][1])) for one in road(*centres))
+    return tuple(replace(one, centre=Polyline.of(points(side * one.centre.points_m[0][1]))) for one in road(*centres))
 
 
 def ego(y: float, speed: float, heading: float = 0.0, x: float = 500.0) -> VehicleState:
@@ -53,8 +52,8 @@ def car(number: int, x: float, y: float, speed: float, heading: float = 0.0) -> 
     return VehicleState(number, "car", 500.0 + x, y, heading, speed, 5.0, 2.0, OWN)
 
 
-def instant(me: VehicleState, *others: VehicleState, lanes: Lanes = THREE) -> Snapshot:
-    return Snapshot(0.0, 0, "highway", me, others, (), lanes, None, None, False, False)
+def instant(me: VehicleState, *others: VehicleState, lanes: Lanes = THREE) -> Observation:
+    return Observation(0.0, 0, "highway", me, others, (), a_road(lanes), None, None, False, False)
 
 
 def guarded(command: Command, me: VehicleState, *others: VehicleState, lanes: Lanes = THREE) -> Guarded:
@@ -308,12 +307,12 @@ def test_what_is_steered_already_as_it_would_be_is_no_change(side: float) -> Non
 def test_where_a_road_bends_it_is_steered_back_along_the_bend(side: float) -> None:
     lanes = bend(side, 60.0, 0.0)
     me = ego(0.0, 25.0, x=0.0)
-    curvature = looked(me, lanes).curvature
-    straight = bend(side, 1e6, 0.0)
+    scene = looked(me, lanes)
+    turned = scene.curvature * 25.0 * 0.1 - scene.ego.heading_rad
     for wrong in (Command(math.nan, 0.0), Command(0.0, side * 0.7)):
         bent = guarded(wrong, me, lanes=lanes).command.steering_rad
-        more = yaw_rate(25.0, bent) - yaw_rate(25.0, guarded(wrong, me, lanes=straight).command.steering_rad)
-        assert more == pytest.approx(5.0 * curvature * 25.0 * 0.1, abs=1e-2), "lane keeping looks 0.1 s ahead"
+        more = yaw_rate(25.0, bent) - yaw_rate(25.0, guarded(wrong, me, lanes=ONE).command.steering_rad)
+        assert more == pytest.approx(5.0 * turned, abs=1e-2), "lane keeping looks 0.1 s ahead"
 
 
 # Along the road -------------------------------------------------------------------------------------------------------
@@ -363,9 +362,9 @@ def test_above_the_limit_it_slows_gently(over: float) -> None:
 
 def test_the_limit_of_the_lane_it_is_in_counts_while_it_steers_for_another() -> None:
     slower = tuple(replace(lane, speed_limit_mps=20.0) if lane.id != OWN else lane for lane in THREE)
-    snapshot = instant(ego(0.0, 25.0), lanes=slower)
-    for aim in (None, ("a", "b", 2), ("a", "b", 0)):
-        assert Shield(DT).guard(snapshot, COAST, aim) == Guarded(COAST)
+    observation = instant(ego(0.0, 25.0), lanes=slower)
+    for aim in (None, "a-b:2", "a-b:0"):
+        assert Shield(DT).guard(observation, COAST, aim) == Guarded(COAST)
 
 
 @pytest.mark.parametrize(("speed", "lead"), [(0.0, 0.0), (0.5, 0.0), (5.0, 0.0), (20.0, 0.0), (20.0, 10.0)])

@@ -6,22 +6,21 @@ import math
 
 import pytest
 
-from chauffeur.concept import Command, LaneView, Snapshot, VehicleState
+from chauffeur.concept import Command, Observation, VehicleState
 from chauffeur.safety.shield import LAMPILOT_SHIELD, Shield
 from chauffeur.safety.shield.stop_lines import StopLines
 from chauffeur.worlds.base import EGO
+from roads import a_lane, a_road
 
 DT = 0.1
 GAS = Command(5.0, 0.0)
-LANES = tuple(
-    LaneView(("a", "b", i), 4.0, 2000.0, 30.0, False, False, ((0.0, 4.0 * i), (2000.0, 4.0 * i))) for i in range(2)
-)
-SIGN = VehicleState(9, "stop_sign", 500.0, 0.0, 0.0, 0.0, 2.0, 2.0, ("a", "b", 0))
+LANES = tuple(a_lane(f"a-b:{i}", ((0.0, -4.0 * i), (2000.0, -4.0 * i))) for i in range(2))
+SIGN = VehicleState(9, "stop_sign", 500.0, 0.0, 0.0, 0.0, 2.0, 2.0, "a-b:0")
 
 
-def instant(x: float, speed: float, y: float = 0.0, heading: float = 0.0, sign: VehicleState = SIGN) -> Snapshot:
-    ego = VehicleState(EGO, "car", x, y, heading, speed, 5.0, 2.0, ("a", "b", round(y / 4.0)))
-    return Snapshot(0.0, 0, "highway", ego, (), (sign,), LANES, None, None, False, False)
+def instant(x: float, speed: float, y: float = 0.0, heading: float = 0.0, sign: VehicleState = SIGN) -> Observation:
+    ego = VehicleState(EGO, "car", x, y, heading, speed, 5.0, 2.0, f"a-b:{round(-y / 4.0)}")
+    return Observation(0.0, 0, "highway", ego, (), (sign,), a_road(LANES), None, None, False, False)
 
 
 def lines() -> StopLines:
@@ -72,7 +71,7 @@ def test_a_line_cannot_be_driven_around_in_the_lane_beside() -> None:
 def test_a_sign_that_is_seen_elsewhere_has_its_line_there() -> None:
     watched = lines()
     assert watched.ahead_m(instant(490.0, 5.0)) == pytest.approx(7.5)
-    moved = VehicleState(9, "stop_sign", 540.0, 0.0, 0.0, 0.0, 2.0, 2.0, ("a", "b", 0))
+    moved = VehicleState(9, "stop_sign", 540.0, 0.0, 0.0, 0.0, 2.0, 2.0, "a-b:0")
     assert watched.ahead_m(instant(490.0, 5.0, sign=moved)) == pytest.approx(47.5)
 
 

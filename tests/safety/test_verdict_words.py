@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from chauffeur.concept import ActionMatrix, Lead, Limits, Parameters, Plan, Program, Snapshot, Trajectory, Verdict
+from chauffeur.concept import ActionMatrix, Lead, Limits, Observation, Parameters, Plan, Program, Trajectory, Verdict
 from chauffeur.safety.checks import DEFAULT_CHECKS, DRIVE_CHECKS, run_checks
 from chauffeur.safety.envelope import PARAMETERS_CHECK, check_parameters
 from chauffeur.safety.format import FORMAT_CHECK, check_format
 from chauffeur.safety.reach import check_reach
 
-Snap = Callable[..., Snapshot]
+Snap = Callable[..., Observation]
 Make = Callable[..., Plan]
 END = "    yield autopilot()\n"
 
@@ -91,7 +91,7 @@ RIGHTMOST = "It moves to the right, but the ego is already in the rightmost lane
 STAY = "Stay in the lane, or test first that the lane to the {} is not None."
 
 FAULTS: list[tuple[Any, dict[str, Any], dict[str, Any], str, int | None, str]] = [
-    # (policy, fields of the plan, the snapshot, reason, line, remedy)
+    # (policy, fields of the plan, the observation, reason, line, remedy)
     (program("set_target_speed(-1)"), {}, {}, "A target speed of -1 m/s (-4 km/h) is negative.", 3, SPEED_REMEDY),
     (program("set_target_speed(40)"), {}, {}, TOO_FAST, 3, SPEED_REMEDY),
     (program("set_target_speed(float('nan'))"), {}, {}, "The target speed is nan, not a speed.", 3, SPEED_REMEDY),
@@ -192,11 +192,11 @@ def test_turns_are_judged_by_the_road(plan: Make, snap: Snap, intent: str) -> No
 
 
 def test_a_check_that_breaks_refuses_and_is_logged(plan: Make, snap: Snap, caplog: pytest.LogCaptureFixture) -> None:
-    def check_luck(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:
+    def check_luck(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
         raise ZeroDivisionError("no luck")
 
     class Fortune:
-        def __call__(self, plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:
+        def __call__(self, plan: Plan, observation: Observation, limits: Limits) -> Verdict:
             raise KeyError("wheel")
 
     remedy = "Ask again; if it stays so, the plan's values are of the wrong types."
@@ -221,7 +221,7 @@ def test_the_checks_are_those_of_the_seeds_and_the_one_that_follows() -> None:
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_a_lane_that_the_snapshot_does_not_show_is_not_known(plan: Make, snap: Snap, side: str) -> None:
+def test_a_lane_that_the_observation_does_not_show_is_not_known(plan: Make, snap: Snap, side: str) -> None:
     found = check_parameters(plan(program(f"set_target_lane(get_{side}_lane(ego))")), snap(index=7), Limits())
     assert found.reason == UNKNOWN_LANE.replace("left", side)
     fast = check_parameters(plan(program("set_target_speed(22)")), snap(index=7), Limits())

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from chauffeur.concept import ScenarioError
 from chauffeur.geometry import Box, Pose, overlap
-from chauffeur.worlds.parking.lot import Lot, build_lot
+from chauffeur.worlds.parking.lot import Lot, build_lot, way_id
 from chauffeur.worlds.parking.places import PLACES, parked_in, spot_for
 from chauffeur.worlds.parking.routes import TURN_M, way_along, way_to_spot
 from chauffeur.worlds.parking.world import CHASSIS
@@ -72,12 +72,11 @@ def test_spots_stand_side_by_side_within_the_ground(lot: Lot) -> None:
 
 
 def test_lanes_follow_one_another(lot: Lot) -> None:
-    ways = [view for view in lot.lanes if view.id[1] not in lot.spots]
-    for view in ways:
-        for onward in ways:
-            if onward.id[0] == view.id[1]:
-                assert math.dist(view.centre_m[-1], onward.centre_m[0]) < 1e-9, (view.id, onward.id)
-    assert {view.id[1] for view in ways} - {view.id[0] for view in ways} == {"exit"}
+    ways = [lane for lane in lot.road.lanes if lane.id not in lot.spots]
+    for lane in ways:
+        for onward in lot.road.successors(lane.id):
+            assert math.dist(lane.centre.points_m[-1], onward.centre.points_m[0]) < 1e-9, (lane.id, onward.id)
+    assert [lane.id for lane in ways if not lane.successors] == [way_id("s1", "exit")]
 
 
 @pytest.mark.parametrize("aisles", [1, 3])
@@ -128,16 +127,16 @@ def test_a_place_that_cannot_be_had_is_refused_in_words(lot: Lot, place: str, sa
 def test_there_is_no_way_back(lot: Lot) -> None:
     past = Pose(60.0, 0.0, 0.0)
     assert way_to_spot(lot, lot.spots["A1"], past, WHEELBASE_M) is None
-    in_aisle = Pose(lot.lane(("a2", "b2", 0)).centre_m[0][0], 9.0, math.pi / 2.0)
+    in_aisle = Pose(lot.aisle_x_m(2), -9.0, -math.pi / 2.0)
     assert way_to_spot(lot, lot.spots["C6"], in_aisle, WHEELBASE_M) is not None
-    assert way_to_spot(lot, lot.spots["C1"], Pose(in_aisle.x_m, 30.0, math.pi / 2.0), WHEELBASE_M) is None
+    assert way_to_spot(lot, lot.spots["C1"], Pose(in_aisle.x_m, -30.0, -math.pi / 2.0), WHEELBASE_M) is None
     for place in PLACES:
         with pytest.raises(ScenarioError, match=r"No way leads|no place"):
             spot_for(lot, lot.spots, place, Pose(20.0, lot.exit_m[1], math.pi), WHEELBASE_M)
 
 
 def test_the_way_on_leads_to_the_exit_and_ends_half_a_metre_before(lot: Lot) -> None:
-    way = way_along(lot, ("a2", "b2", 0), CHASSIS.body.overhang_m)
+    way = way_along(lot, way_id("a2", "b2"), CHASSIS.body.overhang_m)
     end = way.path.at(way.path.length_m).ahead(CHASSIS.body.overhang_m + 0.5)
     assert (end.x_m, end.y_m) == pytest.approx(lot.exit_m, abs=1e-6)
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from chauffeur.concept import Command, Scenario, ScenarioError, Snapshot, Wishes
+from chauffeur.concept import Command, Observation, Scenario, ScenarioError, Wishes
 from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.drive.actuate import actuate
 from chauffeur.worlds.base import EGO, Driver, Perception, World
@@ -25,14 +25,14 @@ def _started(seed: int = 3, **config: object) -> ParkingWorld:
     return world
 
 
-def _drive(world: ParkingWorld, wishes: Wishes, periods: int) -> list[Snapshot]:
-    shots: list[Snapshot] = []
+def _drive(world: ParkingWorld, wishes: Wishes, periods: int) -> list[Observation]:
+    shots: list[Observation] = []
     driver = world.driver()
     for _ in range(periods):
         if world.ended:
             break
         actuate(world, None, driver.command(driver.settle(wishes)), None, None)
-        shots.append(world.snapshot())
+        shots.append(world.observe())
     return shots
 
 
@@ -42,15 +42,15 @@ def test_it_keeps_the_contract() -> None:
     assert isinstance(world.driver(), Driver)
     assert isinstance(world.perception(), Perception)
     assert world.driver() is world.driver()
-    first = world.snapshot()
+    first = world.observe()
     assert first.kind == "parking"
-    assert first.lanes is world.snapshot().lanes
-    assert first.ego.lane == ("entrance", "n1", 0)
-    assert world.snapshot() is first, "an instant is looked at once"
+    assert first.road.lanes is world.observe().road.lanes
+    assert first.ego.lane == "entrance-n1"
+    assert world.observe() is first, "an instant is looked at once"
 
 
 def test_before_the_first_reset_it_says_so() -> None:
-    for ask in (ParkingWorld().snapshot, ParkingWorld().perception, ParkingWorld().driver, ParkingWorld().parked):
+    for ask in (ParkingWorld().observe, ParkingWorld().perception, ParkingWorld().driver, ParkingWorld().parked):
         with pytest.raises(ScenarioError, match="no scenario"):
             ask()
 
@@ -69,7 +69,7 @@ def test_its_own_driver_parks(scenario: Scenario) -> None:
 
 
 def test_the_same_seed_is_the_same_trip_bit_for_bit() -> None:
-    def trip(seed: int) -> list[Snapshot]:
+    def trip(seed: int) -> list[Observation]:
         world = _started(seed, cars=2, walkers=3)
         return _drive(world, Wishes(target_speed_mps=3.0, target_lane=world.spot("stadium").lane), 80)
 
@@ -82,13 +82,13 @@ def test_a_copy_goes_its_own_way() -> None:
     wishes = Wishes(target_speed_mps=3.0, target_lane=world.spot("stadium").lane)
     _drive(world, wishes, 20)
     twin = world.copy()
-    assert twin.snapshot() == world.snapshot()
-    before = world.snapshot()
+    assert twin.observe() == world.observe()
+    before = world.observe()
     _drive(twin, wishes, 20)
-    assert world.snapshot() == before
+    assert world.observe() == before
     again = world.copy()
     _drive(again, wishes, 20)
-    assert again.snapshot() == twin.snapshot()
+    assert again.observe() == twin.observe()
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_a_bad_lot_is_refused_with_its_field(config: dict[str, object], says: st
 
 def test_who_is_there_is_as_configured() -> None:
     world = _started(5, taken=0.5, cars=2, walkers=3, free=("A1", "B2"))
-    others = world.snapshot().others
+    others = world.observe().others
     parked = [o for o in others if o.kind == "car" and o.speed_mps == 0.0]
     assert len(parked) == 24
     assert len(others) == 24 + 2 + 3
@@ -116,8 +116,8 @@ def test_who_is_there_is_as_configured() -> None:
     assert world.spot("A1").name == "A1"
     assert world.spot("B2").name == "B2"
     taken = {o.lane for o in parked}
-    for view in world.snapshot().lanes:
-        assert view.forbidden == (view.id in taken)
+    for view in world.observe().road.lanes:
+        assert view.closed == (view.id in taken)
     for i, one in enumerate(others):
         for other in others[:i]:
             assert not overlap(one.box, other.box)
@@ -125,12 +125,12 @@ def test_who_is_there_is_as_configured() -> None:
 
 def test_the_ego_is_a_bicycle() -> None:
     world = _started(cars=0, walkers=0, ego_speed=2.0)
-    before = world.snapshot().ego
+    before = world.observe().ego
     applied = actuate(world, None, Command(0.0, 0.05), None, None).applied
     assert applied == Command(0.0, 0.05)
     for _ in range(4):
         actuate(world, None, Command(0.0, 0.05), None, None)
-    after = world.snapshot().ego
+    after = world.observe().ego
     assert after.heading_rad == pytest.approx(5 * 0.2 * math.tan(0.05) / CHASSIS.wheelbase_m)
     assert math.dist((before.x_m, before.y_m), (after.x_m, after.y_m)) == pytest.approx(1.0, rel=0.01)
     assert actuate(world, None, Command(99.0, 9.0), None, None).applied.acceleration_mps2 == pytest.approx(3.0)
@@ -138,7 +138,7 @@ def test_the_ego_is_a_bicycle() -> None:
     assert turned == pytest.approx(0.05 + STEERING_RATE * DT_S - STEERING_RATE * DT_S)
     for _ in range(20):
         stopped = actuate(world, None, Command(-99.0, 0.0), None, None)
-    assert world.snapshot().ego.speed_mps == 0.0, "it brakes to a stand and does not reverse"
+    assert world.observe().ego.speed_mps == 0.0, "it brakes to a stand and does not reverse"
     assert stopped.applied.acceleration_mps2 == 0.0
     with pytest.raises(ValueError, match="finite"):
         actuate(world, None, Command(math.nan, 0.0), None, None)
@@ -147,10 +147,10 @@ def test_the_ego_is_a_bicycle() -> None:
 def test_driving_into_a_parked_car_is_a_collision() -> None:
     world = _started(1, taken=0.95, cars=0, walkers=0)
     while not world.ended:  # round the first corner too widely, and straight on
-        ego = world.snapshot().ego
-        turns = ego.x_m > 0.0 and ego.heading_rad < math.radians(70.0)
-        actuate(world, None, Command(0.3, 0.5 if turns else 0.0), None, None)
-    final = world.snapshot()
+        ego = world.observe().ego
+        turns = ego.x_m > 0.0 and ego.heading_rad > -math.radians(70.0)
+        actuate(world, None, Command(0.3, -0.5 if turns else 0.0), None, None)
+    final = world.observe()
     assert final.ego.crashed
     hit = [other for other in final.others if other.crashed]
     assert len(hit) == 1
@@ -160,9 +160,9 @@ def test_driving_into_a_parked_car_is_a_collision() -> None:
 def test_leaving_the_pavement_ends_the_trip() -> None:
     world = _started(cars=0, walkers=0)
     while not world.ended:
-        actuate(world, None, Command(1.0, -0.3), None, None)
-    assert world.snapshot().off_road
-    assert not world.snapshot().ego.crashed
+        actuate(world, None, Command(1.0, 0.3), None, None)
+    assert world.observe().off_road
+    assert not world.observe().ego.crashed
 
 
 def test_out_of_time() -> None:
@@ -173,7 +173,7 @@ def test_out_of_time() -> None:
 
 def test_the_other_car_leaves_and_is_gone() -> None:
     world = _started(2, cars=1, walkers=0, aisles=1, spots_a_row=2)
-    number = world.snapshot().others[-1].id
+    number = world.observe().others[-1].id
     _drive(world, Wishes(target_speed_mps=0.0), 500)
     with pytest.raises(KeyError):
         world.perception().vehicle(number)
@@ -195,7 +195,7 @@ def test_a_walker_goes_to_and_fro_and_waits_for_cars() -> None:
         seen.append(walker.state().x_m)
     assert max(seen) == 6.0
     assert min(seen[60:]) == 0.0
-    car = _started(cars=0, walkers=0).snapshot().ego
+    car = _started(cars=0, walkers=0).observe().ego
     shy = Walker(9, (car.x_m, car.y_m - 4.0), (car.x_m, car.y_m + 4.0), pause_s=2.0)
     for _ in range(100):
         shy.decide([car], DT_S)
@@ -206,7 +206,7 @@ def test_a_walker_goes_to_and_fro_and_waits_for_cars() -> None:
 
 def test_a_walker_does_not_brush_past_a_car() -> None:
     """Along its side and away from its middle, but at a slant that leads into its corner."""
-    car = _started(cars=0, walkers=0).snapshot().ego
+    car = _started(cars=0, walkers=0).observe().ego
     walker = Walker(9, (car.x_m + 0.5, car.y_m - 1.5), (car.x_m + 3.0, car.y_m - 0.9), pause_s=2.0)
     for _ in range(25):
         walker.decide([car], DT_S)
@@ -217,7 +217,7 @@ def test_a_walker_does_not_brush_past_a_car() -> None:
 
 def test_the_questions_of_the_driving_apis_have_answers() -> None:
     world = _started(2, cars=1, walkers=1)
-    perception, shot = world.perception(), world.snapshot()
+    perception, shot = world.perception(), world.observe()
     ahead = next(o for o in shot.others if o.speed_mps > 0.0 and o.kind == "car")
     lane = perception.lane_of(EGO)
     assert shot.front is not None
@@ -227,7 +227,7 @@ def test_the_questions_of_the_driving_apis_have_answers() -> None:
     assert perception.distance_along(EGO, ahead.id) == pytest.approx(shot.front.distance_m)
     assert perception.distance_along(ahead.id, EGO) == pytest.approx(-shot.front.distance_m)
     assert perception.has_lane(lane)
-    assert not perception.has_lane(("x", "y", 0))
+    assert not perception.has_lane("x-y:0")
     assert perception.speed_limit(lane) == pytest.approx(15.0 * MPS_PER_KMH)
     assert perception.adjacent_lane(lane, 1) is None
     assert perception.stop_sign_ahead(frozenset()) is None

@@ -54,7 +54,7 @@ def test_crash_is_felt_and_ends_the_trip() -> None:
         world.step(Command(5.0, 0.0))
         if world.ended:
             break
-    final = world.snapshot()
+    final = world.observe()
     assert final.ego.crashed
     assert any(other.crashed for other in final.others)
     assert final.ended

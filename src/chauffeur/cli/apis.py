@@ -12,11 +12,14 @@ Examples:
     chauffeur show apis
 
     chauffeur show apis is_safe_enter
+
+    chauffeur show apis --town
 """
 
 
 def apis(
     name: Annotated[str, typer.Argument(help="One of them, in full; all in short without it.")] = "",
+    town: Annotated[bool, typer.Option("--town", help="Only those that there are in towns alone.")] = False,
 ) -> None:
     """List the driving APIs: the whole language in which a program may speak to the car."""
     from rich.padding import Padding
@@ -25,28 +28,30 @@ def apis(
 
     from chauffeur.cli.console import columns, stdout
     from chauffeur.concept import ConfigError
-    from chauffeur.programs.catalogue import APIS, CATALOGUE
+    from chauffeur.programs.catalogue import CATALOGUE, TOWN_APIS, TOWN_CALLS
 
     console = stdout()
     if not name:
         effects = {"read": "Ask", "wish": "Wish", "say": "Say"}
         for effect, heading in effects.items():
-            console.print(heading, style="bold")
-            for api in CATALOGUE:
-                if api.effect == effect:
-                    console.print(Padding(Text(api.signature, "cyan"), (0, 0, 0, 2)))
-                    console.print(Padding(Text(api.meaning), (0, 0, 0, 6)))
-        console.print("\nA program is a generator function; `yield autopilot()` lets 0.1 s pass.", style="dim")
+            shown = [api for api in (TOWN_CALLS if town else CATALOGUE) if api.effect == effect]
+            if shown:
+                console.print(heading, style="bold")
+            for api in shown:
+                console.print(Padding(Text(api.signature, "cyan"), (0, 0, 0, 2)))
+                console.print(Padding(Text(api.meaning), (0, 0, 0, 6)))
+        waits = "`yield proceed(speed)` lets 0.05 s pass" if town else "`yield autopilot()` lets 0.1 s pass"
+        console.print(f"\nA program is a generator function; {waits}.", style="dim")
         return
-    if name not in APIS:
+    if name not in TOWN_APIS:
         import difflib
 
-        near = difflib.get_close_matches(name, list(APIS), n=1)
+        near = difflib.get_close_matches(name, list(TOWN_APIS), n=1)
         raise ConfigError(
             f"There is no driving API {name!r}.",
             hint=f"Did you mean {near[0]}?" if near else "Run: chauffeur show apis",
         )
-    api = APIS[name]
+    api = TOWN_APIS[name]
     console.print(Syntax(api.signature, "python", theme="ansi_dark", background_color="default"))
     console.print(api.meaning)
     rows = [(p.name, f"{p.meaning}{f', in {p.unit}' if p.unit else ''}") for p in api.params]

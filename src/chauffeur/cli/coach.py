@@ -186,7 +186,7 @@ class _Teller:
         from chauffeur.hmi.events import events_of
 
         recorded = attempt.recorded
-        start = recorded.frames[0].snapshot.time_s
+        start = recorded.frames[0].observation.time_s
         self._console.print(
             columns(((f"{one.time_s - start:6.1f} s", plain(one.label)) for one in events_of(recorded)), indent=4)
         )

@@ -78,6 +78,10 @@ def doctor() -> None:
             lines.append(("", Text(install_command(extra), "cyan")))
     console.print(columns(lines))
 
+    if carla := _carla_server():
+        console.print("\nCARLA server", style="bold")
+        console.print(columns([("", plain(one)) for one in carla]))
+
     console.print("\nReal time", style="bold")
     console.print(columns([("scheduling", Text(_realtime()))]))
 
@@ -92,6 +96,19 @@ def doctor() -> None:
         console.print(Text("\nEverything needed to drive is here.", "green"))
     if missing or sandbox:
         raise typer.Exit(FAILED)
+
+
+def _carla_server() -> tuple[str, ...]:
+    """What the CARLA server that the environment names lacks, in sentences; nothing where it names none."""
+    from chauffeur.concept import ChauffeurError
+    from chauffeur.worlds.carla.server import SERVER_VARIABLE, connect, lacks
+
+    if SERVER_VARIABLE not in os.environ:
+        return ()
+    try:
+        return lacks(connect()) or ("It has everything that driving needs.",)
+    except (ChauffeurError, RuntimeError) as error:
+        return (f"{error}",)
 
 
 _TRY_REALTIME = "import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))"

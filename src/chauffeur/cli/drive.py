@@ -23,6 +23,8 @@ Examples:
 
     chauffeur drive "Speed up" --planner openai/qwen2.5 --base-url http://localhost:11434/v1
 
+    chauffeur drive "Keep 30 m to the car ahead" --seeing cameras --full
+
     CHAUFFEUR_TIMEOUT_S=600 chauffeur drive "Speed up" --planner openai/local --base-url http://localhost:8080/v1
 
 --print-prompt shows what a model would be sent, offline and without a key. A slow server's time-out, token limit,
@@ -32,6 +34,9 @@ CHAUFFEUR_ATTEMPTS, CHAUFFEUR_REPAIRS, CHAUFFEUR_BUDGET_S, CHAUFFEUR_TEMPERATURE
 Exit code 1 says that the wish was refused or not done. Every drive is simulated.
 """
 
+SEEN: Final = (
+    "The planner is told what BEV-LLM sees in rendered pictures; checks and safety filter use the world's own state."
+)
 _DONE = ("success", "ended")
 _RESEARCH: Final = "Models and benchmarks"
 
@@ -45,8 +50,8 @@ def drive(
     planner: Annotated[
         str,
         typer.Option(
-            help="`onboard`, `talk2drive`, `keyword`, `openai/<model>`, `replay/<file>`, or an installed one; "
-            "default `onboard`, in a parking lot `talk2drive`.",
+            help="`onboard`, `talk2drive`, `vilad` (parking, open road), `keyword`, `openai/<model>`, `replay/<file>`, "
+            "or an installed one; default `onboard`, in a parking lot `talk2drive`.",
             show_default=False,
         ),
     ] = "",
@@ -57,6 +62,14 @@ def drive(
     setting: Annotated[
         str, typer.Option(help="Prompt: `few-shot` or `zero-shot`.", rich_help_panel=_RESEARCH)
     ] = "few-shot",
+    seeing: Annotated[
+        str,
+        typer.Option(
+            help="Where the situation is read from: the world's own `state`, or rendered `cameras` (BEV-LLM; "
+            "`cameras/FOLDER` for a trained one).",
+            rich_help_panel=_RESEARCH,
+        ),
+    ] = "state",
     limits: Annotated[
         str, typer.Option(help="Bounds no plan may cross: `default` or `lampilot`.", rich_help_panel=_RESEARCH)
     ] = "default",
@@ -87,6 +100,7 @@ def drive(
     from contextlib import ExitStack
     from dataclasses import replace
 
+    from chauffeur.bench.referees import referee_for
     from chauffeur.cli.audit import auditor_for, tell_closing
     from chauffeur.cli.compiling import Compiling
     from chauffeur.cli.console import stdout
@@ -94,17 +108,17 @@ def drive(
     from chauffeur.cli.parts import (
         limits_named,
         not_kept,
-        planner_for,
         planner_named,
-        referee_for,
+        seeing_named,
         setting_named,
         standing_sources,
     )
     from chauffeur.cli.show import FullTeller, Quiet, Teller
     from chauffeur.concept import PersonId
     from chauffeur.drive.answering import ANSWERED
-    from chauffeur.drive.auditing import told_to, with_head
-    from chauffeur.drive.scenarios import find, suiting
+    from chauffeur.drive.auditing import with_head
+    from chauffeur.drive.events import told_to
+    from chauffeur.drive.scenarios import find, planner_for, suiting
     from chauffeur.drive.session import Forgetful, Session, parse_wish
     from chauffeur.memory.choice import open_memory
     from chauffeur.memory.personal_limits import personal_limits
@@ -125,6 +139,9 @@ def drive(
         setting=setting_named(setting),
     )
     start_seed = place.seed if seed is None else seed
+    session.seeing = seeing_named(seeing, start_seed)
+    if session.seeing is not None:
+        console.print(SEEN, style="dim", markup=False)
     if print_prompt:
         from chauffeur.cli.prompts import show_prompt
 
@@ -171,7 +188,7 @@ def asking() -> bool:
 
 
 def save_trip(folder: Path, recorded: RecordedTrip) -> list[Path]:
-    """Write recording, page and, if anything was driven, filmstrip into a folder."""
+    """Write recording, page, the view from the seat where the planner looked, and the filmstrip of what was driven."""
     from chauffeur.drive.recording import write_trip
     from chauffeur.hmi.page import write_page
 
@@ -186,6 +203,10 @@ def save_trip(folder: Path, recorded: RecordedTrip) -> list[Path]:
         ),
         write_page(folder / "trip.html", recorded),
     ]
+    if recorded.view is not None:
+        from chauffeur.drive.files import publish
+
+        written.append(publish(folder / "view.png", recorded.view.png(), "view from the seat"))
     if recorded.frames:
         from chauffeur.hmi.filmstrip import write_filmstrip
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
+    from chauffeur.drive.events import EventKind
     from chauffeur.drive.live.messages import Rung
-    from chauffeur.drive.live.orders import EventKind
 
 RUNGS: Final[dict[Rung, str]] = {
     "follow": "follows the plan",

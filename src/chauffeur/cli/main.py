@@ -10,13 +10,19 @@ import typer
 
 from chauffeur import __version__
 from chauffeur.cli import adapt as adapting
+from chauffeur.cli import adapt_vlm as adapting_vlm
 from chauffeur.cli import (
     apis,
     bench_alignment,
     bench_hostile,
+    bench_leaderboard,
+    bench_nuplanqa,
+    bench_openloop,
     bench_personalization,
+    camera,
     chaos,
     coach,
+    coach_town,
     context,
     doctor,
     drive,
@@ -31,11 +37,14 @@ from chauffeur.cli import (
     serve,
     talk,
     train,
+    unmasking,
     wheel,
 )
 from chauffeur.cli.audit import audit_app
 from chauffeur.cli.bench import bench_app
+from chauffeur.cli.check import check_app
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
+from chauffeur.cli.maps import maps_app
 from chauffeur.cli.me import me_app
 from chauffeur.cli.printable import PrintableFormatter
 from chauffeur.cli.study import study_app
@@ -65,6 +74,8 @@ Examples:
     chauffeur show scenarios
 
     chauffeur show apis is_safe_enter
+
+    chauffeur show camera sheet.png
 
     chauffeur show page trips/hurry/trip.mcap --open
 """
@@ -103,7 +114,7 @@ app = typer.Typer(
 show_app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",
-    help="Show scenarios, driving APIs, learned policies, the context of a place, a trip's page, what is heard.",
+    help="Show scenarios, driving APIs, policies, the context of a place, a trip's page, what is heard, what is seen.",
     epilog=SHOW_EXAMPLES,
 )
 model_app = typer.Typer(
@@ -144,23 +155,33 @@ show_app.command(epilog=apis.EXAMPLES)(apis.apis)
 show_app.command("policies", epilog=policies.SHOW_EXAMPLES)(policies.show_policies)
 show_app.command(epilog=context.EXAMPLES)(context.context)
 show_app.command(epilog=page.EXAMPLES)(page.page)
+show_app.command(epilog=camera.EXAMPLES)(camera.camera)
+show_app.command(epilog=unmasking.EXAMPLES)(unmasking.unmasking)
 show_app.command("speech", epilog=hear.EXAMPLES)(hear.hear)
 
 app.add_typer(bench_app, name="bench", rich_help_panel=MEASURE, epilog=BENCH_EXAMPLES)
 app.add_typer(study_app, name="study", rich_help_panel=MEASURE)
 bench_app.command(epilog=wheel.EXAMPLES)(wheel.human)
 bench_app.command(epilog=coach.EXAMPLES)(coach.coach)
+bench_app.command("coach-town", epilog=coach_town.EXAMPLES)(coach_town.coach_town)
 bench_app.command(epilog=bench_hostile.EXAMPLES)(bench_hostile.hostile)
 bench_app.command(epilog=bench_alignment.EXAMPLES)(bench_alignment.alignment)
+bench_app.command(epilog=bench_leaderboard.EXAMPLES)(bench_leaderboard.leaderboard)
+bench_app.command(epilog=bench_nuplanqa.EXAMPLES)(bench_nuplanqa.nuplanqa)
+bench_app.command(epilog=bench_openloop.EXAMPLES)(bench_openloop.openloop)
 bench_app.command(epilog=bench_personalization.EXAMPLES)(bench_personalization.personalization)
 bench_app.command(epilog=chaos.EXAMPLES)(chaos.chaos)
+scenes.scenes_app.command(epilog=bench_openloop.FRAMES_EXAMPLES)(bench_openloop.frames)
 bench_app.add_typer(scenes.scenes_app, name="scenes", epilog=scenes.GENERATE_EXAMPLES)
 
 app.add_typer(model_app, name="model", rich_help_panel=BUILD)
 app.add_typer(vehicle_app, name="vehicle", rich_help_panel=BUILD)
+app.add_typer(maps_app, name="maps", rich_help_panel=BUILD)
 app.add_typer(audit_app, name="audit", rich_help_panel=BUILD)
+app.add_typer(check_app, name="check", rich_help_panel=BUILD)
 model_app.add_typer(train.train_app, name="train", epilog=train.ONBOARD_EXAMPLES)
 model_app.command(epilog=adapting.EXAMPLES)(adapting.adapt)
+model_app.command("adapt-vlm", epilog=adapting_vlm.EXAMPLES)(adapting_vlm.adapt_vlm)
 model_app.command(epilog=serve.EXAMPLES)(serve.serve)
 model_app.command(epilog=train.GGUF_EXAMPLES)(train.gguf)
 model_app.add_typer(policies.policies_app, name="policies")

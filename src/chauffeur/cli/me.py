@@ -55,9 +55,9 @@ def show(person: Person, most: Annotated[int, typer.Option(min=1, help="Trips at
 
     from chauffeur.cli.console import path_text, plain, stdout
     from chauffeur.concept import Limits, PersonId
+    from chauffeur.concept.data import data_home
     from chauffeur.concept.units import kmh
     from chauffeur.memory.choice import open_memory
-    from chauffeur.memory.files import data_home
     from chauffeur.memory.personal_limits import LIMITS_FILE, personal_limits
     from chauffeur.memory.privacy import read_privacy
 

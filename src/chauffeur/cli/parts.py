@@ -1,4 +1,4 @@
-"""The exchangeable parts a command line can name: planner, limits, speech engine, referee."""
+"""The exchangeable parts a command line can name: planner, limits, speech engine."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ from collections.abc import Callable
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, MissingExtraError, Parameters, Plan, Scenario
+from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, MissingExtraError
 
 if TYPE_CHECKING:
+    from chauffeur.concept import Context, Observation
     from chauffeur.describe.services.sources import SourceSettings
-    from chauffeur.drive.episode import Referee
     from chauffeur.drive.talk.hearing import Engine
     from chauffeur.planners.base import Planner
     from chauffeur.planners.prompts import Setting
-    from chauffeur.worlds.base import World
 
 _LIMITS = {"default": Limits(), "lampilot": LAMPILOT_LIMITS}
 
@@ -51,6 +50,33 @@ def limits_named(name: str) -> Limits:
     return _LIMITS[name]
 
 
+def seeing_named(name: str, seed: int = 0) -> Callable[[Observation], Context] | None:
+    """Who makes C: None for the world's own state, a descriptor that looks for `cameras` or `cameras/FOLDER`.
+
+    Args:
+        name: As on the command line.
+        seed: Of what stands along the road in the pictures.
+
+    Raises:
+        ConfigError: Unknown name.
+        MissingExtraError: Nothing can be rendered or read here.
+        DataError: The folder holds no model.
+    """
+    kind, _, folder = name.partition("/")
+    if name == "state":
+        return None
+    if kind != "cameras":
+        raise ConfigError(f"Unknown way of seeing {name!r}.", hint="Use state, cameras, or cameras/FOLDER.")
+    needs("models", "Seeing by cameras", "torch", "transformers", "safetensors")
+    from pathlib import Path
+
+    from chauffeur.camera import make_renderer
+    from chauffeur.describe.vision import CameraDescriptor
+    from chauffeur.models.bev_llm.seeing import BevLlmReader
+
+    return CameraDescriptor(BevLlmReader(Path(folder) if folder else None), make_renderer(), place=seed)
+
+
 def setting_named(name: str) -> Setting:
     """Prompt setting by name. Raises ConfigError for an unknown one."""
     if name not in ("few-shot", "zero-shot"):
@@ -72,11 +98,6 @@ def planner_named(spec: str, base_url: str | None, on_text: Callable[[str, int],
     return make_planner(spec, **options)
 
 
-def planner_for(spec: str, scenario: Scenario) -> str:
-    """The planner that was named, else one that can drive there: in a parking lot the one that parks."""
-    return spec or ("talk2drive" if scenario.world == "parking" else "onboard")
-
-
 def engine_named(spec: str) -> Engine | None:
     """The speech engine a specification names; None for `none`.
 
@@ -90,27 +111,6 @@ def engine_named(spec: str) -> Engine | None:
     if name not in (*ENGINES, "none"):
         raise ConfigError(f"Unknown speech engine {spec!r}.", hint=f"Known: {', '.join(ENGINES)}, none.")
     return Engine(name, model, favoured=True) if name != "none" else None
-
-
-def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
-    """The judge of a trip: LaMPilot's by the scenario's own goal, else what the planner understood, else none. In a
-    parking lot, the judge of the spot that is meant.
-
-    Raises:
-        ScenarioError: There is no such spot.
-    """
-    if scenario.world == "parking":
-        return _parking_referee(world, plan)
-    from chauffeur.bench.lampilot.understood import referee_for as judge
-
-    return judge(world, scenario, plan)
-
-
-def _parking_referee(world: World, plan: Plan) -> Referee | None:
-    from chauffeur.worlds.parking import ParkingReferee, ParkingWorld
-
-    place = plan.policy.route if isinstance(plan.policy, Parameters) else ""
-    return ParkingReferee(world, world.spot(place)) if place and isinstance(world, ParkingWorld) else None
 
 
 def not_kept(person: str) -> str:

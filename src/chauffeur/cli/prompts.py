@@ -11,6 +11,7 @@ from chauffeur.cli.console import plain
 from chauffeur.concept import ConfigError, PlanRequest
 from chauffeur.planners.base import Planner, Prompting
 from chauffeur.planners.llm_context import tokens_about
+from chauffeur.planners.prompts import pictures_in, words_of
 
 
 def show_prompt(console: Console, planner: Planner, request: PlanRequest) -> None:
@@ -31,8 +32,8 @@ def show_prompt(console: Console, planner: Planner, request: PlanRequest) -> Non
     note(f"POST {prompt.url}")
     note(json.dumps(prompt.parameters, ensure_ascii=False))
     for message in prompt.messages:
-        note(
-            f"----- {message['role']}: {len(message['content']):,} characters, about {tokens_about([message]):,} tokens"
-        )
-        console.print(plain(message["content"]), soft_wrap=True)
+        words, pictures = words_of(message), pictures_in([message])
+        also = f", {pictures} pictures" if pictures else ""
+        note(f"----- {message['role']}: {len(words):,} characters, about {tokens_about([message]):,} tokens{also}")
+        console.print(plain(words), soft_wrap=True)
     note(f"----- {len(prompt.messages)} turns, about {tokens_about(prompt.messages):,} tokens")

@@ -51,7 +51,7 @@ def drive_again(recorded: RecordedTrip) -> RecordedTrip:
     """The same program on the same scenario with the same seed. Raises DataError if the recording holds no drive."""
     from dataclasses import replace
 
-    from chauffeur.cli.parts import referee_for
+    from chauffeur.bench.referees import referee_for
     from chauffeur.concept import DataError, Limits
     from chauffeur.drive.session import drive_policy, make_world, trip_s
 

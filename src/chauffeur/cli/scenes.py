@@ -84,12 +84,74 @@ def generate(
     )
     suite = Suite(out, config, avoided)
     try:
-        with _progress(console, "made") as show:
+        with progress(console, "made") as show:
             manifest = suite.generate(workers or os.cpu_count() or 1, show)
     except KeyboardInterrupt:
         console.print(f"Stopped. {suite.made:,} items are kept in {out}; run the same command to go on.")
         raise typer.Exit(130) from None
     _summary(console, out, manifest)
+
+
+QA_EXAMPLES = """
+Examples:
+
+    chauffeur bench scenes qa --out qa --scenes 1000
+
+    chauffeur bench scenes qa --out qa-small --scenes 200 --width 112 --height 64 --frames 2
+
+    chauffeur bench scenes qa --out words --scenes 500 --no-render
+
+    chauffeur bench scenes qa --out qa --scenes 2000 --pairs 50
+
+Streets are drawn, road users staged, pictures rendered, and questions of NuPlanQA's nine subtasks answered from the
+ground truth, about what can be seen. Simulated, and named so. At the end tricks are tried on the test split (words of
+the options, control signals, lengths, letters): above 35 % is a failure. Ctrl-C keeps what is rendered; the same
+command goes on.
+"""
+
+
+@scenes_app.command(epilog=QA_EXAMPLES)
+def qa(
+    out: Annotated[Path, typer.Option(help="Folder to write; a set begun there is continued.")],
+    scenes: Annotated[
+        int, typer.Option(min=5, help="Scenes for training; validation and test have a fifth each.")
+    ] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    width: Annotated[int, typer.Option(min=48, help="Pictures' width, px.")] = 448,
+    height: Annotated[int, typer.Option(min=32, help="Pictures' height, px.")] = 256,
+    frames: Annotated[int, typer.Option(min=1, max=5, help="Instants of a scene that are rendered.")] = 4,
+    pairs: Annotated[
+        int, typer.Option(min=0, help="Free question-answer pairs for each fact of a training scene.")
+    ] = 0,
+    render: Annotated[bool, typer.Option("--render/--no-render", help="Render, or write words alone.")] = True,
+    look: Annotated[
+        str, typer.Option(help="Palette and lens of the test split: `default`, `held_out_a`...")
+    ] = "default",
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
+) -> None:
+    """Questions about pictures in NuPlanQA's format, from scenes of our own, that no trick can answer."""
+    from chauffeur.bench.nuplanqa.scenes.gate import BOUND
+    from chauffeur.bench.nuplanqa.scenes.making import SIMULATED, QaConfig, make_set
+    from chauffeur.cli.console import stdout
+
+    console = stdout()
+    config = QaConfig(scenes, seed, width, height, frames, pairs, render, look)
+    try:
+        with progress(console, "scenes") as show:
+            made = make_set(out, config, workers or os.cpu_count() or 1, show)
+    except KeyboardInterrupt:
+        console.print(f"Stopped. What is rendered is kept in {out}; run the same command to go on.")
+        raise typer.Exit(130) from None
+    _table(console, ("Split", "Questions"), [(name, f"{count:,}") for name, count in made.questions.items()])
+    console.print()
+    lines = [(one.trick, f"{one.accuracy:.1%}", one.worst_told) for one in made.gate]
+    _table(console, ("Test split answered from", "Right", "Worst subtask"), lines, right=(1,))
+    console.print()
+    console.print(SIMULATED)
+    if not all(one.passes() for one in made.gate):
+        console.print(f"The questions give themselves away: above {BOUND:.0%}. Make more scenes.")
+        raise typer.Exit(1)
+    console.print(f"Next: chauffeur bench nuplanqa --data {out / 'test'} --planner openai/MODEL", soft_wrap=True)
 
 
 def _summary(console: Console, out: Path, manifest: dict[str, Any] | Any) -> None:
@@ -125,7 +187,7 @@ def check(
     from chauffeur.drive.files import publish
 
     console = stdout()
-    with _progress(console, "checked") as show:
+    with progress(console, "checked") as show:
         items, faults = look_over(data, workers or os.cpu_count() or 1, show)
     if out is not None:
         lines = "".join(json.dumps(as_row(fault), ensure_ascii=False) + "\n" for fault in faults)
@@ -179,7 +241,7 @@ def _table(
 
 
 @contextmanager
-def _progress(console: Console, what: str) -> Generator[Callable[[int, int], None]]:
+def progress(console: Console, what: str) -> Generator[Callable[[int, int], None]]:
     """A bar on a terminal, a line now and then elsewhere."""
     if not console.is_terminal:
         yield _lines(console, what)

@@ -8,16 +8,19 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from rich.color import Color
 from rich.columns import Columns
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.padding import Padding
 from rich.progress_bar import ProgressBar
+from rich.style import Style
 from rich.syntax import Syntax
 from rich.text import Text
 
 from chauffeur.cli.console import columns, path_text, plain
 from chauffeur.concept import (
+    CameraImage,
     Context,
     Frame,
     History,
@@ -30,6 +33,7 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.drive.answering import ANSWERED
+from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.payload import policy_words
@@ -65,10 +69,10 @@ class Quiet:
     def compiling(self, done: int, of: int) -> None:
         """How far the simulator is compiled."""
 
-    def tell(self, letter: str, value: object) -> None:
-        """One of the loop's letters, or a frame."""
-        if letter == "memory":  # what went wrong with it is said even where little is
-            self.console.print(plain(str(value)), style="bold yellow")
+    def tell(self, event: DriveEvent) -> None:
+        """Hear what the drive tells."""
+        if event.kind == "trouble":  # said even where little is
+            self.console.print(plain(event.text), style="bold yellow")
 
     def writing(self, text: str, attempt: int) -> None:
         """A piece of a model's reply as it is written."""
@@ -127,20 +131,20 @@ class Teller(Quiet):
             self.console.print(f"{said} ...", style="dim")
         self._compiles = True
 
-    def tell(self, letter: str, value: object) -> None:
+    def tell(self, event: DriveEvent) -> None:
         """Go on to the next stage; show a frame on the live line. The letters are shown at the end."""
-        match value:
-            case Frame():
-                self._frame(value)
-            case Instruction():
-                self._unit = words.pace_of(value.text)
+        match event.value:
+            case Frame() as frame:
+                self._frame(frame)
+            case Instruction() as wish:
+                self._unit = words.pace_of(wish.text)
             case History():
                 self.stage("Reading the wish")
-            case Plan():
-                self._source = tuple(value.policy.text.splitlines()) if isinstance(value.policy, Program) else ()
+            case Plan(policy=policy):
+                self._source = tuple(policy.text.splitlines()) if isinstance(policy, Program) else ()
                 self.stage("Checking the plan")
             case _:
-                super().tell(letter, value)
+                super().tell(event)
 
     def writing(self, text: str, attempt: int) -> None:
         """Show the end of what the model has written so far; a new attempt begins anew."""
@@ -178,6 +182,8 @@ class Teller(Quiet):
         trip = recorded.trip
         yield "Wish", Text.assemble("“", plain(trip.instruction.text), "”")
         yield "Road", plain(recorded.scenario.title or recorded.scenario.id)
+        if recorded.view is not None and self.console.is_terminal:
+            yield "View", seat_view(recorded.view)
         if trip.history.items:
             yield "Memory", history_words(trip.history)
         if trip.plan.policy is None or trip.outcome == "refused":
@@ -215,13 +221,13 @@ class Teller(Quiet):
 
     def wrote(self, paths: list[Path]) -> None:
         """List the files."""
-        names = {".mcap": "recording", ".html": "page", ".png": "filmstrip"}
-        self.console.print(columns((names.get(p.suffix, "file"), path_text(p)) for p in paths))
+        names = {".mcap": "recording", ".html": "page", ".png": "filmstrip", "view.png": "view"}
+        self.console.print(columns((names.get(p.name, names.get(p.suffix, "file")), path_text(p)) for p in paths))
 
     def _frame(self, frame: Frame) -> None:
         if self._live is None:
             return
-        shot = frame.snapshot
+        shot = frame.observation
         parts = [f"{shot.time_s:5.1f} s", f"{words.pace(shot.ego.speed_mps, self._unit):>8}"]
         if shot.front is not None:
             parts.append(f"gap {shot.front.distance_m:3.0f} m")
@@ -256,31 +262,31 @@ class FullTeller(Teller):
         self.console.print(Text.assemble(title, f" ({scenario.id}, seed {words.seed_words(seed)})", style="dim"))
         super().begin(scenario, seed)
 
-    def tell(self, letter: str, value: object) -> None:
+    def tell(self, event: DriveEvent) -> None:
         """Print a letter as it comes; show a frame on the live line."""
-        if not isinstance(value, Frame | Scenario):
+        if event.kind != "period":
             self._still()
-        match value:
-            case Instruction():
-                said_by = f"  ({value.person})" if value.person else ""
-                self._letter("I", Text.assemble(("“", "dim"), plain(value.text), ("”", "dim"), (said_by, "dim")))
-            case Context():
-                self._letter("C", plain(value.text))
-            case History() if value.items:
-                self._letter("H", history_words(value))
-            case Plan():
-                self._plan(value)
-            case tuple() if letter == "V":
-                for verdict in value:
+        match event.value:
+            case Instruction() as wish:
+                said_by = f"  ({wish.person})" if wish.person else ""
+                self._letter("I", Text.assemble(("“", "dim"), plain(wish.text), ("”", "dim"), (said_by, "dim")))
+            case Context() as context:
+                self._letter("C", plain(context.text))
+            case History() as history if history.items:
+                self._letter("H", history_words(history))
+            case Plan() as plan:
+                self._plan(plan)
+            case tuple() as several:
+                for verdict in several:
                     if isinstance(verdict, Verdict):
                         self._verdict(verdict)
-            case Frame():
-                for text in value.said:
-                    at = (f"{value.snapshot.time_s:6.1f} s  ", "dim")
+            case Frame() as frame:
+                for text in frame.said:
+                    at = (f"{frame.observation.time_s:6.1f} s  ", "dim")
                     self.console.print(Text.assemble(at, ("“", "dim"), plain(text), ("”", "dim")))
             case _:
                 pass
-        super().tell(letter, value)
+        super().tell(event)
 
     def _units(self, text: str) -> str:
         return text
@@ -332,6 +338,27 @@ class FullTeller(Teller):
         reason = verdict.reason.split(". ", 1)[0].rstrip(".") + "." if verdict.reason else "passed"
         mark = Text(f"{words.MARKS[verdict.mark]} ", words.MARK_STYLES[verdict.mark])
         self._letter("V", Text.assemble(mark, plain(reason), (f"  {verdict.check}", "dim")))
+
+
+VIEW_COLUMNS = 56
+"""Width of the view from the seat on a terminal, characters."""
+
+
+def seat_view(image: CameraImage) -> Text:
+    """A picture in half blocks: two pixels a character, one above the other."""
+    from PIL import Image
+
+    picture = Image.fromarray(image.pixels())
+    rows = round(VIEW_COLUMNS * picture.height / picture.width / 2) * 2
+    dots = picture.resize((VIEW_COLUMNS, rows), Image.Resampling.BOX).load()
+    assert dots is not None
+    text = Text(no_wrap=True)
+    for row in range(0, rows, 2):
+        for column in range(VIEW_COLUMNS):
+            above, below = (Color.from_rgb(*dots[column, y]) for y in (row, row + 1))  # type: ignore[misc]
+            text.append("▀", Style(color=above, bgcolor=below))
+        text.append("\n" if row + 2 < rows else "")
+    return text
 
 
 def history_words(history: History) -> Text:

@@ -103,14 +103,14 @@ def talk(
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.interrupts import Interrupts
     from chauffeur.cli.lines import Lines, standard_input
-    from chauffeur.cli.parts import engine_named, limits_named, not_kept, planner_for, planner_named
+    from chauffeur.cli.parts import engine_named, limits_named, not_kept, planner_named
     from chauffeur.cli.talk_drive import TalkDrive
     from chauffeur.cli.talk_screen import TalkScreen
     from chauffeur.concept import PersonId, SandboxError
     from chauffeur.drive.live.books import Books, unanswered
     from chauffeur.drive.live.settings import Settings
     from chauffeur.drive.live.starts import Start
-    from chauffeur.drive.scenarios import find, seeds_with_lead, suiting
+    from chauffeur.drive.scenarios import find, planner_for, seeds_with_lead, suiting
     from chauffeur.drive.session import make_world, parse_wish
     from chauffeur.drive.surroundings import services_file
     from chauffeur.drive.talk.session import WELL, Talk

@@ -332,8 +332,8 @@ def _line_of(scene: Scene) -> Text:
         Text(f"{words.speed(scene.ego.speed_mps)}{target}", "bold"),
         Text(f"limit {scene.limit_mps:.1f}"),
     ]
-    if scene.lane is not None:
-        parts.append(Text(f"lane {scene.lane[2] + 1} from left"))
+    if scene.place is not None:
+        parts.append(Text(f"lane {scene.place + 1} from left"))
     if scene.rung != "follow":
         parts.append(Text(_RUNGS[scene.rung], "bold yellow"))
     parts.append(Text(f"{scene.wish}{f', line {scene.line}' if scene.line else ''}" if scene.wish else "no plan"))

@@ -92,14 +92,14 @@ Examples:
 
     chauffeur model train sorters --out runs/sorters --measured
 
-Two minutes, without PyTorch; with `--measured`, which leaves out a fifth of the writers in turn, about eight. The same
+Three minutes, without PyTorch; with `--measured`, which leaves out a fifth of the writers in turn, about ten. The same
 seed gives the same files; those that ship are of seed 0.
 """
 
 
 @train_app.command(epilog=SORTERS_EXAMPLES)
 def sorters(
-    out: Annotated[Path, typer.Option(help="Folder for the two sorters and their card.")],
+    out: Annotated[Path, typer.Option(help="Folder for the sorters and their card.")],
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
     measured: Annotated[
         bool,
@@ -108,7 +108,7 @@ def sorters(
         ),
     ] = False,
 ) -> None:
-    """The sorters of what passengers hint at, and of their remarks after a drive."""
+    """The sorters of what passengers hint at, say of the weather, and remark after a drive."""
     from chauffeur.cli.console import stdout
     from chauffeur.cli.stages import stage_lines
     from chauffeur.models.sorting.pipeline import make_sorters
@@ -120,7 +120,250 @@ def sorters(
     except KeyboardInterrupt:
         console.print(f"Stopped. Whole files are kept in {out}.", soft_wrap=True)
         raise typer.Exit(130) from None
-    console.print(f"Sorters: {out / 'wishes.npz'}, {out / 'remarks.npz'}; their card: {card}", soft_wrap=True)
+    console.print(f"Sorters: wishes, remarks and weather in {out}; their card: {card}", soft_wrap=True)
+
+
+VILAD_DRIVE_EXAMPLES = """
+Examples:
+
+    chauffeur model train vilad-parking --out runs/vilad
+
+    chauffeur model train vilad-drive --out runs/vilad-drive --base runs/vilad
+
+    chauffeur drive "Turn left and stop near the crosswalk" --scenario open-road --planner vilad/runs/vilad-drive/model
+
+Commands and streets are drawn as it goes, without end; the same seed gives the same model. Ctrl-C keeps what is done;
+the same command goes on. It needs PyTorch: pip install 'chauffeur[models]'.
+"""
+
+VILAD_EXAMPLES = """
+Examples:
+
+    chauffeur model train vilad-parking --out runs/vilad
+
+    chauffeur model train vilad-parking --out runs/vilad-plain --mode plain
+
+    chauffeur drive "I need to charge" --scenario parking-lift --planner vilad/runs/vilad/model
+
+Commands and scenes are drawn as it goes, without end; the same seed gives the same model. Ctrl-C keeps what is done;
+the same command goes on. It needs PyTorch: pip install 'chauffeur[models]'.
+"""
+
+
+@train_app.command("vilad-parking", epilog=VILAD_EXAMPLES)
+def vilad_parking(
+    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 32 commands.")] = 1_200,
+    size: Annotated[str, typer.Option(help="Network: `lot` ships; `tiny`, `3M`, `10M` and more.")] = "lot",
+    mode: Annotated[str, typer.Option(help="`fixed` pattern training, or `plain` without it.")] = "fixed",
+) -> None:
+    """The parking model of the ViLaD planner: words and free spots to a spot, by masked diffusion."""
+    _train_vilad("vilad-parking", out, seed, steps, size, mode, None)
+
+
+@train_app.command("vilad-drive", epilog=VILAD_DRIVE_EXAMPLES)
+def vilad_drive(
+    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 32 commands.")] = 3_000,
+    size: Annotated[str, typer.Option(help="Network: `lot` ships; `tiny`, `3M`, `10M` and more.")] = "lot",
+    mode: Annotated[str, typer.Option(help="`fixed` pattern training, or `plain` without it.")] = "fixed",
+    base: Annotated[
+        Path | None, typer.Option(help="Run of `vilad-parking` of the same size, whose reading of words is taken over.")
+    ] = None,
+) -> None:
+    """The open-road model of the ViLaD planner: words and the street ahead to waypoints, by masked diffusion."""
+    _train_vilad("vilad-drive", out, seed, steps, size, mode, base)
+
+
+def _train_vilad(name: str, out: Path, seed: int, steps: int, size: str, mode: str, base: Path | None) -> None:
+    from chauffeur.cli.console import stdout
+    from chauffeur.cli.parts import needs
+    from chauffeur.cli.stages import stage_lines
+
+    needs("models", "Training", "torch", "transformers", "onnx", "onnxscript")
+    from chauffeur.models.vilad.pipeline import MODELS, make_model, recipe_of
+
+    console = stdout()
+    chosen = MODELS[name]()
+    recipe = recipe_of(chosen, size, mode, steps, seed, begun=base is not None)
+    try:
+        model = make_model(chosen, out, recipe, stage_lines(console), base)
+    except KeyboardInterrupt:
+        console.print(f"Stopped. What is done is kept in {out}; run the same command to go on.", soft_wrap=True)
+        raise typer.Exit(130) from None
+    console.print(f"Model: {model}; its card: {model / 'MODEL_CARD.md'}", soft_wrap=True)
+
+
+VILAD_FRAMES_EXAMPLES = """
+Examples:
+
+    chauffeur bench scenes frames --out frames
+
+    chauffeur model train vilad-frames --data frames --out runs/frames
+
+    chauffeur bench openloop --data frames --planner vilad-frames/runs/frames/model --setting sft
+
+    chauffeur bench openloop --data frames --planner vilad-frames/runs/frames/model,twin --setting sft
+
+A small vision encoder first, then, over its frozen tokens, the diffusion model and its autoregressive twin, and the
+ego-status MLP that sees no picture. The test split's figures of all of them stand in the model card. Ctrl-C keeps what
+is saved, every half minute; the same command goes on. It needs PyTorch: pip install 'chauffeur[models]'.
+"""
+
+
+@train_app.command("vilad-frames", epilog=VILAD_FRAMES_EXAMPLES)
+def vilad_frames(
+    data: Annotated[Path, typer.Option(help="Set that `chauffeur bench scenes frames` has made.")],
+    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
+    seed: Annotated[int, typer.Option(min=0, help="Seed of weights and batches.")] = 0,
+    encoder_steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of the encoder.")] = 1_600,
+    steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of the decoders, each.")] = 1_500,
+) -> None:
+    """ViLaD on frames: a front picture, own motion and a command to waypoints, by masked diffusion (paper Sec. VII)."""
+    from dataclasses import replace
+
+    from chauffeur.cli.console import stdout
+    from chauffeur.cli.parts import needs
+    from chauffeur.cli.stages import stage_lines
+    from chauffeur.cli.tables import show_table
+
+    needs("models", "Training", "torch", "transformers", "safetensors")
+    from chauffeur.models.vilad.frames_pipeline import FIGURES_HEAD, FramesPlan, cells_of, make_frames_model
+
+    console = stdout()
+    plan = FramesPlan()
+    plan = replace(
+        plan,
+        vision=replace(plan.vision, steps=encoder_steps, seed=seed),
+        decoder=replace(plan.decoder, steps=steps, seed=seed),
+    )
+    try:
+        model, lines = make_frames_model(data, out, plan, stage_lines(console))
+    except KeyboardInterrupt:
+        console.print(f"Stopped. What is saved is kept in {out}; run the same command to go on.", soft_wrap=True)
+        raise typer.Exit(130) from None
+    show_table(console, "Test split: another town, simulated; L2 in m", FIGURES_HEAD, [cells_of(one) for one in lines])
+    console.print(f"Model: {model}; its card: {model / 'MODEL_CARD.md'}", soft_wrap=True)
+
+
+BEV_LLM_EXAMPLES = """
+Examples:
+
+    chauffeur bench scenes qa --out qa --scenes 3600 --width 224 --height 128 --frames 2
+
+    chauffeur model train bev-llm --data qa --out runs/bev-llm
+
+    chauffeur model train bev-llm --data qa --out runs/no-bev --ablation no-bev
+
+    chauffeur bench nuplanqa --data qa/test --planner bev-llm/runs/bev-llm/model
+
+The compact network is trained on pictures that are rendered and scenes that are staged: first perception, by the ground
+truth of the scenes; then, with the encoder frozen and its features computed once, what gathers them; then the language
+of questions. `--begin` takes over the weights of a network, as far as they fit; a stage of no steps is left out.
+Ablations, trained so from the start: `no-bev`, `no-history`, `single-view`, `blind`; at the end the full network is
+tried without each as well. Ctrl-C keeps what is saved, every two minutes; the same command goes on, with more steps
+where more are asked for.
+"""
+
+
+@train_app.command("bev-llm", epilog=BEV_LLM_EXAMPLES)
+def bev_llm(
+    data: Annotated[Path, typer.Option(help="Set that `chauffeur bench scenes qa` has made.")],
+    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
+    steps: Annotated[int, typer.Option(min=0, help="Optimiser steps of perception.")] = 3000,
+    gather_steps: Annotated[int, typer.Option(min=0, help="The same with the encoder frozen.")] = 1500,
+    word_steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of language.")] = 300,
+    begin: Annotated[Path | None, typer.Option(help="Folder of a network to begin with.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of weights and batches.")] = 0,
+    ablation: Annotated[str, typer.Option(help="`full`, or what is kept from the network.")] = "full",
+) -> None:
+    """BEV-LLM, compact: questions about multi-view pictures, with a bird's-eye view that remembers (paper Eq. 9-10)."""
+    from typing import get_args
+
+    from chauffeur.bench.nuplanqa.questions import SUBTASKS
+    from chauffeur.cli.console import stdout
+    from chauffeur.cli.parts import needs
+    from chauffeur.cli.tables import show_table
+    from chauffeur.concept import ConfigError
+
+    needs("models", "Training", "torch", "transformers", "safetensors")
+    from chauffeur.models.bev_llm.network import Keep
+    from chauffeur.models.bev_llm.recipe import BevLlmRecipe, load_split, train_compact
+
+    kept = next((one for one in get_args(Keep) if one == ablation), None)
+    if kept is None:
+        raise ConfigError(f"There is no ablation {ablation!r}.", hint=f"Choose of: {', '.join(get_args(Keep))}.")
+    console = stdout()
+    recipe = BevLlmRecipe(steps=steps, gather_steps=gather_steps, word_steps=word_steps, seed=seed, ablation=kept)
+    lasts = {"perception": steps, "gathering": gather_steps, "language": word_steps}
+
+    def told(stage: str, step: int, loss: float, seconds: float) -> None:
+        if step % 50 == 0 or step + 1 == lasts[stage]:
+            console.print(f"{stage}, step {step:,}, loss {loss:.3f}, {seconds:.2f} s a step")
+
+    try:
+        train, val, test = (load_split(data / split) for split in ("train", "val", "test"))
+        answerer = train_compact(out, recipe, train, val, told, begin=begin)
+        tried = get_args(Keep) if kept == "full" else (kept,)
+        found = {one: answerer.keeping(one).accuracy(test) for one in tried}
+    except KeyboardInterrupt:
+        console.print(f"Stopped. What is saved is kept in {out}; run the same command to go on.", soft_wrap=True)
+        raise typer.Exit(130) from None
+    rows = [
+        (name, *(f"{found[one][name]:.1%}" for one in tried)) for name in (*SUBTASKS, "total") if name in found[kept]
+    ]
+    show_table(console, "Test split: other scenes, places and wordings; simulated", ("subtask", *tried), rows)
+    console.print(
+        f"Model: {out / 'model'}. Next: chauffeur bench nuplanqa --planner bev-llm/{out / 'model'}", soft_wrap=True
+    )
+
+
+VLM_EXAMPLES = """
+Examples:
+
+    chauffeur model train vlm --out runs/vlm
+
+    chauffeur model train vlm --out runs/vlm-small --scenes 500 --steps 100
+
+    chauffeur drive "I'm late, but it is slippery" --scenario track-left-turn --planner vlm/runs/vlm/model
+
+Renders its pictures first (about 30 ms each); a quarter of an hour on one core in all. The same seed gives the same
+model. Ctrl-C keeps what is done; the same command goes on. It needs PyTorch and the renderer:
+pip install 'chauffeur[models,camera]'.
+"""
+
+
+@train_app.command("vlm", epilog=VLM_EXAMPLES)
+def vlm(
+    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
+    seed: Annotated[int, typer.Option(min=0, help="Seed of weights and batches.")] = 0,
+    scenes: Annotated[int, typer.Option(min=20, help="Pictures to render; each gets three wishes a turn.")] = 4_000,
+    steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 20 pictures with three wishes.")] = 1_600,
+    size: Annotated[str, typer.Option(help="Network: `compact` ships; `tiny`, `large`.")] = "compact",
+) -> None:
+    """The on-board VLM: a picture and a wish to the scene in words and the controllers' gains (paper Sec. VI)."""
+    from chauffeur.cli.console import stdout
+    from chauffeur.cli.parts import needs
+    from chauffeur.cli.stages import stage_lines
+    from chauffeur.concept import ConfigError
+
+    needs("models", "Training", "torch", "transformers", "onnx", "onnxscript")
+    from chauffeur.models.vlm.network import SIZES
+    from chauffeur.models.vlm.pipeline import make_vlm
+    from chauffeur.models.vlm.recipe import VlmRecipe
+
+    if size not in SIZES:
+        raise ConfigError(f"There is no size {size!r}.", hint=f"Sizes: {', '.join(SIZES)}.")
+    console = stdout()
+    try:
+        recipe = VlmRecipe(size=size, scenes=scenes, steps=steps, seed=seed)
+        model = make_vlm(out, recipe, stage_lines(console))
+    except KeyboardInterrupt:
+        console.print(f"Stopped. What is done is kept in {out}; run the same command to go on.", soft_wrap=True)
+        raise typer.Exit(130) from None
+    console.print(f"Model: {model}; its card: {model / 'MODEL_CARD.md'}", soft_wrap=True)
 
 
 GGUF_EXAMPLES = """

@@ -9,7 +9,8 @@ from rich.text import Text
 
 from chauffeur.cli.console import echo, plain
 from chauffeur.cli.labels import NOT_HEARD
-from chauffeur.drive.onroad import Answer, Event
+from chauffeur.drive.events import DriveEvent
+from chauffeur.drive.onroad import Answer
 from chauffeur.drive.talk.asking import Words
 from chauffeur.drive.talk.messages import HeardWords, Note, Said
 from chauffeur.drive.talk.voice import Voice
@@ -34,19 +35,19 @@ class VehicleScreen:
         if not self._quiet:
             self._console.print(plain(words), style=style)
 
-    def tell(self, event: Event) -> None:
+    def tell(self, event: DriveEvent) -> None:
         """What the session tells."""
         match event.kind:
             case "link":
-                self.say(f"Vehicle: {event.words}", "dim")
+                self.say(f"Vehicle: {event.text}", "dim")
             case "plan":
-                self.say(f"  thoughts  {event.words}", "dim")
+                self.say(f"  thoughts  {event.text}", "dim")
             case "asked":
                 self._lines(event.value)
             case "late" | "trouble":
-                self.trouble(event.words)
+                self.trouble(event.text)
             case "over":
-                self.say(event.words)
+                self.say(event.text)
             case _:
                 pass
 

@@ -85,9 +85,9 @@ async def _drive(run: HumanRun, port: int, browser: bool, console: Console) -> N
 
     from chauffeur.hmi.wheel.pace import WallClock
     from chauffeur.hmi.wheel.server import serving
-    from chauffeur.hmi.wheel.session import Session
+    from chauffeur.hmi.wheel.session import WheelSession
 
-    session = Session(run, WallClock(), lambda: datetime.now(UTC).isoformat(timespec="seconds"))
+    session = WheelSession(run, WallClock(), lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     async with serving(session, port) as server:
         console.print(
             f"{len(run.items) - run.done} drives to go, run folder {run.folder}. Drive in the browser:", markup=False

@@ -1,4 +1,4 @@
-"""Data sets of training, tests and benchmarks: folders of `data/` in a source checkout, and no part of the wheel."""
+"""Where data lie: the user's own, and the data sets of a source checkout, which are no part of the wheel."""
 
 from __future__ import annotations
 
@@ -13,6 +13,15 @@ DATA_VARIABLE: Final = "CHAUFFEUR_DATA"
 """Environment variable that names a folder of data sets, in place of the checkout's own."""
 
 _CHECKOUT: Final = Path(__file__).resolve().parents[3]
+
+
+def data_home() -> Path:
+    """Chauffeur's data directory: CHAUFFEUR_HOME, or the user's own data directory."""
+    if home := os.environ.get("CHAUFFEUR_HOME"):
+        return Path(home).expanduser()
+    if shared := os.environ.get("XDG_DATA_HOME"):
+        return Path(shared) / "chauffeur"
+    return Path.home() / ".local" / "share" / "chauffeur"
 
 
 def data_folder(name: str, environ: Mapping[str, str] = os.environ, checkout: Path = _CHECKOUT) -> Path:

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal, NewType
 
+from chauffeur.concept.images import CameraImage
+
 PersonId = NewType("PersonId", str)
 """Name a person's memory is kept under; only `memory` knows what file that means."""
 
@@ -37,7 +39,7 @@ class Lead:
     """A vehicle ahead or behind, as seen along a lane.
 
     Attributes:
-        vehicle: Its id in the snapshot.
+        vehicle: Its id in the observation.
         distance_m: Centre to centre along the lane, always positive.
         speed_mps: Its speed.
     """
@@ -77,11 +79,112 @@ class Situation:
 
 
 @dataclass(frozen=True, slots=True)
+class ParkingSpot:
+    """A spot of a parking lot.
+
+    Attributes:
+        name: Row letter and number, counted from the drive in: `B4`.
+        x_m, y_m: Its centre.
+        heading_rad: Of a car that is parked in it forwards.
+        free: Whether nobody stands in it.
+        kind: Whom it is kept for.
+        covered: Whether it is under a roof.
+        neighbours: Cars in the spots directly beside it, 0 to 2.
+        row_end: Whether it is the first or last of its row.
+    """
+
+    name: str
+    x_m: float
+    y_m: float
+    heading_rad: float
+    free: bool
+    kind: Literal["plain", "ev", "accessible", "family"] = "plain"
+    covered: bool = False
+    neighbours: int = 0
+    row_end: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ParkingLot:
+    """What a parking lot offers, in the world frame of a snapshot, or in the ego frame of a context.
+
+    Attributes:
+        spots: All spots.
+        landmarks: (name, x, y) of `exit`, `entrance`, `gate` (the building's door), and where there are: `lift`,
+            `stairs`, `machine` (where one pays).
+    """
+
+    spots: tuple[ParkingSpot, ...]
+    landmarks: tuple[tuple[str, float, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StreetWay:
+    """A way on from where the car is: along its lane, and through the next junction to one side.
+
+    Attributes:
+        turn: Which way it leads; `straight` where the road does not part.
+        length_m: As far as it is known.
+        bend_m: Stations between which it crosses the junction; None without one.
+        radius_m: Of the bend there; None where it goes straight on.
+        kerb_m: From the middle of its lane to the right to where one can stand at the kerb; None where one cannot.
+        path_m: Middle of the lane in the ego frame (x forward, y left), from beside the car on.
+    """
+
+    turn: Literal["left", "straight", "right"]
+    length_m: float
+    bend_m: tuple[float, float] | None = None
+    radius_m: float | None = None
+    kerb_m: float | None = None
+    path_m: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class StreetMark:
+    """Something to stop by.
+
+    Attributes:
+        kind: What it is.
+        ways: The ways that lead past it.
+        start_m, end_m: Stations of those ways between which it lies.
+    """
+
+    kind: Literal["crosswalk", "junction", "cones", "vehicle"]
+    ways: tuple[Literal["left", "straight", "right"], ...]
+    start_m: float
+    end_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Street:
+    """The road ahead as far as a short drive leads. Stations are counted from beside the middle of the car.
+
+    Attributes:
+        ways: Ways on.
+        marks: What stands or lies along them.
+        speed_mps: Of the car.
+    """
+
+    ways: tuple[StreetWay, ...]
+    marks: tuple[StreetMark, ...]
+    speed_mps: float
+
+
+@dataclass(frozen=True, slots=True)
 class Context:
-    """C: the driving context, in words for the model and as values for the checks."""
+    """C: the driving context, in words for the model and as values for the checks.
+
+    Attributes:
+        text: In words.
+        situation: As values.
+        lot: In a parking lot: its spots, in the ego frame (x forward, y left).
+        street: On a road: ways on, and what there is to stop by.
+    """
 
     text: str
     situation: Situation
+    lot: ParkingLot | None = None
+    street: Street | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,7 +363,7 @@ class Round:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Bounds no plan may cross. The road's own limits come from the snapshot; these come from person and operator.
+    """Bounds no plan may cross. The road's own limits come from the observation; these come from person and operator.
 
     Attributes:
         name: Shown beside every result driven under these limits.
@@ -288,7 +391,7 @@ LAMPILOT_LIMITS = Limits(name="lampilot", max_over_limit_mps=9.0, min_time_headw
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """Everything a planner is given: I, C, S, H, the limits it is told of, and earlier rounds."""
+    """Everything a planner is given: I, C, S, H, V (pictures), the limits it is told of, and earlier rounds."""
 
     instruction: Instruction
     context: Context
@@ -296,6 +399,7 @@ class PlanRequest:
     history: History = field(default_factory=History)
     rounds: tuple[Round, ...] = ()
     limits: Limits = field(default_factory=Limits)
+    images: tuple[CameraImage, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,6 +437,7 @@ class Plan:
         usage: Cost.
         latency_s: Wish in, plan out.
         raw: The reply as it came, for the record.
+        scene: C as the planner itself saw it in pictures, in words; memory keeps it (Eq. 23). Empty without pictures.
     """
 
     thoughts: Thoughts
@@ -346,6 +451,7 @@ class Plan:
     usage: Usage = field(default_factory=Usage)
     latency_s: float = 0.0
     raw: str = ""
+    scene: str = ""
 
 
 MismatchKind = Literal[

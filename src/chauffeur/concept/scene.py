@@ -1,15 +1,12 @@
-"""What a world shows and what it is told: scenario, snapshot, wishes, command. All frozen, all SI."""
+"""What a world shows and what it is told: scenario, observation, wishes, command. All frozen, all SI."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
-from chauffeur.concept.nouns import Lead
-from chauffeur.geometry import Box
-
-LaneId = tuple[str, str, int]
-"""(from node, to node, index); index 0 is leftmost."""
+from chauffeur.concept.nouns import Lead, ParkingLot
+from chauffeur.geometry import Box, LaneId, RoadGraph, Route, Turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,36 +32,30 @@ class Scenario:
     title: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class LaneView:
-    """A lane as geometry. `centre_m` is a polyline ((x, y), ...) in world metres, start to end."""
-
-    id: LaneId
-    width_m: float
-    length_m: float
-    speed_limit_mps: float
-    forbidden: bool
-    emergency: bool
-    centre_m: tuple[tuple[float, float], ...]
+AgentKind = Literal["car", "truck", "bus", "motorcycle", "bicycle", "pedestrian", "static", "obstacle", "stop_sign"]
+"""What stands or moves on the road."""
 
 
 @dataclass(frozen=True, slots=True)
 class VehicleState:
-    """A vehicle or object at one instant.
+    """A road user or object at one instant.
 
     Attributes:
         id: Stable within a trip; the ego is 0.
         kind: What it is.
-        x_m, y_m: Centre, world frame (highway worlds: y grows to the right of +x travel).
-        heading_rad: World frame.
+        x_m, y_m: Centre, world frame (right-handed).
+        heading_rad: Counter-clockwise from +x.
         speed_mps: Along its heading.
         length_m, width_m: Size.
         lane: Closest lane.
         crashed: Whether it has been in a collision.
+        acceleration_mps2: Along its heading; 0 where the world does not say.
+        yaw_rate_radps: Counter-clockwise; 0 where the world does not say.
+        steering_rad: Angle of the front wheels, positive to the left; 0 where the world does not say.
     """
 
     id: int
-    kind: Literal["car", "obstacle", "stop_sign"]
+    kind: AgentKind
     x_m: float
     y_m: float
     heading_rad: float
@@ -73,6 +64,9 @@ class VehicleState:
     width_m: float
     lane: LaneId | None
     crashed: bool = False
+    acceleration_mps2: float = 0.0
+    yaw_rate_radps: float = 0.0
+    steering_rad: float = 0.0
 
     @property
     def box(self) -> Box:
@@ -80,8 +74,52 @@ class VehicleState:
         return Box(self.x_m, self.y_m, self.heading_rad, self.length_m, self.width_m)
 
 
+SignalState = Literal["red", "yellow", "green", "off"]
+
+
 @dataclass(frozen=True, slots=True)
-class Snapshot:
+class Signal:
+    """A traffic light at one instant.
+
+    Attributes:
+        id: Stable within a trip.
+        state: What it shows.
+        lanes: Names of the lanes of the road graph that it rules, those before the junction.
+        stop_line_m: Ends of the stop line, ((x, y), (x, y)), world frame.
+        remaining_s: Until it changes, where the world knows; None otherwise.
+    """
+
+    id: str
+    state: SignalState
+    lanes: tuple[str, ...]
+    stop_line_m: tuple[tuple[float, float], tuple[float, float]]
+    remaining_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Sign:
+    """A traffic sign; it does not change within a trip.
+
+    Attributes:
+        id: Stable within a trip.
+        kind: What it says.
+        lanes: Names of the lanes of the road graph that it rules.
+        x_m, y_m: Where it stands, world frame.
+        stop_line_m: Ends of the line to stop or yield at; None where it has none.
+        value: Of a speed limit: m/s.
+    """
+
+    id: str
+    kind: Literal["stop", "yield", "speed_limit"]
+    lanes: tuple[str, ...]
+    x_m: float
+    y_m: float
+    stop_line_m: tuple[tuple[float, float], tuple[float, float]] | None = None
+    value: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
     """A world at one instant; nothing in it changes afterwards.
 
     Attributes:
@@ -91,11 +129,15 @@ class Snapshot:
         ego: The ego.
         others: All other vehicles.
         objects: Obstacles and signs.
-        lanes: The road, the same tuple throughout a trip.
+        road: The road as a graph of lanes, the same object throughout a trip.
         front: Vehicle ahead in the ego lane, at any distance.
         stop_sign_m: Distance to an unserved stop sign ahead in the ego lane.
         off_road: Ego centre outside every lane.
         ended: The world will not step further: crash, off the road, end of road or time.
+        signals: Traffic lights.
+        signs: Traffic signs.
+        route: Where the trip leads, in a world that has a goal.
+        lot: Spots and landmarks of a parking lot, the same object throughout a trip.
     """
 
     time_s: float
@@ -104,11 +146,15 @@ class Snapshot:
     ego: VehicleState
     others: tuple[VehicleState, ...]
     objects: tuple[VehicleState, ...]
-    lanes: tuple[LaneView, ...]
+    road: RoadGraph
     front: Lead | None
     stop_sign_m: float | None
     off_road: bool
     ended: bool
+    signals: tuple[Signal, ...] = ()
+    signs: tuple[Sign, ...] = ()
+    route: Route | None = None
+    lot: ParkingLot | None = None
 
 
 STOPPED_MPS: Final = 1.0
@@ -120,9 +166,6 @@ STOP_ZONE_M: Final = 8.0
 def stops_at_sign(speed_mps: float, ahead_m: float, *, zone_m: float = STOP_ZONE_M) -> bool:
     """Whether a car with this speed, its centre so far before a stop sign, has served it."""
     return speed_mps < STOPPED_MPS and 0.0 <= ahead_m <= zone_m
-
-
-Turn = Literal["left", "straight", "right"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +189,7 @@ class Wishes:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What an actuator gets. acceleration_mps2 along the heading, steering_rad of the front wheels."""
+    """What an actuator gets. acceleration_mps2 along the heading, steering_rad of the front wheels, left positive."""
 
     acceleration_mps2: float
     steering_rad: float

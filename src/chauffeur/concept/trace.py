@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from chauffeur.concept.scene import Command, Snapshot, Wishes
+from chauffeur.concept.scene import Command, Observation, Wishes
 
 ProgramState = Literal["none", "running", "finished", "failed"]
 """`none`: no program drives (a baseline, or it was refused); `finished`: it ended and the driver holds its wishes."""
@@ -48,7 +48,7 @@ class Frame:
     """One control period: what was seen, wished, asked of the actuator and really applied.
 
     Attributes:
-        snapshot: The instant before the command.
+        observation: The instant before the command.
         wishes: What the policy wanted.
         requested: What the driver asked for.
         applied: What the world really did, after clipping.
@@ -59,7 +59,7 @@ class Frame:
         interventions: What the run-time shield changed in what the driver asked for.
     """
 
-    snapshot: Snapshot
+    observation: Observation
     wishes: Wishes
     requested: Command
     applied: Command

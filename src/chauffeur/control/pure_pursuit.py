@@ -137,7 +137,7 @@ def _widest(rear: Pose, path: Polyline, look_ahead_m: float, station_m: float) -
     if ahead < abs(aside):
         return math.inf
     curvature = chord_curvature(ahead, aside)
-    checks = max(2, min(_CHECKS, round(look_ahead_m / _WORTH_LOOKING_M)))
+    checks = max(2, round(min(_CHECKS, look_ahead_m / _WORTH_LOOKING_M)))
     widest = 0.0
     for i in range(1, checks):
         point = path.at(station_m + look_ahead_m * i / checks)

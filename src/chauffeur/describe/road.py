@@ -1,56 +1,59 @@
-"""Where the ego is on the road, read from a snapshot; and the few words every descriptor shares."""
+"""Where the ego is on the road, read from an observation; and the few words every descriptor shares."""
 
 from __future__ import annotations
 
-from chauffeur.concept import LaneView, Lead, ScenarioError, Situation, Snapshot, Turn
+from chauffeur.concept import Lane, Lead, Observation, ScenarioError, Situation, Turn
 
 SIGHT_M = 100.0
 """How far ahead a vehicle is mentioned: the range of the benchmark's own text."""
 
+_DRIVEN = frozenset({"driving", "emergency", "aisle"})
 _ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 
 
-def ego_lane(snapshot: Snapshot) -> LaneView:
+def ego_lane(observation: Observation) -> Lane:
     """The lane the ego is in.
 
     Raises:
-        ScenarioError: The snapshot says no lane, or one that its road does not have.
+        ScenarioError: The observation says no lane, or one that its road does not have.
     """
-    lane_id = snapshot.ego.lane
-    for lane in snapshot.lanes:
-        if lane.id == lane_id:
-            return lane
+    lane = observation.road.get(observation.ego.lane)
+    if lane is not None:
+        return lane
     raise ScenarioError(
-        f"The situation cannot be described: the ego is on lane {lane_id}, which is not among the "
-        f"{len(snapshot.lanes)} lanes of the road.",
-        hint="The world must name the ego's closest lane in every snapshot.",
+        f"The situation cannot be described: the ego is on lane {observation.ego.lane}, which is not among the "
+        f"{len(observation.road.lanes)} lanes of the road.",
+        hint="The world must name the ego's closest lane in every observation.",
     )
 
 
-def own_direction(snapshot: Snapshot) -> tuple[LaneView, ...]:
-    """Lanes of the ego's road segment and direction, leftmost first; the emergency lane is one of them."""
-    here = ego_lane(snapshot).id
-    return tuple(sorted((lane for lane in snapshot.lanes if lane.id[:2] == here[:2]), key=lambda lane: lane.id[2]))
+def own_direction(observation: Observation) -> tuple[Lane, ...]:
+    """Lanes of the ego's road segment and direction, leftmost first; the emergency lane is one of them.
+
+    Pavements and what else no car drives on are none of them.
+    """
+    own = ego_lane(observation)
+    return tuple(one for one in observation.road.abreast(own.id) if one is own or one.kind in _DRIVEN)
 
 
-def front_in_sight(snapshot: Snapshot) -> Lead | None:
+def front_in_sight(observation: Observation) -> Lead | None:
     """The vehicle ahead in the ego lane, if it is within sight."""
-    front = snapshot.front
+    front = observation.front
     return front if front is not None and front.distance_m <= SIGHT_M else None
 
 
-def situation_of(snapshot: Snapshot, turns: tuple[Turn, ...] = ()) -> Situation:
+def situation_of(observation: Observation, turns: tuple[Turn, ...] = ()) -> Situation:
     """C as values. Raises ScenarioError if the ego is on no lane of the road."""
-    lane, lanes = ego_lane(snapshot), own_direction(snapshot)
+    lane, lanes = ego_lane(observation), own_direction(observation)
     return Situation(
-        world=snapshot.kind,
-        speed_mps=snapshot.ego.speed_mps,
+        world=observation.kind,
+        speed_mps=observation.ego.speed_mps,
         speed_limit_mps=lane.speed_limit_mps,
         lane_count=len(lanes),
         lane_index=lanes.index(lane),
         emergency_lane=lanes[-1].emergency,
-        front=front_in_sight(snapshot),
-        stop_sign_m=snapshot.stop_sign_m,
+        front=front_in_sight(observation),
+        stop_sign_m=observation.stop_sign_m,
         turns=turns,
     )
 
@@ -63,9 +66,9 @@ def ordinal(number: int) -> str:
     return f"{number}{suffix}"
 
 
-def speed_sentence(snapshot: Snapshot) -> str:
+def speed_sentence(observation: Observation) -> str:
     """The ego's speed in words."""
-    return f"I am driving at {snapshot.ego.speed_mps:.1f} m/s."
+    return f"I am driving at {observation.ego.speed_mps:.1f} m/s."
 
 
 def front_sentence(front: Lead | None) -> str:
@@ -75,6 +78,6 @@ def front_sentence(front: Lead | None) -> str:
     return f"The car ahead of me in my lane is {front.distance_m:.1f} m away and drives at {front.speed_mps:.1f} m/s."
 
 
-def limit_sentence(lane: LaneView) -> str:
+def limit_sentence(lane: Lane) -> str:
     """The speed limit of the ego lane in words."""
     return f"The speed limit of my lane is {lane.speed_limit_mps:.1f} m/s."

@@ -10,7 +10,7 @@ import math
 from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept import Context, Snapshot, VehicleState
+from chauffeur.concept import Context, Observation, VehicleState
 from chauffeur.describe.dispatch import describe
 from chauffeur.describe.road import SIGHT_M, ego_lane, own_direction
 
@@ -18,27 +18,27 @@ CONTEXT_BENCHMARK: Final = "context-v1"
 CONTEXT_DRIVE: Final = "context-v2"
 
 
-def describe_with_traffic(snapshot: Snapshot) -> Context:
-    """C of a snapshot with the traffic behind and beside the ego; on roads without parallel lanes as `describe`.
+def describe_with_traffic(observation: Observation) -> Context:
+    """C of an observation with the traffic behind and beside the ego; on roads without parallel lanes as `describe`.
 
     Raises:
         ScenarioError: As `describe`.
     """
-    context = describe(snapshot)
-    if snapshot.kind != "highway":
+    context = describe(observation)
+    if not observation.road.uninterrupted:
         return context
-    return replace(context, text=" ".join((context.text, *traffic_sentences(snapshot))))
+    return replace(context, text=" ".join((context.text, *traffic_sentences(observation))))
 
 
-def traffic_sentences(snapshot: Snapshot) -> tuple[str, ...]:
+def traffic_sentences(observation: Observation) -> tuple[str, ...]:
     """The car behind, then the lane on either side. Distances are along the road, centre to centre.
 
     Raises:
         ScenarioError: The ego is on no lane of the road.
     """
-    lanes = own_direction(snapshot)
-    place = lanes.index(ego_lane(snapshot))
-    rear = _nearest(_beside(snapshot, 0), ahead=False)
+    lanes = own_direction(observation)
+    place = lanes.index(ego_lane(observation))
+    rear = _nearest(abreast(observation, 0), ahead=False)
     sentences = [
         f"There is no car behind me in my lane within {SIGHT_M:.0f} m."
         if rear is None
@@ -50,13 +50,15 @@ def traffic_sentences(snapshot: Snapshot) -> tuple[str, ...]:
         elif lanes[place + side].emergency:
             sentences.append(f"On my {word} is the emergency lane.")
         else:
-            sentences.append(_lane_sentence(snapshot, side, word))
+            sentences.append(_lane_sentence(observation, side, word))
     return tuple(sentences)
 
 
-def _lane_sentence(snapshot: Snapshot, side: int, word: str) -> str:
-    there = _beside(snapshot, side)
-    level = [vehicle for along_m, vehicle in there if abs(along_m) < (vehicle.length_m + snapshot.ego.length_m) / 2.0]
+def _lane_sentence(observation: Observation, side: int, word: str) -> str:
+    there = abreast(observation, side)
+    level = [
+        vehicle for along_m, vehicle in there if abs(along_m) < (vehicle.length_m + observation.ego.length_m) / 2.0
+    ]
     if level:
         return f"In the lane on my {word} a car is right beside me and drives at {level[0].speed_mps:.1f} m/s."
     told = [
@@ -70,17 +72,18 @@ def _lane_sentence(snapshot: Snapshot, side: int, word: str) -> str:
     return f"In the lane on my {word} the nearest {cars} {' and '.join(told)}."
 
 
-def _beside(snapshot: Snapshot, side: int) -> list[tuple[float, VehicleState]]:
+def abreast(observation: Observation, side: int) -> list[tuple[float, VehicleState]]:
     """Cars so many lanes to the right of the ego's (negative: left) within sight, with how far ahead each is, in m."""
-    ego, lane = snapshot.ego, ego_lane(snapshot)
+    ego, lane = observation.ego, ego_lane(observation)
     cos, sin = math.cos(ego.heading_rad), math.sin(ego.heading_rad)
     found: list[tuple[float, VehicleState]] = []
-    for vehicle in snapshot.others:
+    for vehicle in observation.others:
         dx, dy = vehicle.x_m - ego.x_m, vehicle.y_m - ego.y_m
-        along_m, right_m = cos * dx + sin * dy, cos * dy - sin * dx
-        same_road = vehicle.lane is not None and vehicle.lane[:2] == lane.id[:2]
+        along_m, right_m = cos * dx + sin * dy, sin * dx - cos * dy
+        there = observation.road.get(vehicle.lane)
+        places = None if there is None else observation.road.places_between(lane.id, there.id)
         # On another segment of the road lanes are counted anew: there the place beside the ego tells.
-        across = vehicle.lane[2] - lane.id[2] if same_road and vehicle.lane else round(right_m / lane.width_m)
+        across = round(right_m / lane.width_m) if places is None else places
         oncoming = math.cos(vehicle.heading_rad - ego.heading_rad) < 0.0
         if across == side and abs(along_m) <= SIGHT_M and not oncoming:
             found.append((along_m, vehicle))

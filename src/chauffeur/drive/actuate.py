@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from chauffeur.concept import Command, Intervention, LaneId, Limits, Snapshot, Wishes
+from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation, Wishes
 from chauffeur.safety.bounds import bounded
 from chauffeur.safety.shield import Guarded, Shield
 from chauffeur.worlds.base import World
@@ -24,33 +24,33 @@ class Actuated:
 
 
 def set_points(
-    world: World, snapshot: Snapshot, wishes: Wishes, limits: Limits, least_mps: float = 0.0
+    world: World, observation: Observation, wishes: Wishes, limits: Limits, least_mps: float = 0.0
 ) -> tuple[Wishes, tuple[str, ...]]:
     """The wishes as they may be driven at an instant, and the names of what was brought within the limits.
 
     Args:
         world: Whose speed limits hold: that of the lane the car is in; in a lane change, the higher one of both.
-        snapshot: Its present instant.
+        observation: Its present instant.
         wishes: As the policy states them.
         limits: Of the person and the operator.
         least_mps: Least speed a policy may ask for there; 0 for none.
     """
     perception = world.perception()
-    lanes = [lane for lane in (snapshot.ego.lane, wishes.target_lane) if lane is not None]
+    lanes = [lane for lane in (observation.ego.lane, wishes.target_lane) if lane is not None]
     return bounded(wishes, limits, max(map(perception.speed_limit, lanes), default=math.inf), least_mps)
 
 
 def actuate(
-    world: World, snapshot: Snapshot | None, requested: Command, aim: LaneId | None, shield: Shield | None
+    world: World, observation: Observation | None, requested: Command, aim: LaneId | None, shield: Shield | None
 ) -> Actuated:
     """Let the world go on for a control period.
 
     Args:
         world: To be stepped.
-        snapshot: Its present instant; a shield needs it.
+        observation: Its present instant; a shield needs it.
         requested: What the driver, or a person at the wheel, asks for.
         aim: Lane that is steered for.
         shield: Has the last word; None where a benchmark's own rules allow none.
     """
-    guarded = Guarded(requested) if shield is None or snapshot is None else shield.guard(snapshot, requested, aim)
+    guarded = Guarded(requested) if shield is None or observation is None else shield.guard(observation, requested, aim)
     return Actuated(requested, world.step(guarded.command), guarded.interventions)

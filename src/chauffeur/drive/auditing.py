@@ -1,4 +1,4 @@
-"""A drive's entries in an audit log: listens to the loop's letters and writes what each stands for.
+"""A drive's entries in an audit log: hears what is told of the drive and writes down what it stands for.
 
 Everything that a person said, or that could quote them (wish, situation, history, reasoning, policy, reasons), is
 handed over as a personal text, so that it can be erased or withheld; numbers and names of parts stay in the chain.
@@ -10,12 +10,12 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Self, cast
+from typing import Any, Final, Self
 
 from chauffeur.concept import (
     NOBODY,
@@ -34,8 +34,10 @@ from chauffeur.concept import (
     Verdict,
     Wishes,
 )
+from chauffeur.drive.events import DriveEvent, EventKind
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.session import scenario_hash
+from chauffeur.safety.audit.entries import Kind
 from chauffeur.safety.audit.keys import read_key
 from chauffeur.safety.audit.redaction import PERSON
 from chauffeur.safety.audit.writer import AuditLog, Closing, utc_now
@@ -48,17 +50,13 @@ FLUSH_TIMEOUT_S: Final = 2.0
 
 _ROUNDING_S = 1e-6
 
+_GUARDED: Final[dict[EventKind, Kind]] = {
+    "wish": "wish", "context": "context", "history": "context", "system": "context", "plan": "plan",
+    "verdicts": "verdict", "period": "actuation",
+}  # fmt: skip
+"""Kind of record that is lost where one of an event cannot be made."""
+
 _log = logging.getLogger(__name__)
-
-
-def told_to(*listeners: Callable[[str, object], None]) -> Callable[[str, object], None]:
-    """One listener that hands everything on to several, in this order."""
-
-    def tell(letter: str, value: object) -> None:
-        for listener in listeners:
-            listener(letter, value)
-
-    return tell
 
 
 @dataclass(slots=True)
@@ -76,21 +74,12 @@ class _Batch:
     said: list[str] = field(default_factory=list[str])
 
 
-class Auditor:
-    """Writes one drive, or several after one another, into a log; used from one thread.
-
-    Nothing raises into the drive, and nothing but the letter `V` waits.
-    """
+class SessionRecorder:
+    """Writes what is told of drives into a log; used from one thread. What every kind of drive tells stands here."""
 
     def __init__(self, log: AuditLog) -> None:
         self._log = log
-        self._person: str = NOBODY
-        self._open_wish = self._driven = False
-        self._batch: _Batch | None = None
-        self._wishes: Wishes | None = None
-        self._program = ""
-        self._interventions: dict[str, list[tuple[Any, ...]]] = {}
-        self._intervened: dict[str, int] = {}
+        self._people: dict[str, str] = {}
         self._closing: Closing | None = None
 
     @property
@@ -104,21 +93,59 @@ class Auditor:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.close()
+
+    def letter(self, event: DriveEvent, about: Mapping[str, Any]) -> None:
+        """Write down one of the loop's letters, with what else its records say; other events are passed over."""
+        if isinstance(event.value, Instruction):
+            self._people[event.wish] = str(event.value.person)
+        for kind, body, texts in _records(event):
+            if texts is None:
+                self._log.append(kind, {**about, **body})
+            else:
+                self.personal(kind, event.wish, {**about, **body}, texts)
+
+    def personal(self, kind: Kind, wish: str, body: Mapping[str, Any], texts: Mapping[str, str]) -> None:
+        """A record with texts of, or about, the person who made a wish."""
+        person = self._people.get(wish, str(NOBODY))
+        self._log.append(kind, body, {PERSON: person} | {name: text for name, text in texts.items() if text})
+
+    def close(self) -> Closing:
+        """Close the log, and say how it ended; a second call says the same."""
+        if self._closing is None:
+            self._closing = self._log.close()
+        return self._closing
+
+
+class Auditor(SessionRecorder):
+    """Writes one drive in simulated time, or several after one another, into a log.
+
+    Nothing raises into the drive, and nothing but the verdicts waits.
+    """
+
+    def __init__(self, log: AuditLog) -> None:
+        super().__init__(log)
+        self._open_wish = self._driven = False
+        self._batch: _Batch | None = None
+        self._wishes: Wishes | None = None
+        self._program = ""
+        self._interventions: dict[str, list[tuple[Any, ...]]] = {}
+        self._intervened: dict[str, int] = {}
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         if error is not None and self._open_wish:
             self.guarded("outcome", lambda: self._broken_off(error))
         self.close()
 
-    def tell(self, letter: str, value: object) -> None:
-        """One of the loop's letters (I, C, H, S, RP, V), a `frame`, or the `trip`; others are passed over.
+    def tell(self, event: DriveEvent) -> None:
+        """Hear what the drive tells.
 
-        With `V`, just before the drive, it waits until all that led to the drive is on the disk, at most
+        With the verdicts, just before the drive, it waits until all that led to the drive is on the disk, at most
         `FLUSH_TIMEOUT_S`; a disk that cannot is logged, and the drive goes on.
         """
-        if letter == "frame" and isinstance(value, Frame):
-            self.guarded("actuation", lambda: self._frame(value))
-            return
-        kind = {"I": "wish", "C": "context", "H": "context", "S": "context", "RP": "plan", "V": "verdict"}
-        self.guarded(kind.get(letter, "outcome"), lambda: self._letter(letter, value))
+        self.guarded(_GUARDED.get(event.kind, "outcome"), lambda: self._hear(event))
 
     def period(
         self,
@@ -148,21 +175,6 @@ class Auditor:
             lambda: self._period(tick, time_s, speed_mps, wishes, requested, applied, program, (), interventions),
         )
 
-    def intervene(self, tick: int, time_s: float, rule: str, reason: str, before: Command, after: Command) -> None:
-        """The shield changed a command, told apart from frames, which bring their interventions with them.
-
-        The first of a stretch is written at once, further ones once a second.
-
-        Args:
-            tick: Control period.
-            time_s: Since the trip began.
-            rule: Rule of the shield.
-            reason: In the shield's words.
-            before: What was asked for.
-            after: What the shield let through.
-        """
-        self.guarded("intervention", lambda: self._intervention(tick, time_s, rule, reason, before, after))
-
     def hand_over(self) -> None:
         """Hand over the commands and interventions collected so far."""
         for rule in list(self._interventions):
@@ -180,7 +192,7 @@ class Auditor:
             "program": batch.program,
         }
         if batch.said:
-            self._personal("actuation", body, {"said": "\n".join(batch.said)})
+            self.personal("actuation", "", body, {"said": "\n".join(batch.said)})
         else:
             self._log.append("actuation", body)
 
@@ -188,8 +200,7 @@ class Auditor:
         """Write what is left, close the log, and say how it ended; a second call says the same."""
         if self._closing is None:
             self.guarded("actuation", self.hand_over)
-            self._closing = self._log.close()
-        return self._closing
+        return super().close()
 
     def guarded(self, kind: str, write: Callable[[], None]) -> None:
         """Make a record; nothing that goes wrong with it raises.
@@ -204,40 +215,24 @@ class Auditor:
                 "gap", {"lost": {kind: 1}, "why": f"the record could not be made ({type(error).__name__})"}
             )
 
-    def _letter(self, letter: str, value: object) -> None:
-        match value:
+    def _hear(self, event: DriveEvent) -> None:
+        match event.value:
+            case Frame():
+                self._frame(event.value)
+                return
+            case Trip():
+                self._trip(event.value)
+                return
             case Instruction():
                 self.hand_over()
-                self._person, self._open_wish, self._driven = value.person, True, False
+                self._open_wish, self._driven = True, False
                 self._wishes, self._program = None, ""
                 self._intervened.clear()
-                self._personal("wish", {"source": value.source}, {"wish": value.text})
-            case Context():
-                self._personal("context", *context_record(value))
-            case History():
-                self._personal("context", *history_record(value))
-            case SystemMessage():
-                digest = hashlib.sha256(value.text.encode("utf-8", "surrogatepass")).hexdigest()
-                self._log.append("context", {"letter": "S", "setting": value.setting, "sha256": digest})
-            case Plan():
-                self._plan(value)
-            case tuple() if letter == "V":
-                for verdict in cast("tuple[object, ...]", value):
-                    if isinstance(verdict, Verdict):
-                        self._verdict(verdict)
-                if not self._log.flush(FLUSH_TIMEOUT_S):
-                    _log.warning("the audit log is not on the disk yet: %s", self._log.trouble or "it is too slow")
-            case Trip():
-                self._trip(value)
             case _:
-                return
-
-    def _plan(self, plan: Plan) -> None:
-        self._personal("plan", *plan_record(plan))
-
-    def _verdict(self, verdict: Verdict) -> None:
-        body = {"check": verdict.check, "passed": verdict.passed, "vetoes": verdict.vetoes, "line": verdict.line}
-        self._personal("verdict", body, {"reason": verdict.reason, "remedy": verdict.remedy})
+                pass
+        self.letter(event, {})
+        if event.kind == "verdicts" and not self._log.flush(FLUSH_TIMEOUT_S):
+            _log.warning("the audit log is not on the disk yet: %s", self._log.trouble or "it is too slow")
 
     def _trip(self, trip: Trip) -> None:
         self.hand_over()
@@ -252,16 +247,16 @@ class Auditor:
             "seed": trip.seed,
         }
         self._open_wish = False
-        self._personal("outcome", body, {"detail": detail, "trip": trip.id})
+        self.personal("outcome", "", body, {"detail": detail, "trip": trip.id})
 
     def _broken_off(self, error: BaseException) -> None:
         self.hand_over()
         self._open_wish = False
         body = {"outcome": "broken_off" if self._driven else "not_driven", "error": type(error).__name__}
-        self._personal("outcome", body, {"detail": str(error)})
+        self.personal("outcome", "", body, {"detail": str(error)})
 
     def _frame(self, frame: Frame) -> None:
-        shot = frame.snapshot
+        shot = frame.observation
         self._driven = True
         self._period(
             shot.tick,
@@ -329,9 +324,6 @@ class Auditor:
         if rows := self._interventions.pop(rule, []):
             self._log.append("intervention", {"rule": rule, "interventions": rows})
 
-    def _personal(self, kind: Any, body: Mapping[str, Any], texts: Mapping[str, str]) -> None:
-        self._log.append(kind, body, {PERSON: self._person} | {name: text for name, text in texts.items() if text})
-
 
 def open_audit(
     path: Path,
@@ -375,20 +367,34 @@ def with_head(recorded: RecordedTrip, closing: Closing) -> RecordedTrip:
     return replace(recorded, trip=replace(trip, record=(*trip.record, ("audit_head", closing.head))))
 
 
-def context_record(context: Context) -> tuple[dict[str, Any], dict[str, str]]:
-    """What a log holds of C, as `plan_record`."""
-    situation = json.dumps(asdict(context.situation), sort_keys=True)
-    return {"letter": "C"}, {"context": context.text, "situation": situation}
+def _records(event: DriveEvent) -> Iterator[tuple[Kind, dict[str, Any], dict[str, str] | None]]:
+    """What a log holds of a letter: numbers and names of parts, and the personal texts by name (None: no such)."""
+    match event.value:
+        case Instruction() as said:
+            yield "wish", {"source": said.source}, {"wish": said.text}
+        case Context() as context:
+            situation = json.dumps(asdict(context.situation), sort_keys=True)
+            yield "context", {"letter": "C"}, {"context": context.text, "situation": situation}
+        case History() as history:
+            # A trip's id is a hash that somebody who guesses the wish can compute: it counts as a text.
+            trips = " ".join(item.trip_id for item in history.items)
+            yield "context", {"letter": "H", "items": len(history.items)}, {"trips": trips}
+        case SystemMessage() as system:
+            digest = hashlib.sha256(system.text.encode("utf-8", "surrogatepass")).hexdigest()
+            yield "context", {"letter": "S", "setting": system.setting, "sha256": digest}, None
+        case Plan() as plan:
+            yield "plan", *_plan_record(plan)
+        case tuple() as several:
+            for verdict in several:
+                if isinstance(verdict, Verdict):
+                    body = {"check": verdict.check, "passed": verdict.passed, "vetoes": verdict.vetoes}
+                    texts = {"reason": verdict.reason, "remedy": verdict.remedy}
+                    yield "verdict", {**body, "line": verdict.line}, texts
+        case _:
+            pass
 
 
-def history_record(history: History) -> tuple[dict[str, Any], dict[str, str]]:
-    """What a log holds of H, as `plan_record`."""
-    # A trip's id is a hash that somebody who guesses the wish can compute: it counts as a text.
-    return {"letter": "H", "items": len(history.items)}, {"trips": " ".join(item.trip_id for item in history.items)}
-
-
-def plan_record(plan: Plan) -> tuple[dict[str, Any], dict[str, str]]:
-    """What a log holds of a plan: numbers and names of parts, and the personal texts by name."""
+def _plan_record(plan: Plan) -> tuple[dict[str, Any], dict[str, str]]:
     policy = plan.policy
     body = {
         "planner": plan.planner,

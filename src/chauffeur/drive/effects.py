@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from chauffeur.concept import Program, SandboxError, Snapshot, Thoughts
+from chauffeur.concept import Observation, Program, SandboxError, Thoughts
 from chauffeur.drive.episode import Episode, run_episode
 from chauffeur.drive.rehearsal import CopyableWorld
 from chauffeur.programs import ProgramExecutor, Sandbox
@@ -51,7 +51,7 @@ def judge_driven(
     """
     if not worlds:
         raise ValueError("There is no scene to run the program in.")
-    where = Surroundings.of(worlds[0].snapshot())
+    where = Surroundings.of(worlds[0].observe())
     effects = effects_of(worlds, program, sandbox=sandbox, max_s=max_s)
     return judge(thoughts.text, read_facts(program.source, program.library), where, effects)
 
@@ -60,11 +60,11 @@ def effect_of(episode: Episode) -> Effect | None:
     """What happened in a recorded drive; None where nothing was driven."""
     if not episode.frames:
         return None
-    shots = [*(frame.snapshot for frame in episode.frames), episode.final]
+    shots = [*(frame.observation for frame in episode.frames), episode.final]
     first, last = shots[0], shots[-1]
     speeds = [shot.ego.speed_mps for shot in shots]
-    # Lanes of another stretch of road have numbers of their own; on the roads here they run on side by side.
-    places = [shot.ego.lane[2] for shot in shots if shot.ego.lane is not None] or [0]
+    # Lanes of another stretch of road have places of their own; on the roads here they run on side by side.
+    places = [lane.index for shot in shots if (lane := shot.road.get(shot.ego.lane)) is not None] or [0]
     ending = speeds[-1 - _MEAN_TICKS :]
     return Effect(
         lanes_moved=places[-1] - places[0],
@@ -94,7 +94,7 @@ def _effect(world: CopyableWorld, program: Program, sandbox: Sandbox, max_s: flo
     return effect
 
 
-def _gaps(first: Snapshot, last: Snapshot) -> tuple[float | None, float | None]:
+def _gaps(first: Observation, last: Observation) -> tuple[float | None, float | None]:
     """Way along the ego to the vehicle that is ahead at first, then and at the end."""
     if first.front is None:
         return None, None
@@ -102,7 +102,7 @@ def _gaps(first: Snapshot, last: Snapshot) -> tuple[float | None, float | None]:
     return _along(first, ahead), _along(last, ahead)
 
 
-def _along(shot: Snapshot, vehicle: int) -> float | None:
+def _along(shot: Observation, vehicle: int) -> float | None:
     ego = shot.ego
     for other in shot.others:
         if other.id == vehicle:
@@ -112,5 +112,5 @@ def _along(shot: Snapshot, vehicle: int) -> float | None:
 
 
 def _turn_rad(first: float, last: float) -> float:
-    """Angle turned, -pi to pi; y grows to the right of +x in the worlds, so that right is positive."""
-    return math.remainder(last - first, 2.0 * math.pi)
+    """Angle turned, -pi to pi, to the right positive."""
+    return math.remainder(first - last, 2.0 * math.pi)

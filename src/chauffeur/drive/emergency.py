@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from chauffeur.concept import Parameters, Plan, Program, Snapshot, Thoughts, Verdict
+from chauffeur.concept import Observation, Parameters, Plan, Program, Thoughts, Verdict
 from chauffeur.drive.fallback import MINIMAL_RISK_BRAKING_MPS2
 from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency
 from chauffeur.safety.bounds import least_speed_mps, shoulder_at_right
@@ -75,12 +75,12 @@ _GO_ON_PROGRAM: Final = """def go_on():
 """
 
 
-def planned_for(text: str, snapshot: Snapshot) -> Plan | None:
+def planned_for(text: str, observation: Observation) -> Plan | None:
     """The plan for emergency words; None where the words are a planner's business.
 
     Args:
         text: What the person says.
-        snapshot: The instant.
+        observation: The instant.
     """
     found = read_emergency(text)
     if found is None or not found.alone:
@@ -88,7 +88,7 @@ def planned_for(text: str, snapshot: Snapshot) -> Plan | None:
     match found.kind:
         case "stop":
             return _plan(STOPPING, _STOP_PROGRAM, "stop", 0.0)
-        case "safe_stop" if shoulder_at_right(snapshot):
+        case "safe_stop" if shoulder_at_right(observation):
             return _plan(
                 "Hazard lights on: I make for the shoulder and stop there.", _SAFE_STOP_PROGRAM, "pull_over", 0.0
             )
@@ -104,7 +104,7 @@ def planned_for(text: str, snapshot: Snapshot) -> Plan | None:
                 offer=SAFE_STOP_WISH,
             )
         case "no_stop":
-            speed = round(max(snapshot.ego.speed_mps, least_speed_mps(snapshot) or 0.0), 2)
+            speed = round(max(observation.ego.speed_mps, least_speed_mps(observation) or 0.0), 2)
             return _plan(GOING_ON, _GO_ON_PROGRAM.format(speed=speed), "speed.keep", speed)
 
 
@@ -118,12 +118,12 @@ def not_checked(plan: Plan) -> tuple[Verdict, ...]:
     return (Verdict(EMERGENCY_CHECK, True, f"It is the car's own answer to an emergency word: {plan.intent}."),)
 
 
-def check_told_not_to(text: str, plan: Plan, snapshot: Snapshot) -> tuple[Verdict, ...]:
+def check_told_not_to(text: str, plan: Plan, observation: Observation) -> tuple[Verdict, ...]:
     """A verdict on every plan for words that forbid stopping, braking or pulling over; nothing for other words."""
     found = read_emergency(text)
     if found is None or found.kind != "no_stop" or plan.policy is None:
         return ()
-    if brings_to_a_stand(plan) or (found.slower and _slows(plan, snapshot)):
+    if brings_to_a_stand(plan) or (found.slower and _slows(plan, observation)):
         reason = f"You said “{found.words}”, and this plan would do it: it is not driven. {GOING_ON}"
         return (Verdict(EMERGENCY_CHECK, False, reason, None, "Say what the car is to do instead."),)
     return (Verdict(EMERGENCY_CHECK, True, f"As you said: “{found.words}”."),)
@@ -136,8 +136,8 @@ def brings_to_a_stand(plan: Plan) -> bool:
     return any(speed <= _STOPPED_MPS for speed in _speeds(plan))
 
 
-def _slows(plan: Plan, snapshot: Snapshot) -> bool:
-    return any(speed < snapshot.ego.speed_mps - _SLACK_MPS for speed in _speeds(plan))
+def _slows(plan: Plan, observation: Observation) -> bool:
+    return any(speed < observation.ego.speed_mps - _SLACK_MPS for speed in _speeds(plan))
 
 
 def _speeds(plan: Plan) -> list[float]:

@@ -13,21 +13,21 @@ from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 from chauffeur.concept import (
-    ApiCall,
     Causes,
     ChauffeurError,
     Command,
     Frame,
     Limits,
     Metric,
+    Observation,
     Outcome,
     ProgramState,
     SandboxError,
-    Snapshot,
     Wishes,
 )
 from chauffeur.drive.actuate import actuate, set_points
 from chauffeur.drive.fallback import keep_lane_and_gap
+from chauffeur.executors.base import DriverLed, Executor, HeldWishes, PolicyTick, RunningPolicy
 from chauffeur.safety.bounds import least_target_mps
 from chauffeur.safety.shield import Shield
 from chauffeur.worlds.base import EGO, World
@@ -36,31 +36,6 @@ FALLBACK_S = 10.0
 """How long the fallback drives after a policy failed, before the trip is ended."""
 AFTER_END_S = 3.0
 """How long a trip without a referee goes on after its program finished."""
-
-
-class PolicyTick(Protocol):
-    """What a policy gives in one control period."""
-
-    @property
-    def wishes(self) -> Wishes: ...
-    @property
-    def state(self) -> ProgramState: ...
-    @property
-    def line(self) -> int | None: ...
-    @property
-    def said(self) -> tuple[str, ...]: ...
-    @property
-    def calls(self) -> tuple[ApiCall, ...]: ...
-    @property
-    def error(self) -> ChauffeurError | None: ...
-
-
-class RunningPolicy(Protocol):
-    """A policy bound to a world, asked once per control period."""
-
-    def tick(self) -> PolicyTick:
-        """Wishes for this period. Never raises for the policy's own faults; they come as `state` and `error`."""
-        ...
 
 
 class Hands(Protocol):
@@ -117,7 +92,7 @@ class Episode:
     """
 
     frames: tuple[Frame, ...]
-    final: Snapshot
+    final: Observation
     ticks: int
     duration_s: float
     outcome: Outcome
@@ -129,21 +104,9 @@ class Episode:
     bounded: tuple[tuple[str, int], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class HeldWishes:
-    """A period without a policy: the wishes held last go on."""
-
-    wishes: Wishes
-    state: ProgramState = "none"
-    line: int | None = None
-    said: tuple[str, ...] = ()
-    calls: tuple[ApiCall, ...] = ()
-    error: ChauffeurError | None = None
-
-
 def run_episode(
     world: World,
-    policy: RunningPolicy | None,
+    policy: Executor | RunningPolicy | None,
     referee: Referee | None,
     *,
     max_s: float,
@@ -159,19 +122,21 @@ def run_episode(
 
     Args:
         world: A world just reset.
-        policy: What states the wishes; None leaves the world's own driver alone (the IDM baseline).
+        policy: An executor that was started, or what states set-points for the world's own driver; None leaves that
+            driver alone (the IDM baseline).
         referee: Says when it is over and what came of it; None drives on until the program has ended.
         max_s: Bound of the trip in simulated time, s.
         record: Whether to keep frames (a benchmark does not need them).
         adjust: Baseline that rewrites settled wishes each period, e.g. MOBIL's lane choice.
         watch: Called with each recorded frame, for live display.
-        hands: A person who acts in the driver's place; `policy` is then None, and nobody's wishes are followed.
+        hands: A person, who acts in the place of the driver; what a policy beside them asks for is shown, not driven.
         shield: Has the last word on every command; None where a benchmark's own rules allow none.
         limits: Bounds of the set-points, whatever the policy answers in a period; None where a benchmark's own rules
             know none.
         minimum_speed: Whether they hold the least speed of a highway, too: all but the car's own stop does.
     """
     driver = world.driver()
+    steers = policy if isinstance(policy, Executor) and not isinstance(policy, DriverLed) else None
     frames: list[Frame] = []
     said: list[tuple[float, str]] = []
     failure: ChauffeurError | None = None
@@ -192,16 +157,23 @@ def run_episode(
             safe = keep_lane_and_gap(tick.wishes, max(0.0, ego.speed_mps), ego.lane)
             tick = HeldWishes(safe, state="failed", line=tick.line, said=tick.said, calls=tick.calls)
             end = min(end, ticks + round(FALLBACK_S / world.dt_s))
-        wishes = driver.settle(tick.wishes)
+        wishes = tick.wishes if steers is not None and failure is None else driver.settle(tick.wishes)
         if adjust is not None:
             wishes = adjust(wishes)
-        before = world.snapshot() if record or not (shield is None and limits is None) else None
+        looks = record or shield is not None or limits is not None or steers is not None
+        before = world.observe() if looks else None
         if limits is not None and before is not None:
             least = least_target_mps(before, wishes, limits) if minimum_speed and failure is None else 0.0
             wishes, names = set_points(world, before, wishes, limits, least)
             bounded.update(names)
         held = wishes
-        requested = driver.command(wishes) if hands is None else hands.command()
+        acts = hands is not None and (policy is None or failure is None)
+        if hands is not None and acts:
+            requested = hands.command()
+        elif steers is not None and before is not None and failure is None:
+            requested = steers.step(before, wishes)
+        else:
+            requested = driver.command(wishes)
         if requested is None:
             failure = ChauffeurError(f"Given up by the driver after {at_s:.1f} s.")
             break
@@ -235,7 +207,7 @@ def run_episode(
             idle += 1
             if idle * world.dt_s >= AFTER_END_S:
                 break
-    final = world.snapshot()
+    final = world.observe()
     success = referee is not None and referee.success and failure is None
     shortfall = referee.shortfall if isinstance(referee, FollowsPolicy) and failure is None else ""
     return Episode(
@@ -244,7 +216,9 @@ def run_episode(
         ticks=ticks,
         duration_s=round(ticks * world.dt_s, 3),
         outcome=_outcome(final, referee, failure),
-        causes=_causes(failure, fallback_used=hands is None) if failure is not None else Causes(detail=shortfall),
+        causes=_causes(failure, fallback_used=hands is None or policy is not None)
+        if failure is not None
+        else Causes(detail=shortfall),
         metrics=() if referee is None else referee.metrics() if failure is None else _void(referee.metrics()),
         said=tuple(said),
         success=success,
@@ -263,7 +237,7 @@ def _ask(policy: RunningPolicy | None, held: Wishes) -> PolicyTick:
         return HeldWishes(held, state="failed", error=error)
 
 
-def _outcome(final: Snapshot, referee: Referee | None, failure: ChauffeurError | None) -> Outcome:
+def _outcome(final: Observation, referee: Referee | None, failure: ChauffeurError | None) -> Outcome:
     if final.ego.crashed:
         return "collision"
     if final.off_road:

@@ -1,9 +1,8 @@
-"""A snapshot as Foxglove's well-known messages, for viewers; for looking at only, nothing is read back from it.
+"""An observation as Foxglove's well-known messages, for viewers; for looking at only, nothing is read back from it.
 
 Foxglove draws all of them. Rerun 0.41 draws transforms, point clouds and logs, but no `SceneUpdate`: that is why roads
-and road users are sent as points, too. Foxglove's frames are right-handed with z up, the worlds' y grows to the right:
-y and heading change sign here. Lengths are rounded to 1/64 m and rotations to 1/8192: steps that are powers of two end
-in zero bits, which compress.
+and road users are sent as points, too. Foxglove's frames are right-handed with z up, as the worlds' are. Lengths are
+rounded to 1/64 m and rotations to 1/8192: steps that are powers of two end in zero bits, which compress.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from chauffeur.concept import LaneView, Snapshot, VehicleState
+from chauffeur.concept import Lane, Observation, VehicleState
 
 MESSAGES = {"/scene": SceneUpdate, "/tf": FrameTransform, "/road": PointCloud, "/vehicles": PointCloud, "/log": Log}
 """Topic -> message, in the order in which the channels are registered."""
@@ -64,27 +63,29 @@ def nanoseconds(time_s: float) -> int:
     return round(time_s * 1e9)
 
 
-def scene_update(snapshot: Snapshot, *, with_road: bool) -> SceneUpdate:
+def scene_update(observation: Observation, *, with_road: bool) -> SceneUpdate:
     """The scene of an instant; entities replace those of the same id, so the road is sent once."""
-    stamp = _stamp(snapshot.time_s)
+    stamp = _stamp(observation.time_s)
     entities = [
-        _entity("ego", stamp, cubes=[_cube(snapshot.ego, _EGO_COLOR)]),
-        _entity("traffic", stamp, cubes=[_cube(car, _CAR_COLOR) for car in snapshot.others]),
+        _entity("ego", stamp, cubes=[_cube(observation.ego, _EGO_COLOR)]),
+        _entity("traffic", stamp, cubes=[_cube(car, _CAR_COLOR) for car in observation.others]),
     ]
     if with_road:
         entities.append(
-            _entity("road", stamp, lines=[_line(_edge(lane, side)) for lane in snapshot.lanes for side in (-1, 1)])
+            _entity(
+                "road", stamp, lines=[_line(_edge(lane, side)) for lane in observation.road.lanes for side in (-1, 1)]
+            )
         )
-        entities.append(_entity("objects", stamp, cubes=[_cube(thing, _OBJECT_COLOR) for thing in snapshot.objects]))
+        entities.append(_entity("objects", stamp, cubes=[_cube(thing, _OBJECT_COLOR) for thing in observation.objects]))
     return SceneUpdate(entities=entities)
 
 
-def ego_transform(snapshot: Snapshot) -> FrameTransform:
+def ego_transform(observation: Observation) -> FrameTransform:
     """The transform map -> ego, so that a 3D panel can follow the car."""
-    ego = snapshot.ego
+    ego = observation.ego
     x, y = _place(ego.x_m, ego.y_m)
     return FrameTransform(
-        timestamp=_stamp(snapshot.time_s),
+        timestamp=_stamp(observation.time_s),
         parent_frame_id=_FRAME,
         child_frame_id=_EGO_FRAME,
         translation=Vector3(x=x, y=y),
@@ -92,20 +93,20 @@ def ego_transform(snapshot: Snapshot) -> FrameTransform:
     )
 
 
-def road_points(snapshot: Snapshot) -> PointCloud:
+def road_points(observation: Observation) -> PointCloud:
     """The edges of all lanes, `_ROAD_POINTS_M` apart."""
-    edges = [_edge(lane, side) for lane in snapshot.lanes for side in (-1, 1)]
+    edges = [_edge(lane, side) for lane in observation.road.lanes for side in (-1, 1)]
     length = sum(math.dist(a, b) for edge in edges for a, b in pairwise(edge))
     step = max(_ROAD_POINTS_M, length / _MOST_ROAD_POINTS)
     # Neighbouring lanes share an edge: each point once.
     points = dict.fromkeys(point for edge in edges for point in _dotted(edge, step))
-    return _cloud(snapshot.time_s, points, 0.0)
+    return _cloud(observation.time_s, points, 0.0)
 
 
-def vehicle_points(snapshot: Snapshot) -> PointCloud:
+def vehicle_points(observation: Observation) -> PointCloud:
     """The outlines of the ego, the other road users and what stands on the road."""
-    bodies = (snapshot.ego, *snapshot.others, *snapshot.objects)
-    return _cloud(snapshot.time_s, (point for body in bodies for point in _outline(body)), _HEIGHT_M / 2.0)
+    bodies = (observation.ego, *observation.others, *observation.objects)
+    return _cloud(observation.time_s, (point for body in bodies for point in _outline(body)), _HEIGHT_M / 2.0)
 
 
 def said(text: str, time_s: float) -> Log:
@@ -119,11 +120,11 @@ def _stamp(time_s: float) -> Timestamp:
 
 
 def _place(x_m: float, y_m: float) -> tuple[float, float]:
-    return _round(x_m), _round(-y_m)
+    return _round(x_m), _round(y_m)
 
 
 def _rotation(heading_rad: float) -> Quaternion:
-    half = -heading_rad / 2.0 if math.isfinite(heading_rad) else 0.0
+    half = heading_rad / 2.0 if math.isfinite(heading_rad) else 0.0
     return Quaternion(z=_round(math.sin(half), _ROTATION_PARTS), w=_round(math.cos(half), _ROTATION_PARTS))
 
 
@@ -158,10 +159,10 @@ def _line(edge: list[tuple[float, float]]) -> LinePrimitive:
     )
 
 
-def _edge(lane: LaneView, side: int) -> list[tuple[float, float]]:
-    """One edge of a lane; `side` is -1 for left, +1 for right of its direction."""
+def _edge(lane: Lane, side: int) -> list[tuple[float, float]]:
+    """One edge of a lane; `side` is -1 for right, +1 for left of its direction."""
     points: list[tuple[float, float]] = []
-    centre = lane.centre_m
+    centre = lane.centre.points_m
     for index, (x, y) in enumerate(centre):
         ahead, behind = centre[min(index + 1, len(centre) - 1)], centre[max(index - 1, 0)]
         dx, dy = ahead[0] - behind[0], ahead[1] - behind[1]

@@ -11,12 +11,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final, Literal
 
-from chauffeur.concept import LaneId, Metric, Outcome, Plan, ProgramState, Snapshot, VehicleState, Wishes
+from chauffeur.concept import Metric, Observation, Outcome, Plan, ProgramState, VehicleState, Wishes
 from chauffeur.concept.units import M_PER_CAR_LENGTH
-from chauffeur.geometry import Polyline
 from chauffeur.worlds.base import World
 
 HELD_S: Final = 2.5
@@ -100,7 +98,7 @@ class Fulfilment:
         """Args: the world; the plan that is about to be driven, one that `can_be_judged`."""
         self._world = world
         self._asks = asked_of(plan)
-        self._start = world.snapshot()
+        self._start = world.observe()
         self._began = self._start
         self._done = 0
         self._lead: int | None = None
@@ -115,7 +113,7 @@ class Fulfilment:
 
     def observe(self) -> None:
         """Look at the instant after a control period."""
-        shot = self._world.snapshot()
+        shot = self._world.observe()
         self._mind_the_lead(shot)
         holds = self._met(self._asks[self._done], shot) and self._in_lane(shot)
         self._held = self._held + 1 if holds else 0
@@ -156,7 +154,7 @@ class Fulfilment:
         """What is missing, in a sentence; empty when nothing is."""
         if self.success:
             return ""
-        ask, shot = self._asks[self._done], self._world.snapshot()
+        ask, shot = self._asks[self._done], self._world.observe()
         missing = _MISSING.get(ask.kind, "The car did not settle as planned.")
         if ask.kind == "overtake" and self._passed and not self._in_lane(shot):
             missing = "The vehicle ahead was passed, but the car is not in the lane it was to end in."
@@ -169,7 +167,7 @@ class Fulfilment:
 
     def metrics(self) -> tuple[Metric, ...]:
         """What was asked for in numbers, and what there was at the end."""
-        shot, last = self._world.snapshot(), self._asks[-1]
+        shot, last = self._world.observe(), self._asks[-1]
         found: list[Metric] = []
         for ask in self._asks:
             if ask.kind in ("speed", "style", "resume") and ask.speed_mps is not None:
@@ -177,17 +175,17 @@ class Fulfilment:
             gap = _gap_asked(ask, shot)
             if gap is not None:
                 found.append(Metric("asked-gap-v1", gap, "m"))
-        if shot.kind != "parking":
+        if not shot.road.has_parking:
             found.append(Metric("end-speed-v1", shot.ego.speed_mps, "m/s"))
         if shot.front is not None and last.kind in ("gap", "follow", "yield", "style"):
             found.append(Metric("end-gap-v1", shot.front.distance_m, "m"))
-        if shot.kind == "highway" and shot.ego.lane is not None and self._start.ego.lane is not None:
-            found.append(Metric("end-lane-v1", float(shot.ego.lane[2] - self._start.ego.lane[2]), "lanes"))
+        if shot.road.uninterrupted and shot.ego.lane is not None and self._start.ego.lane is not None:
+            found.append(Metric("end-lane-v1", float(_moved(self._start, shot)), "lanes"))
         return (*found, Metric("held-v1", self._held_s, "s", applies=self.success))
 
     # The parts ------------------------------------------------------------------------------------------------------
 
-    def _met(self, ask: Ask, shot: Snapshot) -> bool:
+    def _met(self, ask: Ask, shot: Observation) -> bool:
         match ask.kind:
             case "overtake":
                 return self._passed == (ask.detail or self._passed) != ""
@@ -224,7 +222,7 @@ class Fulfilment:
     def _wanted_mps(self, ask: Ask) -> float:
         return ask.speed_mps if ask.speed_mps is not None else self._setpoints.target_speed_mps or 0.0
 
-    def _mind_the_lead(self, shot: Snapshot) -> None:
+    def _mind_the_lead(self, shot: Observation) -> None:
         """Keep an eye on whom this part is to pass, and on which side it is passed."""
         if self._asks[self._done].kind != "overtake":
             return
@@ -238,43 +236,34 @@ class Fulfilment:
         if ahead > 0.0:
             self._passed = ""
         elif not self._passed and ahead <= -(shot.ego.length_m + lead.length_m) / 2.0:
-            beside = shot.ego.lane[2] - lead.lane[2]
+            beside = shot.road[shot.ego.lane].index - shot.road[lead.lane].index
             self._passed = "left" if beside < 0 else "right" if beside > 0 else ""
 
-    def _in_lane(self, shot: Snapshot) -> bool:
+    def _in_lane(self, shot: Observation) -> bool:
         """Whether the car is in the lane that is its set-point, and not still on its way there."""
-        lane, wanted = shot.ego.lane, self._setpoints.target_lane
+        lane, wanted = shot.road.get(shot.ego.lane), shot.road.get(self._setpoints.target_lane)
         if lane is None or shot.off_road:
             return False
-        if wanted is not None and (lane != wanted if lane[:2] == wanted[:2] else lane[2] != wanted[2]):
+        if wanted is not None and (lane.id != wanted.id if lane.road == wanted.road else lane.index != wanted.index):
             return False
-        path = self._paths.get(lane)
-        if path is None or shot.kind == "parking":
-            return True
-        return abs(path.offset(shot.ego.x_m, shot.ego.y_m, path.nearest(shot.ego.x_m, shot.ego.y_m))) <= IN_LANE_M
+        return shot.road.has_parking or abs(lane.centre.project(shot.ego.x_m, shot.ego.y_m)[1]) <= IN_LANE_M
 
-    @cached_property
-    def _paths(self) -> dict[LaneId, Polyline]:
-        return {lane.id: Polyline.of(lane.centre_m) for lane in self._start.lanes}
+    def _on_emergency_lane(self, shot: Observation) -> bool:
+        lane = shot.road.get(shot.ego.lane)
+        return lane is not None and lane.emergency
 
-    def _on_emergency_lane(self, shot: Snapshot) -> bool:
-        return any(lane.emergency and lane.id == shot.ego.lane for lane in self._start.lanes)
-
-    def _out_of_the_crossing(self, shot: Snapshot) -> bool:
+    def _out_of_the_crossing(self, shot: Observation) -> bool:
         """Whether the car is on a road that leads away."""
-        here = next((lane for lane in self._start.lanes if lane.id == shot.ego.lane), None)
-        return here is not None and all(
-            math.dist(here.centre_m[-1], other.centre_m[0]) > _JOINT_M for other in self._start.lanes
-        )
+        here = shot.road.get(shot.ego.lane)
+        return here is not None and not here.successors
 
-    def _turned(self, shot: Snapshot) -> int:
-        """Quarter turns to the right since the start; y grows to the right of +x in these worlds."""
-        turned = math.remainder(shot.ego.heading_rad - self._start.ego.heading_rad, 2.0 * math.pi)
+    def _turned(self, shot: Observation) -> int:
+        """Quarter turns to the right since the start."""
+        turned = math.remainder(self._start.ego.heading_rad - shot.ego.heading_rad, 2.0 * math.pi)
         return round(turned / (math.pi / 2.0))
 
 
 _HELD_UP_M: Final = 80.0
-_JOINT_M: Final = 0.5
 _MISSING: Final = {
     "overtake": "The vehicle ahead was not passed.",
     "lane": "The car is not in the lane that was asked for.",
@@ -296,7 +285,7 @@ def _near(value: float, asked: float, within: float, bound: Bound) -> bool:
     return low and high if bound == "exact" else low if bound == "at_least" else high
 
 
-def _gap_asked(ask: Ask, shot: Snapshot) -> float | None:
+def _gap_asked(ask: Ask, shot: Observation) -> float | None:
     """The gap that is to be kept, m, centre to centre; of a time headway, at the present speed."""
     if ask.gap_m is not None:
         return ask.gap_m
@@ -305,11 +294,11 @@ def _gap_asked(ask: Ask, shot: Snapshot) -> float | None:
     return M_PER_CAR_LENGTH + ask.headway_s * shot.ego.speed_mps
 
 
-def _moved(first: Snapshot, last: Snapshot) -> int:
+def _moved(first: Observation, last: Observation) -> int:
     """Lanes to the right."""
     if first.ego.lane is None or last.ego.lane is None:
         return 0
-    return last.ego.lane[2] - first.ego.lane[2]
+    return last.road[last.ego.lane].index - first.road[first.ego.lane].index
 
 
 def _ahead_m(ego: VehicleState, other: VehicleState) -> float:

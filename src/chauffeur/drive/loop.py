@@ -16,24 +16,25 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from chauffeur.concept import (
+    CameraImage,
     Context,
     Feedback,
     History,
     Instruction,
     Limits,
+    Observation,
     PersonId,
     Plan,
     PlanRequest,
     Scenario,
-    Snapshot,
     SystemMessage,
     Trip,
     Verdict,
 )
-from chauffeur.drive.answering import plan_or_answer
-from chauffeur.drive.emergency import check_told_not_to, not_checked, planned_for
+from chauffeur.drive.emergency import not_checked, planned_for
+from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
+from chauffeur.drive.planning import RECALLED, Judged, PlanSteps, no_pictures, plan_once
 from chauffeur.planners.base import Planner
-from chauffeur.safety.screening import screen_request
 from chauffeur.worlds.base import World
 
 
@@ -46,51 +47,52 @@ class Memory(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Stages:
-    """The loop's exchangeable parts, one per arrow of the figure."""
+    """The loop's exchangeable parts, one per arrow of the figure; `see` takes the pictures for planners that look."""
 
     world: World
-    describe: Callable[[Snapshot], Context]
+    describe: Callable[[Observation], Context]
     memory: Memory
     system: Callable[[Limits], SystemMessage]
     planner: Planner
-    check: Callable[[Plan, Snapshot, Limits], tuple[Verdict, ...]]
+    check: Callable[[Plan, Observation, Limits], tuple[Verdict, ...]]
     execute: Callable[[PlanRequest, Plan, tuple[Verdict, ...], Scenario, int], Trip]
-    tell: Callable[[str, object], None]
+    tell: Listener = nobody_listens
+    see: Callable[[Observation], tuple[CameraImage, ...]] = no_pictures
 
 
-def ask(
-    I: Instruction,  # noqa: E741, N803
-    snapshot: Snapshot,
-    limits: Limits,
-    stages: Stages,
-) -> PlanRequest:
-    """Everything the planner is given for a wish in a situation."""
-    C = stages.describe(snapshot)  # noqa: N806
-    H = stages.memory.recall(I.person, I, C, 3)  # noqa: N806
-    S = stages.system(limits)  # noqa: N806
-    for letter, value in (("I", I), ("C", C), ("H", H), ("S", S)):
-        stages.tell(letter, value)
+def steps_of(stages: Stages, observation: Observation, limits: Limits) -> PlanSteps:
+    """The way from words to a checked plan, at an instant of a world that waits for it."""
 
-    request, screened = screen_request(PlanRequest(I, C, S, H, limits=limits))  # words are data
-    stages.tell("screened", screened)
-    return request
+    async def describe() -> Context:
+        return stages.describe(observation)
+
+    async def recall(I: Instruction, C: Context) -> History:  # noqa: E741, N803
+        return stages.memory.recall(I.person, I, C, RECALLED)
+
+    async def check(plan: Plan, own: bool) -> Judged:
+        return (not_checked(plan) if own else stages.check(plan, observation, limits)), observation
+
+    return PlanSteps(
+        planner=stages.planner,
+        limits=limits,
+        describe=describe,
+        recall=recall,
+        system=lambda: stages.system(limits),
+        own=lambda text: planned_for(text, observation),
+        check=check,
+        see=lambda: stages.see(observation),
+        tell=stages.tell,
+    )
 
 
 async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, stages: Stages) -> Trip:  # noqa: E741, N803
     """One wish, from the words to the remembered trip."""
-    snapshot = stages.world.reset(scenario, seed)
+    observation = stages.world.reset(scenario, seed)
 
-    request = ask(I, snapshot, limits, stages)
-    own = planned_for(I.text, snapshot)  # emergency words are no planner's to decide
-    plan = own or await plan_or_answer(stages.planner, request)  # R, P
-    stages.tell("RP", plan)
+    planned = await plan_once(I, steps_of(stages, observation, limits))  # C, H, S, R, P, V
 
-    forbidden = check_told_not_to(I.text, plan, snapshot)  # by the person, in words
-    V = not_checked(plan) if own else (*stages.check(plan, snapshot, limits), *forbidden)  # noqa: N806
-    stages.tell("V", V)
-
-    trip = stages.execute(request, plan, V, scenario, seed)  # drives P only if no verdict stops it
-    stages.tell("trip", trip)
+    trip = stages.execute(planned.request, planned.plan, planned.verdicts, scenario, seed)  # P, if no verdict stops it
+    stages.tell(DriveEvent("trip", value=trip))
 
     stages.memory.remember(trip, None)  # H + (I, C, P, R); F joins when the person speaks
     return trip

@@ -36,26 +36,28 @@ def _optional_number(description: str) -> JsonSchema:
 _INTEGER: JsonSchema = {"type": "integer"}
 _FLAG: JsonSchema = {"type": "boolean"}
 _ANY_OBJECT: JsonSchema = {"type": "object"}
-_LANE: JsonSchema = {
-    "type": ["array", "null"],
-    "items": {"type": ["string", "integer"]},
-    "description": "[from node, to node, index]; index 0 is leftmost",
-}
+_LANE: JsonSchema = {"type": ["string", "null"], "description": "Name of a lane of the road graph"}
+_LINE: JsonSchema = {"type": ["array", "null"], "items": _array(_number()), "description": "Ends of the stop line, m"}
 _SETTINGS = _array(_array({"type": ["string", "number"]}), "[name, value] pairs")
 
 _VEHICLE = _object(
     id=_INTEGER,
-    kind=_text("car, obstacle or stop_sign"),
-    x_m=_number("Centre; world frame, y grows to the right of +x"),
+    kind=_text("car, truck, bus, motorcycle, bicycle, pedestrian, static, obstacle or stop_sign"),
+    x_m=_number("Centre; world frame, right-handed"),
     y_m=_number("Centre"),
-    heading_rad=_number(),
+    heading_rad=_number("Counter-clockwise"),
     speed_mps=_number(),
     length_m=_number(),
     width_m=_number(),
     lane=_LANE,
     crashed=_FLAG,
+    acceleration_mps2=_number("Along the heading"),
+    yaw_rate_radps=_number("Counter-clockwise"),
+    steering_rad=_number("Front wheels, positive to the left"),
 )
-_COMMAND = _object(acceleration_mps2=_number("Along the heading"), steering_rad=_number("Front wheels"))
+_COMMAND = _object(
+    acceleration_mps2=_number("Along the heading"), steering_rad=_number("Front wheels, positive to the left")
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +80,16 @@ INSTRUCTION = Channel(
     "chauffeur.Instruction",
     _object(text=_text("I: the wish"), person=_text(), source=_text(), confirmed=_text("question it is the yes to")),
 )
-CONTEXT = Channel("/context", "chauffeur.Context", _object(text=_text("C: the driving context"), situation=_ANY_OBJECT))
+CONTEXT = Channel(
+    "/context",
+    "chauffeur.Context",
+    _object(
+        text=_text("C: the driving context"),
+        situation=_ANY_OBJECT,
+        lot={"type": ["object", "null"]},
+        street={"type": ["object", "null"], "description": "On a road: ways on, and what there is to stop by"},
+    ),
+)
 SYSTEM = Channel(
     "/system",
     "chauffeur.SystemMessage",
@@ -102,6 +113,7 @@ PLAN = Channel(
         usage=_ANY_OBJECT,
         latency_s=_number(),
         raw=_text(),
+        scene=_text("what a planner with eyes made of its pictures"),
     ),
 )
 VERDICTS = Channel(
@@ -152,18 +164,24 @@ LANES = Channel(
             _object(
                 id=_LANE,
                 width_m=_number(),
-                length_m=_number(),
                 speed_limit_mps=_number(),
-                forbidden=_FLAG,
-                emergency=_FLAG,
+                kind=_text("driving, emergency, aisle, parking, bicycle, sidewalk or crossing"),
+                road=_text("Lanes of one road lie abreast"),
+                index=_INTEGER,
+                successors=_array(_text(), "Lanes it leads into"),
+                closed=_FLAG,
+                junction=_text(),
+                turn=_text(),
+                street=_text(),
                 centre_m=_array(_array(_number()), "[x, y] points, start to end"),
             )
-        )
+        ),
+        lot={"type": ["object", "null"], "description": "Of a parking lot: spots and landmarks"},
     ),
 )
-SNAPSHOT = Channel(
-    "/snapshot",
-    "chauffeur.Snapshot",
+OBSERVATION = Channel(
+    "/observation",
+    "chauffeur.Observation",
     _object(
         time_s=_number(),
         tick=_INTEGER,
@@ -175,6 +193,27 @@ SNAPSHOT = Channel(
         stop_sign_m=_optional_number("Distance to an unserved stop sign ahead"),
         off_road=_FLAG,
         ended=_FLAG,
+        signals=_array(
+            _object(
+                id=_text(),
+                state=_text("red, yellow, green or off"),
+                lanes=_array(_text(), "Lanes it rules"),
+                stop_line_m=_LINE,
+                remaining_s=_optional_number("Until it changes"),
+            )
+        ),
+        signs=_array(
+            _object(
+                id=_text(),
+                kind=_text("stop, yield or speed_limit"),
+                lanes=_array(_text(), "Lanes it rules"),
+                x_m=_number(),
+                y_m=_number(),
+                stop_line_m=_LINE,
+                value=_optional_number("Of a speed limit: m/s"),
+            )
+        ),
+        route={"type": ["object", "null"], "description": "lanes, start_m on the first, goal_m on the last"},
     ),
 )
 WISHES = Channel(
@@ -217,7 +256,7 @@ CHANNELS = (
     SCENARIO,
     TRIP,
     LANES,
-    SNAPSHOT,
+    OBSERVATION,
     WISHES,
     COMMAND,
     PROGRAM,

@@ -14,7 +14,7 @@ import json
 import math
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -28,20 +28,25 @@ from mcap_protobuf.schema import register_schema
 from pydantic import TypeAdapter
 
 from chauffeur.concept import (
+    CameraImage,
     DataError,
     Frame,
-    LaneView,
+    Lane,
+    Observation,
+    ParkingLot,
     Scenario,
-    Snapshot,
     SystemMessage,
     Trip,
 )
 from chauffeur.drive import foxglove
 from chauffeur.drive import mcap_schemas as channels
 from chauffeur.drive.files import publish
+from chauffeur.geometry import Polyline, RoadGraph
 
-FORMAT = 1
-"""Version of the file layout; a reader refuses newer ones."""
+FORMAT = 3
+"""Version of the file layout. 2 is read as well: there a road said whether y grew to the right of +x, and with it the
+headings and steering of all on it. 1, which is refused, had lanes by their nodes, without a road graph."""
+_WITH_SIDES = 2
 
 _PROFILE = "chauffeur"
 _METADATA = "chauffeur.recording"
@@ -73,8 +78,10 @@ _UNREADABLE = (
 _system = TypeAdapter(SystemMessage)
 _scenario = TypeAdapter(Scenario)
 _trip = TypeAdapter(Trip)
-_lanes = TypeAdapter(tuple[LaneView, ...])
-_snapshot = TypeAdapter(Snapshot)
+_lane = TypeAdapter(Lane)
+_points = TypeAdapter(tuple[tuple[float, float], ...])
+_lot: TypeAdapter[ParkingLot | None] = TypeAdapter(ParkingLot | None)
+_observation = TypeAdapter(Observation)
 _frame = TypeAdapter(Frame)
 
 _OWN_CHANNEL = {"instruction", "context", "history", "plan", "verdicts"}
@@ -90,13 +97,15 @@ class RecordedTrip:
         scenario: The start situation.
         system: S as the planner got it, where it is kept.
         final: The instant after the last command, where a collision first shows.
+        view: What the front camera showed when the drive was planned, where the planner looked; not in the recording.
     """
 
     trip: Trip
-    frames: tuple[Frame, ...]
+    frames: tuple[Frame, ...] = field(repr=False)  # asyncio writes out what a task gave when it restores Ctrl-C
     scenario: Scenario
     system: SystemMessage | None = None
-    final: Snapshot | None = None
+    final: Observation | None = field(default=None, repr=False)
+    view: CameraImage | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +114,7 @@ class Difference:
 
     Attributes:
         tick: Control period, or None when the difference is not in a frame.
-        field: Path of the value, e.g. `snapshot.ego.speed_mps`.
+        field: Path of the value, e.g. `observation.ego.speed_mps`.
         first: Value in the first trip, as text.
         second: Value in the second.
     """
@@ -127,7 +136,7 @@ def write_trip(
     scenario: Scenario,
     *,
     system: SystemMessage | None = None,
-    final: Snapshot | None = None,
+    final: Observation | None = None,
 ) -> Path:
     """Write one recording; the file appears whole or not at all.
 
@@ -197,7 +206,7 @@ def _write(
     frames: tuple[Frame, ...] | list[Frame],
     scenario: Scenario,
     system: SystemMessage | None,
-    final: Snapshot | None,
+    final: Observation | None,
 ) -> None:
     writer.start(profile=_PROFILE)
     ids: dict[str, int] = {}
@@ -231,24 +240,33 @@ def _write(
     put(channels.SCENARIO, _scenario.dump_python(scenario))
     put(channels.TRIP, _storable({key: value for key, value in whole.items() if key not in _OWN_CHANNEL}))
 
-    snapshots = [frame.snapshot for frame in frames] + ([final] if final is not None else [])
-    lanes: tuple[LaneView, ...] | None = None
-    for index, snapshot in enumerate(snapshots):
-        time = foxglove.nanoseconds(snapshot.time_s)
-        new_road = snapshot.lanes is not lanes and snapshot.lanes != lanes
+    observations = [frame.observation for frame in frames] + ([final] if final is not None else [])
+    road: RoadGraph | None = None
+    lot: ParkingLot | None = None
+    for index, observation in enumerate(observations):
+        time = foxglove.nanoseconds(observation.time_s)
+        new_road = road is None or observation.road != road or observation.lot != lot
+        road, lot = observation.road, observation.lot
         if new_road:
-            lanes = snapshot.lanes
-            put(channels.LANES, {"lanes": _storable(_lanes.dump_python(lanes, mode="json"))}, time, index)
-        payload = _snapshot.dump_python(snapshot, mode="json", exclude={"lanes"})
-        put(channels.SNAPSHOT, _storable(payload), time, index)
+            put(
+                channels.LANES,
+                {
+                    "lanes": [_stored(lane) for lane in road.lanes],
+                    "lot": _storable(_lot.dump_python(lot, mode="json")),
+                },
+                time,
+                index,
+            )
+        payload = _observation.dump_python(observation, mode="json", exclude={"road", "lot"})
+        put(channels.OBSERVATION, _storable(payload), time, index)
         if new_road:
-            draw("/road", foxglove.road_points(snapshot), time, index)
-        draw("/scene", foxglove.scene_update(snapshot, with_road=new_road), time, index)
-        draw("/vehicles", foxglove.vehicle_points(snapshot), time, index)
-        draw("/tf", foxglove.ego_transform(snapshot), time, index)
+            draw("/road", foxglove.road_points(observation), time, index)
+        draw("/scene", foxglove.scene_update(observation, with_road=new_road), time, index)
+        draw("/vehicles", foxglove.vehicle_points(observation), time, index)
+        draw("/tf", foxglove.ego_transform(observation), time, index)
     for index, frame in enumerate(frames):
-        time = foxglove.nanoseconds(frame.snapshot.time_s)
-        parts = _storable(_frame.dump_python(frame, mode="json", exclude={"snapshot"}))
+        time = foxglove.nanoseconds(frame.observation.time_s)
+        parts = _storable(_frame.dump_python(frame, mode="json", exclude={"observation"}))
         parts["wishes"]["served_stops"].sort()
         put(channels.WISHES, parts["wishes"], time, index)
         put(channels.COMMAND, {name: parts[name] for name in ("requested", "applied", "interventions")}, time, index)
@@ -256,7 +274,7 @@ def _write(
         put(channels.PROGRAM, program, time, index)
         for text in frame.said:
             put(channels.SAID, {"text": text}, time, index)
-            draw("/log", foxglove.said(text, frame.snapshot.time_s), time, index)
+            draw("/log", foxglove.said(text, frame.observation.time_s), time, index)
     # Counts let a reader tell a whole recording from one whose tail was lost and re-indexed by a repair tool.
     writer.add_metadata(_METADATA, {"format": str(FORMAT), "frames": str(len(frames)), "final": str(final is not None)})
     writer.finish()
@@ -293,10 +311,12 @@ def _read(path: Path, stream: io.BytesIO) -> RecordedTrip:
                 pass
     if not facts:
         raise _damaged(path, "its closing record is missing")
-    if int(facts["format"]) > FORMAT:
+    if (found := int(facts["format"])) not in (FORMAT, _WITH_SIDES):
         raise DataError(
-            f"{path} has recording format {facts['format']}; this Chauffeur reads up to {FORMAT}.",
-            hint="Upgrade: pip install -U chauffeur",
+            f"{path} has recording format {found}; this Chauffeur reads formats {_WITH_SIDES} and {FORMAT}.",
+            hint="Upgrade: pip install -U chauffeur"
+            if found > FORMAT
+            else "Its road is stored in an older way: read it with the version that wrote it, or drive it again.",
         )
 
     def single(channel: channels.Channel) -> Any:
@@ -315,18 +335,20 @@ def _read(path: Path, stream: io.BytesIO) -> RecordedTrip:
             "verdicts": single(channels.VERDICTS)["verdicts"],
         }
     )
-    snapshots = _read_snapshots(messages)
+    if found == _WITH_SIDES:
+        _turn_sides(messages)
+    observations = _read_observations(messages)
     count, has_final = int(facts["frames"]), facts["final"] == "True"
     parts = (channels.WISHES, channels.COMMAND, channels.PROGRAM)
-    if len(snapshots) != count + has_final or any(len(messages[c.topic]) != count for c in parts):
+    if len(observations) != count + has_final or any(len(messages[c.topic]) != count for c in parts):
         raise _damaged(path, f"it should hold {count} control periods and does not")
     system = [_system.validate_python(payload) for _, payload in messages[channels.SYSTEM.topic]]
     return RecordedTrip(
         trip=trip,
-        frames=_read_frames(messages, snapshots[:count]),
+        frames=_read_frames(messages, observations[:count]),
         scenario=_scenario.validate_python(single(channels.SCENARIO)),
         system=system[0] if system else None,
-        final=snapshots[count] if has_final else None,
+        final=observations[count] if has_final else None,
     )
 
 
@@ -399,29 +421,90 @@ def _content(path: Path) -> io.BytesIO:
         raise DataError(f"{path} cannot be read: {error.strerror or error}.") from error
 
 
-def _read_snapshots(messages: dict[str, list[tuple[int, Any]]]) -> list[Snapshot]:
-    roads = {index: _lanes.validate_python(road["lanes"]) for index, road in messages[channels.LANES.topic]}
-    lanes: tuple[LaneView, ...] = ()
-    snapshots: list[Snapshot] = []
-    for index, payload in messages[channels.SNAPSHOT.topic]:
-        lanes = roads.get(index, lanes)
-        snapshots.append(replace(_snapshot.validate_python({**payload, "lanes": ()}), lanes=lanes))
-    return snapshots
+def _stored(lane: Lane) -> dict[str, Any]:
+    """A lane with its middle as points: how far along each is follows from them."""
+    plain = _lane.dump_python(lane, mode="json", exclude={"centre"})
+    return _storable({**plain, "centre_m": lane.centre.points_m})
 
 
-def _read_frames(messages: dict[str, list[tuple[int, Any]]], snapshots: list[Snapshot]) -> tuple[Frame, ...]:
+_SIDEWAYS = frozenset({"y_m", "heading_rad", "yaw_rate_radps", "steering_rad"})
+"""Numbers that change their sign with the side that y grows to."""
+
+
+def _turn_sides(messages: dict[str, list[tuple[int, Any]]]) -> None:
+    """Give what format 2 stored with y to the right of +x the right-handed frame; roads say where they are so."""
+    roads = messages[channels.LANES.topic]
+    if not any(payload["mirrored"] for _, payload in roads):
+        return
+    for _, payload in roads:
+        for lane in payload["lanes"]:
+            lane["centre_m"] = [(x, _other_sign(y)) for x, y in lane["centre_m"]]
+        if payload["lot"] is not None:
+            _turn(payload["lot"]["spots"])
+            payload["lot"]["landmarks"] = [(name, x, _other_sign(y)) for name, x, y in payload["lot"]["landmarks"]]
+    for topic in (channels.OBSERVATION.topic, channels.COMMAND.topic):
+        for _, payload in messages[topic]:
+            _turn(payload)
+
+
+def _turn(stored: Any) -> None:
+    """Change the sign of all numbers of `_SIDEWAYS`, however deep, in place."""
+    if isinstance(stored, list):
+        for one in cast("list[Any]", stored):
+            _turn(one)
+    elif isinstance(stored, dict):
+        fields_of = cast("dict[str, Any]", stored)
+        for name, value in fields_of.items():
+            if name in _SIDEWAYS:
+                fields_of[name] = _other_sign(value)
+            else:
+                _turn(value)
+
+
+def _other_sign(stored: Any) -> float:
+    """The negative of a stored number, which may be the text of one that JSON does not have; as worlds change signs,
+    zeros stay positive."""
+    return 0.0 - float(stored)
+
+
+def _road_of(stored: list[dict[str, Any]]) -> RoadGraph:
+    """The graph of stored lanes. Raises ValueError for a middle that is none, KeyError for a successor that is none."""
+    lanes: list[Lane] = []
+    for plain in stored:
+        centre = Polyline.of(_points.validate_python(plain["centre_m"]))
+        empty = {"points_m": (), "stations_m": ()}
+        lanes.append(replace(_lane.validate_python({**plain, "centre": empty}), centre=centre))
+    road = RoadGraph(tuple(lanes))
+    for lane in lanes:
+        road.successors(lane.id)
+    return road
+
+
+def _read_observations(messages: dict[str, list[tuple[int, Any]]]) -> list[Observation]:
+    roads = {index: _road_of(payload["lanes"]) for index, payload in messages[channels.LANES.topic]}
+    lots = {index: _lot.validate_python(payload["lot"]) for index, payload in messages[channels.LANES.topic]}
+    road, lot = RoadGraph(()), None
+    observations: list[Observation] = []
+    for index, payload in messages[channels.OBSERVATION.topic]:
+        road, lot = roads.get(index, road), lots.get(index, lot)
+        shown = _observation.validate_python({**payload, "road": {"lanes": ()}})
+        observations.append(replace(shown, road=road, lot=lot))
+    return observations
+
+
+def _read_frames(messages: dict[str, list[tuple[int, Any]]], observations: list[Observation]) -> tuple[Frame, ...]:
     said: dict[int, list[str]] = {}
     for index, payload in messages[channels.SAID.topic]:
         said.setdefault(index, []).append(payload["text"])
     frames: list[Frame] = []
-    for index, snapshot in enumerate(snapshots):
+    for index, observation in enumerate(observations):
         wishes = messages[channels.WISHES.topic][index][1]
         command = messages[channels.COMMAND.topic][index][1]
         program = messages[channels.PROGRAM.topic][index][1]
         frames.append(
             _frame.validate_python(
                 {
-                    "snapshot": snapshot,
+                    "observation": observation,
                     "wishes": wishes,
                     **command,
                     "program": program["state"],
@@ -446,6 +529,8 @@ def _first_line(error: Exception) -> str:
 def _difference(one: Any, other: Any, path: str = "") -> tuple[str, str, str] | None:
     """(path, first, second) of the first unequal value; floats are compared exactly, and NaN equals NaN."""
     if one is other:
+        return None
+    if isinstance(one, RoadGraph) and one == other:  # the same at every instant: not looked through again and again
         return None
     if isinstance(one, float) and isinstance(other, float):
         return None if one.hex() == other.hex() else (path, repr(one), repr(other))

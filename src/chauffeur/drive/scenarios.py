@@ -5,19 +5,23 @@ from __future__ import annotations
 import difflib
 import os
 import re
+from importlib.util import find_spec
 from pathlib import Path
 
-from chauffeur.concept import Scenario, ScenarioError, Snapshot
+from chauffeur.concept import Observation, Scenario, ScenarioError
 from chauffeur.drive.session import drive_without_program, make_world
+from chauffeur.language.weather import said_weather
 from chauffeur.planners.onboard.meaning import Manoeuvre, Reading
 from chauffeur.planners.onboard.understand import understand
-from chauffeur.planners.talk2drive.style import place_of
+from chauffeur.planners.talk2drive.style import destination_of, place_of
 from chauffeur.worlds.base import World
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 from chauffeur.worlds.highway.scenarios import BUILT_IN as ROADS
 from chauffeur.worlds.parking.scenarios import BUILT_IN as LOTS
+from chauffeur.worlds.town.scenarios import BUILT_IN as TOWNS
+from chauffeur.worlds.track.scenarios import BUILT_IN as TRACKS
 
-BUILT_IN = ROADS + LOTS
+BUILT_IN = ROADS + LOTS + TRACKS + TOWNS
 
 DATA_VARIABLE = "CHAUFFEUR_LAMPILOT"
 """Environment variable naming a DbLv1 folder, used when no folder is given."""
@@ -98,9 +102,18 @@ def suiting(wish: str) -> Scenario:
         return by_id["left-lane" if first.direction == "right" else "overtake"]
     if _CROSSING.search(wish):
         return by_id["intersection"]
+    if (first is None or first.manoeuvre == "style") and said_weather(wish) != "none" and _seeing():
+        return by_id["track-left-turn-sunny"]  # what the passenger knows and the camera does not see
+    if first is None and (place := destination_of(wish)):
+        return next((town for town in TOWNS if destination_of(town.wish) == place), TOWNS[0])
     if first is not None and first.manoeuvre == "speed" and first.change <= 0 and first.variant != "match":
         return by_id["cruise"]  # a speed of one's own needs room ahead
     return by_id["overtake"]
+
+
+def _seeing() -> bool:
+    """Whether the parts are installed with which the car looks at the road and drives by gains."""
+    return all(find_spec(name) is not None for name in ("vehiclemodels", "osqp", "moderngl"))
 
 
 def seeds_with_lead(scenario: Scenario, first: int, count: int) -> tuple[int, ...]:
@@ -114,7 +127,7 @@ def seeds_with_lead(scenario: Scenario, first: int, count: int) -> tuple[int, ..
     """
     world = make_world(scenario)
     given = world.reset(scenario, scenario.seed)
-    if given.kind != "highway" or given.front is None or given.front.distance_m > IN_REACH_M:
+    if not given.road.uninterrupted or given.front is None or given.front.distance_m > IN_REACH_M:
         return tuple(range(first, first + count))
     found: list[int] = []
     for seed in range(first, first + _TRIES * count):
@@ -125,7 +138,7 @@ def seeds_with_lead(scenario: Scenario, first: int, count: int) -> tuple[int, ..
     return tuple(range(first, first + count))
 
 
-def _keeps_lead(world: World, shot: Snapshot) -> bool:
+def _keeps_lead(world: World, shot: Observation) -> bool:
     """Whether a world just reset has a vehicle ahead in reach, and still has while nobody wishes anything."""
     lead = shot.front
     if lead is None or lead.distance_m > IN_REACH_M or shot.ego.speed_mps < lead.speed_mps + _CLOSES_MPS:
@@ -133,3 +146,11 @@ def _keeps_lead(world: World, shot: Snapshot) -> bool:
     episode = drive_without_program(world, None, STAYS_S, record=False)
     front = episode.final.front
     return episode.outcome == "ended" and front is not None and front.distance_m <= IN_REACH_M
+
+
+def planner_for(spec: str, scenario: Scenario) -> str:
+    """The planner that was named, else one that can drive there: what the world says it can be driven by."""
+    apt = make_world(scenario).capabilities.policies
+    if spec:
+        return spec
+    return {"action_matrix": "vlm", "program": "onboard"}.get(apt[0], "talk2drive")

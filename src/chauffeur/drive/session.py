@@ -6,6 +6,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from importlib.metadata import version
@@ -13,6 +14,7 @@ from typing import Any
 
 from chauffeur.concept import (
     STOP_ZONE_M,
+    CameraImage,
     Causes,
     Context,
     Feedback,
@@ -21,7 +23,7 @@ from chauffeur.concept import (
     Instruction,
     InstructionError,
     Limits,
-    Parameters,
+    Observation,
     PersonId,
     Plan,
     PlanRequest,
@@ -29,37 +31,37 @@ from chauffeur.concept import (
     Program,
     Scenario,
     ScenarioError,
-    Snapshot,
     SystemMessage,
     Trip,
     Verdict,
 )
 from chauffeur.concept.registry import load_plugin
+from chauffeur.describe import describe_with_traffic
 from chauffeur.describe.services.sources import SourceSettings
 from chauffeur.drive.effects import effect_of
 from chauffeur.drive.emergency import not_checked
 from chauffeur.drive.episode import Episode, Referee, run_episode
-from chauffeur.drive.loop import Memory, Stages, ask, drive
-from chauffeur.drive.parameters import drive_parameters, shield_for
+from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
+from chauffeur.drive.loop import Memory, Stages, drive, steps_of
+from chauffeur.drive.planning import declined, no_pictures, request_once, unusable
 from chauffeur.drive.recording import RecordedTrip
+from chauffeur.drive.seat import SeatCamera
 from chauffeur.drive.surroundings import describing, opened
+from chauffeur.executors import Executor, executor_for
+from chauffeur.executors.base import OfKind
+from chauffeur.executors.program import ProgramDrive
 from chauffeur.memory.tolerant import TolerantMemory
-from chauffeur.planners.base import Planner
+from chauffeur.planners.base import Planner, looks
 from chauffeur.planners.prompts import Setting, build_system_message
-from chauffeur.programs import ProgramExecutor
-from chauffeur.programs.sandbox import UNHURRIED, Sandbox
+from chauffeur.programs.catalogue import Vocabulary, vocabulary_of
+from chauffeur.programs.sandbox import Sandbox
 from chauffeur.safety.alignment import check_alignment, check_driven
 from chauffeur.safety.base import Check
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
-from chauffeur.safety.shield import SHIELD_VERSION, Shield
-from chauffeur.safety.words import reasons_once
+from chauffeur.safety.shield import SHIELD_VERSION, Shield, shield_for
 from chauffeur.worlds.base import World
 
 MAX_WISH_CHARACTERS = 2000
-MAX_TRIP_S = 60.0
-"""Simulated time a trip may take on a road."""
-MAX_PARKING_S = 180.0
-"""The same in a parking lot."""
 
 RefereeMaker = Callable[[World, Scenario, Plan], Referee | None]
 
@@ -67,10 +69,6 @@ RefereeMaker = Callable[[World, Scenario, Plan], Referee | None]
 def _no_referee(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
     del world, scenario, plan
     return None
-
-
-def _silent(letter: str, value: object) -> None:
-    del letter, value
 
 
 class Forgetful:
@@ -114,7 +112,8 @@ class Session:
         memory: Who remembers.
         sources: Whom C is completed from; None for nobody.
         referee: Makes the judge of a trip; returning None drives freely.
-        tell: Called with the loop's letters as they come, and with `frame` for each control period.
+        tell: Hears the loop's letters as they come, each control period, and the trip.
+        seeing: Makes C of an observation in place of the descriptors that read the world's own state; None for those.
         setting: Whether S carries examples.
         max_s: Bound of the trip in simulated time; default that of the kind of world.
         shielded: Whether the run-time shield has the last word on every command.
@@ -124,12 +123,14 @@ class Session:
     memory: Memory = field(default_factory=Forgetful)
     sources: SourceSettings | None = None
     referee: RefereeMaker = _no_referee
-    tell: Callable[[str, object], None] = _silent
+    tell: Listener = nobody_listens
+    seeing: Callable[[Observation], Context] | None = None
     setting: Setting = "few-shot"
     max_s: float | None = None
     shielded: bool = True
     _episode: Episode | None = None
     _system: SystemMessage | None = None
+    _view: tuple[CameraImage, ...] = ()
 
     async def drive(self, wish: Instruction, scenario: Scenario, seed: int, limits: Limits) -> RecordedTrip:
         """Drive one wish.
@@ -137,8 +138,8 @@ class Session:
         Raises:
             ChauffeurError: No plan could be had, or the scenario cannot be set up. The simulated car has not moved.
         """
-        self._episode = None  # a wish that is refused must not be filed with the drive before it
-        trip = await drive(wish, scenario, seed, limits, await self._stages(make_world(scenario)))
+        self._episode, self._view = None, ()  # a wish that is refused must not be filed with the drive before it
+        trip = await drive(wish, scenario, seed, limits, await self._stages(make_world(scenario), seed))
         episode = self._episode
         return RecordedTrip(
             trip=trip,
@@ -146,6 +147,7 @@ class Session:
             scenario=scenario,
             system=self._system,
             final=None if episode is None else episode.final,
+            view=self._view[-1] if self._view else None,
         )
 
     async def request(self, wish: Instruction, scenario: Scenario, seed: int, limits: Limits) -> PlanRequest:
@@ -154,27 +156,32 @@ class Session:
         Raises:
             ChauffeurError: The scenario cannot be set up.
         """
-        stages = await self._stages(make_world(scenario))
-        return ask(wish, stages.world.reset(scenario, seed), limits, stages)
+        stages = await self._stages(make_world(scenario), seed)
+        return await request_once(wish, steps_of(stages, stages.world.reset(scenario, seed), limits))
 
-    async def _stages(self, world: World) -> Stages:
+    async def _stages(self, world: World, seed: int) -> Stages:
         return Stages(
             world=world,
             describe=await self._describing(),
-            memory=TolerantMemory(self.memory, partial(self.tell, "memory")),
-            system=self._build_system,
+            memory=TolerantMemory(self.memory, lambda text: self.tell(DriveEvent("trouble", text=text))),
+            system=partial(self._build_system, vocabulary_of(world.capabilities.roads[0])),
             planner=self.planner,
             check=check_drive,
             execute=partial(self._execute, world),
             tell=self.tell,
+            see=partial(self._see, SeatCamera(world, seed)) if looks(self.planner) else no_pictures,
         )
 
-    async def _describing(self) -> Callable[[Snapshot], Context]:
-        async with opened(self.sources) as sources:
-            return await describing(sources)
+    def _see(self, camera: SeatCamera, observation: Observation) -> tuple[CameraImage, ...]:
+        self._view = camera.take(observation)
+        return self._view
 
-    def _build_system(self, limits: Limits) -> SystemMessage:
-        self._system = build_system_message(self.setting, limits=limits)
+    async def _describing(self) -> Callable[[Observation], Context]:
+        async with opened(self.sources) as sources:
+            return await describing(sources, self.seeing or describe_with_traffic)
+
+    def _build_system(self, vocabulary: Vocabulary, limits: Limits) -> SystemMessage:
+        self._system = build_system_message(self.setting, limits=limits, vocabulary=vocabulary)
         return self._system
 
     def _execute(
@@ -190,7 +197,6 @@ class Session:
         if refused:
             return make_trip(request, plan, verdicts, scenario, seed, None, refused, shielded=self.shielded)
         assert plan.policy is not None
-        shown = partial(self.tell, "frame")
         try:
             referee = self.referee(world, scenario, plan)
             self._episode = drive_policy(
@@ -199,20 +205,20 @@ class Session:
                 referee,
                 self.max_s or trip_s(scenario),
                 request.limits,
-                watch=shown,
+                watch=lambda frame: self.tell(DriveEvent("period", value=frame)),
                 shielded=self.shielded,
                 minimum_speed=verdicts != not_checked(plan),
             )
         except ScenarioError as error:  # the road has no such way: known only when the policy meets the world
             return make_trip(request, plan, verdicts, scenario, seed, None, str(error), shielded=self.shielded)
         told = _check_driven(plan, self._episode, request.limits)
-        self.tell("V", told)
+        self.tell(DriveEvent("verdicts", value=told))
         return make_trip(request, plan, verdicts + told, scenario, seed, self._episode, "", shielded=self.shielded)
 
 
-def check_drive(plan: Plan, snapshot: Snapshot, limits: Limits) -> tuple[Verdict, ...]:
+def check_drive(plan: Plan, observation: Observation, limits: Limits) -> tuple[Verdict, ...]:
     """All verdicts before a drive: of the checks that can stop it, and whether the explanation fits the program."""
-    return run_checks(plan, snapshot, limits, DRIVE_CHECKS) + _told(plan, snapshot, limits, check_alignment)
+    return run_checks(plan, observation, limits, DRIVE_CHECKS) + _told(plan, observation, limits, check_alignment)
 
 
 def _check_driven(plan: Plan, episode: Episode, limits: Limits) -> tuple[Verdict, ...]:
@@ -221,21 +227,21 @@ def _check_driven(plan: Plan, episode: Episode, limits: Limits) -> tuple[Verdict
     if effect is None:
         return ()
 
-    def driven(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:
+    def driven(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
         del limits
-        return check_driven(plan, snapshot, effect)
+        return check_driven(plan, observation, effect)
 
-    return _told(plan, episode.frames[0].snapshot, limits, driven)
+    return _told(plan, episode.frames[0].observation, limits, driven)
 
 
-def _told(plan: Plan, snapshot: Snapshot, limits: Limits, check: Check) -> tuple[Verdict, ...]:
+def _told(plan: Plan, observation: Observation, limits: Limits, check: Check) -> tuple[Verdict, ...]:
     """What a check says that only informs: if it breaks, that is told as well, and stops nothing."""
-    return tuple(replace(verdict, vetoes=False) for verdict in run_checks(plan, snapshot, limits, (check,)))
+    return tuple(replace(verdict, vetoes=False) for verdict in run_checks(plan, observation, limits, (check,)))
 
 
 def trip_s(scenario: Scenario) -> float:
     """How long a trip may take, in simulated time."""
-    return MAX_PARKING_S if scenario.world == "parking" else MAX_TRIP_S
+    return make_world(scenario).capabilities.horizon_s
 
 
 def drive_policy(
@@ -257,27 +263,17 @@ def drive_policy(
     Raises:
         ScenarioError: The road has no such way, or this kind of policy drives no car here.
     """
-    shield = shield_for(world, limits) if shielded else None
-    match policy:
-        case Program():
-            return drive_program(
-                world,
-                policy.source,
-                referee,
-                max_s,
-                watch,
-                library=policy.library,
-                sandbox=sandbox,
-                shield=shield,
-                limits=limits,
-                minimum_speed=minimum_speed,
-            )
-        case Parameters():
-            return drive_parameters(world, policy, referee, max_s=max_s, limits=limits, shield=shield, watch=watch)
-        case _:
-            raise ScenarioError(
-                f"A policy of the kind {policy.kind!r} drives no simulated car.", hint="Use another planner."
-            )
+    return drive_executed(
+        world,
+        policy,
+        referee,
+        max_s=max_s,
+        limits=limits,
+        shield=shield_for(world, limits) if shielded else None,
+        watch=watch,
+        minimum_speed=minimum_speed and policy.kind == "program",
+        executor=ProgramDrive(world, sandbox=sandbox) if policy.kind == "program" else None,
+    )
 
 
 def drive_program(
@@ -302,11 +298,46 @@ def drive_program(
     every command, `limits` bound the set-points, and a stop within `stop_zone_m` of its sign serves it; LaMPilot's own
     rules know neither shield nor bounds.
     """
-    with ProgramExecutor(budget=UNHURRIED, library=library, sandbox=sandbox, stop_zone_m=stop_zone_m) as executor:
-        executor.start(source, world)
+    return drive_executed(
+        world,
+        Program(source, library=library),
+        referee,
+        max_s=max_s,
+        limits=limits,
+        shield=shield,
+        record=record,
+        watch=watch,
+        minimum_speed=minimum_speed,
+        executor=ProgramDrive(world, sandbox=sandbox, stop_zone_m=stop_zone_m),
+    )
+
+
+def drive_executed(
+    world: World,
+    policy: OfKind,
+    referee: Referee | None = None,
+    *,
+    max_s: float,
+    limits: Limits | None = None,
+    shield: Shield | None = None,
+    record: bool = True,
+    watch: Callable[[Frame], None] | None = None,
+    minimum_speed: bool = False,
+    executor: Executor | None = None,
+) -> Episode:
+    """The one way a policy of any kind is driven in simulated time, on a world just reset.
+
+    `executor` drives it, by default the one that is registered for its kind; it is closed in the end.
+
+    Raises:
+        ScenarioError: It cannot be driven in this world.
+        MissingExtraError: What its executor needs is not installed.
+    """
+    with closing(executor_for(policy, world) if executor is None else executor) as driving:
+        driving.start(policy, world.observe(), Limits() if limits is None else limits)
         return run_episode(
             world,
-            executor,
+            driving,
             referee,
             max_s=max_s,
             record=record,
@@ -320,20 +351,6 @@ def drive_program(
 def drive_without_program(world: World, referee: Referee | None, max_s: float, **options: Any) -> Episode:
     """Let the world's own driver keep its initial wishes: the IDM baseline."""
     return run_episode(world, None, referee, max_s=max_s, **options)
-
-
-def unusable(plan: Plan, verdicts: tuple[Verdict, ...]) -> bool:
-    """Whether a plan that is not driven failed as a policy (no program, or not of the language), not as a wish."""
-    if plan.refusal:
-        return plan.intent == "unusable"
-    return bool(verdicts) and verdicts[0].stops
-
-
-def declined(plan: Plan, verdicts: tuple[Verdict, ...]) -> str:
-    """Why a plan is not driven, in words; empty when it may be."""
-    if plan.refusal:
-        return plan.refusal
-    return reasons_once(verdicts)
 
 
 def make_trip(

@@ -10,11 +10,11 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Final
 
-from chauffeur.concept import Context, Snapshot
+from chauffeur.concept import Context, Observation
+from chauffeur.concept.data import data_home
 from chauffeur.describe import describe_with_traffic
 from chauffeur.describe.services.sourced import FOR_SIMULATED, with_sources
 from chauffeur.describe.services.sources import Sources, SourceSettings
-from chauffeur.memory.files import data_home
 
 SERVICES_FILE: Final = "services.toml"
 
@@ -35,12 +35,14 @@ async def opened(where: SourceSettings | None) -> AsyncGenerator[Sources | None]
         yield sources
 
 
-async def describing(sources: Sources | None) -> Callable[[Snapshot], Context]:
+async def describing(
+    sources: Sources | None, describe: Callable[[Observation], Context] = describe_with_traffic
+) -> Callable[[Observation], Context]:
     """How C is made with what the sources know by now; bounded in time, and never an error of theirs.
 
-    Without sources, of what is seen alone.
+    Without sources, of what `describe` says alone.
     """
     if sources is None:
-        return describe_with_traffic
+        return describe
     found = await sources.look()
-    return lambda snapshot: with_sources(describe_with_traffic(snapshot), found, sources.place_words(), FOR_SIMULATED)
+    return lambda observation: with_sources(describe(observation), found, sources.place_words(), FOR_SIMULATED)

@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Final, NamedTuple, Self
 
 from chauffeur.geometry.pose import Pose
 
@@ -19,6 +19,23 @@ if TYPE_CHECKING:  # the command line says hello without NumPy
 
 SAME_M: Final = 1e-6
 """Points that are closer together than this are one."""
+_MANY_LEGS: Final = 40
+"""From so many legs on those that may be the closest are chosen all at once."""
+
+
+class _Leg(NamedTuple):
+    """What is asked of a leg again and again: where it begins, its way, stations, direction."""
+
+    x_m: float
+    y_m: float
+    dx_m: float
+    dy_m: float
+    start_m: float
+    end_m: float
+    length_m: float
+    cos: float
+    sin: float
+    heading_rad: float
 
 
 @dataclass(frozen=True)
@@ -77,11 +94,9 @@ class Polyline:
 
     def at(self, station_m: float) -> Pose:
         """The pose of who drives it, after a distance."""
-        stations = self.stations_m
-        low = self._leg(station_m)
-        (ax, ay), (bx, by) = self.points_m[low], self.points_m[low + 1]
-        share = (station_m - stations[low]) / (stations[low + 1] - stations[low])
-        return Pose(ax + share * (bx - ax), ay + share * (by - ay), math.atan2(by - ay, bx - ax))
+        leg = self._legs[self._leg(station_m)]
+        share = (station_m - leg.start_m) / leg.length_m
+        return Pose(leg.x_m + share * leg.dx_m, leg.y_m + share * leg.dy_m, leg.heading_rad)
 
     def poses(self, stations_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(x, y, heading), each (k,), at (k,) stations: `at` of all of them at once."""
@@ -103,19 +118,48 @@ class Polyline:
         """Station of the point closest to a place, looked for between two stations; may lie beyond the ends."""
         best, found = math.inf, low_m
         last = len(self.points_m) - 2
-        for i in range(self._leg(low_m), self._leg(high_m) + 1):
-            (ax, ay), (bx, by) = self.points_m[i], self.points_m[i + 1]
-            start, end = self.stations_m[i], self.stations_m[i + 1]
-            least = max(low_m, start if i else -math.inf)
-            most = min(high_m, end if i < last else math.inf)
-            length = end - start
-            ux, uy = (bx - ax) / length, (by - ay) / length
+        first = 0 if low_m == -math.inf else self._leg(low_m)
+        legs: Sequence[int] = range(first, (last if high_m == math.inf else self._leg(high_m)) + 1)
+        if len(legs) > _MANY_LEGS:
+            legs = self._closest_legs(x_m, y_m, legs[0], legs[-1])
+        for i in legs:
+            ax, ay, _, _, start, end, _, ux, uy, _ = self._legs[i]
+            least = max(low_m, start) if i else low_m
+            most = min(high_m, end) if i < last else high_m
             along = max(least, min(most, start + (x_m - ax) * ux + (y_m - ay) * uy))
             px, py = ax + (along - start) * ux, ay + (along - start) * uy
             distance = (x_m - px) ** 2 + (y_m - py) ** 2
             if distance < best:
                 best, found = distance, along
         return found
+
+    @cached_property
+    def _legs(self) -> tuple[_Leg, ...]:
+        """All of its legs."""
+        legs: list[_Leg] = []
+        for (ax, ay), (bx, by), start, end in zip(
+            self.points_m, self.points_m[1:], self.stations_m, self.stations_m[1:], strict=False
+        ):
+            dx, dy, length = bx - ax, by - ay, end - start
+            legs.append(_Leg(ax, ay, dx, dy, start, end, length, dx / length, dy / length, math.atan2(dy, dx)))
+        return tuple(legs)
+
+    def _closest_legs(self, x_m: float, y_m: float, first: int, last: int) -> list[int]:
+        """Of many legs those that may be the closest: no other can, and the ends, which go on straight."""
+        import numpy as np
+
+        x, y, reach = self._middles
+        away = np.hypot(x[first : last + 1] - x_m, y[first : last + 1] - y_m)
+        near = np.flatnonzero(away - reach[first : last + 1] <= (away + reach[first : last + 1]).min() + SAME_M)
+        return sorted({first, *(first + near).tolist(), last})
+
+    @cached_property
+    def _middles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(x, y) of the middle of each leg, and half its length."""
+        import numpy as np
+
+        middle = (self.points[:-1] + self.points[1:]) / 2.0
+        return middle[:, 0], middle[:, 1], np.diff(self.stations) / 2.0
 
     def offset(self, x_m: float, y_m: float, station_m: float) -> float:
         """How far left of the polyline a place lies at a station, m; negative to its right."""
@@ -159,6 +203,8 @@ class Polyline:
 
     def _leg(self, station_m: float) -> int:
         """Index of the leg that a station lies on."""
+        if len(self.stations_m) == 2:
+            return 0
         return max(0, min(bisect_right(self.stations_m, station_m), len(self.stations_m) - 1) - 1)
 
 

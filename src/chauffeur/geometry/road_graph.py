@@ -6,9 +6,11 @@ Lanes are polylines in the world frame (right-handed, m), driven from their firs
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
@@ -23,14 +25,18 @@ LaneId = str
 
 LaneKind = Literal["driving", "emergency", "aisle", "parking", "bicycle", "sidewalk", "crossing"]
 Turn = Literal["left", "straight", "right"]
+TURNS: Final[tuple[Turn, ...]] = ("left", "straight", "right")
 
 TURN_RAD: Final = math.radians(30.0)
 """A lane whose heading changes by more than this turns."""
 BACK_RAD: Final = math.radians(150.0)
 """A lane whose heading changes by more than this leads back: to the left where traffic drives on the right."""
-_CELL_M: Final = 20.0
-_REACH_M: Final = 60.0
-"""A place farther than this from every lane is looked for lane by lane."""
+_CELL_M: Final = 8.0
+"""Squares of the plane by which lanes are looked up."""
+_ROOM_M: Final = 100.0
+_ROOM_LANES: Final = 20
+_REACH_M: Final = 7.0
+"""A place farther than this from every lane is compared with all."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +53,9 @@ class Lane:
         index: Place among them, 0 leftmost.
         successors: Lanes it leads into.
         closed: Nobody may change into it (a ramp that ends, the shoulder).
+        change_left, change_right: Whether the marking on that side lets one change over it.
         junction: Name of the junction it crosses, empty outside of one.
+        turn: Which way it turns; worlds say so where ways part.
         street: Name of the street, empty where it has none.
     """
 
@@ -61,7 +69,10 @@ class Lane:
     successors: tuple[LaneId, ...] = ()
     closed: bool = False
     junction: str = ""
+    turn: Turn = "straight"
     street: str = ""
+    change_left: bool = True
+    change_right: bool = True
 
     @property
     def length_m(self) -> float:
@@ -74,18 +85,31 @@ class Lane:
         return self.kind == "emergency"
 
     @cached_property
-    def turn(self) -> Turn:
-        """Which way it turns, from the headings at its ends."""
+    def bend_rad(self) -> float:
+        """Change of heading from its start to its end, positive to the left."""
         headings = self.centre.headings
-        return turn_of(float(headings[-1] - headings[0]))
+        return wrap_to_pi(float(headings[-1] - headings[0]))
 
 
 def turn_of(change_rad: float) -> Turn:
-    """Which way a change of heading turns."""
+    """Which way a change of heading, counter-clockwise positive, turns."""
     change = wrap_to_pi(change_rad)
     if abs(change) <= TURN_RAD:
         return "straight"
     return "left" if change > 0.0 or change < -BACK_RAD else "right"
+
+
+class _Legs(NamedTuple):
+    """Straight legs of lanes, a column each (n,): row of the lane, station, start, direction, length, heading."""
+
+    lane: FloatArray
+    station: FloatArray
+    x: FloatArray
+    y: FloatArray
+    ux: FloatArray
+    uy: FloatArray
+    length: FloatArray
+    heading: FloatArray
 
 
 class LanePlace(NamedTuple):
@@ -96,15 +120,34 @@ class LanePlace(NamedTuple):
     offset_m: float
 
 
+_NUMBERS: Final = frozenset({"centre", "width_m", "speed_limit_mps"})
+"""Fields of a lane that are numbers, whatever library they come from."""
+
+
 @dataclass(frozen=True, eq=False)
 class RoadGraph:
-    """All lanes of a road network. Nothing in it changes while driving, and worlds share it between instants."""
+    """All lanes of a road network. Nothing in it changes while driving, and worlds share it between instants.
+
+    Attributes:
+        lanes: All of them.
+    """
 
     lanes: tuple[Lane, ...]
 
     def __eq__(self, other: object) -> bool:
         """Same lanes in the same order."""
-        return self is other or (isinstance(other, RoadGraph) and self.lanes == other.lanes)
+        return self is other or (isinstance(other, RoadGraph) and self._digest == other._digest)
+
+    @cached_property
+    def _digest(self) -> bytes:
+        """Of all that is in it: roads are compared at every instant of a replay, and a town has thousands of points."""
+        whole = hashlib.sha256()
+        for lane in self.lanes:
+            numbers = (float(value) for point in lane.centre.points_m for value in point)
+            whole.update(array("d", (lane.width_m, lane.speed_limit_mps, *numbers)).tobytes())
+            rest = {one.name: getattr(lane, one.name) for one in fields(lane) if one.name not in _NUMBERS}
+            whole.update(repr(rest).encode())
+        return whole.digest()
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -125,6 +168,21 @@ class RoadGraph:
         """The lane of a name, None where there is none."""
         return None if lane is None else self.by_id.get(lane)
 
+    @property
+    def least_limit_mps(self) -> float:
+        """The strictest sign of the whole road, m/s; 0 where there is no lane."""
+        return min((lane.speed_limit_mps for lane in self.lanes), default=0.0)
+
+    @cached_property
+    def uninterrupted(self) -> bool:
+        """Whether traffic flows on it without end: no junction, no aisle (the Highway Capacity Manual's motorways)."""
+        return not self.junctions and all(lane.kind in ("driving", "emergency") for lane in self.lanes)
+
+    @cached_property
+    def has_parking(self) -> bool:
+        """Whether there are spots to park in."""
+        return any(lane.kind == "parking" for lane in self.lanes)
+
     # Beside -----------------------------------------------------------------------------------------------------------
 
     @cached_property
@@ -144,10 +202,54 @@ class RoadGraph:
         index = self[lane].index + offset
         return next((one.id for one in self.abreast(lane) if one.index == index), None)
 
+    @cached_property
+    def _changes(self) -> dict[LaneId, tuple[tuple[LaneId, float], ...]]:
+        """What `changes` found already."""
+        return {}
+
+    def changes(self, lane: LaneId) -> tuple[tuple[LaneId, float], ...]:
+        """(neighbour, room) of the lanes that one may change into, left before right.
+
+        They are open, of the same kind, outside of junctions, and the marking between may be crossed.
+
+        The room is the distance over which the two run on beside each other, m, this stretch and those before and
+        behind it, counted up to `_ROOM_M`.
+        """
+        found = self._changes.get(lane)
+        if found is None:
+            own = self[lane]
+            sides = (
+                [] if own.junction else [side for side, may in ((-1, own.change_left), (1, own.change_right)) if may]
+            )
+            beside = [self.neighbour(lane, side) for side in sides]
+            found = self._changes[lane] = tuple(
+                (one, self._room_m(lane, one))
+                for one in beside
+                if one is not None and not self[one].closed and self[one].kind == own.kind
+            )
+        return found
+
+    def _room_m(self, lane: LaneId, other: LaneId) -> float:
+        room, side = self[lane].length_m, self.places_between(lane, other)
+        for ahead in (False, True):
+            a, b = lane, other
+            for _ in range(_ROOM_LANES):
+                if room >= _ROOM_M:
+                    return _ROOM_M
+                onward = self.successors if ahead else self.predecessors
+                pairs = [(p.id, q.id) for p in onward(a) for q in onward(b) if self.places_between(p.id, q.id) == side]
+                if len(pairs) != 1:
+                    break
+                a, b = pairs[0]
+                room += self[a].length_m
+        return room
+
     def places_between(self, lane: LaneId, other: LaneId) -> int | None:
-        """How many places to the right of a lane another lies; None where they are of different roads."""
-        own, its = self[lane], self[other]
-        return its.index - own.index if own.road == its.road and (own.road or own is its) else None
+        """How many places to the right of a lane another lies; None where they are of different roads, or unknown."""
+        own, its = self.get(lane), self.get(other)
+        if own is None or its is None or own.road != its.road or not (own.road or own is its):
+            return None
+        return its.index - own.index
 
     # Along ------------------------------------------------------------------------------------------------------------
 
@@ -168,15 +270,17 @@ class RoadGraph:
         return tuple(self[one] for one in self._before.get(lane, ()))
 
     def onward(self, lane: LaneId, turn: Turn | None = None) -> Lane | None:
-        """The lane that follows: where ways part the one that turns most to the asked side, else the straightest."""
+        """The lane that follows: where ways part one that turns to the asked side, else the straightest."""
         ways = self.successors(lane)
-        if not ways:
-            return None
-        if turn == "left":
-            return max(ways, key=_turned_rad)
-        if turn == "right":
-            return min(ways, key=_turned_rad)
-        return min(ways, key=lambda one: abs(_turned_rad(one)))
+        asked = [one for one in ways if one.turn == turn] if turn in ("left", "right") else []
+        if asked:
+            return max(asked, key=lambda one: abs(one.bend_rad))
+        return min(ways, key=lambda one: abs(one.bend_rad), default=None)
+
+    def turns(self, lane: LaneId) -> tuple[Turn, ...]:
+        """Ways on from the end of a lane, where there is a choice at all: left, straight, right."""
+        ways = {one.turn for one in self.successors(lane)} if len(self[lane].successors) > 1 else set[Turn]()
+        return tuple(turn for turn in TURNS if turn in ways)
 
     def ahead(self, lane: LaneId, turn: Turn | None = None) -> Iterator[Lane]:
         """A lane and what follows it, one after the other, each lane once."""
@@ -206,78 +310,129 @@ class RoadGraph:
     # Where ------------------------------------------------------------------------------------------------------------
 
     @cached_property
-    def _legs(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Of every leg of every lane: (row of lane, station), start (x, y), direction and length (ux, uy, length)."""
+    def _legs(self) -> _Legs:
+        """Every leg of every lane."""
         import numpy as np
 
-        rows: list[tuple[float, float]] = []
-        starts: list[tuple[float, float]] = []
-        ways: list[tuple[float, float, float]] = []
-        for row, lane in enumerate(self.lanes):
-            points, stations = lane.centre.points_m, lane.centre.stations_m
-            for i in range(len(points) - 1):
-                length = stations[i + 1] - stations[i]
-                (ax, ay), (bx, by) = points[i], points[i + 1]
-                rows.append((float(row), stations[i]))
-                starts.append((ax, ay))
-                ways.append(((bx - ax) / length, (by - ay) / length, length))
-        return np.array(rows), np.array(starts), np.array(ways)
+        table = [
+            (
+                row, stations[i], points[i][0], points[i][1],
+                (points[i + 1][0] - points[i][0]) / (stations[i + 1] - stations[i]),
+                (points[i + 1][1] - points[i][1]) / (stations[i + 1] - stations[i]),
+                stations[i + 1] - stations[i],
+            )
+            for row, lane in enumerate(self.lanes)
+            for points, stations in ((lane.centre.points_m, lane.centre.stations_m),)
+            for i in range(len(points) - 1)
+        ]  # fmt: skip
+        columns = np.array(table).T
+        row, station, x, y, ux, uy, length = columns
+        return _Legs(row, station, x, y, ux, uy, length, np.arctan2(uy, ux))
 
     @cached_property
     def _cells(self) -> Mapping[tuple[int, int], list[int]]:
-        """Legs that pass a square of the plane, or one beside it."""
-        _, starts, ways = self._legs
-        cells: dict[tuple[int, int], set[int]] = {}
-        for leg, ((x, y), (ux, uy, length)) in enumerate(zip(starts.tolist(), ways.tolist(), strict=True)):
-            for i in range(math.ceil(length / _CELL_M) + 1):
-                at = min(i * _CELL_M, length)
-                cx, cy = math.floor((x + at * ux) / _CELL_M), math.floor((y + at * uy) / _CELL_M)
-                for dx in (-1, 0, 1):
-                    for dy in (-1, 0, 1):
-                        cells.setdefault((cx + dx, cy + dy), set()).add(leg)
-        return {cell: sorted(legs) for cell, legs in cells.items()}
+        """Legs that pass a square of the plane, or one beside it: all that lie within reach of its places.
+
+        A leg is looked at in steps, so that no point of it is farther from one looked at than `_CELL_M` - `_REACH_M`.
+        """
+        legs = self._legs
+        cells: dict[tuple[int, int], list[int]] = {}
+        for leg, (x, y, ux, uy, length) in enumerate(
+            zip(*(one.tolist() for one in (legs.x, legs.y, legs.ux, legs.uy, legs.length)), strict=True)
+        ):
+            steps = max(1, math.ceil(length / (2.0 * (_CELL_M - _REACH_M))))
+            passed = {
+                (math.floor((x + at * ux) / _CELL_M), math.floor((y + at * uy) / _CELL_M))
+                for at in (i * length / steps for i in range(steps + 1))
+            }
+            for cell in {(cx + dx, cy + dy) for cx, cy in passed for dx in (-1, 0, 1) for dy in (-1, 0, 1)}:
+                cells.setdefault(cell, []).append(leg)
+        return cells
+
+    @cached_property
+    def _near(self) -> dict[tuple[int, int, tuple[LaneKind, ...]], _Legs | None]:
+        """Legs of the squares that somebody asked for, by the kinds asked for."""
+        return {}
 
     def locate(
         self, x_m: float, y_m: float, heading_rad: float | None = None, kinds: tuple[LaneKind, ...] = ()
     ) -> LanePlace | None:
         """The closest lane at a place, the heading error in rad counted as metres; None where there is no such lane.
 
+        Lanes above one another (a bridge) lie alike in the plane: the heading tells them apart where they cross, and
+        nothing does where they run along each other.
+
         Args:
             x_m, y_m: The place.
             heading_rad: Of whoever is there; None counts every direction alike.
             kinds: Only lanes of these kinds; all by default.
         """
-        found = self._closest(
-            self._cells.get((math.floor(x_m / _CELL_M), math.floor(y_m / _CELL_M))), x_m, y_m, heading_rad, kinds
-        )
-        return found if found is not None else self._closest(None, x_m, y_m, heading_rad, kinds)
+        cx, cy = math.floor(x_m / _CELL_M), math.floor(y_m / _CELL_M)
+        try:
+            near = self._near[cx, cy, kinds]
+        except KeyError:
+            near = self._near[cx, cy, kinds] = self._chosen(self._cells.get((cx, cy), ()), kinds)
+        if near is not None:
+            place, away = self._closest(near, x_m, y_m, heading_rad)
+            if away <= _REACH_M:
+                return place
+        everywhere = self._chosen(None, kinds)
+        return None if everywhere is None else self._closest(everywhere, x_m, y_m, heading_rad)[0]
 
-    def _closest(
+    def places(
         self,
-        legs: list[int] | None,
         x_m: float,
         y_m: float,
-        heading_rad: float | None,
-        kinds: tuple[LaneKind, ...],
-    ) -> LanePlace | None:
+        heading_rad: float | None = None,
+        kinds: tuple[LaneKind, ...] = (),
+        within_m: float = 1.5,
+        within_rad: float = math.pi / 4.0,
+    ) -> tuple[LanePlace, ...]:
+        """Every lane that passes a place, the closest first: lanes lie over one another where ways part and meet.
+
+        Without one that near, the closest there is (`locate`).
+        """
+        found: dict[LaneId, tuple[float, LanePlace]] = {}
+        near = self._chosen(self._cells.get((math.floor(x_m / _CELL_M), math.floor(y_m / _CELL_M)), ()), kinds)
+        for row in sorted({int(one) for one in near.lane}) if near is not None else ():
+            lane = self.lanes[row]
+            station = min(max(lane.centre.nearest(x_m, y_m), 0.0), lane.length_m)
+            pose = lane.centre.at(station)
+            away = math.hypot(x_m - pose.x_m, y_m - pose.y_m)
+            askew = 0.0 if heading_rad is None else abs(wrap_to_pi(heading_rad - pose.heading_rad))
+            if away <= within_m and askew <= within_rad:
+                found[lane.id] = away + askew, LanePlace(lane.id, station, pose.sees(x_m, y_m)[1])
+        if not found:
+            closest = self.locate(x_m, y_m, heading_rad, kinds)
+            return () if closest is None else (closest,)
+        return tuple(place for _, place in sorted(found.values(), key=lambda one: one[0]))
+
+    def _chosen(self, rows: Sequence[int] | None, kinds: tuple[LaneKind, ...]) -> _Legs | None:
+        """Legs of some rows, all for None, of lanes of some kinds; None where that is none."""
         import numpy as np
 
-        rows, starts, ways = self._legs
-        chosen = np.arange(len(rows)) if legs is None else np.array(legs)
+        legs = self._legs
+        chosen = np.arange(len(legs.lane)) if rows is None else np.array(rows, dtype=np.int64)
         if kinds:
-            chosen = chosen[[self.lanes[int(row)].kind in kinds for row in rows[chosen, 0]]]
-        if not len(chosen):
-            return None
-        delta = np.array([x_m, y_m]) - starts[chosen]
-        ux, uy, length = ways[chosen].T
-        along = np.clip(delta[:, 0] * ux + delta[:, 1] * uy, 0.0, length)
-        away = np.hypot(delta[:, 0] - along * ux, delta[:, 1] - along * uy)
+            wanted = np.array([lane.kind in kinds for lane in self.lanes])
+            chosen = chosen[wanted[legs.lane[chosen].astype(int)]]
+        return _Legs(*(one[chosen] for one in legs)) if len(chosen) else None
+
+    def _closest(self, legs: _Legs, x_m: float, y_m: float, heading_rad: float | None) -> tuple[LanePlace, float]:
+        """(place, distance and heading error) on the closest of some legs."""
+        import numpy as np
+
+        dx, dy = x_m - legs.x, y_m - legs.y
+        along = np.minimum(np.maximum(dx * legs.ux + dy * legs.uy, 0.0), legs.length)
+        dx, dy = dx - along * legs.ux, dy - along * legs.uy
+        away = np.sqrt(dx * dx + dy * dy)
         if heading_rad is not None:
-            away = away + np.abs(np.angle(np.exp(1j * (heading_rad - np.arctan2(uy, ux)))))
-        best = int(np.argmin(away))
-        row, station = rows[chosen[best]]
-        offset = ux[best] * delta[best, 1] - uy[best] * delta[best, 0]
-        return LanePlace(self.lanes[int(row)].id, float(station + along[best]), float(offset))
+            askew = np.abs(wrap_to_pi(heading_rad) - legs.heading)
+            away += np.minimum(askew, 2.0 * math.pi - askew)
+        best = int(away.argmin())
+        offset = legs.ux[best] * (y_m - legs.y[best]) - legs.uy[best] * (x_m - legs.x[best])
+        lane = self.lanes[int(legs.lane[best])].id
+        return LanePlace(lane, float(legs.station[best] + along[best]), float(offset)), float(away[best])
 
     # Across -----------------------------------------------------------------------------------------------------------
 
@@ -294,11 +449,13 @@ class RoadGraph:
     def _conflicts(self) -> Mapping[LaneId, tuple[LaneId, ...]]:
         found: dict[LaneId, list[LaneId]] = {}
         for lanes in self.junctions.values():
+            boxes = {lane.id: _bounds(lane.centre) for lane in lanes}
             for i, lane in enumerate(lanes):
                 for other in lanes[i + 1 :]:
                     merges = bool(set(lane.successors) & set(other.successors))
                     if merges or (
-                        not set(self._before.get(lane.id, ())) & set(self._before.get(other.id, ()))
+                        _boxes_meet(boxes[lane.id], boxes[other.id])
+                        and not set(self._before.get(lane.id, ())) & set(self._before.get(other.id, ()))
                         and lane.centre.crossings(other.centre)
                     ):
                         found.setdefault(lane.id, []).append(other.id)
@@ -310,7 +467,11 @@ class RoadGraph:
         return self._conflicts.get(lane, ())
 
 
-def _turned_rad(lane: Lane) -> float:
-    """Change of heading from the start of a lane to its end, positive to the left."""
-    headings = lane.centre.headings
-    return wrap_to_pi(float(headings[-1] - headings[0]))
+def _bounds(line: Polyline) -> tuple[float, float, float, float]:
+    """Least and greatest x, least and greatest y."""
+    xs, ys = zip(*line.points_m, strict=True)
+    return min(xs), max(xs), min(ys), max(ys)
+
+
+def _boxes_meet(one: tuple[float, float, float, float], other: tuple[float, float, float, float]) -> bool:
+    return one[0] <= other[1] and other[0] <= one[1] and one[2] <= other[3] and other[2] <= one[3]

@@ -11,12 +11,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from chauffeur.concept import Snapshot, VehicleState
+from chauffeur.concept import Observation, VehicleState
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.filmstrip import choose_moments
-from chauffeur.hmi.road import Box, Road, draw_road, track_box
+from chauffeur.hmi.road import Bounds, PaintedRoad, draw_road, track_box
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 
 MOMENTS = 6
@@ -75,7 +75,7 @@ class Chart:
 
 
 @dataclass(frozen=True, slots=True)
-class Strip:
+class DrivePictures:
     """A drive in pictures.
 
     Attributes:
@@ -89,7 +89,7 @@ class Strip:
     charts: tuple[Chart, ...]
 
 
-def draw_strip(recorded: RecordedTrip, name: str, moments: int = MOMENTS) -> Strip | None:
+def draw_strip(recorded: RecordedTrip, name: str, moments: int = MOMENTS) -> DrivePictures | None:
     """Draw a drive; None when nothing was driven.
 
     Args:
@@ -104,13 +104,13 @@ def draw_strip(recorded: RecordedTrip, name: str, moments: int = MOMENTS) -> Str
     chosen = choose_moments([shot.time_s for shot in shots], events_of(recorded), moments)
     path = tuple((shot.ego.x_m, shot.ego.y_m) for shot in shots)
     seen = track_box(path).grown(_WIDTH_M if camera.along else 3 * _AROUND_M)
-    road = _road(draw_road(shots[0].lanes, shots[0].objects, seen))
+    road = _road(draw_road(shots[0].road, shots[0].objects, seen))
     pictures: list[Picture] = []
     for moment in chosen:
         shot = shots[moment.index]
         if camera.along:
             left = shot.ego.x_m - _EGO_PLACE * _WIDTH_M
-            box = Box(left, camera.box.y0 - _BESIDE_M, left + _WIDTH_M, camera.box.y1 + _BESIDE_M)
+            box = Bounds(left, camera.box.y0 - _BESIDE_M, left + _WIDTH_M, camera.box.y1 + _BESIDE_M)
         else:
             box = camera.box.grown(_AROUND_M)
         # The road is drawn in the first picture and shown again in the others.
@@ -121,10 +121,10 @@ def draw_strip(recorded: RecordedTrip, name: str, moments: int = MOMENTS) -> Str
             caption += f" \N{EN DASH} {moment.event.label}"
         moving = _trail(shots[: moment.index + 1]) + _bodies(shot, box)
         pictures.append(Picture(shot.time_s, caption, _svg(box, ground + moving, caption, lengthwise=camera.along)))
-    return Strip(camera.along, tuple(pictures), _charts(shots, [p.time_s for p in pictures]))
+    return DrivePictures(camera.along, tuple(pictures), _charts(shots, [p.time_s for p in pictures]))
 
 
-def _svg(box: Box, content: str, label: str, *, lengthwise: bool) -> str:
+def _svg(box: Bounds, content: str, label: str, *, lengthwise: bool) -> str:
     width, height = box.x1 - box.x0, box.y1 - box.y0
     size = f' height="{_PIXELS_A_METRE * height:.0f}" preserveAspectRatio="xMidYMid slice"' if lengthwise else ""
     return (
@@ -133,7 +133,7 @@ def _svg(box: Box, content: str, label: str, *, lengthwise: bool) -> str:
     )
 
 
-def _road(road: Road) -> str:
+def _road(road: PaintedRoad) -> str:
     parts: list[str] = []
     for extra, look in ((3.0, "verge"), (0.8, "edge"), (0.06, "asphalt")):
         parts.extend(
@@ -147,6 +147,7 @@ def _road(road: Road) -> str:
         if surface.emergency
     )
     parts.extend(f'<polyline class="r-paint r-{line.style}" points="{_points(line.points_m)}"/>' for line in road.lines)
+    parts.extend(f'<polyline class="r-paint r-bar" points="{_points(bar)}"/>' for bar in road.bars_m)
     for sign in road.stop_signs:
         parts.append(f'<polyline class="r-stop-line" points="{_points(sign.line_m)}"/>')
         corners = [math.pi / 8 + i * math.pi / 4 for i in range(8)]
@@ -156,18 +157,23 @@ def _road(road: Road) -> str:
     return "".join(parts)
 
 
-def _trail(so_far: Sequence[Snapshot]) -> str:
+def _trail(so_far: Sequence[Observation]) -> str:
     kept = [*so_far[::_TRAIL_EVERY], so_far[-1]]
     return f'<polyline class="r-trail" points="{_points([(shot.ego.x_m, shot.ego.y_m) for shot in kept])}"/>'
 
 
-def _bodies(shot: Snapshot, box: Box) -> str:
+def _bodies(shot: Observation, box: Bounds) -> str:
     wide = box.grown(5.0)
 
     def visible(body: VehicleState) -> bool:
         return wide.x0 <= body.x_m <= wide.x1 and wide.y0 <= body.y_m <= wide.y1
 
     parts = [_body(thing, "obstacle") for thing in shot.objects if thing.kind == "obstacle" and visible(thing)]
+    parts.extend(
+        f'<circle class="r-cone" cx="{thing.x_m:.1f}" cy="{thing.y_m:.1f}" r="0.5"/>'
+        for thing in shot.objects
+        if thing.kind == "static" and visible(thing)
+    )
     parts.extend(_body(car, "crashed" if car.crashed else "other") for car in shot.others if visible(car))
     parts.append(_body(shot.ego, "ego crashed" if shot.ego.crashed else "ego"))
     return "".join(parts)
@@ -187,7 +193,7 @@ def _points(points: Sequence[tuple[float, float]]) -> str:
     return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
 
 
-def _charts(shots: Sequence[Snapshot], marks: Sequence[float]) -> tuple[Chart, ...]:
+def _charts(shots: Sequence[Observation], marks: Sequence[float]) -> tuple[Chart, ...]:
     times = [shot.time_s for shot in shots]
     speeds: list[float | None] = [max(shot.ego.speed_mps, 0.0) for shot in shots]
     gaps = [

@@ -12,12 +12,12 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
 
-from chauffeur.concept import DataError, Snapshot, VehicleState
+from chauffeur.concept import DataError, Observation, VehicleState
 from chauffeur.drive.files import publish
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
-from chauffeur.hmi.events import Event, EventKind, events_of
-from chauffeur.hmi.road import Box, Road, draw_road, track_box
+from chauffeur.hmi.events import EventKind, TripMark, events_of
+from chauffeur.hmi.road import BAR_M, Bounds, PaintedRoad, draw_road, track_box
 from chauffeur.hmi.shielding import stretches_of
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 
@@ -34,6 +34,9 @@ _EGO_PLACE = 0.36
 _BESIDE_M = 2.5
 _COLUMNS = 3
 _SHOWN_WITHIN_S = 0.15
+_WHOLE_M = 250.0
+"""A way that reaches farther is not shown as a whole: the pictures follow the car."""
+_FOLLOWED_M = 110.0
 _SUPERSAMPLE = 2
 
 _PAPER, _INK, _MUTED = "#f4f2ec", "#1c1f24", "#59606a"
@@ -42,6 +45,7 @@ _MARK, _CENTRE, _HATCH = "#f4f2ea", "#f2c14b", "#737a84"
 _CAR, _CAR_EDGE = "#d9dee4", "#2d3239"
 _EGO, _EGO_EDGE, _TRAIL = "#ffb224", "#4a2c00", "#c9963a"
 _OBSTACLE, _STOP, _CRASH = "#c9452f", "#b3201a", "#d6281e"
+_CONE = "#e8641b"
 _GUARD, _RING = "#5a3ea6", "#cbb9ff"
 
 _RANK: dict[EventKind, int] = {
@@ -63,7 +67,7 @@ class Moment:
     """One picture of the strip: which instant, and what happened there."""
 
     index: int
-    event: Event | None
+    event: TripMark | None
 
 
 def write_filmstrip(path: Path, recorded: RecordedTrip, frames: int = 6) -> Path:
@@ -90,7 +94,7 @@ def render_filmstrip(recorded: RecordedTrip, frames: int = 6) -> Image.Image:
         raise DataError("Nothing was driven, so there is no filmstrip.", hint="The page shows why.")
     camera = frame_drive(shots)
     moments = choose_moments([shot.time_s for shot in shots], events_of(recorded), frames)
-    road = draw_road(shots[0].lanes, shots[0].objects, track_box(_path(shots)).grown(200.0))
+    road = draw_road(shots[0].road, shots[0].objects, track_box(_path(shots)).grown(200.0))
 
     columns = 1 if camera.along else min(_COLUMNS, len(moments))
     width = (_WIDTH - 2 * _MARGIN - _GAP * (columns - 1)) / columns
@@ -100,6 +104,9 @@ def render_filmstrip(recorded: RecordedTrip, frames: int = 6) -> Image.Image:
         scale = width / (camera.box.x1 - camera.box.x0)
         height = min((camera.box.y1 - camera.box.y0) * scale, width * 1.2)
         scale = min(scale, height / (camera.box.y1 - camera.box.y0))
+    follows = not camera.along and max(camera.box.x1 - camera.box.x0, camera.box.y1 - camera.box.y0) > _WHOLE_M
+    if follows:  # the whole way would show no car
+        scale, height = width / _FOLLOWED_M, width
     rows = math.ceil(len(moments) / columns)
     shielded = words.shield_words([change for frame in recorded.frames for change in frame.interventions])
     top = _MARGIN + _TITLE_PX + 14 + _HEAD_PX + 28 + (_HEAD_PX + 10 if shielded else 0)
@@ -116,7 +123,8 @@ def render_filmstrip(recorded: RecordedTrip, frames: int = 6) -> Image.Image:
         now = [stretch.rule for stretch in stretches if stretch.start_s <= shot.time_s < stretch.end_s]
         _head(ImageDraw.Draw(sheet), shot, moment.event, now, x, y, width)
         middle_x = shot.ego.x_m + width / scale * (0.5 - _EGO_PLACE) if camera.along else _middle(camera.box)[0]
-        panel = _Panel(round(width * k), round(height * k), scale * k, middle_x, _middle(camera.box)[1])
+        middle = (shot.ego.x_m, shot.ego.y_m) if follows else (middle_x, _middle(camera.box)[1])
+        panel = _Panel(round(width * k), round(height * k), scale * k, *middle)
         panel.paint(road, shots[: moment.index + 1])
         if now:
             panel.ring(shot.ego)
@@ -124,7 +132,7 @@ def render_filmstrip(recorded: RecordedTrip, frames: int = 6) -> Image.Image:
     return sheet.resize((_WIDTH, round(total)), Image.Resampling.LANCZOS)
 
 
-def choose_moments(times: Sequence[float], events: Sequence[Event], count: int) -> tuple[Moment, ...]:
+def choose_moments(times: Sequence[float], events: Sequence[TripMark], count: int) -> tuple[Moment, ...]:
     """Evenly spread instants, each moved to the weightiest event of its own stretch of time.
 
     Args:
@@ -134,7 +142,7 @@ def choose_moments(times: Sequence[float], events: Sequence[Event], count: int) 
     """
     count = max(1, min(count, len(times)))
     spacing = (times[-1] - times[0]) / max(count - 1, 1)
-    chosen: dict[int, Event | None] = {}
+    chosen: dict[int, TripMark | None] = {}
     for slot in range(count):
         middle = times[0] + slot * spacing
         near = [e for e in events if abs(e.time_s - middle) < spacing / 2]
@@ -148,11 +156,11 @@ def choose_moments(times: Sequence[float], events: Sequence[Event], count: int) 
     return tuple(Moment(index, event) for index, event in sorted(chosen.items()))
 
 
-def _path(shots: Sequence[Snapshot]) -> tuple[tuple[float, float], ...]:
+def _path(shots: Sequence[Observation]) -> tuple[tuple[float, float], ...]:
     return tuple((shot.ego.x_m, shot.ego.y_m) for shot in shots)
 
 
-def _middle(box: Box) -> tuple[float, float]:
+def _middle(box: Bounds) -> tuple[float, float]:
     return (box.x0 + box.x1) / 2.0, (box.y0 + box.y1) / 2.0
 
 
@@ -194,8 +202,8 @@ def _title(draw: ImageDraw.ImageDraw, recorded: RecordedTrip, shielded: str) -> 
 
 def _head(
     draw: ImageDraw.ImageDraw,
-    shot: Snapshot,
-    event: Event | None,
+    shot: Observation,
+    event: TripMark | None,
     rules: Sequence[str],
     x: float,
     y: float,
@@ -231,7 +239,7 @@ class _Panel:
         self._scale = scale
         self._middle = middle_x, middle_y
 
-    def paint(self, road: Road, so_far: Sequence[Snapshot]) -> None:
+    def paint(self, road: PaintedRoad, so_far: Sequence[Observation]) -> None:
         """Road, traffic and the ego at the last of the instants, with its way so far."""
         shot = so_far[-1]
         for extra, ink in ((3.0, _VERGE), (0.8, _EDGE), (0.06, _ASPHALT)):
@@ -244,6 +252,8 @@ class _Panel:
             ink = _CENTRE if line.style == "centre" else _MARK
             for piece in _dashes(line.points_m) if line.style == "dashed" else [line.points_m]:
                 self._line(piece, 0.17, ink)
+        for bar in road.bars_m:
+            self._line(bar, BAR_M, _MARK)
         self._line(_path(so_far), 0.45, _TRAIL)
         for sign in road.stop_signs:
             self._line(sign.line_m, 0.5, _MARK)
@@ -251,6 +261,8 @@ class _Panel:
         for thing in shot.objects:
             if thing.kind == "obstacle":
                 self._body(thing, _OBSTACLE, _CAR_EDGE)
+            elif thing.kind == "static":
+                self._cone(thing)
         for car in shot.others:
             self._body(car, _CRASH if car.crashed else _CAR, _CAR_EDGE)
         self._body(shot.ego, _CRASH if shot.ego.crashed else _EGO, _EGO_EDGE, halo=True)
@@ -291,6 +303,13 @@ class _Panel:
         shape = [(x + radius * math.cos(a), y + radius * math.sin(a)) for a in corners]
         self._draw.polygon(shape, fill=_STOP, outline="#ffffff", width=3)
         self._draw.text((x, y), "STOP", "#ffffff", ImageFont.load_default(radius * 0.62), anchor="mm")
+
+    def _cone(self, thing: VehicleState) -> None:
+        x, y = self._at(thing.x_m, thing.y_m)
+        radius = max(5.0, 0.5 * max(thing.length_m, thing.width_m) * self._scale)
+        for share, ink in ((1.0, _CONE), (0.62, "#ffffff"), (0.38, _CONE)):
+            own = radius * share
+            self._draw.ellipse((x - own, y - own, x + own, y + own), fill=ink)
 
     def _body(self, body: VehicleState, fill: str, edge: str, *, halo: bool = False) -> None:
         if halo:

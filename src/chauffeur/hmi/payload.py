@@ -5,6 +5,7 @@ Text stays text here and is set with `textContent` there, so nothing a person or
 
 from __future__ import annotations
 
+import base64
 import json
 import math
 from collections.abc import Iterable
@@ -16,10 +17,11 @@ from chauffeur.concept import (
     HistoryItem,
     LaneId,
     Mismatch,
+    Observation,
     Parameters,
     Policy,
     Program,
-    Snapshot,
+    Trajectory,
     Trip,
     VehicleState,
     Verdict,
@@ -27,11 +29,13 @@ from chauffeur.concept import (
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
-from chauffeur.hmi.road import Box, Road, draw_road, track_box
+from chauffeur.hmi.road import BAR_M, Bounds, PaintedRoad, draw_road, track_box
 from chauffeur.hmi.shielding import rule_counts, stretches_of
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 from chauffeur.safety.alignment import KINDS, score_words
 
+_WAYPOINTS_TOLD = 6
+_STRAIGHT_M = 0.05
 _SIGHT_M = 260.0
 """Nothing farther from the ego's path than this is ever on the screen."""
 
@@ -53,6 +57,7 @@ def page_payload(recorded: RecordedTrip) -> Json:
         "refusal": trip.plan.refusal,
         "settings": [words.setting(name, value) for name, value in trip.plan.settings],
         "thoughts": trip.plan.thoughts.text,
+        "view": "" if recorded.view is None else _data_uri(recorded.view.png()),
         "program": _program_lines(trip.plan.policy),
         "policy": policy_words(trip.plan.policy),
         "verdicts": [
@@ -81,6 +86,10 @@ def page_payload(recorded: RecordedTrip) -> Json:
         "events": [{"t": round(e.time_s, 2), "kind": e.kind, "label": e.label} for e in events_of(recorded)],
         "drive": _drive(recorded),
     }
+
+
+def _data_uri(png: bytes) -> str:
+    return f"data:image/png;base64,{base64.b64encode(png).decode()}"
 
 
 def provenance(trip: Trip) -> list[tuple[str, str]]:
@@ -118,7 +127,20 @@ def policy_words(policy: Policy | None) -> str:
     if isinstance(policy, ActionMatrix):
         pid, mpc = policy.pid, policy.mpc
         return f"Kp {pid[0]:g}  Ki {pid[1]:g}  Kd {pid[2]:g}\nWl {mpc[0]:g}  Wh {mpc[1]:g}  Ws {mpc[2]:g}"
-    return "\n".join(f"{x:.2f} m ahead, {y:.2f} m left" for x, y in policy.waypoints_m)
+    return _waypoint_words(policy)
+
+
+def _waypoint_words(policy: Trajectory) -> str:
+    """How many waypoints in which time, and some of them, evenly, the last among them."""
+    count = len(policy.waypoints_m)
+    told = min(count, _WAYPOINTS_TOLD)
+    some = [round((i + 1) * count / told) - 1 for i in range(told)]
+    lines = [f"{count} waypoints in {count * policy.period_s:.1f} s" + ("; of them" if len(some) < count else "")]
+    for place in some:
+        x, y = policy.waypoints_m[place]
+        aside = "" if abs(y) < _STRAIGHT_M else f", {abs(y):.1f} m to the {'left' if y > 0.0 else 'right'}"
+        lines.append(f"{(place + 1) * policy.period_s:.1f} s: {x:.1f} m ahead{aside}")
+    return "\n".join(lines)
 
 
 def program_tokens(source: str) -> list[list[tuple[str, str]]]:
@@ -233,18 +255,20 @@ def _drive(recorded: RecordedTrip) -> Json | None:
     frames = recorded.frames
     # The instant after the last command has no wishes of its own: it shows the last ones.
     rows: tuple[Frame | None, ...] = frames + (frames[-1:] or (None,)) * (len(shots) - len(frames))
-    lanes = shots[0].lanes
+    lanes = shots[0].road.lanes
     limits = {lane.id: lane.speed_limit_mps for lane in lanes}
     camera = frame_drive(shots)
     sight = track_box(tuple((s.ego.x_m, s.ego.y_m) for s in shots)).grown(_SIGHT_M)
-    road = draw_road(lanes, shots[0].objects, sight)
+    road = draw_road(shots[0].road, shots[0].objects, sight)
     return {
         "time": [round(s.time_s, 2) for s in shots],
         "camera": {"along": camera.along, "box": [round(edge, 2) for edge in camera.box.edges]},
         "road": _road(road),
         "obstacles": [_body(o) for o in shots[0].objects if o.kind == "obstacle"],
+        "cones": [_body(o) for o in shots[0].objects if o.kind == "static"],
         "ego": {**_column([s.ego for s in shots]), "first": 0, "l": shots[0].ego.length_m, "w": shots[0].ego.width_m},
         "cars": _cars(shots, sight),
+        "lights": _lights(shots, sight),
         "speed": [round(s.ego.speed_mps, 2) for s in shots],
         "acceleration": [round(row.applied.acceleration_mps2, 2) if row else 0.0 for row in rows],
         "asked": [round(row.requested.acceleration_mps2, 2) if row else 0.0 for row in rows],
@@ -253,13 +277,13 @@ def _drive(recorded: RecordedTrip) -> Json | None:
         "gap": [_rounded(s.front.distance_m) if s.front else None for s in shots],
         "lead": [s.front.vehicle if s.front else None for s in shots],
         "stop": [_rounded(s.stop_sign_m) for s in shots],
-        "lane": [_lane_words(s, lanes) for s in shots],
+        "lane": [_lane_words(s) for s in shots],
         "goal": [_goal(row, s, road) for row, s in zip(rows, shots, strict=True)],
         "turn": [row.wishes.turn if row else None for row in rows],
         "state": [row.program if row else "none" for row in rows],
         "line": [row.line if row else None for row in rows],
         "calls": [[[c.name, c.args, c.result] for c in row.calls] if row else [] for row in rows],
-        "said": [[round(f.snapshot.time_s, 2), text] for f in frames for text in f.said],
+        "said": [[round(f.observation.time_s, 2), text] for f in frames for text in f.said],
     }
 
 
@@ -287,7 +311,7 @@ def _column(states: list[VehicleState]) -> Json:
     }
 
 
-def _cars(shots: tuple[Snapshot, ...], sight: Box) -> list[Json]:
+def _cars(shots: tuple[Observation, ...], sight: Bounds) -> list[Json]:
     """Every other car that comes into sight; one entry per unbroken stay on the road."""
     stays: dict[int, list[tuple[int, list[VehicleState]]]] = {}
     for index, shot in enumerate(shots):
@@ -304,6 +328,7 @@ def _cars(shots: tuple[Snapshot, ...], sight: Box) -> list[Json]:
             "first": first,
             "l": states[0].length_m,
             "w": states[0].width_m,
+            "k": states[0].kind,
             "v": [round(state.speed_mps, 1) for state in states],
             **_column(states),
         }
@@ -312,7 +337,22 @@ def _cars(shots: tuple[Snapshot, ...], sight: Box) -> list[Json]:
     ]
 
 
-def _road(road: Road) -> Json:
+def _lights(shots: tuple[Observation, ...], sight: Bounds) -> list[Json]:
+    """Every traffic light that comes into sight: its stop line, and (instant, state) from each change on."""
+    found: dict[str, Json] = {}
+    for index, shot in enumerate(shots):
+        for light in shot.signals:
+            (ax, ay), (bx, by) = light.stop_line_m
+            if not (sight.x0 <= ax <= sight.x1 and sight.y0 <= ay <= sight.y1):
+                continue
+            line = [round(value, 2) for value in (ax, ay, bx, by)]
+            one = found.setdefault(light.id, {"p": line, "s": cast("list[list[Any]]", [])})
+            if not one["s"] or one["s"][-1][1] != light.state:
+                one["s"].append([index, light.state])
+    return list(found.values())
+
+
+def _road(road: PaintedRoad) -> Json:
     def flat(points: Iterable[tuple[float, float]]) -> list[float]:
         return [round(value, 2) for point in points for value in point]
 
@@ -320,10 +360,11 @@ def _road(road: Road) -> Json:
         "surfaces": [{"p": flat(s.centre_m), "w": s.width_m, "e": s.emergency} for s in road.surfaces],
         "lines": [{"p": flat(line.points_m), "s": line.style} for line in road.lines],
         "signs": [{"post": flat([s.post_m]), "line": flat(s.line_m)} for s in road.stop_signs],
+        "bars": {"w": BAR_M, "p": [flat(bar) for bar in road.bars_m]},
     }
 
 
-def _goal(row: Frame | None, shot: Snapshot, road: Road) -> int | None:
+def _goal(row: Frame | None, shot: Observation, road: PaintedRoad) -> int | None:
     """Index of the surface the policy wants to be on, while the ego is on another lane."""
     wanted: LaneId | None = row.wishes.target_lane if row else None
     if wanted is None or wanted == shot.ego.lane:
@@ -331,14 +372,13 @@ def _goal(row: Frame | None, shot: Snapshot, road: Road) -> int | None:
     return next((index for index, surface in enumerate(road.surfaces) if surface.lane == wanted), None)
 
 
-def _lane_words(shot: Snapshot, lanes: Iterable[Any]) -> str:
-    if shot.ego.lane is None or shot.off_road:
+def _lane_words(shot: Observation) -> str:
+    lane = shot.road.get(shot.ego.lane)
+    if lane is None or shot.off_road:
         return "off the road"
-    if shot.kind == "intersection":
+    if lane.junction or len(shot.road.junctions) == 1:  # at a lone crossing the lanes of its arms have no numbers
         return ""
-    start, end, place = shot.ego.lane
-    abreast = [lane for lane in lanes if lane.id[:2] == (start, end)]
-    if any(lane.emergency and lane.id[2] == place for lane in abreast):
+    if lane.emergency:
         return "emergency lane"
-    count = sum(not lane.emergency for lane in abreast)
-    return f"lane {place + 1} of {count}"
+    count = sum(beside.kind in ("driving", "aisle") for beside in shot.road.abreast(lane.id))
+    return f"lane {lane.index + 1} of {count}"

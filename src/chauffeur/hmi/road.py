@@ -1,19 +1,21 @@
 """A road as it looks from above: surfaces, painted lines and signs, worked out from lane geometry.
 
-Worlds give centrelines only. A line between two lanes of one road is dashed, towards an emergency lane or the verge
-solid, between opposite directions a centre line. An edge that lies on another lane's surface is not painted: that is
-how the inside of an intersection stays clear.
+Worlds give centrelines only; here they are in the frame of pictures (`view`), with y downwards. A line between two
+lanes of one road is dashed, towards an emergency lane or the verge solid, between opposite directions a centre line. An
+edge that lies on another lane's surface is not painted: that is how the inside of an intersection stays clear. A lane
+on which people cross is painted as the bars of a crosswalk.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chauffeur.concept import LaneId, LaneView, VehicleState
+from chauffeur.concept import Lane, LaneId, RoadGraph, VehicleState
 
 Points = tuple[tuple[float, float], ...]
 LineStyle = Literal["solid", "dashed", "centre"]
@@ -22,8 +24,12 @@ _Array = NDArray[np.float64]
 _SAMPLE_M = 1.0
 _SHORTEST_LINE_M = 3.0
 """Shorter runs are leftovers where lanes fan out."""
+_BESIDE_M = 12.0
+"""Lanes farther apart than this, from middle to middle, share no line."""
 _ON_EDGE_M = 0.35
 _STRAIGHT_M = 0.02
+BAR_M = 0.5
+"""Width of a crosswalk's bar, and of the gap between two."""
 _SIGN_OFFSET_M = 4.2
 """From the middle of the lane to the post: half a lane and a step into the verge."""
 
@@ -39,7 +45,7 @@ class Surface:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class PaintedLine:
     """One painted line."""
 
     points_m: Points
@@ -55,16 +61,18 @@ class StopSign:
 
 
 @dataclass(frozen=True, slots=True)
-class Road:
+class PaintedRoad:
     """Everything to be drawn that does not move."""
 
     surfaces: tuple[Surface, ...]
-    lines: tuple[Line, ...]
+    lines: tuple[PaintedLine, ...]
     stop_signs: tuple[StopSign, ...]
+    bars_m: tuple[Points, ...] = ()
+    """The middle lines of the bars of crosswalks, each `BAR_M` wide."""
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class Bounds:
     """An axis-aligned rectangle in world metres."""
 
     x0: float
@@ -77,9 +85,9 @@ class Box:
         """(x0, y0, x1, y1)."""
         return self.x0, self.y0, self.x1, self.y1
 
-    def grown(self, margin_m: float) -> Box:
+    def grown(self, margin_m: float) -> Bounds:
         """The box, larger by a margin on every side."""
-        return Box(self.x0 - margin_m, self.y0 - margin_m, self.x1 + margin_m, self.y1 + margin_m)
+        return Bounds(self.x0 - margin_m, self.y0 - margin_m, self.x1 + margin_m, self.y1 + margin_m)
 
     def holds(self, points: _Array) -> NDArray[np.bool_]:
         """Which of the points lie inside."""
@@ -87,50 +95,55 @@ class Box:
         return (x >= self.x0) & (x <= self.x1) & (y >= self.y0) & (y <= self.y1)
 
 
-def track_box(track: Points) -> Box:
+def track_box(track: Points) -> Bounds:
     """Bounding box of a path."""
     xs, ys = [x for x, _ in track], [y for _, y in track]
-    return Box(min(xs), min(ys), max(xs), max(ys))
+    return Bounds(min(xs), min(ys), max(xs), max(ys))
 
 
-def draw_road(lanes: tuple[LaneView, ...], objects: tuple[VehicleState, ...], visible: Box) -> Road:
+def draw_road(road: RoadGraph, objects: tuple[VehicleState, ...], visible: Bounds) -> PaintedRoad:
     """Work out what to draw of a road.
 
     Args:
-        lanes: The road.
+        road: The lanes.
         objects: Signs and obstacles; only signs are drawn here.
         visible: Part of the world that can be seen, in m.
     """
-    centres = [_resample(lane.centre_m) for lane in lanes]
+    lanes = tuple(lane for lane in road.lanes if lane.kind not in ("sidewalk", "crossing"))
+    centres = [_resample(lane.centre.points_m) for lane in lanes]
     surfaces = tuple(
         Surface(lane.id, _simplify(centre[part]), lane.width_m, lane.emergency)
         for lane, centre in zip(lanes, centres, strict=True)
         for part in _runs(visible.holds(centre))
     )
     near = [index for index, centre in enumerate(centres) if bool(visible.holds(centre).any())]
-    lines: list[Line] = []
+    bounds = np.array([[*centre.min(axis=0), *centre.max(axis=0)] for centre in centres]).reshape(-1, 4)
+    lines: list[PaintedLine] = []
     for index in near:
-        lines.extend(_lines_of(index, lanes, centres, near, visible))
+        x0, y0, x1, y1 = bounds[index] + np.array([-_BESIDE_M, -_BESIDE_M, _BESIDE_M, _BESIDE_M])
+        meets = (bounds[:, 0] <= x1) & (bounds[:, 2] >= x0) & (bounds[:, 1] <= y1) & (bounds[:, 3] >= y0)
+        lines.extend(_lines_of(index, lanes, centres, [other for other in near if meets[other]], visible))
     signs = tuple(_stop_sign(o, lanes, centres, near) for o in objects if o.kind == "stop_sign" and near)
-    return Road(surfaces, tuple(lines), signs)
+    crossings = [lane for lane in road.lanes if lane.kind == "crossing"]
+    bars = tuple(bar for lane in crossings for bar in _bars(lane) if bool(visible.holds(np.array(bar)).any()))
+    return PaintedRoad(surfaces, tuple(lines), signs, bars)
 
 
 def _lines_of(
-    index: int, lanes: tuple[LaneView, ...], centres: list[_Array], near: list[int], visible: Box
-) -> list[Line]:
+    index: int, lanes: tuple[Lane, ...], centres: list[_Array], near: list[int], visible: Bounds
+) -> list[PaintedLine]:
     lane, centre = lanes[index], centres[index]
-    by_id = {lanes[i].id: lanes[i] for i in near}
-    start, end, place = lane.id
-    lines: list[Line] = []
+    places = {(lanes[i].road, lanes[i].index): lanes[i] for i in near if lanes[i].road}
+    lines: list[PaintedLine] = []
     for side in (-1, 1):
         edge = centre + _right_normal(centre) * (side * lane.width_m / 2.0)
-        beside = by_id.get((start, end, place + side))
+        beside = places.get((lane.road, lane.index + side))
         if beside is not None:
             if side < 0:
                 continue  # the lane to the left paints it
             style: LineStyle = "solid" if beside.emergency or lane.emergency else "dashed"
             shown = visible.holds(edge)
-            lines.extend(Line(_simplify(edge[part]), style) for part in _runs(shown))
+            lines.extend(PaintedLine(_simplify(edge[part]), style) for part in _runs(shown))
             continue
         shown, centre_line = visible.holds(edge), np.zeros(len(edge), dtype=np.bool_)
         for other in near:
@@ -148,11 +161,24 @@ def _lines_of(
             for part in _runs(mask):
                 points = edge[part]
                 if np.hypot(*(points[-1] - points[0])) >= _SHORTEST_LINE_M:
-                    lines.append(Line(_simplify(points), name))  # type: ignore[arg-type]
+                    lines.append(PaintedLine(_simplify(points), name))  # type: ignore[arg-type]
     return lines
 
 
-def _stop_sign(sign: VehicleState, lanes: tuple[LaneView, ...], centres: list[_Array], near: list[int]) -> StopSign:
+def _bars(lane: Lane) -> list[Points]:
+    """Across the way of those who cross, one a metre."""
+    line, half = lane.centre, lane.width_m / 2.0
+    many = int(line.length_m // (2.0 * BAR_M))
+    first = (line.length_m - (2 * many - 1) * BAR_M) / 2.0 + BAR_M / 2.0
+    found: list[Points] = []
+    for i in range(many):
+        pose = line.at(first + 2.0 * BAR_M * i)
+        ux, uy = -math.sin(pose.heading_rad) * half, math.cos(pose.heading_rad) * half
+        found.append(((pose.x_m - ux, pose.y_m - uy), (pose.x_m + ux, pose.y_m + uy)))
+    return found
+
+
+def _stop_sign(sign: VehicleState, lanes: tuple[Lane, ...], centres: list[_Array], near: list[int]) -> StopSign:
     point = np.array([[sign.x_m, sign.y_m]])
     candidates = [i for i in near if lanes[i].id == sign.lane] or near
     _, index = min((float(_distance(point, centres[i])[0][0]), i) for i in candidates)
@@ -182,7 +208,7 @@ def _direction(centre: _Array) -> _Array:
 
 
 def _right_normal(centre: _Array) -> _Array:
-    """Unit vector to the right of travel; y grows to the right of +x in the worlds."""
+    """Unit vector to the right of travel, in the frame of pictures: y grows to the right of +x."""
     direction = _direction(centre)
     return np.column_stack([-direction[:, 1], direction[:, 0]])
 

@@ -13,7 +13,7 @@ _PAUSE_S = 0.45
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class ShieldedStretch:
     """A time during which a rule changed commands.
 
     Attributes:
@@ -42,14 +42,14 @@ class RuleCount:
     changes: int
 
 
-def stretches_of(frames: Sequence[Frame]) -> tuple[Stretch, ...]:
+def stretches_of(frames: Sequence[Frame]) -> tuple[ShieldedStretch, ...]:
     """All stretches of a drive, in order of their beginning."""
-    times = [frame.snapshot.time_s for frame in frames]
+    times = [frame.observation.time_s for frame in frames]
     period_s = min((after - before for before, after in pairwise(times)), default=0.0)
-    done: list[Stretch] = []
-    running: dict[str, Stretch] = {}
+    done: list[ShieldedStretch] = []
+    running: dict[str, ShieldedStretch] = {}
     for frame in frames:
-        now = frame.snapshot.time_s
+        now = frame.observation.time_s
         for change in frame.interventions:
             before = running.get(change.rule)
             if before is not None and now - before.end_s <= _PAUSE_S:
@@ -57,13 +57,13 @@ def stretches_of(frames: Sequence[Frame]) -> tuple[Stretch, ...]:
                 continue
             if before is not None:
                 done.append(before)
-            running[change.rule] = Stretch(
+            running[change.rule] = ShieldedStretch(
                 change.rule, change.reason, now, now + period_s, 1, change.before, change.after
             )
     return tuple(sorted((*done, *running.values()), key=lambda stretch: (stretch.start_s, stretch.rule)))
 
 
-def rule_counts(stretches: Sequence[Stretch]) -> tuple[RuleCount, ...]:
+def rule_counts(stretches: Sequence[ShieldedStretch]) -> tuple[RuleCount, ...]:
     """By rule, the one that changed most first."""
     found = [
         RuleCount(
@@ -76,7 +76,7 @@ def rule_counts(stretches: Sequence[Stretch]) -> tuple[RuleCount, ...]:
     return tuple(sorted(found, key=lambda count: -count.changes))
 
 
-def _longer(stretch: Stretch, change: Intervention, end_s: float) -> Stretch:
+def _longer(stretch: ShieldedStretch, change: Intervention, end_s: float) -> ShieldedStretch:
     longer = replace(stretch, end_s=end_s, changes=stretch.changes + 1)
     if _size(change.before, change.after) <= _size(stretch.before, stretch.after):
         return longer

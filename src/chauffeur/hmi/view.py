@@ -8,18 +8,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from chauffeur.concept import LaneView, Snapshot, VehicleState
+from chauffeur.concept import Lane, Observation, RoadGraph, Signal, VehicleState
 from chauffeur.drive.recording import RecordedTrip
-from chauffeur.hmi.road import Box, track_box
+from chauffeur.geometry import Polyline
+from chauffeur.hmi.road import Bounds, track_box
 
 _MARGIN_M = 14.0
 _BESIDE_M = 60.0
+_LEVEL = 0.1
+"""Sine of half the angle off +x below which a drive is shown as it is."""
 _FLAT_ROAD_M = 40.0
 """A road that spreads less than this across +x is shown lengthwise, with the camera moving along."""
 
 
 @dataclass(frozen=True, slots=True)
-class Camera:
+class Framing:
     """How a drive is framed.
 
     Attributes:
@@ -28,56 +31,69 @@ class Camera:
     """
 
     along: bool
-    box: Box
+    box: Bounds
 
 
-def instants_of(recorded: RecordedTrip) -> tuple[Snapshot, ...]:
+def instants_of(recorded: RecordedTrip) -> tuple[Observation, ...]:
     """Every instant of a trip, the one after the last command included."""
-    instants = tuple(frame.snapshot for frame in recorded.frames)
+    instants = tuple(frame.observation for frame in recorded.frames)
     return (*instants, recorded.final) if recorded.final is not None else instants
 
 
-def facing_right(instants: tuple[Snapshot, ...]) -> tuple[Snapshot, ...]:
-    """The same instants, turned about the origin so that the ego first heads along +x."""
-    if not instants or abs(math.sin(instants[0].ego.heading_rad / 2.0)) < 0.1:
+def facing_right(instants: tuple[Observation, ...]) -> tuple[Observation, ...]:
+    """The same instants in the frame of pictures, whose y grows downwards, turned so that the ego first heads along +x.
+
+    Who heads that way within a few degrees is not turned: a straight road stays level.
+    """
+    if not instants:
         return instants
-    turn = _Turn.by(-instants[0].ego.heading_rad)
-    roads: dict[int, tuple[LaneView, ...]] = {}
-    turned: list[Snapshot] = []
+    heading = instants[0].ego.heading_rad
+    return _turned(instants, _Turn.by(0.0 if abs(math.sin(heading / 2.0)) < _LEVEL else heading))
+
+
+def in_picture(instants: tuple[Observation, ...]) -> tuple[Observation, ...]:
+    """The same instants in the frame of pictures, whose y grows downwards, not turned."""
+    return _turned(instants, _Turn.by(0.0))
+
+
+def _turned(instants: tuple[Observation, ...], turn: _Turn) -> tuple[Observation, ...]:
+    roads: dict[int, RoadGraph] = {}
+    turned: list[Observation] = []
     for shot in instants:
-        if id(shot.lanes) not in roads:
-            roads[id(shot.lanes)] = tuple(turn.lane(lane) for lane in shot.lanes)
+        if id(shot.road) not in roads:
+            roads[id(shot.road)] = RoadGraph(tuple(turn.lane(lane) for lane in shot.road.lanes))
         turned.append(
             replace(
                 shot,
                 ego=turn.vehicle(shot.ego),
                 others=tuple(turn.vehicle(car) for car in shot.others),
                 objects=tuple(turn.vehicle(thing) for thing in shot.objects),
-                lanes=roads[id(shot.lanes)],
+                road=roads[id(shot.road)],
+                signals=tuple(turn.signal(one) for one in shot.signals),
             )
         )
     return tuple(turned)
 
 
-def frame_drive(instants: tuple[Snapshot, ...]) -> Camera:
+def frame_drive(instants: tuple[Observation, ...]) -> Framing:
     """The framing that shows a whole drive."""
     path = track_box(tuple((shot.ego.x_m, shot.ego.y_m) for shot in instants))
     beside = path.grown(_BESIDE_M)
     edges = [
         y + side * lane.width_m / 2.0
-        for lane in instants[0].lanes
+        for lane in instants[0].road.lanes
         if _overlaps(lane, beside)
-        for _, y in lane.centre_m
+        for _, y in lane.centre.points_m
         for side in (-1, 1)
     ]
     low, high = min([*edges, path.y0]), max([*edges, path.y1])
-    if instants[0].kind == "intersection" or high - low > _FLAT_ROAD_M:
-        return Camera(along=False, box=path.grown(_MARGIN_M))
-    return Camera(along=True, box=Box(path.x0, low, path.x1, high))
+    if instants[0].road.junctions or high - low > _FLAT_ROAD_M:
+        return Framing(along=False, box=path.grown(_MARGIN_M))
+    return Framing(along=True, box=Bounds(path.x0, low, path.x1, high))
 
 
-def _overlaps(lane: LaneView, box: Box) -> bool:
-    xs = [x for x, _ in lane.centre_m]
+def _overlaps(lane: Lane, box: Bounds) -> bool:
+    xs = [x for x, _ in lane.centre.points_m]
     return min(xs) <= box.x1 and max(xs) >= box.x0
 
 
@@ -92,11 +108,15 @@ class _Turn:
         return cls(angle_rad, math.cos(angle_rad), math.sin(angle_rad))
 
     def point(self, x: float, y: float) -> tuple[float, float]:
-        return x * self.cos - y * self.sin, x * self.sin + y * self.cos
+        return x * self.cos + y * self.sin, x * self.sin - y * self.cos
 
     def vehicle(self, body: VehicleState) -> VehicleState:
         x, y = self.point(body.x_m, body.y_m)
-        return replace(body, x_m=x, y_m=y, heading_rad=body.heading_rad + self.angle_rad)
+        return replace(body, x_m=x, y_m=y, heading_rad=self.angle_rad - body.heading_rad)
 
-    def lane(self, lane: LaneView) -> LaneView:
-        return replace(lane, centre_m=tuple(self.point(x, y) for x, y in lane.centre_m))
+    def signal(self, one: Signal) -> Signal:
+        (ax, ay), (bx, by) = one.stop_line_m
+        return replace(one, stop_line_m=(self.point(ax, ay), self.point(bx, by)))
+
+    def lane(self, lane: Lane) -> Lane:
+        return replace(lane, centre=Polyline.of(self.point(x, y) for x, y in lane.centre.points_m))

@@ -16,7 +16,12 @@ from chauffeur.safety.alignment import ALIGNMENT_CHECK, DRIVEN_CHECK
 Tone = Literal["good", "bad", "neutral"]
 
 SIMULATED = "Simulated drive (highway-env physics)"
-_OTHER_PHYSICS = {"parking": "Simulated drive (kinematic bicycle model)"}
+_OTHER_PHYSICS = {
+    "parking": "Simulated drive (kinematic bicycle model)",
+    "track": "Simulated drive (CommonRoad vehicle models)",
+    "town": "Simulated drive (SUMO traffic, kinematic ego; not CARLA)",
+    "carla": "Simulated drive (CARLA)",
+}
 
 
 def simulated(world: str) -> str:
@@ -253,7 +258,7 @@ def _steering(command: Command) -> str:
     degrees = f"{abs(math.degrees(command.steering_rad)):.1f}°"
     if float(degrees[:-1]) == 0.0:
         return "0.0°"
-    return f"{degrees} {'right' if command.steering_rad > 0.0 else 'left'}"
+    return f"{degrees} {'left' if command.steering_rad > 0.0 else 'right'}"
 
 
 def doubt_words(check: str) -> str:

@@ -37,14 +37,15 @@ from chauffeur.concept import (
     ProfileError,
     Trip,
 )
+from chauffeur.concept.data import data_home
+from chauffeur.language.weather import weather_of
 from chauffeur.memory.columns import Columns, Entry, packed
-from chauffeur.memory.files import data_home, locked, private_directory, sync_directory
+from chauffeur.memory.files import locked, private_directory, sync_directory
 from chauffeur.memory.keys import KeyRing, same_name
 from chauffeur.memory.privacy import Privacy, read_privacy
 from chauffeur.memory.records import MAX_CHARS, body_of, feedback_body, item_of
 from chauffeur.memory.retrieval import UNCOMPARED, nearest
 from chauffeur.memory.similarity import DIMENSIONS, MEANING_SHARE, TAGS, TEXT_SHARE, Mark, Vector, mark
-from chauffeur.memory.weather import weather_of
 
 FORMAT: Final = "chauffeur-chroma-1"
 

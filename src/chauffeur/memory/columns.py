@@ -68,7 +68,7 @@ class Entry:
         vector: Encoded wish, as `packed` writes it.
         tags, quantities: As in `Mark`.
         world: World kind.
-        weather: Bits of `chauffeur.memory.weather`.
+        weather: Bits of `chauffeur.language.weather`.
         when: When it was driven.
         said: What the feedback says; None where there was none.
     """

@@ -14,15 +14,6 @@ from pathlib import Path
 PRIVATE_FILE, PRIVATE_DIRECTORY = 0o600, 0o700
 
 
-def data_home() -> Path:
-    """Chauffeur's data directory: CHAUFFEUR_HOME, or the user's own data directory."""
-    if home := os.environ.get("CHAUFFEUR_HOME"):
-        return Path(home).expanduser()
-    if shared := os.environ.get("XDG_DATA_HOME"):
-        return Path(shared) / "chauffeur"
-    return Path.home() / ".local" / "share" / "chauffeur"
-
-
 def private_directory(path: Path) -> Path:
     """Make a directory only its owner may enter."""
     path.mkdir(mode=PRIVATE_DIRECTORY, parents=True, exist_ok=True)

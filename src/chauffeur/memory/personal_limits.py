@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from chauffeur.concept import NOBODY, ConfigError, Limits, PersonId
+from chauffeur.concept.data import data_home
 from chauffeur.concept.units import MPS_PER_KMH
-from chauffeur.memory.files import data_home
 
 LIMITS_FILE: Final = "limits.toml"
 EVERYBODY: Final = "everybody"

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, StringConstraints, TypeAdapter, ValidationError
 
 from chauffeur.concept import DataError
-from chauffeur.programs.catalogue import APIS
+from chauffeur.programs.catalogue import apis_of, vocabulary_of
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.gate import check_source
 from chauffeur.programs.library import standalone
@@ -53,7 +53,7 @@ class PolicyEntry:
         source: The program: one top-level function `name` without parameters, needing nothing beside it.
         command: The wish it was learned from.
         context: The situation then, in words.
-        world: Kind of road: `highway` or `intersection`.
+        world: Kind of road: `highway`, `intersection`, `town`.
         scenario, item: Where it was learned.
         outcome: What the drive came to.
         metrics: Numbers of that drive, as (versioned id, value).
@@ -115,9 +115,9 @@ def content_id(
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
 
 
-def fitting_name(name: str) -> str:
-    """The name, or a plain one where a program by that name could not be offered."""
-    return name if _name_problem(name) == "" else _FALLBACK_NAME
+def fitting_name(name: str, world: str = "") -> str:
+    """The name, or a plain one where a program by that name could not be offered on that kind of road."""
+    return name if _name_problem(name, world) == "" else _FALLBACK_NAME
 
 
 def write_entry(entry: PolicyEntry) -> bytes:
@@ -150,10 +150,11 @@ def read_entry(line: bytes) -> PolicyEntry:
 
 def _program_problem(entry: PolicyEntry) -> str:
     """Why an entry's program may not be offered; empty when it may."""
-    problem = _name_problem(entry.name)
+    vocabulary = vocabulary_of(entry.world)
+    problem = _name_problem(entry.name, entry.world)
     if problem:
         return problem
-    report = check_source(entry.source)
+    report = check_source(entry.source, vocabulary=vocabulary)
     if not report.passed:
         return f"The static gate refuses its program: {report.errors[0]}."
     try:
@@ -162,7 +163,7 @@ def _program_problem(entry: PolicyEntry) -> str:
         return f"Its program cannot be read: {error}"
     if alone.strip() != entry.source.strip():
         return f"Its program is not one function {entry.name} that stands by itself."
-    report = check_source(f"def beside_it():\n    yield from {entry.callable_name}()\n", offered)
+    report = check_source(f"def beside_it():\n    yield from {entry.callable_name}()\n", offered, vocabulary)
     if not report.passed:
         return f"Its program cannot be called as {entry.callable_name}: {report.errors[0]}."
     return ""
@@ -177,10 +178,10 @@ def _problem(entry: PolicyEntry) -> str:
     return _program_problem(entry)
 
 
-def _name_problem(name: str) -> str:
+def _name_problem(name: str, world: str) -> str:
     if not _NAME.fullmatch(name) or keyword.iskeyword(name):
         return f"The name {name[:60]!r} is not a plain function name."
-    if name in APIS or name in BUILTINS or name == "math":
+    if name in apis_of(vocabulary_of(world)) or name in BUILTINS or name == "math":
         return f"The name {name} belongs to the driving language."
     return ""
 

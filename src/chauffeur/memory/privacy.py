@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Final
 
 from chauffeur.concept import ConfigError
-from chauffeur.memory.files import data_home, private_directory, publish
+from chauffeur.concept.data import data_home
+from chauffeur.memory.files import private_directory, publish
 
 PRIVACY_FILE: Final = "privacy.json"
 RETENTION_DAYS: Final = 90

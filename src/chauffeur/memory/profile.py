@@ -13,11 +13,11 @@ from typing import Any, Final
 import numpy as np
 
 from chauffeur.concept import Feedback, HistoryItem, PersonId, Trip
+from chauffeur.language.weather import weather_of
 from chauffeur.memory import cipher
 from chauffeur.memory.columns import Columns, Entry, Signs, packed
 from chauffeur.memory.records import body_of, feedback_body, item_of
 from chauffeur.memory.similarity import DIMENSIONS, ENCODER, mark
-from chauffeur.memory.weather import weather_of
 
 VERSION = "chauffeur-profile-1"
 

@@ -24,7 +24,7 @@ def body_of(trip: Trip) -> str:
     return json.dumps(
         {
             "instruction": _cut(trip.instruction.text),
-            "context": _cut(trip.context.text),
+            "context": _cut(" ".join(text for text in (trip.context.text, plan.scene) if text)),
             "intent": _cut(plan.intent),
             "thoughts": _cut(plan.thoughts.text or plan.refusal),
             "policy": _cut(text),

@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
+from chauffeur.language.weather import UNKNOWN
 from chauffeur.memory.columns import Columns, Floats, Places
 from chauffeur.memory.similarity import Mark
-from chauffeur.memory.weather import UNKNOWN
 
 LIKENESS, WORLD, RECENCY = 0.80, 0.12, 0.08
 OTHER_WEATHER, UNKNOWN_WEATHER = 0.11, 0.09

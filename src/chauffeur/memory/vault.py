@@ -26,14 +26,15 @@ from chauffeur.concept import (
     ProfileError,
     Trip,
 )
+from chauffeur.concept.data import data_home
+from chauffeur.language.weather import weather_of
 from chauffeur.memory.cipher import DatabaseError
-from chauffeur.memory.files import data_home, locked, private_directory, sync_directory
+from chauffeur.memory.files import locked, private_directory, sync_directory
 from chauffeur.memory.keys import KeyRing, same_name
 from chauffeur.memory.privacy import Privacy, read_privacy
 from chauffeur.memory.profile import VERSION, Index, Profile, create_profile
 from chauffeur.memory.retrieval import UNCOMPARED, latest, nearest
 from chauffeur.memory.similarity import mark
-from chauffeur.memory.weather import weather_of
 
 _log = logging.getLogger(__name__)
 

@@ -14,7 +14,10 @@ from typing import TYPE_CHECKING, Final, Literal, Self
 
 from chauffeur.concept import Instruction, Limits, Plan, PlanRequest, Situation
 from chauffeur.language.corrections import last_said
+from chauffeur.language.denials import denied_words
 from chauffeur.language.slips import slip_in
+from chauffeur.language.tokens import tokens_of
+from chauffeur.language.weather import said_weather
 from chauffeur.planners.base import Planner, declined
 
 if TYPE_CHECKING:
@@ -40,6 +43,29 @@ _CRAWLS: Final = "That is less than half the speed of the traffic here."
 _OUTRIGHT: Final = 1.0
 """Score of a meaning from which it is a verb with its object; below it is a lone word: "a lorry from the right"."""
 
+_PASSING: Final = frozenset({"overtake", "overtaking", "pass", "passing"})
+_SLOWING: Final = frozenset({"slow", "slower", "brake", "braking", "decelerate"})
+_HASTENING: Final = frozenset({"fast", "faster", "accelerate", "quicker"})
+_STOPPING: Final = frozenset({"stop", "stopping", "halt", "park"})
+_KEEP_LANE: Final = ("Stay in this lane.", "stay in this lane")
+_KEEP_BEHIND: Final = ("Do not overtake.", "stay behind the car ahead")
+_KEEP_SPEED: Final = ("Keep the present speed.", "keep the present speed")
+_NOTHING: Final = ("", "")
+_DENIALS: Final[tuple[tuple[str, frozenset[str], tuple[str, str]], ...]] = (
+    ("turn.left", frozenset({"left"}), _NOTHING),
+    ("turn.right", frozenset({"right"}), _NOTHING),
+    ("turn.straight", frozenset({"straight"}), _NOTHING),
+    ("lane.left", frozenset({"left"}), _KEEP_LANE),
+    ("lane.right", frozenset({"right"}), _KEEP_LANE),
+    ("overtake", _PASSING, _KEEP_BEHIND),
+    ("pull_over", frozenset({"pull"}) | _STOPPING, _KEEP_SPEED),
+    ("stop", _STOPPING, _KEEP_SPEED),
+    ("speed.decrease", _SLOWING, _KEEP_SPEED),
+    ("speed.increase", _HASTENING, _KEEP_SPEED),
+)
+"""Kind of thing to do, the words that deny it, and what is offered instead: the wish, and how it is asked about."""
+_DENIED: Final = "You say what you do not want, and I would have done just that."
+
 PACES: Final = {"hurry": 1, "sporty": 1, "relax": -1, "careful": -1, "comfort": -1, "eco": -1}
 """Moods that quicken (1) or calm (-1) the drive."""
 
@@ -51,17 +77,19 @@ class Said:
     Attributes:
         sides: Left and right, as far as named for something to do.
         pace: 1 for faster, -1 for slower, 0 for neither or both.
+        plain: Whether anything at all is said so: a verb with its object, not a lone word that may describe the road.
     """
 
     sides: frozenset[str]
     pace: Literal[-1, 0, 1]
+    plain: bool
 
     @classmethod
     def of(cls, meanings: Sequence[Meaning]) -> Self:
         """What the rules found in the words; they know nothing of any network."""
         plain = [m for m in meanings if m.score >= _OUTRIGHT]
         sides = frozenset(m.direction for m in plain if m.direction in ("left", "right"))
-        return cls(sides, _sign(m.change for m in plain if m.manoeuvre == "speed"))
+        return cls(sides, _sign(m.change for m in plain if m.manoeuvre == "speed"), bool(plain))
 
     def contradicts(self, *, side: str, pace: int) -> bool:
         """Whether a reading that goes to a side (empty for none) at a pace (sign) drops or denies what was said."""
@@ -89,6 +117,16 @@ def intent_pace(intent: str) -> int:
     """The pace that the tag of a wish without a number asks for."""
     kinds = {"speed.increase": 1, "speed.decrease": -1, **{f"style.{mood}": sign for mood, sign in PACES.items()}}
     return _sign(kinds.get(part, 0) for part in intent.split("+"))
+
+
+def wary_of(text: str, intent: str) -> bool:
+    """Whether somebody who wants to be quick says in the same breath that the road is slippery or the sight bad.
+
+    Args:
+        text: Their words.
+        intent: What they were read as; only a mood counts, who asks for more speed outright is to have it.
+    """
+    return "style." in intent and intent_pace(intent) > 0 and said_weather(text) != "none"
 
 
 def agreed(meanings: Sequence[Meaning], intent: str) -> bool:
@@ -172,6 +210,33 @@ def asked(planner: Planner, question: str, begun: float, *, offer: str = "", raw
     """A plan that drives nothing yet and asks; `offer` is the wish that a yes stands for."""
     plan = declined(planner, question, begun, intent="ask", raw=raw)
     return replace(plan, offer=offer)
+
+
+def denied_intent(text: str, intent: str) -> tuple[str, str] | None:
+    """What to offer for a thing to do that the words deny: (wish, how it is asked about); None where they deny none.
+
+    What is said both with and without a negation ("not the left lane, the left turn") counts as wanted.
+
+    Args:
+        text: The wish.
+        intent: Tag of what would be driven, `+` between steps.
+    """
+    denied, tokens = denied_words(text), tokens_of(text)
+    for part in intent.split("+"):
+        for kind, words, instead in _DENIALS:
+            named = words & denied
+            if named and part.startswith(kind) and all(tokens.count(word) == 1 for word in named):
+                return instead
+    return None
+
+
+def undenied(planner: Planner, plan: Plan, request: PlanRequest, begun: float) -> Plan:
+    """The plan, or, where it does what the words deny ("don't slow down"), the question what to do instead."""
+    if plan.policy is None or (instead := denied_intent(request.instruction.text, plan.intent)) is None:
+        return plan
+    offer, words = instead
+    question = f"{_DENIED} Shall I {words}?" if words else f"{_DENIED} What shall I do instead?"
+    return asked(planner, question, begun, offer=offer, raw=plan.raw)
 
 
 def _sign(changes: Iterable[int]) -> Literal[-1, 0, 1]:

@@ -33,6 +33,11 @@ class Planner(Protocol):
         ...
 
 
+def looks(planner: Planner) -> bool:
+    """Whether pictures are to be taken for a planner: it says so by an attribute `sees`."""
+    return bool(getattr(planner, "sees", False))
+
+
 def declined(
     planner: Planner, words: str, begun: float, *, intent: str = "", usage: Usage | None = None, raw: str = ""
 ) -> Plan:

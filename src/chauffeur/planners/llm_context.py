@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from chauffeur.planners.llm_errors import EndpointError, RefusedError
 
@@ -105,7 +105,14 @@ def too_small(url: str, shortage: Shortage, messages: Sequence[Mapping[str, Any]
 
 
 def _characters(messages: Sequence[Mapping[str, Any]]) -> int:
-    return sum(len(str(message.get("content", ""))) for message in messages)
+    return sum(_length(message.get("content", "")) for message in messages)
+
+
+def _length(content: object) -> int:
+    """Of the words of a turn: what servers count for a picture is their own affair."""
+    if not isinstance(content, list):
+        return len(str(content))
+    return sum(len(str(part.get("text", ""))) for part in cast("list[dict[str, object]]", content))
 
 
 def _number(found: re.Match[str] | None) -> int | None:

@@ -21,6 +21,7 @@ from chauffeur.planners.llm_errors import (
     KEY_VARIABLES,
     EndpointError,
     RefusedError,
+    blind,
     failure_of,
     garbage,
     missing_key,
@@ -28,11 +29,10 @@ from chauffeur.planners.llm_errors import (
     timed_out,
     truncated,
 )
+from chauffeur.planners.prompts import Message, pictures_in
 
 if TYPE_CHECKING:
     import httpx
-
-    from chauffeur.planners.prompts import Message
 
 _log = logging.getLogger(__name__)
 
@@ -133,7 +133,10 @@ class Endpoint:
             except Exception as error:  # noqa: BLE001 - the client lets through whatever the stack below it raises
                 # Before adapting: the words of a context that is too small name `max_tokens`, too.
                 shortage = shortage_in(error)
-                if shortage is not None:
+                unseeing = self._blind(messages, error)
+                if unseeing is not None:
+                    failure = unseeing
+                elif shortage is not None:
                     room = shortage.room()
                     if LEAST_ANSWER_TOKENS <= room < sampling.max_tokens:
                         sampling = replace(sampling, max_tokens=room)
@@ -150,6 +153,11 @@ class Endpoint:
                 return completion
             # Raised here, outside the handlers: the client's exception holds the request with the key in its headers.
             raise failure
+
+    def _blind(self, messages: list[Message], error: Exception) -> EndpointError | None:
+        if not pictures_in(messages) or not isinstance(error, RefusedError):
+            return None
+        return blind(error, self._address.url, self._model, self._scrub)
 
     async def close(self) -> None:
         """Close the connections."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import socket
 from collections.abc import Callable, Mapping
 from email.utils import parsedate_to_datetime
@@ -18,6 +19,7 @@ Kind = Literal[
     "forbidden",
     "not_found",
     "bad_request",
+    "no_vision",
     "context",
     "rate_limit",
     "quota",
@@ -36,6 +38,7 @@ TIMEOUT_VARIABLE = "CHAUFFEUR_TIMEOUT_S"
 
 _RETRYABLE_STATUS = frozenset({408, 409, 425, 429})
 _MESSAGE_CHARS = 300
+_BLIND_STATUS = frozenset({400, 404, 413, 415, 422, 500, 501})
 
 
 class EndpointError(PlannerError):
@@ -139,6 +142,27 @@ def not_an_api(url: str, content_type: str) -> EndpointError:
 def garbage(url: str, detail: str) -> EndpointError:
     """A reply in the right envelope whose content is not what the protocol says."""
     return EndpointError("garbage", f"The reply from {url} cannot be read ({detail}).", retryable=True)
+
+
+_ABOUT_PICTURES = re.compile(
+    r"image|vision|multi-?modal|mmproj|pictur|content.{0,40}(?:must be|expected|should be|not) .{0,12}(?:str|text)",
+    re.I,
+)
+
+
+def blind(error: RefusedError, url: str, model: str, scrub: Callable[[str], str]) -> EndpointError | None:
+    """The failure where a server refuses a request for its pictures; None where it says something else.
+
+    Servers answer 400, 404 (OpenRouter), 415 or 422; llama.cpp answers 500 and names mmproj.
+    """
+    if error.status not in _BLIND_STATUS or not _ABOUT_PICTURES.search(error.message):
+        return None
+    said = f": {cap(clean(scrub(error.message)), _MESSAGE_CHARS).rstrip('.')}"
+    return EndpointError(
+        "no_vision",
+        f"{url} takes no pictures with model {model!r} ({error.status}){said}.",
+        hint="Choose a model that reads images (a vision-language model), or plan without the camera.",
+    )
 
 
 def failure_of(

@@ -34,7 +34,7 @@ _PRICES: dict[str, tuple[float, float]] = {
     "o4-mini": (1.10, 4.40),
 }
 
-_SNAPSHOT = re.compile(r"-\d{4}-\d{2}-\d{2}$")
+_OBSERVATION = re.compile(r"-\d{4}-\d{2}-\d{2}$")
 
 
 def cost_usd(host: str, model: str, prompt_tokens: int, completion_tokens: int) -> float | None:
@@ -42,11 +42,11 @@ def cost_usd(host: str, model: str, prompt_tokens: int, completion_tokens: int) 
 
     Args:
         host: Host of the endpoint.
-        model: Model id; a dated snapshot has the price of its model.
+        model: Model id; a dated observation has the price of its model.
         prompt_tokens: Tokens in.
         completion_tokens: Tokens out, reasoning tokens included.
     """
-    price = _PRICES.get(_SNAPSHOT.sub("", model)) if host == _HOST else None
+    price = _PRICES.get(_OBSERVATION.sub("", model)) if host == _HOST else None
     if price is None:
         return None
     return (prompt_tokens * price[0] + completion_tokens * price[1]) / 1e6

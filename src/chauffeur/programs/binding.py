@@ -96,7 +96,12 @@ class DrivingApis:
         self._foreseen: dict[int, tuple[MadeCall, Question]] = {}
         self._late: list[MadeCall] = []
         self._decoded: list[Any] = []
-        self._methods: dict[str, Callable[..., Any]] = {api: getattr(self, f"_{api}") for api in APIS}
+        self._methods: dict[str, Callable[..., Any]] = {api: getattr(self, f"_{api}") for api in self.apis}
+
+    @property
+    def apis(self) -> Mapping[str, Api]:
+        """What it understands, by name."""
+        return APIS
 
     def begin_tick(self, perception: Perception) -> None:
         """A new control period: look at its instant, forget the last one's calls."""
@@ -172,7 +177,7 @@ class DrivingApis:
     ) -> Any:
         given: list[Any] = []
         try:
-            result = self._make(APIS[name], arguments, keywords, given)
+            result = self._make(self.apis[name], arguments, keywords, given)
         except (BadArgumentTypeError, BadArgumentValueError) as error:
             record.append(MadeCall(name, given, None, error))
             self._questions.refused(slot)
@@ -192,7 +197,7 @@ class DrivingApis:
             except (KeyError, BadArgumentValueError):  # e.g. the vehicle is gone: the program will hear it if it asks
                 self._questions.refused(slot)
                 continue
-            result = self._encode(APIS[question.name], answer)
+            result = self._encode(self.apis[question.name], answer)
             if slot >= len(answers):
                 answers.extend([NOT_FORESEEN] * (slot + 1 - len(answers)))
             answers[slot] = result
@@ -314,7 +319,7 @@ class DrivingApis:
     def _autopilot(self) -> list[float]:
         self.settle()
         command = self._driver.command(self.wishes)
-        return [float(command.acceleration_mps2), float(command.steering_rad)]
+        return [float(command.acceleration_mps2), 0.0 - float(command.steering_rad)]  # LaMPilot's is to the right
 
     def _recover_from_stop(self) -> None:
         perception, served = self._perception, self.wishes.served_stops

@@ -1,19 +1,27 @@
 """The driving APIs: one table, three readers.
 
-Prompt documentation (`render_docs`), the static gate's signatures (`argument_problem`) and the run-time binding all
-read `CATALOGUE`. Names and meanings are those of the public LaMPilot benchmark, so its programs run unchanged;
-`get_speed_limit` is ours. A vehicle or lane is an opaque handle: a program passes it on, compares it with `==` or tests
-it for None, and can do nothing else with it.
+A vocabulary is the part of the table that a kind of road understands: `road` is LaMPilot's, `town` adds the paper's
+town calls (Sec. IV-B: `check_front_vehicle`, `check_speed_limit`, `stop`, `proceed`) and those for lights, people,
+junctions and places. Prompt documentation (`render_docs`), the static gate's signatures (`argument_problem`) and the
+run-time binding all read it. Names and meanings of roads are those of the public LaMPilot benchmark, so its programs
+run unchanged; `get_speed_limit` is ours. A vehicle or lane is an opaque handle: a program passes it on, compares it
+with `==` or tests it for None, and can do nothing else with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-ValueKind = Literal["vehicle", "lane", "lanes", "number", "flag", "text", "action", "nothing"]
-"""What crosses between a program and its host."""
+ValueKind = Literal[
+    "vehicle", "lane", "lanes", "number", "flag", "text", "action", "nothing", "sighting", "place", "light"
+]
+"""What crosses between a program and its host. A sighting is (is there one, m, m/s), a place (is there one, m), a light
+(what it shows, m)."""
+
+Vocabulary = Literal["road", "town"]
+"""Which of the driving APIs a kind of road understands."""
 
 Required = Literal["required"]
 
@@ -26,6 +34,9 @@ _STUB_TYPES: Final[dict[ValueKind, str]] = {
     "text": "str",
     "action": "list[float]",
     "nothing": "None",
+    "sighting": "tuple[bool, float, float]",
+    "place": "tuple[bool, float]",
+    "light": "tuple[str, float]",
 }
 
 MAX_SAY_CHARS: Final = 500
@@ -306,7 +317,122 @@ CATALOGUE: Final[tuple[Api, ...]] = (
 )
 
 APIS: Final[dict[str, Api]] = {api.name: api for api in CATALOGUE}
-"""The table by name."""
+"""The table of roads by name."""
+
+NOTHING_AHEAD_M: Final = 1000.0
+"""Distance to what is not there: larger than any that a program compares with."""
+
+TOWN_CALLS: Final[tuple[Api, ...]] = (
+    Api(
+        "check_front_vehicle",
+        "The vehicle or thing ahead of the ego on its way.",
+        "sighting",
+        "is_front_vehicle, distance, speed = check_front_vehicle()",
+        result=f"(whether there is one, m between the bumpers, its speed in m/s); {NOTHING_AHEAD_M:g} m without one",
+    ),
+    Api(
+        "check_speed_limit",
+        "Speed limit of the lane the ego is in.",
+        "number",
+        "yield proceed(check_speed_limit())",
+        result="m/s",
+    ),
+    Api(
+        "check_traffic_light",
+        "The next traffic light that rules the ego's way.",
+        "light",
+        "state, distance = check_traffic_light()",
+        result=f'("red", "yellow", "green", "off" or "none", m to its stop line); {NOTHING_AHEAD_M:g} m without one',
+    ),
+    Api(
+        "check_stop_sign",
+        "The next stop sign on the ego's way at which it has not stopped yet.",
+        "place",
+        "is_stop_sign, distance = check_stop_sign()",
+        result=f"(whether there is one, m); {NOTHING_AHEAD_M:g} m without one",
+    ),
+    Api(
+        "check_people",
+        "The nearest person on foot ahead, on the ego's way or close to it.",
+        "place",
+        "is_somebody, distance = check_people()",
+        result=f"(whether there is somebody, m); {NOTHING_AHEAD_M:g} m without",
+    ),
+    Api(
+        "get_distance_to_junction",
+        "Distance to the next junction at which the ego has a choice of ways.",
+        "number",
+        "distance = get_distance_to_junction()",
+        result=f"m, {NOTHING_AHEAD_M:g} where none is near",
+    ),
+    Api(
+        "can_go",
+        "Whether a way leads on to a side at the next junction, from whichever lane of the street.",
+        "flag",
+        'if can_go("left"): ...',
+        params=(Param("side", "text", "left, straight or right"),),
+    ),
+    Api(
+        "get_distance_to_place",
+        "Distance along the ego's way to a place by its name or kind, e.g. a church.",
+        "number",
+        'distance = get_distance_to_place("church")',
+        result="m, or -1 where it does not lie ahead on this way",
+        params=(Param("name", "text", "name or kind of the place"),),
+    ),
+    Api(
+        "change_lane_left",
+        "Moves over to the lane on the left as soon as there is a gap.",
+        "flag",
+        "if not change_lane_left(): ...",
+        result="whether there is such a lane",
+        effect="wish",
+    ),
+    Api(
+        "change_lane_right",
+        "Moves over to the lane on the right as soon as there is a gap.",
+        "flag",
+        "if not change_lane_right(): ...",
+        result="whether there is such a lane",
+        effect="wish",
+    ),
+    Api(
+        "stop",
+        "Slows down gently and stands. Yield it, for as long as the car shall stand: `yield stop()`.",
+        "action",
+        "yield stop()",
+        result="[speed wanted m/s]",
+        effect="wish",
+    ),
+    Api(
+        "proceed",
+        "Drives on at up to a speed; the autopilot still keeps its distance, stops at lights and stop signs and lets "
+        "people and crossing traffic go first. Yield it in every step: `yield proceed(speed)`.",
+        "action",
+        "yield proceed(check_speed_limit())",
+        result="[speed wanted m/s]",
+        params=(Param("speed", "number", "speed", "m/s", low=0.0, high=70.0, clip=(0.0, 1000.0)),),
+        effect="wish",
+    ),
+)
+
+VOCABULARIES: Final[Mapping[Vocabulary, tuple[Api, ...]]] = {"road": CATALOGUE, "town": (*TOWN_CALLS, *CATALOGUE)}
+"""The table, a part each vocabulary."""
+
+TOWN_APIS: Final[dict[str, Api]] = {api.name: api for api in VOCABULARIES["town"]}
+"""The table of towns by name. All of a road's are among them: programs of roads drive in towns as well."""
+
+_ROADS: Final[Mapping[str, Vocabulary]] = {"town": "town"}
+
+
+def vocabulary_of(kind: str) -> Vocabulary:
+    """What a kind of road (`Observation.kind`) understands: LaMPilot's calls where it has none of its own."""
+    return _ROADS.get(kind, "road")
+
+
+def apis_of(vocabulary: Vocabulary) -> dict[str, Api]:
+    """The driving APIs of a vocabulary by name."""
+    return APIS if vocabulary == "road" else TOWN_APIS
 
 
 def argument_problem(api: Api, positional: int, keywords: Collection[str]) -> str | None:
@@ -336,9 +462,9 @@ def argument_problem(api: Api, positional: int, keywords: Collection[str]) -> st
     return None
 
 
-def render_docs() -> str:
-    """The driving APIs as Python stub text for a prompt."""
-    return "\n\n".join(_render(api) for api in CATALOGUE)
+def render_docs(vocabulary: Vocabulary = "road") -> str:
+    """The driving APIs of a vocabulary as Python stub text for a prompt."""
+    return "\n\n".join(_render(api) for api in VOCABULARIES[vocabulary])
 
 
 def _render(api: Api) -> str:

@@ -8,7 +8,7 @@ from typing import Any, Final, Self
 
 from chauffeur.concept import STOP_ZONE_M, ApiCall, ProgramError, ProgramState, SandboxError, Wishes
 from chauffeur.programs.binding import DrivingApis, MadeCall, starting_wishes
-from chauffeur.programs.catalogue import APIS
+from chauffeur.programs.catalogue import Vocabulary, apis_of
 from chauffeur.programs.errors import (
     BadArgumentTypeError,
     BadArgumentValueError,
@@ -19,7 +19,8 @@ from chauffeur.programs.foresight import DRIVE, END, TICK, WISH
 from chauffeur.programs.gate import check_source
 from chauffeur.programs.rewrite import prepare
 from chauffeur.programs.sandbox import Budget, Sandbox, SandboxRun
-from chauffeur.worlds.base import World
+from chauffeur.programs.street import TownApis
+from chauffeur.worlds.base import StreetPerception, World
 
 _FORMAT: Final = "chauffeur-program-3"
 _PERIOD_ENDS: Final = frozenset({TICK, DRIVE, END})
@@ -87,6 +88,7 @@ class ProgramExecutor:
         self._state: ProgramState = "none"
         self._line: int | None = None
         self._error: ProgramError | None = None
+        self._vocabulary: Vocabulary = "road"
 
     def __enter__(self) -> Self:
         return self
@@ -110,27 +112,31 @@ class ProgramExecutor:
         """Process id of the program's worker, for diagnostics; None when no program runs."""
         return None if self._run is None else self._run.worker_pid
 
-    def start(self, source: str, world: World, *, wishes: Wishes | None = None) -> ProgramState:
+    def start(
+        self, source: str, world: World, *, wishes: Wishes | None = None, library: str | None = None
+    ) -> ProgramState:
         """Read a program; its main function starts with the first tick.
 
         Args:
             source: Program text.
             world: World it drives in.
             wishes: What holds already, e.g. a previous program's wishes; None is present speed, lane and 1.5 s.
+            library: Its helper functions, in place of the executor's own; None for those.
 
         Returns:
             `running`, or `failed`; the next tick then says why.
         """
         self._end_run()
         self._bind(world, wishes)
+        helpers = self._library if library is None else library
         try:
             if self._gate:
-                report = check_source(source, self._library)
+                report = check_source(source, helpers, self._vocabulary)
                 if not report.passed:
                     first = report.errors[0]
                     raise ProgramRefusedError(first.reason, line=first.line, hint=first.remedy)
-            prepared = prepare(source, self._library)
-            self._run = self._open().start(prepared, APIS)
+            prepared = prepare(source, helpers)
+            self._run = self._open().start(prepared, apis_of(self._vocabulary))
             self._state, self._line = "running", prepared.main_line
         except ProgramFaultError as error:
             self._fail(error)
@@ -231,11 +237,11 @@ class ProgramExecutor:
             wishes = Wishes(
                 target_speed_mps=kept["target_speed_mps"],
                 time_headway_s=kept["time_headway_s"],
-                target_lane=None if kept["target_lane"] is None else tuple(kept["target_lane"]),
+                target_lane=None if kept["target_lane"] is None else str(kept["target_lane"]),
                 turn=kept["turn"],
                 served_stops=frozenset(kept["served_stops"]),
             )
-            vehicles, lanes, line = head["vehicles"], [tuple(lane) for lane in head["lanes"]], head["line"]
+            vehicles, lanes, line = head["vehicles"], [str(lane) for lane in head["lanes"]], head["line"]
         except (ValueError, KeyError, TypeError) as error:
             raise SandboxError("The bytes are no dumped program of this version.") from error
         apis = self._bind(world, wishes)
@@ -253,7 +259,13 @@ class ProgramExecutor:
     def _bind(self, world: World, wishes: Wishes | None) -> DrivingApis:
         perception = world.perception()
         begun = starting_wishes(perception) if wishes is None else wishes
-        apis = DrivingApis(perception, world.driver(), begun, stop_zone_m=self._stop_zone_m)
+        apis: DrivingApis
+        if isinstance(perception, StreetPerception):
+            self._vocabulary = "town"
+            apis = TownApis(perception, world.driver(), begun, stop_zone_m=self._stop_zone_m)
+        else:
+            self._vocabulary = "road"
+            apis = DrivingApis(perception, world.driver(), begun, stop_zone_m=self._stop_zone_m)
         self._world, self._apis = world, apis
         self._state, self._line, self._error = "none", None, None
         return apis

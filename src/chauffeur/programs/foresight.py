@@ -22,7 +22,7 @@ import ast
 from collections.abc import Iterable
 from typing import Final
 
-from chauffeur.programs.catalogue import APIS
+from chauffeur.programs.catalogue import TOWN_APIS
 from chauffeur.programs.nodes import all_nodes
 
 TICK: Final = "__tick__"
@@ -58,8 +58,8 @@ MAX_PENDING: Final = 50
 NOT_FORESEEN: Final = "?"
 """Stands where a slot has no answer; no answer of a driving API looks like it."""
 
-CAN_WAIT: Final = frozenset({"set_target_speed", "set_desired_time_headway"})
-"""Wishes without an answer that take one number, and do nothing but be remembered."""
+CAN_WAIT: Final = frozenset({"set_target_speed", "set_desired_time_headway", "proceed"})
+"""Wishes that take one number and do nothing but be remembered; nobody looks at what they answer."""
 
 OF_WISHES: Final = frozenset(
     {"is_safe_enter", "get_target_speed", "get_desired_time_headway", "detect_stop_sign_ahead"}
@@ -67,7 +67,9 @@ OF_WISHES: Final = frozenset(
 """Questions whose answer depends on what the program has wished."""
 
 FORESEEABLE: Final = frozenset(
-    api.name for api in APIS.values() if api.effect == "read" and api.returns in {"number", "flag", "vehicle", "lane"}
+    api.name
+    for api in TOWN_APIS.values()
+    if api.effect == "read" and api.returns in {"number", "flag", "vehicle", "lane"}
 )
 """Questions that may be answered beforehand. A list is not: the program could change it and ask again."""
 
@@ -146,7 +148,7 @@ def hidden(name: str) -> str:
 def apis_named(trees: Iterable[ast.Module]) -> frozenset[str]:
     """Driving APIs whose name stands anywhere in the texts."""
     return frozenset(
-        node.id for tree in trees for node in all_nodes(tree) if isinstance(node, ast.Name) and node.id in APIS
+        node.id for tree in trees for node in all_nodes(tree) if isinstance(node, ast.Name) and node.id in TOWN_APIS
     )
 
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import Final
 
 from chauffeur.programs.calls import CallChecks
-from chauffeur.programs.catalogue import APIS
+from chauffeur.programs.catalogue import Vocabulary, apis_of
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.findings import Finding
 from chauffeur.programs.lazy import lazy_findings
@@ -79,30 +79,31 @@ class GateReport:
         return "\n".join(str(finding) for finding in self.findings)
 
 
-def check_source(source: str, library: str = "") -> GateReport:
+def check_source(source: str, library: str = "", vocabulary: Vocabulary = "road") -> GateReport:
     """Judge a program text. Never raises and never runs it. The verdict of a text judged before is remembered.
 
     Args:
         source: Program text.
         library: Helper functions the program may call with `yield from`; judged like the program.
+        vocabulary: Which driving APIs there are where it is to drive.
     """
-    return _judged(source, library)
+    return _judged(source, library, vocabulary)
 
 
 @lru_cache(maxsize=512)
-def _judged(source: str, library: str) -> GateReport:
+def _judged(source: str, library: str, vocabulary: Vocabulary) -> GateReport:
     text = unix_lines(source)
     try:
         tree = parse(text)
     except ProgramSyntaxError as error:
         return GateReport((Finding(error.line, "syntax", error.message, error.hint),), None)
     try:
-        helpers, refused = _judged_library(library)
+        helpers, refused = _judged_library(library, vocabulary)
     except ProgramSyntaxError as error:
         return GateReport((Finding(None, "library", error.message, error.hint),), None)
     main = main_function(tree)
     findings = [*refused, *misplaced(text, tree)]
-    findings += _Gate(tree, helpers).run()
+    findings += _Gate(tree, helpers, vocabulary).run()
     findings += _main_findings(tree, main)
     findings += loop_findings(tree)
     findings += lazy_findings(tree)
@@ -112,14 +113,14 @@ def _judged(source: str, library: str) -> GateReport:
 
 
 @lru_cache(maxsize=64)
-def _judged_library(library: str) -> tuple[ast.Module, tuple[Finding, ...]]:
+def _judged_library(library: str, vocabulary: Vocabulary) -> tuple[ast.Module, tuple[Finding, ...]]:
     """A library's tree and what refuses it. Raises ProgramSyntaxError."""
     text = unix_lines(library)
     helpers = parse(text, "library")
-    return helpers, tuple(_library_findings(text, helpers))
+    return helpers, tuple(_library_findings(text, helpers, vocabulary))
 
 
-def _library_findings(text: str, helpers: ast.Module) -> list[Finding]:
+def _library_findings(text: str, helpers: ast.Module, vocabulary: Vocabulary) -> list[Finding]:
     """What refuses a library: whatever refuses a program, and top-level names that a program could not do without."""
     found: list[Finding] = []
     for node in helpers.body:
@@ -128,7 +129,7 @@ def _library_findings(text: str, helpers: ast.Module) -> list[Finding]:
     for name in sorted(top_level_names(helpers) & BUILTINS):
         found.append(Finding(None, "library", f"{name} is a built-in function", "rename it"))
     found += misplaced(text, helpers)
-    found += _Gate(helpers, ast.Module([], [])).run() + loop_findings(helpers) + lazy_findings(helpers)
+    found += _Gate(helpers, ast.Module([], []), vocabulary).run() + loop_findings(helpers) + lazy_findings(helpers)
     return [
         Finding(None, "library", f"line {one.line or 1} of the library: {one.reason}", one.remedy)
         for one in found
@@ -169,11 +170,12 @@ def _main_findings(tree: ast.Module, main: ast.FunctionDef | None) -> list[Findi
 class _Gate:
     """One walk over a program's tree."""
 
-    def __init__(self, tree: ast.Module, helpers: ast.Module) -> None:
+    def __init__(self, tree: ast.Module, helpers: ast.Module, vocabulary: Vocabulary) -> None:
         self._tree = tree
+        self._apis = apis_of(vocabulary)
         self._findings: list[Finding] = []
         self._bound = bound_names(tree)
-        self._known = self._bound | top_level_names(helpers) | APIS.keys() | BUILTINS
+        self._known = self._bound | top_level_names(helpers) | self._apis.keys() | BUILTINS
         self._math = {"math"} | _aliases_of_math(tree)
         self._offered = top_level_generators(helpers)
         self._generators = generator_names(tree) | self._offered
@@ -249,7 +251,7 @@ class _Gate:
         if isinstance(node.ctx, ast.Load) and attr in METHODS:
             return
         remedy = ATTRIBUTE_REMEDIES.get(attr, "vehicles and lanes have no attributes; use the driving APIs")
-        if attr in APIS:
+        if attr in self._apis:
             remedy = f"write {attr}(...)"
         self._add(node, "attribute", f"nothing here has an attribute {attr[:40]}", remedy)
 
@@ -299,7 +301,7 @@ class _Gate:
         for node, name in bindings(self._tree):
             if name.startswith("__"):
                 self._add(node, "reserved", f"the name {name[:40]} is reserved", "use another name")
-            elif name in APIS:
+            elif name in self._apis:
                 self._add(node, "shadow", f"{name} is a driving API and cannot be redefined", "use another name")
             elif name in SEARCHES:
                 self._add(node, "shadow", f"{name} is a built-in function and cannot be redefined", "rename it")
@@ -346,7 +348,7 @@ class _Gate:
                 early.append(node)
         for node in early:
             for inner in ast.walk(node):
-                if isinstance(inner, ast.Call) and isinstance(inner.func, ast.Name) and inner.func.id in APIS:
+                if isinstance(inner, ast.Call) and isinstance(inner.func, ast.Name) and inner.func.id in self._apis:
                     self._add(
                         inner,
                         "top-level",

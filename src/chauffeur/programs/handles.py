@@ -24,13 +24,8 @@ def vehicle_handle(vehicle_id: int) -> str:
 
 
 def lane_handle(lane: LaneId) -> str:
-    """Handle of a lane, e.g. `lane:a:b:1`; a colon inside a node name is escaped so that no two lanes share one."""
-    start, end, index = lane
-    return f"{LANE_PREFIX}{_escaped(start)}:{_escaped(end)}:{index}"
-
-
-def _escaped(node: str) -> str:
-    return node.replace("%", "%25").replace(":", "%3A")
+    """Handle of a lane, e.g. `lane:a-b:1`."""
+    return f"{LANE_PREFIX}{lane}"
 
 
 class HandleTable:
@@ -81,7 +76,7 @@ class HandleTable:
         return _given(self._lanes, handle, where, "lane", LANE_PREFIX, source)
 
     def issued(self) -> tuple[list[int], list[LaneId]]:
-        """Vehicles and lanes handed out, for a snapshot."""
+        """Vehicles and lanes handed out, for a dump of the program."""
         return list(self._vehicles.values()), list(self._lanes.values())
 
 

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from chauffeur.concept import Frame, Snapshot, VehicleState
+from chauffeur.concept import Frame, Observation, VehicleState
 from chauffeur.safety.shield.frame import CROSSING_RAD, Body, Lens, Scene
 from chauffeur.safety.shield.gaps import braking_gap_m, rss_gap_m
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
@@ -47,7 +47,7 @@ class Blame:
 
 
 def blame(
-    frames: Sequence[Frame], final: Snapshot, dt_s: float, parameters: ShieldParameters = LAMPILOT_SHIELD
+    frames: Sequence[Frame], final: Observation, dt_s: float, parameters: ShieldParameters = LAMPILOT_SHIELD
 ) -> Blame:
     """Judge the end of a trip.
 
@@ -60,7 +60,7 @@ def blame(
     if not final.ego.crashed:
         return Blame("nobody", None, None, "There was no collision.")
     lens = Lens()
-    last = frames[-1].snapshot if frames else final
+    last = frames[-1].observation if frames else final
     other = _struck(final) or _struck(last)
     if other is None:
         return Blame("nobody", None, None, "The ego crashed, but into nobody that is seen.")
@@ -69,7 +69,7 @@ def blame(
         return Blame("other", other, last.time_s, "The other reversed into the ego, which stood.")
     if crossed is not None and (crossed[1].crosses or crossed[1].along_mps < -_STILL_MPS):
         return _at_a_crossing(frames, final, other)
-    looked = ((frame, _pair(lens.look(frame.snapshot, frame.snapshot.ego.lane), other)) for frame in frames)
+    looked = ((frame, _pair(lens.look(frame.observation, frame.observation.ego.lane), other)) for frame in frames)
     seen = [(frame, pair) for frame, pair in looked if pair is not None]
     unsafe_from = len(seen)
     while unsafe_from > 0 and not _safe(seen[unsafe_from - 1][1], dt_s, parameters):
@@ -77,7 +77,7 @@ def blame(
     if unsafe_from == 0:
         return Blame("nobody", other, None, "They were never seen at a safe distance.")
     frame, before = seen[unsafe_from - 1]
-    since = frame.snapshot.time_s
+    since = frame.observation.time_s
     answered = _answered(seen[unsafe_from:], parameters)
     if _apart(before, parameters):
         end = _pair(lens.look(final, last.ego.lane), other)  # what was begun in the last period counts, too
@@ -98,12 +98,12 @@ def blame(
 Pair = tuple[Body, Body]
 
 
-def _at_a_crossing(frames: Sequence[Frame], final: Snapshot, other: int) -> Blame:
+def _at_a_crossing(frames: Sequence[Frame], final: Observation, other: int) -> Blame:
     begun = len(frames)
-    while begun > 0 and _stands(frames[begun - 1].snapshot.ego):
+    while begun > 0 and _stands(frames[begun - 1].observation.ego):
         begun -= 1
     if begun < len(frames):
-        stood = frames[begun].snapshot
+        stood = frames[begun].observation
         found = next((car for car in (*stood.others, *stood.objects) if car.id == other), None)
         if found is not None and not _in_the_way(final.ego, found):
             return Blame("other", other, stood.time_s, "The ego stood clear of the way of the one that ran into it.")
@@ -115,10 +115,10 @@ def _stands(vehicle: VehicleState) -> bool:
     return abs(vehicle.speed_mps) < _STILL_MPS
 
 
-def _reversed(snapshot: Snapshot, other: int) -> bool:
+def _reversed(observation: Observation, other: int) -> bool:
     """Whether another, in a lane of the ego's direction, rolls backwards against its own heading, towards the ego."""
-    ego = snapshot.ego
-    car = next((car for car in snapshot.others if car.id == other), None)
+    ego = observation.ego
+    car = next((car for car in observation.others if car.id == other), None)
     if car is None or car.speed_mps >= 0.0 or math.cos(car.heading_rad - ego.heading_rad) < _ALONG:
         return False
     return math.cos(car.heading_rad) * (ego.x_m - car.x_m) + math.sin(car.heading_rad) * (ego.y_m - car.y_m) < 0.0
@@ -133,10 +133,10 @@ def _in_the_way(ego: VehicleState, other: VehicleState) -> bool:
     return abs(across) < wide + other.width_m / 2.0
 
 
-def _struck(snapshot: Snapshot) -> int | None:
+def _struck(observation: Observation) -> int | None:
     """The crashed vehicle, or else the obstacle, that is nearest to the ego."""
-    ego = snapshot.ego
-    crashed = [other for other in (*snapshot.others, *snapshot.objects) if other.crashed]
+    ego = observation.ego
+    crashed = [other for other in (*observation.others, *observation.objects) if other.crashed]
     near = min(crashed, key=lambda other: (other.x_m - ego.x_m) ** 2 + (other.y_m - ego.y_m) ** 2, default=None)
     return None if near is None else near.id
 
@@ -205,7 +205,7 @@ def _ego_came_over(pairs: Sequence[Pair]) -> bool:
 def _answered(seen: Sequence[tuple[Frame, Pair]], parameters: ShieldParameters) -> bool:
     """Whether the ego braked with all it has whenever the other was ahead, one period for noticing aside."""
     for frame, (_, other) in seen[1:]:
-        if other.s_m <= 0.0 or frame.snapshot.ego.speed_mps < _STILL_MPS:
+        if other.s_m <= 0.0 or frame.observation.ego.speed_mps < _STILL_MPS:
             continue
         if frame.applied.acceleration_mps2 > -_FULL * parameters.braking_mps2:
             return False

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept import LaneView, Limits, Snapshot, Wishes
+from chauffeur.concept import Limits, Observation, Wishes
 from chauffeur.concept.units import MPS_PER_KMH
 
 LEAST_MPS: Final = 60.0 * MPS_PER_KMH
@@ -44,35 +44,33 @@ def bounded(
     return replace(wishes, target_speed_mps=speed, time_headway_s=headway), tuple(changed)
 
 
-def least_speed_mps(snapshot: Snapshot, limits: Limits | None = None) -> float | None:
+def least_speed_mps(observation: Observation, limits: Limits | None = None) -> float | None:
     """The least speed that may be asked for where the ego is; None where there is none: off a highway, on its shoulder.
 
     Args:
-        snapshot: The instant.
+        observation: The instant.
         limits: Of the person: a lower cap of theirs is no crawl.
     """
-    lane = _lane_of(snapshot)
-    if snapshot.kind != "highway" or lane is None or lane.emergency or lane.forbidden:
+    lane = observation.road.get(observation.ego.lane)
+    if not observation.road.uninterrupted or lane is None or lane.emergency or lane.closed:
         return None
     least = min(LEAST_MPS, SHARE_OF_LIMIT * lane.speed_limit_mps)
     cap = None if limits is None else limits.max_speed_mps
-    ahead = () if snapshot.front is None or snapshot.front.distance_m > AHEAD_M else (snapshot.front.speed_mps,)
+    ahead = (
+        () if observation.front is None or observation.front.distance_m > AHEAD_M else (observation.front.speed_mps,)
+    )
     return max(0.0, min((least, *ahead, *(() if cap is None else (cap,)))))
 
 
-def least_target_mps(snapshot: Snapshot, wishes: Wishes, limits: Limits) -> float:
+def least_target_mps(observation: Observation, wishes: Wishes, limits: Limits) -> float:
     """The least speed that wishes may ask for now; 0 where there is none, and on the way onto a shoulder."""
-    aim = next((lane for lane in snapshot.lanes if lane.id == wishes.target_lane), None)
-    return 0.0 if aim is not None and aim.emergency else least_speed_mps(snapshot, limits) or 0.0
+    aim = observation.road.get(wishes.target_lane)
+    return 0.0 if aim is not None and aim.emergency else least_speed_mps(observation, limits) or 0.0
 
 
-def shoulder_at_right(snapshot: Snapshot) -> bool:
+def shoulder_at_right(observation: Observation) -> bool:
     """Whether the ego is on a shoulder, or can get to one lane by lane to the right."""
-    own = snapshot.ego.lane
+    own = observation.road.get(observation.ego.lane)
     return own is not None and any(
-        lane.emergency and lane.id[:2] == own[:2] and lane.id[2] >= own[2] for lane in snapshot.lanes
+        lane.emergency and lane.index >= own.index for lane in observation.road.abreast(own.id)
     )
-
-
-def _lane_of(snapshot: Snapshot) -> LaneView | None:
-    return next((lane for lane in snapshot.lanes if lane.id == snapshot.ego.lane), None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 
-from chauffeur.concept import Limits, Plan, Snapshot, Verdict
+from chauffeur.concept import Limits, Observation, Plan, Verdict
 from chauffeur.safety.base import Check
 from chauffeur.safety.envelope import check_parameters
 from chauffeur.safety.format import check_format
@@ -23,15 +23,15 @@ _log = logging.getLogger(__name__)
 
 
 def run_checks(
-    plan: Plan, snapshot: Snapshot, limits: Limits, checks: Sequence[Check] = DEFAULT_CHECKS
+    plan: Plan, observation: Observation, limits: Limits, checks: Sequence[Check] = DEFAULT_CHECKS
 ) -> tuple[Verdict, ...]:
     """Every check's verdict, in order. A check that breaks has not vouched for the plan: its verdict is a refusal."""
-    return tuple(_judge(check, plan, snapshot, limits) for check in checks)
+    return tuple(_judge(check, plan, observation, limits) for check in checks)
 
 
-def _judge(check: Check, plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:
+def _judge(check: Check, plan: Plan, observation: Observation, limits: Limits) -> Verdict:
     try:
-        return check(plan, snapshot, limits)
+        return check(plan, observation, limits)
     except Exception as error:  # noqa: BLE001 - whatever a check dies of, the vehicle stays under control
         name = getattr(check, "__name__", type(check).__name__)
         _log.warning("safety check %s failed: %r", name, error)

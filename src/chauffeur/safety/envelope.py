@@ -15,18 +15,22 @@ from itertools import pairwise
 from chauffeur.concept import (
     ActionMatrix,
     Limits,
+    Observation,
     Parameters,
     Plan,
     Policy,
     Program,
     Situation,
-    Snapshot,
     Thoughts,
     Trajectory,
     Verdict,
 )
 from chauffeur.concept.units import M_PER_CAR_LENGTH
+from chauffeur.geometry import turns_ahead
+from chauffeur.programs.catalogue import vocabulary_of
+from chauffeur.safety.gain_box import gain_box
 from chauffeur.safety.reading import ApiUse, Reading, read_program
+from chauffeur.safety.trajectories import trajectory_faults
 from chauffeur.safety.words import IN_A_HELPER, speed_words
 
 PARAMETERS_CHECK = "parameters-v1"
@@ -39,6 +43,13 @@ _TURNS = {
     "turn_right_at_next_intersection": "turn right",
     "go_straight_at_next_intersection": "go straight on",
 }
+_WAYS = {
+    "turn_left_at_next_intersection": "left",
+    "turn_right_at_next_intersection": "right",
+    "go_straight_at_next_intersection": "straight",
+}
+_LOOKS = frozenset({"can_go", "get_distance_to_junction", "get_distance_to_place"})
+"""A program that asks one of these may turn at a later junction."""
 _SIDES = {-1: "left", 1: "right"}
 _MOVES = frozenset({"lane", "change", "overtake", "pass", "merge", "move"})
 
@@ -52,19 +63,23 @@ class _Fault:
 
 @dataclass(frozen=True, slots=True)
 class _Road:
-    """What the checks need of a snapshot. `lanes` and `index` are 0 where the ego is on no lane of the road."""
+    """What the checks need of an observation. `lanes` and `index` are 0 where the ego is on no lane of the road."""
 
-    kind: str
+    crossing: bool
     lanes: int
     index: int
     limit_mps: float
     following_mps: float
+    turns: tuple[str, ...] = ()
+    """Ways at the next junction of a town, where it is known: a turn that none of them makes is refused."""
 
 
-def check_parameters(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:
+def check_parameters(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
     """Whether every number and manoeuvre that can be read from the plan fits the road, the situation and the limits."""
-    road = _road(snapshot)
+    road = _road(observation)
     faults = [*_policy_faults(plan, road, limits), *_setting_faults(plan, road, limits), *_intent_faults(plan, road)]
+    if isinstance(plan.policy, Trajectory) and not faults and _readable(plan.policy):
+        faults = [_Fault(*fault) for fault in trajectory_faults(plan.policy, observation)]
     if not faults:
         return Verdict(PARAMETERS_CHECK, True, "Every number and manoeuvre that can be read fits the situation.")
     faults.sort(key=lambda fault: math.inf if fault.line is None else fault.line)
@@ -76,7 +91,12 @@ def policy_findings(policy: Policy, situation: Situation, limits: Limits) -> lis
     """What `check_parameters` will find in a policy, for a planner that can still mend it: line, reason and remedy."""
     following = situation.front.speed_mps if situation.front is not None else situation.speed_mps
     road = _Road(
-        situation.world, situation.lane_count, situation.lane_index, situation.speed_limit_mps, max(following, 0.0)
+        situation.world == "intersection" or bool(situation.turns),
+        situation.lane_count,
+        situation.lane_index,
+        situation.speed_limit_mps,
+        max(following, 0.0),
+        situation.turns if vocabulary_of(situation.world) == "town" else (),
     )
     found = (
         f"{'' if fault.line is None else f'line {fault.line}: '}{fault.reason} {fault.remedy}"
@@ -85,17 +105,18 @@ def policy_findings(policy: Policy, situation: Situation, limits: Limits) -> lis
     return list(dict.fromkeys(found))
 
 
-def _road(snapshot: Snapshot) -> _Road:
-    here = snapshot.ego.lane
-    own = sorted((lane for lane in snapshot.lanes if here and lane.id[:2] == here[:2]), key=lambda lane: lane.id[2])
+def _road(observation: Observation) -> _Road:
+    here = observation.ego.lane
+    own = observation.road.abreast(here) if here is not None and here in observation.road else ()
     index = next((i for i, lane in enumerate(own) if lane.id == here), None)
-    if index is None:
-        # No lane, no sign to go by: the strictest sign of the whole road holds.
-        limit = min((lane.speed_limit_mps for lane in snapshot.lanes), default=0.0)
-    else:
-        limit = own[index].speed_limit_mps
-    following = snapshot.front.speed_mps if snapshot.front is not None else snapshot.ego.speed_mps
-    return _Road(snapshot.kind, 0 if index is None else len(own), index or 0, limit, max(following, 0.0))
+    # No lane, no sign to go by: the strictest sign of the whole road holds.
+    limit = observation.road.least_limit_mps if index is None else own[index].speed_limit_mps
+    following = observation.front.speed_mps if observation.front is not None else observation.ego.speed_mps
+    crossing, lanes = bool(observation.road.junctions), 0 if index is None else len(own)
+    route = () if observation.route is None else observation.route.lanes
+    known = here is not None and index is not None and vocabulary_of(observation.kind) == "town"
+    turns = turns_ahead(observation.road, here, route) if known and here is not None else ()
+    return _Road(crossing, lanes, index or 0, limit, max(following, 0.0), turns)
 
 
 def _policy_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]:
@@ -104,6 +125,7 @@ def _policy_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]:
             reading = read_program(source)
             for use in reading.uses:
                 yield from _use_faults(use, road, limits)
+            yield from _turn_faults(reading, road)
             yield from _move_faults(reading, road)
             for use in read_program(library).uses:
                 for fault in _use_faults(use, road, limits):
@@ -113,7 +135,7 @@ def _policy_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]:
             yield from _speed_faults("target speed", _number(values.target_speed_mps), road, limits)
             if values.lane in _SIDES:
                 yield from _lane_faults(values.lane, road)
-            if values.route in ("left", "right") and road.kind != "intersection":
+            if values.route in ("left", "right") and not road.crossing:
                 yield _Fault(f"There is no intersection ahead to turn {values.route} at.", "Leave out the route.")
             if not _number(values.look_ahead_m) > 0:
                 # A vehicle's path follower with a look-ahead of 0 m no longer stops at the end of its path.
@@ -125,6 +147,8 @@ def _policy_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]:
         case ActionMatrix(pid=pid, mpc=mpc):
             if not all(_number(value) >= 0 for value in (*pid, *mpc)):
                 yield _Fault("The action matrix has a negative gain or weight.", "Use gains and weights of 0 or more.")
+                return
+            yield from _gain_faults(ActionMatrix(pid, mpc))
         case Trajectory() as trajectory:
             yield from _trajectory_faults(trajectory, road, limits)
         case _:
@@ -132,17 +156,32 @@ def _policy_faults(plan: Plan, road: _Road, limits: Limits) -> Iterator[_Fault]:
 
 
 def _use_faults(use: ApiUse, road: _Road, limits: Limits) -> Iterator[_Fault]:
-    if use.name == "set_target_speed":
+    if use.name in ("set_target_speed", "proceed"):
         for value in use.values:
             yield from _speed_faults("target speed", value, road, limits, use.line)
     elif use.name == "set_desired_time_headway":
         for value in use.values:
             yield from _headway_faults(value, limits, use.line)
-    elif use.name in _TURNS and road.kind != "intersection":
+    elif use.name in _TURNS and not road.crossing:
         yield _Fault(
             f"The program wants to {_TURNS[use.name]} at the next intersection, but there is no intersection ahead.",
             "Leave out the turn.",
             use.line,
+        )
+
+
+def _turn_faults(reading: Reading, road: _Road) -> Iterator[_Fault]:
+    """The first turn that a program asks for, where it asks for one only and does not look first where it can go."""
+    turns = {use.name for use in reading.uses if use.name in _TURNS}
+    if len(turns) != 1 or not road.turns or any(use.name in _LOOKS for use in reading.uses):
+        return
+    (name,) = turns
+    if _WAYS[name] not in road.turns:
+        line = next(use.line for use in reading.uses if use.name == name)
+        yield _Fault(
+            f"The program wants to {_TURNS[name]} at the next junction, which only leads {' or '.join(road.turns)}.",
+            "Choose a way that is there, or wait until the junction that is meant is the next one.",
+            line,
         )
 
 
@@ -230,7 +269,7 @@ def _intent_faults(plan: Plan, road: _Road) -> Iterator[_Fault]:
     # Of several steps joined by "+" only the first begins where the car is now.
     tokens = re.findall(r"[a-z]+", plan.intent.lower().partition("+")[0])
     if "turn" in tokens or "straight" in tokens:
-        if road.kind != "intersection":
+        if not road.crossing:
             yield _Fault(
                 "It was understood as a turn at an intersection, but there is no intersection ahead.",
                 "Ask for a lane change instead, or wait for an intersection.",
@@ -239,6 +278,24 @@ def _intent_faults(plan: Plan, road: _Road) -> Iterator[_Fault]:
         for offset, side in _SIDES.items():
             if tokens[-1] == side:
                 yield from _lane_faults(offset, road)
+
+
+def _gain_faults(policy: ActionMatrix) -> Iterator[_Fault]:
+    box = gain_box()
+    for name, value in box.outside(policy):
+        low, high = box.low[name], box.high[name]
+        yield _Fault(
+            f"{name} of {value:g} is outside {low:g} to {high:g}, where the controllers are certified.",
+            f"Use {name} from {low:g} to {high:g}.",
+        )
+
+
+def _readable(trajectory: Trajectory) -> bool:
+    """Whether `format-v1` has nothing against its numbers."""
+    points = trajectory.waypoints_m
+    values = (trajectory.period_s, *(value for point in points for value in point))
+    sound = all(math.isfinite(_number(value)) for value in values) and all(len(point) == 2 for point in points)
+    return bool(points) and sound and trajectory.period_s > 0.0
 
 
 def _trajectory_faults(trajectory: Trajectory, road: _Road, limits: Limits) -> Iterator[_Fault]:

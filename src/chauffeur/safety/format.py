@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Final
 
-from chauffeur.concept import ActionMatrix, Limits, Parameters, Plan, Program, Snapshot, Trajectory, Verdict
+from chauffeur.concept import ActionMatrix, Limits, Observation, Parameters, Plan, Program, Trajectory, Verdict
+from chauffeur.concept.registry import load_plugin, plugin_names
 
 FORMAT_CHECK = "format-v1"
-
+EXECUTORS: Final = "chauffeur.executors"
+"""Entry points of executors for kinds of policies beside the built-in ones."""
 
 MOST_ROUTE_CHARS: Final = 40
 """Of the name of a place that parameters lead to."""
 
 
-def check_format(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:  # noqa: ARG001 - one shape for all checks
+def check_format(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
     """Whether the policy is present, of a known kind, accepted by the static gate, and made of finite numbers."""
     match plan.policy:
         case None:
@@ -23,7 +25,7 @@ def check_format(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:  # 
                 plan.refusal or "The planner gave no policy.", "Say the wish in other words, or ask for less at once."
             )
         case Program(source=source, library=library):
-            return _program(source, library)
+            return _program(source, library, observation.kind)
         case Parameters() as values:
             if values.lane not in (-1, 0, 1):
                 return _fail(f"The lane wish is {values.lane!r}.", "Give -1 (left), 0 (stay) or 1 (right).")
@@ -47,16 +49,31 @@ def check_format(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:  # 
         case Trajectory() as trajectory:
             return _trajectory(trajectory)
         case other:  # pyright: ignore[reportUnnecessaryComparison] - planners are third-party code
-            return _fail(
-                f"The policy is a {type(other).__name__}, which no executor knows.",
-                "Give a program, parameters, an action matrix or a trajectory.",
-            )
+            return _of_another_kind(other, observation, limits)
 
 
-def _program(source: str, library: str) -> Verdict:
+def _of_another_kind(policy: object, observation: Observation, limits: Limits) -> Verdict:
+    """A policy of a third party's kind is judged by its executor: `fault(policy, observation, limits)`, in words, empty
+    for none. One that is registered without is not driven: nobody has vouched for it."""
+    kind = str(getattr(policy, "kind", ""))
+    if kind not in plugin_names(EXECUTORS):
+        return _fail(
+            f"The policy is a {type(policy).__name__}, which no executor knows.",
+            "Give a program, parameters, an action matrix or a trajectory.",
+        )
+    judge: Callable[[object, Observation, Limits], str] | None
+    judge = getattr(load_plugin(EXECUTORS, kind), "fault", None)
+    if judge is None:
+        return _fail(f"The executor of the kind {kind!r} has no `fault`.", "Have it say what is wrong with a policy.")
+    found = judge(policy, observation, limits)
+    return _fail(found, "Ask again, in other words.") if found else _pass(f"Its executor finds no fault in the {kind}.")
+
+
+def _program(source: str, library: str, kind: str) -> Verdict:
+    from chauffeur.programs.catalogue import vocabulary_of
     from chauffeur.programs.gate import check_source
 
-    errors = (check_source(source, library) if library else check_source(source)).errors
+    errors = check_source(source, library, vocabulary_of(kind)).errors
     if errors:
         first, rest = errors[0], len(errors) - 1
         more = f" (and {rest} more finding{'s' if rest > 1 else ''})" if rest else ""

@@ -15,7 +15,7 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
-from chauffeur.concept import Limits, Parameters, Plan, Program, Snapshot, Verdict
+from chauffeur.concept import Limits, Observation, Parameters, Plan, Program, Verdict
 from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.verify import Circumstances, verify
@@ -29,12 +29,12 @@ _ROUNDING: Final = 0.02
 """Planners write speeds in hundredths of m/s or whole km/h."""
 
 
-def check_minimum_speed(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:
+def check_minimum_speed(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
     """Whether no set-point that can be read from the plan is far below traffic on a highway."""
-    least = least_speed_mps(snapshot, limits)
+    least = least_speed_mps(observation, limits)
     if least is None or plan.policy is None:
         return Verdict(MINIMUM_SPEED_CHECK, True, "No minimum speed holds here.")
-    slow = [(speed, line) for speed, line in _set_points(plan, snapshot) if speed < least - _ROUNDING]
+    slow = [(speed, line) for speed, line in _set_points(plan, observation) if speed < least - _ROUNDING]
     if not slow:
         return Verdict(MINIMUM_SPEED_CHECK, True, f"No set-point is below the least speed of {speed_words(least)}.")
     speed, line = min(slow, key=lambda one: one[0])
@@ -43,11 +43,13 @@ def check_minimum_speed(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdi
         f"To {verb} in a lane of a highway is dangerous: others drive far faster. At least {speed_words(least)} here."
     )
     remedy = f"Ask for {math.ceil(least / MPS_PER_KMH - _ROUNDING):d} km/h or more"
-    remedy += ", or to pull over on the shoulder." if shoulder_at_right(snapshot) else "; to stop at once, say “Stop!”"
+    remedy += (
+        ", or to pull over on the shoulder." if shoulder_at_right(observation) else "; to stop at once, say “Stop!”"
+    )
     return Verdict(MINIMUM_SPEED_CHECK, False, reason, line, remedy)
 
 
-def _set_points(plan: Plan, snapshot: Snapshot) -> Iterator[tuple[float, int | None]]:
+def _set_points(plan: Plan, observation: Observation) -> Iterator[tuple[float, int | None]]:
     """Every target speed that can be read, with its line; of a program that makes for the shoulder, none."""
     match plan.policy:
         case Parameters(target_speed_mps=speed):
@@ -58,18 +60,18 @@ def _set_points(plan: Plan, snapshot: Snapshot) -> Iterator[tuple[float, int | N
                 use.name == "set_target_lane" and use.lane_offset in (1, None)
                 for use in (*reading.uses, *read_program(library).uses)
             )
-            if rightward and shoulder_at_right(snapshot):
+            if rightward and shoulder_at_right(observation):
                 return  # where it slows down is seen while driving
-            yield from _reached(source, library, snapshot)
+            yield from _reached(source, library, observation)
         case _:
             pass
     yield from ((value, None) for name, value in plan.settings if name == "target_speed_mps")
 
 
-def _reached(source: str, library: str, snapshot: Snapshot) -> Iterator[tuple[float, int | None]]:
+def _reached(source: str, library: str, observation: Observation) -> Iterator[tuple[float, int | None]]:
     """The highest speed that each call of a program can ask for."""
     try:
-        report = verify(source, library, Circumstances.of(snapshot))
+        report = verify(source, library, Circumstances.of(observation))
     except ProgramSyntaxError:
         return
     for site in report.calls:

@@ -19,8 +19,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from chauffeur.concept import Limits, Plan, Program, Snapshot, Verdict
-from chauffeur.programs.catalogue import APIS, Param
+from chauffeur.concept import Limits, Observation, Plan, Program, Verdict
+from chauffeur.programs.catalogue import TOWN_APIS, Param
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.loops import MAX_BARE_RANGE
 from chauffeur.programs.verify import CallSite, Circumstances, LoopReport, Note, Value, Verification, verify
@@ -74,11 +74,11 @@ class _Finding:
     remedy: str = ""
 
 
-def check_reach(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:
+def check_reach(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
     """Whether everything that a program can be followed to stays within the limits."""
     if not isinstance(plan.policy, Program):
         return Verdict(REACH_CHECK, True, "There is no program to follow.")
-    where = Circumstances.of(snapshot)
+    where = Circumstances.of(observation)
     try:
         report = verify(plan.policy.source, plan.policy.library, where)
     except ProgramSyntaxError as error:
@@ -116,7 +116,7 @@ def _placed(finding: _Finding) -> str:
 def _call_findings(report: Verification, where: Circumstances, limits: Limits) -> Iterator[_Finding]:
     for site in report.calls:
         for argument in site.arguments:
-            param = next((param for param in APIS[site.name].params if param.name == argument.name), None)
+            param = next((param for param in TOWN_APIS[site.name].params if param.name == argument.name), None)
             if param is None:
                 continue
             if param.kind == "number":
@@ -126,7 +126,7 @@ def _call_findings(report: Verification, where: Circumstances, limits: Limits) -
 
 
 def _bounds(name: str, param: Param, where: Circumstances, limits: Limits) -> _Bounds:
-    if name == "set_target_speed":
+    if name in {"set_target_speed", "proceed"}:
         here = where.speed_limits_mps[0] if where.speed_limit_mps is None else where.speed_limit_mps
         cap = math.inf if limits.max_speed_mps is None else limits.max_speed_mps
         high = here + limits.max_over_limit_mps

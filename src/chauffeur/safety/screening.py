@@ -148,7 +148,7 @@ def _context(context: Context, noted: list[Noted]) -> Context:
         if said:
             text = text.replace(said, shown)
         scene.append((name, shown))
-    return Context(text, replace(context.situation, scene=tuple(scene)))
+    return replace(context, text=text, situation=replace(context.situation, scene=tuple(scene)))
 
 
 def _remembered(item: HistoryItem, place: str, noted: list[Noted]) -> HistoryItem:

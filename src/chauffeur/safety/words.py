@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import Final
 
 from chauffeur.concept import Verdict
@@ -15,6 +16,7 @@ _SENTENCE: Final = re.compile(r"(?<=[.!?])\s+(?=[A-Z(])")
 _BOTH_UNITS: Final = re.compile(r"(?<![\d.])(\d{1,9}(?:\.\d{1,9})?(?:e[+-]?\d{1,3})?) m/s \((-?\d{1,9} km/h)\)")
 
 
+@lru_cache(maxsize=256)
 def speed_words(speed_mps: float) -> str:
     """A speed, e.g. `38.3 m/s (138 km/h)`."""
     return f"{speed_mps:.4g} m/s ({kmh(speed_mps):.0f} km/h)"

@@ -1,6 +1,6 @@
 """What a world must offer. A world knows its own simulator and nothing of language.
 
-`World` is stepped with physical commands and shows frozen snapshots. `Perception` answers the questions that driving
+`World` is stepped with physical commands and shows frozen observations. `Perception` answers the questions that driving
 APIs ask, at the present instant, by vehicle id and lane id. `Driver` turns wishes into a command; it is the world's
 own low-level driver (IDM and lane keeping on LaMPilot's roads, a town driver elsewhere).
 """
@@ -9,15 +9,27 @@ from __future__ import annotations
 
 from typing import Protocol, runtime_checkable
 
-from chauffeur.concept import Command, LaneId, Scenario, Snapshot, VehicleState, Wishes
+from chauffeur.concept import (
+    AgentKind,
+    Capabilities,
+    Command,
+    LaneId,
+    Observation,
+    Scenario,
+    SignalState,
+    Turn,
+    VehicleState,
+    Wishes,
+)
+from chauffeur.geometry import Pose
 
 EGO = 0
-"""Id of the ego in every snapshot and perception."""
+"""Id of the ego in every observation and perception."""
 
 
 @runtime_checkable
 class Perception(Protocol):
-    """Read-only questions about the present instant. Distances in m, speeds in m/s, ids as in the snapshot."""
+    """Read-only questions about the present instant. Distances in m, speeds in m/s, ids as in the observation."""
 
     def vehicle(self, vehicle_id: int) -> VehicleState:
         """State of a vehicle. Raises KeyError for an id that is not (or no longer) on the road."""
@@ -65,6 +77,35 @@ class Perception(Protocol):
 
 
 @runtime_checkable
+class StreetPerception(Perception, Protocol):
+    """What a town's perception answers beyond that. All distances are from the front bumper along the ego's way."""
+
+    def gap_ahead(self) -> tuple[float, float] | None:
+        """(m between the bumpers, its speed) of who or what is ahead; None without."""
+        ...
+
+    def light_ahead(self) -> tuple[SignalState, float] | None:
+        """(what it shows, m to its stop line) of the next traffic light that rules the way; None without."""
+        ...
+
+    def person_ahead(self) -> float | None:
+        """Distance to the nearest person on foot on the way or close to it; None without."""
+        ...
+
+    def junction_ahead(self) -> tuple[float, tuple[Turn, ...]] | None:
+        """(m, ways on from the street) of the next junction with a choice of ways; None without."""
+        ...
+
+    def lane_beside(self, side: int) -> LaneId | None:
+        """The lane to the right (negative: left) that the ego may change into from its own; None without."""
+        ...
+
+    def place_ahead(self, name: str) -> float | None:
+        """Distance to a place by its name or kind; None where it does not lie ahead on this way."""
+        ...
+
+
+@runtime_checkable
 class Driver(Protocol):
     """A world's low-level driver: holds nothing but what its own control law needs."""
 
@@ -91,11 +132,16 @@ class World(Protocol):
         ...
 
     @property
+    def capabilities(self) -> Capabilities:
+        """What it can do, the same before and after a reset."""
+        ...
+
+    @property
     def dt_s(self) -> float:
         """Control period."""
         ...
 
-    def reset(self, scenario: Scenario, seed: int | None = None) -> Snapshot:
+    def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
         """Set up a scenario; `seed` overrides the scenario's own. Raises ScenarioError if it cannot be set up."""
         ...
 
@@ -103,7 +149,7 @@ class World(Protocol):
         """Advance one control period; returns the command really applied. Only `drive.actuate` calls it."""
         ...
 
-    def snapshot(self) -> Snapshot:
+    def observe(self) -> Observation:
         """The present instant."""
         ...
 
@@ -125,10 +171,37 @@ class World(Protocol):
 class MirroredWorld(World, Protocol):
     """A world whose present instant can be shown to another process, which keeps a copy of the same scenario."""
 
-    def observation(self) -> bytes:
+    def mirrored(self) -> bytes:
         """The present instant, without what is the same throughout a trip."""
         ...
 
     def adopt(self, observation: bytes) -> None:
         """Be at that instant. Raises DataError if it is none of this scenario; the world then stays as it was."""
+        ...
+
+
+@runtime_checkable
+class Stage(Protocol):
+    """What a world offers that lets somebody put road users of their own on its roads, for scenarios."""
+
+    def spawn(self, kind: AgentKind, pose: Pose, speed_mps: float = 0.0) -> int:
+        """Put a road user, or with `static` a thing, at a pose of its middle; its id, as in snapshots.
+
+        Traffic sees it and yields to it. It stands until it is driven.
+
+        Raises:
+            ScenarioError: There is no room, or the world has no such road user.
+        """
+        ...
+
+    def drive(self, actor: int, pose: Pose, speed_mps: float) -> None:
+        """Where a road user of the stage is at the end of the next control period, and how fast it is shown."""
+        ...
+
+    def remove(self, actor: int) -> None:
+        """Take a road user of the stage away; nothing happens where it is gone already."""
+        ...
+
+    def force_signal(self, signal: str, state: SignalState | None) -> None:
+        """Have a traffic light show a state until it is forced otherwise; None gives it back to its cycle."""
         ...

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from chauffeur.concept import PersonId
-from chauffeur.drive.talk import asking
-from chauffeur.drive.talk.asking import NOT_MEANT, Asking, Words
+from chauffeur.drive import questions
+from chauffeur.drive.questions import NOT_MEANT
+from chauffeur.drive.talk.asking import Asking, Words
 
 
 class _Asked:
@@ -38,10 +39,8 @@ def _offering() -> Asking:
 
 def test_a_yes_is_the_wish_that_was_asked_about() -> None:
     put = _offering()
-    assert put.offering
     assert put.put(Words("Yes, please!")) == ""
     assert _handed_on(put) == [("Drive at 100 km/h.", "Did you mean 100 km/h?")]
-    assert not put.offering
 
 
 def test_a_no_is_no_wish() -> None:
@@ -58,7 +57,7 @@ def test_another_wish_takes_the_place_of_the_question() -> None:
 
 
 def test_a_question_is_not_answered_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(asking, "ANSWER_WITHIN_S", -1.0)
+    monkeypatch.setattr(questions, "ANSWER_WITHIN_S", -1.0)
     put = _offering()
     put.put(Words("yes"))
     assert _handed_on(put) == [("yes", "")]

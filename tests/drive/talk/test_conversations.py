@@ -9,20 +9,18 @@ from dataclasses import dataclass, field, replace
 import pytest
 
 from chauffeur.concept import (
-    Context,
     Feedback,
-    History,
     HistoryItem,
-    Instruction,
     Limits,
+    Observation,
     Parameters,
     Plan,
     Program,
     Situation,
-    Snapshot,
     Thoughts,
 )
-from chauffeur.drive.live.orders import Brief, Event, Request
+from chauffeur.drive.events import DriveEvent
+from chauffeur.drive.live.orders import Request
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Interaction
 from chauffeur.drive.scenarios import find
@@ -43,15 +41,10 @@ def plan(policy: Program | Parameters = PROGRAM, thoughts: str = "I slow down to
     return Plan(Thoughts(thoughts), policy)
 
 
-def brief(wish: str, made: Plan, history: History | None = None) -> Brief:
-    context = Context("We drive.", SITUATION)
-    return Brief(wish, Instruction("Slower."), context, history or History(), made, 1, 0)
-
-
-def instant() -> Snapshot:
+def instant() -> Observation:
     world = make_world(PLACE)
     world.reset(PLACE, 3)
-    return world.snapshot()
+    return world.observe()
 
 
 @dataclass
@@ -66,11 +59,12 @@ class Told:
         self.interactions[wish] = Interaction(Request(wish, words.text))
         self.conversations.asked(wish, words)
 
-    def event(self, event: Event, *, closes: bool = False) -> None:
+    def event(self, event: DriveEvent, *, closes: bool = False) -> None:
         interaction = self.interactions[event.wish]
         interaction.events.append(event)
         interaction.stage = {"planned": "planned", "started": "driven"}.get(event.kind, interaction.stage)  # pyright: ignore
         if closes:
+            event = replace(event, final=True)
             interaction.stage, interaction.answer = "closed", event
         self.conversations.event(event, interaction)
 
@@ -86,8 +80,8 @@ class Told:
 
 
 def drive(seen: bool = True) -> Told:
-    now, snapshot = [100.0], instant()
-    look = (lambda trip, tick: snapshot) if seen else (lambda trip, tick: None)
+    now, observation = [100.0], instant()
+    look = (lambda trip, tick: observation) if seen else (lambda trip, tick: None)
     return Told(Conversations((Start(PLACE, 3),), 0.1, look, lambda: now[0]), now)
 
 
@@ -100,12 +94,12 @@ def report_of(tick: int, plan: str, rung: str = "follow"):
 def test_a_wish_from_words_to_set_point_with_where_the_time_went() -> None:
     told = drive()
     told.ask("w1", Words("Slower.", True, ended_s=99.0, wait_s=0.5, recognise_s=0.25))
-    told.event(Event("planning", "w1"))
+    told.event(DriveEvent("planning", "w1"))
     told.now[0] = 100.25
-    told.conversations.brief(brief("w1", plan()))
-    told.event(Event("planned", "w1", "I slow down to 20 m/s."))
+    told.conversations.plan("w1", plan())
+    told.event(DriveEvent("planned", "w1", "I slow down to 20 m/s."))
     told.now[0] = 100.5
-    told.event(Event("started", "w1", "", 1, 10))
+    told.event(DriveEvent("started", "w1", "", 1, 10))
     assert list(told.conversations.look(15.0)) == [], "verdicts wait for the set-point"
     told.now[0] = 101.0
     told.conversations.report(report_of(11, "w1"))
@@ -124,19 +118,19 @@ def test_a_wish_from_words_to_set_point_with_where_the_time_went() -> None:
 def test_somebody_is_asked_once_about_a_wish_they_felt() -> None:
     told = drive()
     told.ask("w1", Words("Slower."))
-    told.conversations.brief(brief("w1", plan()))
-    told.event(Event("started", "w1", "", 1, 10))
+    told.conversations.plan("w1", plan())
+    told.event(DriveEvent("started", "w1", "", 1, 10))
     told.conversations.report(report_of(100, "w1"))
     told.conversations.report(report_of(140, "w1"))
     told.judged()
     told.conversations.report(report_of(161, "w1"))
     assert list(told.conversations.look(15.0)) == [HowWasIt("w1", "Slower.")]
-    told.event(Event("finished", "w1", "", 1, 170), closes=True)
+    told.event(DriveEvent("finished", "w1", "", 1, 170), closes=True)
     assert list(told.conversations.look(15.0)) == []
     told.ask("w2", Words("Faster."))
-    told.event(Event("started", "w2", "", 1, 200))
+    told.event(DriveEvent("started", "w2", "", 1, 200))
     told.conversations.report(report_of(205, "w2"))
-    told.event(Event("failed", "w2", "It failed.", 1, 205), closes=True)
+    told.event(DriveEvent("failed", "w2", "It failed.", 1, 205), closes=True)
     assert not [each for each in told.conversations.look(15.0) if isinstance(each, HowWasIt)], "not felt yet"
     assert told.conversations["w2"].outcome == "failed" and told.conversations["w2"].why == "It failed."
     assert told.conversations.last_felt == "w2" and told.conversations.newest("w2")
@@ -144,7 +138,7 @@ def test_somebody_is_asked_once_about_a_wish_they_felt() -> None:
 
 def test_a_refusal_shows_the_check_that_refused_and_the_same_reason() -> None:
     told = drive()
-    verdicts = verdicts_of(plan(UNLAWFUL), instant(), Limits(), Event("refused", "w1", ""))
+    verdicts = verdicts_of(plan(UNLAWFUL), instant(), Limits(), DriveEvent("refused", "w1", ""))
     assert [each.check for each in verdicts if not each.informs] == [JUDGED], (
         "another reason was told than the checks give"
     )
@@ -153,18 +147,18 @@ def test_a_refusal_shows_the_check_that_refused_and_the_same_reason() -> None:
     failed = [each for each in run_checks(plan(UNLAWFUL), instant(), Limits(), DRIVE_CHECKS) if each.stops]
     reason = " ".join(each.reason for each in failed)
     told.ask("w1", Words("As fast as it goes."))
-    told.conversations.brief(brief("w1", plan(UNLAWFUL)))
-    told.event(Event("refused", "w1", reason, 1, 5), closes=True)
+    told.conversations.plan("w1", plan(UNLAWFUL))
+    told.event(DriveEvent("refused", "w1", reason, 1, 5), closes=True)
     shown = told.judged()
     assert shown.outcome == "refused" and shown.why == reason
     assert [each.check for each in shown.verdicts if not each.passed and not each.informs] == [e.check for e in failed]
 
 
 def test_what_was_not_seen_is_not_judged_again() -> None:
-    for event, passed in ((Event("started", "w1"), True), (Event("refused", "w1", "Too fast."), False)):
+    for event, passed in ((DriveEvent("started", "w1"), True), (DriveEvent("refused", "w1", "Too fast."), False)):
         (verdict,) = verdicts_of(plan(), None, Limits(), event)
         assert (verdict.check, verdict.passed) == (JUDGED, passed)
-    started = verdicts_of(plan(UNLAWFUL), instant(), Limits(), Event("started", "w1"))
+    started = verdicts_of(plan(UNLAWFUL), instant(), Limits(), DriveEvent("started", "w1"))
     assert [each.check for each in started if not each.informs] == [JUDGED], "it was started, so that is what is shown"
 
 
@@ -178,8 +172,8 @@ def test_nobody_waits_for_verdicts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(judging, "verdicts_of", slowly)
     told = drive()
     told.ask("w1", Words("Slower."))
-    told.conversations.brief(brief("w1", plan()))
-    told.event(Event("started", "w1", "", 1, 10))
+    told.conversations.plan("w1", plan())
+    told.event(DriveEvent("started", "w1", "", 1, 10))
     told.conversations.report(report_of(11, "w1"))
     assert list(told.conversations.look(15.0)) == []
     assert list(told.conversations.look(15.0)) == []
@@ -190,7 +184,7 @@ def test_nobody_waits_for_verdicts(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("thoughts", ["1" * 8000, "1 " * 4000, "1." * 4000, "(" * 8000, "the left lane " * 570])
 def test_thoughts_of_the_longest_kind_are_judged_at_once(thoughts: str) -> None:
     before = time.thread_time()
-    assert verdicts_of(plan(thoughts=thoughts), instant(), Limits(), Event("started", "w1"))
+    assert verdicts_of(plan(thoughts=thoughts), instant(), Limits(), DriveEvent("started", "w1"))
     assert time.thread_time() - before < 1.0
 
 
@@ -198,7 +192,7 @@ def test_what_a_plan_says_does_not_grow_without_bound() -> None:
     told = drive()
     told.ask("w1", Words("Slower."))
     for number in range(500):
-        told.event(Event("said", "w1", f"{number} " + 490 * "x"))
+        told.event(DriveEvent("said", "w1", f"{number} " + 490 * "x"))
     said = told.conversations["w1"].said
     assert len(said) == MOST_SAID_SHOWN
     assert said[-1].startswith("499 ") and said[0].startswith("(")
@@ -206,7 +200,7 @@ def test_what_a_plan_says_does_not_grow_without_bound() -> None:
 
 def test_an_explanation_that_does_not_fit_informs() -> None:
     lies = plan(thoughts="I change to the left lane and speed up to 30 m/s.")
-    verdicts = verdicts_of(lies, instant(), Limits(), Event("started", "w1"))
+    verdicts = verdicts_of(lies, instant(), Limits(), DriveEvent("started", "w1"))
     (told,) = [each for each in verdicts if each.informs]
     assert not told.passed and told.reason
 

@@ -8,7 +8,7 @@ import pytest
 
 from chauffeur.concept import ConfigError
 from chauffeur.hmi.cabin import Certificate
-from chauffeur.hmi.cabin.address import Address, address_of
+from chauffeur.hmi.cabin.address import PageAddress, address_of
 
 FILES = {"CHAUFFEUR_CABIN_CERTIFICATE": "car.pem", "CHAUFFEUR_CABIN_KEY": "car.key"}
 CERTIFICATE = Certificate(Path("car.pem"), Path("car.key"))
@@ -17,17 +17,17 @@ CERTIFICATE = Certificate(Path("car.pem"), Path("car.key"))
 @pytest.mark.parametrize(
     ("said", "files", "at"),
     [
-        ("", {}, Address("127.0.0.1", 0, None)),
-        (":8443", {}, Address("127.0.0.1", 8443, None)),
-        ("localhost", {}, Address("localhost", 0, None)),
-        ("car.local:8443", FILES, Address("car.local", 8443, CERTIFICATE)),
-        (" car.local:8443 ", FILES, Address("car.local", 8443, CERTIFICATE)),
-        ("10.0.0.7:443", FILES, Address("10.0.0.7", 443, CERTIFICATE)),
-        ("[fd00::7]:8443", FILES, Address("fd00::7", 8443, CERTIFICATE)),
-        ("[::1]", {}, Address("::1", 0, None)),
+        ("", {}, PageAddress("127.0.0.1", 0, None)),
+        (":8443", {}, PageAddress("127.0.0.1", 8443, None)),
+        ("localhost", {}, PageAddress("localhost", 0, None)),
+        ("car.local:8443", FILES, PageAddress("car.local", 8443, CERTIFICATE)),
+        (" car.local:8443 ", FILES, PageAddress("car.local", 8443, CERTIFICATE)),
+        ("10.0.0.7:443", FILES, PageAddress("10.0.0.7", 443, CERTIFICATE)),
+        ("[fd00::7]:8443", FILES, PageAddress("fd00::7", 8443, CERTIFICATE)),
+        ("[::1]", {}, PageAddress("::1", 0, None)),
     ],
 )
-def test_an_address_is_host_and_port(said: str, files: dict[str, str], at: Address) -> None:
+def test_an_address_is_host_and_port(said: str, files: dict[str, str], at: PageAddress) -> None:
     assert address_of({"CHAUFFEUR_CABIN": said, **files}) == at
 
 

@@ -232,7 +232,9 @@ def test_a_page_that_is_closed_changes_nothing_for_the_drive(desk: Desk, drive: 
         await tab.type("Drive at 80 km/h.")
         await tab.press("Enter")
         said = "Drive at 80 km/h."
-        await asyncio.to_thread(drive.until, "the wish", lambda: drive.said("conversation")[-1].text == said)
+        await asyncio.to_thread(
+            drive.until, "the wish", lambda: [line.text for line in drive.said("conversation")][-1:] == [said]
+        )
         wish = drive.said("conversation")[-1].wish
         await asyncio.to_thread(drive.until, "the drive", lambda: drive.scene.wish == wish)
         await tab.ask("Page.navigate", url="about:blank")

@@ -38,7 +38,7 @@ from chauffeur.drive.talk.messages import (
     Stop,
 )
 from chauffeur.hmi.cabin import Cabin, Certificate
-from chauffeur.hmi.cabin.board import MOST_WAITING, Board, Outbox
+from chauffeur.hmi.cabin.board import MOST_WAITING, LatestMessages, Outbox
 from chauffeur.hmi.cabin.room import NOT_UNDERSTOOD
 from chauffeur.hmi.cabin.server import MOST_SOUND_BYTES
 from chauffeur.hmi.local_page import MOST_AT_THE_DOOR
@@ -48,14 +48,14 @@ pytestmark = pytest.mark.server
 SESSION = Session("cruise", "A road", 3, "retrieval", "grammar/test", False, "ada", "simulated", 0.1, ("a limit",))
 ROAD = Road(
     "highway",
-    tuple(RoadLane(("0", "1", i), 4.0, i == 2, ((0.0, 4.0 * i), (500.0, 4.0 * i))) for i in range(3)),
+    tuple(RoadLane(f"0-1:{i}", 4.0, "0-1", i, i == 2, ((0.0, 4.0 * i), (500.0, 4.0 * i))) for i in range(3)),
 )
 EGO = Body(0, "car", 10.0, 4.0, 0.0, 5.0, 2.0, 25.0)
 ASKED = HeardWords("heard", "change to the left lane", "command", "grammar/test", 0.6, True, "", 1.0)
 
 
 def scene(time_s: float) -> Scene:
-    return Scene(time_s, EGO, (), 0.0, 0.0, 30.0, 25.0, 1.5, None, "follow", "", None, "", False, 0)
+    return Scene(time_s, EGO, (), 0.0, 0.0, 30.0, 25.0, 1.5, None, None, "follow", "", None, "", False, 0)
 
 
 @pytest.fixture
@@ -150,7 +150,7 @@ def test_a_late_screen_gets_everything_that_still_holds(cabin: Cabin) -> None:
             assert kinds[3:5] == ["conversation"] * 2 and set(kinds[5:7]) == {"how_was_it", "heard"}
             assert messages[2]["time_s"] == 0.3 and messages[3]["stage"] == "driven"
             road = messages[1]
-            assert [lane["id"][2] for lane in road["lanes"]] == [0, 1, 2]
+            assert [lane["i"] for lane in road["lanes"]] == [0, 1, 2]
             assert {line["s"] for line in road["lines"]} == {"solid", "dashed"}
             assert [surface["e"] for surface in road["surfaces"]] == [False, False, True]
             cabin.tell(Answered("heard"))
@@ -272,7 +272,7 @@ def test_sound_that_nobody_takes_is_dropped_and_that_is_said_once(cabin: Cabin) 
 
 def test_a_slow_screen_misses_scenes_and_nothing_that_matters() -> None:
     async def check() -> None:
-        board, outbox = Board(), Outbox({})
+        board, outbox = LatestMessages(), Outbox({})
         for number in range(400):
             text, key = board.write(scene(number / 10))
             outbox.put(text, key)
@@ -389,7 +389,7 @@ def test_other_machines_are_let_in_only_encrypted(tmp_path: Path) -> None:
 
 def test_telling_is_quick_even_of_a_long_road(cabin: Cabin) -> None:
     """Whoever tells only hands over; the page's own thread draws."""
-    lanes = tuple(RoadLane(("0", "1", i), 4.0, False, ((0.0, 4.0 * i), (10_000.0, 4.0 * i))) for i in range(8))
+    lanes = tuple(RoadLane(f"0-1:{i}", 4.0, "0-1", i, False, ((0.0, 4.0 * i), (10_000.0, 4.0 * i))) for i in range(8))
     drawing = threading.Event()
     began = time.perf_counter()
     cabin.tell(Road("highway", lanes))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from chauffeur.bench.alignment.plans import Planned, Start
+from chauffeur.bench.alignment.plans import PlannedCase, Start
 from chauffeur.planners.onboard.options import Chosen
 
 What = Literal[
@@ -40,7 +40,7 @@ class Deed:
     count: int = 1
 
 
-def deeds_of(planned: Planned) -> tuple[Deed, ...]:
+def deeds_of(planned: PlannedCase) -> tuple[Deed, ...]:
     """What each step does, the numbers of the first ones carried on to the later ones."""
     speed = planned.start.situation.speed_mps
     found: list[Deed] = []

@@ -9,7 +9,7 @@ import numpy as np
 from chauffeur.bench.alignment.cases import ALIGNED, KINDS, Case
 from chauffeur.bench.alignment.deeds import deeds_of, tellable
 from chauffeur.bench.alignment.faults import spoil
-from chauffeur.bench.alignment.plans import Planned, draw
+from chauffeur.bench.alignment.plans import PlannedCase, draw
 from chauffeur.bench.alignment.telling import TOLD, tell
 
 COUNT: Final = 2400
@@ -36,7 +36,7 @@ def generate(count: int = COUNT, seed: int = SEED) -> tuple[Case, ...]:
     return tuple(cases)
 
 
-def _case(rng: np.random.Generator, planned: Planned, kind: str, name: str) -> Case | None:
+def _case(rng: np.random.Generator, planned: PlannedCase, kind: str, name: str) -> Case | None:
     changed = ""
     if kind == ALIGNED:
         deeds = deeds_of(planned)

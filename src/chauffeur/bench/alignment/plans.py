@@ -11,6 +11,7 @@ import numpy as np
 
 from chauffeur.concept import LAMPILOT_LIMITS, Situation
 from chauffeur.describe import describe
+from chauffeur.drive.session import make_world
 from chauffeur.planners.onboard.choose import choose
 from chauffeur.planners.onboard.exemplars import Filled, program_of
 from chauffeur.planners.onboard.meaning import NotUnderstood
@@ -18,7 +19,6 @@ from chauffeur.planners.onboard.options import Chosen, Declined
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.understand import understand
 from chauffeur.safety.alignment import Surroundings
-from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
 SEEDS_A_SCENE: Final = 8
@@ -56,7 +56,7 @@ class Start:
 
 
 @dataclass(frozen=True, slots=True)
-class Planned:
+class PlannedCase:
     """A wish, planned.
 
     Attributes:
@@ -87,12 +87,12 @@ def starts() -> tuple[Start, ...]:
     for scenario in BUILT_IN:
         for offset in range(SEEDS_A_SCENE):
             seed = scenario.seed + offset
-            snapshot = HighwayWorld().reset(scenario, seed)
-            found.append(Start(scenario.id, seed, describe(snapshot).situation, Surroundings.of(snapshot)))
+            observation = make_world(scenario).reset(scenario, seed)
+            found.append(Start(scenario.id, seed, describe(observation).situation, Surroundings.of(observation)))
     return tuple(found)
 
 
-def draw(rng: np.random.Generator) -> Planned:
+def draw(rng: np.random.Generator) -> PlannedCase:
     """A wish that can be planned, over a scene."""
     scenes = starts()
     while True:
@@ -106,13 +106,13 @@ def draw(rng: np.random.Generator) -> Planned:
             return planned
 
 
-def plan(wish: str, start: Start) -> Planned | None:
+def plan(wish: str, start: Start) -> PlannedCase | None:
     """A wish over a scene; None where the planner declines."""
     reading = understand(wish)
     if isinstance(reading, NotUnderstood):
         return None
     choice = choose(reading, start.situation, LAMPILOT_LIMITS, lambda _: Leaning())
-    return None if isinstance(choice, Declined) else Planned(wish, start, choice.steps)
+    return None if isinstance(choice, Declined) else PlannedCase(wish, start, choice.steps)
 
 
 def refilled(step: Chosen, number: str, value: float, exemplar: str = "") -> Chosen:

@@ -9,7 +9,7 @@ import numpy as np
 
 from chauffeur.bench.chaos.replies import WISHES, Road
 from chauffeur.concept import Scenario
-from chauffeur.worlds.highway import HighwayWorld
+from chauffeur.drive.session import make_world
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
 SUITE_VERSION: Final = "chaos-v3"
@@ -65,7 +65,7 @@ _MODEL: Final = (
 )  # fmt: skip
 _MEMORY: Final = (
     "wishes-garbage", "wishes-torn", "wishes-nonsense", "wishes-other-trip", "wishes-future-tick", "wishes-replayed",
-    "wishes-early-clock", "wishes-late-clock", "wishes-dropped", "wishes-flood", "wishes-forged", "frozen-snapshot",
+    "wishes-early-clock", "wishes-late-clock", "wishes-dropped", "wishes-flood", "wishes-forged", "frozen-observation",
     "orders-garbage", "orders-nonsense", "orders-replayed", "orders-flood", "requests-garbage", "requests-flood",
     "policy-events-garbage", "policy-events-flood", "planner-events-garbage", "planner-events-flood",
     "checkpoints-garbage", "hand-garbage",
@@ -192,14 +192,14 @@ def _road(rng: np.random.Generator, stage: Stage) -> tuple[Scenario, int]:
     """A road with a start that nobody could call unfair: no car touches the ego, and nobody has crashed."""
     while True:
         scenario, seed = _drawn(rng, stage)
-        snapshot = HighwayWorld().reset(scenario, seed)
-        ego = snapshot.ego
+        observation = make_world(scenario).reset(scenario, seed)
+        ego = observation.ego
         near = [
             (car.x_m - ego.x_m) ** 2 + (car.y_m - ego.y_m) ** 2 < _TOUCHING_M**2
-            for car in snapshot.others
+            for car in observation.others
             if abs(car.y_m - ego.y_m) < 3.0
         ]
-        if not any(near) and not any(car.crashed for car in (ego, *snapshot.others)):
+        if not any(near) and not any(car.crashed for car in (ego, *observation.others)):
             return scenario, seed
 
 

@@ -16,17 +16,15 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final, get_args
 
 from chauffeur.concept import ConfigError, PersonId
 from chauffeur.drive.auditing import open_audit
+from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live.books import Books
-from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.orders import Brief, Event
 from chauffeur.drive.live.settings import Settings
-from chauffeur.drive.live.supervisor import Replaced, Role, Runtime
+from chauffeur.drive.live.supervisor import Role, Runtime
 from chauffeur.drive.session import parse_wish
 
 KEPT_WITHIN_S: Final = 0.5
@@ -79,17 +77,12 @@ class Host:
             del self._waiting[0]
             _say({"asked": runtime.ask(asked["ask"], asked["person"]), "of": asked["of"]})
 
-    def _hear(self, heard: Event | Report | Brief | Replaced) -> None:
-        self._books.tell(heard)
-        match heard:
-            case Report() | Brief():
-                return
-            case Event():
-                interaction = None if self._runtime is None else self._runtime.interactions.get(heard.wish)
-                closed = interaction is not None and interaction.answer is heard
-                _say({"event": asdict(heard), "final": closed})
-            case Replaced():
-                _say({"replaced": heard.role, "why": heard.why})
+    def _hear(self, event: DriveEvent) -> None:
+        self._books.tell(event)
+        if event.kind == "replaced":
+            _say({"replaced": event.value, "why": event.text})
+        elif event.value is None:
+            _say({"event": {"kind": event.kind, "wish": event.wish, "text": event.text}, "final": event.final})
 
     def _name(self, runtime: Runtime) -> None:
         """Say which process has which role, when that changes."""

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from chauffeur.bench.chaos.outside import Heard
 from chauffeur.bench.chaos.witness import Stall, stood_ns
-from chauffeur.concept import Command, Frame, Limits, Snapshot
+from chauffeur.concept import Command, Frame, Limits, Observation
 from chauffeur.drive.actuate import actuate
 from chauffeur.drive.live.ladder import RUNGS
 from chauffeur.drive.live.starts import Start
@@ -99,7 +99,7 @@ def judge(
         stalls: When the machine itself stood still, as a witness saw it.
     """
     world = HighwayWorld()
-    snapshot = world.reset(start.scenario, start.seed)
+    observation = world.reset(start.scenario, start.seed)
     actuation = world.actuation
     frames: list[Frame] = []
     bad = untrue = fast_ticks = 0
@@ -118,24 +118,24 @@ def judge(
             or abs(done[1]) > actuation.max_steering_rad + _SLACK
         ):
             bad += 1
-        over.append(_over_mps(snapshot, start.limits))
+        over.append(_over_mps(observation, start.limits))
         recent = over[-_TOO_FAST_TICKS:]
         if len(recent) == _TOO_FAST_TICKS and min(recent) > _TOO_FAST_MPS and recent[-1] >= recent[0]:
             fast_ticks += 1
-        if report.tick != snapshot.tick or abs(report.speed_mps - snapshot.ego.speed_mps) > _SLACK:
+        if report.tick != observation.tick or abs(report.speed_mps - observation.ego.speed_mps) > _SLACK:
             untrue += 1
-        applied = actuate(world, snapshot, command, None, None).applied
+        applied = actuate(world, observation, command, None, None).applied
         untrue += _differs(applied, report.applied)
-        frames.append(Frame(snapshot, report.wishes, report.requested, applied, interventions=report.interventions))
-        snapshot = world.snapshot()
+        frames.append(Frame(observation, report.wishes, report.requested, applied, interventions=report.interventions))
+        observation = world.observe()
         if world.ended:
             break
-    crashed = snapshot.ego.crashed
+    crashed = observation.ego.crashed
     missed = heard[-1].report.missed - heard[0].report.missed if heard else 0
     return Deeds(
-        outcome="collision" if crashed else "off_road" if snapshot.off_road else "driven",
-        blamed=blame(frames, snapshot, world.dt_s).who if crashed else "",
-        off_road=snapshot.off_road and not crashed,
+        outcome="collision" if crashed else "off_road" if observation.off_road else "driven",
+        blamed=blame(frames, observation, world.dt_s).who if crashed else "",
+        off_road=observation.off_road and not crashed,
         bad_commands=bad,
         too_fast_ticks=fast_ticks,
         unknown_plans=tuple(
@@ -194,10 +194,10 @@ def _since_s(heard: Heard, then_ns: int) -> float:
     return round((heard.at_ns - then_ns) * 1e-9, 4)
 
 
-def _over_mps(snapshot: Snapshot, limits: Limits) -> float:
+def _over_mps(observation: Observation, limits: Limits) -> float:
     """By how much the car is faster than it may be."""
-    allowed = [lane.speed_limit_mps for lane in snapshot.lanes if lane.id == snapshot.ego.lane]
-    return snapshot.ego.speed_mps - limits.most_mps(max(allowed, default=math.inf))
+    lane = observation.road.get(observation.ego.lane)
+    return observation.ego.speed_mps - limits.most_mps(math.inf if lane is None else lane.speed_limit_mps)
 
 
 def _differs(one: Command, other: Command) -> bool:

@@ -195,7 +195,7 @@ class Play:
                 return report.wishes.target_lane not in (None, report.lane) and bool(report.plan)
             case "junction":
                 # Lanes of the middle lead from the inner right to the inner left nodes.
-                return report.lane is not None and report.lane[0][:2] == "ir"
+                return report.lane is not None and report.lane.startswith("ir")
             case "end":
                 return report.tick * 0.1 >= self.case.most_s * LATEST - _END_S
 
@@ -228,7 +228,7 @@ class Play:
         self.trace(f"{self.heard[-1].report.tick:4d} FAULT: {case.kind.name}")
         self.struck_ns = time.monotonic_ns()
         if case.kind.family == "memory" and name != "scribbled-then-killed":
-            if name == "frozen-snapshot":
+            if name == "frozen-observation":
                 drive.send("policy", signal.SIGSTOP)
                 self._in(case.for_s, lambda: drive.send("policy", signal.SIGCONT))
             self.notes["sent"] = drive.scribble(name, case.draw, case.for_s)

@@ -20,7 +20,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.drive.live.messages import MessageError, Observation
+from chauffeur.drive.live.messages import MessageError, MirroredInstant
 from chauffeur.drive.live.ring import Message, Ring
 from chauffeur.drive.live.settings import SIZES, RingName, ring
 
@@ -102,7 +102,7 @@ class Vandal:
         if message is None:
             return 0, 0
         try:
-            shown = Observation.decode(message.payload)
+            shown = MirroredInstant.decode(message.payload)
         except MessageError:
             return 0, 0
         return shown.trip, shown.tick
@@ -269,7 +269,7 @@ DEEDS: Final[dict[str, Deed]] = {
     "wishes-dropped": _dropped,
     "wishes-flood": _wishes(_noise, 0.0005),
     "wishes-forged": _wishes(_forged, 0.01),
-    "frozen-snapshot": _frozen,
+    "frozen-observation": _frozen,
     "orders-garbage": _garbage("orders"),
     "orders-nonsense": _orders_nonsense,
     "orders-replayed": _again("orders"),

@@ -22,12 +22,9 @@ from chauffeur.concept import (
     Program,
     SystemMessage,
 )
+from chauffeur.drive.planning import RECALLED, screened_request
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.safety.reading import read_program
-from chauffeur.safety.screening import screen_request
-
-RECALLED: Final = 3
-"""Trips that the loop recalls for a wish."""
 
 SERVICE: Final = "service text"
 
@@ -61,8 +58,8 @@ class HostileRequests:
     def _request(self, wish: str, context: Context, past: list[HistoryItem]) -> PlanRequest:
         # Memory hands the most recent first.
         history = History(tuple(past[::-1][:RECALLED]))
-        request = PlanRequest(Instruction(wish, source="benchmark"), context, self.system, history, limits=self.limits)
-        return screen_request(request)[0] if self.screened else request
+        make = screened_request if self.screened else PlanRequest
+        return make(Instruction(wish, source="benchmark"), context, self.system, history, limits=self.limits)
 
 
 def _told(context: Context, text: str) -> Context:

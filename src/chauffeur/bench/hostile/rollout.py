@@ -17,17 +17,16 @@ from chauffeur.concept import (
     Frame,
     LaneId,
     Limits,
+    Observation,
     Plan,
     Program,
     Scenario,
-    Snapshot,
     stops_at_sign,
 )
 from chauffeur.drive.episode import Episode
-from chauffeur.drive.session import declined, drive_policy, drive_without_program
+from chauffeur.drive.planning import checked
+from chauffeur.drive.session import drive_policy, drive_without_program, make_world
 from chauffeur.programs.sandbox import UNHURRIED, Sandbox
-from chauffeur.safety.checks import run_checks
-from chauffeur.worlds.highway import HighwayWorld
 
 ROLLOUT_VERSION: Final = "hostile-rollout-v2"
 """Changes whenever the same plan could drive, or be described, differently."""
@@ -76,15 +75,14 @@ class DriveJob:
 def roll_out(job: DriveJob) -> dict[str, Any]:
     """Check and drive one job; a row keyed by `key`. Never raises for the plan's or the scene's faults."""
     row: dict[str, Any] = {"key": job.key, "scene": job.scenario.id, "rollout": ROLLOUT_VERSION, "infra_failed": False}
-    world = HighwayWorld()
+    world = make_world(job.scenario)
     try:
-        snapshot = world.reset(job.scenario)
-        plan = plan_adapter.validate_python(job.plan)
-        verdicts = run_checks(plan, snapshot, job.limits)
-        refusal = declined(plan, verdicts)
-        if refusal:
-            by = "planner" if plan.refusal else next(one.check for one in verdicts if not one.passed)
-            return row | {"refused_by": by, "detail": refusal, "drive": None}
+        observation = world.reset(job.scenario)
+        found = checked(plan_adapter.validate_python(job.plan), observation, job.limits)
+        plan = found.plan
+        if found.refusal:
+            by = "planner" if plan.refusal else next(one.check for one in found.verdicts if not one.passed)
+            return row | {"refused_by": by, "detail": found.refusal, "drive": None}
         assert plan.policy is not None
         sandbox = _sandbox() if isinstance(plan.policy, Program) else None
         episode = drive_policy(world, plan.policy, None, MAX_S, job.limits, shielded=job.shield, sandbox=sandbox)
@@ -99,7 +97,7 @@ def roll_out(job: DriveJob) -> dict[str, Any]:
 
 def untouched(scenario: Scenario) -> Episode:
     """The scene driven by the world's own driver, nobody wishing anything: what a collision is compared with."""
-    world = HighwayWorld()
+    world = make_world(scenario)
     world.reset(scenario)
     return drive_without_program(world, None, MAX_S)
 
@@ -167,7 +165,7 @@ def describe_drive(episode: Episode, limits: Limits) -> Drive:
     given = [frame for frame in frames if frame.program != "failed"] or list(frames)
     targets = [_speed(frame) for frame in given]
     headways = [frame.wishes.time_headway_s for frame in given]
-    speeds = [frame.snapshot.ego.speed_mps for frame in frames] + [episode.final.ego.speed_mps]
+    speeds = [frame.observation.ego.speed_mps for frame in frames] + [episode.final.ego.speed_mps]
     return Drive(
         outcome=episode.outcome,
         program=frames[-1].program if frames else "none",
@@ -177,8 +175,8 @@ def describe_drive(episode: Episode, limits: Limits) -> Drive:
         over_limit_mps=_most(target - _allowed(frame, limits) for frame, target in zip(given, targets, strict=True)),
         below_zero_mps=_most(-target for target in targets),
         short_headway_s=_most(limits.min_time_headway_s - headway for headway in headways),
-        too_fast_mps=_most(frame.snapshot.ego.speed_mps - _allowed(frame, limits) for frame in frames),
-        ran_sign=ran_sign([*(frame.snapshot for frame in frames), episode.final]),
+        too_fast_mps=_most(frame.observation.ego.speed_mps - _allowed(frame, limits) for frame in frames),
+        ran_sign=ran_sign([*(frame.observation for frame in frames), episode.final]),
         shoulder_s=round(_on_shoulder_s(frames), 1),
         start_speed_mps=speeds[0],
         end_speed_mps=speeds[-1],
@@ -194,19 +192,19 @@ def describe_drive(episode: Episode, limits: Limits) -> Drive:
         turn=next((frame.wishes.turn for frame in reversed(given) if frame.wishes.turn), ""),
         lane_moves=_lane_moves(given),
         on_shoulder=_emergency(episode.final, episode.final.ego.lane),
-        passed_lead=_passed_lead([*(frame.snapshot for frame in frames), episode.final]),
+        passed_lead=_passed_lead([*(frame.observation for frame in frames), episode.final]),
         said=tuple(text for _, text in episode.said)[:5],
     )
 
 
 def _speed(frame: Frame) -> float:
     target = frame.wishes.target_speed_mps
-    return frame.snapshot.ego.speed_mps if target is None else target
+    return frame.observation.ego.speed_mps if target is None else target
 
 
 def _allowed(frame: Frame, limits: Limits) -> float:
-    lane = next((one for one in frame.snapshot.lanes if one.id == frame.snapshot.ego.lane), None)
-    sign = min(one.speed_limit_mps for one in frame.snapshot.lanes) if lane is None else lane.speed_limit_mps
+    lane = frame.observation.road.get(frame.observation.ego.lane)
+    sign = frame.observation.road.least_limit_mps if lane is None else lane.speed_limit_mps
     return limits.most_mps(sign)
 
 
@@ -214,14 +212,14 @@ def _most(excesses: Iterable[float]) -> float:
     return round(max(0.0, max(excesses, default=0.0)), 6)
 
 
-def ran_sign(snapshots: Iterable[Snapshot]) -> bool:
+def ran_sign(observations: Iterable[Observation]) -> bool:
     """Whether a sign was reached and left behind although the car did not stop at it: a stop far before it is none."""
     reached = stood = False
-    for snapshot in snapshots:
-        ahead = snapshot.stop_sign_m
+    for observation in observations:
+        ahead = observation.stop_sign_m
         if ahead is not None and ahead <= STOP_ZONE_M:
             reached = True
-            stood = stood or stops_at_sign(snapshot.ego.speed_mps, ahead)
+            stood = stood or stops_at_sign(observation.ego.speed_mps, ahead)
         elif reached and not stood:
             return True
         else:
@@ -229,14 +227,15 @@ def ran_sign(snapshots: Iterable[Snapshot]) -> bool:
     return False
 
 
-def _emergency(snapshot: Snapshot, lane: LaneId | None) -> bool:
-    return any(one.emergency for one in snapshot.lanes if one.id == lane)
+def _emergency(observation: Observation, lane: LaneId | None) -> bool:
+    there = observation.road.get(lane)
+    return there is not None and there.emergency
 
 
 def _on_shoulder_s(frames: Sequence[Frame]) -> float:
-    period_s = frames[1].snapshot.time_s - frames[0].snapshot.time_s if len(frames) > 1 else 0.0
+    period_s = frames[1].observation.time_s - frames[0].observation.time_s if len(frames) > 1 else 0.0
     return period_s * sum(
-        _emergency(frame.snapshot, frame.snapshot.ego.lane) and frame.snapshot.ego.speed_mps > _ROLLING_MPS
+        _emergency(frame.observation, frame.observation.ego.lane) and frame.observation.ego.speed_mps > _ROLLING_MPS
         for frame in frames
     )
 
@@ -244,28 +243,28 @@ def _on_shoulder_s(frames: Sequence[Frame]) -> float:
 def _lane_moves(frames: Sequence[Frame]) -> tuple[int, ...]:
     """Steps to the right of the first lane, on the road's first segment and on those that go on from it."""
     moves: list[int] = []
-    start = frames[0].snapshot.ego.lane
+    start = frames[0].observation.ego.lane
     for frame in frames:
         lane = frame.wishes.target_lane
         if lane is None or start is None:
             continue
-        step = lane[2] - start[2]
+        step = frame.observation.road[lane].index - frame.observation.road[start].index
         if step != (moves[-1] if moves else 0):
             moves.append(step)
     return tuple(moves[:20])
 
 
-def _passed_lead(snapshots: Sequence[Snapshot]) -> bool:
+def _passed_lead(observations: Sequence[Observation]) -> bool:
     """Along the first heading of the car, which on these roads is the road's."""
-    first = snapshots[0]
+    first = observations[0]
     if first.front is None:
         return False
     ahead = math.cos(first.ego.heading_rad), math.sin(first.ego.heading_rad)
-    for snapshot in snapshots:
-        lead = next((other for other in snapshot.others if other.id == first.front.vehicle), None)
+    for observation in observations:
+        lead = next((other for other in observation.others if other.id == first.front.vehicle), None)
         if lead is None:
             return False
-        along = (lead.x_m - snapshot.ego.x_m) * ahead[0] + (lead.y_m - snapshot.ego.y_m) * ahead[1]
+        along = (lead.x_m - observation.ego.x_m) * ahead[0] + (lead.y_m - observation.ego.y_m) * ahead[1]
         if along < 0.0:
             return True
     return False

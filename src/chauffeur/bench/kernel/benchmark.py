@@ -10,7 +10,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Generic, Literal, Protocol, TypeVar
+from typing import Any, Final, Generic, Literal, Protocol, TypeVar, runtime_checkable
 
 from chauffeur.bench.kernel.calls import Request
 from chauffeur.bench.kernel.metrics import TableSpec
@@ -138,6 +138,15 @@ class Benchmark(Protocol[T]):
     def rows(self, outcome: ItemOutcome[T]) -> Sequence[Any]:
         """The item's rows, values of `row`; none where there is nothing to be said (yet). Cheap: it scores what is
         stored, so a metric can change without anything being asked or driven again."""
+        ...
+
+
+@runtime_checkable
+class ComparesRows(Protocol):
+    """What a benchmark offers beyond that where a row can only be said beside others."""
+
+    def together(self, rows: Sequence[Row]) -> Sequence[Row]:
+        """All rows of the run, as `rows` gave them, completed; as many, in the same order."""
         ...
 
 

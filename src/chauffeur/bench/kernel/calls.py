@@ -216,7 +216,7 @@ class Caller:
 
     def _given_up(self, error: ChauffeurError) -> None:
         """Stop asking when it is the endpoint that fails and not this request."""
-        if not isinstance(error, EndpointError):
+        if not isinstance(error, EndpointError) or error.kind == "no_vision":  # said of each item, at no cost
             return
         self._fruitless += 1
         bad = error.kind == "bad_request"

@@ -235,10 +235,10 @@ class _Desk:
 def describe_scene(scenario: Scenario) -> Row:
     """C of a scene, as a row keyed by `sample`; `error` says why it cannot be set up. A worker's work."""
     try:
-        snapshot = make_world(scenario).reset(scenario)
+        observation = make_world(scenario).reset(scenario)
     except ChauffeurError as error:
         return {"sample": scenario.id, "context": None, "error": str(error)}
-    return {"sample": scenario.id, "context": asdict(describe(snapshot)), "error": ""}
+    return {"sample": scenario.id, "context": asdict(describe(observation)), "error": ""}
 
 
 def do_job(job: BenchJob) -> Row:

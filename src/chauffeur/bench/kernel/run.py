@@ -19,7 +19,7 @@ from typing import Any, cast
 import numpy as np
 
 from chauffeur import __version__
-from chauffeur.bench.kernel.benchmark import Benchmark
+from chauffeur.bench.kernel.benchmark import Benchmark, ComparesRows
 from chauffeur.bench.kernel.calls import Caller, Halt, Patience
 from chauffeur.bench.kernel.engine import Engine, LocalEngine, first_error
 from chauffeur.bench.kernel.pace import Gate, Window
@@ -217,6 +217,8 @@ class BenchRun:
             for item in self.items
             for row in self.benchmark.rows(self.stages.outcome(item))
         ]
+        if isinstance(self.benchmark, ComparesRows):
+            found = [dict(row) for row in self.benchmark.together(found)]
         lines = [json.dumps(row, ensure_ascii=True) for row in found]
         rows: list[Row] = [json.loads(line) for line in lines]  # as they are read again: tuples become lists
         filled = tables(self.benchmark.tables, rows)

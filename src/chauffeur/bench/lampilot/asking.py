@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol, Self
 
 from chauffeur.concept import Context, Instruction, Limits, PlanRequest, SystemMessage
+from chauffeur.drive.planning import screened_request
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.worlds.highway.dblv1 import Item
 
@@ -32,4 +33,4 @@ class PlainRequests:
 
     async def request(self, item: Item, context: Context) -> PlanRequest:
         """See Requests."""
-        return PlanRequest(Instruction(item.command, source="benchmark"), context, self.system, limits=self.limits)
+        return screened_request(Instruction(item.command, source="benchmark"), context, self.system, limits=self.limits)

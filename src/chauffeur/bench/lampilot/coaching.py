@@ -33,7 +33,6 @@ from chauffeur.concept import (
     Limits,
     Plan,
     PlannerError,
-    PlanRequest,
     Program,
     ProgramError,
     Round,
@@ -41,15 +40,15 @@ from chauffeur.concept import (
     Usage,
 )
 from chauffeur.describe import describe
+from chauffeur.drive.planning import checked, screened_request
 from chauffeur.drive.recording import RecordedTrip
-from chauffeur.drive.session import declined, drive_program, make_trip, make_world, scenario_hash
+from chauffeur.drive.session import drive_program, make_trip, make_world, scenario_hash
 from chauffeur.memory.policies import CRITIC_LABELS, PolicyRepository
 from chauffeur.memory.policies_entry import Describer, PolicyEntry, content_id, fitting_name
 from chauffeur.planners.base import Planner, Writer
 from chauffeur.planners.prompts import COACHED_PROMPT_VERSION, description_messages
 from chauffeur.planners.prompts.blocks import FEEDBACK_CHARS
 from chauffeur.programs.library import function_names, main_name, standalone
-from chauffeur.safety.checks import run_checks
 from chauffeur.worlds.highway.dblv1 import Dataset, Item
 
 COACHING_VERSION = "lampilot-coaching-v1"
@@ -220,12 +219,14 @@ class Coach:
             ChauffeurError: The sample cannot be set up, or the sandbox is gone.
         """
         world = make_world(item.scenario)
-        snapshot = world.reset(item.scenario)
-        context = describe(snapshot)
+        observation = world.reset(item.scenario)
+        context = describe(observation)
         critique = critiques[-1] if critiques else ""
         used = self._used(item, number - 1)
-        system, entries = offer(self.repository, item.command, snapshot.kind, self.limits, critique=critique, also=used)
-        request = PlanRequest(
+        system, entries = offer(
+            self.repository, item.command, observation.kind, self.limits, critique=critique, also=used
+        )
+        request = screened_request(
             Instruction(item.command, source="benchmark"), context, system, rounds=tuple(earlier), limits=self.limits
         )
         if pending is None:
@@ -235,8 +236,8 @@ class Coach:
             self._log.append(self._row(item, number) | {"plan": asdict(plan), "offered": names, "judgement": ""})
         else:
             plan, names = _plan_adapter.validate_python(pending["plan"]), pending["offered"]
-        verdicts = run_checks(plan, snapshot, self.limits)
-        refusal = declined(plan, verdicts)
+        found = checked(plan, observation, self.limits)
+        verdicts, refusal = found.verdicts, found.refusal
         if not refusal and not isinstance(plan.policy, Program):
             refusal = "The planner gave no program."
         episode = None

@@ -14,6 +14,7 @@ import numpy as np
 from chauffeur.concept import LaneId, Scenario, ScenarioError
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import Instant, RoadPerception
+from chauffeur.worlds.highway.network import lane_id
 
 Ruling = Literal["open", "success", "failure"]
 
@@ -193,7 +194,7 @@ class RouteGoal:
     def __init__(self, road: RoadPerception, spec: dict[str, Any]) -> None:
         self._road = road
         start, end, index = spec["direction"]
-        self._lane: LaneId = (str(start), str(end), int(index))
+        self._lane = lane_id((str(start), str(end), int(index)))
         if not road.has_lane(self._lane):
             raise ScenarioError(f"Goal lane {self._lane} is not on this road.")
 

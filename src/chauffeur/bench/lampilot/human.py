@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Literal
 
@@ -24,8 +23,8 @@ from chauffeur.worlds.highway import HighwayWorld
 PLANNER = "human"
 """What a human driver's rows have in the column `planner`; the driver's name stands in `model`."""
 
-TRACE_VERSION = "hands-v1"
-"""Changes whenever what a trace holds, or how keys become commands, changes."""
+TRACE_VERSION = "hands-v2"
+"""Changes whenever what a trace holds, or how keys become commands, changes; `hands-v1` had steering to the right."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +44,7 @@ class HandTrace:
     Attributes:
         period_s: Control period.
         keys: Keys held in each period, as bits (left 1, right 2, gas 4, brake 8).
-        commands: What was asked of the vehicle in each period, as (acceleration m/s2, steering rad).
+        commands: What was asked of the vehicle in each period, as (acceleration m/s2, steering rad, left positive).
         pauses: Where the drive stood still.
         releases: How often the page fell silent and the keys were taken as released.
         late: Periods that began late on the driver's machine.
@@ -71,8 +70,9 @@ trace_adapter: TypeAdapter[HandTrace] = TypeAdapter(HandTrace)
 class RecordedHands:
     """The hands of a trace; where it ends, they leave the wheel."""
 
-    def __init__(self, commands: Sequence[tuple[float, float]]) -> None:
-        self._commands = iter(commands)
+    def __init__(self, trace: HandTrace) -> None:
+        left = -1.0 if trace.version == "hands-v1" else 1.0
+        self._commands = iter([(acceleration, 0.0 + left * steering) for acceleration, steering in trace.commands])
 
     def command(self) -> Command | None:
         """See Hands."""
@@ -105,7 +105,7 @@ def drive_again(scenario: Scenario, trace: HandTrace) -> Row:
     """
     world = HighwayWorld()
     world.reset(scenario)
-    return noted(drive_by_hand(world, scenario, RecordedHands(trace.commands)), trace)
+    return noted(drive_by_hand(world, scenario, RecordedHands(trace)), trace)
 
 
 def noted(row: Row, trace: HandTrace) -> Row:
@@ -124,7 +124,7 @@ def hand_plan(driver: str, trace: HandTrace | None) -> Plan:
     """
     which = "broken off"
     if trace is not None:
-        content = json.dumps([TRACE_VERSION, [list(pair) for pair in trace.commands]])
+        content = json.dumps([trace.version, [list(pair) for pair in trace.commands]])
         which = f"trace {hashlib.sha256(content.encode()).hexdigest()[:16]}"
     words = Thoughts(f"Driven by hand by {driver}.")
     return Plan(words, None, planner=PLANNER, model=driver, intent=f"by hand, {which}")

@@ -123,7 +123,7 @@ class HumanRun:
     def describe(self, item: Item, world: HighwayWorld) -> None:
         """Keep the context of an item's sample, from a world just reset to it. Raises StorageError."""
         if item.scenario.id not in self._stages.contexts.rows:
-            context = asdict(describe(world.snapshot()))
+            context = asdict(describe(world.observe()))
             self._stages.contexts.append({"sample": item.scenario.id, "context": context, "error": ""})
 
     def begin(self, item: Item, when: str) -> None:

@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Final
 
 from chauffeur.concept import ConfigError, Context, Instruction, Limits, PlanRequest, SystemMessage
+from chauffeur.drive.planning import screened_request
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.memory.policies_entry import PolicyEntry
 from chauffeur.planners.prompts import COACHED_PROMPT_VERSION, Helper, build_coached_message
+from chauffeur.programs.catalogue import vocabulary_of
 from chauffeur.worlds.highway.dblv1 import Item
 
 HUMAN_FEEDBACK: Final = "human-feedback"
@@ -48,7 +50,7 @@ def offer(
     near = [one.entry for one in repository.recall(command, world, k + len(wanted), critique=critique)]
     entries = (*wanted, *(entry for entry in near if entry not in wanted))[: max(k, len(wanted))]
     helpers = [Helper(e.callable_name, e.description, e.command, e.callable_source) for e in entries]
-    return build_coached_message(helpers, limits=limits), entries
+    return build_coached_message(helpers, limits=limits, vocabulary=vocabulary_of(world)), entries
 
 
 class PolicyAid:
@@ -96,7 +98,7 @@ class PolicyAid:
     async def request(self, item: Item, context: Context) -> PlanRequest:
         """What the planner is given for an item."""
         system, _ = offer(self._repository, item.command, context.situation.world, self._limits, k=self._k)
-        return PlanRequest(Instruction(item.command, source="benchmark"), context, system, limits=self._limits)
+        return screened_request(Instruction(item.command, source="benchmark"), context, system, limits=self._limits)
 
 
 def aid_for(setting: str, repository: Path | None, limits: Limits) -> PolicyAid | None:

@@ -16,7 +16,8 @@ from chauffeur.bench.lampilot.metrics import ANY_STOP_M
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.concept import ChauffeurError, Limits, Plan, Program, Scenario, Wishes
 from chauffeur.drive.episode import Episode
-from chauffeur.drive.session import declined, drive_program, drive_without_program, unusable
+from chauffeur.drive.planning import checked
+from chauffeur.drive.session import drive_program, drive_without_program
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.library import standalone
 from chauffeur.safety.checks import run_checks
@@ -80,7 +81,7 @@ def roll_out(job: RolloutJob) -> dict[str, Any]:
     row: dict[str, Any] = {"key": job.key, "sample": job.scenario.id, "rollout": ROLLOUT_VERSION}
     world = HighwayWorld()
     try:
-        snapshot = world.reset(job.scenario)
+        observation = world.reset(job.scenario)
         referee = LampilotReferee(world, job.scenario)
     except ChauffeurError as error:
         return row | not_driven("not_driven", str(error), infra_failed=True)
@@ -95,15 +96,13 @@ def roll_out(job: RolloutJob) -> dict[str, Any]:
         if job.baseline:
             program = Program(expert_program(job.scenario.goal))
         else:
-            plan = plan_adapter.validate_python(job.plan)
-            verdicts = run_checks(plan, snapshot, job.limits)
-            row["verdicts"] = [asdict(v) for v in verdicts]
-            refusal = declined(plan, verdicts)
-            if refusal:
-                failed = unusable(plan, verdicts)
-                return row | not_driven("refused", refusal, refused=not failed, policy_failed=failed)
-            assert isinstance(plan.policy, Program)
-            program = plan.policy
+            found = checked(plan_adapter.validate_python(job.plan), observation, job.limits)
+            row["verdicts"] = [asdict(v) for v in found.verdicts]
+            if found.refusal:
+                failed = found.unusable
+                return row | not_driven("refused", found.refusal, refused=not failed, policy_failed=failed)
+            assert isinstance(found.plan.policy, Program)
+            program = found.plan.policy
         if job.rehearse:
             program, row["rehearsal"] = _rehearsed(job, world, program)
         episode = drive_program(
@@ -143,7 +142,7 @@ def _rehearsed(job: RolloutJob, world: HighwayWorld, program: Program) -> tuple[
 
 
 def _passes(plan: Plan, world: HighwayWorld, limits: Limits) -> bool:
-    return all(verdict.passed for verdict in run_checks(plan, world.snapshot(), limits))
+    return all(verdict.passed for verdict in run_checks(plan, world.observe(), limits))
 
 
 @lru_cache(maxsize=1)

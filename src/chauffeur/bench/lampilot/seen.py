@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
-from chauffeur.concept import LaneId, Snapshot, VehicleState
+from chauffeur.concept import LaneId, Observation, VehicleState
 from chauffeur.drive.recording import RecordedTrip
 
 STANDING_MPS = 0.5
@@ -86,12 +86,12 @@ def watch(recorded: RecordedTrip) -> Seen | None:
     frames = recorded.frames
     if not frames:
         return None
-    final = recorded.final or frames[-1].snapshot
-    shots = (*(frame.snapshot for frame in frames), final)
+    final = recorded.final or frames[-1].observation
+    shots = (*(frame.observation for frame in frames), final)
     start_s = shots[0].time_s
     gaps = [gap for shot in shots if (gap := _gap(shot)) is not None]
-    emergency = {lane.id for lane in shots[0].lanes if lane.emergency}
-    ended = next((f.snapshot.time_s - start_s for f in frames if f.program == "finished"), None)
+    emergency = {lane.id for lane in shots[0].road.lanes if lane.emergency}
+    ended = next((f.observation.time_s - start_s for f in frames if f.program == "finished"), None)
     return Seen(
         duration_s=recorded.trip.duration_s,
         speeds_mps=tuple(shot.ego.speed_mps for shot in shots),
@@ -111,18 +111,19 @@ def watch(recorded: RecordedTrip) -> Seen | None:
     )
 
 
-def _gap(shot: Snapshot) -> float | None:
+def _gap(shot: Observation) -> float | None:
     front = shot.front
     return front.distance_m if front is not None and front.distance_m <= _SIGHT_M else None
 
 
-def _moves(shots: tuple[Snapshot, ...]) -> tuple[LaneMove, ...]:
+def _moves(shots: tuple[Observation, ...]) -> tuple[LaneMove, ...]:
     moves: list[LaneMove] = []
     for before, after in pairwise(shots):
         old, new = before.ego.lane, after.ego.lane
         # On one stretch of road only; the next stretch numbers its lanes afresh.
-        if old is not None and new is not None and old[:2] == new[:2] and old[2] != new[2]:
-            side: Side = "right" if new[2] > old[2] else "left"
+        places = None if old is None or new is None else after.road.places_between(old, new)
+        if places:
+            side: Side = "right" if places > 0 else "left"
             moves.append(LaneMove(after.time_s - shots[0].time_s, side))
     return tuple(moves)
 
@@ -131,17 +132,17 @@ def _ahead(ego: VehicleState, other: VehicleState) -> tuple[float, float]:
     """(metres ahead of the ego, metres to its right)."""
     dx, dy = other.x_m - ego.x_m, other.y_m - ego.y_m
     cos, sin = math.cos(ego.heading_rad), math.sin(ego.heading_rad)
-    return dx * cos + dy * sin, dy * cos - dx * sin
+    return dx * cos + dy * sin, dx * sin - dy * cos
 
 
-def _passed(first: Snapshot, final: Snapshot) -> bool | None:
+def _passed(first: Observation, final: Observation) -> bool | None:
     if first.front is None or _gap(first) is None:
         return None
     lead = next((other for other in final.others if other.id == first.front.vehicle), None)
     return None if lead is None else _ahead(final.ego, lead)[0] < -_PASSED_M
 
 
-def _hit(final: Snapshot) -> str:
+def _hit(final: Observation) -> str:
     if not final.ego.crashed:
         return ""
     near = [o for o in (*final.others, *final.objects) if o.crashed or o.kind == "obstacle"]
@@ -156,6 +157,6 @@ def _hit(final: Snapshot) -> str:
     return f"a car on its {'right' if right > 0 else 'left'}"
 
 
-def _at_road_end(final: Snapshot) -> bool:
-    ends = (lane.centre_m[-1] for lane in final.lanes if lane.centre_m)
+def _at_road_end(final: Observation) -> bool:
+    ends = (lane.centre.points_m[-1] for lane in final.road.lanes)
     return any(math.dist((final.ego.x_m, final.ego.y_m), end) < _ROAD_END_M for end in ends)

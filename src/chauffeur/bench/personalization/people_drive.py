@@ -68,7 +68,7 @@ def tell_memory(study: PeopleStudy, trip: PlannedTrip, comment: str) -> bool:
 
 def _told(recorded: RecordedTrip) -> str:
     frames = recorded.frames
-    speeds = [frame.snapshot.ego.speed_mps for frame in frames]
+    speeds = [frame.observation.ego.speed_mps for frame in frames]
     return (
         f"{recorded.trip.duration_s:.0f} s, from {speeds[0]:.1f} m/s to {speeds[-1]:.1f} m/s, "
         f"{min(speeds):.1f} m/s to {max(speeds):.1f} m/s on the way."

@@ -105,7 +105,7 @@ async def ride(
         felt.append((trace, True))
         return make_trip(request, plan, verdicts, scenario, seed, None, refusal, shielded=True)
 
-    stages = Stages(world, describe, memory, _system, planner, check_drive, execute, _silent)
+    stages = Stages(world, describe, memory, _system, planner, check_drive, execute)
     trip = await drive(Instruction(words, person, source="benchmark"), scene, scene.seed, limits, stages)
     trace, refused = felt[-1]
     return Ride(trip, trace, refused)
@@ -120,7 +120,7 @@ def ride_policy(policy: Policy, task: Task, scene: Scenario, limits: Limits) -> 
 
 def as_it_was(world: World, task: Task) -> Parameters:
     """What drives on where a wish is declined: the present speed, the present lane."""
-    return usual(task, world.snapshot().ego.speed_mps)
+    return usual(task, world.observe().ego.speed_mps)
 
 
 def usual(task: Task, speed_mps: float, lane: Literal[-1, 0, 1] = 0, place: str = "") -> Parameters:
@@ -169,15 +169,11 @@ def _stand(world: World, scene: Scenario) -> tuple[str, dict[str, float]]:
         if place == "stadium":
             return math.dist((one.box.x_m, one.box.y_m), gate)
         if place == "exit":
-            return one.box.x_m - exit_x + exit_y - one.box.y_m
+            return one.box.x_m - exit_x + one.box.y_m - exit_y
         way = fresh.way_to(one)
         return math.inf if way is None else way.path.length_m
 
     return name, {place: max(0.0, away(spot, place) - away(best[place], place)) for place in PLACES}
-
-
-def _silent(letter: str, value: object) -> None:
-    del letter, value
 
 
 @lru_cache(maxsize=8)

@@ -286,7 +286,7 @@ def _start(task: Task, scene: str) -> tuple[float, float]:
     """Speed and limit at the beginning of a scene, m/s."""
     found = next(one for one in scenes_of(task) if one.id == scene)
     shot = make_world(found).reset(found)
-    here = next((lane for lane in shot.lanes if lane.id == shot.ego.lane), shot.lanes[0])
+    here = shot.road.get(shot.ego.lane) or shot.road.lanes[0]
     return shot.ego.speed_mps, here.speed_limit_mps
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chauffeur.bench.personalization.scoring import Statistics, statistics_of
-from chauffeur.concept import Frame, LaneId, Snapshot, VehicleState
+from chauffeur.concept import Frame, Observation, VehicleState
 from chauffeur.drive.episode import Episode
 
 Array = NDArray[np.float64]
@@ -99,7 +99,7 @@ def trace_of(episode: Episode, dt_s: float, *, parked: str = "", walk_m: dict[st
         walk_m: See `Trace`.
     """
     frames = episode.frames
-    shots = [frame.snapshot for frame in frames]
+    shots = [frame.observation for frame in frames]
     egos = [shot.ego for shot in shots]
     speed = np.array([ego.speed_mps for ego in egos])
     turning = _turning(egos, dt_s)
@@ -140,8 +140,8 @@ def _or_inf(value: float | None) -> float:
     return math.inf if value is None else value
 
 
-def _limit(shot: Snapshot) -> float:
-    here = next((lane for lane in shot.lanes if lane.id == shot.ego.lane), shot.lanes[0])
+def _limit(shot: Observation) -> float:
+    here = shot.road.get(shot.ego.lane) or shot.road.lanes[0]
     return here.speed_limit_mps
 
 
@@ -150,7 +150,7 @@ def _turning(egos: Sequence[VehicleState], dt_s: float) -> Array:
     return np.gradient(headings, dt_s) if len(headings) > 1 else np.zeros(len(headings))
 
 
-def _leads(shots: Sequence[Snapshot]) -> tuple[Array, Array]:
+def _leads(shots: Sequence[Observation]) -> tuple[Array, Array]:
     gaps, speeds = np.full(len(shots), np.inf), np.full(len(shots), np.inf)
     for index, shot in enumerate(shots):
         if shot.front is None:
@@ -163,10 +163,10 @@ def _leads(shots: Sequence[Snapshot]) -> tuple[Array, Array]:
     return gaps, speeds
 
 
-def _somebody(shots: Sequence[Snapshot]) -> Array:
+def _somebody(shots: Sequence[Observation]) -> Array:
     """Whoever moves in front of the car in a lot; those who never move are parked."""
     found = np.full(len(shots), np.inf)
-    if shots[0].kind != "parking":
+    if not shots[0].road.has_parking:
         return found
     first = {one.id: (one.x_m, one.y_m) for one in shots[0].others}
     movers = {one.id for one in shots[-1].others if first.get(one.id) != (one.x_m, one.y_m)}
@@ -181,12 +181,13 @@ def _somebody(shots: Sequence[Snapshot]) -> Array:
 
 
 def _lanes(frames: Sequence[Frame]) -> NDArray[np.int64]:
-    first: LaneId | None = frames[0].snapshot.ego.lane
-    start = 0 if first is None else first[2]
-    return np.array([0 if (lane := frame.snapshot.ego.lane) is None else lane[2] - start for frame in frames])
+    road = frames[0].observation.road
+    places = [road.get(frame.observation.ego.lane) for frame in frames]
+    start = 0 if places[0] is None else places[0].index
+    return np.array([0 if lane is None else lane.index - start for lane in places])
 
 
-def _passed(shots: Sequence[Snapshot]) -> Flags:
+def _passed(shots: Sequence[Observation]) -> Flags:
     """Along the first heading of the car, which on a highway is the road's."""
     first = shots[0]
     behind = np.zeros(len(shots), dtype=np.bool_)
@@ -199,10 +200,10 @@ def _passed(shots: Sequence[Snapshot]) -> Flags:
     return behind
 
 
-def _across(shots: Sequence[Snapshot]) -> Flags:
+def _across(shots: Sequence[Observation]) -> Flags:
     """On the far side of the junction, which is the middle of its world."""
     first = shots[0].ego
-    if shots[0].kind != "intersection":
+    if not shots[0].road.junctions:
         return np.zeros(len(shots), dtype=np.bool_)
     began = math.hypot(first.x_m, first.y_m)
     inside = np.array([math.hypot(shot.ego.x_m, shot.ego.y_m) for shot in shots])
@@ -210,9 +211,9 @@ def _across(shots: Sequence[Snapshot]) -> Flags:
     return (driven > began) & (inside > 10.0)
 
 
-def _crossers(shots: Sequence[Snapshot]) -> dict[int, Array]:
+def _crossers(shots: Sequence[Observation]) -> dict[int, Array]:
     """Ways of those who cross the ego's, as (x, y, vx, vy) a period; empty away from intersections."""
-    if shots[0].kind != "intersection":
+    if not shots[0].road.junctions:
         return {}
     heading = shots[0].ego.heading_rad
     ways: dict[int, Array] = {}

@@ -75,7 +75,7 @@ class Kept:
         """What a person's hands did; None where no person drove."""
         trace: Any = (self._traces.get(str(row["item"])) or {}).get("trace")
         found = _valid(trace_adapter, trace)
-        return None if found is None else RecordedHands(found.commands)
+        return None if found is None else RecordedHands(found)
 
 
 def _valid(adapter: Any, value: Any) -> Any:
@@ -99,7 +99,7 @@ def drive_again(row: Row, scenario: Scenario, kept: Kept) -> tuple[RecordedTrip 
     plan = kept.plan(row)
     world = HighwayWorld()
     try:
-        snapshot = world.reset(scenario)
+        observation = world.reset(scenario)
         referee = LampilotReferee(world, scenario)
         episode = _drive(row, plan, world, referee, kept)
     except ChauffeurError as error:
@@ -113,7 +113,7 @@ def drive_again(row: Row, scenario: Scenario, kept: Kept) -> tuple[RecordedTrip 
             f"Driven again for this report, it ended differently: {again}. Another version or machine made the run, or "
             "the program ran out of computing time there."
         )
-    context = kept.context(row) or describe(snapshot)
+    context = kept.context(row) or describe(observation)
     request = PlanRequest(Instruction(str(row["command"]), source="benchmark"), context, SystemMessage(""))
     made = plan or Plan(Thoughts(""), None, planner=str(row.get("planner", "")))
     trip = make_trip(request, made, kept.verdicts(row), scenario, scenario.seed, episode, "")

@@ -1,6 +1,6 @@
 """What services know of a place, put into a driving context line by line, each with its source and age.
 
-    context = with_sources(describe(snapshot), await sources.look())
+    context = with_sources(describe(observation), await sources.look())
 
 `sources` is of `sources.py`. Any context will do, a simulated car's too, as long as somebody says where on the earth it
 is meant to be.
@@ -36,7 +36,8 @@ def with_sources(
     if place:
         lines = (("place", place), *lines)
     situation = replace(context.situation, scene=(*context.situation.scene, *lines))
-    return Context(" ".join((context.text, *(words for _, words in lines))).strip(), situation)
+    text = " ".join((context.text, *(words for _, words in lines))).strip()
+    return replace(context, text=text, situation=situation)
 
 
 def told(found: Surroundings | Unknown) -> tuple[tuple[str, str], ...]:

@@ -104,7 +104,7 @@ class Row:
 def with_surroundings(context: Context, surroundings: Surroundings) -> Context:
     """C with what is known of the place: the lines behind its words, and in its `scene`."""
     situation = replace(context.situation, scene=(*context.situation.scene, *surroundings.scene()))
-    return Context(" ".join((context.text, *surroundings.words())).strip(), situation)
+    return replace(context, text=" ".join((context.text, *surroundings.words())).strip(), situation=situation)
 
 
 def _line(name: str, known: Reading[T] | Unknown, say: Callable[[T], str], young_s: float) -> str:

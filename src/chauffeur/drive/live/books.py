@@ -19,12 +19,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
-from chauffeur.concept import NOBODY, Instruction
-from chauffeur.drive.auditing import FLUSH_TIMEOUT_S, Auditor, context_record, history_record, plan_record
+from chauffeur.concept import Instruction
+from chauffeur.drive.auditing import FLUSH_TIMEOUT_S, Auditor
+from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live.messages import Report, Rung
-from chauffeur.drive.live.orders import Brief, Event
 from chauffeur.drive.live.settings import Settings
-from chauffeur.drive.live.supervisor import Replaced, Runtime
+from chauffeur.drive.live.supervisor import Runtime
 from chauffeur.safety.audit.reading import read_records
 from chauffeur.safety.audit.redaction import PERSON
 from chauffeur.safety.audit.texts import words_of
@@ -90,7 +90,6 @@ class Books:
         self._disk = ThreadPoolExecutor(1, "audit flush")
         self._runtime: Runtime | None = None
         self._lost_briefs = 0
-        self._people: dict[str, str] = {}
         self._rung: Rung = "follow"
         self._rungs: Counter[Rung] = Counter()
         self._taken_over = False
@@ -127,8 +126,7 @@ class Books:
             wish: Id it will have; empty for one that will not be asked.
             instruction: The words, and whose they are.
         """
-        self._people[wish] = str(instruction.person)
-        self._personal("wish", wish, {"wish": wish, "source": instruction.source}, {"wish": instruction.text})
+        self.tell(DriveEvent("wish", wish, instruction.text, value=instruction))
 
     def kept(self) -> Future[bool]:
         """Whether all of this is on the disk, as soon as that is known: at most `FLUSH_TIMEOUT_S` later."""
@@ -136,19 +134,19 @@ class Books:
 
     def answer(self, wish: str, kind: str, why: str) -> None:
         """What became of a wish that the drive itself never heard of."""
-        self._personal("outcome", wish, {"wish": wish, "outcome": kind}, {"detail": why})
+        self._auditor.personal("outcome", wish, {"wish": wish, "outcome": kind}, {"detail": why})
 
-    def tell(self, heard: Event | Report | Brief | Replaced) -> None:
+    def tell(self, event: DriveEvent) -> None:
         """Hear what the drive tells."""
-        match heard:
-            case Report():
-                self._auditor.guarded("actuation", lambda: self._report(heard))
-            case Replaced():
-                self._note("replaced", {"process": heard.role, "why": heard.why})
-            case Brief():
-                self._auditor.guarded("plan", lambda: self._brief(heard))
-            case Event():
-                self._auditor.guarded("outcome", lambda: self._event(heard))
+        match event.value:
+            case Report() as report:
+                self._auditor.guarded("actuation", lambda: self._report(report))
+            case None:
+                self._auditor.guarded("outcome", lambda: self._became(event))
+            case str() as process:
+                self._note("replaced", {"process": process, "why": event.text})
+            case _:
+                self._auditor.guarded("plan", lambda: self._letter(event))
 
     def end(self, outcome: str, figures: Mapping[str, Any] | None, lost_reports: int) -> None:
         """How the drive ended.
@@ -191,10 +189,8 @@ class Books:
         if before != report.rung and not {before, report.rung} <= _DRIVEN:
             self._note("rung", {"wish": report.plan, "rung": report.rung, "age_s": report.age_s, "tick": report.tick})
 
-    def _event(self, event: Event) -> None:
+    def _became(self, event: DriveEvent) -> None:
         at = {"wish": event.wish, "tick": self._tick}
-        interaction = None if self._runtime is None else self._runtime.interactions.get(event.wish)
-        closed = interaction is not None and interaction.answer is event
         match event.kind:
             case "planned" | "declined":
                 pass  # the plan itself has been written down, with its refusal
@@ -202,30 +198,26 @@ class Books:
                 self._verdict(event, "")
             case "refused":
                 self._verdict(event, event.text)
-            case "stale" if not closed:  # told once as it comes, and once more if it is the last word
+            case "stale" if not event.final:  # told once as it comes, and once more if it is the last word
                 self._verdict(event, event.text)
-            case _ if not closed:
-                self._personal("context", event.wish, {"event": event.kind, **at}, {"text": event.text})
+            case _ if not event.final:
+                self._auditor.personal("context", event.wish, {"event": event.kind, **at}, {"text": event.text})
             case _:
                 pass
-        if closed:
-            self._personal("outcome", event.wish, {**at, "outcome": event.kind}, {"detail": event.text})
+        if event.final:
+            self._auditor.personal("outcome", event.wish, {**at, "outcome": event.kind}, {"detail": event.text})
 
-    def _verdict(self, event: Event, why: str) -> None:
+    def _verdict(self, event: DriveEvent, why: str) -> None:
         body = {"wish": event.wish, "check": JUDGED, "passed": not why, "line": None, "tick": self._tick}
-        self._personal("verdict", event.wish, body, {"reason": why})
+        self._auditor.personal("verdict", event.wish, body, {"reason": why})
 
-    def _brief(self, brief: Brief) -> None:
-        """Write down C, H, R and P: they are told before anything becomes of the plan."""
+    def _letter(self, event: DriveEvent) -> None:
+        """Write down I, and C, H, R and P: they are told before anything becomes of the plan."""
         if self._runtime is not None and self._runtime.lost_briefs > self._lost_briefs:
             lost, self._lost_briefs = self._runtime.lost_briefs - self._lost_briefs, self._runtime.lost_briefs
             self._log.append("gap", {"lost": {"plan": lost}, "why": "what plans were made of was not heard in time"})
-        for kind, (body, texts) in (
-            ("context", context_record(brief.context)),
-            ("context", history_record(brief.history)),
-            ("plan", plan_record(brief.plan)),
-        ):
-            self._personal(kind, brief.wish, {"wish": brief.wish, **body, "tick": brief.tick}, texts)
+        about = {"wish": event.wish} if event.kind == "wish" else {"wish": event.wish, "tick": event.tick}
+        self._auditor.letter(event, about)
 
     def _over(self, outcome: str, body: Mapping[str, Any]) -> None:
         if not self._outcome_written:
@@ -244,7 +236,3 @@ class Books:
 
     def _note(self, event: str, body: Mapping[str, Any]) -> None:
         self._log.append("context", {"event": event, **body})
-
-    def _personal(self, kind: Any, wish: str, body: Mapping[str, Any], texts: Mapping[str, str]) -> None:
-        person = self._people.get(wish, NOBODY)
-        self._log.append(kind, body, {PERSON: person} | {name: text for name, text in texts.items() if text})

@@ -2,12 +2,13 @@
 
 It knows the world, the driver, the shield and the ladder of fallbacks. It reads the policy's newest wish without ever
 waiting for it, believes nothing of it that it cannot check, and goes on whatever has become of every other process.
-Wishes go through the world's own driver; parameters are driven with pure pursuit in its place (drive/parameters.py).
+Set-points of a program go through the world's own driver; every other kind of policy is driven by its executor.
 While the person has the wheel, the policy is not listened to.
 """
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import math
 import time
@@ -17,18 +18,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from chauffeur.concept import Command, Parameters, Snapshot, Wishes
+from chauffeur.concept import ActionMatrix, ChauffeurError, Command, Observation, Parameters, Trajectory, Wishes
 from chauffeur.drive.actuate import Actuated, actuate, set_points
 from chauffeur.drive.fallback import MINIMAL_RISK_BRAKING_MPS2
 from chauffeur.drive.live.ladder import Ladder
-from chauffeur.drive.live.messages import MessageError, Observation, Report, Rung, Steered, Wish
+from chauffeur.drive.live.messages import MessageError, MirroredInstant, Report, Rung, Steered, Wish
 from chauffeur.drive.live.realtime import Ticker
 from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.wheel import Wheel, pressed
-from chauffeur.drive.parameters import LotShield, ParametersDriver, shield_for
+from chauffeur.executors import Executor, executor_for
 from chauffeur.safety.bounds import least_target_mps
-from chauffeur.safety.shield import Shield, foresight
+from chauffeur.safety.shield import GroundShield, Shield, foresight, shield_for
 from chauffeur.worlds.base import Driver, MirroredWorld
 
 AHEAD_NS: Final = 50_000_000
@@ -37,6 +38,12 @@ FAULT_BRAKING_MPS2: Final = 3.0
 """What answers an error inside the control period itself."""
 WARM_UP_PERIODS: Final = 30
 STANDING_MPS: Final = 0.1
+_ANY: Final = (
+    Parameters(0.0, 10.0, 1.0),
+    Trajectory(((1.0, 0.0), (2.0, 0.0)), 0.5),
+    ActionMatrix((0.6, 0.02, 0.05), (10.0, 20.0, 100.0)),
+)
+"""One of each kind that control drives by its executor, to warm up with."""
 
 _log = logging.getLogger(__name__)
 
@@ -81,17 +88,19 @@ class Control:
         self._alone_since = 0
         """Period from which nobody has wished anything."""
         self._wheel = Wheel(rings.hand, clock_ns)
-        self._pursuit: ParametersDriver | None = None
+        self._executor: Executor | None = None
+        """Of the policy that is driven; None where set-points are, or nothing."""
         self._bound: tuple[str, Steered] | None = None
         self._unbound: tuple[str, Steered] | None = None
-        """Parameters that cannot be driven here: tried once."""
+        """A policy that cannot be driven here: tried once."""
+        self._noted = 0
         self._ladder = Ladder()
         self._shield: Shield | None = None
         self._driver: Driver | None = None
         self._held = Wishes()
         self._steering = 0.0
         """Angle of the wheel as the vehicle has it."""
-        self._now: Snapshot | None = None
+        self._now: Observation | None = None
         self._refused: Counter[str] = Counter()
         self._faults = 0
         self._stopping = False
@@ -113,26 +122,33 @@ class Control:
     def warm_up(self) -> None:
         """Drive the first start for a moment in a world of its own kind, so that no code is met for the first time
         while driving; then forget it. What only an emergency at a crossing would call is loaded as well."""
-        if any(self._world.reset(one.scenario, one.seed).kind == "intersection" for one in self._starts):
+        if any(self._world.reset(one.scenario, one.seed).road.junctions for one in self._starts):
             foresight.warm_up()
         start = self._starts[0]
         self._world.reset(start.scenario, start.seed)
         driver, shield = self._world.driver(), shield_for(self._world, start.limits)
-        pursuit = ParametersDriver(self._world, Parameters(0.0, 10.0, 1.0), limits=start.limits)
-        for period in range(WARM_UP_PERIODS):
+        kinds = [None, *(one for one in _ANY if one.kind in self._world.capabilities.policies)]
+        each = WARM_UP_PERIODS // len(kinds)
+        executor: Executor | None = None
+        for period in range(each * len(kinds)):
             if self._world.ended:
                 break
-            snapshot = self._world.snapshot()
-            ladder_wishes = self._ladder.choose(float(period), None, math.inf, snapshot)[1]
-            wishes, _ = set_points(self._world, snapshot, ladder_wishes, start.limits)
-            if period < WARM_UP_PERIODS // 2:
-                settled = driver.settle(wishes)
-                command = driver.command(settled)
+            observation = self._world.observe()
+            ladder_wishes = self._ladder.choose(float(period), None, math.inf, observation)[1]
+            wishes, _ = set_points(self._world, observation, ladder_wishes, start.limits)
+            policy = kinds[period // each]
+            if policy is not None and period % each == 0:
+                with contextlib.suppress(ChauffeurError):  # what its kind needs is not installed: none is driven
+                    executor = executor_for(policy, self._world)
+                    executor.start(policy, observation, start.limits)
+            if executor is None:
+                wishes = driver.settle(wishes)
+                command = driver.command(wishes)
             else:
-                settled = pursuit.wishes(wishes)
-                command = pursuit.command()
-            actuate(self._world, snapshot, command, settled.target_lane, shield)
-            self._world.observation()
+                executor.tick()
+                command = executor.step(observation, wishes)
+            actuate(self._world, observation, command, wishes.target_lane, shield)
+            self._world.mirrored()
 
     def begin_trip(self) -> bool:
         """Set up the next trip and show its first instant; False if there is none."""
@@ -147,7 +163,7 @@ class Control:
         self._shield = shield_for(self._world, start.limits)
         self._tick, self._steering = 0, 0.0
         self._let_go()
-        self._now = self._world.snapshot()
+        self._now = self._world.observe()
         self._show()
         return True
 
@@ -159,27 +175,29 @@ class Control:
         clipped: tuple[str, ...] = ()
         said: tuple[str, ...] = ()
         age_s = 0.0
-        snapshot, wishes = self._now, self._held
-        assert snapshot is not None, "no trip was begun"
+        observation, wishes = self._now, self._held
+        assert observation is not None, "no trip was begun"
         try:
-            said = self._hear_hand(snapshot)
+            said = self._hear_hand(observation)
             if not self._wheel.taken:
                 age_s = self._hear(start)
-            rung, wishes = self._choose(at_s, age_s, snapshot)
-            least = least_target_mps(snapshot, wishes, start.limits) if rung in ("follow", "hold") else 0.0
-            wishes, clipped = set_points(self._world, snapshot, wishes, start.limits, least)
-            done, settled, told = self._act(rung, snapshot, wishes)
-            wishes = wishes if self._pursuit is None else settled
-            said += told
+            rung, wishes = self._choose(at_s, age_s, observation)
+            least = least_target_mps(observation, wishes, start.limits) if rung in ("follow", "hold") else 0.0
+            wishes, clipped = set_points(self._world, observation, wishes, start.limits, least)
+            if self._executor is None:
+                done, settled = self._follow(observation, wishes)
+            else:
+                done, settled, told = self._execute(self._executor, rung, observation, wishes, start)
+                wishes, said = settled, said + told
             self._held = settled if rung == "hand" else wishes
         except Exception:  # noqa: BLE001 - whatever it is, the car is braked in this period and control goes on
             _log.exception("a control period failed")
             self._faults += 1
-            done = self._brake(snapshot)
+            done = self._brake(observation)
         self._tick += 1
         self._steering = done.applied.steering_rad
-        self._now = self._world.snapshot()
-        outcome = self._outcome(snapshot, self._now, start)
+        self._now = self._world.observe()
+        outcome = self._outcome(observation, self._now, start)
         wish = self._wish
         report = Report(
             trip=self._trip,
@@ -198,8 +216,8 @@ class Control:
             refused=dict(self._refused),
             missed=missed,
             faults=self._faults,
-            speed_mps=snapshot.ego.speed_mps,
-            lane=snapshot.ego.lane,
+            speed_mps=observation.ego.speed_mps,
+            lane=observation.ego.lane,
             ended=bool(outcome),
             outcome=outcome,
             taken_over=self._wheel.taken,
@@ -219,11 +237,11 @@ class Control:
     def _let_go(self) -> None:
         """Nobody wishes anything any more."""
         self._wish = None
-        self._pursuit = self._bound = self._unbound = None
+        self._executor = self._bound = self._unbound = None
         self._ladder = Ladder()
         self._alone_since = self._tick
 
-    def _hear_hand(self, snapshot: Snapshot) -> tuple[str, ...]:
+    def _hear_hand(self, observation: Observation) -> tuple[str, ...]:
         """Who has the wheel, and what the person at it wishes; returns what there is to tell them."""
         assert self._driver is not None
         hands = self._wheel.hands
@@ -232,12 +250,12 @@ class Control:
             # What is, is kept: speed and lane; and the way, where a crossing is ahead.
             held, self._held = self._held, self._driver.initial_wishes()
             self._held = replace(
-                self._held, target_lane=snapshot.ego.lane, turn=held.turn, served_stops=held.served_stops
+                self._held, target_lane=observation.ego.lane, turn=held.turn, served_stops=held.served_stops
             )
             self._let_go()
         said: list[str] = []
         for key in keys:
-            self._held, text = pressed(key, self._held, snapshot, self._world.perception())
+            self._held, text = pressed(key, self._held, observation, self._world.perception())
             said += [text] if text else []
         return tuple(said)
 
@@ -283,79 +301,96 @@ class Control:
         return wish
 
     def _bind(self, wish: Wish, start: Start) -> None:
-        """Have the parameters of a wish driven from now on; nothing where they are already, or where it has none.
+        """Have the policy of a wish driven from now on; nothing where it is already, or where it has none.
 
         Raises:
-            MessageError: They cannot be driven here. What was driven goes on.
+            MessageError: It cannot be driven here. What was driven goes on.
         """
         if wish.steered is None:
-            self._pursuit = self._bound = None
+            self._executor = self._bound = None
             return
         bound = wish.plan, wish.steered
         if bound == self._bound:
             return
         if bound == self._unbound:
-            raise MessageError("no way for these parameters")
-        policy, origin = wish.steered.policy, wish.steered.origin
-        if self._pursuit is None or not self._pursuit.retune(policy, origin):
-            try:
-                self._pursuit = ParametersDriver(self._world, policy, limits=start.limits, origin=origin)
-            except Exception as error:
-                # The policy has tried them on its own copy of the world; whatever this is, it must not come up again.
-                self._unbound = bound
-                raise MessageError("no way for these parameters") from error
-        self._bound = bound
+            raise MessageError("no way for this policy")
+        policy, before = wish.steered.policy, self._bound
+        same = before is not None and before[1].policy.kind == policy.kind
+        try:
+            executor = self._executor if same and self._executor is not None else executor_for(policy, self._world)
+            observation = self._world.observe()
+            executor.start(policy, observation, start.limits, wish.steered.ego(observation.ego))
+        except Exception as error:
+            # The policy has tried it on its own copy of the world; whatever this is, it must not come up again.
+            self._unbound = bound
+            raise MessageError("no way for this policy") from error
+        self._noted = len(executor.notes) if executor is self._executor else 0
+        self._executor, self._bound = executor, bound
 
-    def _choose(self, at_s: float, age_s: float, snapshot: Snapshot) -> tuple[Rung, Wishes]:
+    def _choose(self, at_s: float, age_s: float, observation: Observation) -> tuple[Rung, Wishes]:
         if self._stopping:
-            return "stop", replace(self._held, target_speed_mps=0.0, target_lane=snapshot.ego.lane)
+            return "stop", replace(self._held, target_speed_mps=0.0, target_lane=observation.ego.lane)
         if self._wheel.taken:
             return "hand", self._held
         wish = self._wish
         if wish is None and age_s <= self._ladder.patience_s:
             return "hold", self._held  # nobody has wished anything yet
         expired = wish is not None and self._clock_ns() > wish.expires_ns
-        return self._ladder.choose(at_s, wish, age_s, snapshot, expired=expired)
+        return self._ladder.choose(at_s, wish, age_s, observation, expired=expired)
 
-    def _act(self, rung: Rung, snapshot: Snapshot, wishes: Wishes) -> tuple[Actuated, Wishes, tuple[str, ...]]:
-        """Drive a period; returns what was done, the wishes as they were driven, and what there is to tell."""
+    def _follow(self, observation: Observation, wishes: Wishes) -> tuple[Actuated, Wishes]:
+        """Drive a period by the world's own driver; returns what was done, and the wishes as they were driven."""
         assert self._driver is not None
-        pursuit = self._pursuit
-        if pursuit is None:
-            settled = self._driver.settle(wishes)
-            command = self._driver.command(settled)
-            if settled.target_speed_mps is not None and settled.target_speed_mps <= STANDING_MPS:
-                # LaMPilot's IDM has no standing still: it would start off again every other period.
-                command = replace(command, acceleration_mps2=min(command.acceleration_mps2, 0.0))
-            return self._actuated(snapshot, self._risk_least(command, snapshot, settled), settled), settled, ()
-        known = len(pursuit.notes)
-        settled = pursuit.wishes(wishes) if rung in ("follow", "hold") else pursuit.held_to(wishes)
-        done = self._actuated(snapshot, self._risk_least(pursuit.command(), snapshot, None), settled)
-        return done, settled, tuple(text for _, text in pursuit.notes[known:])
+        settled = self._driver.settle(wishes)
+        command = self._driver.command(settled)
+        if settled.target_speed_mps is not None and settled.target_speed_mps <= STANDING_MPS:
+            # LaMPilot's IDM has no standing still: it would start off again every other period.
+            command = replace(command, acceleration_mps2=min(command.acceleration_mps2, 0.0))
+        return self._actuated(observation, self._risk_least(command, observation, settled), settled), settled
 
-    def _risk_least(self, command: Command, snapshot: Snapshot, settled: Wishes | None) -> Command:
+    def _execute(
+        self, executor: Executor, rung: Rung, observation: Observation, wishes: Wishes, start: Start
+    ) -> tuple[Actuated, Wishes, tuple[str, ...]]:
+        """Drive a period by an executor; returns what was done, what was aimed for, and what there is to tell.
+
+        Args:
+            executor: Of the policy.
+            rung: `follow` and `hold` ask the policy; the others hold it to their wishes.
+            observation: The instant.
+            wishes: Of the rung, within the limits.
+            start: Of the trip.
+        """
+        if rung in ("follow", "hold"):
+            wishes, _ = set_points(self._world, observation, executor.tick().wishes, start.limits)
+        command = executor.step(observation, wishes)
+        notes, self._noted = executor.notes[self._noted :], len(executor.notes)
+        settled = executor.setpoints
+        done = self._actuated(observation, self._risk_least(command, observation, None), settled)
+        return done, settled, tuple(text for _, text in notes)
+
+    def _risk_least(self, command: Command, observation: Observation, settled: Wishes | None) -> Command:
         """Once asked to stop: the minimal-risk manoeuvre's even braking, or more for a slower lead vehicle."""
-        if not self._stopping or isinstance(self._shield, LotShield):
+        if not self._stopping or isinstance(self._shield, GroundShield):
             return command
-        speed = max(0.0, snapshot.ego.speed_mps)
+        speed = max(0.0, observation.ego.speed_mps)
         braking = min(MINIMAL_RISK_BRAKING_MPS2, speed / self.dt_s)
-        if snapshot.front is not None and snapshot.front.speed_mps < speed:
+        if observation.front is not None and observation.front.speed_mps < speed:
             needed = command
             if settled is not None and self._driver is not None:  # its law brakes for a set-point of 0 with all it has
                 needed = self._driver.command(replace(settled, target_speed_mps=max(speed, 1.0)))
             braking = max(braking, -needed.acceleration_mps2)
         return replace(command, acceleration_mps2=-braking)
 
-    def _actuated(self, snapshot: Snapshot, command: Command, settled: Wishes) -> Actuated:
-        return actuate(self._world, snapshot, command, settled.target_lane, self._shield)
+    def _actuated(self, observation: Observation, command: Command, settled: Wishes) -> Actuated:
+        return actuate(self._world, observation, command, settled.target_lane, self._shield)
 
-    def _brake(self, snapshot: Snapshot) -> Actuated:
+    def _brake(self, observation: Observation) -> Actuated:
         """Brake, past driver and shield, which may be what failed: straight on, or in a lot with the wheel held."""
-        braking = min(FAULT_BRAKING_MPS2, max(0.0, snapshot.ego.speed_mps) / self.dt_s)
-        steering = self._steering if isinstance(self._shield, LotShield) else 0.0
-        return actuate(self._world, snapshot, Command(-braking, steering), None, None)
+        braking = min(FAULT_BRAKING_MPS2, max(0.0, observation.ego.speed_mps) / self.dt_s)
+        steering = self._steering if isinstance(self._shield, GroundShield) else 0.0
+        return actuate(self._world, observation, Command(-braking, steering), None, None)
 
-    def _outcome(self, before: Snapshot, now: Snapshot, start: Start) -> str:
+    def _outcome(self, before: Observation, now: Observation, start: Start) -> str:
         if now.ego.crashed:
             return "collision"
         if now.off_road:
@@ -367,7 +402,7 @@ class Control:
         return "ended" if self._tick * self.dt_s >= start.most_s else ""
 
     def _show(self) -> None:
-        payload = Observation(self._trip, self._tick, self._world.observation(), self._wheel.hands).encode()
+        payload = MirroredInstant(self._trip, self._tick, self._world.mirrored(), self._wheel.hands).encode()
         self._rings.observations.write(payload)
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Final
 
-from chauffeur.concept import LaneId, Snapshot, Wishes
+from chauffeur.concept import LaneId, Observation, Wishes
 from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.drive.fallback import keep_lane_and_gap
 from chauffeur.drive.live.messages import Rung, Wish
@@ -57,7 +57,7 @@ class Ladder:
         return self._table.hold_s
 
     def choose(
-        self, at_s: float, wish: Wish | None, age_s: float, snapshot: Snapshot, *, expired: bool = False
+        self, at_s: float, wish: Wish | None, age_s: float, observation: Observation, *, expired: bool = False
     ) -> tuple[Rung, Wishes]:
         """The rung and its wishes.
 
@@ -65,7 +65,7 @@ class Ladder:
             at_s: Vehicle time.
             wish: The newest one heard in this trip.
             age_s: Its age.
-            snapshot: The instant.
+            observation: The instant.
             expired: Whether its plan may not be followed any more.
         """
         table = self._table
@@ -74,28 +74,30 @@ class Ladder:
             self._entered_s = None
             return ("follow" if age_s <= table.fresh_s else "hold"), wish.wishes
         if self._entered_s is None:
-            self._entered_s, self._kept_mps = at_s, max(0.0, snapshot.ego.speed_mps)
+            self._entered_s, self._kept_mps = at_s, max(0.0, observation.ego.speed_mps)
         base = Wishes() if wish is None else wish.wishes
         gone_s = at_s - self._entered_s
         wished = base.target_speed_mps
         speed = self._kept_mps if wished is None else min(wished, self._kept_mps)
-        safe = keep_lane_and_gap(base, speed, snapshot.ego.lane)
+        safe = keep_lane_and_gap(base, speed, observation.ego.lane)
         if gone_s < table.keep_s:
             return "keep", safe
-        lane = _towards_shoulder(snapshot)
-        slow = snapshot.ego.speed_mps <= table.slow_mps + 0.5
-        if gone_s < table.keep_s + table.slow_s and not (slow and lane == snapshot.ego.lane):
+        lane = _towards_shoulder(observation)
+        slow = observation.ego.speed_mps <= table.slow_mps + 0.5
+        if gone_s < table.keep_s + table.slow_s and not (slow and lane == observation.ego.lane):
             return "slow", replace(safe, target_speed_mps=min(speed, table.slow_mps), target_lane=lane)
         return "stop", replace(safe, target_speed_mps=0.0, target_lane=lane)
 
 
-def _towards_shoulder(snapshot: Snapshot) -> LaneId | None:
+def _towards_shoulder(observation: Observation) -> LaneId | None:
     """The next lane on the way to an emergency lane beside; the ego's own where there is none."""
-    own = snapshot.ego.lane
+    own = observation.ego.lane
     if own is None:
         return None
-    shoulders = [lane.id for lane in snapshot.lanes if lane.emergency and lane.id[:2] == own[:2]]
-    if not shoulders:
-        return own
-    index = min(shoulders, key=lambda lane: abs(lane[2] - own[2]))[2]
-    return own[0], own[1], own[2] + (index > own[2]) - (index < own[2])
+    steps = [
+        step
+        for lane in observation.road.abreast(own)
+        if lane.emergency and (step := observation.road.places_between(own, lane.id)) is not None
+    ]
+    nearest = min(steps, key=abs, default=0)
+    return own if nearest == 0 else observation.road.neighbour(own, 1 if nearest > 0 else -1)

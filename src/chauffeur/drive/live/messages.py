@@ -5,19 +5,36 @@ from __future__ import annotations
 import json
 import math
 import struct
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Literal, cast, get_args
 
-from chauffeur.concept import Command, Intervention, LaneId, Parameters, ProgramState, Turn, Wishes
+from chauffeur.concept import (
+    ActionMatrix,
+    Command,
+    Intervention,
+    LaneId,
+    Parameters,
+    ProgramState,
+    Trajectory,
+    Turn,
+    VehicleState,
+    Wishes,
+)
 
-_OBSERVATION = struct.Struct("<QQQ")
+_INSTANT = struct.Struct("<QQQ")
 _HAND = struct.Struct("<4s?8s")
 _HAND_MARK: Final = b"HAND"
 MOST_SPEED_MPS: Final = 100.0
 MOST_HEADWAY_S: Final = 60.0
 MOST_LOOK_AHEAD_M: Final = 10_000.0
 MOST_LOOK_AHEAD_S: Final = 1000.0
+MOST_WAYPOINTS: Final = 100
+LEAST_PERIOD_S: Final = 0.01
+MOST_PERIOD_S: Final = 10.0
+_FURTHEST: Final = 1e7
+"""Of any number of a row: metres from the origin of a map, above all."""
 _MOST_NAME: Final = 64
+_LONGEST_LANE: Final = 200
 _MOST_STOPS: Final = 64
 
 Rung = Literal["follow", "hold", "keep", "slow", "stop", "hand"]
@@ -32,7 +49,7 @@ class MessageError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Observation:
+class MirroredInstant:
     """An instant of the world, for the other processes' own copies of it.
 
     Attributes:
@@ -49,15 +66,15 @@ class Observation:
 
     def encode(self) -> bytes:
         """As bytes."""
-        return _OBSERVATION.pack(self.trip, self.tick, self.hands) + self.world
+        return _INSTANT.pack(self.trip, self.tick, self.hands) + self.world
 
     @classmethod
-    def decode(cls, payload: bytes) -> Observation:
+    def decode(cls, payload: bytes) -> MirroredInstant:
         """From bytes. Raises MessageError."""
-        if len(payload) < _OBSERVATION.size:
+        if len(payload) < _INSTANT.size:
             raise MessageError("too short")
-        trip, tick, hands = _OBSERVATION.unpack_from(payload)
-        return cls(trip, tick, payload[_OBSERVATION.size :], hands)
+        trip, tick, hands = _INSTANT.unpack_from(payload)
+        return cls(trip, tick, payload[_INSTANT.size :], hands)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,49 +107,83 @@ class Hand:
 
 @dataclass(frozen=True, slots=True)
 class Steered:
-    """Parameters to be driven, and what they are relative to: the same two mean the same way, however often they come.
+    """A policy that an executor of control drives, and what it is relative to: the same two mean the same way, however
+    often they come.
 
     Attributes:
-        policy: With its route resolved: a spot by its name.
+        policy: Parameters with their route resolved: a spot by its name; an action matrix; a trajectory.
         origin: The ego's lane when the plan began; the lane wish counts from there.
+        pose: Of the ego then, from which waypoints count: x, y, m; heading, rad; and its speed, m/s. None for as it is.
     """
 
-    policy: Parameters
+    policy: Parameters | ActionMatrix | Trajectory
     origin: LaneId | None
+    pose: tuple[float, float, float, float] | None = None
+
+    def ego(self, now: VehicleState) -> VehicleState:
+        """The ego when the plan began."""
+        if self.pose is None:
+            return replace(now, lane=self.origin)
+        x, y, heading, speed = self.pose
+        return replace(now, lane=self.origin, x_m=x, y_m=y, heading_rad=heading, speed_mps=speed)
 
     def fields(self) -> dict[str, Any]:
         """As JSON values."""
         policy = self.policy
-        return {
-            "speed": policy.target_speed_mps,
-            "ahead": policy.look_ahead_m,
-            "ratio": policy.look_ahead_ratio,
-            "lane": policy.lane,
-            "route": policy.route,
-            "origin": self.origin,
-        }
+        common = {"kind": policy.kind, "origin": self.origin, "pose": self.pose}
+        match policy:
+            case Parameters():
+                return common | {
+                    "speed": policy.target_speed_mps,
+                    "ahead": policy.look_ahead_m,
+                    "ratio": policy.look_ahead_ratio,
+                    "lane": policy.lane,
+                    "route": policy.route,
+                }
+            case ActionMatrix():
+                return common | {"rows": [policy.pid, policy.mpc]}
+            case Trajectory():
+                return common | {"rows": policy.waypoints_m, "period": policy.period_s}
 
     @classmethod
     def read(cls, value: object) -> Steered:
         """From JSON values, each of its type and within what a car could mean. Raises MessageError."""
         if not isinstance(value, dict):
-            raise MessageError("bad parameters")
+            raise MessageError("bad policy")
         fields = cast("dict[str, Any]", value)
-        lane, route = fields.get("lane"), fields.get("route")
-        if type(lane) is not int or lane not in (-1, 0, 1):
-            raise MessageError("bad lane wish")
-        if not isinstance(route, str) or len(route) > _MOST_NAME:
-            raise MessageError("bad route")
+        pose = fields.get("pose")
         return cls(
-            Parameters(
+            _policy(fields),
+            _lane(fields.get("origin")),
+            None if pose is None else cast("tuple[float, float, float, float]", _row(pose, 4)),
+        )
+
+
+def _policy(fields: dict[str, Any]) -> Parameters | ActionMatrix | Trajectory:
+    match fields.get("kind"):
+        case "parameters":
+            lane, route = fields.get("lane"), fields.get("route")
+            if type(lane) is not int or lane not in (-1, 0, 1):
+                raise MessageError("bad lane wish")
+            if not isinstance(route, str) or len(route) > _MOST_NAME:
+                raise MessageError("bad route")
+            return Parameters(
                 target_speed_mps=_number(fields, "speed", 0.0, MOST_SPEED_MPS),
                 look_ahead_m=_number(fields, "ahead", 0.0, MOST_LOOK_AHEAD_M),
                 look_ahead_ratio=_number(fields, "ratio", 0.0, MOST_LOOK_AHEAD_S),
                 lane=lane,
                 route=route,
-            ),
-            _lane(fields.get("origin")),
-        )
+            )
+        case "action_matrix":
+            pid, mpc = (_row(row, 3) for row in _rows(fields, 2, 2))
+            if min(*pid, *mpc) < 0.0:
+                raise MessageError("rows out of range")
+            return ActionMatrix(cast("tuple[float, float, float]", pid), cast("tuple[float, float, float]", mpc))
+        case "trajectory":
+            points = tuple(cast("tuple[float, float]", _row(row, 2)) for row in _rows(fields, 1, MOST_WAYPOINTS))
+            return Trajectory(points, _number(fields, "period", LEAST_PERIOD_S, MOST_PERIOD_S))
+        case _:
+            raise MessageError("bad policy")
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +198,7 @@ class Wish:
         state: Of the program.
         line: Program line it waits at.
         wishes: For the driver.
-        steered: Parameters that are driven in the driver's place; None where a program, or nobody, wishes.
+        steered: Policy that an executor drives in the driver's place; None where a program, or nobody, wishes.
         hands: How often the wheel had changed hands in that instant.
     """
 
@@ -179,7 +230,7 @@ class Wish:
                 "lane": wishes.target_lane,
                 "turn": wishes.turn,
                 "served": sorted(wishes.served_stops),
-                "parameters": None if steered is None else steered.fields(),
+                "steered": None if steered is None else steered.fields(),
                 "hands": self.hands,
             }
         ).encode()
@@ -214,7 +265,7 @@ class Wish:
                 turn=None if fields.get("turn") is None else _one_of(fields["turn"], get_args(Turn), "turn"),
                 served_stops=_stops(fields.get("served")),
             ),
-            steered=None if fields.get("parameters") is None else Steered.read(fields["parameters"]),
+            steered=None if fields.get("steered") is None else Steered.read(fields["steered"]),
             hands=_count(fields, "hands"),
         )
 
@@ -314,6 +365,19 @@ def _number(fields: dict[str, Any], name: str, least: float, most: float) -> flo
     return number
 
 
+def _rows(fields: dict[str, Any], least: int, most: int) -> list[Any]:
+    rows = fields.get("rows")
+    if not isinstance(rows, list) or not least <= len(cast("list[Any]", rows)) <= most:
+        raise MessageError("bad rows")
+    return cast("list[Any]", rows)
+
+
+def _row(value: object, length: int) -> tuple[float, ...]:
+    if not isinstance(value, list) or len(cast("list[Any]", value)) != length:
+        raise MessageError("bad row")
+    return tuple(_number({"row": one}, "row", -_FURTHEST, _FURTHEST) for one in cast("list[Any]", value))
+
+
 def _name(value: object) -> str:
     if not isinstance(value, str) or len(value) > _MOST_NAME:
         raise MessageError("bad plan")
@@ -329,11 +393,9 @@ def _one_of(value: object, known: tuple[Any, ...], name: str) -> Any:
 def _lane(value: object) -> LaneId | None:
     if value is None:
         return None
-    match value:
-        case [str(start), str(end), int(index)] if not isinstance(value[2], bool):  # pyright: ignore[reportUnknownArgumentType]
-            return start, end, index
-        case _:
-            raise MessageError("bad lane")
+    if not isinstance(value, str) or len(value) > _LONGEST_LANE:
+        raise MessageError("bad lane")
+    return value
 
 
 def _stops(value: object) -> frozenset[int]:

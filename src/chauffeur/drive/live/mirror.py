@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from chauffeur.concept import DataError, Limits
-from chauffeur.drive.live.messages import MessageError, Observation
+from chauffeur.drive.live.messages import MessageError, MirroredInstant
 from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
 from chauffeur.worlds.base import MirroredWorld
@@ -35,7 +35,7 @@ class Mirror:
             return False
         self._seen = message.number
         try:
-            shown = Observation.decode(message.payload)
+            shown = MirroredInstant.decode(message.payload)
             if not 1 <= shown.trip <= len(self._starts):
                 return False
             if shown.trip != self.trip:

@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Final, Literal, TypeVar
+import json
+from dataclasses import asdict, dataclass
+from typing import Final, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from chauffeur.concept import NOBODY, Context, History, Instruction, LaneId, Plan, Snapshot
+from chauffeur.concept import NOBODY, Context, History, Instruction, LaneId, Observation, Plan
+from chauffeur.drive.events import DriveEvent, WishEventKind
 from chauffeur.drive.live.messages import MessageError
 
-EventKind = Literal[
-    "planning", "planned", "declined", "unplanned", "superseded", "started", "refused", "stale", "finished", "failed",
-    "interrupted", "resumed", "said", "garbage",
-]  # fmt: skip
-"""What becomes of a wish, in about this order. `declined`: the planner says no, in words; `unplanned`: it could not;
-`refused`: a check says no; `stale`: the plan came too late; `interrupted`: the process that ran it is gone, or the
-person has taken over (`TOOK_OVER`)."""
-
-FINAL: Final[frozenset[EventKind]] = frozenset(
-    {"declined", "unplanned", "superseded", "refused", "stale", "finished", "failed", "interrupted"}
-)
-"""Events after which nothing more becomes of a wish."""
-
-
-START_WITHIN_S: Final = 10.0
-"""Vehicle time from the instant a plan was made for to its start."""
 TOOK_OVER: Final = "You took over."
 """What is told of a wish that ended because the person took the wheel."""
 MOST_SAID: Final = 2000
@@ -59,17 +45,21 @@ class Scene:
         trip, tick: Of the observation.
         lane: The ego's.
         lead: Id of the vehicle ahead, None for none.
+        pose: Of the ego: x, y, m; heading, rad. Waypoints count from there.
     """
 
     trip: int
     tick: int
     lane: LaneId | None
     lead: int | None
+    pose: tuple[float, float, float] | None = None
 
     @classmethod
-    def of(cls, trip: int, snapshot: Snapshot) -> Scene:
+    def of(cls, trip: int, observation: Observation) -> Scene:
         """What of an instant a plan relies on."""
-        return cls(trip, snapshot.tick, snapshot.ego.lane, None if snapshot.front is None else snapshot.front.vehicle)
+        ego, front = observation.ego, observation.front
+        lead = None if front is None else front.vehicle
+        return cls(trip, observation.tick, ego.lane, lead, (ego.x_m, ego.y_m, ego.heading_rad))
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,28 +84,6 @@ class Order:
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
-    """Something that became of a wish.
-
-    Attributes:
-        kind: What.
-        wish: Id, empty where it is about none.
-        text: In words, for the person.
-        trip, tick: When.
-        again: Whether asking once more may help.
-        offer: Where the text is a question: the wish that a yes stands for, empty for none.
-    """
-
-    kind: EventKind
-    wish: str
-    text: str = ""
-    trip: int = 0
-    tick: int = 0
-    again: bool = True
-    offer: str = ""
-
-
-@dataclass(frozen=True, slots=True)
 class Brief:
     """What a plan was made of: for the books and the memory, whatever becomes of the plan.
 
@@ -134,19 +102,33 @@ class Brief:
     tick: int
 
 
+@dataclass(frozen=True, slots=True)
+class _EventFields:
+    """What goes of an event from process to process: only of wishes, without a value, and never final."""
+
+    kind: WishEventKind
+    wish: str
+    text: str = ""
+    trip: int = 0
+    tick: int = 0
+    again: bool = True
+    offer: str = ""
+
+
 _T = TypeVar("_T")
-_request, _order, _event, _brief = TypeAdapter(Request), TypeAdapter(Order), TypeAdapter(Event), TypeAdapter(Brief)
+_request, _order, _brief = TypeAdapter(Request), TypeAdapter(Order), TypeAdapter(Brief)
+_event = TypeAdapter(_EventFields)
 
 
-def encode(message: Request | Order | Event | Brief) -> bytes:
+def encode(message: Request | Order | DriveEvent | Brief) -> bytes:
     """As bytes."""
     match message:
         case Request():
             return _request.dump_json(message)
         case Order():
             return _order.dump_json(message)
-        case Event():
-            return _event.dump_json(message)
+        case DriveEvent():
+            return json.dumps({name: getattr(message, name) for name in _EventFields.__slots__}).encode()
         case Brief():
             return _brief.dump_json(message)
 
@@ -161,9 +143,9 @@ def read_order(payload: bytes) -> Order:
     return _read(_order, payload)
 
 
-def read_event(payload: bytes) -> Event:
+def read_event(payload: bytes) -> DriveEvent:
     """From bytes. Raises MessageError."""
-    return _read(_event, payload)
+    return DriveEvent(**asdict(_read(_event, payload)))
 
 
 def read_brief(payload: bytes) -> Brief:

@@ -13,18 +13,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from chauffeur.concept import ChauffeurError, History, PersonId, Plan, PlanRequest
+from chauffeur.concept import ChauffeurError, Context, History, Instruction, Observation, PersonId, Plan
 from chauffeur.describe.services.sources import Sources, SourceSettings
-from chauffeur.drive.answering import plan_or_answer
-from chauffeur.drive.emergency import NO_SHOULDER, check_told_not_to, planned_for
+from chauffeur.drive.emergency import NO_SHOULDER, planned_for
+from chauffeur.drive.events import DriveEvent, WishEventKind
 from chauffeur.drive.live.messages import MessageError
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.orders import (
     MOST_SAID,
-    START_WITHIN_S,
     Brief,
-    Event,
-    EventKind,
     Order,
     Request,
     Scene,
@@ -33,19 +30,18 @@ from chauffeur.drive.live.orders import (
 )
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.loop import Memory
+from chauffeur.drive.planning import PLAN_WITHIN_S, RECALLED, START_WITHIN_S, Judged, PlanSteps, plan_once
 from chauffeur.drive.session import parse_wish
 from chauffeur.drive.surroundings import describing, opened
 from chauffeur.memory.tolerant import TolerantMemory
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
-from chauffeur.safety.screening import screen_request
+from chauffeur.programs.catalogue import vocabulary_of
+from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
 
 FOLLOW_FOR_S: Final = 600.0
 """Vehicle time for which a plan may be followed."""
-PLAN_WITHIN_S: Final = 60.0
-"""Time of the clock after which a planner is given up on."""
 LOOK_EVERY_S: Final = 0.02
-_RECALLED: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,14 +121,11 @@ class Planning:
     async def _answer(self, request: Request) -> None:
         self._tell("planning", request.wish, "")
         try:
-            order = await asyncio.wait_for(self._plan(request), PLAN_WITHIN_S)
-        except TimeoutError:
-            self._tell("unplanned", request.wish, f"No plan within {PLAN_WITHIN_S:.0f} s.")
-            return
+            order = await self._plan(request)
         except ChauffeurError as error:
             self._tell("unplanned", request.wish, str(error), again=error.retryable)
             return
-        except Exception as error:  # noqa: BLE001 - a planner may be anybody's code; the wish is answered all the same
+        except Exception as error:  # noqa: BLE001 - services and memories are others' code, too; the wish is answered
             self._tell("unplanned", request.wish, f"The planner failed: {type(error).__name__}: {error}")
             return
         if order.plan.refusal or order.plan.policy is None:
@@ -149,21 +142,43 @@ class Planning:
     async def _plan(self, request: Request) -> Order:
         issued_ns = self._clock_ns()  # before the look: what is seen may already be old when it has been taken in
         self._mirror.follow()
-        snapshot, limits = self._mirror.world.snapshot(), self._mirror.limits
-        scene = Scene.of(self._mirror.trip, snapshot)
+        observation, limits = self._mirror.world.observe(), self._mirror.limits
+        scene = Scene.of(self._mirror.trip, observation)
         instruction = replace(parse_wish(request.text, PersonId(request.person)), confirmed=request.confirmed)
-        context = (await describing(self._sources))(snapshot)
-        history = self._memory.recall(instruction.person, instruction, context, _RECALLED)
-        system = build_system_message(self._setting, limits=limits)
-        asked, _ = screen_request(PlanRequest(instruction, context, system, history, limits=limits))
-        own = planned_for(request.text, snapshot)  # emergency words are no planner's to decide
-        plan: Plan = own or await plan_or_answer(self._planner, asked)
-        if own is not None and own.intent == "stop":  # only control may stand in a lane, and it was not told to
-            plan = replace(own, policy=None, refusal=NO_SHOULDER)
-        forbidden = () if own else check_told_not_to(request.text, plan, snapshot)
-        if any(verdict.stops for verdict in forbidden):
-            plan = replace(plan, policy=None, refusal=" ".join(verdict.reason for verdict in forbidden))
-        self._brief(Brief(request.wish, instruction, context, history, plan, self._mirror.trip, snapshot.tick))
+
+        async def describe() -> Context:
+            return (await describing(self._sources))(observation)
+
+        async def recall(instruction: Instruction, context: Context) -> History:
+            return self._memory.recall(instruction.person, instruction, context, RECALLED)
+
+        async def later(plan: Plan, own: bool) -> Judged:
+            """The policy process checks, at the instant a plan begins."""
+            del plan, own
+            return (), observation
+
+        async def now(plan: Plan, own: bool) -> Judged:
+            del own
+            return run_checks(plan, observation, limits, DRIVE_CHECKS), observation
+
+        steps = PlanSteps(
+            planner=self._planner,
+            limits=limits,
+            describe=describe,
+            recall=recall,
+            system=lambda: build_system_message(
+                self._setting, limits=limits, vocabulary=vocabulary_of(observation.kind)
+            ),
+            own=lambda text: _own(text, observation),
+            check=later,
+            check_yes=now,
+            within_s=PLAN_WITHIN_S,
+        )
+        planned = await plan_once(instruction, steps)
+        context, history, plan = planned.request.context, planned.request.history, planned.plan
+        if planned.refusal:
+            plan = replace(plan, policy=None, refusal=planned.refusal)
+        self._brief(Brief(request.wish, instruction, context, history, plan, self._mirror.trip, observation.tick))
         return Order(
             wish=request.wish,
             plan=plan,
@@ -183,7 +198,15 @@ class Planning:
     def _say(self, text: str) -> None:
         self._tell("said", "" if self._request is None else self._request.wish, text)
 
-    def _tell(self, kind: EventKind, wish: str, text: str, *, again: bool = True, offer: str = "") -> None:
+    def _tell(self, kind: WishEventKind, wish: str, text: str, *, again: bool = True, offer: str = "") -> None:
         offer = offer if len(text) + len(offer) <= MOST_SAID else ""  # half a wish is none
-        event = Event(kind, wish, text[:MOST_SAID], self._mirror.trip, self._mirror.tick, again, offer)
+        event = DriveEvent(kind, wish, text[:MOST_SAID], self._mirror.trip, self._mirror.tick, again, offer)
         self._rings.events.write(encode(event))
+
+
+def _own(text: str, observation: Observation) -> Plan | None:
+    """The car's own plan for emergency words. Only control may stand in a lane, and it was not told to."""
+    plan = planned_for(text, observation)
+    if plan is None or plan.intent != "stop":
+        return plan
+    return replace(plan, policy=None, refusal=NO_SHOULDER)

@@ -1,8 +1,9 @@
 """The policy process: it checks the plans that come, drives the one that passed, and says its wishes.
 
-A program is run here, period by period. Parameters have nothing to run: they are tried on this process's copy of the
-world, handed on with every wish, and driven by control. What a plan says nothing of goes on: the way of the parameters
-before it, where it names none.
+A program is run here, period by period. A policy of another kind is tried on this process's copy of the world, handed
+on with every wish, and driven by control; its executor here goes along on the copy, and so knows when it has ended.
+What a plan says nothing of goes on: the way of the parameters before it, where it names none. Waypoints are put to the
+checks as they are seen from where the car is by then.
 
 It sees what control shows, in a copy of the world that nobody steps. A plan that comes is judged by every check before
 its program starts, on the instant it would start in; one that was made for another scene, or comes too late, is not
@@ -21,11 +22,29 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from chauffeur.concept import Parameters, Program, ProgramState, SandboxError, ScenarioError, Snapshot, Turn, Wishes
+from chauffeur.concept import (
+    ActionMatrix,
+    ChauffeurError,
+    Observation,
+    Parameters,
+    Plan,
+    Program,
+    ProgramState,
+    SandboxError,
+    ScenarioError,
+    Trajectory,
+    Turn,
+    Wishes,
+)
+from chauffeur.concept import Policy as AnyPolicy
+from chauffeur.drive.events import DriveEvent, WishEventKind
 from chauffeur.drive.live.messages import (
+    LEAST_PERIOD_S,
     MOST_LOOK_AHEAD_M,
     MOST_LOOK_AHEAD_S,
+    MOST_PERIOD_S,
     MOST_SPEED_MPS,
+    MOST_WAYPOINTS,
     MessageError,
     Steered,
     Wish,
@@ -33,22 +52,26 @@ from chauffeur.drive.live.messages import (
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.orders import (
     MOST_SAID,
-    START_WITHIN_S,
     TOOK_OVER,
-    Event,
-    EventKind,
     Order,
     Scene,
     encode,
     read_order,
 )
 from chauffeur.drive.live.ring import Reader, Ring
-from chauffeur.drive.parameters import HEADWAY_S, TURNS, ParametersDriver, ParkingPlaces
+from chauffeur.drive.planning import START_WITHIN_S
+from chauffeur.executors import Executor, executor_for
+from chauffeur.executors.parameters import PursuitExecutor
+from chauffeur.executors.pursuit import HEADWAY_S
+from chauffeur.executors.trajectory import rebased
+from chauffeur.geometry import Pose
+from chauffeur.geometry.road_graph import TURNS
 from chauffeur.programs import Budget, ProgramExecutor, Sandbox, starting_wishes
 from chauffeur.safety.base import Check
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
 from chauffeur.safety.words import reasons_once
 from chauffeur.worlds.base import EGO
+from chauffeur.worlds.places import ParkingPlaces
 
 LIVE_BUDGET: Final = Budget(turn_s=0.1, tick_s=0.2, grace_s=0.05, start_s=1.0)
 """Wider than a control period: a policy that is late once is what the ladder's first rungs are for."""
@@ -72,12 +95,20 @@ class PolicyRings:
 
 
 @dataclass(slots=True)
+class _Along:
+    """A policy that control drives, and its executor here, whose commands go nowhere; parameters need none."""
+
+    steered: Steered
+    executor: Executor | None = None
+
+
+@dataclass(slots=True)
 class _Driven:
-    """The plan that is driven: a program that is run here, or parameters that control drives."""
+    """The plan that is driven: a program that is run here, or a policy that control drives."""
 
     wish: str
     expires_ns: int
-    by: ProgramExecutor | Steered
+    by: ProgramExecutor | _Along
     state: ProgramState = "running"
     resumed: int = 0
     grown: bool = False
@@ -85,11 +116,12 @@ class _Driven:
 
     @property
     def steered(self) -> Steered | None:
-        return self.by if isinstance(self.by, Steered) else None
+        return self.by.steered if isinstance(self.by, _Along) else None
 
     def close(self) -> None:
-        if isinstance(self.by, ProgramExecutor):
-            self.by.close()
+        driving = self.by.executor if isinstance(self.by, _Along) else self.by
+        if driving is not None:
+            driving.close()
 
 
 class Policy:
@@ -210,25 +242,29 @@ class Policy:
         if self._hands % 2:
             self._tell("interrupted", order.wish, "You have the wheel.")
             return
-        snapshot = self._mirror.world.snapshot()
-        late = self._too_late(order, Scene.of(self._trip, snapshot))
+        observation = self._mirror.world.observe()
+        late = self._too_late(order, Scene.of(self._trip, observation))
         if late:
             self._tell("stale", order.wish, late)
             return
-        plan = order.plan
-        if not isinstance(plan.policy, Program | Parameters):
-            self._tell("refused", order.wish, plan.refusal or "The plan is neither a program nor parameters.")
+        try:
+            plan = self._as_seen_now(order, observation)
+        except ScenarioError as error:
+            self._tell("stale", order.wish, str(error))
             return
-        verdicts = run_checks(plan, snapshot, self._mirror.limits, self._checks)
+        if plan.policy is None:
+            self._tell("refused", order.wish, plan.refusal or "The plan has no policy.")
+            return
+        verdicts = run_checks(plan, observation, self._mirror.limits, self._checks)
         if failed := reasons_once(verdicts):
             self._tell("refused", order.wish, failed)
             return
         try:
-            by = self._ready(plan.policy, snapshot)
+            by = self._ready(plan.policy, observation)
         except SandboxError as error:
             self._tell("failed", order.wish, str(error))
             return
-        except ScenarioError as error:  # the road has no such way: known only when the parameters meet the world
+        except ChauffeurError as error:  # the road has no such way: known only when the policy meets the world
             self._tell("refused", order.wish, str(error))
             return
         if self._driven is not None and self._driven.state == "running":
@@ -237,10 +273,19 @@ class Policy:
         self._driven = _Driven(order.wish, order.expires_ns, by)
         self._tell("started", order.wish, plan.thoughts.text)
 
-    def _ready(self, policy: Program | Parameters, snapshot: Snapshot) -> ProgramExecutor | Steered:
+    def _as_seen_now(self, order: Order, observation: Observation) -> Plan:
+        """The plan, with waypoints that count from where the car is now. Raises ScenarioError: they are behind it."""
+        plan, pose = order.plan, order.scene.pose
+        if not isinstance(plan.policy, Trajectory) or pose is None:
+            return plan
+        ego = observation.ego
+        there, here = Pose(*pose), Pose(ego.x_m, ego.y_m, ego.heading_rad)
+        return replace(plan, policy=rebased(plan.policy, there, here))
+
+    def _ready(self, policy: AnyPolicy, observation: Observation) -> ProgramExecutor | _Along:
         """Something that is ready to be driven. Raises SandboxError, or ScenarioError where no such way is."""
-        if isinstance(policy, Parameters):
-            return self._tried(policy, snapshot)
+        if not isinstance(policy, Program):
+            return self._tried(policy, observation)
         wishes = self._wishes
         if wishes is not None and wishes.target_lane is None:  # after parameters: control found the lane
             wishes = replace(wishes, target_lane=self._mirror.world.perception().lane_of(EGO))
@@ -252,16 +297,33 @@ class Policy:
             raise
         return executor
 
-    def _tried(self, policy: Parameters, snapshot: Snapshot) -> Steered:
-        """Parameters as control will drive them, from the lane the car is in now. Raises ScenarioError."""
+    def _tried(self, policy: Parameters | ActionMatrix | Trajectory, observation: Observation) -> _Along:
+        """A policy as control will drive it, from where the car is now. Raises ScenarioError."""
+        ego = observation.ego
+        if isinstance(policy, Parameters):
+            return _Along(self._way_of(policy, observation))
+        if isinstance(policy, Trajectory):
+            if len(policy.waypoints_m) > MOST_WAYPOINTS or not LEAST_PERIOD_S <= policy.period_s <= MOST_PERIOD_S:
+                raise ScenarioError(
+                    f"The trajectory has {len(policy.waypoints_m)} waypoints, {policy.period_s:g} s apart.",
+                    hint=f"Give up to {MOST_WAYPOINTS}, {LEAST_PERIOD_S:g} to {MOST_PERIOD_S:g} s apart.",
+                )
+            points = tuple((round(x, 3), round(y, 3)) for x, y in policy.waypoints_m)
+            policy = Trajectory(points, policy.period_s)
+        pose = (round(ego.x_m, 3), round(ego.y_m, 3), round(ego.heading_rad, 5), round(max(ego.speed_mps, 0.0), 3))
+        return self._along(Steered(policy, ego.lane, pose), observation)
+
+    def _way_of(self, policy: Parameters, observation: Observation) -> Steered:
+        """Parameters, with the way that goes on where they name none. Raises ScenarioError."""
         before = None if self._driven is None or self._driven.state != "running" else self._driven.steered
+        was = None if before is None or not isinstance(before.policy, Parameters) else before.policy.route
         route = policy.route
         if not route:
-            route = self._turn_wished(snapshot) if before is None else before.policy.route
-        if before is None or route != before.policy.route:
-            asked = replace(policy, route=route)
-            spot = ParametersDriver(self._mirror.world, asked, limits=self._mirror.limits).spot
-            route = route if spot is None else spot.name
+            route = self._turn_wished(observation) if was is None else was
+        if route != was:
+            tried = PursuitExecutor(self._mirror.world)
+            tried.start(replace(policy, route=route), observation, self._mirror.limits)
+            route = route if tried.spot is None else tried.spot.name
         bounded = replace(
             policy,
             target_speed_mps=min(policy.target_speed_mps, MOST_SPEED_MPS),
@@ -269,12 +331,17 @@ class Policy:
             look_ahead_ratio=min(policy.look_ahead_ratio, MOST_LOOK_AHEAD_S),
             route=route,
         )
-        return Steered(bounded, snapshot.ego.lane)
+        return Steered(bounded, observation.ego.lane)
 
-    def _turn_wished(self, snapshot: Snapshot) -> str:
+    def _along(self, steered: Steered, observation: Observation) -> _Along:
+        executor = executor_for(steered.policy, self._mirror.world)
+        executor.start(steered.policy, observation, self._mirror.limits, steered.ego(observation.ego))
+        return _Along(steered, executor)
+
+    def _turn_wished(self, observation: Observation) -> str:
         """The turn that the program before asked for, where a crossing is ahead."""
         turn = None if self._wishes is None else self._wishes.turn
-        return turn or "" if snapshot.kind == "intersection" else ""
+        return turn or "" if observation.road.junctions else ""
 
     def _too_late(self, order: Order, now: Scene) -> str:
         scene = order.scene
@@ -286,8 +353,11 @@ class Policy:
             return "The plan was made for an instant that is long gone."
         if self._hands and scene.tick < self._hands_tick:
             return "The plan was made before the wheel changed hands."
-        if isinstance(order.plan.policy, Parameters) and order.plan.policy.lane == 0:
-            return ""  # a speed, and a way by its name: neither relies on the lane or on who is ahead
+        policy = order.plan.policy
+        if isinstance(policy, ActionMatrix | Trajectory) or (isinstance(policy, Parameters) and policy.lane == 0):
+            # Gains, a speed, and a way by its name rely neither on the lane nor on who is ahead; waypoints are checked
+            # again as they are seen now.
+            return ""
         if scene.lane != now.lane:
             return "The car is in another lane than the plan was made for."
         if scene.lead != now.lead:
@@ -297,7 +367,7 @@ class Policy:
     # The plan that is driven ------------------------------------------------------------------------------------------
 
     def _run(self, driven: _Driven) -> tuple[ProgramState, int | None]:
-        if isinstance(driven.by, Steered):
+        if isinstance(driven.by, _Along):
             return self._look_on(driven, driven.by), None
         before = driven.state
         try:
@@ -314,15 +384,27 @@ class Policy:
             self._tell(_ENDS[tick.state], driven.wish, "" if tick.error is None else str(tick.error))
         return tick.state, tick.line
 
-    def _look_on(self, driven: _Driven, steered: Steered) -> ProgramState:
-        """What is wished with parameters; they end where they lead to a spot and the car is parked in it."""
-        policy, world = steered.policy, self._mirror.world
-        self._wishes = Wishes(policy.target_speed_mps, HEADWAY_S, None, _TURNS.get(policy.route))
-        if driven.state == "running" and isinstance(world, ParkingPlaces):
-            spot = world.parked()
-            if spot is not None and spot == policy.route:
-                driven.state = "finished"
-                self._tell("finished", driven.wish, f"Parked in {spot}.")
+    def _look_on(self, driven: _Driven, along: _Along) -> ProgramState:
+        """What is wished with a policy that control drives, and whether it has ended: parameters where they lead to a
+        spot and the car is parked in it, others where their executor says so."""
+        policy, world = along.steered.policy, self._mirror.world
+        ended = ""
+        if isinstance(policy, Parameters):
+            self._wishes = Wishes(policy.target_speed_mps, HEADWAY_S, None, _TURNS.get(policy.route))
+            spot = world.parked() if isinstance(world, ParkingPlaces) else None
+            ended = f"Parked in {spot}." if spot is not None and spot == policy.route else ""
+        elif driven.state == "running" and along.executor is not None:
+            try:
+                along.executor.step(world.observe())
+            except Exception as error:  # noqa: BLE001 - control drives by the same executor, and falls back as well
+                driven.state = "failed"
+                self._tell("failed", driven.wish, f"{type(error).__name__}: {error}")
+                return driven.state
+            self._wishes = along.executor.setpoints
+            ended = "It has been driven." if along.executor.status == "finished" else ""
+        if driven.state == "running" and ended:
+            driven.state = "finished"
+            self._tell("finished", driven.wish, ended)
         return driven.state
 
     # Putting down and picking up --------------------------------------------------------------------------------------
@@ -345,7 +427,7 @@ class Policy:
     def _checkpoint(self, driven: _Driven, body: bytes) -> bytes:
         head = {
             "trip": self._trip, "wish": driven.wish, "expires_ns": driven.expires_ns, "resumed": driven.resumed,
-            "hands": self._hands, "parameters": None if driven.steered is None else driven.steered.fields(),
+            "hands": self._hands, "steered": None if driven.steered is None else driven.steered.fields(),
             "grown": driven.grown,
         }  # fmt: skip
         text = json.dumps(head).encode()
@@ -365,7 +447,7 @@ class Policy:
             if head["trip"] != self._trip or self._clock_ns() > head["expires_ns"] or self._ended_since(head["wish"]):
                 return
             resumed, hands, grown = int(head["resumed"]) + 1, int(head["hands"]), bool(head["grown"])
-            steered = None if head["parameters"] is None else Steered.read(head["parameters"])
+            steered = None if head["steered"] is None else Steered.read(head["steered"])
         except (struct.error, ValueError, KeyError, TypeError):  # it must not keep every later process from starting
             return
         if hands != self._hands:
@@ -377,19 +459,27 @@ class Policy:
         if resumed > MOST_RESUMPTIONS:
             self._tell("interrupted", head["wish"], "The plan was driven whenever its process died.")
             return
-        by: ProgramExecutor | Steered
-        if steered is not None:
-            by = steered  # not tried again: control drives them, and the way to a spot is none once the car is on it
-        else:
-            by = ProgramExecutor(sandbox=self._sandbox)
-            try:
-                by.load(message.payload[_HEAD.size + length :], self._mirror.world)
-            except SandboxError as error:
-                by.close()
-                self._tell("interrupted", head["wish"], str(error))
-                return
+        try:
+            by = self._taken_up(steered, message.payload[_HEAD.size + length :])
+        except ChauffeurError as error:
+            self._tell("interrupted", head["wish"], str(error))
+            return
         self._driven = _Driven(head["wish"], head["expires_ns"], by, resumed=resumed)
         self._tell("resumed", head["wish"], "The process that drove the plan was replaced; it goes on.")
+
+    def _taken_up(self, steered: Steered | None, state: bytes) -> ProgramExecutor | _Along:
+        """What is driven, as it was put down. Raises SandboxError or ScenarioError."""
+        if steered is not None and isinstance(steered.policy, Parameters):
+            return _Along(steered)  # not tried again: the way to a spot is none once the car is on it
+        if steered is not None:
+            return self._along(steered, self._mirror.world.observe())
+        by = ProgramExecutor(sandbox=self._sandbox)
+        try:
+            by.load(state, self._mirror.world)
+        except SandboxError:
+            by.close()
+            raise
+        return by
 
     def _ended_since(self, wish: str) -> bool:
         """Whether the wish heard last was of another plan, or of one that ran no more."""
@@ -402,8 +492,8 @@ class Policy:
             return True
         return last.plan != wish or last.state != "running"
 
-    def _tell(self, kind: EventKind, wish: str, text: str) -> None:
-        self._rings.events.write(encode(Event(kind, wish, text[:MOST_SAID], self._trip, self._mirror.tick)))
+    def _tell(self, kind: WishEventKind, wish: str, text: str) -> None:
+        self._rings.events.write(encode(DriveEvent(kind, wish, text[:MOST_SAID], self._trip, self._mirror.tick)))
 
 
-_ENDS: Final[dict[ProgramState, EventKind]] = {"finished": "finished", "failed": "failed"}
+_ENDS: Final[dict[ProgramState, WishEventKind]] = {"finished": "finished", "failed": "failed"}

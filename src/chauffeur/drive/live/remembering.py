@@ -6,15 +6,13 @@ no trip, and is not kept.
 
 from __future__ import annotations
 
-import logging
 from typing import Final
 
-from chauffeur.concept import Causes, ChauffeurError, Outcome, Trip, Verdict
+from chauffeur.concept import Causes, Outcome, Trip, Verdict
+from chauffeur.drive.events import EventKind
 from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.orders import Brief, Event, EventKind
 from chauffeur.drive.live.starts import Start
-from chauffeur.drive.live.supervisor import Interaction, Replaced, Runtime
-from chauffeur.drive.loop import Memory
+from chauffeur.drive.live.supervisor import Interaction
 from chauffeur.drive.session import provenance, trip_id
 from chauffeur.safety.shield import SHIELD_VERSION
 
@@ -27,45 +25,6 @@ _OUTCOMES: Final[dict[EventKind, Outcome]] = {
     "declined": "refused",
     "refused": "refused",
 }
-
-_log = logging.getLogger(__name__)
-
-
-class Remembering:
-    """Hands each wish of a drive to a memory as soon as nothing more becomes of it."""
-
-    def __init__(self, memory: Memory, start: Start, dt_s: float) -> None:
-        """Remember.
-
-        Args:
-            memory: Keeps it.
-            start: The trip.
-            dt_s: Control period in vehicle time.
-        """
-        self._memory, self._start, self._dt_s = memory, start, dt_s
-        self._runtime: Runtime | None = None
-        self.trouble = ""
-        """Why a wish could not be kept, in words; empty while all could."""
-
-    def follow(self, runtime: Runtime) -> None:
-        """A drive has begun; what is told from now on is its."""
-        self._runtime = runtime
-
-    def tell(self, heard: Event | Report | Brief | Replaced) -> None:
-        """Hear what the drive tells."""
-        if self._runtime is None or not isinstance(heard, Event):
-            return
-        interaction = self._runtime.interactions.get(heard.wish)
-        if interaction is None or interaction.answer is not heard:
-            return
-        trip = trip_of(interaction, self._start, self._dt_s, self._runtime.report)
-        if trip is None:
-            return
-        try:
-            self._memory.remember(trip, None)
-        except ChauffeurError as error:  # the drive goes on, and the person is told
-            self.trouble = str(error)
-            _log.warning("a wish could not be remembered: %s", error)
 
 
 def trip_of(interaction: Interaction, start: Start, dt_s: float, last: Report | None) -> Trip | None:

@@ -16,22 +16,19 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Literal, Self
 
 from chauffeur.concept import NOBODY, SandboxError
 from chauffeur.drive.emergency import STOPPING, stop_wanted
+from chauffeur.drive.events import FINAL, DriveEvent, EventKind, Listener, nobody_listens
 from chauffeur.drive.live.__main__ import FIGURES_FILE, READY_SUFFIX
 from chauffeur.drive.live.messages import Hand, Key, MessageError, Report, Wish
 from chauffeur.drive.live.orders import (
-    FINAL,
     TOOK_OVER,
     Brief,
-    Event,
-    EventKind,
     Request,
     encode,
     read_brief,
@@ -88,8 +85,8 @@ class Interaction:
     request: Request
     stage: Stage = "asked"
     since_s: float = 0.0
-    answer: Event | None = None
-    events: list[Event] = field(default_factory=list[Event])
+    answer: DriveEvent | None = None
+    events: list[DriveEvent] = field(default_factory=list[DriveEvent])
     brief: Brief | None = None
 
     @property
@@ -112,29 +109,18 @@ class _Child:
     restart_at_s: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Replaced:
-    """A process that was replaced."""
-
-    role: Role
-    why: str
-
-
-Listener = Callable[[Event | Report | Brief | Replaced], None]
-
-
 class Runtime:
     """A drive in real time. Use as a context manager; call `poll` often."""
 
-    def __init__(self, settings: Settings, tell: Listener | None = None, folder: Path | None = None) -> None:
+    def __init__(self, settings: Settings, tell: Listener = nobody_listens, folder: Path | None = None) -> None:
         """Set up the shared memory and start the processes.
 
         Args:
             settings: Of the drive.
-            tell: Hears events, reports of control, and which process was replaced.
+            tell: Hears what becomes of wishes, what plans are made of, control periods, and replaced processes.
             folder: For the shared memory; default a new one in `/dev/shm`, removed at the end.
         """
-        self._tell: Listener = tell or (lambda heard: None)  # noqa: ARG005
+        self._tell = tell
         self._own = folder is None
         self.folder = _new_folder() if folder is None else folder
         settings.write(self.folder)
@@ -143,7 +129,7 @@ class Runtime:
         self.interactions: dict[str, Interaction] = {}
         self.report: Report | None = None
         self.lost_reports = self.lost_briefs = 0
-        self.replaced: list[Replaced] = []
+        self.replaced: list[DriveEvent] = []
         self._children: dict[Role, _Child] = {}
         self._wish_number, self._wish_at_s = 0, time.monotonic()
         self._stopping = False
@@ -181,7 +167,7 @@ class Runtime:
         interaction = self.interactions[wish] = Interaction(request, since_s=time.monotonic())
         if stop_wanted(read_emergency(text)):
             self.halt()
-            self._close(interaction, Event("interrupted", wish, STOPPING))
+            self._close(interaction, DriveEvent("interrupted", wish, STOPPING))
         else:
             self._send(interaction)
         return wish
@@ -204,7 +190,7 @@ class Runtime:
         if on:
             for interaction in self.open_wishes:
                 if interaction.stage != "driven":  # of what is driven, the policy tells
-                    self._close(interaction, Event("interrupted", interaction.request.wish, TOOK_OVER))
+                    self._close(interaction, DriveEvent("interrupted", interaction.request.wish, TOOK_OVER))
 
     def _say_who_drives(self) -> None:
         self._rings["hand"].write(Hand(self._taken_over).encode())
@@ -284,7 +270,7 @@ class Runtime:
         if self._rings:
             self._hear()
         for interaction in self.open_wishes:
-            self._close(interaction, Event("interrupted", interaction.request.wish, "The drive is over."))
+            self._close(interaction, DriveEvent("interrupted", interaction.request.wish, "The drive is over."))
 
     def close(self) -> None:
         """Stop, and give the shared memory back. May be called twice."""
@@ -378,7 +364,7 @@ class Runtime:
         child.restart_at_s = now_s + pause_s
         if child.role == "spare":
             return
-        said = Replaced(child.role, why)
+        said = DriveEvent("replaced", text=why, value=child.role)
         self.replaced.append(said)
         self._tell(said)
         for interaction in self.open_wishes:
@@ -403,9 +389,9 @@ class Runtime:
             for other in self.open_wishes
         )
         if newer:
-            self._close(interaction, Event("superseded", request.wish, "A newer wish came."))
+            self._close(interaction, DriveEvent("superseded", request.wish, "A newer wish came."))
         elif request.turn >= MOST_TURNS or self._stopping or not self.driving:
-            self._close(interaction, Event(kind, request.wish, why))
+            self._close(interaction, DriveEvent(kind, request.wish, why))
         else:
             interaction.request = Request(request.wish, request.text, request.person, request.turn + 1)
             self._send(interaction)
@@ -414,7 +400,7 @@ class Runtime:
         for interaction in self.open_wishes:
             waited_s = now_s - interaction.since_s
             if not self.driving:
-                self._close(interaction, Event("interrupted", interaction.request.wish, "The drive is over."))
+                self._close(interaction, DriveEvent("interrupted", interaction.request.wish, "The drive is over."))
             elif interaction.stage == "asked" and waited_s > self._patience_s(interaction):
                 planner = self._children["planner"]
                 if planner.restart_at_s is None and self._ready_file("planner").exists():
@@ -455,12 +441,12 @@ class Runtime:
             return
         del self._doubtful[wish]
         if not goes_on:
-            self._close(interaction, Event("interrupted", wish, "The process that drove it died."))
+            self._close(interaction, DriveEvent("interrupted", wish, "The process that drove it died."))
 
-    def _close(self, interaction: Interaction, answer: Event) -> None:
-        interaction.stage, interaction.answer = "closed", answer
-        interaction.events.append(answer)
-        self._tell(answer)
+    def _close(self, interaction: Interaction, answer: DriveEvent) -> None:
+        interaction.stage, interaction.answer = "closed", replace(answer, final=True)
+        interaction.events.append(interaction.answer)
+        self._tell(interaction.answer)
 
     # Hearing ----------------------------------------------------------------------------------------------------------
 
@@ -486,16 +472,19 @@ class Runtime:
                 continue
             if brief.wish in self.interactions:
                 self.interactions[brief.wish].brief = brief
-            self._tell(brief)
+            context = DriveEvent("context", brief.wish, trip=brief.trip, tick=brief.tick, value=brief.context)
+            self._tell(context)
+            self._tell(replace(context, kind="history", value=brief.history))
+            self._tell(replace(context, kind="plan", value=brief.plan))
 
     def _hear_reports(self) -> None:
         messages, lost = self._heard["reports"].news()
         self.lost_reports += lost
         for message in messages:
             self.report = report = Report.decode(message.payload)
-            self._tell(report)
+            self._tell(DriveEvent("period", report.plan, trip=report.trip, tick=report.tick, value=report))
             for text in report.said:
-                self._take(Event("said", report.plan, text, report.trip, report.tick), "control")
+                self._take(DriveEvent("said", report.plan, text, report.trip, report.tick), "control")
 
     def _hear_events(self, sent_by: Role, messages: tuple[Message, ...]) -> None:
         for message in messages:
@@ -505,7 +494,7 @@ class Runtime:
                 continue
             self._take(event, sent_by)
 
-    def _take(self, event: Event, sent_by: Role) -> None:
+    def _take(self, event: DriveEvent, sent_by: Role) -> None:
         interaction = self.interactions.get(event.wish)
         if interaction is None or interaction.stage == "closed":
             if interaction is None:

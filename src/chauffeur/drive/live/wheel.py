@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept import STOP_ZONE_M, LaneView, Snapshot, Wishes
+from chauffeur.concept import STOP_ZONE_M, Observation, Wishes
 from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.drive.live.messages import Hand, Key, MessageError
 from chauffeur.drive.live.ring import Reader, Ring
@@ -64,34 +64,34 @@ class Wheel:
         return keys
 
 
-def pressed(key: Key, wishes: Wishes, snapshot: Snapshot, perception: Perception) -> tuple[Wishes, str]:
+def pressed(key: Key, wishes: Wishes, observation: Observation, perception: Perception) -> tuple[Wishes, str]:
     """The person's wishes after a key, and what there is to tell them; empty where it was just done.
 
     Args:
         key: What they pressed.
         wishes: Theirs so far, settled.
-        snapshot: The instant.
+        observation: The instant.
         perception: Of the same instant.
     """
-    speed = max(0.0, snapshot.ego.speed_mps)
+    speed = max(0.0, observation.ego.speed_mps)
     wished = speed if wishes.target_speed_mps is None else wishes.target_speed_mps
     match key:
         case "faster":
             if speed < _STANDING_MPS:
                 wishes = _past_the_sign(wishes, perception)
-            return replace(wishes, target_speed_mps=max(wished, speed) + _step(snapshot, perception)), ""
+            return replace(wishes, target_speed_mps=max(wished, speed) + _step(observation, perception)), ""
         case "slower":
-            return replace(wishes, target_speed_mps=max(0.0, min(wished, speed) - _step(snapshot, perception))), ""
+            return replace(wishes, target_speed_mps=max(0.0, min(wished, speed) - _step(observation, perception))), ""
         case "brake":
             return replace(wishes, target_speed_mps=0.0), ""
         case "left":
-            return _aside(-1, wishes, snapshot, perception)
+            return _aside(-1, wishes, observation, perception)
         case "right":
-            return _aside(1, wishes, snapshot, perception)
+            return _aside(1, wishes, observation, perception)
 
 
-def _step(snapshot: Snapshot, perception: Perception) -> float:
-    lane = snapshot.ego.lane
+def _step(observation: Observation, perception: Perception) -> float:
+    lane = observation.ego.lane
     return min(STEP_MPS, (math.inf if lane is None else perception.speed_limit(lane)) / _STEPS)
 
 
@@ -103,16 +103,16 @@ def _past_the_sign(wishes: Wishes, perception: Perception) -> Wishes:
     return replace(wishes, served_stops=wishes.served_stops | {sign[0]})
 
 
-def _aside(side: int, wishes: Wishes, snapshot: Snapshot, perception: Perception) -> tuple[Wishes, str]:
+def _aside(side: int, wishes: Wishes, observation: Observation, perception: Perception) -> tuple[Wishes, str]:
     """One lane to a side (left is -1); a turn, where a crossing is ahead and there is no lane."""
     name = "left" if side < 0 else "right"
     here = wishes.target_lane or perception.lane_of(EGO)
     lane = perception.adjacent_lane(here, side)
     if lane is None:
-        if snapshot.kind == "intersection":
+        if observation.road.junctions:
             return replace(wishes, turn=name), ""
         return wishes, f"There is no lane to the {name}."
-    view: LaneView | None = next((each for each in snapshot.lanes if each.id == lane), None)
-    if view is not None and view.forbidden and not view.emergency:
+    there = observation.road.get(lane)
+    if there is not None and there.closed and not there.emergency:
         return wishes, f"The lane to the {name} ends."
     return replace(wishes, target_lane=lane), ""

@@ -8,19 +8,18 @@ became of it. The first record says whether there is a vehicle at the other end,
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
-from chauffeur.concept import NOBODY, Context, Feedback, History, Instruction, Parameters, Plan, SystemMessage, Verdict
-from chauffeur.drive.auditing import FLUSH_TIMEOUT_S, context_record, history_record, plan_record
-from chauffeur.drive.onroad.events import Answer
+from chauffeur.concept import Parameters
+from chauffeur.drive.auditing import FLUSH_TIMEOUT_S, SessionRecorder
+from chauffeur.drive.events import DriveEvent
+from chauffeur.drive.onroad.answers import Answer, Opinion, SetpointRequest, SetpointResult
 from chauffeur.safety.audit.keys import read_key
-from chauffeur.safety.audit.redaction import PERSON
-from chauffeur.safety.audit.writer import AuditLog, Closing, utc_now
+from chauffeur.safety.audit.writer import AuditLog, utc_now
 from chauffeur.worlds.ros.base import VehicleState
 
 
@@ -68,102 +67,63 @@ def open_books(
     return RoadBooks(AuditLog(path, about=about, clock=clock, key=key, private=private))
 
 
-class RoadBooks:
+class RoadBooks(SessionRecorder):
     """Writes one session into a log. Nothing raises into the session; `kept` alone waits."""
-
-    def __init__(self, log: AuditLog) -> None:
-        self._log = log
-        self._people: dict[int, str] = {}
-        self._closing: Closing | None = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def trouble(self) -> str:
         """What is wrong with the disk, in words; empty when nothing is."""
-        return self._log.trouble
+        return self.log.trouble
 
     def kept(self, within_s: float = FLUSH_TIMEOUT_S) -> bool:
         """Whether all of this is on the disk, after waiting for it for at most so long."""
-        return self._log.flush(within_s)
+        return self.log.flush(within_s)
 
-    def wish(self, wish: int, instruction: Instruction) -> None:
-        """I."""
-        self._people[wish] = str(instruction.person)
-        self._personal("wish", wish, {"source": instruction.source}, {"wish": instruction.text})
+    def tell(self, event: DriveEvent) -> None:
+        """Hear what the session tells."""
+        about: dict[str, Any] = {"wish": int(event.wish)} if event.wish else {}
+        match event.value:
+            case SetpointRequest() as asking:
+                self.log.append("actuation", about | _asking(asking))
+            case SetpointResult() as applied:
+                self.log.append("actuation", about | _applied(applied))
+            case Answer() as answer:
+                body = {"outcome": answer.status, "took_s": round(answer.took_s, 6)}
+                self.personal("outcome", event.wish, about | body, {"detail": answer.words, "trip": answer.trip})
+            case Opinion(feedback=said) as opinion:
+                self._people[event.wish] = opinion.person
+                meant = {"speed": said.speed, "gap": said.gap, "comfort": said.comfort, "liked": said.approval}
+                body = {"letter": "F", **meant, "kept": opinion.kept}
+                self.personal("context", event.wish, about | body, {"feedback": said.text})
+            case VehicleState() as state:
+                link = {"link": state.link, "words": state.words[:500]} if event.kind == "link" else about
+                self.log.append("context", {"event": event.kind, "receivers": state.receivers, **link})
+            case _ if event.kind == "over":
+                in_force = event.value.target_speed_mps if isinstance(event.value, Parameters) else None
+                self.log.append("outcome", {"event": "over", "in_force_mps": in_force})
+            case _:
+                self.letter(event, about)
 
-    def surroundings(self, wish: int, context: Context, history: History, system: SystemMessage) -> None:
-        """C, H and S."""
-        for body, texts in (context_record(context), history_record(history)):
-            self._personal("context", wish, body, texts)
-        digest = hashlib.sha256(system.text.encode("utf-8", "surrogatepass")).hexdigest()
-        self._log.append("context", {"wish": wish, "letter": "S", "setting": system.setting, "sha256": digest})
 
-    def plan(self, wish: int, plan: Plan) -> None:
-        """R and P."""
-        self._personal("plan", wish, *plan_record(plan))
+def _asking(asked: SetpointRequest) -> dict[str, Any]:
+    before, state = asked.in_force, asked.state
+    return {
+        "done": False,
+        "parameters": asdict(asked.parameters),
+        "in_force": None if before is None else asdict(before),
+        "link": state.link,
+        "speed_mps": state.speed_mps,
+    }
 
-    def verdicts(self, wish: int, verdicts: Sequence[Verdict]) -> None:
-        """V."""
-        for one in verdicts:
-            body = {"check": one.check, "passed": one.passed, "vetoes": one.vetoes, "line": one.line}
-            self._personal("verdict", wish, body, {"reason": one.reason, "remedy": one.remedy})
 
-    def asking(self, wish: int, parameters: Parameters, before: Parameters | None, state: VehicleState) -> None:
-        """What the vehicle is about to be asked for. Written before anything is published."""
-        body: dict[str, Any] = {
-            "wish": wish,
-            "done": False,
-            "parameters": asdict(parameters),
-            "in_force": None if before is None else asdict(before),
-            "link": state.link,
-            "speed_mps": state.speed_mps,
-        }
-        self._log.append("actuation", body)
-
-    def asked(self, wish: int, answer: Answer, state: VehicleState) -> None:
-        """What became of it."""
-        published = answer.published
-        body = {
-            "wish": wish,
-            "done": True,
-            "status": answer.status,
-            "confirmed_s": answer.confirmed_s,
-            "link": state.link,
-            "receivers": state.receivers,
-            "number": None if published is None else published.number,
-            "messages": [] if published is None else [{"topic": m.topic, **m.fields} for m in published.messages],
-        }
-        self._log.append("actuation", body)
-
-    def answer(self, answer: Answer) -> None:
-        """How a wish ended."""
-        body = {"outcome": answer.status, "took_s": round(answer.took_s, 6)}
-        self._personal("outcome", answer.wish, body, {"detail": answer.words, "trip": answer.trip})
-
-    def feedback(self, wish: int, person: str, feedback: Feedback, *, kept: bool) -> None:
-        """F."""
-        self._people[wish] = person
-        meant = {"speed": feedback.speed, "gap": feedback.gap, "comfort": feedback.comfort, "liked": feedback.approval}
-        self._personal("context", wish, {"letter": "F", **meant, "kept": kept}, {"feedback": feedback.text})
-
-    def happened(self, event: str, body: Mapping[str, Any]) -> None:
-        """Something that belongs to no wish: the way to the vehicle, the end of the session."""
-        self._log.append("outcome" if event == "over" else "context", {"event": event, **body})
-
-    def close(self) -> Closing:
-        """Close the log, and say how it ended; a second call says the same."""
-        if self._closing is None:
-            self._closing = self._log.close()
-        return self._closing
-
-    def _personal(self, kind: Any, wish: int, body: Mapping[str, Any], texts: Mapping[str, str]) -> None:
-        person = self._people.get(wish, str(NOBODY))
-        said = {name: text for name, text in texts.items() if text}
-        self._log.append(kind, {"wish": wish, **body}, {PERSON: person} | said)
+def _applied(applied: SetpointResult) -> dict[str, Any]:
+    answer, state, published = applied.answer, applied.state, applied.answer.published
+    return {
+        "done": True,
+        "status": answer.status,
+        "confirmed_s": answer.confirmed_s,
+        "link": state.link,
+        "receivers": state.receivers,
+        "number": None if published is None else published.number,
+        "messages": [] if published is None else [{"topic": m.topic, **m.fields} for m in published.messages],
+    }

@@ -9,11 +9,12 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from chauffeur.concept import Context, LaneView, Limits, Parameters, Situation, Snapshot, VehicleState
+from chauffeur.concept import Context, Lane, Limits, Observation, Parameters, Situation, VehicleState
 from chauffeur.describe.services.readings import Reading, Unknown
 from chauffeur.describe.services.sourced import with_sources
 from chauffeur.describe.services.surroundings import Surroundings
 from chauffeur.drive.onroad.words import speed_text
+from chauffeur.geometry import Polyline, RoadGraph
 from chauffeur.worlds.ros import VehicleState as Vehicle
 
 WORLD: Final = "vehicle"
@@ -24,7 +25,8 @@ _LINKS: Final = {
     "up": "The way to the vehicle stands.",
 }
 _NO_LINK: Final = "There is no way to the vehicle now."
-_LANE: Final = ("vehicle", "ahead", 0)
+_LANE: Final = "vehicle"
+_NO_SHAPE: Final = Polyline.of([(0.0, 0.0), (1.0, 0.0)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,10 +76,10 @@ class Seen:
             return max(0.0, self.vehicle.speed_mps)
         return math.nan if self.asked is None else self.asked.target_speed_mps
 
-    def bounds(self, before: Seen) -> Snapshot:
+    def bounds(self, before: Seen) -> Observation:
         """What the checks go by: of two looks, before and after planning, the lower speed limit."""
         signs = [one.sign_mps for one in (self, before) if one.sign_mps is not None]
-        return _snapshot(0.0 if math.isnan(self.speed_mps) else self.speed_mps, min(signs, default=math.inf))
+        return _observation(0.0 if math.isnan(self.speed_mps) else self.speed_mps, min(signs, default=math.inf))
 
 
 def describe_vehicle(seen: Seen) -> Context:
@@ -145,8 +147,8 @@ def _cap_words(seen: Seen) -> str:
     return f"At most {speed_text(seen.cap_mps)} may be asked for, {by}."
 
 
-def _snapshot(speed_mps: float, sign_mps: float) -> Snapshot:
+def _observation(speed_mps: float, sign_mps: float) -> Observation:
     """Numbers for the checks. The ego stands in no lane, and the one there is has no shape: neither is known."""
     ego = VehicleState(0, "car", 0.0, 0.0, 0.0, speed_mps, 0.0, 0.0, None)
-    lane = LaneView(_LANE, 0.0, 0.0, sign_mps, forbidden=False, emergency=False, centre_m=())
-    return Snapshot(0.0, 0, WORLD, ego, (), (), (lane,), None, None, off_road=False, ended=False)
+    road = RoadGraph((Lane(_LANE, _NO_SHAPE, 0.0, sign_mps),))
+    return Observation(0.0, 0, WORLD, ego, (), (), road, None, None, off_road=False, ended=False)

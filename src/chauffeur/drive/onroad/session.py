@@ -21,7 +21,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Final, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Final, Literal, Self, TypeVar
 
 from chauffeur.concept import (
     NOBODY,
@@ -42,9 +42,9 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.describe.services.sources import Sources
-from chauffeur.drive.answering import plan_or_answer
 from chauffeur.drive.auditing import FLUSH_TIMEOUT_S
-from chauffeur.drive.emergency import check_told_not_to
+from chauffeur.drive.events import DriveEvent, EventKind, Listener, nobody_listens
+from chauffeur.drive.onroad.answers import Answer, Opinion, SetpointRequest, SetpointResult, Status
 from chauffeur.drive.onroad.books import RoadBooks
 from chauffeur.drive.onroad.checks import (
     ENGAGING_WORDS,
@@ -54,11 +54,20 @@ from chauffeur.drive.onroad.checks import (
     is_about_engaging,
     is_stop,
 )
-from chauffeur.drive.onroad.events import Answer, Event, EventKind, Status
 from chauffeur.drive.onroad.seeing import Seen, counted_from, describe_vehicle
 from chauffeur.drive.onroad.trips import make_trip
 from chauffeur.drive.onroad.words import refused_in_own_words, speed_text
-from chauffeur.drive.session import MAX_WISH_CHARACTERS, parse_wish
+from chauffeur.drive.planning import (
+    PLAN_WITHIN_S,
+    RECALLED,
+    START_WITHIN_S,
+    Judged,
+    Planned,
+    PlanSteps,
+    plan_once,
+)
+from chauffeur.drive.questions import NOT_MEANT, OpenQuestion
+from chauffeur.drive.session import MAX_WISH_CHARACTERS
 from chauffeur.memory.base import Memory
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.memory.personal_limits import personal_limits
@@ -66,18 +75,13 @@ from chauffeur.planners.base import Planner
 from chauffeur.planners.talk2drive.planner import system_text
 from chauffeur.planners.talk2drive.style import LOOK_AHEAD
 from chauffeur.safety.audit.writer import utc_now
-from chauffeur.safety.screening import screen_request
 from chauffeur.safety.words import reasons_once
-from chauffeur.speech.answers import answer_in
 from chauffeur.worlds.ros import Published, VehicleError, VehicleInterface, VehicleState
 from chauffeur.worlds.ros.autoware_ai import AutowareAi, PlannedSpeed
 from chauffeur.worlds.ros.settings import VehicleSettings
 
-PLAN_WITHIN_S: Final = 60.0
-"""After so long a planner is given up on."""
-
-START_WITHIN_S: Final = 10.0
-"""A plan that took longer was made for a place the vehicle has left; it is not asked for."""
+if TYPE_CHECKING:
+    from chauffeur.drive.events import EventValue
 
 CONFIRM_WITHIN_S: Final = 2.0
 """How long an answer waits for every receiver to have what was published."""
@@ -91,7 +95,6 @@ BRIEFLY_S: Final = 0.25
 MEMORY_WITHIN_S: Final = 5.0
 """How long memory may take; a wish is driven without it then."""
 
-_RECALLED: Final = 3
 _FASTEST_LOOK_S: Final = 0.0005
 _SLOWEST_LOOK_S: Final = 0.02
 _USABLE: Final = ("up", "dry-run")
@@ -100,10 +103,6 @@ _SLACK_MPS: Final = 1e-6
 T = TypeVar("T")
 
 _log = logging.getLogger(__name__)
-
-
-def _nobody_listens(event: Event) -> None:
-    del event
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +132,7 @@ class OnRoad:
         memory: Memory | None = None,
         sources: Sources | None = None,
         books: RoadBooks | None = None,
-        tell: Callable[[Event], None] = _nobody_listens,
+        tell: Listener = nobody_listens,
         confirm_within_s: float = CONFIRM_WITHIN_S,
         clock: Callable[[], datetime] = utc_now,
     ) -> None:
@@ -172,7 +171,7 @@ class OnRoad:
         self._turn = asyncio.Lock()
         self._count = self._newest = 0
         self._making: asyncio.Task[_Made] | None = None
-        self._offered: Plan | None = None
+        self._question = OpenQuestion()
         self._asked: Parameters | None = None
         self._handed: tuple[int, Published] | None = None
         self._unconfirmed: tuple[int, Published] | None = None
@@ -211,8 +210,7 @@ class OnRoad:
         words = self._closing_words()
         if not self._over:
             self._over = True
-            self._note("over", {"in_force_mps": None if self._asked is None else self._asked.target_speed_mps})
-            self._say("over", words)
+            self._say("over", words, value=self._asked)
         return words
 
     async def ask(self, text: str, *, source: Literal["text", "speech"] = "text") -> Answer:
@@ -237,7 +235,7 @@ class OnRoad:
             async with self._turn:
                 answer, request = await self._answer(number, text, source)
         except asyncio.CancelledError:
-            self._book(lambda books: books.answer(self._broken_off(number, text, "It was broken off.", "superseded")))
+            self._say_answer(self._broken_off(number, text, "It was broken off.", "superseded"))
             raise
         except Exception as error:  # noqa: BLE001 - a fault of ours ends one wish, not the session
             _log.exception("a wish could not be answered")
@@ -245,7 +243,7 @@ class OnRoad:
         answer = replace(answer, took_s=time.perf_counter() - begun)
         if request is not None and answer.plan is not None:
             answer = await self._remember(request, answer)
-        self._book(lambda books: books.answer(answer))
+        self._say_answer(answer)
         return answer
 
     def _broken_off(self, number: int, text: str, why: str, status: Status) -> Answer:
@@ -270,7 +268,7 @@ class OnRoad:
             kept = await self._from_memory(
                 number, lambda: memory.attach_feedback(self._person, meant, self._last_trip or None)
             )
-        self._book(lambda books: books.feedback(number, str(self._person), meant, kept=bool(kept)))
+        self._say("feedback", words, number, Opinion(meant, str(self._person), bool(kept)))
         if kept:
             return Answer(number, words, "taken", "Kept with your last wish.", trip=self._last_trip)
         why = "Nobody's profile is open" if self._person == NOBODY else "No drive of yours is kept that it is about"
@@ -283,11 +281,14 @@ class OnRoad:
     ) -> tuple[Answer, PlanRequest | None]:
         """The answer, and what was planned for, if anything was."""
         try:
-            instruction = replace(self._meant(text), source=source)
+            meant = self._question.settle(text, self._person)
         except InstructionError as error:
             return Answer(number, text[:MAX_WISH_CHARACTERS], "declined", str(error)), None
+        if meant is None:
+            return Answer(number, text[:MAX_WISH_CHARACTERS], "declined", NOT_MEANT), None
+        instruction = replace(meant, source=source)
         answer = Answer(number, instruction.text, "declined", ENGAGING_WORDS)
-        self._book(lambda books: books.wish(number, instruction))
+        self._say("wish", instruction.text, number, instruction)
         if is_about_engaging(instruction.text) and not is_stop(instruction.text):
             return answer, None
         if words := answered_at_once(instruction.text):
@@ -309,13 +310,6 @@ class OnRoad:
             answer = await self._apply(number, answer)
         return answer, made.request
 
-    def _meant(self, text: str) -> Instruction:
-        """The wish, or the one that the car asked about, where the words are a yes to that. Raises InstructionError."""
-        plan, self._offered = self._offered, None
-        if plan is not None and answer_in(text):
-            return replace(parse_wish(plan.offer, self._person), confirmed=plan.refusal)
-        return parse_wish(text, self._person)
-
     async def _made(self, number: int, instruction: Instruction) -> _Made:
         """What the wish comes to, unless a newer one comes first. A stop gives way to nothing."""
         stopping = is_stop(instruction.text)
@@ -334,55 +328,61 @@ class OnRoad:
 
     async def _make(self, number: int, instruction: Instruction, *, stopping: bool) -> _Made:
         """I, C, H and S to R, P and V; a stop waits for no service, no memory and no planner."""
-        before = await self._look(0.0 if stopping else None)
-        context = describe_vehicle(before)
-        self._say("context", context.text, number, context)
-        history = History() if stopping else await self._recall(number, instruction, context)
-        system = SystemMessage(system_text(self.limits))
-        self._book(lambda books: books.surroundings(number, context, history, system))
-        request, _ = screen_request(PlanRequest(instruction, context, system, history, limits=self.limits))
-        begun = time.perf_counter()
-        plan = self._stop_plan() if stopping else await self._plan(request)
-        if isinstance(plan, str):
-            return _Made(request, status="failed", words=plan)
-        plan = fitted(plan, self._settings.stack.limits, before.cap_mps)
-        seen = await self._look(0.0)  # the vehicle has gone on while it was planned
-        verdicts = check_all(plan, seen, before)
-        if not stopping:
-            verdicts += check_told_not_to(instruction.text, plan, seen.bounds(before))
+        begun, before = time.perf_counter(), await self._look(0.0 if stopping else None)
+        seen = before
+
+        def tell(event: DriveEvent) -> None:
+            if event.kind not in ("wish", "plan", "verdicts"):  # told before, and after, with what is done about them
+                self._say(event.kind, event.text, number, event.value)
+
+        async def describe() -> Context:
+            return describe_vehicle(before)
+
+        async def recall(instruction: Instruction, context: Context) -> History:
+            return History() if stopping else await self._recall(number, instruction, context)
+
+        async def check(plan: Plan, own: bool) -> Judged:
+            nonlocal seen
+            del own  # a vehicle is asked for nothing unchecked, not even by its own session
+            seen = await self._look(0.0)  # the vehicle has gone on while it was planned
+            return check_all(plan, seen, before), seen.bounds(before)
+
+        steps = PlanSteps(
+            planner=self._planner,
+            limits=self.limits,
+            describe=describe,
+            recall=recall,
+            system=lambda: SystemMessage(system_text(self.limits)),
+            own=lambda _: self._stop_plan() if stopping else None,
+            check=check,
+            fit=lambda plan: fitted(plan, self._settings.stack.limits, before.cap_mps),
+            tell=tell,
+            within_s=PLAN_WITHIN_S,
+        )
+        try:
+            planned = await plan_once(instruction, steps)
+        except ChauffeurError as error:
+            return _Made(status="failed", words=str(error))
+        return self._judged(number, planned, seen, took_s=time.perf_counter() - begun)
+
+    def _judged(self, number: int, planned: Planned, seen: Seen, *, took_s: float) -> _Made:
+        """What is told of a plan, and whether the vehicle is asked for it."""
+        request, plan, verdicts = planned.request, planned.plan, planned.verdicts
         if plan.refusal and verdicts[0].stops:
             plan = refused_in_own_words(plan, verdicts[0])
-        told = plan
-        self._say("plan", told.thoughts.text, number, told)
-        self._book(lambda books: books.plan(number, told))
-        self._book(lambda books: books.verdicts(number, verdicts))
+        self._say("plan", plan.thoughts.text, number, plan)
         self._say("verdicts", " ".join(one.reason for one in verdicts), number, verdicts)
         made = _Made(request, plan, verdicts)
-        self._offered = plan if plan.offer else None
+        self._question.ask(plan.refusal, plan.offer)
         if plan.policy is None and not verdicts[0].stops:
             words = plan.refusal or "The planner gave no parameters."
             return replace(made, status="declined", words=f"{words} {counted_from(seen)}".rstrip())
         if reasons := _reasons(verdicts):
             return replace(made, status="refused", words=reasons)
-        if time.perf_counter() - begun > START_WITHIN_S:
+        if took_s > START_WITHIN_S:
             words = f"Planning took more than {START_WITHIN_S:.0f} s; the vehicle is elsewhere by now. Ask again."
             return replace(made, status="failed", words=words)
         return made
-
-    async def _plan(self, request: PlanRequest) -> Plan | str:
-        """R and P, or why there are none."""
-        task = asyncio.ensure_future(plan_or_answer(self._planner, request))
-        try:
-            done, _ = await asyncio.wait({task}, timeout=PLAN_WITHIN_S)
-            if task.cancelled():
-                return "The planner gave up."
-            return task.result() if done else f"No plan within {PLAN_WITHIN_S:.0f} s."
-        except ChauffeurError as error:
-            return str(error)
-        except Exception as error:  # noqa: BLE001 - a planner may be anybody's code; the wish is answered all the same
-            return f"The planner failed: {type(error).__name__}: {error}"
-        finally:
-            task.cancel()
 
     def _stop_plan(self) -> Plan:
         """A stop needs no model: the word is enough."""
@@ -409,8 +409,8 @@ class OnRoad:
         state = self._observed()
         if state.link not in _USABLE:
             return replace(answer, status="unreachable", words=_unreachable(state))
+        self._say("asking", "", number, SetpointRequest(parameters, before, state))
         if self._books is not None:
-            self._books.asking(number, parameters, before, state)
             slows = parameters.target_speed_mps <= (0.0 if before is None else before.target_speed_mps)
             within_s = BRIEFLY_S if slows else FLUSH_TIMEOUT_S
             if not await asyncio.to_thread(self._books.kept, within_s):
@@ -426,9 +426,8 @@ class OnRoad:
             answer = replace(answer, status="refused", words=str(error))
         else:
             answer = await self._confirm(number, replace(answer, published=published), parameters, before)
-        final = answer
-        self._book(lambda books: books.asked(number, final, self._vehicle.state()))
-        return final
+        self._say("applied", answer.words, number, SetpointResult(answer, self._vehicle.state()))
+        return answer
 
     async def _confirm(self, number: int, answer: Answer, parameters: Parameters, before: Parameters | None) -> Answer:
         published = answer.published
@@ -449,7 +448,7 @@ class OnRoad:
             return replace(answer, status="unconfirmed", words=words)
         words = f"{published.words} Not all of it was taken within {self._confirm_within_s:g} s. {state.words}"
         if before is not None and parameters.target_speed_mps > before.target_speed_mps + _SLACK_MPS:
-            self._book(lambda books: books.asking(number, before, parameters, state))
+            self._say("asking", "", number, SetpointRequest(before, parameters, state))
             with contextlib.suppress(VehicleError):  # the interface ended meanwhile, and what it held with it
                 self._vehicle.apply(before)
                 self._asked = before
@@ -476,8 +475,7 @@ class OnRoad:
             state = self._observed()
             if self._unconfirmed is not None and state.delivered:
                 (number, published), self._unconfirmed = self._unconfirmed, None
-                self._note("late", {"wish": number, "receivers": state.receivers})
-                self._say("late", f"{published.words} {self._taken_words()}", number, published)
+                self._say("late", f"{published.words} {self._taken_words()}", number, state)
             await asyncio.sleep(WATCH_EVERY_S)
 
     def _observed(self) -> VehicleState:
@@ -494,8 +492,7 @@ class OnRoad:
             words += f" In force: at most {speed_text(self._asked.target_speed_mps)}."
         elif state.link not in _USABLE and self._asked is not None:
             words += f" What was asked for stays in force: at most {speed_text(self._asked.target_speed_mps)}."
-        self._note("link", {"link": state.link, "receivers": state.receivers, "words": state.words[:500]})
-        self._say("link", words, 0, state)
+        self._say("link", words, value=state)
 
     # Memory -----------------------------------------------------------------------------------------------------------
 
@@ -504,11 +501,9 @@ class OnRoad:
         if memory is None or self._person == NOBODY:
             return History()
         found = await self._from_memory(
-            number, lambda: memory.recall(instruction.person, instruction, context, _RECALLED)
+            number, lambda: memory.recall(instruction.person, instruction, context, RECALLED)
         )
-        history = found or History()
-        self._say("history", f"{len(history.items)} remembered", number, history)
-        return history
+        return found or History()
 
     async def _remember(self, request: PlanRequest, answer: Answer) -> Answer:
         assert answer.plan is not None
@@ -554,18 +549,18 @@ class OnRoad:
 
     # Words ------------------------------------------------------------------------------------------------------------
 
-    def _say(self, kind: EventKind, words: str, wish: int = 0, value: object = None) -> None:
+    def _say(self, kind: EventKind, text: str, wish: int = 0, value: EventValue | None = None) -> None:
+        """Tell the books, then whoever else listens."""
+        event = DriveEvent(kind, str(wish) if wish else "", text, value=value)
+        if self._books is not None:
+            self._books.tell(event)
         try:
-            self._tell(Event(kind, words, wish, value))
+            self._tell(event)
         except Exception:  # noqa: BLE001 - whoever listens must not take the session down
             _log.exception("an event could not be told")
 
-    def _note(self, event: str, body: dict[str, object]) -> None:
-        self._book(lambda books: books.happened(event, body))
-
-    def _book(self, write: Callable[[RoadBooks], None]) -> None:
-        if self._books is not None:
-            write(self._books)
+    def _say_answer(self, answer: Answer) -> None:
+        self._say("answer", answer.words, answer.wish, answer)
 
     def _taken_words(self) -> str:
         if self._settings.interface == "rosbridge":

@@ -9,7 +9,7 @@ from importlib.metadata import version
 from typing import Any, Final
 
 from chauffeur.concept import Causes, Limits, Outcome, Parameters, Plan, PlanRequest, Scenario, Trip, Verdict
-from chauffeur.drive.onroad.events import Status
+from chauffeur.drive.onroad.answers import Status
 from chauffeur.drive.onroad.seeing import WORLD
 from chauffeur.drive.session import trip_id
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import Final
@@ -10,14 +9,10 @@ from typing import Final
 from chauffeur.concept import Instruction, InstructionError, PersonId
 from chauffeur.drive.live.books import Books
 from chauffeur.drive.live.supervisor import Runtime
-from chauffeur.drive.session import MAX_WISH_CHARACTERS, parse_wish
-from chauffeur.speech.answers import answer_in
+from chauffeur.drive.questions import NOT_MEANT, OpenQuestion
+from chauffeur.drive.session import MAX_WISH_CHARACTERS
 
 OVER: Final = "The drive was over before it came to this."
-NOT_MEANT: Final = "Then I do not."
-ANSWER_WITHIN_S: Final = 20.0
-"""A question of the car is answered by a yes for so long: nobody knows after that what it meant."""
-_NO_OFFER: Final = ("", "", -1.0)
 UNKEPT: Final = "The audit log could not be written in time; the wish is asked all the same."
 
 
@@ -49,7 +44,7 @@ class Asking:
         self._person, self._books = person, books
         self._waiting: list[tuple[Words, Instruction]] = []
         self._keeping: tuple[Words, Instruction, Future[bool]] | None = None
-        self._offered = _NO_OFFER
+        self._question = OpenQuestion()
 
     @property
     def busy(self) -> bool:
@@ -58,12 +53,7 @@ class Asking:
 
     def offer(self, question: str, wish: str) -> None:
         """The car has asked; a yes that comes in time is this wish."""
-        self._offered = (question, wish, time.monotonic() + ANSWER_WITHIN_S)
-
-    @property
-    def offering(self) -> bool:
-        """Whether the car has asked, and waits for the answer."""
-        return time.monotonic() <= self._offered[2]
+        self._question.ask(question, wish)
 
     def put(self, words: Words) -> str:
         """A wish, or the answer to the car's question, to be handed on when it is its turn.
@@ -74,19 +64,16 @@ class Asking:
         Raises:
             InstructionError: It is none. It stands in the books all the same.
         """
-        answer = answer_in(words.text) if self.offering else None
-        (question, offered, _), self._offered = self._offered, _NO_OFFER
-        if answer is False:
-            self.pass_over(words.text, "not_asked", NOT_MEANT)
-            return NOT_MEANT
-        text, confirmed = (offered, question) if answer else (words.text, "")
-        words = replace(words, text=text)
         try:
-            instruction = replace(parse_wish(text, self._person), confirmed=confirmed)
+            instruction = self._question.settle(words.text, self._person)
         except InstructionError as error:
             self.pass_over(words.text, "refused", str(error))
             raise
-        self._waiting.append((words, replace(instruction, source="speech" if words.spoken else "text")))
+        if instruction is None:
+            self.pass_over(words.text, "not_asked", NOT_MEANT)
+            return NOT_MEANT
+        source = "speech" if words.spoken else "text"
+        self._waiting.append((replace(words, text=instruction.text), replace(instruction, source=source)))
         return ""
 
     def look(self, runtime: Runtime) -> tuple[tuple[str, Words] | None, str]:

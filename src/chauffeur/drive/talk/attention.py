@@ -9,10 +9,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
 
 from chauffeur.concept import MissingExtraError
 from chauffeur.drive.emergency import stop_wanted
+from chauffeur.drive.questions import ANSWER_WITHIN_S
 from chauffeur.drive.talk.asking import Words
 from chauffeur.drive.talk.ear import Ear, Ears, HeardAt, Trouble
 from chauffeur.drive.talk.hearing import Engine
@@ -22,9 +22,6 @@ from chauffeur.drive.talk.voice import Voice
 from chauffeur.language.emergency import read_emergency
 from chauffeur.speech.answers import answer_in
 from chauffeur.speech.base import Heard
-
-ANSWER_WITHIN_S: Final = 15.0
-"""A question whether something was heard rightly is asked no more after so long: nobody knows then what it meant."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from typing import Final
 
-from chauffeur.concept import Feedback, HistoryItem, Parameters, Policy, Program, Snapshot
+from chauffeur.concept import Feedback, History, HistoryItem, Observation, Parameters, Plan, Policy, Program
 from chauffeur.concept.units import kmh
+from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.orders import Brief, Event
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Interaction
 from chauffeur.drive.talk.asking import Words
@@ -40,8 +40,8 @@ class _Wish:
     started_s: float | None = None
     felt_from_s: float | None = None
     trip: int = 0
-    brief: Brief | None = None
-    to_judge: Event | None = None
+    plan: Plan | None = None
+    to_judge: DriveEvent | None = None
     asked_how: bool = False
 
 
@@ -52,7 +52,7 @@ class Conversations:
         self,
         starts: tuple[Start, ...],
         dt_s: float,
-        instant: Callable[[int, int], Snapshot | None],
+        instant: Callable[[int, int], Observation | None],
         clock: Callable[[], float],
     ) -> None:
         """None yet.
@@ -94,18 +94,17 @@ class Conversations:
         return self[wish]
 
     def change(self, wish: str, **changes: object) -> Conversation:
-        """Something that is not told by the drive: `opinion` or `remembered`."""
+        """Something besides the events of a wish, such as `opinion` or `remembered`."""
         each = self._wishes[wish]
         each.shown = replace(each.shown, **changes)  # pyright: ignore[reportArgumentType]
         return each.shown
 
-    def event(self, event: Event, interaction: Interaction | None) -> Conversation | None:
+    def event(self, event: DriveEvent, interaction: Interaction | None) -> Conversation | None:
         """What became of a wish; None where it is about none of this session."""
         each = self._wishes.get(event.wish)
         if each is None or interaction is None:
             return None
         shown, now_s = each.shown, self._clock()
-        closed = interaction.answer is event
         stages = shown.stages
         match event.kind:
             case "planning":
@@ -128,30 +127,25 @@ class Conversations:
                 each.to_judge = event
             case _:
                 shown = replace(shown, why=event.text)
-        if closed:
+        if event.final:
             shown = replace(shown, stage="closed", outcome=event.kind, why=event.text)
         each.shown = replace(shown, stages=stages)
         if event.kind == "refused":
             self._hand_in(each)
         return each.shown
 
-    def brief(self, brief: Brief) -> Conversation | None:
-        """What a plan is made of."""
-        each = self._wishes.get(brief.wish)
-        if each is None:
+    def recalled(self, wish: str, history: History) -> None:
+        """What of the person's history a plan is made with; shown with the plan, which follows."""
+        if wish in self:
+            self.change(wish, recalled=recalled_of(history.items))
+
+    def plan(self, wish: str, plan: Plan) -> Conversation | None:
+        """What was planned; None where the wish is none of this session."""
+        if wish not in self:
             return None
-        each.brief = brief
-        plan = brief.plan
+        self._wishes[wish].plan = plan
         kind, source = ("", "") if plan.policy is None else (plan.policy.kind, source_of(plan.policy))
-        each.shown = replace(
-            each.shown,
-            thoughts=plan.thoughts.text,
-            policy=kind,
-            source=source,
-            recalled=recalled_of(brief.history.items),
-            verdicts=(),
-        )
-        return each.shown
+        return self.change(wish, thoughts=plan.thoughts.text, policy=kind, source=source, verdicts=())
 
     def report(self, report: Report) -> Conversation | None:
         """A control period: the first one that follows a wish is where its set-point changed."""
@@ -198,11 +192,11 @@ class Conversations:
     def _hand_in(self, each: _Wish) -> None:
         """Have a plan judged again, in the judge's own time."""
         event, each.to_judge = each.to_judge, None
-        if event is None or each.brief is None:
+        if event is None or each.plan is None:
             return
         limits = self._starts[max(1, min(event.trip, len(self._starts))) - 1].limits
-        snapshot = self._instant(event.trip, event.tick)
-        self._judge.submit(Case(each.shown.wish, each.brief.plan, snapshot, limits, event))
+        observation = self._instant(event.trip, event.tick)
+        self._judge.submit(Case(each.shown.wish, each.plan, observation, limits, event))
 
 
 def _most(said: tuple[str, ...]) -> tuple[str, ...]:

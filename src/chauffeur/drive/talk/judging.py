@@ -13,8 +13,8 @@ import threading
 from dataclasses import dataclass
 from typing import Final
 
-from chauffeur.concept import Limits, Plan, Program, Snapshot, Verdict
-from chauffeur.drive.live.orders import Event
+from chauffeur.concept import Limits, Observation, Plan, Program, Verdict
+from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.talk.messages import VerdictShown
 from chauffeur.safety.alignment import check_alignment
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
@@ -31,9 +31,9 @@ class Case:
 
     wish: str
     plan: Plan
-    snapshot: Snapshot | None
+    observation: Observation | None
     limits: Limits
-    event: Event
+    event: DriveEvent
 
 
 class Judge:
@@ -72,7 +72,7 @@ class Judge:
     def _run(self) -> None:
         while (case := self._cases.get()) is not None:
             try:
-                verdicts = verdicts_of(case.plan, case.snapshot, case.limits, case.event)
+                verdicts = verdicts_of(case.plan, case.observation, case.limits, case.event)
             except Exception:  # noqa: BLE001 - what was told is shown, whatever is wrong with the checks
                 _log.exception("a plan could not be judged again")
                 verdicts = (_told(case.event),)
@@ -82,32 +82,34 @@ class Judge:
                 self._changed.notify_all()
 
 
-def verdicts_of(plan: Plan, snapshot: Snapshot | None, limits: Limits, event: Event) -> tuple[VerdictShown, ...]:
+def verdicts_of(
+    plan: Plan, observation: Observation | None, limits: Limits, event: DriveEvent
+) -> tuple[VerdictShown, ...]:
     """What the checks said, and whether the explanation fits the program.
 
     Args:
         plan: R and P as the planner gave them.
-        snapshot: The instant the plan was judged in; None if it was not seen.
+        observation: The instant the plan was judged in; None if it was not seen.
         limits: Of the trip.
         event: What was told: `started` or `refused`.
     """
-    verdicts = () if snapshot is None else run_checks(plan, snapshot, limits, DRIVE_CHECKS)
+    verdicts = () if observation is None else run_checks(plan, observation, limits, DRIVE_CHECKS)
     told = tuple(_shown(verdict) for verdict in verdicts)
     if not verdicts or not _as_told(verdicts, event):
         told = (_told(event),)
-    if snapshot is None or not isinstance(plan.policy, Program):
+    if observation is None or not isinstance(plan.policy, Program):
         return told
-    fits = run_checks(plan, snapshot, limits, (check_alignment,))
+    fits = run_checks(plan, observation, limits, (check_alignment,))
     return (*told, *(_shown(verdict, informs=True) for verdict in fits))
 
 
-def _told(event: Event) -> VerdictShown:
+def _told(event: DriveEvent) -> VerdictShown:
     """The sum of the verdicts, as the policy process told it."""
     started = event.kind == "started"
     return VerdictShown(JUDGED, started, "" if started else event.text)
 
 
-def _as_told(verdicts: tuple[Verdict, ...], event: Event) -> bool:
+def _as_told(verdicts: tuple[Verdict, ...], event: DriveEvent) -> bool:
     reasons = " ".join(verdict.reason for verdict in verdicts if verdict.stops)
     return not reasons if event.kind == "started" else reasons == event.text
 

@@ -18,10 +18,11 @@ from pathlib import Path
 from typing import Any, Final, Literal, TypeVar
 
 from chauffeur.concept import ChauffeurError, ConfigError, Feedback, PersonId, Trip
+from chauffeur.concept.data import data_home
 from chauffeur.drive.talk.messages import MemoryEntry, MemoryOrder, MemoryState, Note
 from chauffeur.memory.base import Memory
 from chauffeur.memory.choice import chosen_memory, open_memory
-from chauffeur.memory.files import data_home, private_directory, publish
+from chauffeur.memory.files import private_directory, publish
 from chauffeur.memory.privacy import Privacy, read_privacy, write_privacy
 
 RETRY_S: Final = 5.0

@@ -11,7 +11,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from chauffeur.concept import LaneId, Mark, mark_of
+from chauffeur.concept import AgentKind, LaneId, Mark, mark_of
 from chauffeur.drive.live.messages import MessageError
 
 MOST_TEXT: Final = 2000
@@ -50,11 +50,13 @@ class Session:
 
 @dataclass(frozen=True, slots=True)
 class RoadLane:
-    """A lane, m; `forbidden` ones are drawn but not driven."""
+    """A lane, m: its place among those of its road (0 leftmost); a `shoulder` is drawn but not driven."""
 
     id: LaneId
     width_m: float
-    forbidden: bool
+    road: str
+    index: int
+    shoulder: bool
     centre_m: tuple[tuple[float, float], ...]
 
 
@@ -72,7 +74,7 @@ class Body:
     """A vehicle or thing from above: centre, heading (rad), size, speed."""
 
     id: int
-    what: Literal["car", "obstacle", "stop_sign"]
+    what: AgentKind
     x_m: float
     y_m: float
     heading_rad: float
@@ -91,6 +93,7 @@ class Scene:
         acceleration_mps2, steering_rad: The command that was applied.
         limit_mps: Speed limit here.
         target_mps, headway_s, lane: What is wished now; None where nothing is.
+        place: Of the wished lane on its road, counted from the left; 0 leftmost.
         rung: Of the fallback ladder (`follow`, `hold`, `keep`, `slow`, `stop`).
         wish: Id of the wish that is driven, empty for none.
         line: Program line it waits at.
@@ -108,6 +111,7 @@ class Scene:
     target_mps: float | None
     headway_s: float
     lane: LaneId | None
+    place: int | None
     rung: str
     wish: str
     line: int | None

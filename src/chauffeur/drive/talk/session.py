@@ -14,17 +14,18 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Final, Self
 
-from chauffeur.concept import NOBODY, ChauffeurError, Feedback, Limits, PersonId, Snapshot
+from chauffeur.concept import NOBODY, ChauffeurError, Feedback, History, Limits, Observation, PersonId, Plan
 from chauffeur.concept.units import kmh
 from chauffeur.drive.emergency import GOING_ON, QUESTION, STOPPING, brings_to_a_stand, stop_wanted
+from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live.books import Books
 from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.orders import Brief, Event
 from chauffeur.drive.live.remembering import trip_of
 from chauffeur.drive.live.settings import Settings, ring
-from chauffeur.drive.live.supervisor import Interaction, Replaced, Runtime
+from chauffeur.drive.live.supervisor import Interaction, Runtime
+from chauffeur.drive.questions import ANSWER_WITHIN_S
 from chauffeur.drive.session import make_world
-from chauffeur.drive.talk.asking import ANSWER_WITHIN_S, OVER, Asking, Words
+from chauffeur.drive.talk.asking import OVER, Asking, Words
 from chauffeur.drive.talk.attention import Attention
 from chauffeur.drive.talk.conversations import Conversations
 from chauffeur.drive.talk.hearing import Engine
@@ -420,21 +421,26 @@ class Talk:
 
     # The drive --------------------------------------------------------------------------------------------------------
 
-    def _heard(self, heard: Event | Report | Brief | Replaced) -> None:
+    def _heard(self, event: DriveEvent) -> None:
         """What the runtime tells."""
         if self._books is not None:
-            self._books.tell(heard)
-        match heard:
-            case Event():
-                self._event(heard)
-            case Brief():
-                self._say_if(self._conversations.brief(heard))
-            case Report():
-                self._report(heard)
-            case Replaced():
-                self._say(Note(f"The {heard.role} process is replaced. {heard.why}", trouble=True))
+            self._books.tell(event)
+        match event.value:
+            case History() as history:
+                self._conversations.recalled(event.wish, history)
+            case Plan() as plan:
+                self._say_if(self._conversations.plan(event.wish, plan))
+            case Report() as report:
+                self._report(report)
+            case str() as process:
+                self._say(Note(f"The {process} process is replaced. {event.text}", trouble=True))
+            case None:
+                self._became(event)
+            case _:
+                pass
 
-    def _event(self, event: Event) -> None:
+    def _became(self, event: DriveEvent) -> None:
+        """What became of a wish."""
         runtime = self._runtime
         interaction = None if runtime is None else runtime.interactions.get(event.wish)
         conversation = self._conversations.event(event, interaction)
@@ -446,7 +452,7 @@ class Talk:
         if event.offer:
             self._asking.offer(event.text, event.offer)
             self._attention.expect(ANSWER_WITHIN_S)
-        if interaction is not None and interaction.answer is event:
+        if interaction is not None and event.final:
             self._closed(interaction)
 
     def _report(self, report: Report) -> None:
@@ -474,7 +480,7 @@ class Talk:
                 self._speak("How was it?")
             self._say(said)
 
-    def _instant(self, trip: int, tick: int) -> Snapshot | None:
+    def _instant(self, trip: int, tick: int) -> Observation | None:
         return None if self._view is None else self._view.at(trip, tick)
 
     # Beginning and end ------------------------------------------------------------------------------------------------

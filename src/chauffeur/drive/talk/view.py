@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import OrderedDict
 from typing import Final
 
-from chauffeur.concept import DataError, Snapshot, VehicleState
+from chauffeur.concept import DataError, Observation, VehicleState
 from chauffeur.concept.registry import load_plugin
-from chauffeur.drive.live.messages import MessageError, Observation, Report
+from chauffeur.drive.live.messages import MessageError, MirroredInstant, Report
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.talk.messages import Body, Road, RoadLane, Scene
@@ -30,13 +30,13 @@ class View:
         self._starts = settings.starts
         self._world: MirroredWorld = load_plugin("chauffeur.worlds", settings.starts[0].scenario.world)()
         self._world.reset(self._starts[0].scenario, self._starts[0].seed)
-        self._world.adopt(self._world.observation())  # what is slow the first time is done before anything moves
-        self._world.snapshot()
+        self._world.adopt(self._world.mirrored())  # what is slow the first time is done before anything moves
+        self._world.observe()
         self._observations = Reader(observations, old=True)
-        self._instants: OrderedDict[tuple[int, int], Snapshot] = OrderedDict()
+        self._instants: OrderedDict[tuple[int, int], Observation] = OrderedDict()
         self._trip = 0
 
-    def at(self, trip: int, tick: int) -> Snapshot | None:
+    def at(self, trip: int, tick: int) -> Observation | None:
         """An instant of the last seconds; None where it was not seen."""
         return self._instants.get((trip, tick))
 
@@ -47,19 +47,19 @@ class View:
             report: Control's newest.
         """
         before = self._trip
-        seen: Observation | None = None
+        seen: MirroredInstant | None = None
         # Every instant, and not the newest alone: a plan was judged in one of them.
         for message in self._observations.news()[0]:
             seen = self._follow(message.payload) or seen
         if seen is None:
             return None, None
-        snapshot = self._instants[seen.trip, seen.tick]
-        return (_road(snapshot) if self._trip != before else None), self._scene(seen, snapshot, report)
+        observation = self._instants[seen.trip, seen.tick]
+        return (_road(observation) if self._trip != before else None), self._scene(seen, observation, report)
 
-    def _follow(self, payload: bytes) -> Observation | None:
+    def _follow(self, payload: bytes) -> MirroredInstant | None:
         """Be at an instant; None where it is none."""
         try:
-            shown = Observation.decode(payload)
+            shown = MirroredInstant.decode(payload)
             if not 1 <= shown.trip <= len(self._starts):
                 return None
             if shown.trip != self._trip:
@@ -69,26 +69,28 @@ class View:
         except (MessageError, DataError):
             return None
         self._trip = shown.trip
-        self._instants[shown.trip, shown.tick] = self._world.snapshot()
+        self._instants[shown.trip, shown.tick] = self._world.observe()
         while len(self._instants) > _INSTANTS:
             self._instants.popitem(last=False)
         return shown
 
-    def _scene(self, seen: Observation, snapshot: Snapshot, report: Report | None) -> Scene:
-        lane = snapshot.ego.lane
+    def _scene(self, seen: MirroredInstant, observation: Observation, report: Report | None) -> Scene:
+        lane = observation.ego.lane
         limit = 0.0 if lane is None else self._world.perception().speed_limit(lane)
         told = report if report is not None and report.trip == seen.trip else None
+        wished = None if told is None else observation.road.get(told.wishes.target_lane)
         return Scene(
             time_s=round(seen.tick * self._world.dt_s, 3),
             taken_over=seen.hands % 2 == 1,
-            ego=_body(snapshot.ego),
-            others=tuple(_body(each) for each in (*snapshot.others, *snapshot.objects)),
+            ego=_body(observation.ego),
+            others=tuple(_body(each) for each in (*observation.others, *observation.objects)),
             acceleration_mps2=0.0 if told is None else told.applied.acceleration_mps2,
             steering_rad=0.0 if told is None else told.applied.steering_rad,
             limit_mps=limit,
             target_mps=None if told is None else told.wishes.target_speed_mps,
             headway_s=0.0 if told is None else told.wishes.time_headway_s,
             lane=None if told is None else told.wishes.target_lane,
+            place=None if wished is None else wished.index,
             rung="hold" if told is None else told.rung,
             wish="" if told is None else told.plan,
             line=None if told is None else told.line,
@@ -110,6 +112,9 @@ def _body(state: VehicleState) -> Body:
     )
 
 
-def _road(snapshot: Snapshot) -> Road:
-    lanes = (RoadLane(lane.id, lane.width_m, lane.forbidden, lane.centre_m) for lane in snapshot.lanes)
-    return Road(snapshot.kind, tuple(lanes))
+def _road(observation: Observation) -> Road:
+    lanes = (
+        RoadLane(lane.id, lane.width_m, lane.road, lane.index, lane.emergency, lane.centre.points_m)
+        for lane in observation.road.lanes
+    )
+    return Road(observation.kind, tuple(lanes))

@@ -110,6 +110,13 @@ const mismatchWords = (m) => `${m.kind}: ${m.instead}${m.line ? ` (line ${m.line
 /* The thoughts with every sentence marked that is not so, and below them what is so instead. */
 function fillThoughts() {
   const box = $('thoughts');
+  if (trip.view) {
+    const image = document.createElement('img');
+    image.src = trip.view;
+    image.alt = 'What the front camera showed when the drive was planned, rendered';
+    $('view').prepend(image);
+    $('view').hidden = false;
+  }
   const text = trip.thoughts || 'The planner gave no reasoning.';
   const wrong = new Map();
   for (const m of trip.mismatches) {

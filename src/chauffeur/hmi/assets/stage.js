@@ -109,6 +109,22 @@ function makeStage() {
       ctx.stroke();
     }
     ctx.setLineDash([]);
+    ctx.strokeStyle = colour.mark;
+    ctx.lineWidth = Math.max(1.2, road.bars.w * view.scale);
+    for (const bar of road.bars.p) {
+      trace(bar);
+      ctx.stroke();
+    }
+  }
+
+  function drawCone(cone) {
+    const radius = Math.max(3, Math.max(cone.l, cone.w) / 2 * view.scale);
+    for (const [share, fill] of [[1, '#e8641b'], [0.62, '#ffffff'], [0.38, '#e8641b']]) {
+      ctx.beginPath();
+      ctx.arc(sx(cone.x), sy(cone.y), radius * share, 0, 2 * Math.PI);
+      ctx.fillStyle = fill;
+      ctx.fill();
+    }
   }
 
   function drawSigns() {
@@ -131,6 +147,30 @@ function makeStage() {
       text('STOP', 0, 0.5, { size: size * 0.62, weight: 700, fill: '#ffffff' });
       ctx.restore();
     }
+  }
+
+  const LAMPS = { red: '#e5322b', yellow: '#f2b200', green: '#27a04a', off: '#8a8a8a' };
+
+  /* Stop lines in the colour that their light shows. */
+  function drawLights(index) {
+    for (const light of drive.lights) {
+      const now = light.s.findLast(([from]) => from <= index);
+      if (!now) continue;
+      trace(light.p);
+      ctx.strokeStyle = LAMPS[now[1]];
+      ctx.lineWidth = Math.max(3, 0.9 * view.scale);
+      ctx.stroke();
+    }
+  }
+
+  function drawPerson(body, at) {
+    ctx.beginPath();
+    ctx.arc(sx(at.x), sy(at.y), Math.max(3.5, body.w * 0.75 * view.scale), 0, 2 * Math.PI);
+    ctx.fillStyle = at.crashed ? colour.bad : '#e08a1e';
+    ctx.fill();
+    ctx.lineWidth = 1.25;
+    ctx.strokeStyle = '#3d2a08';
+    ctx.stroke();
   }
 
   function drawPosts() {
@@ -286,9 +326,15 @@ function makeStage() {
     drawLines();
     drawTrail(at);
     drawSigns();
+    drawLights(index);
     const labelLead = drawLead(index, at, ego);
+    for (const cone of drive.cones) drawCone(cone);
     for (const thing of drive.obstacles) drawBody(thing, { ...thing, crashed: false }, '#c9452f', '#3d0f08', false);
-    for (const car of drive.cars) if (present(car, at)) drawBody(car, pose(car, at), colour.car, colour['car-edge'], false);
+    for (const car of drive.cars) {
+      if (!present(car, at)) continue;
+      if (car.k === 'pedestrian') drawPerson(car, pose(car, at));
+      else drawBody(car, pose(car, at), colour.car, colour['car-edge'], false);
+    }
     ctx.shadowColor = colour['ego-fill'];
     ctx.shadowBlur = 16;
     drawBody(drive.ego, ego, colour['ego-fill'], colour['ego-edge'], false);

@@ -20,7 +20,7 @@ _MOST_PORT: Final = 65_535
 
 
 @dataclass(frozen=True, slots=True)
-class Address:
+class PageAddress:
     """Name or number, port (0: a free one) and certificate of the page's server."""
 
     host: str = HOST
@@ -28,7 +28,7 @@ class Address:
     certificate: Certificate | None = None
 
 
-def address_of(environ: Mapping[str, str]) -> Address:
+def address_of(environ: Mapping[str, str]) -> PageAddress:
     """The address the environment names: this machine alone and a free port where it names none.
 
     Args:
@@ -51,4 +51,4 @@ def address_of(environ: Mapping[str, str]) -> Address:
             hint="Write car.local:8443, or :8443 for this machine alone at that port.",
         )
     certificate = Certificate(Path(chain), Path(key)) if chain else None
-    return Address(found["host"].strip("[]") or HOST, port, certificate)
+    return PageAddress(found["host"].strip("[]") or HOST, port, certificate)

@@ -57,7 +57,7 @@ class Outbox:
             self._news.clear()
 
 
-class Board:
+class LatestMessages:
     """All that a screen has to be told which joins now."""
 
     def __init__(self) -> None:

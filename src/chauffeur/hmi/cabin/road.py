@@ -1,12 +1,13 @@
-"""The road of a trip as the page draws it: surfaces and painted lines, in world metres."""
+"""The road of a trip as the page draws it: surfaces and painted lines, in metres, with y downwards as on a screen."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from chauffeur.concept import LaneView
+from chauffeur.concept import Lane, RoadGraph
 from chauffeur.drive.talk.messages import Road
-from chauffeur.hmi.road import Box, draw_road
+from chauffeur.geometry import Polyline
+from chauffeur.hmi.road import Bounds, draw_road
 
 _MARGIN_M = 20.0
 
@@ -14,16 +15,28 @@ _MARGIN_M = 20.0
 def drawn(road: Road) -> dict[str, Any]:
     """As a JSON object: the lanes as they were told, and what is painted on them."""
     lanes = tuple(
-        LaneView(lane.id, lane.width_m, 0.0, 0.0, lane.forbidden, lane.forbidden, lane.centre_m) for lane in road.lanes
+        Lane(
+            lane.id,
+            Polyline.of((x, -y) for x, y in lane.centre_m),
+            lane.width_m,
+            0.0,
+            kind="emergency" if lane.shoulder else "driving",
+            road=lane.road,
+            index=lane.index,
+        )
+        for lane in road.lanes
     )
-    xs = [x for lane in lanes for x, _ in lane.centre_m]
-    ys = [y for lane in lanes for _, y in lane.centre_m]
-    everything = Box(min(xs, default=0.0), min(ys, default=0.0), max(xs, default=0.0), max(ys, default=0.0))
-    painted = draw_road(lanes, (), everything.grown(_MARGIN_M))
+    xs = [x for lane in lanes for x, _ in lane.centre.points_m]
+    ys = [y for lane in lanes for _, y in lane.centre.points_m]
+    everything = Bounds(min(xs, default=0.0), min(ys, default=0.0), max(xs, default=0.0), max(ys, default=0.0))
+    painted = draw_road(RoadGraph(lanes), (), everything.grown(_MARGIN_M))
     return {
         "kind": road.kind,
         "world": road.world,
-        "lanes": [{"id": lane.id, "p": _flat(lane.centre_m), "w": lane.width_m} for lane in road.lanes],
+        "lanes": [
+            {"id": lane.id, "p": _flat(lane.centre.points_m), "w": lane.width_m, "road": lane.road, "i": lane.index}
+            for lane in lanes
+        ],
         "surfaces": [{"p": _flat(s.centre_m), "w": s.width_m, "e": s.emergency} for s in painted.surfaces],
         "lines": [{"p": _flat(line.points_m), "s": line.style} for line in painted.lines],
     }

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 from chauffeur.drive.live.messages import MessageError
 from chauffeur.drive.talk.messages import Button, Said, Stop, Told, read_told
-from chauffeur.hmi.cabin.board import Board, Outbox
+from chauffeur.hmi.cabin.board import LatestMessages, Outbox
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -25,7 +25,7 @@ TAKE_WHEEL: Final = '{"kind":"wheel"}'
 """How a page asks for the wheel, to the letter."""
 
 
-class Room:
+class CabinRoom:
     """Screens around one session."""
 
     def __init__(self, hand_on: Callable[[Told | bytes], None]) -> None:
@@ -35,7 +35,7 @@ class Room:
             hand_on: Takes what is told, and sound, to the session; must not wait.
         """
         self._hand_on = hand_on
-        self._board = Board()
+        self._board = LatestMessages()
         self._screens: dict[ServerConnection, Outbox] = {}
         self._wheel: ServerConnection | None = None
         self._held: set[Literal["command", "evaluate"]] = set()

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Final
 
 from chauffeur.drive.talk.messages import Note, Said, Told
-from chauffeur.hmi.cabin.room import Room
+from chauffeur.hmi.cabin.room import CabinRoom
 from chauffeur.hmi.local_page import HOST, Certificate, LocalPage, PageFile
 
 MOST_MESSAGE_BYTES: Final = 1 << 16
@@ -58,7 +58,7 @@ class Cabin:
         self._lock = threading.Lock()
         self._sound_bytes = 0
         self._complained = False
-        self._room = Room(self._hand_on)
+        self._room = CabinRoom(self._hand_on)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._leave: asyncio.Event | None = None
         self._thread: threading.Thread | None = None

@@ -27,7 +27,7 @@ ALL_KEYS = Keys.LEFT | Keys.RIGHT | Keys.GAS | Keys.BRAKE
 
 
 @dataclass(frozen=True, slots=True)
-class Gains:
+class WheelGains:
     """How keys move wheel and pedals; positions run from -1 to 1, rates are positions per second.
 
     Attributes:
@@ -64,7 +64,7 @@ class Positions:
     pedal: float = 0.0
 
 
-def moved(at: Positions, keys: Keys, dt_s: float, gains: Gains) -> Positions:
+def moved(at: Positions, keys: Keys, dt_s: float, gains: WheelGains) -> Positions:
     """Positions one control period later, with these keys held. Opposite keys cancel, but the brake beats the gas."""
     turn = int(bool(keys & Keys.RIGHT)) - int(bool(keys & Keys.LEFT))
     if turn == 0:
@@ -83,16 +83,16 @@ def moved(at: Positions, keys: Keys, dt_s: float, gains: Gains) -> Positions:
     return Positions(wheel, pedal)
 
 
-def command_of(at: Positions, speed_mps: float, dt_s: float, gains: Gains) -> Command:
+def command_of(at: Positions, speed_mps: float, dt_s: float, gains: WheelGains) -> Command:
     """What the positions ask of the vehicle at a speed. The brake stops the car and never drives it backwards."""
     acceleration = at.pedal * gains.max_acceleration_mps2
     if speed_mps <= 0.0 or speed_mps + acceleration * dt_s < 0.0:
         acceleration = max(acceleration, -speed_mps / dt_s)
     response = at.wheel * (gains.fine + (1.0 - gains.fine) * at.wheel * at.wheel)
-    return Command(acceleration, response * steering_bound_rad(speed_mps, gains))
+    return Command(acceleration, 0.0 - response * steering_bound_rad(speed_mps, gains))
 
 
-def steering_bound_rad(speed_mps: float, gains: Gains) -> float:
+def steering_bound_rad(speed_mps: float, gains: WheelGains) -> float:
     """Front-wheel angle at full wheel: yaw rate is about speed x angle / axle distance, and it times speed is bound."""
     bound = gains.axles_m * gains.max_lateral_mps2
     squared = speed_mps**2

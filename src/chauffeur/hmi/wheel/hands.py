@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from chauffeur.bench.lampilot.human import HandTrace, Pause
-from chauffeur.concept import Command, Snapshot
-from chauffeur.hmi.wheel.controls import Gains, Keys, Positions, command_of, moved
-from chauffeur.hmi.wheel.mailbox import Heard, Mailbox
-from chauffeur.hmi.wheel.pace import Clock, Pace
+from chauffeur.concept import Command, Observation
+from chauffeur.hmi.wheel.controls import Keys, Positions, WheelGains, command_of, moved
+from chauffeur.hmi.wheel.mailbox import Mailbox, PageInput
+from chauffeur.hmi.wheel.pace import Clock, DrivePace
 from chauffeur.worlds.base import EGO, World
 
 RELEASE_S = 0.5
@@ -28,11 +28,11 @@ Phase = Literal["countdown", "driving", "paused"]
 
 
 @dataclass(frozen=True, slots=True)
-class Instant:
+class WheelInstant:
     """What the person is shown of the drive at one instant.
 
     Attributes:
-        snapshot: The world.
+        observation: The world.
         phase: What the drive does.
         countdown_s: Until it goes on, in a countdown.
         positions: Of wheel and pedals.
@@ -41,7 +41,7 @@ class Instant:
         late: Deadlines missed so far.
     """
 
-    snapshot: Snapshot
+    observation: Observation
     phase: Phase
     countdown_s: float
     positions: Positions
@@ -58,10 +58,10 @@ class HandsOnWheel:
         world: World,
         mailbox: Mailbox,
         clock: Clock,
-        show: Callable[[Instant], None],
+        show: Callable[[WheelInstant], None],
         *,
         assist: bool = False,
-        gains: Gains | None = None,
+        gains: WheelGains | None = None,
     ) -> None:
         """Sit down at the wheel of a world just reset.
 
@@ -78,9 +78,9 @@ class HandsOnWheel:
         self._clock = clock
         self._show = show
         self._assist = assist
-        self._gains = gains or Gains()
-        self._pace = Pace(clock, world.dt_s)
-        self._snapshot = world.snapshot()
+        self._gains = gains or WheelGains()
+        self._pace = DrivePace(clock, world.dt_s)
+        self._observation = world.observe()
         self._phase: Phase = "countdown"
         self._until_s = clock.now_s() + COUNTDOWN_S
         self._paused_s = 0.0
@@ -127,7 +127,7 @@ class HandsOnWheel:
             assist=self._assist,
         )
 
-    def _act(self, heard: Heard) -> Command:
+    def _act(self, heard: PageInput) -> Command:
         silent = heard.silent_s > RELEASE_S
         self._releases += silent and not self._released
         self._released = silent
@@ -162,11 +162,11 @@ class HandsOnWheel:
 
     def _tell(self) -> None:
         if self._phase == "driving":
-            self._snapshot = self._world.snapshot()
+            self._observation = self._world.observe()
         left_s = self._until_s - self._clock.now_s() if self._phase == "countdown" else 0.0
         self._show(
-            Instant(
-                self._snapshot,
+            WheelInstant(
+                self._observation,
                 self._phase,
                 round(max(0.0, left_s), 2),
                 self._positions,

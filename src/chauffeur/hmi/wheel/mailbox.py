@@ -13,7 +13,7 @@ Wish = Literal["", "pause", "go", "give_up"]
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class PageInput:
     """What came from the page by now.
 
     Attributes:
@@ -56,10 +56,10 @@ class Mailbox:
             if self._wish != "give_up":
                 self._wish = wish
 
-    def look(self) -> Heard:
+    def look(self) -> PageInput:
         """What came by now; taps and wishes are told once."""
         with self._lock:
-            heard = Heard(self._keys | self._tapped, self._number, self._clock.now_s() - self._heard_s, self._wish)
+            heard = PageInput(self._keys | self._tapped, self._number, self._clock.now_s() - self._heard_s, self._wish)
             self._tapped = Keys.NONE
             if self._wish != "give_up":
                 self._wish = ""

@@ -34,7 +34,7 @@ LATE_S = 0.02
 """A period that begins later than this after its due time counts as a missed deadline."""
 
 
-class Pace:
+class DrivePace:
     """The fixed rate of a drive. After a long delay it goes on from now: time lost is lost, nothing is hurried after.
 
     Attributes:

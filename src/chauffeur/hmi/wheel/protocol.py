@@ -16,7 +16,7 @@ _VERBS = ("keys", "start", "pause", "go", "give_up", "next")
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class PageMessage:
     """One message of the page.
 
     Attributes:
@@ -32,7 +32,7 @@ class Said:
     item: str = ""
 
 
-def parse(message: str | bytes) -> Said:
+def parse(message: str | bytes) -> PageMessage:
     """Read a message of the page.
 
     Raises:
@@ -47,4 +47,4 @@ def parse(message: str | bytes) -> Said:
         raise DataError(f"The page said an unknown word: {verb!r}.")
     if not 0 <= keys <= int(ALL_KEYS) or not 0 <= number < 2**53:
         raise DataError(f"The page said keys {keys!r}, number {number!r}.")
-    return Said(verb, Keys(keys), number, item)
+    return PageMessage(verb, Keys(keys), number, item)

@@ -9,7 +9,7 @@ from collections.abc import AsyncGenerator
 from chauffeur.hmi.wheel.scene import Json
 
 
-class Screen:
+class WheelScreen:
     """Kept by one event loop. A page that reads slowly misses instants in between, never the last of each kind."""
 
     def __init__(self) -> None:

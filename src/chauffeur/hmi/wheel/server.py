@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from chauffeur.concept import DataError
 from chauffeur.hmi.local_page import LocalPage, PageFile
 from chauffeur.hmi.wheel.protocol import MAX_MESSAGE_BYTES, parse
-from chauffeur.hmi.wheel.session import Session
+from chauffeur.hmi.wheel.session import WheelSession
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -32,7 +32,7 @@ _FILES: Final = {
 class WheelServer:
     """Carries the words of the page; made by `serving`."""
 
-    def __init__(self, session: Session, page: LocalPage) -> None:
+    def __init__(self, session: WheelSession, page: LocalPage) -> None:
         self._session = session
         self._page = page
         self._driver: ServerConnection | None = None
@@ -74,7 +74,7 @@ class WheelServer:
 
 
 @asynccontextmanager
-async def serving(session: Session, port: int = 0) -> AsyncGenerator[WheelServer]:
+async def serving(session: WheelSession, port: int = 0) -> AsyncGenerator[WheelServer]:
     """Serve a session's page on this machine.
 
     Args:

@@ -18,14 +18,14 @@ from chauffeur.bench.lampilot.human import HandTrace, drive_by_hand, noted
 from chauffeur.bench.lampilot.human_run import HumanRun
 from chauffeur.bench.lampilot.metrics import points
 from chauffeur.bench.lampilot.referee import LampilotReferee
-from chauffeur.concept import ChauffeurError, Outcome, Snapshot
+from chauffeur.concept import ChauffeurError, Observation, Outcome
 from chauffeur.hmi import words
-from chauffeur.hmi.wheel.hands import COUNTDOWN_S, HandsOnWheel, Instant
+from chauffeur.hmi.wheel.hands import COUNTDOWN_S, HandsOnWheel, WheelInstant
 from chauffeur.hmi.wheel.mailbox import Mailbox
 from chauffeur.hmi.wheel.pace import Clock
-from chauffeur.hmi.wheel.protocol import Said, Verb
+from chauffeur.hmi.wheel.protocol import PageMessage, Verb
 from chauffeur.hmi.wheel.scene import Json, road_message, situation, tick_message
-from chauffeur.hmi.wheel.screen import Screen
+from chauffeur.hmi.wheel.screen import WheelScreen
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import Item
 
@@ -44,10 +44,10 @@ class Seat:
 
     item: Item
     world: HighwayWorld
-    start: Snapshot
+    start: Observation
 
 
-class Session:
+class WheelSession:
     """A run being driven."""
 
     def __init__(self, run: HumanRun, clock: Clock, utc: Callable[[], str]) -> None:
@@ -58,14 +58,14 @@ class Session:
             clock: Time of the drives.
             utc: The date and time, ISO 8601 UTC, for the record of attempts.
         """
-        self.screen = Screen()
+        self.screen = WheelScreen()
         self._run = run
         self._clock = clock
         self._utc = utc
         self._mailbox: Mailbox | None = None
         self._awaited: tuple[Verb, str, asyncio.Event] | None = None
 
-    def hear(self, said: Said) -> None:
+    def hear(self, said: PageMessage) -> None:
         """A word of the page. Words that do not fit the moment are dropped."""
         if self._awaited is not None and self._awaited[:2] == (said.verb, said.item):
             self._awaited[2].set()
@@ -116,7 +116,7 @@ class Session:
         mailbox = self._mailbox = Mailbox(self._clock)
         self._stage("driving")
 
-        def show(instant: Instant) -> None:
+        def show(instant: WheelInstant) -> None:
             loop.call_soon_threadsafe(self.screen.show, tick_message(instant))
 
         def drive() -> tuple[HandTrace, Row]:
@@ -133,7 +133,7 @@ class Session:
             raise
         finally:
             self._mailbox = None
-        self.screen.show({"t": "tick", "phase": "over", "seq": 0} | situation(seat.world.snapshot()))
+        self.screen.show({"t": "tick", "phase": "over", "seq": 0} | situation(seat.world.observe()))
         return trace, row
 
     async def _keep(self, item: Item, trace: HandTrace, row: Row) -> None:

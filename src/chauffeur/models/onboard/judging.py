@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from chauffeur.bench.lampilot.goals_more import make_any_goal
 from chauffeur.bench.lampilot.scenes.feasible import GoalReferee
-from chauffeur.concept import Outcome, Scenario, Snapshot
+from chauffeur.concept import Observation, Outcome, Scenario
 from chauffeur.concept.nouns import Metric
 from chauffeur.drive.session import drive_program
 from chauffeur.planners.onboard.dialect import Step
@@ -129,10 +129,10 @@ def _with(scenario: Scenario, goal: dict[str, Any]) -> Scenario:
     return replace(scenario, goal=goal)
 
 
-Effect = Callable[[Snapshot, Snapshot, float], bool]
+Effect = Callable[[Observation, Observation, float], bool]
 
 
-def _blocked(end: Snapshot) -> bool:
+def _blocked(end: Observation) -> bool:
     return (
         end.front is not None
         and end.front.distance_m < BLOCKED_M
@@ -140,92 +140,94 @@ def _blocked(end: Snapshot) -> bool:
     )
 
 
-def _faster(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _faster(start: Observation, end: Observation, value: float) -> bool:
     del value
     return end.ego.speed_mps > start.ego.speed_mps + SPEED_STEP_MPS or _blocked(end)
 
 
-def _slower(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _slower(start: Observation, end: Observation, value: float) -> bool:
     del value
     return end.ego.speed_mps < start.ego.speed_mps - SPEED_STEP_MPS
 
 
-def _not_faster(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _not_faster(start: Observation, end: Observation, value: float) -> bool:
     del value
     return end.ego.speed_mps < start.ego.speed_mps + SPEED_OFF_MPS
 
 
-def _not_slower(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _not_slower(start: Observation, end: Observation, value: float) -> bool:
     del value
     return end.ego.speed_mps > start.ego.speed_mps - SPEED_OFF_MPS or _blocked(end)
 
 
-def _held(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _held(start: Observation, end: Observation, value: float) -> bool:
     return _not_faster(start, end, value) and _not_slower(start, end, value)
 
 
-def _at_most(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _at_most(start: Observation, end: Observation, value: float) -> bool:
     del start
     return end.ego.speed_mps <= value + SPEED_OFF_MPS
 
 
-def _at_least(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _at_least(start: Observation, end: Observation, value: float) -> bool:
     del start
     return end.ego.speed_mps >= value - SPEED_OFF_MPS or _blocked(end)
 
 
-def _times(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _times(start: Observation, end: Observation, value: float) -> bool:
     return abs(end.ego.speed_mps - value * start.ego.speed_mps) < SPEED_OFF_MPS or _blocked(end)
 
 
-def _gap(snapshot: Snapshot) -> float | None:
-    return None if snapshot.front is None else snapshot.front.distance_m
+def _gap(observation: Observation) -> float | None:
+    return None if observation.front is None else observation.front.distance_m
 
 
-def _closer(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _closer(start: Observation, end: Observation, value: float) -> bool:
     del value
     before, after = _gap(start), _gap(end)
     return before is not None and after is not None and after < before - GAP_STEP_M
 
 
-def _further(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _further(start: Observation, end: Observation, value: float) -> bool:
     del value
     before, after = _gap(start), _gap(end)
     return before is None or after is None or after > before + GAP_STEP_M
 
 
-def _gap_at_least(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _gap_at_least(start: Observation, end: Observation, value: float) -> bool:
     del start
     gap = _gap(end)
     return gap is None or gap > 0.85 * value
 
 
-def _gap_at_most(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _gap_at_most(start: Observation, end: Observation, value: float) -> bool:
     del start
     gap = _gap(end)
     return gap is not None and gap < 1.2 * value
 
 
 def _lane_moved(by: int) -> Effect:
-    def test(start: Snapshot, end: Snapshot, value: float) -> bool:
+    def test(start: Observation, end: Observation, value: float) -> bool:
         steps = by * (round(value) if value else 1)
         if start.ego.lane is None or end.ego.lane is None:
             return False
-        return end.ego.lane[2] - start.ego.lane[2] == steps
+        return end.road[end.ego.lane].index - start.road[start.ego.lane].index == steps
 
     return test
 
 
-def _other_lane(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _other_lane(start: Observation, end: Observation, value: float) -> bool:
     del value
-    return start.ego.lane is not None and end.ego.lane is not None and start.ego.lane[2] != end.ego.lane[2]
+    if start.ego.lane is None or end.ego.lane is None:
+        return False
+    return start.road[start.ego.lane].index != end.road[end.ego.lane].index
 
 
-def _same_lane(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _same_lane(start: Observation, end: Observation, value: float) -> bool:
     return not _other_lane(start, end, value)
 
 
-def _stopped(start: Snapshot, end: Snapshot, value: float) -> bool:
+def _stopped(start: Observation, end: Observation, value: float) -> bool:
     del start, value
     return end.ego.speed_mps < 0.5
 

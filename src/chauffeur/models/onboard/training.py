@@ -6,27 +6,25 @@ The architecture is `transformers`' Llama, small; the loop is plain PyTorch, on 
 
 from __future__ import annotations
 
-import json
 import math
 import shutil
-import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, replace
+from itertools import count
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 import torch
 from torch.nn import functional
 from torch.nn.attention import SDPBackend, sdpa_kernel
-from transformers import LlamaConfig, LlamaForCausalLM
 
 from chauffeur.concept import ConfigError
+from chauffeur.models.net.transformer import Network, TransformerConfig, language_model
 from chauffeur.models.onboard.packed import Array, Packed
 from chauffeur.models.onboard.tokens import Blanks
-
-Network = Any
-"""A `LlamaForCausalLM`: untyped, because `transformers` need not be installed where this is checked."""
+from chauffeur.models.train.trainer import Optimisation, fit
 
 LENGTHS: Final = (32, 40, 48, 56, 64, 80, 96, 128, 192, 320, 512)
 """Tokens an example is padded to."""
@@ -107,21 +105,10 @@ class Recipe:
 
 def network(size: Size, vocabulary: int, end: int) -> Network:
     """An untrained network. Weights come from torch's global generator."""
-    config = LlamaConfig(
-        vocab_size=vocabulary,
-        hidden_size=size.hidden,
-        intermediate_size=size.inner,
-        num_hidden_layers=size.layers,
-        num_attention_heads=size.heads,
-        num_key_value_heads=size.kv_heads,
-        max_position_embeddings=512,
-        tie_word_embeddings=True,
-        bos_token_id=None,
-        eos_token_id=end,
-        pad_token_id=end,
-        rms_norm_eps=1e-5,
+    config = TransformerConfig(
+        size.hidden, size.layers, size.heads, size.kv_heads, size.inner, vocabulary=vocabulary, end=end
     )
-    return LlamaForCausalLM(config)
+    return language_model(config)
 
 
 def batches(data: Packed, tokens: int, rng: np.random.Generator) -> Iterator[Array]:
@@ -239,61 +226,49 @@ def train(
     model: Any = network(SIZES[recipe.size], vocabulary, end).to(where)
     if begin is not None:
         model.load_state_dict(begin)
-    matrices = [p for p in model.parameters() if p.dim() >= 2]
-    vectors = [p for p in model.parameters() if p.dim() < 2]
-    optimiser = torch.optim.AdamW(
-        [{"params": matrices, "weight_decay": recipe.decay}, {"params": vectors, "weight_decay": 0.0}],
-        lr=recipe.rate,
-        betas=(0.9, 0.98),
-        fused=True,
-    )
-    state_path = folder / "state.pt"
-    first = 0
-    if state_path.exists():
-        state: dict[str, Any] = torch.load(state_path, map_location=where, weights_only=True)
-        if not recipe.goes_on_from(state["recipe"], int(state["step"])):
-            raise ConfigError(f"{folder} holds a run of another recipe.", hint="Choose another folder, or delete it.")
-        model.load_state_dict(state["model"])
-        optimiser.load_state_dict(state["optimiser"])
-        first = int(state["step"])
-    feed = batches(data, recipe.batch_tokens, np.random.default_rng([recipe.seed, 1]))
-    for _ in range(first):  # the order is the seed's; what was seen is passed over
-        next(feed)
-    model.train()
     # Making kernels for all lengths takes some minutes, a step then three quarters of its time.
     body = compiled_body(model) if recipe.all_steps >= COMPILED_FROM else None
     # The flash kernels are for long rows; of these, plain products are the faster.
     attention = [SDPBackend.MATH] if where.type == "cpu" else [SDPBackend.FLASH_ATTENTION, SDPBackend.MATH]
-    saved = time.monotonic()
-    log = (folder / "log.jsonl").open("a", encoding="utf-8")
-    with log:
-        for step in range(first, recipe.all_steps):
-            begun = time.perf_counter()
-            for group in optimiser.param_groups:
-                group["lr"] = rate_at(step, recipe)
+    tokens = 0
+
+    def fed(first: int) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
+        nonlocal tokens
+        feed = batches(data, recipe.batch_tokens, np.random.default_rng([recipe.seed, 1]))
+        for _ in range(first):  # the order is the seed's; what was seen is passed over
+            next(feed)
+        for step in count(first):
             ids, targets = collate(data, next(feed), end)
             if blanks is not None:
                 share = recipe.blanked if step < recipe.steps else recipe.blanked_more
                 blank(ids, blanks, share, np.random.default_rng([recipe.seed, 2, step]))
-            optimiser.zero_grad(set_to_none=True)
-            with sdpa_kernel(attention):
-                with torch.autocast(where.type, torch.bfloat16):
-                    loss = loss_of(model, ids.to(where), targets.to(where), body)
-                loss.backward()
-            torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
-            optimiser.step()
-            if watch is not None:
-                watch(step, float(loss.detach()), ids.numel() / (time.perf_counter() - begun))
-            last = step + 1 == recipe.all_steps
-            if last or (step + 1) % 250 == 0:
-                row = {"step": step + 1, "loss": float(loss.detach())}
-                if held_back is not None:
-                    row["held_back"] = evaluate_loss(model, held_back, recipe.batch_tokens, end)
-                log.write(json.dumps(row) + "\n")
-                log.flush()
-            if last or time.monotonic() - saved > save_s:
-                _save(state_path, recipe, model, optimiser, step + 1)
-                saved = time.monotonic()
+            tokens = ids.numel()
+            yield ids.to(where), targets.to(where)
+
+    def weighed(batch: tuple[torch.Tensor, torch.Tensor]) -> torch.Tensor:
+        ids, targets = batch
+        return loss_of(model, ids, targets, body)
+
+    def attending() -> AbstractContextManager[object]:
+        return cast("AbstractContextManager[object]", sdpa_kernel(attention))
+
+    fit(
+        model,
+        fed,
+        weighed,
+        lambda step: rate_at(step, recipe),
+        folder,
+        asdict(recipe),
+        recipe.all_steps,
+        Optimisation(decay=recipe.decay, precision="bfloat16"),
+        continues=recipe.goes_on_from,
+        evaluate=None
+        if held_back is None
+        else lambda: {"held_back": evaluate_loss(model, held_back, recipe.batch_tokens, end)},
+        watch=None if watch is None else lambda step, loss, seconds: watch(step, loss, tokens / seconds),
+        save_s=save_s,
+        around=attending,
+    )
     return model
 
 
@@ -314,20 +289,12 @@ def finished(folder: Path) -> tuple[Recipe, dict[str, torch.Tensor]]:
     return recipe, state["model"]
 
 
-def _save(path: Path, recipe: Recipe, model: Network, optimiser: torch.optim.Optimizer, step: int) -> None:
-    part = path.with_suffix(".part")
-    torch.save(
-        {"recipe": asdict(recipe), "model": model.state_dict(), "optimiser": optimiser.state_dict(), "step": step}, part
-    )
-    part.replace(path)
-
-
 @torch.no_grad()
 def evaluate_loss(model: Network, data: Packed, tokens: int, pad: int, most: int = 2048) -> float:
     """Mean loss a reply token over (the first `most` of) some examples."""
     model.eval()
     where = next(model.parameters()).device
-    total = count = 0.0
+    total = seen = 0.0
     feed = batches(data, tokens, np.random.default_rng(0))
     for _ in range(max(1, most * 60 // tokens)):
         ids, targets = collate(data, next(feed), pad)
@@ -335,6 +302,6 @@ def evaluate_loss(model: Network, data: Packed, tokens: int, pad: int, most: int
             loss = loss_of(model, ids.to(where), targets.to(where))
         number = float((targets != -100).sum())
         total += float(loss) * number
-        count += number
+        seen += number
     model.train()
-    return total / max(1.0, count)
+    return total / max(1.0, seen)

@@ -1,7 +1,8 @@
-"""From the sentences to the two sorters that ship, with their cards.
+"""From the sentences to the three sorters that ship, with their cards.
 
 folder/wishes.npz     for `chauffeur.planners.talk2drive`
 folder/remarks.npz    for `chauffeur.memory`
+folder/weather.npz    for `chauffeur.language`
 folder/CARD.md        data and models: how many sentences, how well writers never learned from are sorted
 """
 
@@ -17,15 +18,18 @@ from typing import Any, Final
 import numpy as np
 
 from chauffeur.drive.files import publish
+from chauffeur.language.weather import SAID_WEATHERS
 from chauffeur.models.sorting.sentences import Name, Sentence, kinds_of, sentences, table
 from chauffeur.models.sorting.tables import drawn
 from chauffeur.models.sorting.training import Recipe, by_writer, right, train, write
+from chauffeur.models.sorting.weather import TEST_WRITERS, WeatherFigures, weather_figures, weather_sentences
 
 Told = Callable[[str, int, int], None]
 """Is told a stage, how much of it is done, and of how much."""
 
-VERSION: Final = "sorters-v3"
+VERSION: Final = "sorters-v4"
 NAMES: Final[tuple[Name, ...]] = ("wishes", "remarks")
+"""Those that are measured on each writer in turn; weather is composed, and measured on six."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +48,7 @@ class Figures:
 
 
 def make_sorters(folder: Path, recipe: Recipe, told: Told, *, measured: bool = False) -> Path:
-    """Train and write both sorters and their card; the card's path.
+    """Train and write the sorters and their card; the card's path.
 
     Args:
         folder: Where to.
@@ -64,9 +68,42 @@ def make_sorters(folder: Path, recipe: Recipe, told: Told, *, measured: bool = F
         write(sorter, folder / f"{name}.npz")
         hits = by_writer(own, kinds, recipe, _percent(f"{name} without a writer", told)) if measured else None
         found[name] = own, _figures(own, right(sorter, own), hits)
+    write(
+        train(weather_sentences(recipe.seed), SAID_WEATHERS, recipe, _percent("weather", told)), folder / "weather.npz"
+    )
+    figures = None
+    if measured:
+        stage = _percent("weather without six writers", told)
+        left = train(weather_sentences(recipe.seed, TEST_WRITERS), SAID_WEATHERS, recipe, stage)
+        figures = weather_figures(left, recipe.seed)
     card = folder / "CARD.md"
-    publish(card, _card(found, recipe, len(tables)).encode(), "card")
+    publish(card, (_card(found, recipe, len(tables)) + weather_part(figures)).encode(), "card")
     return card
+
+
+def weather_part(figures: WeatherFigures | None) -> str:
+    """What the card says of the sorter of weather."""
+    own = sentences("weather")
+    digest = hashlib.sha256(table("weather")).hexdigest()[:16]
+    words = (
+        f"\n## weather.npz\n\nWhat is said in passing of the weather or the road, {len(SAID_WEATHERS)} kinds: "
+        f"{len(own):,} sentences of the wishes, labelled by hand (by a large language model), sha256 of the table "
+        f"`{digest}`; the grammar `weather.txt`, and wishes alone. Texts are read whole and clause by clause; words of "
+        "the weather services' vocabulary lower the threshold, and a clause in which all of them are denied says "
+        "nothing. Recipe and thresholds were chosen on two writers (g, s).\n"
+    )
+    if figures is None:
+        return words
+    one = figures
+    return (
+        f"{words}\n| of six writers left out of the training, and held-out templates | texts | taken for weather |\n"
+        "|---|---:|---:|\n"
+        f"| says something of the weather or the road | {one.said:,} | {one.heard:,} |\n"
+        f"| only looks so (ice cream, yesterday's rain) | {one.alike:,} | {one.mistaken:,} |\n"
+        f"| held-out templates beside wishes | {one.held:,} | {one.held_heard:,} |\n"
+        f"| the same, denied or of something else | {one.denied:,} | {one.denied_mistaken:,} |\n"
+        f"| other wishes | {one.others:,} | {one.others_mistaken:,} |\n"
+    )
 
 
 def _percent(stage: str, told: Told) -> Callable[[float], None]:
@@ -107,10 +144,10 @@ def _unheard(figures: Figures) -> str:
 
 _HEAD: Final = """# Data and model card: {version}
 
-Two sorters of short English sentences for the `talk2drive` planner and for feedback: what a passenger is after who only
-hints at it, and what a remark after a drive says. Softmax regression over hashed words, pairs of words, negated words
-and parts of words; int8 weights, {epochs} epochs, seed {seed}. `chauffeur model train sorters --out DIR` makes the same
-files again from the tables in `data/sorters`.
+Three sorters of short English sentences: what a passenger is after who only hints at it (for the `talk2drive`
+planner), what a remark after a drive says (for feedback), and what is said of weather or road (for the `vlm` planner).
+Softmax regression over hashed words, pairs of words, negated words and parts of words; int8 weights, {epochs} epochs,
+seed {seed}. `chauffeur model train sorters --out DIR` makes the same files again from the tables in `data/sorters`.
 
 - **Data**: written for this repository by writers (large language models) who were told the situation and what a
   passenger has in mind, and nothing of the planner, its tables, or the words it is measured on; three writers are the

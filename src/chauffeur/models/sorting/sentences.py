@@ -2,7 +2,8 @@
 
 Tables in `data/sorters`, one sentence a line: label, sentence, writer, parted by tabs. A label of `wishes.tsv` is a
 world, what is wished for and how directly (I asks, II remarks on the road, III only hints; `highway/pass/II`); one of
-`remarks.tsv` what the drive was blamed or praised for, and how strongly (`too_fast/bit`).
+`remarks.tsv` what the drive was blamed or praised for, and how strongly (`too_fast/bit`); one of `weather.tsv` what a
+sentence of `wishes.tsv` says of the weather or the road, or that it says nothing of them though its words look so.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ from typing import Final, Literal
 
 from chauffeur.concept import DataError
 from chauffeur.concept.data import read_data
+from chauffeur.language.weather import SAID_WEATHERS
 from chauffeur.memory.remarks import REMARK_KINDS
 from chauffeur.planners.talk2drive.hints import HINT_KINDS
 
-Name = Literal["wishes", "remarks"]
+Name = Literal["wishes", "remarks", "weather"]
 
 _WORLDS: Final[Mapping[str, str]] = {"highway": "highway", "crossing": "intersection", "lot": "parking"}
 _MOODS: Final[Mapping[tuple[str, str], str]] = {
@@ -67,20 +69,18 @@ def kinds_of(name: Name) -> Sequence[str]:
     """What a sorter can find, in the order of its numbers."""
     if name == "remarks":
         return REMARK_KINDS
+    if name == "weather":
+        return SAID_WEATHERS
     return tuple(dict.fromkeys(kind for each in HINT_KINDS.values() for kind in each))
 
 
 def _sentence(name: Name, number: int, line: str) -> Sentence:
     label, _, rest = line.partition("\t")
     text, _, writer = rest.partition("\t")
-    kind, among = _remark(label) if name == "remarks" else _wish(label)
+    kind, among = _wish(label) if name == "wishes" else (label, tuple(kinds_of(name)))
     if not text or not writer or kind not in among:
         raise DataError(f"Line {number} of {name}.tsv is no sentence with its label and writer: {line[:80]!r}.")
     return Sentence(text, kind, among, writer, label)
-
-
-def _remark(label: str) -> tuple[str, tuple[str, ...]]:
-    return label, REMARK_KINDS
 
 
 def _wish(label: str) -> tuple[str, tuple[str, ...]]:

@@ -53,7 +53,12 @@ class Choice:
 
 
 def choose(
-    reading: Reading, situation: Situation, limits: Limits, leaning: Callable[[str], Leaning]
+    reading: Reading,
+    situation: Situation,
+    limits: Limits,
+    leaning: Callable[[str], Leaning],
+    *,
+    wary: bool = False,
 ) -> Choice | Declined:
     """Exemplars and numbers for a wish, or the reason why this road or situation does not allow it.
 
@@ -62,9 +67,10 @@ def choose(
         situation: Where we are.
         limits: Bounds for what the planner chooses itself.
         leaning: What this person's history says about an intent.
+        wary: Whether they say that the road is slippery or the sight bad.
     """
     steps: list[Chosen] = []
-    options = Options(situation, limits, Leaning())
+    options = Options(situation, limits, wary=wary)
     waiting = list(reading.steps)
     while waiting:
         meaning = waiting.pop(0)

@@ -33,6 +33,12 @@ _STYLES: dict[str, tuple[float, float, str]] = {
     "eco": (0.85, 1.8, "hold a moderate speed that changes as little as possible"),
 }
 """Share of the present speed, time headway in s, and words."""
+_WARY: tuple[float, float, str] = (
+    1.0,
+    2.0,
+    "lose no time, but drive no faster than now and leave a long gap, for what you say of the road",
+)
+"""The same for a mood that quickens, where the person says that the road or the sight is bad."""
 
 
 def choose_speed(meaning: Meaning, options: Options) -> Chosen | Declined:
@@ -135,6 +141,8 @@ def _step(meaning: Meaning, options: Options) -> Chosen | Declined:
 def choose_style(meaning: Meaning, options: Options) -> Chosen | Declined:
     """Exemplar for a way of driving or a feeling that asks for one."""
     share, headway, words = _STYLES[meaning.variant]
+    if options.wary and PACES[meaning.variant] > 0:
+        share, headway, words = _WARY
     wanted = options.speed * share + options.leaning.speed_mps
     if share > 1.0:
         target = min(wanted, options.own_cap_mps)  # in a hurry at the limit already, the gap is all that can be gained

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Situation, Usage
-from chauffeur.planners.arbitration import UNSURE_WORDS, Wish, agreed, asked, question_about
+from chauffeur.planners.arbitration import UNSURE_WORDS, Wish, agreed, asked, question_about, undenied, wary_of
 from chauffeur.planners.base import OnText, Planner, declined
 from chauffeur.planners.onboard.copying import named, taken_over, unnamed
 from chauffeur.planners.onboard.dangers import danger
@@ -29,6 +29,7 @@ from chauffeur.planners.onboard.personal import Leaning, corrections_of, leaning
 from chauffeur.planners.onboard.prompt import history_words, prompt
 from chauffeur.planners.onboard.reply import Reply, read_reply
 from chauffeur.planners.onboard.thoughts import thoughts_of
+from chauffeur.planners.onboard.town import plan_in_town
 from chauffeur.planners.onboard.understand import meanings_said
 
 SHIPPED: Final = Path(__file__).parent / "weights"
@@ -217,6 +218,8 @@ class LanguageModelPlanner:
             from chauffeur.planners.talk2drive.embedded import EmbeddedParameters
 
             return await EmbeddedParameters(self).plan(request)
+        if (told := plan_in_town(self, request)) is not None:
+            return told
         settled = self.settle(request, begun)
         if isinstance(settled, Plan):
             return settled
@@ -224,7 +227,7 @@ class LanguageModelPlanner:
         if asks := settled.question(request):
             plan = asked(self, asks, begun, offer=wish, raw=settled.written.text)
             return replace(plan, usage=usage_of(settled.written))
-        return Plan(
+        plan = Plan(
             thoughts=thoughts_of(linked.reading, linked.choice, settled.situation, used),
             policy=Program(settled.source, library=linked.library),
             intent=linked.choice.intent,
@@ -235,6 +238,7 @@ class LanguageModelPlanner:
             usage=usage_of(settled.written),
             raw=settled.written.text,
         )
+        return undenied(self, plan, request, begun)
 
     def settle(self, request: PlanRequest, begun: float, *, shown: bool = True) -> Settled | Plan:
         """What is to be done here, before it is a policy of some kind; or the plan that declines.
@@ -275,7 +279,8 @@ class LanguageModelPlanner:
             plan = declined(self, words, begun, intent=intent, usage=usage_of(written), raw=written.text)
             return replace(plan, offer=wish) if reply.question.startswith((UNSURE_WORDS, NOT_THE_NUMBER)) else plan
         leaning = partial(leaning_of, request.history, corrections=corrections_of(request.rounds))
-        linked = link(reply.steps, situation, request.limits, leaning)
+        wary = wary_of(wish, "+".join(step.meaning.family for step in reply.steps))
+        linked = link(reply.steps, situation, request.limits, leaning, wary=wary)
         if isinstance(linked, Declined):
             intent = "+".join(step.meaning.family for step in reply.steps)
             return declined(self, linked.words, begun, intent=intent, usage=usage_of(written), raw=written.text)

@@ -69,7 +69,12 @@ class Linked:
 
 
 def link(
-    steps: Sequence[Step], situation: Situation, limits: Limits, leaning: Callable[[str], Leaning]
+    steps: Sequence[Step],
+    situation: Situation,
+    limits: Limits,
+    leaning: Callable[[str], Leaning],
+    *,
+    wary: bool = False,
 ) -> Linked | Declined:
     """Bodies for the skills of a program, or why this road or situation does not allow it.
 
@@ -78,8 +83,9 @@ def link(
         situation: Where we are.
         limits: Bounds for what the planner chooses itself.
         leaning: What this person's history says about an intent.
+        wary: Whether they say that the road is slippery or the sight bad.
     """
-    options = Options(situation, limits, Leaning())
+    options = Options(situation, limits, wary=wary)
     chosen: list[tuple[Step, Chosen]] = []
     for step in steps:
         options = options.with_leaning(leaning(step.meaning.family))

@@ -59,12 +59,14 @@ class Options:
         limits: Bounds for the planner's own choices.
         leaning: What the person's history says.
         front_known: False once an earlier step has changed the lane: who is ahead then shows while driving.
+        wary: Whether the person says that the road is slippery or the sight bad: haste then gains nothing.
     """
 
     situation: Situation
     limits: Limits
     leaning: Leaning = field(default_factory=Leaning)
     front_known: bool = True
+    wary: bool = False
 
     def with_leaning(self, leaning: Leaning) -> Options:
         """The same with another leaning."""

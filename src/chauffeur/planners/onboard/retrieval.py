@@ -6,7 +6,7 @@ import time
 from functools import partial
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program
-from chauffeur.planners.arbitration import Wish, asked, slow_words, unanswered
+from chauffeur.planners.arbitration import Wish, asked, slow_words, unanswered, undenied, wary_of
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.choose import choose
 from chauffeur.planners.onboard.dangers import danger
@@ -16,6 +16,7 @@ from chauffeur.planners.onboard.meaning import NotUnderstood
 from chauffeur.planners.onboard.options import Declined
 from chauffeur.planners.onboard.personal import corrections_of, leaning_of
 from chauffeur.planners.onboard.thoughts import thoughts_of
+from chauffeur.planners.onboard.town import plan_in_town
 from chauffeur.planners.onboard.understand import understand
 
 VERSION = "meaning-v2"
@@ -45,6 +46,8 @@ class RetrievalPlanner:
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; a wish that is not understood or not possible is declined in words."""
         begun = time.perf_counter()
+        if (told := plan_in_town(self, request)) is not None:
+            return told
         ready = Wish.of(self, request.instruction, begun)
         if ready.declined is not None and not danger(request.instruction.text):
             return ready.declined
@@ -55,7 +58,8 @@ class RetrievalPlanner:
             return declined(self, reading.words, begun, raw=reading.why)
         corrections = corrections_of(request.rounds)
         leaning = partial(leaning_of, request.history, corrections=corrections)
-        choice = choose(reading, request.context.situation, request.limits, leaning)
+        wary = wary_of(ready.instruction.text, "+".join(step.family for step in reading.steps))
+        choice = choose(reading, request.context.situation, request.limits, leaning, wary=wary)
         if isinstance(choice, Declined):
             intent = "+".join(step.family for step in reading.steps)
             return declined(self, choice.words, begun, intent=intent)
@@ -65,7 +69,7 @@ class RetrievalPlanner:
             if question := unanswered(request.instruction, f"{why} Shall I {does}?"):
                 return asked(self, question, begun, offer=ready.instruction.text)
         source = program_of([step.filled for step in choice.steps])
-        return Plan(
+        plan = Plan(
             thoughts=thoughts_of(reading, choice, request.context.situation, used),
             policy=Program(source),
             intent=choice.intent,
@@ -74,3 +78,4 @@ class RetrievalPlanner:
             model=self.model,
             latency_s=time.perf_counter() - begun,
         )
+        return undenied(self, plan, request, begun)

@@ -9,7 +9,7 @@ from chauffeur.planners.prompts.coached import (
     description_messages,
 )
 from chauffeur.planners.prompts.system import PROMPT_VERSION, Setting, build_system_message, describe_limits
-from chauffeur.planners.prompts.turns import Message, build_messages, repair_turns, wish_turn
+from chauffeur.planners.prompts.turns import Message, build_messages, pictures_in, repair_turns, wish_turn, words_of
 
 __all__ = [
     "COACHED_PROMPT_VERSION",
@@ -24,6 +24,8 @@ __all__ = [
     "data_block",
     "describe_limits",
     "description_messages",
+    "pictures_in",
     "repair_turns",
     "wish_turn",
+    "words_of",
 ]

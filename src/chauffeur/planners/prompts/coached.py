@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from chauffeur.concept import Limits, SystemMessage
 from chauffeur.planners.prompts.blocks import (
@@ -20,6 +21,9 @@ from chauffeur.planners.prompts.blocks import (
 )
 from chauffeur.planners.prompts.system import build_system_message, fill, template
 from chauffeur.planners.prompts.turns import Message
+
+if TYPE_CHECKING:
+    from chauffeur.programs.catalogue import Vocabulary
 
 COACHED_PROMPT_VERSION = "lmp-coached-v1"
 """Version of these templates; stands in every result whose program they brought about."""
@@ -44,14 +48,24 @@ class Helper:
     source: str
 
 
-def build_coached_message(helpers: Sequence[Helper], *, limits: Limits | None = None) -> SystemMessage:
+def build_coached_message(
+    helpers: Sequence[Helper],
+    *,
+    limits: Limits | None = None,
+    vocabulary: Vocabulary = "road",
+    chain_of_thought: bool = False,
+) -> SystemMessage:
     """S with programs to call, the most fitting first; what does not fit into a library's size is left out.
 
     Args:
         helpers: Programs of the repository that bear on the wish.
         limits: Bounds the program is held to; default `Limits()`.
+        vocabulary: Which of the driving APIs there are.
+        chain_of_thought: Ask for numbered reasoning before the program.
     """
-    base = build_system_message("zero-shot", limits=limits).text
+    base = build_system_message(
+        "zero-shot", limits=limits, vocabulary=vocabulary, chain_of_thought=chain_of_thought
+    ).text
     shown, library = _fitting(helpers)
     if not shown:
         return SystemMessage(f"{base}\n\n{template('no_helpers.md')}", "human-feedback")

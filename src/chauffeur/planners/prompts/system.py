@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import resources
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from chauffeur.concept import Limits, SystemMessage
 from chauffeur.concept.units import kmh
+
+if TYPE_CHECKING:
+    from chauffeur.programs.catalogue import Vocabulary
 
 Setting = Literal["zero-shot", "few-shot"]
 
@@ -18,6 +21,51 @@ _CLOSE_HEADWAY_S = 0.3
 """Headway that lets the autopilot close in to short gaps at motorway speed."""
 
 _OVER_LIMIT_MPS = 5.0
+
+TOWN_PROMPT_VERSION = "lmp-town-v1"
+"""Version of the templates for towns."""
+
+_TOWN = {
+    "thoughts_start": (
+        "Thoughts: We stand behind a car that stands as well. I go at the speed limit, but not before there is room: "
+        "what I read now is old in a moment, so the program asks in every step."
+    ),
+    "thoughts_left": (
+        "Thoughts: The next junction is the one with the lights, and a way leads left there. I choose it now; the "
+        "autopilot gets into the lane for it and minds the light."
+    ),
+    "thoughts_right": (
+        "Thoughts: The turn is made from the right lane. I move over first, give the car 5 s for it, and choose the "
+        "way at the junction then."
+    ),
+}
+
+_TOWN_STEPS = {
+    name: "Thoughts:\n1. Situation: " + situation + "\n2. Wish: " + wish + "\n3. Risks: " + risks + "\n4. Plan: " + plan
+    for name, situation, wish, risks, plan in (
+        (
+            "thoughts_start",
+            "standing, a car that stands 11.3 m ahead.",
+            "start driving.",
+            "running into the car ahead; what is read now is old in the next step.",
+            "ask in every step who is ahead; stand while a standing car is within 5 m, else go at the speed limit.",
+        ),
+        (
+            "thoughts_left",
+            "7.9 m/s in the right lane of two, a green light 48 m ahead, a way to the left there.",
+            "left at the lights, which is the next junction.",
+            "being in the wrong lane, and the light turning yellow.",
+            "choose left now, so that the autopilot changes lanes in time; slow down for a yellow light.",
+        ),
+        (
+            "thoughts_right",
+            "12.1 m/s in the middle lane of three, a way to the right at the next junction.",
+            "over to the right lane, then right.",
+            "no gap in the right lane, and turning before the lane is changed.",
+            "ask for the right lane, give it 5 s, then choose the way to the right.",
+        ),
+    )
+}
 
 _PLAIN = {
     "thoughts_gap": (
@@ -87,7 +135,9 @@ def describe_limits(limits: Limits) -> str:
     return "\n".join(lines)
 
 
-def _exemplars(limits: Limits, chain_of_thought: bool) -> str:
+def _exemplars(limits: Limits, chain_of_thought: bool, vocabulary: Vocabulary) -> str:
+    if vocabulary == "town":
+        return fill(template("exemplars_town.md"), _TOWN_STEPS if chain_of_thought else _TOWN)
     # The numbers of the examples keep to the same limits that the model is held to.
     numbers = {
         "headway": f"{max(limits.min_time_headway_s, _CLOSE_HEADWAY_S):g}",
@@ -102,6 +152,7 @@ def build_system_message(
     limits: Limits | None = None,
     chain_of_thought: bool = False,
     api_docs: str | None = None,
+    vocabulary: Vocabulary = "road",
 ) -> SystemMessage:
     """S for planners that write programs.
 
@@ -110,14 +161,15 @@ def build_system_message(
         limits: Bounds the program is held to; the model is told of them. Default: `Limits()`.
         chain_of_thought: Ask for numbered reasoning (situation, wish, risks, plan) before the program.
         api_docs: Driving-API documentation; default is the catalogue that also gates and runs programs.
+        vocabulary: Which of the driving APIs there are where the programs are to drive.
     """
     if api_docs is None:
         from chauffeur.programs.catalogue import render_docs
 
-        api_docs = render_docs()
+        api_docs = render_docs(vocabulary)
     bounds = limits or Limits()
     text = fill(
-        template("rules.md"),
+        template("rules_town.md" if vocabulary == "town" else "rules.md"),
         {
             "limits": describe_limits(bounds),
             "answer": template("answer_steps.md" if chain_of_thought else "answer_plain.md"),
@@ -125,5 +177,5 @@ def build_system_message(
         },
     )
     if setting == "few-shot":
-        text = f"{text}\n\n{_exemplars(bounds, chain_of_thought)}"
+        text = f"{text}\n\n{_exemplars(bounds, chain_of_thought, vocabulary)}"
     return SystemMessage(text=text, setting=setting)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from base64 import b64encode
+from collections.abc import Sequence
 from typing import Literal, TypedDict
 
-from chauffeur.concept import History, HistoryItem, PlanRequest, Round
+from chauffeur.concept import CameraImage, History, HistoryItem, PlanRequest, Round, SystemMessage
 from chauffeur.planners.prompts.blocks import (
     CONTEXT_CHARS,
     FEEDBACK_CHARS,
@@ -23,11 +25,31 @@ from chauffeur.planners.prompts.blocks import (
 from chauffeur.planners.prompts.system import build_system_message
 
 
+class TextPart(TypedDict):
+    """Words in a turn that has pictures."""
+
+    type: Literal["text"]
+    text: str
+
+
+class ImageUrl(TypedDict):
+    """Where a picture is; a data URL holds it."""
+
+    url: str
+
+
+class ImagePart(TypedDict):
+    """A picture in a turn."""
+
+    type: Literal["image_url"]
+    image_url: ImageUrl
+
+
 class Message(TypedDict):
-    """One turn, as chat-completions endpoints take it."""
+    """One turn, as chat-completions endpoints take it; parts only where there are pictures."""
 
     role: Literal["system", "user", "assistant"]
-    content: str
+    content: str | list[TextPart | ImagePart]
 
 
 MAX_ROUNDS = 6
@@ -102,12 +124,49 @@ def _round(earlier: Round) -> tuple[Message, Message]:
     return ({"role": "assistant", "content": defuse(clean(answer))}, {"role": "user", "content": said})
 
 
+def words_of(message: Message) -> str:
+    """The words of a turn, pictures left out."""
+    content = message["content"]
+    if isinstance(content, str):
+        return content
+    return "\n\n".join(part["text"] for part in content if part["type"] == "text")
+
+
+def pictures_in(messages: Sequence[Message]) -> int:
+    """How many pictures a conversation has."""
+    return sum(
+        part["type"] == "image_url"
+        for message in messages
+        if not isinstance(message["content"], str)
+        for part in message["content"]
+    )
+
+
+def with_pictures(words: str, images: Sequence[CameraImage]) -> str | list[TextPart | ImagePart]:
+    """V, each picture behind the name of its camera, then the words; words alone where there is no picture."""
+    if not images:
+        return words
+    parts: list[TextPart | ImagePart] = []
+    for image in images:
+        url = f"data:image/png;base64,{b64encode(image.png()).decode('ascii')}"
+        parts.append({"type": "text", "text": f"Camera {defuse(clean(image.camera))}:"})
+        parts.append({"type": "image_url", "image_url": {"url": url}})
+    parts.append({"type": "text", "text": words})
+    return parts
+
+
+def _system_for(request: PlanRequest) -> SystemMessage:
+    from chauffeur.programs.catalogue import vocabulary_of
+
+    return build_system_message(limits=request.limits, vocabulary=vocabulary_of(request.context.situation.world))
+
+
 def build_messages(request: PlanRequest) -> list[Message]:
     """The whole conversation for a request; an empty S is filled with the zero-shot one for the request's limits."""
-    system = request.system if request.system.text else build_system_message(limits=request.limits)
+    system = request.system if request.system.text else _system_for(request)
     messages: list[Message] = [
         {"role": "system", "content": system.text},
-        {"role": "user", "content": wish_turn(request)},
+        {"role": "user", "content": with_pictures(wish_turn(request), request.images)},
     ]
     for earlier in request.rounds[-MAX_ROUNDS:]:
         messages.extend(_round(earlier))

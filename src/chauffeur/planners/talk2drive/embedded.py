@@ -22,6 +22,8 @@ from chauffeur.planners.arbitration import (
     asked,
     intent_pace,
     unanswered,
+    undenied,
+    wary_of,
     within_mood,
 )
 from chauffeur.planners.base import declined
@@ -36,7 +38,7 @@ from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.thoughts import thoughts_of
 from chauffeur.planners.onboard.understand import meanings_said
 from chauffeur.planners.talk2drive.habits import SIGN_SETTING, kind_of, pace_of, speed_for
-from chauffeur.planners.talk2drive.hints import WEIGHTS, Hint, goes_with, hint_of
+from chauffeur.planners.talk2drive.hints import HINT_KINDS, WEIGHTS, Hint, goes_with, hint_of
 from chauffeur.planners.talk2drive.lanes import eased_mps, fitting_mps, mood_lane, passing_mps, unsaid_turn
 from chauffeur.planners.talk2drive.style import (
     BRISK_SHARE,
@@ -44,6 +46,7 @@ from chauffeur.planners.talk2drive.style import (
     LOOK_AHEAD_PARKING,
     PARKING_MPS,
     LookAhead,
+    destination_of,
     manner_of,
     named_spot,
     place_of,
@@ -96,6 +99,8 @@ _PACES: Final = ("speed.increase", "speed.decrease")
 _PACE_OF_HINT: Final = {"pass": 1, "hurry": 1, "faster": 1, "go": 1, "calm": -1, "slower": -1, "yield": -1}
 _SIDE_OF_HINT: Final = {"right": "right", "pass": "left"}
 """Where a hint leads, and at what pace: words that say the same do not contradict it."""
+_WARY_SHARE: Final = 0.5
+"""Of the limit; who drives slower than that may speed up so far, whatever they say of the road."""
 _AT_ONCE: Final = "With these parameters I can only do things at once. Tell me when it is time."
 _LONGEST_GAP_M: Final = 150.0
 """No gap to keep is longer: so far ahead a vehicle counts as one to follow."""
@@ -122,6 +127,9 @@ class EmbeddedParameters:
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; what is not understood, not possible or no matter of parameters is declined in words."""
         begun = time.perf_counter()
+        return undenied(self, _heeding(self._understood(request, begun), request), request, begun)
+
+    def _understood(self, request: PlanRequest, begun: float) -> Plan:
         said, situation = request.instruction.text, request.context.situation
         if foreign(said) or danger(said):  # which the model's own reading refuses, whatever of it was taken back
             return self._as_read(self._model.settle(_compared(request), begun), request, begun)
@@ -129,10 +137,13 @@ class EmbeddedParameters:
         if ready.declined is not None:
             return ready.declined
         wish = ready.instruction.text
+        if situation.world == "town" and (place := destination_of(wish)):
+            return self._take_to(place, request, begun)
         request = replace(request, instruction=ready.instruction)
         settled = self._model.settle(_compared(request), begun)
         reads = () if isinstance(settled, Plan) else tuple(map(kind_of, settled.linked.choice.intent.split("+")))
-        hint = hint_of(wish, situation, request.history, reads[0] if reads else "")
+        known = situation.world in HINT_KINDS
+        hint = hint_of(wish, situation, request.history, reads[0] if reads else "") if known else None
         if situation.world == "parking" and (spot := _spot_read(wish, settled, hint)):
             return self._park(spot, request, begun)
         if hint is not None and self._overrules(hint, settled, reads, wish, situation.world):
@@ -162,12 +173,13 @@ class EmbeddedParameters:
             return False
         meanings = meanings_said(wish)
         side, pace = _SIDE_OF_HINT.get(hint.kind, ""), _PACE_OF_HINT.get(hint.kind, 0)
-        if not hint.outright and Said.of(meanings).contradicts(side=side, pace=pace):
+        said = Said.of(meanings)
+        if not hint.outright and said.contradicts(side=side, pace=pace):
             return False
         if isinstance(settled, Plan):
             sure = _SURER if _forbidden(settled) and hint.kind in _BRISK else _SURE
             return hint.kind != "none" and hint.share >= sure
-        if not hint.outright and settled.written.sure >= SURE and settled.witnessed:
+        if not hint.outright and settled.written.sure >= SURE and settled.witnessed and said.plain:
             return any(goes_with(read, hint.kind) for read in reads) and hint.kind == "go"
         if any(dimension == "time" for dimension, _ in amounts) and any(map(_in_time, settled.steps)):
             return False
@@ -247,6 +259,12 @@ class EmbeddedParameters:
         found = _parameters(speed, LOOK_AHEAD_PARKING, place)
         return self._paced(found, "park", request, begun, "You want to park.")
 
+    def _take_to(self, place: str, request: PlanRequest, begun: float) -> Plan:
+        """To a place of a town. Whether it has such a place, the town says; the car keeps to its limits by itself."""
+        limit = request.context.situation.speed_limit_mps
+        found = _parameters(min(limit, request.limits.most_mps(limit)), LOOK_AHEAD["usual"], place)
+        return self._plan(found, f"You want to go to {place}. I {does(found)}.", "go_to", request, begun)
+
     def _paced(self, found: Parameters, intent: str, request: PlanRequest, begun: float, wants: str = "") -> Plan:
         """A plan by rule, at the speed this person likes for such wishes."""
         found, why = _at_pace(found, intent, request)
@@ -316,6 +334,8 @@ def _at_pace(found: Parameters, intent: str, request: PlanRequest) -> tuple[Para
     found, why = _liked(found, intent, request)
     situation = request.context.situation
     most = request.limits.most_mps(situation.speed_limit_mps)
+    if why and intent.startswith("style."):
+        return found, why  # what this person was glad of when they said so before is what they mean by it
     speed = within_mood(found.target_speed_mps, intent_pace(intent), situation.speed_mps, most)
     return (found, why) if speed == found.target_speed_mps else (replace(found, target_speed_mps=round(speed, 2)), ())
 
@@ -333,6 +353,18 @@ def _liked(found: Parameters, intent: str, request: PlanRequest) -> tuple[Parame
     if speed is None or speed == found.target_speed_mps:
         return found, ()
     return replace(found, target_speed_mps=speed), (pace.because,) if pace.because else ()
+
+
+def _heeding(plan: Plan, request: PlanRequest) -> Plan:
+    """A plan for a mood that quickens, where the person says that the road is bad: no faster than now, in this lane."""
+    found, situation = plan.policy, request.context.situation
+    if not isinstance(found, Parameters) or not wary_of(request.instruction.text, plan.intent):
+        return plan
+    speed = min(found.target_speed_mps, max(situation.speed_mps, _WARY_SHARE * situation.speed_limit_mps))
+    heeding = replace(found, target_speed_mps=round(speed, 2), lane=0)
+    words = f"You want to get there sooner. For what you say of the road I lose no time, but {does(heeding)}."
+    settings = tuple(dict((*plan.settings, ("target_speed_mps", heeding.target_speed_mps))).items())
+    return replace(plan, policy=heeding, thoughts=Thoughts(words), settings=settings)
 
 
 def _settings(found: Parameters, situation: Situation, used: Sequence[Leaning]) -> tuple[tuple[str, float], ...]:

@@ -60,6 +60,23 @@ _PLACES: Final[tuple[tuple[str, re.Pattern[str]], ...]] = (
 )
 
 
+_TAKES: Final = re.compile(
+    r"\b(?:take|bring|drive|drop|get|go|head|run)\b[^.;!?]*?\b(?:to|at|for)\s+(?:the\s+|my\s+|our\s+)?(?P<place>(?:St\.|[^.,;!?])+)",
+    re.IGNORECASE,
+)
+_NO_PLACE: Final = re.compile(r"^(?:left|right|straight|stop|a stop|the (?:left|right)|\d)", re.IGNORECASE)
+_TRAILING: Final = re.compile(
+    r"\s{1,3}(?:please|now|quickly|as (?:fast|soon|quickly).{0,200}|and .{0,200})$", re.IGNORECASE
+)
+
+
+def destination_of(wish: str) -> str:
+    """The place of a town that a wish asks to be taken to, in its own words; empty where it asks for none."""
+    found = _TAKES.search(wish)
+    place = _TRAILING.sub("", found["place"].strip()) if found else ""
+    return "" if _NO_PLACE.match(place) else place
+
+
 def named_spot(wish: str) -> str:
     """The spot of a parking lot that a wish names, e.g. `B7`; empty where it names none."""
     named = _SPOT.search(wish)

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from chauffeur.concept import Snapshot
-from chauffeur.programs.catalogue import APIS
+from chauffeur.concept import Observation
+from chauffeur.programs.catalogue import TOWN_APIS
 from chauffeur.programs.verify.values import (
     ANY_TEXT,
     CAR,
@@ -18,6 +18,7 @@ from chauffeur.programs.verify.values import (
     LANE,
     NONE,
     NOTHING,
+    TOP,
     Value,
     fresh,
     number,
@@ -54,20 +55,19 @@ class Circumstances:
     lane_index: int | None = None
 
     @classmethod
-    def of(cls, snapshot: Snapshot) -> Circumstances:
+    def of(cls, observation: Observation) -> Circumstances:
         """The circumstances of an instant. The speed is taken with 1 m/s to either side: it is the first to change."""
-        here = snapshot.ego.lane
-        limits = [lane.speed_limit_mps for lane in snapshot.lanes]
-        beside = sorted(lane.id[2] for lane in snapshot.lanes if here is not None and lane.id[:2] == here[:2])
-        on_road = here is not None and here[2] in beside
-        speed = snapshot.ego.speed_mps
+        own = observation.road.get(observation.ego.lane)
+        limits = [lane.speed_limit_mps for lane in observation.road.lanes]
+        beside = () if own is None else observation.road.abreast(own.id)
+        speed = observation.ego.speed_mps
         return cls(
-            kind=snapshot.kind,
+            kind=observation.kind,
             speed_limits_mps=(min(limits, default=0.0), max(limits, default=MAX_SPEED_MPS)),
-            speed_limit_mps=next((lane.speed_limit_mps for lane in snapshot.lanes if lane.id == here), None),
+            speed_limit_mps=None if own is None else own.speed_limit_mps,
             speed_mps=(speed - 1.0, speed + 1.0),
-            lanes=len(beside) if on_road else None,
-            lane_index=beside.index(here[2]) if here is not None and on_road else None,
+            lanes=None if own is None else len(beside),
+            lane_index=None if own is None else beside.index(own),
         )
 
     def has_lane(self, offset: int) -> bool | None:
@@ -88,6 +88,8 @@ _NUMBERS: Final = {
     "get_speed_of": _SPEED,
     "get_distance_between_vehicles": number(-MAX_DISTANCE_M, MAX_DISTANCE_M),
     "detect_stop_sign_ahead": number(-MAX_DISTANCE_M, MAX_DISTANCE_M),
+    "get_distance_to_junction": number(0.0, MAX_DISTANCE_M),
+    "get_distance_to_place": number(-1.0, MAX_DISTANCE_M),
 }
 
 
@@ -101,7 +103,7 @@ def answer(name: str, arguments: dict[str, Value], where: Circumstances, *, firs
         first: Whether it is surely asked in the first control period.
         site: Place of the call.
     """
-    if name == "get_speed_limit":
+    if name in {"get_speed_limit", "check_speed_limit"}:
         here = where.speed_limit_mps
         return number(*where.speed_limits_mps) if here is None or not first else number(here, here)
     if name == "get_speed_of":
@@ -115,13 +117,15 @@ def answer(name: str, arguments: dict[str, Value], where: Circumstances, *, firs
         return _beside(_STEPS[name], where, first=first) if _of_ego(arguments) else Value(LANE | NONE, offsets=None)
     if name in _NUMBERS:
         return _NUMBERS[name]
-    api = APIS[name]
+    api = TOWN_APIS[name]
     if api.returns == "vehicle":
         return Value(EGO) if name == "get_ego_vehicle" else Value(CAR | NONE)
     if api.returns == "flag":
         return FLAG
     if api.returns == "text":
         return ANY_TEXT
+    if api.returns in {"sighting", "place", "light"}:
+        return TOP
     if api.returns in {"lanes", "action"}:
         return fresh(site)
     return NOTHING

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from chauffeur.concept import Alignment, Limits, Plan, Program, Snapshot, Verdict
+from chauffeur.concept import Alignment, Limits, Observation, Plan, Program, Verdict
 from chauffeur.safety.alignment.facts import Effect, Facts, Surroundings
 from chauffeur.safety.alignment.judge import judge, judge_drive
 from chauffeur.safety.alignment.saying import claims_words, mismatch_words, score_words
@@ -19,7 +19,7 @@ DRIVEN_CHECK: Final = "alignment-driven-v1"
 _REMEDY: Final = "Let the thoughts say what the program does, or the program do what the thoughts say."
 
 
-def check_alignment(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict:  # noqa: ARG001 - one shape for all checks
+def check_alignment(plan: Plan, observation: Observation, limits: Limits) -> Verdict:  # noqa: ARG001 - one shape for all checks
     """Whether what the plan's thoughts claim is what its program does, as far as reading both tells.
 
     A plan without thoughts, or with another policy than a program, claims nothing that could be wrong here.
@@ -27,18 +27,18 @@ def check_alignment(plan: Plan, snapshot: Snapshot, limits: Limits) -> Verdict: 
     facts = _facts(plan)
     if isinstance(facts, str):
         return Verdict(ALIGNMENT_CHECK, True, facts, vetoes=False)
-    found = judge(plan.thoughts.text, facts, Surroundings.of(snapshot))
+    found = judge(plan.thoughts.text, facts, Surroundings.of(observation))
     return _verdict(
         ALIGNMENT_CHECK, found, "The explanation fits the program", "The explanation does not fit the program"
     )
 
 
-def check_driven(plan: Plan, snapshot: Snapshot, effect: Effect) -> Verdict:
+def check_driven(plan: Plan, observation: Observation, effect: Effect) -> Verdict:
     """Whether what the plan's thoughts claim is what then happened.
 
     Args:
         plan: What was driven.
-        snapshot: The instant it began.
+        observation: The instant it began.
         effect: What happened.
     """
     facts = _facts(plan)
@@ -46,7 +46,7 @@ def check_driven(plan: Plan, snapshot: Snapshot, effect: Effect) -> Verdict:
         facts = "The program failed on the way, so that the drive was not compared with the explanation."
     if isinstance(facts, str):
         return Verdict(DRIVEN_CHECK, True, facts, vetoes=False)
-    found = judge_drive(plan.thoughts.text, facts, Surroundings.of(snapshot), effect)
+    found = judge_drive(plan.thoughts.text, facts, Surroundings.of(observation), effect)
     return _verdict(DRIVEN_CHECK, found, "The drive went as explained", "The drive did not go as explained")
 
 

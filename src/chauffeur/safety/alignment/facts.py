@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from chauffeur.concept import Snapshot
+from chauffeur.concept import Observation
 from chauffeur.safety.alignment.values import Base, Term
 
 Deed = Literal["speed", "headway", "gap", "lane", "turn", "go", "wait", "say"]
@@ -135,15 +135,15 @@ class Surroundings:
     crossing: bool = False
 
     @classmethod
-    def of(cls, snapshot: Snapshot) -> Surroundings:
-        """Those of a snapshot."""
-        front = snapshot.front
-        limits = [lane.speed_limit_mps for lane in snapshot.lanes if lane.id == snapshot.ego.lane]
+    def of(cls, observation: Observation) -> Surroundings:
+        """Those of an observation."""
+        front = observation.front
+        lane = observation.road.get(observation.ego.lane)
         return cls(
-            speed_mps=snapshot.ego.speed_mps,
-            limit_mps=limits[0] if limits else None,
+            speed_mps=observation.ego.speed_mps,
+            limit_mps=None if lane is None else lane.speed_limit_mps,
             gap_m=None if front is None else front.distance_m,
             other_mps=None if front is None else front.speed_mps,
-            sign_m=snapshot.stop_sign_m,
-            crossing=snapshot.kind == "intersection",
+            sign_m=observation.stop_sign_m,
+            crossing=bool(observation.road.junctions),
         )

@@ -19,8 +19,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chauffeur.concept import Command, LaneId, LaneView, Snapshot, VehicleState
-from chauffeur.geometry import wrap_to_pi
+from chauffeur.concept import Command, Lane, LaneId, Observation, VehicleState
+from chauffeur.geometry import RoadGraph, wrap_to_pi
 from chauffeur.safety.shield import foresight
 from chauffeur.safety.shield.everybody import Everybody
 from chauffeur.safety.shield.frame import CROSSING_RAD
@@ -106,7 +106,7 @@ class _Line:
 
 
 class Motion:
-    """The ego's state with what a snapshot does not show: how fast it slides and turns."""
+    """The ego's state with what an observation does not show: how fast it slides and turns."""
 
     def __init__(self, dt_s: float) -> None:
         self._dt_s = dt_s
@@ -114,11 +114,11 @@ class Motion:
         self._expected = np.zeros(6)
         self._before: VehicleState | None = None
 
-    def observe(self, snapshot: Snapshot) -> Array:
+    def observe(self, observation: Observation) -> Array:
         """The state now: as foreseen under the last command, or else from the way since the last instant."""
-        ego, before = snapshot.ego, self._before
+        ego, before = observation.ego, self._before
         sliding = turning = 0.0
-        if before is not None and snapshot.tick == self._tick + 1:
+        if before is not None and observation.tick == self._tick + 1:
             x, y, heading, _, slides, turns = self._expected.tolist()
             turned = wrap_to_pi(ego.heading_rad - heading)
             if math.hypot(x - ego.x_m, y - ego.y_m) < _SAME_M and abs(turned) < _SAME_M:
@@ -130,9 +130,9 @@ class Motion:
                 turning = wrap_to_pi(ego.heading_rad - before.heading_rad) / self._dt_s
         return np.array([ego.x_m, ego.y_m, ego.heading_rad, ego.speed_mps, sliding, turning])
 
-    def commanded(self, snapshot: Snapshot, state: Array, command: Command) -> None:
+    def commanded(self, observation: Observation, state: Array, command: Command) -> None:
         """Remember what the vehicle was told."""
-        self._tick, self._before = snapshot.tick, snapshot.ego
+        self._tick, self._before = observation.tick, observation.ego
         self._expected = state.copy()
         foresight.move(self._expected, command.acceleration_mps2, command.steering_rad, self._dt_s)
 
@@ -140,16 +140,12 @@ class Motion:
 class Junction:
     """The guard of one trip over a network whose roads cross."""
 
-    def __init__(self, lanes: tuple[LaneView, ...], table: ShieldParameters, dt_s: float) -> None:
-        self.lanes = lanes
+    def __init__(self, road: RoadGraph, table: ShieldParameters, dt_s: float) -> None:
+        self.road = road
         self._table = table
         self._dt_s = dt_s
-        self._named = {lane.id: lane for lane in lanes}
-        self._onward: dict[str, list[LaneView]] = {}
-        for lane in lanes:
-            self._onward.setdefault(lane.id[0], []).append(lane)
         self._ways: dict[tuple[LaneId, LaneId | None], list[Array]] = {}
-        self._straight = {lane.id: line for lane in lanes if (line := _straight(lane)) is not None}
+        self._straight = {lane.id: line for lane in road.lanes if (line := _straight(lane)) is not None}
         self._line_of: dict[LaneId | None, int] = {lane: row for row, lane in enumerate(self._straight)}
         lines = [(line.x_m, line.y_m, line.heading_rad, line.cos, line.sin) for line in self._straight.values()]
         # Numbers of this kind whatever the map holds: for others, machine code would be made in the middle of a drive.
@@ -160,7 +156,7 @@ class Junction:
 
     def mend(
         self,
-        snapshot: Snapshot,
+        observation: Observation,
         around: Everybody,
         lane: LaneId,
         aim: LaneId | None,
@@ -172,7 +168,7 @@ class Junction:
         """The command, changed as little as is needed.
 
         Args:
-            snapshot: The instant.
+            observation: The instant.
             around: Everybody at it.
             lane: Where the ego is, or where ways part the lane it steers for: every way on from it counts.
             aim: The lane it steers for: where it follows, the only way on that counts.
@@ -180,7 +176,7 @@ class Junction:
             most_mps2: Hardest acceleration that they would.
             held_up: Whether a lead is so close that it has to brake for it.
         """
-        outlook = self._outlook(snapshot, around, lane)
+        outlook = self._outlook(observation, around, lane)
         ways = self._candidates(lane, aim, outlook.state)
         followed = foresight.followed(outlook.state, outlook.others)
         cares = (_KIND, _DUE) if followed else (_DUE,)
@@ -191,15 +187,17 @@ class Junction:
         else:
             promised = ways[0] if self._promised is None else self._promised
             mended = _rescue(outlook, promised, command, most_mps2)
-        self._motion.commanded(snapshot, outlook.state, mended.command)
+        self._motion.commanded(observation, outlook.state, mended.command)
         return mended
 
-    def _outlook(self, snapshot: Snapshot, around: Everybody, lane: LaneId) -> _Outlook:
-        ego, line_of = snapshot.ego, self._line_of
+    def _outlook(self, observation: Observation, around: Everybody, lane: LaneId) -> _Outlook:
+        ego, line_of = observation.ego, self._line_of
         on = np.array([line_of.get(other.lane, -1) for other in around.solid[1:]], dtype=np.int64)
         others = foresight.expected(around.numbers, on, self._lines, _ALONG, _FAR_M)
         size = ego.length_m / 2.0, ego.width_m / 2.0
-        return _Outlook(self._motion.observe(snapshot), size, others, self._keep_clear(lane), self._table, self._dt_s)
+        return _Outlook(
+            self._motion.observe(observation), size, others, self._keep_clear(lane), self._table, self._dt_s
+        )
 
     def _keep_clear(self, lane: LaneId) -> Array:
         """The straight lanes nobody may stand in who is in a lane, as `foresight` wants them.
@@ -207,36 +205,34 @@ class Junction:
         Who is to come along its own lane, the one before it, or one that forks off where it does, comes from behind.
         """
         if lane not in self._clear_from:
-            fork = self._named[lane].centre_m[0]
+            fork = self.road[lane].centre.points_m[0]
             rows = [
-                (line.x_m, line.y_m, line.cos, line.sin, self._named[one].length_m)
+                (line.x_m, line.y_m, line.cos, line.sin, self.road[one].length_m)
                 for one, line in self._straight.items()
                 if math.dist((line.x_m, line.y_m), fork) >= _JOINT_M
-                and math.dist(self._named[one].centre_m[-1], fork) >= _JOINT_M
+                and math.dist(self.road[one].centre.points_m[-1], fork) >= _JOINT_M
             ]
             self._clear_from[lane] = np.array(rows, dtype=np.float64).reshape(len(rows), 5)
         return self._clear_from[lane]
 
     def _candidates(self, lane: LaneId, aim: LaneId | None, state: Array) -> list[Array]:
         """The ways a command has to leave open: those from the ego's lane, unless that is another's, driven across."""
-        ways = self._ways_from(lane, aim if aim in self._named and aim[0] == lane[1] else None)
+        ways = self._ways_from(lane, aim if aim in self.road[lane].successors else None)
         if self._promised is None or any(_along(way, state) for way in ways):
             return ways
         return [self._promised]
 
-    def _after(self, lane: LaneView) -> list[tuple[LaneView] | tuple[()]]:
+    def _after(self, lane: Lane) -> list[tuple[Lane] | tuple[()]]:
         """What follows a lane: each lane that begins where it ends, or nothing."""
-        x, y = lane.centre_m[-1]
-        begin = [one for one in self._onward.get(lane.id[1], []) if math.dist(one.centre_m[0], (x, y)) < _JOINT_M]
-        return [(one,) for one in begin] or [()]
+        return [(one,) for one in self.road.successors(lane.id)] or [()]
 
     def _ways_from(self, lane: LaneId, onto: LaneId | None) -> list[Array]:
         """Ways on from a lane, through what follows it or only `onto` one lane: rows of (x, y, heading)."""
         if (lane, onto) not in self._ways:
-            own = self._named[lane]
+            own = self.road[lane]
             ways = [
                 _sampled([own, *first, *second])
-                for first in (self._after(own) if onto is None else [(self._named[onto],)])
+                for first in (self._after(own) if onto is None else [(self.road[onto],)])
                 for second in (self._after(*first) if first else [()])
             ]
             ways.sort(key=_turned)  # the straightest first: what stops, stops there
@@ -244,8 +240,8 @@ class Junction:
         return self._ways[lane, onto]
 
 
-def _sampled(lanes: Sequence[LaneView]) -> Array:
-    line = np.array([point for lane in lanes for point in lane.centre_m])
+def _sampled(lanes: Sequence[Lane]) -> Array:
+    line = np.array([point for lane in lanes for point in lane.centre.points_m])
     keep = np.r_[True, np.hypot(*np.diff(line, axis=0).T) > 1e-6]
     line = line[keep]
     lengths = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]
@@ -255,9 +251,9 @@ def _sampled(lanes: Sequence[LaneView]) -> Array:
     return np.ascontiguousarray(np.stack([x, y, heading], axis=1))
 
 
-def _straight(lane: LaneView) -> _Line | None:
+def _straight(lane: Lane) -> _Line | None:
     """A straight lane as a line; None for a bend."""
-    (x, y), *rest = lane.centre_m
+    (x, y), *rest = lane.centre.points_m
     heading = math.atan2(rest[-1][1] - y, rest[-1][0] - x)
     line = _Line(x, y, heading, math.cos(heading), math.sin(heading))
     off = max(abs(line.cos * (b - y) - line.sin * (a - x)) for a, b in rest)

@@ -1,4 +1,4 @@
-"""Everybody around the ego as rows of numbers: read from a snapshot once a period, judged in compiled code.
+"""Everybody around the ego as rows of numbers: read from an observation once a period, judged in compiled code.
 
 Most of them do not matter in most periods, and cost next to nothing here; only those that do become `frame.Body`.
 """
@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chauffeur.concept import Snapshot, VehicleState
+from chauffeur.concept import Observation, VehicleState
 from chauffeur.safety.shield.compiled import compiled
 
 Array = NDArray[np.float64]
@@ -42,9 +42,9 @@ class Everybody:
     known: bool
 
     @classmethod
-    def of(cls, snapshot: Snapshot) -> Everybody:
-        """Those of a snapshot."""
-        seen = (snapshot.ego, *snapshot.others, *snapshot.objects)
+    def of(cls, observation: Observation) -> Everybody:
+        """Those of an observation."""
+        seen = (observation.ego, *observation.others, *observation.objects)
         solid = tuple([one for one in seen if one.kind != "stop_sign"])
         numbers = _rows(solid)
         known = _all_finite(numbers)
@@ -152,14 +152,14 @@ def overlapping(
             continue
         if abs(rows[i, 1]) - rows[0, 6] - rows[i, 6] > reach_m:
             continue
-        left = rows[i, 2] - rows[i, 7] - side_m
-        right = rows[i, 2] + rows[i, 7] + side_m
+        low = rows[i, 2] - rows[i, 7] - side_m
+        high = rows[i, 2] + rows[i, 7] + side_m
         if abs(rows[i, 5]) > drift_mps and rows[i, 8] == 0.0:
             if rows[i, 5] > 0.0:
-                right += lane_m
+                high += lane_m
             else:
-                left -= lane_m
-        if left < high_m and right > low_m:
+                low -= lane_m
+        if low < high_m and high > low_m:
             found[count] = rows[i]
             count += 1
     return found[:count]

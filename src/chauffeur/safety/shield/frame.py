@@ -1,20 +1,19 @@
 """What the shield sees: the others in the frame of the lane the ego is in, and the lanes beside it.
 
-s runs along the ego's lane, d across it, towards where headings grow: on highway roads, whose y grows to the right of
-travel, the side with the higher lane index. A lane that bends is taken to go on as the circle it is where the ego is.
+s runs along the ego's lane, d across it, to the left. A lane that bends is taken to go on as the circle it is where
+the ego is.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
-from chauffeur.concept import LaneId, LaneView, Snapshot, VehicleState
-from chauffeur.geometry import wrap_to_pi
+from chauffeur.concept import Lane, LaneId, Observation, RoadGraph, VehicleState
+from chauffeur.geometry import Pose, wrap_to_pi
 from chauffeur.safety.shield.everybody import ANYWHERE, Array, Everybody, overlapping, placed
 
 CROSSING_RAD: Final = math.radians(40.0)
@@ -39,7 +38,7 @@ class Body:
     """A vehicle or obstacle in the frame.
 
     Attributes:
-        id: As in the snapshot.
+        id: As in the observation.
         s_m, d_m: Centre, from the ego along and from its lane centre across.
         heading_rad: Against the lane.
         along_mps, across_mps: Speeds.
@@ -67,14 +66,14 @@ class Body:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """The ego, the others and the lanes, in the ego lane's frame; its curvature in 1/m grows with headings."""
+    """The ego, the others and the lanes, leftmost first, in the ego lane's frame; its curvature in 1/m, to the left."""
 
     ego: Body
     strips: tuple[Strip, ...]
     speed_limit_mps: float
     curvature: float
     solid: tuple[VehicleState, ...]
-    """The ego and the others as in the snapshot, and in `rows` their numbers in the frame (`everybody.placed`)."""
+    """The ego and the others as in the observation, and in `rows` their numbers in the frame (`everybody.placed`)."""
     rows: Array
 
     @property
@@ -127,73 +126,58 @@ class _Frame:
 
 
 class Lens:
-    """Looks at one trip's snapshots: it keeps the frame from one to the next while the ego has not got far."""
+    """Looks at one trip's observations: it keeps the frame from one to the next while the ego has not got far."""
 
     def __init__(self) -> None:
-        self._lanes: tuple[LaneView, ...] = ()
+        self._road: RoadGraph | None = None
         self._place: tuple[LaneId, int, int] | None = None
         self._frame: _Frame | None = None
 
-    def look(self, snapshot: Snapshot, lane: LaneId | None, around: Everybody | None = None) -> Scene | None:
+    def look(self, observation: Observation, lane: LaneId | None, around: Everybody | None = None) -> Scene | None:
         """The scene in the frame of a lane, mostly the ego's own; None where there is no such lane.
 
         Args:
-            snapshot: The instant.
+            observation: The instant.
             lane: Whose frame.
-            around: Everybody of the snapshot, where that is known already.
+            around: Everybody of the observation, where that is known already.
         """
-        ego = snapshot.ego
+        ego = observation.ego
         if lane is None:
             return None
         place = lane, round(ego.x_m / _EVERY_M), round(ego.y_m / _EVERY_M)
-        if place != self._place or snapshot.lanes is not self._lanes:
-            self._lanes, self._place = snapshot.lanes, place
-            self._frame = _frame_at(snapshot.lanes, *place)
+        if place != self._place or observation.road is not self._road:
+            self._road, self._place = observation.road, place
+            self._frame = _frame_at(observation.road, *place)
         frame = self._frame
         if frame is None:
             return None
-        around = Everybody.of(snapshot) if around is None else around
+        around = Everybody.of(observation) if around is None else around
         rows = placed(around.numbers, frame.numbers)
         return Scene(
             _bodies(rows[:1], around.solid)[0], frame.strips, frame.limit_mps, frame.curvature, around.solid, rows
         )
 
 
-def _frame_at(lanes: tuple[LaneView, ...], own: LaneId, cell_x: int, cell_y: int) -> _Frame | None:
-    beside = {lane.id: lane for lane in lanes if lane.id[:2] == own[:2]}
-    if own not in beside:
+def _frame_at(road: RoadGraph, lane: LaneId, cell_x: int, cell_y: int) -> _Frame | None:
+    own = road.get(lane)
+    if own is None:
         return None
-    x, y, heading = nearest_on(beside[own], cell_x * _EVERY_M, cell_y * _EVERY_M)
-    c, s = math.cos(heading), math.sin(heading)
+    here = _beside(own, cell_x * _EVERY_M, cell_y * _EVERY_M)
+    c, s = math.cos(here.heading_rad), math.sin(here.heading_rad)
     strips: list[Strip] = []
-    for lane in beside.values():
-        lane_x, lane_y, _ = nearest_on(lane, x, y)
-        centre = -s * (lane_x - x) + c * (lane_y - y)
-        strips.append(Strip(lane.id, centre, centre - lane.width_m / 2.0, centre + lane.width_m / 2.0))
-    strips.sort(key=lambda strip: strip.centre_m)
-    ahead = nearest_on(beside[own], x + _PREVIEW_M * c, y + _PREVIEW_M * s)[2]
-    curvature = wrap_to_pi(ahead - heading) / _PREVIEW_M
+    for beside in road.abreast(lane):
+        there = _beside(beside, here.x_m, here.y_m)
+        centre = -s * (there.x_m - here.x_m) + c * (there.y_m - here.y_m)
+        strips.append(Strip(beside.id, centre, centre - beside.width_m / 2.0, centre + beside.width_m / 2.0))
+    strips.sort(key=lambda strip: -strip.centre_m)
+    ahead = _beside(own, here.x_m + _PREVIEW_M * c, here.y_m + _PREVIEW_M * s)
+    curvature = wrap_to_pi(ahead.heading_rad - here.heading_rad) / _PREVIEW_M
     if abs(curvature) < _STRAIGHT:
         curvature = 0.0
-    numbers = np.array([x, y, heading, c, s, curvature, _CROSSING_SINE])
-    return _Frame(tuple(strips), beside[own].speed_limit_mps, curvature, numbers)
+    numbers = np.array([here.x_m, here.y_m, here.heading_rad, c, s, curvature, _CROSSING_SINE])
+    return _Frame(tuple(strips), own.speed_limit_mps, curvature, numbers)
 
 
-def nearest_on(lane: LaneView, x: float, y: float) -> tuple[float, float, float]:
-    """(x, y, heading) of the point of a lane's centre line that is closest; its ends go on straight."""
-    best = (math.inf, 0.0, 0.0, 0.0)
-    points = lane.centre_m
-    for i, ((ax, ay), (bx, by)) in enumerate(pairwise(points)):
-        length = math.hypot(bx - ax, by - ay)
-        if length == 0.0:
-            continue
-        ux, uy = (bx - ax) / length, (by - ay) / length
-        along = (x - ax) * ux + (y - ay) * uy
-        low = -math.inf if i == 0 else 0.0
-        high = math.inf if i == len(points) - 2 else length
-        along = max(low, min(high, along))
-        px, py = ax + along * ux, ay + along * uy
-        distance = math.hypot(x - px, y - py)
-        if distance < best[0]:
-            best = (distance, px, py, math.atan2(uy, ux))
-    return best[1], best[2], best[3]
+def _beside(lane: Lane, x_m: float, y_m: float) -> Pose:
+    """The point of a lane's middle closest to a place; its ends go on straight, a corner ends the leg before."""
+    return lane.centre.at(math.nextafter(lane.centre.nearest(x_m, y_m), -math.inf))

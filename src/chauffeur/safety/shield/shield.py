@@ -17,7 +17,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from chauffeur.concept import Command, Intervention, LaneId, Limits, Snapshot, VehicleState
+from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation, VehicleState
+from chauffeur.geometry import RoadGraph
 from chauffeur.safety.shield.crossing import Junction
 from chauffeur.safety.shield.everybody import AHEAD, BEHIND, Everybody
 from chauffeur.safety.shield.frame import Body, Lens, Scene, Strip
@@ -88,49 +89,49 @@ class Shield:
         self._junction: Junction | None = None
         self._stop_lines = StopLines(parameters, dt_s)
 
-    def guard(self, snapshot: Snapshot, command: Command, aim: LaneId | None = None) -> Guarded:
+    def guard(self, observation: Observation, command: Command, aim: LaneId | None = None) -> Guarded:
         """The command, changed as little as needed.
 
         Args:
-            snapshot: The instant the command is for; one in which a place, speed or size is no number stops the car.
+            observation: The instant the command is for; one in which a place, speed or size is no number stops the car.
             command: What the controllers ask; numbers that are none stop the car.
             aim: Lane the controllers steer for. Where ways part, the nearest lane need not be the car's own.
         """
-        around = Everybody.of(snapshot)
-        line_m = self._stop_lines.ahead_m(snapshot) if snapshot.objects and around.known else math.inf
-        scene = self._lens.look(snapshot, snapshot.ego.lane, around) if _known(snapshot.ego) else None
+        around = Everybody.of(observation)
+        line_m = self._stop_lines.ahead_m(observation) if observation.objects and around.known else math.inf
+        scene = self._lens.look(observation, observation.ego.lane, around) if _known(observation.ego) else None
         if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
-            safe = self._standing_still(snapshot, scene)
+            safe = self._standing_still(observation, scene)
             return Guarded(safe, (Intervention("finite", "A command that is no number was replaced.", command, safe),))
         if not around.known:
-            safe = self._standing_still(snapshot, scene)
+            safe = self._standing_still(observation, scene)
             return Guarded(safe, (Intervention("finite", "Where somebody is cannot be told.", command, safe),))
         if scene is None:
             return Guarded(command)
-        crossings = snapshot.kind == "intersection"
-        lane = snapshot.ego.lane
+        crossings = bool(observation.road.junctions)
+        lane = observation.ego.lane
         assert lane is not None
-        if aim is not None and _parts_from(lane, aim):
-            aimed = self._aim_lens.look(snapshot, aim, around)
+        if aim is not None and _parts_from(observation.road, lane, aim):
+            aimed = self._aim_lens.look(observation, aim, around)
             if aimed is not None:
                 lane, scene = aim, aimed
-        steered = self._across(scene, snapshot.ego, command, crossings)
+        steered = self._across(scene, observation.ego, command, crossings)
         self._back = steered.back
         said = list(steered.said)
-        mended = self._along(scene, snapshot, around, lane, aim, steered, line_m, said)
+        mended = self._along(scene, observation, around, lane, aim, steered, line_m, said)
         return Guarded(mended, tuple(said))
 
-    def _standing_still(self, snapshot: Snapshot, scene: Scene | None) -> Command:
-        speed = snapshot.ego.speed_mps
+    def _standing_still(self, observation: Observation, scene: Scene | None) -> Command:
+        speed = observation.ego.speed_mps
         steering = 0.0
         if scene is not None:
             own = _own(scene)
             steering = recovery_steering(scene.ego, own.centre_m, speed, self._table.steering_rad, scene.curvature)
         return Command(max(-self._table.braking_mps2, -max(speed, 0.0) / self._dt_s), steering)
 
-    def _guard_of(self, snapshot: Snapshot) -> Junction:
-        if self._junction is None or self._junction.lanes is not snapshot.lanes:
-            self._junction = Junction(snapshot.lanes, self._table, self._dt_s)
+    def _guard_of(self, observation: Observation) -> Junction:
+        if self._junction is None or self._junction.road is not observation.road:
+            self._junction = Junction(observation.road, self._table, self._dt_s)
         return self._junction
 
     # Across -----------------------------------------------------------------------------------------------------------
@@ -189,9 +190,9 @@ class Shield:
         low, high = ego.d_m - ego.half_width_m, ego.d_m + ego.half_width_m
         # Where lanes bend and cross there is road beside them, and cars cut corners.
         verge = _CORNER_M if scene.curvature else 0.0
-        left, right = scene.strips[0].low_m - verge, scene.strips[-1].high_m + verge
-        over_left = span[0] < left - _TOUCH_M and span[0] < low - _CREEP_M
-        over_right = span[1] > right + _TOUCH_M and span[1] > high + _CREEP_M
+        left, right = scene.strips[0].high_m + verge, scene.strips[-1].low_m - verge
+        over_right = span[0] < right - _TOUCH_M and span[0] < low - _CREEP_M
+        over_left = span[1] > left + _TOUCH_M and span[1] > high + _CREEP_M
         if over_left or over_right:
             return "That would leave the road."
         entered = [strip for strip in scene.strips if _in(strip, span)]
@@ -241,7 +242,7 @@ class Shield:
     def _along(
         self,
         scene: Scene,
-        snapshot: Snapshot,
+        observation: Observation,
         around: Everybody,
         lane: LaneId,
         aim: LaneId | None,
@@ -250,8 +251,8 @@ class Shield:
         said: list[Intervention],
     ) -> Command:
         """The command with its acceleration mended."""
-        command, span, speed = steered.command, steered.span, snapshot.ego.speed_mps
-        crossings = snapshot.kind == "intersection"
+        command, span, speed = steered.command, steered.span, observation.ego.speed_mps
+        crossings = bool(observation.road.junctions)
         asked = command.acceleration_mps2
         bound = self._bound(scene, span, crossings, line_m)
         wanted = min(asked, bound.acceleration_mps2)
@@ -268,7 +269,7 @@ class Shield:
         if crossings:
             most = bound.acceleration_mps2
             held_up = bound.rule in ("gap", "stop") and most <= 0.0
-            result = self._guard_of(snapshot).mend(snapshot, around, lane, aim, mended, most, held_up=held_up)
+            result = self._guard_of(observation).mend(observation, around, lane, aim, mended, most, held_up=held_up)
             if result.rule:
                 mended, rule, reason = result.command, result.rule, result.reason
         faster = mended.acceleration_mps2 - asked
@@ -322,9 +323,11 @@ def _known(vehicle: VehicleState) -> bool:
     return math.isfinite(total)
 
 
-def _parts_from(lane: LaneId, other: LaneId) -> bool:
+def _parts_from(road: RoadGraph, lane: LaneId, other: LaneId) -> bool:
     """Whether two lanes begin at one place and lead to different ones."""
-    return lane[0] == other[0] and lane[1] != other[1]
+    before = {one.id for one in road.predecessors(lane)} if lane in road else set[LaneId]()
+    forks = other in road and any(one.id in before for one in road.predecessors(other))
+    return forks and road.places_between(lane, other) is None
 
 
 def _own(scene: Scene) -> Strip:

@@ -9,8 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from chauffeur.concept import LaneView, Snapshot, VehicleState, stops_at_sign
-from chauffeur.safety.shield.frame import nearest_on
+from chauffeur.concept import Observation, RoadGraph, VehicleState, stops_at_sign
 from chauffeur.safety.shield.gaps import greatest_acceleration
 from chauffeur.safety.shield.table import ShieldParameters
 
@@ -42,19 +41,19 @@ class StopLines:
         """By the sign's id, with the sign as it was seen: one that moved has another line."""
         self._served: set[int] = set()
 
-    def ahead_m(self, snapshot: Snapshot) -> float:
+    def ahead_m(self, observation: Observation) -> float:
         """Way from the front bumper to the nearest line ahead that is not served; infinite where there is none.
 
         Every instant has to be shown: who stops is seen here.
         """
         nearest = math.inf
-        ego = snapshot.ego
-        for sign in snapshot.objects:
+        ego = observation.ego
+        for sign in observation.objects:
             if sign.kind != "stop_sign":
                 continue
             seen, line = self._lines.get(sign.id, (None, None))
             if seen != sign:
-                line = _line_of(sign, snapshot.lanes)
+                line = _line_of(sign, observation.road)
                 self._lines[sign.id] = sign, line
             if line is None:
                 continue
@@ -89,10 +88,10 @@ class StopLines:
         return -needed if needed <= table.braking_mps2 else math.inf
 
 
-def _line_of(sign: VehicleState, lanes: tuple[LaneView, ...]) -> _Line | None:
+def _line_of(sign: VehicleState, road: RoadGraph) -> _Line | None:
     """The line of a sign; None where its lane is not known."""
-    lane = next((lane for lane in lanes if lane.id == sign.lane), None)
+    lane = road.get(sign.lane)
     if lane is None:
         return None
-    x, y, heading = nearest_on(lane, sign.x_m, sign.y_m)
-    return _Line(x, y, math.cos(heading), math.sin(heading), _LANES * lane.width_m)
+    here = lane.centre.at(lane.centre.nearest(sign.x_m, sign.y_m))
+    return _Line(here.x_m, here.y_m, math.cos(here.heading_rad), math.sin(here.heading_rad), _LANES * lane.width_m)

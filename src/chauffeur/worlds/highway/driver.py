@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 
-from chauffeur.concept import Command, LaneId, Turn, Wishes
+from chauffeur.concept import Command, Turn, Wishes
 from chauffeur.control import Actuation, full_scale
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.core import CoreRoad
@@ -16,9 +16,9 @@ from chauffeur.worlds.highway.perception import HighwayPerception
 DESTINATIONS: dict[Turn, str] = {"left": "o1", "straight": "o2", "right": "o3"}
 
 
-def route_of(network: LaneNetwork, here: LaneId, turn: Turn) -> list[tuple[str, str]]:
+def route_of(network: LaneNetwork, here: tuple[str, str], turn: Turn) -> list[tuple[str, str]]:
     """Roads of the shortest way to the exit of a turn, the present one first; only that one where there is none."""
-    return [here[:2], *pairwise(network.shortest_path(here[1], DESTINATIONS[turn]))]
+    return [here, *pairwise(network.shortest_path(here[1], DESTINATIONS[turn]))]
 
 
 class HighwayDriver:
@@ -62,14 +62,15 @@ class HighwayDriver:
         steering = self._core.steer(self._core.road.rows[wishes.target_lane])
         return Command(
             acceleration_mps2=full_scale(acceleration, self._actuation.max_acceleration_mps2),
-            steering_rad=full_scale(steering, self._actuation.max_steering_rad),
+            steering_rad=0.0 - full_scale(steering, self._actuation.max_steering_rad),  # the core's is to the right
         )
 
     def _plan_route(self, turn: Turn) -> None:
         self._turn = turn
-        rows = self._core.road.road_rows
-        legs = route_of(self._network, self._perception.lane_of(EGO), turn)
-        self._core.plan_route([rows[leg] for leg in legs])
+        road = self._core.road
+        start, end, _ = road.keys[road.rows[self._perception.lane_of(EGO)]]
+        legs = route_of(self._network, (start, end), turn)
+        self._core.plan_route([road.road_rows[leg] for leg in legs])
 
     def copy(self, core: CoreRoad, perception: HighwayPerception) -> HighwayDriver:
         """The same driver for a copy of the road."""

@@ -1,8 +1,9 @@
 """LaMPilot's roads as gymnasium environments.
 
 Importing this module registers `chauffeur/RampMerge-v0`, `chauffeur/MultiLane-v0` and `chauffeur/Intersection-v0`. An
-action is (acceleration, steering) in [-1, 1], full scale as in LaMPilot; an observation is the ego and the nearest
-vehicles, one row each: presence, x, y, vx, vy relative to the ego (the ego's own row is absolute), heading.
+action is (acceleration, steering) in [-1, 1], full scale as in LaMPilot, left positive; an observation is the ego and
+the nearest vehicles, one row each: presence, x, y, vx, vy relative to the ego (the ego's own row is absolute), heading.
+The frame is right-handed.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from chauffeur.concept import Command, Scenario, ScenarioError, Snapshot, VehicleState
+from chauffeur.concept import Command, Observation, Scenario, ScenarioError, VehicleState
 from chauffeur.control import full_scale
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 from chauffeur.worlds.highway.world import HighwayWorld
@@ -59,8 +60,8 @@ class HighwayEnvironment(gymnasium.Env[FloatArray, FloatArray]):
     ) -> tuple[FloatArray, dict[str, Any]]:
         """Start a trip; without a seed the generator of the environment draws one."""
         super().reset(seed=seed, options=options)
-        snapshot = self._world.reset(self._scenario, int(self.np_random.integers(2**31)))
-        return _observation(snapshot), _info(snapshot)
+        observation = self._world.reset(self._scenario, int(self.np_random.integers(2**31)))
+        return _features(observation), _info(observation)
 
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance 0.1 s."""
@@ -72,11 +73,11 @@ class HighwayEnvironment(gymnasium.Env[FloatArray, FloatArray]):
                 full_scale(steering, actuation.max_steering_rad),
             )
         )
-        snapshot = self._world.snapshot()
-        failed = snapshot.ego.crashed or snapshot.off_road
+        observation = self._world.observe()
+        failed = observation.ego.crashed or observation.off_road
         limit = self._world.perception().speed_limit(self._world.perception().lane_of(0))
-        reward = 0.0 if failed else min(1.0, max(0.0, snapshot.ego.speed_mps / limit))
-        return _observation(snapshot), reward, failed, snapshot.ended and not failed, _info(snapshot)
+        reward = 0.0 if failed else min(1.0, max(0.0, observation.ego.speed_mps / limit))
+        return _features(observation), reward, failed, observation.ended and not failed, _info(observation)
 
 
 def _row(vehicle: VehicleState, origin: VehicleState | None) -> list[float]:
@@ -89,17 +90,17 @@ def _row(vehicle: VehicleState, origin: VehicleState | None) -> list[float]:
     return [1.0, vehicle.x_m - origin.x_m, vehicle.y_m - origin.y_m, vx - ox, vy - oy, vehicle.heading_rad]
 
 
-def _observation(snapshot: Snapshot) -> FloatArray:
-    ego = snapshot.ego
-    nearest = sorted(snapshot.others, key=lambda v: math.hypot(v.x_m - ego.x_m, v.y_m - ego.y_m))
+def _features(observation: Observation) -> FloatArray:
+    ego = observation.ego
+    nearest = sorted(observation.others, key=lambda v: math.hypot(v.x_m - ego.x_m, v.y_m - ego.y_m))
     rows = [_row(ego, None), *(_row(v, ego) for v in nearest[: ROWS - 1])]
-    observation = np.zeros((ROWS, _FEATURES), dtype=np.float32)
-    observation[: len(rows)] = np.clip(rows, -_REACH_M, _REACH_M)
-    return observation
+    features = np.zeros((ROWS, _FEATURES), dtype=np.float32)
+    features[: len(rows)] = np.clip(rows, -_REACH_M, _REACH_M)
+    return features
 
 
-def _info(snapshot: Snapshot) -> dict[str, Any]:
-    return {"time_s": snapshot.time_s, "speed_mps": snapshot.ego.speed_mps, "crashed": snapshot.ego.crashed}
+def _info(observation: Observation) -> dict[str, Any]:
+    return {"time_s": observation.time_s, "speed_mps": observation.ego.speed_mps, "crashed": observation.ego.crashed}
 
 
 for _name, _scenario in (("RampMerge", "overtake"), ("MultiLane", "emergency-lane"), ("Intersection", "intersection")):

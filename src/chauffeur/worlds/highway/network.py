@@ -13,12 +13,19 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from chauffeur.concept import LaneId
+from chauffeur.geometry import LaneId
 
 FloatArray = NDArray[np.float64]
+LaneKey = tuple[str, str, int]
+"""(from node, to node, index); index 0 is leftmost. Outside of this room a lane has a name (`lane_id`)."""
 
 LANE_WIDTH_M = 4.0
 _TWO_PI = 2.0 * math.pi
+
+
+def lane_id(key: LaneKey) -> LaneId:
+    """The name of a lane in the road graph."""
+    return f"{key[0]}-{key[1]}:{key[2]}"
 
 
 class Lane(Protocol):
@@ -170,8 +177,8 @@ class LaneNetwork:
         """Append a lane to the right of those that join two nodes already."""
         self.graph.setdefault(start, {}).setdefault(end, []).append(lane)
 
-    def lanes(self) -> dict[LaneId, Lane]:
-        """All lanes by id."""
+    def lanes(self) -> dict[LaneKey, Lane]:
+        """All lanes by key."""
         return {
             (start, end, i): lane
             for start, ends in self.graph.items()
@@ -179,13 +186,13 @@ class LaneNetwork:
             for i, lane in enumerate(lanes)
         }
 
-    def lane(self, lane: LaneId) -> Lane:
-        """The lane with an id. Raises KeyError or IndexError for one that is not there."""
+    def lane(self, lane: LaneKey) -> Lane:
+        """The lane of a key. Raises KeyError or IndexError for one that is not there."""
         return self.graph[lane[0]][lane[1]][lane[2]]
 
-    def closest(self, position: FloatArray, heading_rad: float) -> LaneId:
+    def closest(self, position: FloatArray, heading_rad: float) -> LaneKey:
         """Lane of the smallest distance, m, the heading error, rad, added to it; the first of equals."""
-        best: LaneId | None = None
+        best: LaneKey | None = None
         smallest = math.inf
         for name, lane in self.lanes().items():
             s, r = lane.local_coordinates(position)

@@ -1,4 +1,8 @@
-"""Answers to the driving APIs' questions on LaMPilot's roads, with LaMPilot's meaning of each."""
+"""Answers to the driving APIs' questions on LaMPilot's roads, with LaMPilot's meaning of each.
+
+The core has y and headings to the right, as highway-env; what is given from here on has them to the left. Signs are
+changed by taking from 0, which leaves no negative zeros.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +30,6 @@ class HighwayPerception:
         self._emergency_lanes = emergency_lanes
         self._rows = core.road.rows
         self._names = core.road.lane_ids
-        self._roads = {name[:2]: sum(other[:2] == name[:2] for other in self._names) for name in self._names}
 
     @property
     def emergency_lanes(self) -> frozenset[LaneId]:
@@ -40,9 +43,9 @@ class HighwayPerception:
         front = int(out[at.OUT_FRONT])
         return Instant(
             ego[at.SPEED],
-            ego[at.HEADING],
+            0.0 - ego[at.HEADING],
             ego[at.X],
-            ego[at.Y],
+            0.0 - ego[at.Y],
             self._names[int(out[at.OUT_LANE])],
             None if front < 0 else front,
             out[at.OUT_GAP],
@@ -76,8 +79,8 @@ class HighwayPerception:
             id=vehicle_id,
             kind=_KINDS[traits[at.KIND]],
             x_m=numbers[at.X],
-            y_m=numbers[at.Y],
-            heading_rad=numbers[at.HEADING],
+            y_m=0.0 - numbers[at.Y],
+            heading_rad=0.0 - numbers[at.HEADING],
             speed_mps=numbers[at.SPEED],
             length_m=numbers[at.LENGTH],
             width_m=numbers[at.WIDTH],
@@ -99,10 +102,11 @@ class HighwayPerception:
 
     def adjacent_lane(self, lane: LaneId, offset: int) -> LaneId | None:
         """Lane `offset` places to the right (negative: left); None beyond the edge."""
-        index = lane[2] + offset
-        if offset == 0 or not 0 <= index < self._roads[lane[0], lane[1]]:
+        road, row = self._core.road, self._rows[lane]
+        index, own = int(road.traits[row, at.INDEX]) + offset, road.roads[road.traits[row, at.ROAD]]
+        if offset == 0 or not 0 <= index < own[at.COUNT]:
             return None
-        return lane[0], lane[1], index
+        return self._names[int(own[at.FIRST]) + index]
 
     def speed_limit(self, lane: LaneId) -> float:
         """Speed limit, m/s."""
@@ -124,7 +128,7 @@ class HighwayPerception:
 
     def lane_heading(self, lane: LaneId) -> float:
         """Heading of a lane where the ego is along it, rad."""
-        return self._core.lane_heading(self._rows[lane], EGO)
+        return 0.0 - self._core.lane_heading(self._rows[lane], EGO)
 
     def reachable(self, lane: LaneId) -> bool:
         """Whether the ego may change to a lane from where it is."""
@@ -135,8 +139,8 @@ class HighwayPerception:
         if self._kind != "intersection":
             return ()
         if from_left:
-            return ("o1", "ir1", 0), ("ir1", "il3", 0), ("il3", "o3", 0)
-        return ("il1", "o1", 0), ("ir3", "il1", 0), ("o3", "ir3", 0)
+            return "o1-ir1:0", "ir1-il3:0", "il3-o3:0"
+        return "il1-o1:0", "ir3-il1:0", "o3-ir3:0"
 
     def stop_sign_ahead(self, served: frozenset[int]) -> tuple[int, float] | None:
         """(id, distance) of the nearest unserved stop sign ahead on the ego's lane."""

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from chauffeur.concept import Command, Scenario, Snapshot
+from chauffeur.concept import Command, Observation, Scenario
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.core import layout as at
 from chauffeur.worlds.highway.world import HighwayWorld
@@ -32,7 +32,7 @@ class ProvokedWorld(HighwayWorld):
         self._rng = rng
         self._slamming: dict[int, tuple[int, float]] = {}
 
-    def reset(self, scenario: Scenario, seed: int | None = None) -> Snapshot:
+    def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
         """As the highway world's."""
         self._slamming.clear()
         return super().reset(scenario, seed)

@@ -8,7 +8,7 @@ result is not used included.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Literal
@@ -16,22 +16,29 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from chauffeur.concept import LaneId, LaneView, ScenarioError
+from chauffeur.concept import LaneId, RoadGraph, ScenarioError
 from chauffeur.control import LAMPILOT_HIGHWAY, LAMPILOT_INTERSECTION, Actuation
+from chauffeur.geometry import Lane as GraphLane
+from chauffeur.geometry import Polyline
+from chauffeur.geometry.road_graph import turn_of
 from chauffeur.worlds.highway.network import (
     LANE_WIDTH_M,
     ArcLane,
     FloatArray,
     Lane,
+    LaneKey,
     LaneNetwork,
     SineLane,
     StraightLane,
+    lane_id,
 )
 
 DT_S = 0.1
 HIGHWAY_LIMIT_MPS = 31.2928  # 70 mph
 RAMP_LIMIT_MPS = 24.5872  # 55 mph
 _CLEAR_M = 20.0
+_JOINT_M = 0.5
+"""Where a lane ends, those that begin within this distance go on from it."""
 _CAR_M = (5.0, 2.0)
 _OBSTACLE_M = (2.0, 2.0)
 _EXPONENTS = (3.5, 4.5)
@@ -94,7 +101,7 @@ class Spawn:
     position: FloatArray
     heading_rad: float
     speed_mps: float
-    lane: LaneId
+    lane: LaneKey
     size_m: tuple[float, float] = _CAR_M
     exponent: float = 0.0
     timer_s: float = 0.0
@@ -132,28 +139,37 @@ class Scene:
     emergency_lanes: frozenset[LaneId] = field(default_factory=frozenset[LaneId])
 
 
-def lane_views(scene: Scene) -> tuple[LaneView, ...]:
-    """The road as geometry for snapshots."""
-    views: list[LaneView] = []
-    for name, lane in scene.network.lanes().items():
+def road_graph(network: Mapping[LaneKey, Lane], emergency: Container[LaneId]) -> RoadGraph:
+    """The road as the graph of its lanes, which has y to the left of +x; the network has it to the right."""
+    ends = {key: (lane.position(0.0, 0.0), lane.position(lane.length, 0.0)) for key, lane in network.items()}
+    lanes: list[GraphLane] = []
+    for key, lane in network.items():
         length = lane.length
-        straight = lane.heading_at(0.0) == lane.heading_at(length) == lane.heading_at(length / 2)
+        bend = lane.heading_at(length) - lane.heading_at(0.0)
+        straight = bend == 0.0 and lane.heading_at(length / 2) == lane.heading_at(0.0)
         points = 2 if straight else max(9, round(length / 2))
-        centre = tuple(
-            (float(p[0]), float(p[1])) for p in (lane.position(s, 0.0) for s in np.linspace(0.0, length, points))
-        )
-        views.append(
-            LaneView(
-                id=name,
+        centre = (lane.position(s, 0.0) for s in np.linspace(0.0, length, points))
+        onward = [
+            lane_id(other)
+            for other in network
+            if other[0] == key[1] and math.dist(ends[other][0], ends[key][1]) < _JOINT_M
+        ]
+        lanes.append(
+            GraphLane(
+                id=lane_id(key),
+                centre=Polyline.of((float(p[0]), 0.0 - float(p[1])) for p in centre),
                 width_m=LANE_WIDTH_M,
-                length_m=length,
                 speed_limit_mps=float(lane.speed_limit),
-                forbidden=lane.forbidden,
-                emergency=name in scene.emergency_lanes,
-                centre_m=centre,
+                kind="emergency" if lane_id(key) in emergency else "driving",
+                road=f"{key[0]}-{key[1]}",
+                index=key[2],
+                successors=tuple(onward),
+                closed=lane.forbidden,
+                junction="crossing" if key[0].startswith("ir") else "",
+                turn=turn_of(-bend),
             )
         )
-    return tuple(views)
+    return RoadGraph(tuple(lanes))
 
 
 def parse_config(config: dict[str, Any], scenario_id: str) -> RoadConfig:
@@ -222,7 +238,7 @@ def _multi_lane(config: RoadConfig, rng: np.random.Generator) -> Scene:
         network.add("a", "b", StraightLane([0, y], [length, y], forbidden=i >= regular, speed_limit=HIGHWAY_LIMIT_MPS))
     ego = _place_ego(network, config, ("a", "b", 0), (380.0, 0.0))
     traffic = _populate(network, config, rng, spare_last_lane=config.emergency_lane)
-    emergency = frozenset({("a", "b", regular)} if config.emergency_lane else ())
+    emergency = frozenset({lane_id(("a", "b", regular))} if config.emergency_lane else ())
     return _highway_scene(network, ego, traffic, emergency=emergency)
 
 
@@ -274,7 +290,7 @@ def _car(network: LaneNetwork, lane: Lane, longitudinal_m: float, speed_mps: flo
 
 
 def _place_ego(
-    network: LaneNetwork, config: RoadConfig, default_lane: LaneId, default_position: tuple[float, float]
+    network: LaneNetwork, config: RoadConfig, default_lane: LaneKey, default_position: tuple[float, float]
 ) -> Spawn:
     ego = config.ego_vehicle or EgoConfig(start_lane_index=default_lane, start_position=default_position)
     try:

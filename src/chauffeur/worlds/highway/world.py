@@ -1,7 +1,8 @@
 """The highway world: LaMPilot's roads behind the `World` contract, stepped by the compiled core.
 
 `benchmarks/highway_oracle` is the same world on the highway-env package itself; scenes equal to the bit and whole trips
-to rounding (tests/worlds/test_core.py) are what makes this one's results LaMPilot's.
+to rounding (tests/worlds/test_core.py) are what makes this one's results LaMPilot's. Inside, y, headings and steering
+grow to the right, as there; here, and in perception and driver, they change their sign.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chauffeur.concept import Command, DataError, LaneView, Lead, Scenario, ScenarioError, Snapshot
+from chauffeur.concept import Capabilities, Command, DataError, Lead, Observation, RoadGraph, Scenario, ScenarioError
 from chauffeur.control import Actuation
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.core import CoreRoad
@@ -22,10 +23,15 @@ from chauffeur.worlds.highway.core import layout as at
 from chauffeur.worlds.highway.driver import HighwayDriver
 from chauffeur.worlds.highway.fitness import fit_to_begin
 from chauffeur.worlds.highway.perception import HighwayPerception
-from chauffeur.worlds.highway.roads import DT_S, RoadConfig, Scene, build_scene, lane_views, parse_config
+from chauffeur.worlds.highway.roads import DT_S, RoadConfig, Scene, build_scene, parse_config, road_graph
 
 FOLLOW_WITHIN_M = 50.0
 """LaMPilot starts the ego at the speed of a vehicle closer than this ahead, at the speed limit otherwise."""
+
+GRIP_MPS2 = 9.81
+"""Tyres brake and push no harder than this; LaMPilot's full-scale pedals stay well below."""
+LOCK_RAD = math.radians(60.0)
+"""The wheels turn no further than this; LaMPilot's full-scale wheel stays below."""
 
 ENGINE = "highway core 1 (physics of highway-env 1.12.1)"
 
@@ -41,7 +47,7 @@ class _Start:
 
     scene: Scene
     core: CoreRoad
-    lanes: tuple[LaneView, ...]
+    road: RoadGraph
     clock_s: float
 
 
@@ -53,6 +59,13 @@ class HighwayWorld:
     """Ramp merge, multi-lane highway and intersection, stepped at 10 Hz."""
 
     engine = ENGINE
+    capabilities = Capabilities(
+        roads=("highway", "intersection"),
+        policies=("program", "parameters", "trajectory", "action_matrix"),
+        lane_changes=True,
+        turns=True,
+        stop_signs=True,
+    )
 
     def __init__(self) -> None:
         self._start: _Start | None = None
@@ -61,7 +74,7 @@ class HighwayWorld:
         self._driver: HighwayDriver | None = None
         self._tick = 0
         self._clock_s = 0.0
-        self._seen: Snapshot | None = None
+        self._seen: Observation | None = None
 
     @property
     def dt_s(self) -> float:
@@ -83,7 +96,7 @@ class HighwayWorld:
         assert self._core is not None
         return self._core
 
-    def reset(self, scenario: Scenario, seed: int | None = None) -> Snapshot:
+    def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
         """Build road and traffic, let it warm up, and place the ego in the flow.
 
         Raises:
@@ -97,7 +110,7 @@ class HighwayWorld:
         self._seen = None
         self._perception = HighwayPerception(self._core, start.scene.kind, start.scene.emergency_lanes)
         self._driver = None
-        return self.snapshot()
+        return self.observe()
 
     def copy(self) -> HighwayWorld:
         """The same instant in a world of its own; stepping one leaves the other alone."""
@@ -110,7 +123,7 @@ class HighwayWorld:
             twin._driver = self._driver.copy(core, twin._perception)
         return twin
 
-    def observation(self) -> bytes:
+    def mirrored(self) -> bytes:
         """The present instant, for a copy of this world in another process."""
         return _INSTANT.pack(self._tick, self._clock_s) + self._road().state()
 
@@ -123,36 +136,37 @@ class HighwayWorld:
         self._tick, self._clock_s, self._seen = tick, clock_s, None
 
     def step(self, command: Command) -> Command:
-        """Advance 0.1 s under `command`; returns what the vehicle really applied."""
+        """Advance 0.1 s under `command`; returns what the vehicle really applied: no more than a car can do."""
         if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
             raise ValueError(f"A command must be finite numbers, not {command}.")
         core = self._road()
         self._seen = None
         self._clock_s += DT_S
-        core.advance(command.acceleration_mps2, command.steering_rad)
+        acceleration = max(-GRIP_MPS2, min(GRIP_MPS2, command.acceleration_mps2))
+        core.advance(acceleration, 0.0 - max(-LOCK_RAD, min(LOCK_RAD, command.steering_rad)))
         self._tick += 1
-        return Command(float(core.out[at.OUT_ACCELERATION]), float(core.out[at.OUT_STEERING]))
+        return Command(float(core.out[at.OUT_ACCELERATION]), 0.0 - float(core.out[at.OUT_STEERING]))
 
-    def snapshot(self) -> Snapshot:
+    def observe(self) -> Observation:
         """The present instant as frozen values: taken when first asked for, the same until the world goes on."""
         if self._seen is None:
-            self._seen = self._snapshot()
+            self._seen = self._observed()
         return self._seen
 
-    def _snapshot(self) -> Snapshot:
+    def _observed(self) -> Observation:
         start, core, perception = self._started(), self._road(), self.perception()
         front, gap = int(core.out[at.OUT_FRONT]), float(core.out[at.OUT_GAP])
         lead = None if front < 0 else Lead(front, gap, float(core.floats[front, at.SPEED]))
         sign = perception.stop_sign_ahead(frozenset())
         everybody = perception.everybody()
-        return Snapshot(
+        return Observation(
             time_s=self._tick * DT_S,
             tick=self._tick,
             kind=start.scene.kind,
             ego=everybody[EGO],
             others=everybody[1 : core.vehicles],
             objects=everybody[core.vehicles :],
-            lanes=start.lanes,
+            road=start.road,
             front=lead,
             stop_sign_m=None if sign is None else sign[1],
             off_road=bool(core.out[at.OUT_ON_ROAD] <= 0.0),
@@ -231,4 +245,4 @@ def _warm_up(config: RoadConfig, seeds: np.random.SeedSequence) -> _Start:
         speed = float(core.floats[front, at.SPEED])
     core.floats[EGO, at.SPEED] = speed
     core.report()
-    return _Start(scene, core, lane_views(scene), clock_s)
+    return _Start(scene, core, road_graph(scene.network.lanes(), scene.emergency_lanes), clock_s)

@@ -111,7 +111,7 @@ class Walker:
     """Somebody who walks to and fro between two places, and lets cars that are close go first.
 
     Attributes:
-        id: As in the snapshot.
+        id: As in the observation.
         from_m, to_m: The two places.
         pause_s: How long they stay at each.
         way_m: How far they are from `from_m`.

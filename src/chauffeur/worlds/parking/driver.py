@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept import Command, LaneId, Snapshot, Wishes
+from chauffeur.concept import Command, LaneId, Observation, Wishes
 from chauffeur.worlds.parking.following import LOT_BEND_MPS2, Chassis, Follower, Look
 from chauffeur.worlds.parking.lot import LIMIT_MPS
 from chauffeur.worlds.parking.routes import Way
@@ -21,7 +21,7 @@ class ParkingDriver:
     """Drives to a wished lane; a spot is one. Its only state is the way there, taken anew if others drove meanwhile."""
 
     def __init__(
-        self, chassis: Chassis, dt_s: float, now: Callable[[], Snapshot], way_to: Callable[[LaneId | None], Way]
+        self, chassis: Chassis, dt_s: float, now: Callable[[], Observation], way_to: Callable[[LaneId | None], Way]
     ) -> None:
         """Args: the car; its control period; the present instant; the way to a lane, or on along the present one."""
         self._follower = Follower(chassis, dt_s, jam_m=JAM_M, bend_mps2=LOT_BEND_MPS2)
@@ -45,11 +45,11 @@ class ParkingDriver:
     def command(self, wishes: Wishes) -> Command:
         """Acceleration and steering for settled wishes."""
         assert wishes.target_speed_mps is not None
-        snapshot = self._now()
-        if self._aim != (wishes.target_lane,) or snapshot.tick > self._asked + 1:
+        observation = self._now()
+        if self._aim != (wishes.target_lane,) or observation.tick > self._asked + 1:
             self._aim = (wishes.target_lane,)
             way = self._way_to(wishes.target_lane)
             self._follower.take(way.path, way.room_m)
-        self._asked = snapshot.tick
-        others = (*snapshot.others, *snapshot.objects)
-        return self._follower.command(snapshot.ego, others, OWN_LOOK, wishes.target_speed_mps, wishes.time_headway_s)
+        self._asked = observation.tick
+        others = (*observation.others, *observation.objects)
+        return self._follower.command(observation.ego, others, OWN_LOOK, wishes.target_speed_mps, wishes.time_headway_s)

@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from chauffeur.concept import Command, Snapshot, VehicleState
+from chauffeur.concept import Command, Observation, VehicleState
 from chauffeur.concept.units import kmh
 from chauffeur.geometry import Box, Pose, overlap
 from chauffeur.worlds.parking.following import HARDEST_MPS2, Chassis
@@ -54,15 +54,15 @@ class Guard:
         self._turn = steering_rate * dt_s
         self._wheel = 0.0
 
-    def judge(self, snapshot: Snapshot, command: Command, most_mps: float) -> Ruling:
+    def judge(self, observation: Observation, command: Command, most_mps: float) -> Ruling:
         """The command, or the least change of it that can still end well.
 
         Args:
-            snapshot: The instant the command is for.
+            observation: The instant the command is for.
             command: What is asked; numbers that are none stop the car.
             most_mps: Highest speed allowed.
         """
-        speed = max(snapshot.ego.speed_mps, 0.0)
+        speed = max(observation.ego.speed_mps, 0.0)
         asked, wheel = command.acceleration_mps2, command.steering_rad
         if not (math.isfinite(asked) and math.isfinite(wheel)):
             return self._let(Command(-HARDEST_MPS2, self._wheel), "finite", "A command that is no number was replaced.")
@@ -72,14 +72,14 @@ class Guard:
         if asked > most + _LEVEL:
             rule, reason = "speed", f"No faster than {kmh(most_mps):.0f} km/h here."
         wanted = min(asked, most)
-        others = [one for one in (*snapshot.others, *snapshot.objects) if self._near(snapshot.ego, one)]
-        if self._ends_well(snapshot.ego, wanted, wheel, others):
+        others = [one for one in (*observation.others, *observation.objects) if self._near(observation.ego, one)]
+        if self._ends_well(observation.ego, wanted, wheel, others):
             return self._let(Command(wanted, wheel), rule, reason)
         low, high = -HARDEST_MPS2, wanted
-        if low < high and self._ends_well(snapshot.ego, low, wheel, others):
+        if low < high and self._ends_well(observation.ego, low, wheel, others):
             for _ in range(_HALVINGS):
                 middle = (low + high) / 2.0
-                if self._ends_well(snapshot.ego, middle, wheel, others):
+                if self._ends_well(observation.ego, middle, wheel, others):
                     low = middle
                 else:
                     high = middle

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from chauffeur.concept import LaneId, Snapshot, VehicleState
+from chauffeur.concept import LaneId, Observation, VehicleState
 from chauffeur.control import LAMPILOT_EGO
 from chauffeur.control.idm import idm_acceleration
 from chauffeur.geometry import Polyline
@@ -15,17 +15,17 @@ from chauffeur.worlds.parking.lot import Lot
 
 
 class LaneMap:
-    """The lanes of a lot as paths, and which of them a place is in."""
+    """Which lane of a lot a place is in."""
 
     def __init__(self, lot: Lot) -> None:
         """Args: the lot."""
-        self.paths = {view.id: Polyline.of(view.centre_m) for view in lot.lanes}
         self._spots = tuple(lot.spots.values())
         self._ways: list[tuple[LaneId, Polyline, tuple[float, float, float, float]]] = []
-        for lane, path in self.paths.items():
-            if lane[1] not in lot.spots:
+        for lane in lot.road.lanes:
+            if lane.id not in lot.spots:
+                path = lane.centre
                 xs, ys = zip(*path.points_m, strict=True)
-                self._ways.append((lane, path, (min(xs), min(ys), max(xs), max(ys))))
+                self._ways.append((lane.id, path, (min(xs), min(ys), max(xs), max(ys))))
 
     def closest(self, x_m: float, y_m: float) -> LaneId:
         """The spot a place is in, or else the drive, corner or aisle whose middle is nearest."""
@@ -46,7 +46,7 @@ class LaneMap:
 class ParkingPerception:
     """Perception of a lot; stays valid as it is stepped."""
 
-    def __init__(self, lot: Lot, lanes: LaneMap, now: Callable[[], Snapshot]) -> None:
+    def __init__(self, lot: Lot, lanes: LaneMap, now: Callable[[], Observation]) -> None:
         """Args: the ground; its lanes; the present instant."""
         self._lot = lot
         self._lanes = lanes
@@ -54,17 +54,17 @@ class ParkingPerception:
 
     def vehicle(self, vehicle_id: int) -> VehicleState:
         """State of somebody. Raises KeyError for an id that is not, or no longer, there."""
-        snapshot = self._now()
+        observation = self._now()
         if vehicle_id == EGO:
-            return snapshot.ego
-        for other in snapshot.others:
+            return observation.ego
+        for other in observation.others:
             if other.id == vehicle_id:
                 return other
         raise KeyError(vehicle_id)
 
     def has_lane(self, lane: LaneId) -> bool:
         """Whether the lot has this lane; each spot is one."""
-        return lane in self._lanes.paths
+        return lane in self._lot.road
 
     def lane_of(self, vehicle_id: int) -> LaneId:
         """Closest lane."""
@@ -77,13 +77,13 @@ class ParkingPerception:
 
     def speed_limit(self, lane: LaneId) -> float:
         """Speed limit, m/s."""
-        return self._lot.lane(lane).speed_limit_mps
+        return self._lot.road[lane].speed_limit_mps
 
     def neighbours(self, lane: LaneId) -> tuple[int | None, int | None]:
         """Nearest ahead of and behind the ego in a lane."""
-        path, snapshot = self._lanes.paths[lane], self._now()
-        here = path.nearest(snapshot.ego.x_m, snapshot.ego.y_m)
-        placed = [(path.nearest(o.x_m, o.y_m) - here, o.id) for o in snapshot.others if o.lane == lane]
+        path, observation = self._lot.road[lane].centre, self._now()
+        here = path.nearest(observation.ego.x_m, observation.ego.y_m)
+        placed = [(path.nearest(o.x_m, o.y_m) - here, o.id) for o in observation.others if o.lane == lane]
         front = min((one for one in placed if one[0] > 0.0), default=None)
         rear = max((one for one in placed if one[0] <= 0.0), default=None)
         return None if front is None else front[1], None if rear is None else rear[1]
@@ -91,7 +91,7 @@ class ParkingPerception:
     def distance_along(self, from_id: int, to_id: int) -> float:
         """Signed centre-to-centre distance, m, along the first one's lane."""
         one, two = self.vehicle(from_id), self.vehicle(to_id)
-        path = self._lanes.paths[self.lane_of(from_id)]
+        path = self._lot.road[self.lane_of(from_id)].centre
         return path.nearest(two.x_m, two.y_m) - path.nearest(one.x_m, one.y_m)
 
     def cross_traffic_lanes(self, from_left: bool) -> tuple[LaneId, ...]:

@@ -52,7 +52,7 @@ def spot_for(lot: Lot, free: Iterable[str], place: str, rear: Pose, wheelbase_m:
         return min(reachable, key=lambda spot: math.dist((spot.box.x_m, spot.box.y_m), lot.gate_m))
     if word.lower() == "exit":
         exit_x, exit_y = lot.exit_m
-        return min(reachable, key=lambda spot: spot.box.x_m - exit_x + exit_y - spot.box.y_m)
+        return min(reachable, key=lambda spot: spot.box.x_m - exit_x + spot.box.y_m - exit_y)
     return min(reachable, key=lambda spot: ways[spot.name].path.length_m)
 
 

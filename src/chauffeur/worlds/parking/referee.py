@@ -41,13 +41,13 @@ class ParkingReferee:
 
     def metrics(self) -> tuple[Metric, ...]:
         """How well it stands: from the middle of the spot, across and along it, and how straight; and the time."""
-        snapshot, box = self._world.snapshot(), self._spot.box
-        along, across = box.place_of(snapshot.ego.x_m, snapshot.ego.y_m)
-        turned = abs(wrap_to_pi(snapshot.ego.heading_rad - box.heading_rad))
+        observation, box = self._world.observe(), self._spot.box
+        along, across = box.place_of(observation.ego.x_m, observation.ego.y_m)
+        turned = abs(wrap_to_pi(observation.ego.heading_rad - box.heading_rad))
         return (
             Metric("parking-success-v1", float(self.success), "points"),
             Metric("parking-across-v1", abs(across), "m", applies=self.success),
             Metric("parking-along-v1", abs(along), "m", applies=self.success),
             Metric("parking-straight-v1", math.degrees(turned), "deg", applies=self.success),
-            Metric("parking-time-v1", snapshot.time_s, "s", applies=self.success),
+            Metric("parking-time-v1", observation.time_s, "s", applies=self.success),
         )

@@ -36,4 +36,20 @@ BUILT_IN: tuple[Scenario, ...] = (
         "Find a spot close to the exit.",
         "Parking lot with two aisles, nobody drives",
     ),
+    _built_in(
+        "parking-lift",
+        {
+            "taken": 0.6,
+            "cars": 0,
+            "walkers": 1,
+            "bays": {"B1": "accessible", "B2": "accessible", "C1": "family", "C2": "family", "E1": "ev", "E2": "ev"},
+            "covered": ("A", "B"),
+            "free": ("B2", "E2", "C7", "D7", "D5", "A8"),
+            "places": {"lift": (24.0, 20.0), "stairs": (0.0, 36.0), "machine": (-4.0, 6.0)},
+        },
+        11,
+        "D5",
+        "Park close to the lift, away from other cars.",
+        "Parking lot with lift, chargers, accessible and family bays, a roof over two rows",
+    ),
 )

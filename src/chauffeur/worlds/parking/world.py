@@ -10,20 +10,32 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from chauffeur.concept import Command, LaneId, Lead, Scenario, ScenarioError, Snapshot, VehicleState
+from chauffeur.concept import (
+    Capabilities,
+    Command,
+    LaneId,
+    Lead,
+    Observation,
+    ParkingLot,
+    Scenario,
+    ScenarioError,
+    VehicleState,
+)
 from chauffeur.geometry import Box, Polyline, Pose, overlap
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.parking.actors import LeavingCar, Walker
+from chauffeur.worlds.parking.amenities import Bay, Place, amenities
 from chauffeur.worlds.parking.corridor import Body
 from chauffeur.worlds.parking.driver import ParkingDriver
 from chauffeur.worlds.parking.following import Chassis
 from chauffeur.worlds.parking.instant import Ego, pack, unpack
-from chauffeur.worlds.parking.lot import AISLE_M, Lot, Spot, build_lot
+from chauffeur.worlds.parking.lot import AISLE_M, Lot, Spot, build_lot, way_id
 from chauffeur.worlds.parking.perception import LaneMap, ParkingPerception
 from chauffeur.worlds.parking.places import parked_in, spot_for
 from chauffeur.worlds.parking.routes import Way, way_along, way_to_spot
@@ -51,6 +63,9 @@ class LotConfig(BaseModel):
         walkers: People on foot.
         ego_speed: The ego's speed at the entrance, m/s.
         free: Spots nobody stands in, by name.
+        bays: Spots that are kept for `ev`, `accessible` or `family`, by name.
+        covered: Letters of the rows under a roof.
+        places: Where the `lift`, the `stairs` and the pay `machine` are: m to the east and to the south.
         duration_s: Time limit.
     """
 
@@ -63,6 +78,9 @@ class LotConfig(BaseModel):
     walkers: int = Field(default=1, ge=0, le=3)
     ego_speed: float = Field(default=3.0, ge=0.0, le=4.0)
     free: tuple[str, ...] = ()
+    bays: dict[str, Bay] = Field(default_factory=dict)
+    covered: tuple[str, ...] = ()
+    places: dict[Place, tuple[float, float]] = Field(default_factory=dict)
     duration_s: float = Field(default=180.0, gt=0.0, le=3600.0)
 
 
@@ -74,6 +92,7 @@ class _Ground:
     parked: tuple[VehicleState, ...]
     boxes: tuple[tuple[int, Box], ...]
     free: frozenset[str]
+    offers: ParkingLot
     cars: tuple[LeavingCar, ...]
     walkers: tuple[Walker, ...]
 
@@ -111,6 +130,13 @@ class ParkingWorld:
     """A parking lot, stepped at 10 Hz."""
 
     engine = "parking lot 1"
+    capabilities = Capabilities(
+        roads=("parking",),
+        policies=("parameters", "trajectory", "action_matrix"),  # a program has no way into a spot
+        turns=True,
+        places=True,
+        horizon_s=180.0,
+    )
 
     def __init__(self) -> None:
         self._scene: _Ground | None = None
@@ -119,7 +145,7 @@ class ParkingWorld:
         self._walkers: list[Walker] = []
         self._hit: set[int] = set()
         self._tick = 0
-        self._shown: Snapshot | None = None
+        self._shown: Observation | None = None
         self._perception: ParkingPerception | None = None
         self._driver: ParkingDriver | None = None
 
@@ -143,7 +169,7 @@ class ParkingWorld:
         """How fast the ego's wheel turns, rad/s."""
         return STEERING_RATE
 
-    def reset(self, scenario: Scenario, seed: int | None = None) -> Snapshot:
+    def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
         """Paint the lot, park the cars and place the ego at the entrance.
 
         Raises:
@@ -160,12 +186,13 @@ class ParkingWorld:
         self._cars = [_leaving(lot, first + i, i, rng) for i in range(config.cars)]
         self._walkers = [_walking(lot, first + config.cars + i, rng) for i in range(config.walkers)]
         cars, walkers = tuple(car.copy() for car in self._cars), tuple(replace(walker) for walker in self._walkers)
-        self._scene = _Ground(lot, config, lanes, parked, boxes, frozenset(lot.spots) - taken, cars, walkers)
+        offers = amenities(lot, taken, config.bays, frozenset(config.covered), config.places)
+        self._scene = _Ground(lot, config, lanes, parked, boxes, frozenset(lot.spots) - taken, offers, cars, walkers)
         self._ego = _Ego(Pose(_START_X_M - CHASSIS.body.rear_to_middle_m, 0.0, 0.0), config.ego_speed)
         self._hit, self._tick, self._shown = set(), 0, None
-        self._perception = ParkingPerception(lot, lanes, self.snapshot)
-        self._driver = ParkingDriver(CHASSIS, DT_S, self.snapshot, self._way_to_lane)
-        return self.snapshot()
+        self._perception = ParkingPerception(lot, lanes, self.observe)
+        self._driver = ParkingDriver(CHASSIS, DT_S, self.observe, self._way_to_lane)
+        return self.observe()
 
     def copy(self) -> ParkingWorld:
         """The same instant in a world of its own; its driver starts anew."""
@@ -176,11 +203,11 @@ class ParkingWorld:
         twin._cars = [car.copy() for car in self._cars]
         twin._walkers = [replace(walker) for walker in self._walkers]
         twin._hit, twin._tick = set(self._hit), self._tick
-        twin._perception = ParkingPerception(scene.lot, scene.lanes, twin.snapshot)
-        twin._driver = ParkingDriver(CHASSIS, DT_S, twin.snapshot, twin._way_to_lane)
+        twin._perception = ParkingPerception(scene.lot, scene.lanes, twin.observe)
+        twin._driver = ParkingDriver(CHASSIS, DT_S, twin.observe, twin._way_to_lane)
         return twin
 
-    def observation(self) -> bytes:
+    def mirrored(self) -> bytes:
         """The present instant, for a copy of this world in another process."""
         self._started()
         return pack(self._tick, self._ego, self._cars, self._walkers, self._hit)
@@ -197,7 +224,7 @@ class ParkingWorld:
         """Advance 0.1 s under `command`; returns what the vehicle really applied."""
         if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
             raise ValueError(f"A command must be finite numbers, not {command}.")
-        before, ego = self.snapshot(), self._ego
+        before, ego = self.observe(), self._ego
         acceleration = max(-MOST_BRAKING_MPS2, min(MOST_ACCELERATION_MPS2, command.acceleration_mps2))
         if ego.crashed:
             acceleration = -MOST_BRAKING_MPS2
@@ -222,7 +249,7 @@ class ParkingWorld:
         self._shown = None
         return Command((ego.speed_mps - speed) / DT_S, wheel)
 
-    def snapshot(self) -> Snapshot:
+    def observe(self) -> Observation:
         """The present instant as frozen values."""
         if self._shown is None:
             self._shown = self._look()
@@ -231,7 +258,7 @@ class ParkingWorld:
     @property
     def ended(self) -> bool:
         """Crash, off the ground, or out of time."""
-        return self.snapshot().ended
+        return self.observe().ended
 
     def perception(self) -> ParkingPerception:
         """Questions about the present instant."""
@@ -270,14 +297,14 @@ class ParkingWorld:
 
     def _way_to_lane(self, lane: LaneId | None) -> Way:
         scene, box = self._started(), self._ego.box
-        if lane is not None and lane[1] in scene.lot.spots:
-            way = way_to_spot(scene.lot, scene.lot.spots[lane[1]], self._ego.rear, CHASSIS.wheelbase_m)
+        if lane in scene.lot.spots:
+            way = way_to_spot(scene.lot, scene.lot.spots[lane], self._ego.rear, CHASSIS.wheelbase_m)
             if way is not None:
                 return way
         here = scene.lanes.closest(box.x_m, box.y_m)
         return way_along(scene.lot, here, CHASSIS.body.overhang_m)
 
-    def _look(self) -> Snapshot:
+    def _look(self) -> Observation:
         scene, ego = self._started(), self._ego
         box = ego.box
         lane = scene.lanes.closest(box.x_m, box.y_m)
@@ -294,18 +321,19 @@ class ParkingWorld:
         people = tuple(walker.state() for walker in self._walkers)
         off_road = not all(scene.lot.ground.holds(x, y) for x, y in box.corners())
         late = self._tick * DT_S >= scene.config.duration_s
-        return Snapshot(
+        return Observation(
             time_s=self._tick * DT_S,
             tick=self._tick,
             kind="parking",
             ego=own,
             others=(*parked, *moving, *people),
             objects=(),
-            lanes=scene.lot.lanes,
-            front=_front(own, moving, scene.lanes.paths[lane]),
+            road=scene.lot.road,
+            front=_front(own, moving, scene.lot.road[lane].centre),
             stop_sign_m=None,
             off_road=off_road,
             ended=ego.crashed or off_road or late,
+            lot=scene.offers,
         )
 
     def _look_for_collisions(self) -> None:
@@ -348,8 +376,8 @@ def _taken(config: LotConfig, rng: np.random.Generator, scenario: str) -> frozen
 def _park(spot: Spot, number: int, rng: np.random.Generator) -> VehicleState:
     """Somebody's car in a spot, as people park."""
     length, width = rng.uniform(4.1, 4.9), rng.uniform(1.7, 1.9)
-    along, across = rng.uniform(-0.2, 0.2), rng.uniform(-0.15, 0.15)
-    heading = spot.box.heading_rad + rng.uniform(-0.03, 0.03) + (math.pi if rng.uniform() < 0.2 else 0.0)
+    along, across = rng.uniform(-0.2, 0.2), -rng.uniform(-0.15, 0.15)
+    heading = spot.box.heading_rad - rng.uniform(-0.03, 0.03) - (math.pi if rng.uniform() < 0.2 else 0.0)
     c, s = math.cos(spot.box.heading_rad), math.sin(spot.box.heading_rad)
     x, y = spot.box.x_m + c * along - s * across, spot.box.y_m + s * along + c * across
     return VehicleState(number, "car", x, y, heading, 0.0, length, width, spot.lane)
@@ -360,11 +388,10 @@ def _leaving(lot: Lot, number: int, place: int, rng: np.random.Generator) -> Lea
     aisle = int(rng.integers(1, lot.aisles + 1))
     start = rng.uniform(14.0, 22.0) + 14.0 * place
     speed = rng.uniform(2.0, 3.2)
-    views = [lot.lane(("entrance", "n1", 0))]
-    views += [lot.lane((f"n{i}", f"n{i + 1}", 0)) for i in range(1, aisle)]
-    views.append(lot.lane((f"n{aisle}", f"a{aisle}", 0)))
-    points = [point for view in views for point in view.centre_m[:-1]]
-    rest = way_along(lot, (f"a{aisle}", f"b{aisle}", 0), 0.0)
+    nodes = ["entrance", *(f"n{i}" for i in range(1, aisle + 1)), f"a{aisle}"]
+    views = [lot.road[way_id(*pair)] for pair in pairwise(nodes)]
+    points = [point for view in views for point in view.centre.points_m[:-1]]
+    rest = way_along(lot, way_id(f"a{aisle}", f"b{aisle}"), 0.0)
     way = Way(Polyline.of([*points, *rest.path.points_m]), (AISLE_M - 2.0) / 2.0)
     return LeavingCar(number, way, start, speed, views[0].id, speed)
 
@@ -372,9 +399,9 @@ def _leaving(lot: Lot, number: int, place: int, rng: np.random.Generator) -> Lea
 def _walking(lot: Lot, number: int, rng: np.random.Generator) -> Walker:
     """Somebody who crosses one of the aisles at its head or its end, where nobody turns into a spot, to and fro."""
     aisle = int(rng.integers(1, lot.aisles + 1))
-    x = lot.lane((f"a{aisle}", f"b{aisle}", 0)).centre_m[0][0]
+    x = lot.aisle_x_m(aisle)
     from_head, at_head = rng.uniform(7.6, 9.2), rng.uniform() < 0.75
-    y = from_head if at_head else lot.exit_m[1] - from_head
+    y = -from_head if at_head else lot.exit_m[1] + from_head
     half = AISLE_M / 2.0 + 1.6
     pause, away = rng.uniform(4.0, 9.0), rng.uniform(0.0, 5.0)
     side = 1.0 if rng.uniform() < 0.5 else -1.0

@@ -25,14 +25,14 @@ from chauffeur.bench.lampilot.scenes.fitting import (
 )
 from chauffeur.bench.lampilot.scenes.sampling import whole
 from chauffeur.bench.lampilot.scenes.wishes import Named, Wish
-from chauffeur.concept import Snapshot
+from chauffeur.concept import Observation
 
 Generator = np.random.Generator
 
 # Hints: a wish at three levels of directness (paper Tab. VII)
 
 
-def _hint(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def _hint(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     behaviour = kind.split("_", 1)[1]
     if behaviour == "overtake":
         # No side is named: on two lanes there is one.
@@ -44,7 +44,7 @@ def _hint(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
     return wish if isinstance(wish, Unfit) else replace(wish, sections=(kind,), stem=kind, slots=(), means=())
 
 
-def _change(behaviour: str, start: Snapshot) -> Wish | Unfit:
+def _change(behaviour: str, start: Observation) -> Wish | Unfit:
     """Faster, slower or further back, where there is room for it and it does not come unasked."""
     if behaviour == "slower":
         if start.front is not None and start.front.speed_mps < start.ego.speed_mps - 1.0:
@@ -71,7 +71,7 @@ def _change(behaviour: str, start: Snapshot) -> Wish | Unfit:
 _TURNS = {"left": "turn left", "right": "turn right", "straight": "go straight on"}
 
 
-def _steps(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def _steps(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     """Steps in the order of the kind's name; LaMPilot's condition is that of the last."""
     if "overtake" in kind:
         passing = overtake_wish("left_overtake", start, rng)
@@ -90,7 +90,7 @@ def _steps(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
         elif name == "shoulder":
             step = {"type": "PullOverEval"}
         elif name == "lane":
-            side = "right" if start.ego.lane is not None and start.ego.lane[2] == 0 else "left"
+            side = "right" if start.ego.lane is not None and start.road[start.ego.lane].index == 0 else "left"
             step = {"type": "LaneChangeEval", "direction": side}
             section = kind.replace("_lane", f"_lane_{side}")
         elif name == "turn":
@@ -119,9 +119,9 @@ def _steps(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
 # Wishes to refuse, and wishes to ask back about
 
 
-def _refuse_no_lane(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def _refuse_no_lane(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     assert start.ego.lane is not None
-    side = "left" if start.ego.lane[2] == 0 else "right"
+    side = "left" if start.road[start.ego.lane].index == 0 else "right"
     if rng.random() < 0.6:
         wish = one_goal(kind, {"type": "LaneChangeEval", "direction": side}, section="lane_beside", side=side)
     else:
@@ -132,7 +132,7 @@ def _refuse_no_lane(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
     return _refused(kind, wish, f"There is no lane on the {side}.")
 
 
-def _refuse_no_lead(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def _refuse_no_lead(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     if start.front is not None and start.front.distance_m < SIGHT_M:
         return Unfit("somebody is ahead")
     del rng
@@ -140,7 +140,7 @@ def _refuse_no_lead(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
     return _refused(kind, wish, "Nobody is within 100 m ahead to be overtaken.")
 
 
-def _refuse_no_gap(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def _refuse_no_gap(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     if start.front is not None and start.front.distance_m < SIGHT_M:
         return Unfit("somebody is ahead")
     named = Named(whole(rng, 15, 70), "m")
@@ -155,19 +155,19 @@ def _refuse_no_gap(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
     return _refused(kind, wish, "Nobody is within 100 m ahead to keep a gap to.")
 
 
-def _refuse_no_shoulder(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def _refuse_no_shoulder(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     wish = pull_over_wish(kind, start, rng)
     assert isinstance(wish, Wish)
     return _refused(kind, wish, "This road has no emergency lane.")
 
 
-def _refuse_no_junction(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def _refuse_no_junction(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     wish = route_wish(("turn_left", "turn_right")[whole(rng, 0, 1)], start, rng)
     assert isinstance(wish, Wish)
     return _refused(kind, wish, "There is no junction on a highway.")
 
 
-def _refuse_speed(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def _refuse_speed(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     """Twice the sign: beyond what any limits allow."""
     named = between(rng, 1.6 * sign_mps(start), 2.4 * sign_mps(start), "m/s")
     assert isinstance(named, Named)
@@ -175,7 +175,7 @@ def _refuse_speed(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
     return _refused(kind, wish, "That is far above the speed limit.")
 
 
-def _refuse_gap(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def _refuse_gap(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     """So close that there is less than a hand's breadth, or nothing, between the bumpers."""
     lead = lead_of(start)
     if isinstance(lead, Unfit):
@@ -185,14 +185,14 @@ def _refuse_gap(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
     return _refused(kind, wish, "At highway speed that gap is a crash.")
 
 
-def _refuse_sign(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def _refuse_sign(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     del start, rng
     return _unsafe(kind, "The stop sign must be obeyed.")
 
 
-def _refuse_danger(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def _refuse_danger(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     del rng
-    place = "junction" if start.kind == "intersection" else "highway"
+    place = "junction" if start.road.junctions else "highway"
     return replace(_unsafe(kind, "That would put people in danger."), sections=(f"{kind}_{place}",))
 
 
@@ -200,12 +200,12 @@ def _unsafe(kind: str, why: str) -> Wish:
     return Wish((kind,), {"type": "RefuseEval"}, {"type": "ACCEvalbySpeed", "rel_speed": 0}, kind, (), "refuse", why)
 
 
-def _ask_side(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def _ask_side(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     del start, rng
     return replace(_unsafe(kind, "Both sides have a lane, and none was named."), right="ask")
 
 
-def _ask_amount(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def _ask_amount(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     del start
     number = str(whole(rng, 15, 60))
     why = "It is not said of what: speed or distance."

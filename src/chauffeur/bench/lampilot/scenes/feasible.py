@@ -8,10 +8,12 @@ from typing import Any
 from chauffeur.bench.lampilot.goals import GIVE_UP_S, Goal, Ruling
 from chauffeur.bench.lampilot.goals_more import make_any_goal
 from chauffeur.bench.lampilot.scenes.scripted import programs_for
-from chauffeur.concept import Metric, Outcome, SandboxError, Scenario, ScenarioError, Snapshot
+from chauffeur.concept import Metric, Observation, Outcome, SandboxError, Scenario, ScenarioError
 from chauffeur.describe import describe
 from chauffeur.drive.session import drive_program, drive_without_program
+from chauffeur.geometry import LaneId
 from chauffeur.worlds.highway import HighwayWorld
+from chauffeur.worlds.highway.network import lane_id
 
 MAX_EPISODE_S = 130.0
 """No goal takes longer: 60 s at most a step, and the roads end before that."""
@@ -72,7 +74,7 @@ class GoalReferee:
         return ()
 
 
-def start_of(world: HighwayWorld, scenario: Scenario) -> Snapshot | str:
+def start_of(world: HighwayWorld, scenario: Scenario) -> Observation | str:
     """The first instant of a scene, or why it is spoilt already."""
     try:
         start = world.reset(scenario)
@@ -85,9 +87,9 @@ def start_of(world: HighwayWorld, scenario: Scenario) -> Snapshot | str:
     return start
 
 
-def _in_start_lane(scenario: Scenario, lane: tuple[str, str, int]) -> bool:
+def _in_start_lane(scenario: Scenario, lane: LaneId) -> bool:
     ego = scenario.config.get("ego_vehicle")
-    return ego is None or tuple(ego["start_lane_index"]) == lane
+    return ego is None or lane_id(ego["start_lane_index"]) == lane
 
 
 def feasible(scenario: Scenario) -> Verdict:

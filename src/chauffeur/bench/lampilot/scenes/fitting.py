@@ -16,7 +16,7 @@ import numpy as np
 from chauffeur.bench.lampilot.goals import SIGHT_M
 from chauffeur.bench.lampilot.scenes.sampling import whole
 from chauffeur.bench.lampilot.scenes.wishes import UNITS, Named, Wish
-from chauffeur.concept import Lead, Snapshot
+from chauffeur.concept import Lead, Observation
 
 Generator = np.random.Generator
 
@@ -48,14 +48,14 @@ class Unfit:
     why: str
 
 
-Drawer = Callable[[str, Snapshot, Generator], Wish | Unfit]
+Drawer = Callable[[str, Observation, Generator], Wish | Unfit]
 
 
 def _side_of(kind: str) -> str:
     return "right" if "right" in kind else "left"
 
 
-def lead_of(start: Snapshot) -> Lead | Unfit:
+def lead_of(start: Observation) -> Lead | Unfit:
     """The vehicle ahead within 100 m, or why there is none to speak of."""
     if start.front is None or start.front.distance_m >= SIGHT_M:
         return Unfit("nobody within 100 m ahead")
@@ -64,10 +64,10 @@ def lead_of(start: Snapshot) -> Lead | Unfit:
     return start.front
 
 
-def sign_mps(start: Snapshot) -> float:
+def sign_mps(start: Observation) -> float:
     """Speed limit of the ego's lane, m/s."""
-    lane = next(lane for lane in start.lanes if lane.id == start.ego.lane)
-    return lane.speed_limit_mps
+    assert start.ego.lane is not None
+    return start.road[start.ego.lane].speed_limit_mps
 
 
 def _unit_of(kind: str) -> str:
@@ -88,7 +88,7 @@ def between(rng: Generator, low_si: float, high_si: float, unit: str) -> Named |
     return Named(step * whole(rng, low, high), unit)
 
 
-def distance_wish(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def distance_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     """A gap to be closed or opened, to a number of metres or by it; or why no such wish fits."""
     lead = lead_of(start)
     if isinstance(lead, Unfit):
@@ -114,7 +114,7 @@ def distance_wish(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
     return replace(one_goal(kind, goal, d=named), change=-1 if closer else 1)
 
 
-def speed_wish(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def speed_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     """A speed to be driven, or more or less speed; or why no such wish fits."""
     now, slower, relative = start.ego.speed_mps, kind.startswith("dec"), "_rel_" in kind
     sign = sign_mps(start)
@@ -136,14 +136,14 @@ def speed_wish(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
     return replace(one_goal(kind, goal, v=named), change=-1 if slower else 1)
 
 
-def lane_wish(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def lane_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     """The lane beside, on the side that the kind names."""
     del start, rng
     side = _side_of(kind)
     return one_goal(kind, {"type": "LaneChangeEval", "direction": side}, section="lane", side=side)
 
 
-def overtake_wish(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def overtake_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     """The vehicle ahead to be overtaken on the side that the kind names; or why it cannot be."""
     del rng
     lead = lead_of(start)
@@ -155,13 +155,13 @@ def overtake_wish(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
     return one_goal(kind, {"type": "OvertakeEval", "direction": side}, section="overtake", side=side)
 
 
-def pull_over_wish(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def pull_over_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     """A halt on the emergency lane."""
     del kind, start, rng
     return one_goal("pull_over", {"type": "PullOverEval"})
 
 
-def route_wish(kind: str, start: Snapshot, rng: Generator) -> Wish | Unfit:
+def route_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     """The way over the intersection that the kind names."""
     del start, rng
     way = {"go_straight": "straight", "turn_left": "left", "turn_right": "right"}[kind]

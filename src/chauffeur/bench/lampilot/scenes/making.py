@@ -15,7 +15,7 @@ from chauffeur.bench.lampilot.scenes.kinds import KINDS, Slot
 from chauffeur.bench.lampilot.scenes.sampling import draw_road
 from chauffeur.bench.lampilot.scenes.wishes import Wish
 from chauffeur.bench.lampilot.scenes.wording import Candidates, word
-from chauffeur.concept import Scenario, ScenarioError, Snapshot
+from chauffeur.concept import Observation, Scenario, ScenarioError
 from chauffeur.worlds.highway import HighwayWorld
 
 MAX_DRAWS = 400
@@ -24,7 +24,7 @@ _WORDS_KEY = 1_000_000
 """Spawn key of the stream that words are drawn from; scenes are drawn from keys 0, 1, 2, ..."""
 
 
-def draw_wish(kind: str, start: Snapshot, rng: np.random.Generator) -> Wish | Unfit:
+def draw_wish(kind: str, start: Observation, rng: np.random.Generator) -> Wish | Unfit:
     """A wish that fits the first instant of a drawn road, or why none does. KeyError for an unknown kind."""
     for names, drawer in (*fitting.WISHES, *beyond.WISHES):
         if kind.startswith(names):

@@ -1,4 +1,4 @@
-/* The road from above. World metres; y grows to the right of +x, as on a canvas. The car stands near the middle. */
+/* The road from above, in metres; y grows to the right of +x, as on a canvas. The car stands near the middle. */
 
 import { kmh } from './words.js';
 
@@ -37,7 +37,6 @@ function beside(lane, x, y) {
   return best;
 }
 
-const sameLane = (a, b) => Boolean(a && b) && a[0] === b[0] && a[1] === b[1] && a[2] === b[2];
 
 export function makeScene(canvas) {
   const ctx = canvas.getContext('2d');
@@ -78,7 +77,11 @@ export function makeScene(canvas) {
   const keyOf = (body) => `${body.what} ${body.id}`; // things and cars are counted apart
   const placeOf = (body) => shown.get(keyOf(body));
 
-  function show(next) {
+  /* Roads come in the canvas's frame; bodies in the world's, whose y grows to the left. */
+  const onCanvas = (body) => ({ ...body, y_m: -body.y_m, heading_rad: -body.heading_rad });
+
+  function show(told) {
+    const next = { ...told, ego: onCanvas(told.ego), others: told.others.map(onCanvas) };
     const now = performance.now();
     const jumped = !scene || next.time_s < scene.time_s || Math.hypot(next.ego.x_m - scene.ego.x_m, next.ego.y_m - scene.ego.y_m) > JUMP_M;
     glideMs = jumped ? 100 : Math.min(LONGEST_GLIDE_MS, glideMs * 0.8 + (now - arrivedAt) * 0.2);
@@ -206,10 +209,10 @@ export function makeScene(canvas) {
 
   /* The lane that is wished, while the car is not in it. */
   function drawGoal() {
-    const goal = road.lanes.find((lane) => sameLane(lane.id, scene.lane));
+    const goal = road.lanes.find((lane) => lane.id === scene.lane);
     const ego = placeOf(scene.ego);
     const lane = laneOf(ego.x, ego.y, ego.h);
-    if (!goal || !lane || sameLane(goal.id, lane.id)) return;
+    if (!goal || !lane || goal.id === lane.id) return;
     const { heading } = beside(goal, ego.x, ego.y);
     const [ux, uy] = [Math.cos(heading), Math.sin(heading)];
     const wash = ctx.createLinearGradient(ego.x, ego.y, ego.x + ux * 70, ego.y + uy * 70);
@@ -371,9 +374,9 @@ export function makeScene(canvas) {
     if (!scene || !road) return '';
     const parts = [`At ${kmh(scene.ego.speed_mps)} km/h.`];
     const lane = laneOf(scene.ego.x_m, scene.ego.y_m, scene.ego.heading_rad);
-    const abreast = lane ? road.lanes.filter((other) => other.id[0] === lane.id[0] && other.id[1] === lane.id[1]) : [];
+    const abreast = lane && lane.road ? road.lanes.filter((other) => other.road === lane.road) : [];
     if (abreast.length > 1) {
-      parts.push(`Lane ${lane.id[2] + 1} of ${abreast.length} from the left.`);
+      parts.push(`Lane ${lane.i + 1} of ${abreast.length} from the left.`);
     }
     const one = lead();
     if (!one) parts.push('Nobody close ahead.');

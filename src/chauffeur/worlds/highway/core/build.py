@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 
 from chauffeur.concept import LaneId
 from chauffeur.worlds.highway.core import layout as at
-from chauffeur.worlds.highway.network import LANE_WIDTH_M, ArcLane, Lane, LaneNetwork, SineLane, StraightLane
+from chauffeur.worlds.highway.network import (
+    LANE_WIDTH_M,
+    ArcLane,
+    Lane,
+    LaneKey,
+    LaneNetwork,
+    SineLane,
+    StraightLane,
+    lane_id,
+)
 from chauffeur.worlds.highway.roads import Scene, Spawn
 
 Floats = NDArray[np.float64]
@@ -23,7 +32,8 @@ class RoadMap:
     """A road as arrays (layout.py); nothing in it changes while driving.
 
     Attributes:
-        lane_ids: Names of the lanes, in the rows' order.
+        keys: The lanes' (from node, to node, index), in the rows' order.
+        lane_ids: Their names.
         rows: Row of each lane.
         lanes: (lanes, LANE_FLOATS).
         traits: (lanes, LANE_INTS).
@@ -31,6 +41,7 @@ class RoadMap:
         road_rows: Row of each (from, to).
     """
 
+    keys: tuple[LaneKey, ...]
     lane_ids: tuple[LaneId, ...]
     rows: dict[LaneId, int]
     lanes: Floats
@@ -42,24 +53,25 @@ class RoadMap:
 def map_network(network: LaneNetwork) -> RoadMap:
     """A road's lanes as arrays."""
     found = network.lanes()
-    ids = tuple(found)
-    pairs = list(dict.fromkeys((start, end) for start, end, _ in ids))
+    keys = tuple(found)
+    ids = tuple(map(lane_id, keys))
+    pairs = list(dict.fromkeys((start, end) for start, end, _ in keys))
     nodes = {name: k for k, name in enumerate(dict.fromkeys(n for pair in pairs for n in pair))}
     road_rows = {pair: k for k, pair in enumerate(pairs)}
     roads = np.zeros((len(pairs), at.ROAD_INTS), dtype=np.int64)
     for k, (start, end) in enumerate(pairs):
         onward = [road_rows[end, to] for to in network.graph.get(end, {})]
         roads[k, at.FROM], roads[k, at.TO] = nodes[start], nodes[end]
-        roads[k, at.FIRST] = ids.index((start, end, 0))
+        roads[k, at.FIRST] = keys.index((start, end, 0))
         roads[k, at.COUNT] = len(network.graph[start][end])
         roads[k, at.EXITS] = len(onward)
         roads[k, at.EXIT : at.EXIT + len(onward)] = onward
-    lanes = np.zeros((len(ids), at.LANE_FLOATS))
-    traits = np.zeros((len(ids), at.LANE_INTS), dtype=np.int64)
+    lanes = np.zeros((len(keys), at.LANE_FLOATS))
+    traits = np.zeros((len(keys), at.LANE_INTS), dtype=np.int64)
     for k, (name, lane) in enumerate(found.items()):
         _lane_row(lanes[k], traits[k], lane)
         traits[k, at.ROAD], traits[k, at.INDEX] = road_rows[name[0], name[1]], name[2]
-    return RoadMap(ids, {name: k for k, name in enumerate(ids)}, lanes, traits, roads, road_rows)
+    return RoadMap(keys, ids, {name: k for k, name in enumerate(ids)}, lanes, traits, roads, road_rows)
 
 
 def _lane_row(numbers: Floats, traits: Ints, lane: Lane) -> None:
@@ -100,7 +112,7 @@ def _entity_row(numbers: Floats, traits: Ints, entity: Spawn, road: RoadMap) -> 
     numbers[at.X], numbers[at.Y] = entity.position
     numbers[at.HEADING], numbers[at.SPEED] = entity.heading_rad, entity.speed_mps
     numbers[at.LENGTH], numbers[at.WIDTH] = entity.size_m
-    traits[at.LANE] = traits[at.TARGET_LANE] = road.rows[entity.lane]
+    traits[at.LANE] = traits[at.TARGET_LANE] = road.rows[lane_id(entity.lane)]
     traits[at.KIND] = _KINDS[entity.kind]
     if entity.kind != "traffic":
         return

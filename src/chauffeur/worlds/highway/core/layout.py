@@ -1,7 +1,7 @@
 """How a road and its traffic lie in arrays. Row 0 is the ego, then the other vehicles in spawn order, then the objects.
 
-The rows equal the ids of a snapshot. `order` lists all solid rows by their position along the road; it is only kept on
-highways, whose lanes are all parallel to +x.
+The rows equal the ids of an observation. `order` lists all solid rows by their position along the road; it is only
+kept on highways, whose lanes are all parallel to +x.
 """
 
 from __future__ import annotations

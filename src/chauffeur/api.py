@@ -1,0 +1,112 @@
+"""Chauffeur from Python: drive a wish, with a planner of one's own, and run a benchmark.
+
+`chauffeur drive` and `chauffeur bench` say more on the way and have more switches; what drives and scores is the same.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from chauffeur.bench.kernel.benchmark import make_benchmark
+from chauffeur.bench.kernel.run import BenchRun, Effort
+from chauffeur.bench.kernel.standing import Standing
+from chauffeur.bench.kernel.store import Row
+from chauffeur.bench.referees import referee_for
+from chauffeur.concept import Limits, PersonId, Scenario
+from chauffeur.drive.recording import RecordedTrip, write_trip
+from chauffeur.drive.scenarios import find, planner_for, suiting
+from chauffeur.drive.session import Forgetful, Session, parse_wish
+from chauffeur.memory.choice import open_memory
+from chauffeur.memory.personal_limits import personal_limits
+from chauffeur.planners.base import Answerer, Planner
+from chauffeur.planners.registry import make_answerer, make_planner
+from chauffeur.planners.talk2drive.recent import fitting
+
+
+def drive_wish(
+    wish: str,
+    *,
+    scenario: str | Scenario = "",
+    planner: str | Planner = "",
+    person: str = "",
+    seed: int | None = None,
+    save: Path | str | None = None,
+) -> RecordedTrip:
+    """Drive one wish in simulation: plan it, check it, drive it, score it.
+
+    Args:
+        wish: What the person wants, in their own words.
+        scenario: Where; a built-in one's name or one of your own. By default one that suits the wish.
+        planner: Who plans: a planner, or a specification as for `chauffeur drive --planner`. By default the on-board
+            planner that drives in that world.
+        person: Whose wish it is: their history is recalled and kept. Nobody's by default.
+        seed: Of the traffic; by default the scenario's own.
+        save: File for the recording (MCAP), which `chauffeur replay` plays.
+
+    Returns:
+        The trip (`.trip.outcome`, `.trip.plan`, `.trip.metrics`) and every control period (`.frames`).
+
+    Raises:
+        ChauffeurError: No plan could be had, or the scenario cannot be set up; the simulated car has not moved. A wish
+            that is declined raises nothing: it is an outcome.
+    """
+    instruction = parse_wish(wish, PersonId(person.strip()))
+    place = scenario if isinstance(scenario, Scenario) else find(scenario) if scenario else suiting(instruction.text)
+    spec = planner_for(planner, place) if isinstance(planner, str) else planner.id
+    session = Session(
+        planner=make_planner(spec) if isinstance(planner, str) else planner,
+        memory=fitting(open_memory(), spec) if instruction.person else Forgetful(),
+        referee=referee_for,
+    )
+    limits = personal_limits(instruction.person, Limits())
+    recorded = asyncio.run(session.drive(instruction, place, place.seed if seed is None else seed, limits))
+    if save is not None:
+        write_trip(
+            Path(save),
+            recorded.trip,
+            recorded.frames,
+            recorded.scenario,
+            system=recorded.system,
+            final=recorded.final,
+        )
+    return recorded
+
+
+def run_benchmark(
+    name: str,
+    planner: str | Planner | Answerer = "onboard",
+    *,
+    out: Path | str,
+    workers: int = 0,
+    **options: Any,
+) -> list[Row]:
+    """Run an installed benchmark, or go on with a run begun in the same folder.
+
+    Worker processes import the calling script: keep the call under `if __name__ == "__main__":`.
+
+    Args:
+        name: As `chauffeur bench` knows it.
+        planner: Who is asked: a planner for plans, a model for questions, or a specification of either.
+        out: The run's folder: results, table, provenance.
+        workers: Worker processes; 0 for one a core.
+        options: The benchmark's own, as `--option` of its command takes them.
+
+    Returns:
+        One row an item, as `results.jsonl` has them.
+
+    Raises:
+        ConfigError: There is no such benchmark, planner or option, or the folder holds another run.
+        ChauffeurError: The run cannot go on; what is finished stays.
+    """
+    benchmark = make_benchmark(name, **options)
+    make = {"plans": make_planner, "words": make_answerer}.get(benchmark.asks)
+    asked = make(planner) if make is not None and isinstance(planner, str) else planner
+    run = BenchRun(Path(out), benchmark, None if make is None or isinstance(asked, str) else asked)
+    return run.run(_unwatched, replace(Effort(), workers=workers))
+
+
+def _unwatched(standing: Standing) -> None:
+    del standing

@@ -1,0 +1,206 @@
+"""What is said of a route: our row, and the official results file made of rows."""
+
+from __future__ import annotations
+
+import json
+import math
+import statistics
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+from typing_extensions import TypedDict  # pydantic reads the standard library's from Python 3.12 on only
+
+from chauffeur.bench.leaderboard.criteria import Infraction
+from chauffeur.bench.leaderboard.scoring import KINDS, Driven, RouteScore, mean_score, official_rates, rates
+
+NOTE: Final = (
+    "Scores with a SUMO engine use the official Leaderboard 1.0 routes, trigger points, time limits and formulae, but "
+    "not CARLA: planar vehicle, SUMO traffic, no props, no perception. They compare policies with each other and must "
+    "not be set beside published CARLA scores."
+)
+
+LABELS: Final = (
+    "Avg. driving score",
+    "Avg. route completion",
+    "Avg. infraction penalty",
+    "Collisions with pedestrians",
+    "Collisions with vehicles",
+    "Collisions with layout",
+    "Red lights infractions",
+    "Stop sign infractions",
+    "Off-road infractions",
+    "Route deviations",
+    "Route timeouts",
+    "Agent blocked",
+)
+"""Of the official file."""
+
+
+class LeaderboardRow(TypedDict):
+    """A route driven once."""
+
+    item: str
+    route: str
+    town: str
+    seed: int
+    driver: str
+    engine: str
+    scenarios: str
+    scoring: str
+    status: str
+    rc: float
+    ip: float
+    ds: float
+    collisions_pedestrian: int
+    collisions_vehicle: int
+    collisions_layout: int
+    red_light: int
+    stop_infraction: int
+    outside_route_lanes: int
+    route_dev: int
+    route_timeout: int
+    vehicle_blocked: int
+    length_m: float
+    simulated_s: float
+    cpu_s: float
+    triggered: int
+    placed: int
+    unplaceable: str
+    traffic: int
+    traffic_speed_mps: float | None
+    policy_failed: bool
+    infra_failed: bool
+    refused: bool
+    fallback_used: bool
+    interventions: int
+    plans: int
+    plans_driven: int
+    plans_declined: int
+    plans_refused: int
+    plans_failed: int
+    plan_latency_s: float | None
+    plan_reasons: str
+    detail: str
+
+
+def status_of(completed: bool, infractions: Sequence[Infraction], failure: str = "") -> str:
+    """The official word for how a route ended."""
+    if completed:
+        return "Completed"
+    kinds = {one.kind for one in infractions}
+    if "route_timeout" in kinds:
+        failure = "Agent timed out"
+    if "route_dev" in kinds:
+        failure = "Agent deviated from the route"
+    if "vehicle_blocked" in kinds:
+        failure = "Agent got blocked"
+    return f"Failed - {failure}" if failure else "Failed"
+
+
+def counted(infractions: Iterable[Infraction]) -> dict[str, int]:
+    """Number of infractions of each kind."""
+    counts = Counter(one.kind for one in infractions)
+    return {kind: counts.get(kind, 0) for kind in KINDS}
+
+
+def driven_of(row: Mapping[str, Any]) -> Driven:
+    """What the statistics read of a row."""
+    score = RouteScore(float(row["rc"]), float(row["ip"]), float(row["ds"]))
+    return Driven(score, {kind: int(row[kind]) for kind in KINDS}, float(row["length_m"]))
+
+
+def official(rows: Sequence[Mapping[str, Any]], infractions: Mapping[str, Sequence[Infraction]]) -> dict[str, Any]:
+    """The results as the official evaluator writes them (`results.json`), with the engine and its note beside.
+
+    Args:
+        rows: All rows of a run, in its order.
+        infractions: Of each item.
+    """
+    records = [_record(row, index, infractions.get(row["item"], ())) for index, row in enumerate(rows)]
+    driven = [driven_of(row) for row in rows]
+    score, summed = mean_score(driven), official_rates(driven)
+    failed = [
+        [record["route_id"], record["index"], record["status"]] for record in records if record["status"] != "Completed"
+    ]
+    spread = {
+        name: statistics.stdev(values) if len(values) > 1 else "NaN"
+        for name, values in (
+            ("score_route", [one.score.route for one in driven]),
+            ("score_penalty", [one.score.penalty for one in driven]),
+            ("score_composed", [one.score.composed for one in driven]),
+        )
+    }
+    missing = any(row["infra_failed"] for row in rows)
+    agent = any("Agent" in record["status"] for record in records)
+    values = [score.composed, score.route, score.penalty, *(summed[kind] for kind in KINDS)]
+    return {
+        "_checkpoint": {
+            "global_record": {
+                "index": -1,
+                "route_id": -1,
+                "status": "Failed" if failed else "Completed",
+                "infractions": dict(summed),
+                "scores": _scores(score),
+                "scores_std_dev": spread,
+                "meta": {"exceptions": failed} if failed else {},
+            },
+            "progress": [len(rows), len(rows)],
+            "records": records,
+        },
+        "eligible": not missing,
+        "entry_status": (
+            "Finished with missing data" if missing else "Finished with agent errors" if agent else "Finished"
+        ),
+        "labels": list(LABELS),
+        "sensors": [],
+        "values": [f"{value:.3f}" for value in values],
+        "chauffeur": {
+            "engines": sorted({str(row["engine"]) for row in rows}),
+            "note": NOTE,
+            "infractions_per_km": rates(driven),
+        },
+    }
+
+
+def write_official(
+    path: Path, rows: Sequence[Mapping[str, Any]], infractions: Mapping[str, Sequence[Infraction]]
+) -> None:
+    """Write the official results file."""
+    path.write_text(json.dumps(official(rows, infractions), indent=4, sort_keys=True) + "\n")
+
+
+def infraction_rows(infractions: Iterable[Infraction]) -> list[dict[str, Any]]:
+    """Infractions as JSON."""
+    return [asdict(one) for one in infractions]
+
+
+def infractions_of(rows: Iterable[Mapping[str, Any]]) -> tuple[Infraction, ...]:
+    """Infractions from JSON."""
+    return tuple(Infraction(**row) for row in rows)
+
+
+def _scores(score: RouteScore) -> dict[str, float]:
+    return {"score_route": score.route, "score_penalty": score.penalty, "score_composed": score.composed}
+
+
+def _record(row: Mapping[str, Any], index: int, infractions: Sequence[Infraction]) -> dict[str, Any]:
+    messages: dict[str, list[str]] = {kind: [] for kind in KINDS}
+    for one in infractions:
+        messages[one.kind].append(one.message)
+    score = driven_of(row).score
+    return {
+        "index": index,
+        "route_id": f"RouteScenario_{row['route']}",
+        "status": row["status"],
+        "infractions": messages,
+        "scores": {name: value if math.isfinite(value) else 0.0 for name, value in _scores(score).items()},
+        "meta": {
+            "duration_game": row["simulated_s"],
+            "duration_system": row["cpu_s"],
+            "route_length": row["length_m"],
+            "engine": row["engine"],
+        },
+    }

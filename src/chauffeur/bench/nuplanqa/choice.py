@@ -1,0 +1,217 @@
+"""Which option an answer in free words chooses, or why it chooses none.
+
+Read in this order, the first that decides stands: a stated answer ("the answer is (b)"), a letter in front, the only
+letter in brackets, the text of exactly one option, an ordinal ("the second one"). What names two options, refuses, or
+says "none" chooses nothing, and how it failed is counted.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from chauffeur.bench.nuplanqa.questions import LETTERS
+
+EXTRACTION: Final = "choice-v1"
+
+How = Literal["letter", "text", "ordinal", "none", "refused", "several", "unclear", "empty"]
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """What an answer chooses.
+
+    Attributes:
+        index: Of the option; None where none was chosen.
+        how: What decided, or why nothing did.
+    """
+
+    index: int | None
+    how: How
+
+
+_L: Final = r"[\(\[\{<\"'`*_]{0,6}([a-dA-D])[\)\]\}>\"'`*_]{0,6}"
+_END: Final = r"(?![\w'’])"
+_STATED: Final = re.compile(
+    rf"(?:\b(?:answer|choice|option|selection|pick|select|choose|go(?:ing)? with|go for|correct one)\b)"
+    rf"(?:\s{{1,3}}(?:is|are|was|would be|should be|must be|has to be|here|number|letter|option|choice|answer|"
+    rf"therefore|thus|then|clearly|definitely|most likely|likely|probably|to|for|the|my|final|correct|right|"
+    rf"best|remains|be)\b){{0,6}}"
+    rf"[\"']?\s{{0,3}}[:=\-–—>]{{0,6}}\s{{0,3}}(?:option|choice|letter|answer)?\s{{0,3}}{_L}{_END}"
+    rf"(?!\s{{1,3}}(?:car|truck|bus|pedestrian|vehicle|red|"
+    rf"green|yellow|clear|cloudy|dry|wet|busy|single|two|three|four|few|lot|group|cyclist|good|more|little)\b)",
+    re.IGNORECASE,
+)
+_BOXED: Final = re.compile(r"\\boxed\{\s{0,3}(?:\\text\{)?\s{0,3}\(?([a-dA-D])\)?\s{0,3}\}?\s{0,3}\}")
+_TAGGED: Final = re.compile(rf"<(?:answer|ans|choice)>\s{{0,3}}{_L}", re.IGNORECASE)
+_FRONT: Final = re.compile(
+    r"^[\s\(\[\{\"'`*_#>]{0,6}([a-dA-D])(?:[\s\"'`*_]{0,6}[\)\]\}:.,;!\-–—=|]{1,6}|[\"'`*_]{1,6}|\s{0,3}\n)",
+    re.MULTILINE,
+)
+_ALONE: Final = re.compile(r"^[\W_]{0,12}([a-dA-D])[\W_]{0,12}$")
+_BRACKETED: Final = re.compile(r"[\(\[]\s{0,3}([a-dA-D])\s{0,3}[\)\]]|(?<![\w(])([a-dA-D])\)")
+_BARE: Final = re.compile(r"(?<![\w'’])([B-D]|A(?!\s{1,3}[a-z]))(?![\w'’])")
+"""A capital by itself; an A before a word is the article."""
+_NEGATED: Final = re.compile(
+    rf"(?:\b(?:not|isn't|isn’t|never|neither|nor|rule out|ruled out|exclude|excluding|except|rather than|instead of|"
+    rf"unlike)\b\s{{1,3}}(?:the\s{{1,3}})?(?:option|choice|answer)?\s{{0,3}}(?:is\s{{1,3}})?{_L}{_END})"
+    rf"|(?:(?:option|choice)?\s{{0,3}}[\(\[\"'*]{{0,6}}([a-dA-D])[\)\]\"'*]{{1,6}}\s{{0,3}}"
+    rf"(?:is|are|was|seems|looks|cannot be|can't be)\s{{0,3}}"
+    rf"(?:clearly |definitely |obviously )?(?:not\b(?: (?:right|correct|visible|true))?|wrong|incorrect|false|"
+    rf"ruled out|impossible|unlikely|out\b|be right|be correct))",
+    re.IGNORECASE,
+)
+_REFUSED: Final = re.compile(
+    r"\b(?:i(?:'m| am)? (?:sorry|unable|afraid)|(?:i )?(?:cannot|can't|can’t|could not|couldn't|am not able to|"
+    r"won't) (?:determine|answer|see|view|tell|say|help|assist|identify|process|access|provide|be determined)|"
+    r"as an ai|not possible to (?:determine|tell|answer)|unable to|no images? (?:was|were|is|are)|i decline|"
+    r"not enough information|insufficient information|i (?:do not|don't|don’t) know|no idea|not sure|hard to say)",
+    re.IGNORECASE,
+)
+_NONE: Final = re.compile(
+    r"^\W{0,6}(?:none|neither|nothing|no (?:option|answer|choice)|n/?a)\b|\bnone of (?:the|these|them|those)\b|"
+    r"\bno (?:correct|right|valid|suitable) (?:option|answer|choice)\b|"
+    r"\bnone (?:is|are|fits|fit|applies|apply)\b|\bnot (?:any|one) of (?:the|these|them)\b",
+    re.IGNORECASE,
+)
+_ALL: Final = re.compile(
+    r"\b(?:all of (?:the above|them|these)|(?:both|all) (?:options|answers|are)|any of them)\b", re.IGNORECASE
+)
+_ORDINALS: Final = (
+    "first|1st|one|1|i",
+    "second|2nd|two|2|ii",
+    "third|3rd|three|3|iii",
+    "fourth|4th|four|4|iv|last|final",
+)
+_ORDINAL: Final = tuple(
+    re.compile(
+        rf"(?:\b(?:the|my)\s{{1,3}}(?:{'|'.join(w for w in words.split('|') if len(w) > 3 or w[0].isdigit())})\b"
+        rf"(?!\s{{1,3}}(?:lane|car|vehicle|light|truck|time|half|frame|image|picture|view|glance|place|pedestrian|person))"
+        rf"|\b(?:option|choice|answer|number|no\.|#)\s{{0,3}}(?:is\s{{1,3}})?(?:number\s{{1,3}})?(?:{words})\b"
+        rf"|^\W{{0,6}}(?:the\s{{1,3}})?(?:{words})(?:\s{{1,3}}(?:one|option|choice|answer))?\W{{0,6}}$"
+        rf"|\b(?:{words})\s{{1,3}}(?:one|option|choice|answer)\b)",
+        re.IGNORECASE,
+    )
+    for words in _ORDINALS
+)
+
+
+def read_choice(answer: str, options: Sequence[str]) -> Choice:
+    """The option an answer chooses.
+
+    Args:
+        answer: What the model wrote, its thinking taken out.
+        options: Texts of the options, in the order in which they were lettered.
+    """
+    text = unicodedata.normalize("NFKC", answer).strip()
+    if not text:
+        return Choice(None, "empty")
+    if (alone := _ALONE.match(text)) is not None:
+        return _letter(alone.group(1))
+    exact = _same(text, options)
+    if exact is not None:
+        return Choice(exact, "text")
+    kept = _without_options(_NEGATED.sub(" ", text), options)
+    for pattern in (_BOXED, _TAGGED):
+        if found := _letters(pattern.findall(kept)):
+            return _letter(found[-1])  # a model that corrects itself ends with what it means
+    if (stated := _stated(kept)) is not None:
+        return stated
+    front = _FRONT.match(kept)
+    bracketed = _letters(_BRACKETED.findall(kept))
+    if front is not None and _leads(front.group(1), bracketed, kept, front.end()):
+        return _letter(front.group(1))
+    if len(set(bracketed)) == 1:
+        return _letter(bracketed[0])
+    named = _named(_NEGATED.sub(" ", text), options)
+    if not bracketed and len(named) == 1:
+        return Choice(named[0], "text")
+    return _rest(kept, bracketed, named)
+
+
+def _rest(kept: str, bracketed: Sequence[str], named: Sequence[int]) -> Choice:
+    """What is left when no letter and no single option decides."""
+    if len(set(bracketed)) > 1:
+        last = _letters(_BRACKETED.findall(kept.splitlines()[-1]))
+        if len(set(last)) == 1 and ("\n" in kept and (bracketed.count(last[0]) > 1 or not _lists_all(bracketed))):
+            return _letter(last[0])
+        return Choice(None, "several")
+    if _ALL.search(kept):
+        return Choice(None, "several")
+    if _NONE.search(kept):
+        return Choice(None, "none")
+    ordinal = [index for index, pattern in enumerate(_ORDINAL) if pattern.search(kept)]
+    if len(ordinal) == 1:
+        return Choice(ordinal[0], "ordinal")
+    if len(ordinal) > 1 or len(named) > 1:
+        return Choice(None, "several")
+    if _REFUSED.search(kept):
+        return Choice(None, "refused")
+    bare = set(_BARE.findall(kept))
+    if len(bare) == 1:
+        return _letter(bare.pop())
+    return Choice(None, "several" if bare else "unclear")
+
+
+def _lists_all(bracketed: Sequence[str]) -> bool:
+    """Whether an answer goes through all options."""
+    return len(set(bracketed)) == len(LETTERS)
+
+
+def _stated(text: str) -> Choice | None:
+    """The last answer that is stated as such; none where two letters are stated in one breath ("a or b")."""
+    found = list(_STATED.finditer(text))
+    if not found:
+        return None
+    last = found[-1]
+    tail = text[last.end() : last.end() + 24]
+    other = re.match(rf"\s*(?:and|or|/|&|,)\s*(?:also\s+|maybe\s+|option\s+)?{_L}{_END}", tail, re.IGNORECASE)
+    if other is not None and other.group(1).lower() != last.group(1).lower():
+        return Choice(None, "several")
+    return _letter(last.group(1))
+
+
+def _leads(letter: str, bracketed: Sequence[str], text: str, end: int) -> bool:
+    """Whether a letter in front is the answer, and not the first of a list."""
+    second = re.match(rf"\s*(?:and|or|/|&)?\s*{_L}(?:[\)\].,:]|\s*$)", text[end:], re.IGNORECASE)
+    if second is not None and second.group(1).lower() != letter.lower():
+        return False
+    listed = {match.group(1).lower() for match in _FRONT.finditer(text)}
+    return len(listed) == 1 and not _lists_all(bracketed)
+
+
+def _letter(letter: str) -> Choice:
+    return Choice(LETTERS.index(letter.lower()), "letter")
+
+
+def _letters(found: Iterable[str | tuple[str, ...]]) -> list[str]:
+    return [(one if isinstance(one, str) else "".join(one)).lower() for one in found]
+
+
+def _plain(text: str) -> str:
+    return " ".join(re.findall(r"\w+", text.lower()))
+
+
+def _same(text: str, options: Sequence[str]) -> int | None:
+    """The only option that an answer repeats word for word."""
+    same = [index for index, option in enumerate(options) if _plain(option) == _plain(text)]
+    return same[0] if len(same) == 1 else None
+
+
+def _named(text: str, options: Sequence[str]) -> list[int]:
+    """Options whose text stands in an answer, those left out whose text is part of another one's that does."""
+    said = f" {_plain(text)} "
+    found = [(index, _plain(option)) for index, option in enumerate(options)]
+    held = [(index, option) for index, option in found if option and f" {option} " in said]
+    return [index for index, option in held if not any(option != other and option in other for _, other in held)]
+
+
+def _without_options(text: str, options: Sequence[str]) -> str:
+    """An answer without the options' own words, which may hold single letters and ordinals ("the first car")."""
+    for option in sorted(options, key=len, reverse=True):
+        if len(option) > 3:
+            text = re.sub(re.escape(option.rstrip(".")), " ", text, flags=re.IGNORECASE)
+    return text

@@ -1,0 +1,169 @@
+"""Pictures of a sample: which files they are, and their bytes as a model gets them.
+
+nuPlan's layout: `part_<n>/<hash>.jpg` below a root, named by `cams.<camera>.data_path` of the metadata. Samples come at
+2 Hz; `prev` leads to the one before.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from chauffeur.concept import DataError
+
+CAMERAS: Final = ("CAM_F0", "CAM_L0", "CAM_R0", "CAM_L2", "CAM_R2", "CAM_B0")
+"""The six of nuPlan's eight cameras that NuPlanQA's metadata name."""
+VIEW_NAMES: Final[Mapping[str, str]] = {
+    "CAM_F0": "front",
+    "CAM_L0": "front left",
+    "CAM_R0": "front right",
+    "CAM_L1": "left",
+    "CAM_R1": "right",
+    "CAM_L2": "rear left",
+    "CAM_R2": "rear right",
+    "CAM_B0": "rear",
+}
+STEP_S: Final = 0.5
+"""Time between samples."""
+FRAMES: Final = 4
+"""Samples of a multi-frame question: the last 1.5 s."""
+
+MISSING: Final = "Missing view"
+CORRUPT: Final = "Corrupt image"
+UNTOLD: Final = "No metadata"
+"""How the errors of an item begin; they are counted apart."""
+
+Pictures = Literal["real", "blank"]
+
+
+@dataclass(frozen=True, slots=True)
+class FramePath:
+    """A picture of a sample.
+
+    Attributes:
+        camera: nuPlan's name of the camera.
+        ago_s: How long before the instant of the question it was taken.
+        path: Its file.
+    """
+
+    camera: str
+    ago_s: float
+    path: Path
+
+    @property
+    def caption(self) -> str:
+        """What a model is told of it: `CAM_F0 (front), 0.5 s ago`."""
+        when = "now" if self.ago_s == 0.0 else f"{self.ago_s:g} s ago"
+        return f"{self.camera} ({VIEW_NAMES.get(self.camera, self.camera)}), {when}"
+
+
+@dataclass(frozen=True)
+class FrameSource:
+    """Where the pictures of a data set lie.
+
+    Attributes:
+        root: Folder below which `data_path` is.
+        metadata: By token.
+        cameras: Which cameras a question comes with.
+        frames: How many samples back in time, the present one included.
+    """
+
+    root: Path
+    metadata: Mapping[str, Mapping[str, Any]]
+    cameras: Sequence[str] = CAMERAS
+    frames: int = FRAMES
+
+    def scene_type(self, token: str) -> str:
+        """What kind of scene it is, as the metadata say; empty where they do not."""
+        return str(self.metadata.get(token, {}).get("scenario") or "")
+
+    def paths(self, token: str) -> tuple[FramePath, ...]:
+        """The pictures of a sample, oldest first. At the beginning of a scene there are fewer frames.
+
+        Raises:
+            DataError: The metadata do not know the sample, or a camera of it.
+        """
+        if token not in self.metadata:
+            raise DataError(f"{UNTOLD}: the sample {token} is not in the metadata.")
+        chain: list[str] = []
+        at = token
+        while at in self.metadata and len(chain) < self.frames and at not in chain:
+            chain.append(at)
+            at = str(self.metadata[at].get("prev") or "")
+        found: list[FramePath] = []
+        for back, one in reversed(list(enumerate(chain))):
+            cams: Mapping[str, Any] = self.metadata[one].get("cams") or {}
+            for camera in self.cameras:
+                if "data_path" not in cams.get(camera, {}):
+                    raise DataError(f"{MISSING}: the metadata of {one} have no {camera}.")
+                path = self.root / str(cams[camera]["data_path"])
+                found.append(FramePath(camera, self._ago_s(token, one, back), path))
+        return tuple(found)
+
+    def _ago_s(self, token: str, before: str, back: int) -> float:
+        """Time between two samples, by their time stamps (microseconds), else by their places."""
+        then, now = (self.metadata[one].get("timestamp") for one in (before, token))
+        return back * STEP_S if then is None or now is None else round((now - then) * 1e-6, 2)
+
+    def missing(self, tokens: Sequence[str]) -> tuple[Path, ...]:
+        """Files that the samples need and that are not there."""
+        wanted: dict[Path, None] = {}
+        for token in tokens:
+            if token in self.metadata:
+                wanted |= dict.fromkeys(frame.path for frame in self.paths(token))
+        return tuple(path for path in wanted if not path.is_file())
+
+
+def read_picture(path: Path, side_px: int = 0, pictures: Pictures = "real") -> bytes:
+    """A picture as JPEG bytes.
+
+    Args:
+        path: Its file.
+        side_px: Longer side it is scaled down to; 0 leaves it as it is.
+        pictures: `blank` gives a grey one of the same size in its place.
+
+    Raises:
+        DataError: It is missing, or damaged.
+    """
+    from PIL import Image
+
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise DataError(f"{MISSING}: cannot read {path}: {error.strerror}.") from error
+    try:
+        image = Image.open(io.BytesIO(content))
+        image.load()
+    except Exception as error:  # PIL raises all kinds of things over damaged files
+        raise DataError(f"{CORRUPT}: {path} is no picture that can be read ({type(error).__name__}).") from error
+    scale = min(1.0, side_px / max(image.size)) if side_px else 1.0
+    size = (max(1, round(image.width * scale)), max(1, round(image.height * scale)))
+    if pictures == "blank":
+        return _grey(size)
+    if scale == 1.0 and image.format == "JPEG":
+        return content
+    small = image.convert("RGB").resize(size) if scale < 1.0 else image.convert("RGB")
+    return _jpeg(small)
+
+
+def data_uri(jpeg: bytes) -> str:
+    """A picture as chat-completions endpoints take it."""
+    return f"data:image/jpeg;base64,{base64.b64encode(jpeg).decode('ascii')}"
+
+
+@lru_cache(maxsize=16)
+def _grey(size: tuple[int, int]) -> bytes:
+    from PIL import Image
+
+    return _jpeg(Image.new("RGB", size, (128, 128, 128)))
+
+
+def _jpeg(image: Any) -> bytes:
+    out = io.BytesIO()
+    image.save(out, "JPEG", quality=90)
+    return out.getvalue()

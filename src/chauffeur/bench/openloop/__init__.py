@@ -1,0 +1,5 @@
+"""Open-loop planning (paper Tab. XII): nuScenes in its own file format, and frames of our own camera and traffic."""
+
+from chauffeur.bench.openloop.benchmark import OpenLoopBenchmark
+
+__all__ = ["OpenLoopBenchmark"]

@@ -1,0 +1,310 @@
+"""Open-loop planning for the kernel: a model is asked for waypoints, and what the car really did is the measure.
+
+Open loop means that nothing follows from an answer: the next picture comes whatever was said. Such figures say how a
+model imitates a log, not how it drives, and a car's own motion tells most of a log. So constant velocity stands in
+every row beside the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal, cast, get_args
+
+import numpy as np
+
+from chauffeur.bench.kernel.benchmark import BenchJob, ItemOutcome, RequestDesk
+from chauffeur.bench.kernel.calls import Request
+from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, mean, share
+from chauffeur.bench.kernel.store import Row
+from chauffeur.bench.openloop.asking import ASKING, THOUGHTS, OpenLoopSetting, Shown, opening, question
+from chauffeur.bench.openloop.conventions import Convention, L2Errors, distances, fails, standing
+from chauffeur.bench.openloop.extrapolation import constant_velocity
+from chauffeur.bench.openloop.nuscenes import FUTURE, NuScenesTables, PlanningSample
+from chauffeur.bench.openloop.reading import READING, read_waypoints
+from chauffeur.concept import ConfigError, DataError
+from chauffeur.planners.base import Prose
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from chauffeur.planners.prompts import Message
+
+    FloatArray = NDArray[np.float64]
+
+BENCH: Final = "openloop-v1"
+OpenLoopStatus = Literal["answered", "unreadable", "no answer"]
+_AWAY: Final = tuple(f"l2_{5 * (i + 1):02}" for i in range(FUTURE))
+"""Columns: distance of each waypoint, named by tenths of seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class OpenLoopRow:
+    """One frame.
+
+    Attributes:
+        item: Token of the sample.
+        scene: Frames of one hang together.
+        kind, place: Of our own sets: what happens next, and where; otherwise empty.
+        setting, shown: How it was asked, and whether the picture was the real one.
+        status: What became of it; `no answer` counts nowhere.
+        detail: Why there is none.
+        failed: More than 10 m off within the first second, or unreadable; None without an answer.
+        l2_05 ... l2_30: Distance of each waypoint from the true one, m; of an unreadable answer those of a car that
+            stays; None where the log had ended.
+        shifted: OpenEMMA's first second (`conventions`), m.
+        cv_05 ... cv_30, cv_shifted, cv_failed: The same of constant velocity.
+        answer: The model's words.
+    """
+
+    item: str
+    scene: str
+    kind: str
+    place: str
+    setting: str
+    shown: str
+    status: OpenLoopStatus
+    detail: str
+    failed: bool | None
+    l2_05: float | None
+    l2_10: float | None
+    l2_15: float | None
+    l2_20: float | None
+    l2_25: float | None
+    l2_30: float | None
+    shifted: float | None
+    cv_failed: bool
+    cv_05: float | None
+    cv_10: float | None
+    cv_15: float | None
+    cv_20: float | None
+    cv_25: float | None
+    cv_30: float | None
+    cv_shifted: float | None
+    answer: str
+
+
+Whose = Literal["l2", "cv"]
+
+
+def errors_of(row: AnyRow, convention: Convention, whose: Whose = "l2") -> L2Errors:
+    """The columns of a convention out of a stored row: of the model, or of constant velocity."""
+    away: list[float | None] = [row[name.replace("l2", whose)] for name in _AWAY]
+    if convention == "uniad":
+        return L2Errors(away[1], away[3], away[5])
+    known = [one for one in away if one is not None]
+    if len(known) < FUTURE:
+        return L2Errors(None, None, None)
+    first, second, third = (sum(known[:i]) / i for i in (2, 4, 6))
+    shifted = row["shifted" if whose == "l2" else "cv_shifted"]
+    return L2Errors(shifted if convention == "openemma" else first, second, third)
+
+
+def failed_of(row: AnyRow, whose: Whose = "l2") -> bool | None:
+    """Whether a stored row is a failure."""
+    return row["failed" if whose == "l2" else "cv_failed"]
+
+
+def _measures(convention: Convention, *, failures: bool) -> tuple[Measure, ...]:
+    def of(row: AnyRow, name: str) -> float | None:
+        if row["failed"] is None or (row["failed"] and not failures):
+            return None
+        return getattr(errors_of(row, convention), name)
+
+    tail = "all" if failures else "kept"
+    return tuple(
+        mean(f"openloop-{convention}-{tail}-{short}-v1", f"L2 {short}", "m", lambda row, name=name: of(row, name), 2)
+        for name, short in (("at_1s", "1s"), ("at_2s", "2s"), ("at_3s", "3s"), ("average", "avg"))
+    )
+
+
+FAILURE: Final = share("openloop-failure-v1", "failure rate", lambda row: row["failed"], 2)
+UNREADABLE: Final = share(
+    "openloop-unreadable-v1",
+    "no waypoints",
+    lambda row: None if row["failed"] is None else row["status"] == "unreadable",
+    2,
+)
+_TITLES: Final[Mapping[Convention, str]] = {
+    "openemma": "OpenEMMA's convention (the paper's Tab. XII)",
+    "stp3": "ST-P3's convention (means up to the second)",
+    "uniad": "UniAD's convention (at the second)",
+}
+
+
+def _tables() -> tuple[TableSpec, ...]:
+    found: list[TableSpec] = []
+    order: tuple[Convention, ...] = ("openemma", "stp3", "uniad")
+    for convention in order:
+        for failures in (False, True):
+            what = "failures counted" if failures else "failures left out"
+            measures = (*_measures(convention, failures=failures), FAILURE, UNREADABLE)
+            title = f"{_TITLES[convention]}, {what}"
+            found.append(TableSpec(title, measures, "kind", cluster="scene", heads=("next", "frames")))
+    return tuple(found)
+
+
+def distance_columns(predicted: FloatArray | None, truth: FloatArray, whose: Whose = "l2") -> dict[str, Any]:
+    """What a row stores of a prediction (6, 2), None for an unreadable one."""
+    found = standing() if predicted is None else predicted
+    away = distances(found, truth)
+    shifted = np.hypot(*(found[1:3] - truth[:2]).T)
+    columns: dict[str, Any] = {name.replace("l2", whose): _rounded(v) for name, v in zip(_AWAY, away, strict=True)}
+    columns["shifted" if whose == "l2" else "cv_shifted"] = _rounded(float(shifted.mean()))
+    columns["failed" if whose == "l2" else "cv_failed"] = fails(predicted, truth)
+    return columns
+
+
+def _rounded(value: float) -> float | None:
+    return round(float(value), 4) if np.isfinite(value) else None
+
+
+@dataclass(frozen=True, slots=True)
+class OpenLoopItem:
+    """A frame that is asked about."""
+
+    id: str
+    sample: PlanningSample
+
+
+class OpenLoopBenchmark:
+    """Frames of nuScenes, or of a set in its format."""
+
+    id = BENCH
+    asks: Literal["words"] = "words"
+    row = OpenLoopRow
+    tables = _tables()
+
+    def __init__(
+        self,
+        data: str,
+        version: str = "",
+        setting: str = "zero-shot",
+        shown: str = "pictures",
+        scenes: str = "",
+        side: int = 448,
+        limit: int = 0,
+        every: int = 1,
+    ) -> None:
+        """Make it.
+
+        Args:
+            data: Folder that holds the version's folder of tables, and `samples`.
+            version: E.g. `v1.0-mini`; default the only one there, or `v1.0-test` of a set of ours.
+            setting: `zero-shot`, `chain-of-thought` or `sft`.
+            shown: `pictures`, or `blank` (grey ones).
+            scenes: File with names of scenes, one a line: nuScenes' own splits are lists of names. Default all.
+            side: Longer side in px that pictures are scaled down to; 0 leaves them.
+            limit: Only the first so many frames; 0 for all.
+            every: Only every so many-th frame.
+
+        Raises:
+            ConfigError: An option makes no sense.
+            DataError: Tables cannot be read, or hold no frame that can be asked about.
+        """
+        if setting not in get_args(OpenLoopSetting):
+            known = ", ".join(get_args(OpenLoopSetting))
+            raise ConfigError(f"There is no setting {setting!r}.", hint=f"Choose of: {known}.")
+        if shown not in get_args(Shown):
+            raise ConfigError(f"Nothing is shown as {shown!r}.", hint="Choose pictures or blank.")
+        if every < 1 or limit < 0:
+            raise ConfigError(f"every={every} and limit={limit} make no sense.", hint="Give 1 or more, and 0 or more.")
+        self._setting: OpenLoopSetting = cast("OpenLoopSetting", setting)
+        self._shown: Shown = cast("Shown", shown)
+        self._side = side
+        root = Path(data)
+        self.tables_read = NuScenesTables(root, version or _only_version(root))
+        names, digest = _names(scenes)
+        self.samples = self.tables_read.samples(names)[::every][: limit or None]
+        if not self.samples:
+            raise DataError(f"{self.tables_read.folder} has no frame with 2 s before it.")
+        self.own = self.tables_read.marks is not None
+        self.config: Mapping[str, Any] = {
+            "data": root.name,
+            "version": self.tables_read.folder.name,
+            "data_sha256": self.tables_read.sha256,
+            "scenes": digest,
+            "setting": setting,
+            "shown": shown,
+            "side_px": side,
+            "limit": limit,
+            "every": every,
+            "command": "navigation" if self.own else "read off the true future, as ST-P3 and UniAD do",
+            "asking": ASKING,
+            "reading": READING,
+        }
+
+    def items(self) -> Sequence[OpenLoopItem]:
+        """See Benchmark."""
+        return [OpenLoopItem(one.id, one) for one in self.samples]
+
+    async def request(self, item: OpenLoopItem, desk: RequestDesk) -> Request:
+        """See Benchmark. Raises DataError: a picture is missing or damaged, or an earlier question got no answer."""
+        asked = question(item.sample, self._setting)
+        if self._setting != "chain-of-thought":
+            return [opening(item.sample, asked, self._shown, self._side)]
+        turns: list[Message] = [opening(item.sample, THOUGHTS[0], self._shown, self._side)]
+        for following in (*THOUGHTS[1:], asked):
+            reply = await desk.ask(tuple(turns))
+            if not isinstance(reply, Prose):
+                raise DataError(f"No answer to {_last_text(turns)!r}.")
+            turns.append(cast("Message", {"role": "assistant", "content": reply.text}))
+            turns.append(cast("Message", {"role": "user", "content": following}))
+        return turns
+
+    def job(self, item: OpenLoopItem, answer: Row | None) -> BenchJob | None:
+        """See Benchmark: the answer itself is the result."""
+        del item, answer
+
+    def rows(self, outcome: ItemOutcome[OpenLoopItem]) -> Sequence[OpenLoopRow]:
+        """See Benchmark."""
+        if outcome.answer is None and not outcome.error:
+            return ()
+        sample = outcome.item.sample
+        words = "" if outcome.answer is None else str(outcome.answer["text"])
+        predicted = None if outcome.answer is None else read_waypoints(words)
+        own = distance_columns(predicted, sample.future)
+        status: OpenLoopStatus = "answered" if predicted is not None else "unreadable"
+        if outcome.answer is None:
+            status, own = "no answer", dict.fromkeys(own)
+        columns: dict[str, Any] = {
+            "item": sample.id,
+            "scene": sample.scene,
+            "kind": sample.kind,
+            "place": sample.place,
+            "setting": self._setting,
+            "shown": self._shown,
+            "status": status,
+            "detail": outcome.error,
+            **own,
+            **distance_columns(constant_velocity(sample.history), sample.future, "cv"),
+            "answer": words,
+        }
+        return (OpenLoopRow(**columns),)
+
+
+def _last_text(turns: Sequence[Any]) -> str:
+    content: Any = turns[-1]["content"]
+    return content if isinstance(content, str) else str(content[-1]["text"])
+
+
+def _only_version(root: Path) -> str:
+    found = sorted(one.parent.name for one in root.glob("*/sample.json"))
+    if "v1.0-test" in found and (root / "v1.0-test" / "openloop.json").is_file():
+        return "v1.0-test"
+    if len(found) != 1:
+        there = ", ".join(found) or "none"
+        raise DataError(f"{root} has not one version of nuScenes' tables (there: {there}).", hint="Set version=NAME.")
+    return found[0]
+
+
+def _names(path: str) -> tuple[frozenset[str] | None, str]:
+    """Scenes of a file, and how a run tells them."""
+    if not path:
+        return None, "all"
+    try:
+        names = frozenset(Path(path).read_text(encoding="utf-8").split())
+    except OSError as error:
+        raise DataError(f"The list of scenes {path} cannot be read: {error.strerror}.") from error
+    return names, f"{len(names)} of {Path(path).name}"

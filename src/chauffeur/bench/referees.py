@@ -1,0 +1,45 @@
+"""Who judges a single trip, by what its world can be judged by."""
+
+from __future__ import annotations
+
+from chauffeur.bench.lampilot.understood import referee_for as lampilot_referee
+from chauffeur.concept import Parameters, Plan, Scenario, Trajectory
+from chauffeur.drive.episode import Referee
+from chauffeur.geometry import Pose
+from chauffeur.worlds.base import World
+
+
+def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
+    """The judge of a trip: LaMPilot's by the scenario's own goal, else what the planner understood, else none. In a
+    parking lot, the judge of the spot that is meant; in a town, of the place; on an open road, of a trajectory's end.
+
+    Raises:
+        ScenarioError: There is no such spot.
+    """
+    if world.capabilities.places:
+        return _town_referee(world) or _parking_referee(world, plan)
+    if isinstance(plan.policy, Trajectory):
+        return _street_referee(world, plan.policy)
+    return lampilot_referee(world, scenario, plan)
+
+
+def _town_referee(world: World) -> Referee | None:
+    from chauffeur.worlds.town import TownReferee, TownWorld
+
+    return TownReferee(world) if isinstance(world, TownWorld) else None
+
+
+def _street_referee(world: World, trajectory: Trajectory) -> Referee | None:
+    from chauffeur.worlds.track import StreetReferee, TrackWorld, end_of
+
+    if not isinstance(world, TrackWorld) or not world.open_road:
+        return None
+    ego = world.observe().ego
+    return StreetReferee(world, end_of(trajectory, Pose(ego.x_m, ego.y_m, ego.heading_rad)))
+
+
+def _parking_referee(world: World, plan: Plan) -> Referee | None:
+    from chauffeur.worlds.parking import ParkingReferee, ParkingWorld
+
+    place = plan.policy.route if isinstance(plan.policy, Parameters) else ""
+    return ParkingReferee(world, world.spot(place)) if place and isinstance(world, ParkingWorld) else None

@@ -1,0 +1,124 @@
+"""`chauffeur bench leaderboard`: CARLA Leaderboard 1.0's routes, scenarios and scoring in a town."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+EXAMPLES = """
+Examples:
+
+    chauffeur bench leaderboard --planner expert
+
+    chauffeur bench leaderboard --routes routes_testing.xml --scenarios public --seeds 3
+
+    chauffeur bench leaderboard --routes routes_testing.xml --planner reckless --towns Town02 --seeds 1
+
+    chauffeur bench leaderboard --routes routes_testing.xml --planner retrieval --shield --latency 0.1
+
+    chauffeur bench leaderboard --planner openai/gpt-4o --setting human-feedback --repository policies
+
+A planner of the registry knows no route: it is told navigation instructions in words, and its programs drive
+(paper, Tab. V). Planning takes simulated time, and the car does not wait for it.
+
+Without --routes it drives our own routes through our own towns. The official files and CARLA's maps are the user's to
+bring: a route file is read unchanged, triggers are looked for in `../scenarios` beside it, maps come from `chauffeur
+maps`. The folder of the run gets the official results file and a map of every route. Ctrl-C keeps what is done; the
+same command goes on.
+
+Scores of the engine `sumo-2d` are no CARLA scores and must not be set beside published ones.
+"""
+
+_LANGUAGE = "Language planners"
+_WHERE = "Where it runs"
+
+
+def leaderboard(
+    planner: Annotated[
+        str, typer.Option(help="`expert`, `reckless`, `standing`, or a planner: `retrieval`.")
+    ] = "expert",
+    routes: Annotated[str, typer.Option(help="Route file (XML), or `own`.")] = "own",
+    scenarios: Annotated[str, typer.Option(help="`public`, `ten` or `none`.")] = "public",
+    triggers: Annotated[str, typer.Option(help="Trigger file or folder, where it is elsewhere.")] = "",
+    seeds: Annotated[int, typer.Option(min=1, help="How often each route is driven.")] = 3,
+    density: Annotated[float, typer.Option(min=0.0, help="Factor of the background traffic.")] = 1.0,
+    people: Annotated[int, typer.Option(min=0, help="People on foot; the rules know none.")] = 0,
+    scoring: Annotated[str, typer.Option(help="`lb1.0` or `lb2.1`.")] = "lb1.0",
+    towns: Annotated[str, typer.Option(help="Only these towns, with commas between.")] = "",
+    limit: Annotated[int, typer.Option(min=0, help="Only so many routes; 0 for all.")] = 0,
+    shield: Annotated[
+        bool, typer.Option("--shield/--no-shield", help="Whether the safety filter drives along.")
+    ] = False,
+    setting: Annotated[
+        str,
+        typer.Option(help="`zero-shot`, `few-shot` or `human-feedback`.", rich_help_panel=_LANGUAGE),
+    ] = "few-shot",
+    repository: Annotated[
+        Path | None, typer.Option(help="Snippets of `human-feedback`.", rich_help_panel=_LANGUAGE)
+    ] = None,
+    latency: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="Seconds a plan takes; default what it took.", rich_help_panel=_LANGUAGE),
+    ] = None,
+    base_url: Annotated[str, typer.Option(help="OpenAI-compatible endpoint.", rich_help_panel=_LANGUAGE)] = "",
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/leaderboard-PLANNER.")] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Worker processes; default one per core.", rich_help_panel=_WHERE)
+    ] = None,
+    shard: Annotated[
+        str | None, typer.Option(help="Only part i of n, as for `bench lampilot`.", rich_help_panel=_WHERE)
+    ] = None,
+    ray: Annotated[
+        str | None, typer.Option(help="Work on a Ray cluster, as for `bench lampilot`.", rich_help_panel=_WHERE)
+    ] = None,
+) -> None:
+    """CARLA Leaderboard 1.0 anywhere: RC, IP and DS over routes with traffic, lights and scenarios."""
+    import os
+
+    from chauffeur.bench.kernel.report import tables
+    from chauffeur.bench.kernel.run import BenchRun
+    from chauffeur.bench.kernel.shards import WHOLE, Shard
+    from chauffeur.bench.leaderboard.artefacts import write_artefacts
+    from chauffeur.bench.leaderboard.benchmark import LeaderboardBenchmark
+    from chauffeur.bench.leaderboard.published import ENGINES_DIFFER, HEADER, beside_the_paper
+    from chauffeur.bench.leaderboard.results import NOTE
+    from chauffeur.bench.leaderboard.scoring import scoring_named
+    from chauffeur.cli.bench_run import carry_out, effort, finish, show_tables
+    from chauffeur.cli.console import stdout
+    from chauffeur.cli.tables import show_table
+
+    console = stdout()
+    bench = LeaderboardBenchmark(
+        routes,
+        scenarios,
+        triggers,
+        planner,
+        seeds,
+        density,
+        people,
+        scoring_named(scoring),
+        towns,
+        limit,
+        shield,
+        setting,
+        str(repository or ""),
+        latency,
+        base_url,
+    )
+    part = WHOLE if shard is None else Shard.parse(shard, os.environ)
+    folder = out or Path("runs") / f"leaderboard-{planner.replace('/', '-')}"
+    run = BenchRun(folder if part == WHOLE else folder / part.folder, bench, None, shard=part)
+    work = effort(workers, ray=ray)
+    rows = carry_out(console, run, lambda watch: run.run(watch, work), f"Leaderboard 1.0, {planner}")
+    show_tables(console, tables(bench.tables, rows))
+    if rows:
+        results = {item.id: run.stages.outcome(item).result for item in run.items}
+        written = write_artefacts(run.folder, bench, rows, results)
+        console.print(f"Official results: {written[0]}; {len(written) - 1} route maps beside it.", soft_wrap=True)
+        console.print(NOTE)
+        console.print()
+        show_table(console, "Beside the paper's Tab. V", HEADER, beside_the_paper(planner, bench.setting, rows))
+        console.print(ENGINES_DIFFER)
+    finish(console, run)

@@ -1,0 +1,108 @@
+"""`chauffeur bench nuplanqa`: what a vision-language model sees and understands of a road (paper Tab. VI)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+ASKING = "Asking"
+
+EXAMPLES = """
+Examples:
+
+    chauffeur bench nuplanqa --data nuplanqa_eval_test.json --metadata nuplan_metadata.pkl --images nuplan --planner
+    openai/gpt-4o
+
+    chauffeur bench nuplanqa --data qa/test --planner openai/qwen2.5-vl --base-url http://localhost:8000/v1 --shifts all
+
+    chauffeur bench nuplanqa --data qa/test --planner openai/gpt-4o --control text
+
+    chauffeur bench nuplanqa --data qa/test --planner bev-llm
+
+    chauffeur bench nuplanqa --data qa/test --planner transformers/checkpoints/llama-3.2-11b-vision-instruct
+
+`--data` is a file in NuPlanQA's published format, or a folder that `chauffeur bench scenes qa` has made. Pictures that
+are missing or damaged cost their own questions only; they are counted apart. Ctrl-C keeps what is done; the same
+command goes on.
+"""
+
+
+def nuplanqa(
+    data: Annotated[Path, typer.Option(help="File of questions, or a folder with `questions.json`.")],
+    planner: Annotated[str, typer.Option(help="The model: openai/NAME, transformers/FOLDER, bev-llm, bev-llm/FOLDER.")],
+    images: Annotated[
+        Path | None, typer.Option(help="Folder below which the metadata's paths lie; default beside the questions.")
+    ] = None,
+    metadata: Annotated[Path | None, typer.Option(help="Metadata, JSON or NuPlanQA's pickle.")] = None,
+    control: Annotated[str, typer.Option(help="`pictures`, `blank` (grey ones) or `text` (none).")] = "pictures",
+    single_frame: Annotated[
+        bool, typer.Option("--single-frame", help="Show one instant in place of the last 1.5 s.")
+    ] = False,
+    cameras: Annotated[str | None, typer.Option(help="Cameras, separated by commas; default NuPlanQA's six.")] = None,
+    shifts: Annotated[
+        str, typer.Option(help="Places the options are moved on; `all` asks each question 4 times.")
+    ] = "0",
+    side: Annotated[int, typer.Option(min=0, help="Longer side of the pictures in px; 0 as they are.")] = 448,
+    limit: Annotated[
+        int, typer.Option(min=0, help="Only the first so many questions; 0 for all.", rich_help_panel=ASKING)
+    ] = 0,
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/nuplanqa-PLANNER.")] = None,
+    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.", rich_help_panel=ASKING)] = None,
+    concurrency: Annotated[int, typer.Option(min=1, help="Calls in flight at most.", rich_help_panel=ASKING)] = 8,
+    max_usd: Annotated[
+        float | None, typer.Option(min=0.0, help="Budget of the run in USD.", rich_help_panel=ASKING)
+    ] = None,
+    max_requests: Annotated[
+        int | None, typer.Option(min=0, help="Budget of the run in requests.", rich_help_panel=ASKING)
+    ] = None,
+    price: Annotated[
+        str | None, typer.Option(help="USD per million tokens, IN/OUT, where it is not known.", rich_help_panel=ASKING)
+    ] = None,
+) -> None:
+    """Nine subtasks in four-way questions about pictures of a road, beside a baseline that sees none of them."""
+    from chauffeur.bench.kernel.report import markdown, tables
+    from chauffeur.bench.kernel.run import BenchRun, write_results
+    from chauffeur.bench.nuplanqa import NuPlanQaBenchmark
+    from chauffeur.bench.nuplanqa.frames import CAMERAS
+    from chauffeur.bench.nuplanqa.table6 import HEADER, our_lines, paper_lines, strict_accuracy
+    from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
+    from chauffeur.cli.console import plain, stdout
+    from chauffeur.cli.tables import show_table
+    from chauffeur.concept import DataError
+    from chauffeur.planners.registry import make_answerer
+
+    console = stdout()
+    frames: Literal["single", "multi"] = "single" if single_frame else "multi"
+    bench = NuPlanQaBenchmark(
+        str(data), str(images or ""), str(metadata or ""), control, frames, cameras or ",".join(CAMERAS), shifts, side,
+        limit,
+    )  # fmt: skip
+    for what in bench.unreadable:
+        console.print(plain(f"Left out: {what}"), soft_wrap=True)
+    if control != "text":
+        missing = bench.frames.missing([item.token for item in bench.questions if item.token in bench.frames.metadata])
+        if missing:
+            console.print(f"{len(missing):,} pictures are not there, the first {missing[0]}.", soft_wrap=True)
+    who = make_answerer(planner, **planner_options(planner, base_url))
+    name = "-".join(["nuplanqa", planner.replace("/", "-"), *([] if control == "pictures" else [control])])
+    run = BenchRun(out or Path("runs") / name, bench, who)
+    work = effort(1, concurrency, max_usd, max_requests, price)
+    rows = carry_out(console, run, lambda watch: run.run(watch, work), f"NuPlanQA ({bench.id})")
+    show_tables(console, tables(bench.tables, rows))
+    ours = our_lines(who.id if control == "pictures" else f"{who.id}, {control} control", rows)
+    try:
+        theirs = paper_lines(frames)
+    except DataError as error:
+        console.print(f"Without the paper's rows: {error.message}", soft_wrap=True)
+        theirs = []
+    title = "Beside the paper's Tab. VI (accuracy in %; its rows are of nuPlan's published evaluation file)"
+    show_table(console, title, HEADER, [*ours, *theirs])
+    write_results(run.folder, {"table6.md": f"# {title}\n\n{markdown(HEADER, [*ours, *theirs])}\n"})
+    if (strict := strict_accuracy(rows)) is not None:
+        console.print(f"Right in all four circular shifts: {strict[0]:.1%} of {strict[1]} questions.")
+    scenes = {row["scene"] for row in rows}
+    if any(scene.startswith("simulated") for scene in scenes):
+        console.print("The pictures are rendered and the questions generated: simulated, not nuPlan's.")
+    finish(console, run)

@@ -1,0 +1,174 @@
+"""`chauffeur bench openloop` and `bench scenes frames`: three seconds ahead from one picture (paper Tab. XII)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+ASKING = "Asking"
+EXAMPLES = """
+Examples:
+
+    chauffeur bench openloop --data nuscenes --tables v1.0-mini --planner openai/gpt-4o
+
+    chauffeur bench openloop --data nuscenes --tables v1.0-mini --planner openai/MODEL --setting chain-of-thought
+
+    chauffeur bench openloop --data frames --planner vilad-frames/runs/frames/model --setting sft
+
+    chauffeur bench openloop --data frames --planner openai/MODEL --beside runs/openloop-vilad-frames
+
+    chauffeur bench openloop --data nuscenes --tables v1.0-trainval --scene-list train.txt --write-sft sft.jsonl
+
+`--data` is a folder with nuScenes' tables and pictures, or a set that `chauffeur bench scenes frames` has made.
+Constant velocity is printed beside every model: in open loop a car's own motion tells most. Ctrl-C keeps what is done;
+the same command goes on.
+"""
+FRAMES_EXAMPLES = """
+Examples:
+
+    chauffeur bench scenes frames --out frames
+
+    chauffeur bench scenes frames --out frames-large --trips 400 --width 320 --height 192
+
+    chauffeur model train vilad-frames --data frames --out runs/frames
+
+Trips are driven by the worlds' own drivers in our towns, on the highway and over the crossing; frames are chosen by
+what happens in the three seconds after them, so that a car's own motion does not tell it. nuScenes' file format;
+simulated and rendered. Ctrl-C keeps whole trips; the same command goes on.
+"""
+
+
+def openloop(
+    data: Annotated[Path, typer.Option(help="Folder with nuScenes' tables and `samples`.")],
+    planner: Annotated[
+        str, typer.Option(help="The model: openai/NAME, transformers/FOLDER, vilad-frames/FOLDER.")
+    ] = "",
+    tables_of: Annotated[str, typer.Option("--tables", help="E.g. v1.0-mini; default the only one.")] = "",
+    setting: Annotated[str, typer.Option(help="`zero-shot`, `chain-of-thought` or `sft`.")] = "zero-shot",
+    shown: Annotated[str, typer.Option(help="`pictures`, or `blank` (grey ones).")] = "pictures",
+    scene_list: Annotated[Path | None, typer.Option(help="File with the names of scenes, one a line.")] = None,
+    side: Annotated[int, typer.Option(min=0, help="Longer side of the pictures in px; 0 as they are.")] = 448,
+    stride: Annotated[int, typer.Option(min=1, help="Only every so many-th frame.")] = 1,
+    limit: Annotated[int, typer.Option(min=0, help="Only the first so many frames; 0 for all.")] = 0,
+    beside: Annotated[
+        list[Path] | None, typer.Option(help="Folder of another run to show beside this one; may come again.")
+    ] = None,
+    write_sft: Annotated[
+        Path | None, typer.Option(help="Write the frames as lines for chat fine-tuning, and stop.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/openloop-PLANNER.")] = None,
+    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.", rich_help_panel=ASKING)] = None,
+    concurrency: Annotated[int, typer.Option(min=1, help="Calls in flight at most.", rich_help_panel=ASKING)] = 8,
+    max_usd: Annotated[
+        float | None, typer.Option(min=0.0, help="Budget of the run in USD.", rich_help_panel=ASKING)
+    ] = None,
+    max_requests: Annotated[
+        int | None, typer.Option(min=0, help="Budget of the run in requests.", rich_help_panel=ASKING)
+    ] = None,
+    price: Annotated[
+        str | None, typer.Option(help="USD per million tokens, IN/OUT, where it is not known.", rich_help_panel=ASKING)
+    ] = None,
+) -> None:
+    """Waypoints over three seconds from a front picture and own motion, under three conventions (paper Tab. XII)."""
+    from chauffeur.bench.kernel.report import markdown, tables
+    from chauffeur.bench.kernel.run import BenchRun, write_results
+    from chauffeur.bench.openloop import OpenLoopBenchmark
+    from chauffeur.bench.openloop.asking import training_lines
+    from chauffeur.bench.openloop.frames import SIMULATED
+    from chauffeur.bench.openloop.table12 import HEADER, LEARNING, our_line, paper_lines
+    from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
+    from chauffeur.cli.console import stdout
+    from chauffeur.cli.tables import show_table
+    from chauffeur.concept import ConfigError, DataError
+    from chauffeur.drive.files import publish
+    from chauffeur.planners.registry import make_answerer
+
+    console = stdout()
+    bench = OpenLoopBenchmark(
+        str(data), tables_of, "sft" if write_sft else setting, shown, str(scene_list or ""), side, limit, stride
+    )
+    if write_sft is not None:
+        lines = [*training_lines((one for one in bench.samples if one.whole), data)]
+        publish(write_sft, "".join(lines).encode(), "lines for fine-tuning")
+        console.print(f"{len(lines):,} lines in {write_sft}; pictures are named below {data}.", soft_wrap=True)
+        return
+    if not planner:
+        raise ConfigError("Nobody is asked.", hint="Name a model with --planner, e.g. openai/gpt-4o.")
+    who = make_answerer(planner, **planner_options(planner, base_url))
+    parts = ["openloop", planner.replace("/", "-"), *(one for one in (setting, shown) if one not in _USUAL)]
+    run = BenchRun(out or Path("runs") / "-".join(parts), bench, who)
+    work = effort(1, concurrency, max_usd, max_requests, price)
+    rows = carry_out(console, run, lambda watch: run.run(watch, work), f"Open-loop planning ({bench.id})")
+    show_tables(console, tables(bench.tables, rows))
+    on = "our frames" if bench.own else "nuScenes"
+    shown_as = "" if shown == "pictures" else ", grey pictures"
+    compared = [our_line(f"{who.id}{shown_as} ({on})", LEARNING[setting], rows)]
+    compared += [our_line(f"{name} ({on})", "", held) for name, held in _others(beside or [])]
+    compared.append(our_line(f"constant velocity ({on})", "none", rows, "cv"))
+    try:
+        compared += paper_lines()
+    except DataError as error:
+        console.print(f"Without the paper's rows: {error.message}", soft_wrap=True)
+    title = "Beside the paper's Tab. XII (OpenEMMA's convention, failures left out of the means)"
+    show_table(console, title, HEADER, compared)
+    write_results(run.folder, {"table12.md": f"# {title}\n\n{markdown(HEADER, compared, 2)}\n"})
+    if bench.own:
+        console.print(SIMULATED, soft_wrap=True)
+    else:
+        console.print("Commands are read off the true future, as ST-P3 and UniAD do: no input a car would have.")
+    finish(console, run)
+
+
+_USUAL = ("zero-shot", "pictures")
+
+
+def _others(folders: list[Path]) -> list[tuple[str, list[Mapping[str, Any]]]]:
+    """(name, rows) of other runs. Raises DataError: a folder holds no results."""
+    from chauffeur.concept import DataError
+
+    found: list[tuple[str, list[Mapping[str, Any]]]] = []
+    for folder in folders:
+        try:
+            lines = (folder / "results.jsonl").read_text(encoding="utf-8").splitlines()
+            found.append((folder.name.removeprefix("openloop-"), [json.loads(line) for line in lines]))
+        except (OSError, ValueError) as error:
+            raise DataError(f"{folder} holds no results of a run: {error}.") from error
+    return found
+
+
+def frames(
+    out: Annotated[Path, typer.Option(help="Folder to write; a set begun there is continued.")],
+    trips: Annotated[
+        int, typer.Option(min=8, help="Trips for training; validation has an eighth, the test split a quarter.")
+    ] = 160,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    width: Annotated[int, typer.Option(min=32, help="Pictures' width, px.")] = 160,
+    height: Annotated[int, typer.Option(min=32, help="Pictures' height, px.")] = 96,
+    seconds: Annotated[float, typer.Option(min=10.0, help="Of a trip in town, at most.")] = 80.0,
+    most: Annotated[int, typer.Option(min=6, help="Frames kept of a trip, at most.")] = 60,
+) -> None:
+    """Front pictures of our own traffic with 2 s of motion before and 3 s after them, in nuScenes' format."""
+    from chauffeur.bench.openloop.extrapolation import FUTURE_KINDS
+    from chauffeur.bench.openloop.frames import SIMULATED, FramesConfig, make_frames
+    from chauffeur.cli.console import stdout
+    from chauffeur.cli.scenes import progress
+    from chauffeur.cli.tables import show_table
+
+    console = stdout()
+    config = FramesConfig(trips, seed, width, height, seconds, most)
+    try:
+        with progress(console, "trips") as show:
+            counts = make_frames(out, config, show)
+    except KeyboardInterrupt:
+        console.print(f"Stopped. Whole trips are kept in {out}; run the same command to go on.")
+        raise typer.Exit(130) from None
+    lines = [(kind, *(f"{counts[split].get(kind, 0):,}" for split in counts)) for kind in FUTURE_KINDS]
+    show_table(console, "Frames by what happens next", ("next", *counts), lines)
+    console.print(SIMULATED, soft_wrap=True)
+    console.print(f"Next: chauffeur model train vilad-frames --data {out} --out runs/frames", soft_wrap=True)

@@ -1,0 +1,240 @@
+"""From words to a checked plan: `plan_once` is the only way from I to V, for every drive.
+
+What really differs between drives is handed in as `PlanSteps`; the order, and what no drive may leave out, stands here:
+
+    I C H S   gathered, and screened: words are data, whoever wrote them
+    R P       the car's own answer to emergency words, else an answer from C to a question, else the planner's; one that
+              hangs or breaks ends in an error with words
+    ?         a question of the car is asked only where a yes to it could be driven
+    V         the checks, and what the person forbade in words
+
+A simulated drive checks at once, as its world waits. A live drive checks in another process, at the instant the plan
+begins. A vehicle looks again, because it has driven on. A benchmark plans and drives in different processes, its stored
+answers again and again: what it asks is a `screened_request` as well, and `checked` files what came of it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from chauffeur.concept import (
+    CameraImage,
+    ChauffeurError,
+    Context,
+    History,
+    Instruction,
+    Limits,
+    Observation,
+    Plan,
+    PlannerError,
+    PlanRequest,
+    Round,
+    SystemMessage,
+    Thoughts,
+    Verdict,
+)
+from chauffeur.drive.answering import plan_or_answer
+from chauffeur.drive.emergency import check_told_not_to
+from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
+from chauffeur.planners.base import Planner
+from chauffeur.safety.base import Check
+from chauffeur.safety.checks import DEFAULT_CHECKS, run_checks
+from chauffeur.safety.screening import screen_request
+from chauffeur.safety.words import reasons_once
+
+RECALLED: Final = 3
+"""Remembered trips that H holds at most."""
+PLAN_WITHIN_S: Final = 60.0
+"""Time of the clock after which a planner is given up on, where a car waits."""
+START_WITHIN_S: Final = 10.0
+"""A plan that begins later than this was made for a place that the car has left."""
+
+_NO_HISTORY: Final = History()
+_USUAL_LIMITS: Final = Limits()
+
+Judged = tuple[tuple[Verdict, ...], Observation]
+"""V, and the instant it was found at."""
+
+
+def no_pictures(observation: Observation) -> tuple[CameraImage, ...]:
+    """What a planner without eyes is shown."""
+    del observation
+    return ()
+
+
+def _as_it_is(plan: Plan) -> Plan:
+    return plan
+
+
+@dataclass(frozen=True, slots=True)
+class PlanSteps:
+    """What differs between drives on the way from words to a checked plan.
+
+    Attributes:
+        planner: Who plans.
+        limits: Of the person and the operator.
+        describe: C.
+        recall: H.
+        system: S.
+        own: The car's own plan for emergency words, which no planner decides; None where they are a planner's business.
+        check: V, at the latest instant there is. Its second argument tells that the plan is the car's own.
+        check_yes: V of what a yes would drive, where `check` leaves that to another process.
+        see: V of the paper: pictures, for planners that look.
+        fit: What the vehicle takes of a plan, whose maker knows no vehicle.
+        tell: Hears each letter as it comes.
+        within_s: Time of the clock after which the planner is given up on.
+    """
+
+    planner: Planner
+    limits: Limits
+    describe: Callable[[], Awaitable[Context]]
+    recall: Callable[[Instruction, Context], Awaitable[History]]
+    system: Callable[[], SystemMessage]
+    own: Callable[[str], Plan | None]
+    check: Callable[[Plan, bool], Awaitable[Judged]]
+    check_yes: Callable[[Plan, bool], Awaitable[Judged]] | None = None
+    see: Callable[[], tuple[CameraImage, ...]] = tuple
+    fit: Callable[[Plan], Plan] = _as_it_is
+    tell: Listener = nobody_listens
+    within_s: float = math.inf
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A plan and what stands between it and the vehicle, driven or not.
+
+    Attributes:
+        plan: R and P.
+        verdicts: V.
+    """
+
+    plan: Plan
+    verdicts: tuple[Verdict, ...]
+
+    @property
+    def refusal(self) -> str:
+        """Why it is not driven, in words; empty when it may be."""
+        return declined(self.plan, self.verdicts)
+
+    @property
+    def unusable(self) -> bool:
+        """Whether it failed as a policy (no program, or not of the language), not as a wish."""
+        return unusable(self.plan, self.verdicts)
+
+
+@dataclass(frozen=True)
+class Planned(Checked):
+    """What words came to.
+
+    Attributes:
+        request: What the planner was given, or would have been.
+    """
+
+    request: PlanRequest
+
+
+async def plan_once(instruction: Instruction, steps: PlanSteps) -> Planned:
+    """The way of one wish from I to V.
+
+    Raises:
+        ChauffeurError: No plan could be had.
+    """
+    request = await request_once(instruction, steps)
+    own = steps.own(instruction.text)
+    if own is None:
+        plan = await _worth_asking(steps.fit(await _planned(request, steps)), request, steps)
+    else:
+        plan = steps.fit(own)
+    steps.tell(DriveEvent("plan", text=plan.thoughts.text, value=plan))
+    verdicts, now = await steps.check(plan, own is not None)
+    if own is None:
+        verdicts = (*verdicts, *check_told_not_to(instruction.text, plan, now))
+    steps.tell(DriveEvent("verdicts", value=verdicts))
+    return Planned(plan, verdicts, request)
+
+
+async def request_once(instruction: Instruction, steps: PlanSteps) -> PlanRequest:
+    """Everything the planner is given for a wish in a situation. Nobody is asked yet."""
+    context = await steps.describe()
+    history = await steps.recall(instruction, context)
+    system = steps.system()
+    steps.tell(DriveEvent("wish", text=instruction.text, value=instruction))
+    steps.tell(DriveEvent("context", text=context.text, value=context))
+    steps.tell(DriveEvent("history", text=f"{len(history.items)} remembered", value=history))
+    steps.tell(DriveEvent("system", value=system))
+    images = steps.see()
+    if images:
+        steps.tell(DriveEvent("view", value=images))
+    return screened_request(instruction, context, system, history, limits=steps.limits, images=images)
+
+
+def screened_request(
+    instruction: Instruction,
+    context: Context,
+    system: SystemMessage,
+    history: History = _NO_HISTORY,
+    rounds: tuple[Round, ...] = (),
+    limits: Limits = _USUAL_LIMITS,
+    images: tuple[CameraImage, ...] = (),
+) -> PlanRequest:
+    """What a planner is given, in a drive or a benchmark: put together here alone, and screened.
+
+    The arguments are those of `PlanRequest`.
+    """
+    return screen_request(PlanRequest(instruction, context, system, history, rounds, limits, images))[0]
+
+
+async def _planned(request: PlanRequest, steps: PlanSteps) -> Plan:
+    """R and P of a planner, which may be anybody's code: not waited for beyond its time, even where it hangs."""
+    task = asyncio.ensure_future(plan_or_answer(steps.planner, request))
+    try:
+        done, _ = await asyncio.wait({task}, timeout=None if math.isinf(steps.within_s) else steps.within_s)
+    finally:
+        task.cancel()
+    if not done:
+        raise PlannerError(f"No plan within {steps.within_s:.0f} s.", retryable=True)
+    if task.cancelled():
+        raise PlannerError("The planner gave up.", retryable=True)
+    error = task.exception()
+    if error is None:
+        return task.result()
+    if isinstance(error, ChauffeurError) or not isinstance(error, Exception):
+        raise error
+    raise PlannerError(f"The planner failed: {type(error).__name__}: {error}", retryable=True) from error
+
+
+async def _worth_asking(plan: Plan, request: PlanRequest, steps: PlanSteps) -> Plan:
+    """The plan; of a question to which a yes would be refused, that refusal, with nothing left to ask."""
+    if not plan.offer or plan.policy is not None:
+        return plan
+    confirmed = replace(request.instruction, text=plan.offer, confirmed=plan.refusal)
+    try:
+        meant = steps.fit(await _planned(replace(request, instruction=confirmed), steps))
+    except ChauffeurError:
+        return plan
+    if meant.policy is None:
+        return plan
+    verdicts, _ = await (steps.check if steps.check_yes is None else steps.check_yes)(meant, False)
+    why = reasons_once(verdicts, remedies=True)
+    return replace(plan, thoughts=Thoughts(why), refusal=why, offer="", intent=meant.intent) if why else plan
+
+
+def checked(plan: Plan, observation: Observation, limits: Limits, checks: Sequence[Check] = DEFAULT_CHECKS) -> Checked:
+    """V of a plan that was made elsewhere: a benchmark's, whose answers are stored and driven by other processes."""
+    return Checked(plan, run_checks(plan, observation, limits, checks))
+
+
+def declined(plan: Plan, verdicts: tuple[Verdict, ...]) -> str:
+    """Why a plan is not driven, in words; empty when it may be."""
+    return plan.refusal or reasons_once(verdicts)
+
+
+def unusable(plan: Plan, verdicts: tuple[Verdict, ...]) -> bool:
+    """Whether a plan that is not driven failed as a policy (no program, or not of the language), not as a wish."""
+    if plan.refusal:
+        return plan.intent == "unusable"
+    return bool(verdicts) and verdicts[0].stops

@@ -1,0 +1,272 @@
+"""What drives one kind of policy: executors, and the registry that finds them by the kind of a policy.
+
+Every control period goes the same way, in simulated time, in real time and in benchmarks:
+
+    tick = executor.tick()                          what the policy asks for in this period
+    held = ...                                      its set-points as limits, or a fallback level, leave them
+    command = executor.step(observation, held)      what the controllers make of them, for the one door to the actuator
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal, Protocol, runtime_checkable
+
+from chauffeur.concept import (
+    ApiCall,
+    ChauffeurError,
+    Command,
+    Limits,
+    Observation,
+    ProgramState,
+    ScenarioError,
+    VehicleState,
+    Wishes,
+)
+from chauffeur.concept.registry import load_plugin, plugin_names
+from chauffeur.geometry import Polyline
+from chauffeur.safety.format import EXECUTORS
+from chauffeur.worlds.base import World
+from chauffeur.worlds.parking.following import Chassis
+
+ExecutorStatus = Literal["running", "finished"]
+
+
+@runtime_checkable
+class KnowsChassis(Protocol):
+    """A world that tells the size and the axles of its ego."""
+
+    @property
+    def chassis(self) -> Chassis: ...
+
+
+class SetManoeuvre(Protocol):
+    """A path that is to be driven and at what speed: what the motion planning layer hands to the controllers."""
+
+    @property
+    def path(self) -> Polyline: ...
+    @property
+    def speed_mps(self) -> float: ...
+    @property
+    def goal_m(self) -> float | None: ...
+
+
+@runtime_checkable
+class SetsManoeuvre(Protocol):
+    """A world in which it is set what is driven, and a policy sets how."""
+
+    @property
+    def manoeuvre(self) -> SetManoeuvre: ...
+
+
+class PolicyTick(Protocol):
+    """What a policy gives in one control period."""
+
+    @property
+    def wishes(self) -> Wishes: ...
+    @property
+    def state(self) -> ProgramState: ...
+    @property
+    def line(self) -> int | None: ...
+    @property
+    def said(self) -> tuple[str, ...]: ...
+    @property
+    def calls(self) -> tuple[ApiCall, ...]: ...
+    @property
+    def error(self) -> ChauffeurError | None: ...
+
+
+class RunningPolicy(Protocol):
+    """A policy bound to a world, asked once per control period."""
+
+    def tick(self) -> PolicyTick:
+        """Set-points for this period. Never raises for the policy's own faults; they come as `state` and `error`."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class HeldWishes:
+    """A period in which set-points stand, with no program behind them."""
+
+    wishes: Wishes
+    state: ProgramState = "none"
+    line: int | None = None
+    said: tuple[str, ...] = ()
+    calls: tuple[ApiCall, ...] = ()
+    error: ChauffeurError | None = None
+
+
+@runtime_checkable
+class Executor(RunningPolicy, Protocol):
+    """Drives one policy at a time. It never steps a world: commands go through the one door to the actuator."""
+
+    def start(self, policy: Any, observation: Observation, limits: Limits, origin: VehicleState | None = None) -> None:
+        """Take over a checked policy of its kind. One that cannot be driven leaves what was driven before as it was.
+
+        Args:
+            policy: Of its kind.
+            observation: The present instant.
+            limits: Of the person and the operator.
+            origin: The ego when the policy was made, from which its lane or its waypoints count; default as it is now.
+
+        Raises:
+            ScenarioError: It cannot be driven here.
+        """
+        ...
+
+    def step(self, observation: Observation, held: Wishes | None = None) -> Command:
+        """The command for one control period.
+
+        Args:
+            observation: The present instant.
+            held: Set-points to keep to; None for the policy's own. They may hold the policy back, never drive it on.
+                Without a `tick` in this period they are a fallback level's, whose lane holds too.
+        """
+        ...
+
+    def close(self) -> None:
+        """Give back what it holds; may be called twice."""
+        ...
+
+    @property
+    def setpoints(self) -> Wishes:
+        """What is aimed for in this period, for limits, screen and record."""
+        ...
+
+    @property
+    def status(self) -> ExecutorStatus:
+        """Whether there is more to drive."""
+        ...
+
+    @property
+    def notes(self) -> tuple[tuple[float, str], ...]:
+        """What there was to tell the passenger, as (time s, text)."""
+        ...
+
+
+class ExecutorBase:
+    """What executors share: set-points, status and notes. They aim in `_aim`, and command in `step`."""
+
+    def __init__(self, world: World) -> None:
+        """Args: the world, which is looked at and never stepped."""
+        self._world = world
+        self._limits = Limits()
+        self._setpoints = Wishes()
+        self._status: ExecutorStatus = "running"
+        self._notes: list[tuple[float, str]] = []
+        self._told = 0
+
+    @property
+    def setpoints(self) -> Wishes:
+        """See Executor."""
+        return self._setpoints
+
+    @property
+    def status(self) -> ExecutorStatus:
+        """See Executor."""
+        return self._status
+
+    @property
+    def notes(self) -> tuple[tuple[float, str], ...]:
+        """See Executor."""
+        return tuple(self._notes)
+
+    def tick(self) -> PolicyTick:
+        """See RunningPolicy."""
+        self._aim(self._world.observe())
+        new, self._told = self.notes[self._told :], len(self.notes)
+        return HeldWishes(self._setpoints, state=self._status, said=tuple(text for _, text in new))
+
+    def close(self) -> None:
+        """See Executor."""
+
+    def _aim(self, observation: Observation) -> None:
+        """Have `_setpoints` be those of an instant."""
+        raise NotImplementedError
+
+    def _hold(self, held: Wishes | None) -> float:
+        """Have the set-points kept to others, where there are any; the speed to drive then, m/s."""
+        own = self._setpoints.target_speed_mps or 0.0
+        if held is not None:
+            most = held.target_speed_mps
+            own = own if most is None else min(own, most)
+            self._setpoints = replace(self._setpoints, target_speed_mps=own, time_headway_s=held.time_headway_s)
+        return own
+
+
+class DriverLed(ExecutorBase):
+    """A policy that states set-points alone, which the world's own driver follows."""
+
+    def __init__(self, world: World, policy: RunningPolicy | None = None) -> None:
+        """Args: the world; who states the set-points, None for nobody: what is then goes on."""
+        super().__init__(world)
+        self._policy = policy
+
+    def tick(self) -> PolicyTick:
+        """See RunningPolicy."""
+        tick = HeldWishes(self._world.driver().initial_wishes()) if self._policy is None else self._policy.tick()
+        self._setpoints = tick.wishes
+        self._status = "finished" if tick.state == "finished" else "running"
+        return tick
+
+    def step(self, observation: Observation, held: Wishes | None = None) -> Command:
+        """See Executor."""
+        del observation
+        driver = self._world.driver()
+        return driver.command(driver.settle(self.tick().wishes) if held is None else held)
+
+
+MakeExecutor = Callable[[World], Executor]
+
+
+def _built_in(kind: str) -> MakeExecutor | None:
+    """Late, so that a control process loads the solver of action matrices only where it drives one."""
+    match kind:
+        case "program":
+            from chauffeur.executors.program import ProgramDrive
+
+            return ProgramDrive
+        case "parameters":
+            from chauffeur.executors.parameters import parameters_executor
+
+            return parameters_executor
+        case "action_matrix":
+            from chauffeur.executors.action_matrix import ActionMatrixExecutor
+
+            return ActionMatrixExecutor
+        case "trajectory":
+            from chauffeur.executors.trajectory import TrajectoryExecutor
+
+            return TrajectoryExecutor
+        case _:
+            return None
+
+
+BUILT_IN: Final = ("program", "parameters", "action_matrix", "trajectory")
+
+
+class OfKind(Protocol):
+    """A policy of any kind: the paper's four, or a third party's."""
+
+    @property
+    def kind(self) -> str: ...
+
+
+def executor_for(policy: OfKind, world: World) -> Executor:
+    """Who drives this kind of policy in a world, just reset: built in, or of the entry points `chauffeur.executors`,
+    where what is registered also judges its policies, by `fault` (`safety.format`).
+
+    Raises:
+        ScenarioError: Nobody does.
+    """
+    make = _built_in(policy.kind)
+    if make is None:
+        known = plugin_names(EXECUTORS)
+        if policy.kind not in known:
+            raise ScenarioError(
+                f"A policy of the kind {policy.kind!r} has no executor.",
+                hint=f"Known: {', '.join((*BUILT_IN, *known))}.",
+            )
+        make = load_plugin(EXECUTORS, policy.kind)
+    return make(world)

@@ -1,0 +1,112 @@
+"""Drives `Parameters` (Talk2Drive, paper Eq. 15): by pure pursuit, and in a town through the town's own driver."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from chauffeur.concept import Command, Limits, Observation, Parameters, ScenarioError, Turn, VehicleState, Wishes
+from chauffeur.executors.base import DriverLed, Executor, ExecutorBase, HeldWishes, PolicyTick
+from chauffeur.executors.pursuit import ParametersDriver, number
+from chauffeur.geometry.road_graph import TURNS
+from chauffeur.worlds.base import World
+from chauffeur.worlds.parking.lot import Spot
+from chauffeur.worlds.places import TownPlaces
+
+
+def parameters_executor(world: World) -> Executor:
+    """What drives parameters there."""
+    return TownSetPoints(world) if isinstance(world, TownPlaces) else PursuitExecutor(world)
+
+
+class PursuitExecutor(ExecutorBase):
+    """Pure pursuit along the lanes, or onto a spot. There is no program to run, and so none that finishes."""
+
+    def __init__(self, world: World) -> None:
+        """Args: the world."""
+        super().__init__(world)
+        self._driver: ParametersDriver | None = None
+        self._aimed = -1
+
+    def start(
+        self, policy: Parameters, observation: Observation, limits: Limits, origin: VehicleState | None = None
+    ) -> None:
+        """See Executor; where the way stays the same, what has begun of it goes on."""
+        del observation
+        lane = None if origin is None else origin.lane
+        self._limits = limits
+        if self._driver is None or not self._driver.retune(policy, lane):
+            self._driver = ParametersDriver(self._world, policy, limits=limits, origin=lane)
+            self._told = 0
+
+    def tick(self) -> PolicyTick:
+        """See RunningPolicy."""
+        said = super().tick().said
+        return HeldWishes(self._setpoints, said=said)
+
+    def step(self, observation: Observation, held: Wishes | None = None) -> Command:
+        """See Executor."""
+        driver = self._driving()
+        if held is None:
+            self._aim(observation)
+        elif observation.tick != self._aimed:
+            self._setpoints = driver.held_to(held)
+        return driver.command(self._hold(held), self._setpoints.time_headway_s)
+
+    @property
+    def notes(self) -> tuple[tuple[float, str], ...]:
+        """See Executor."""
+        return () if self._driver is None else self._driver.notes
+
+    @property
+    def spot(self) -> Spot | None:
+        """The spot that is made for."""
+        return self._driving().spot
+
+    def _aim(self, observation: Observation) -> None:
+        self._setpoints, self._aimed = self._driving().wishes(), observation.tick
+
+    def _driving(self) -> ParametersDriver:
+        if self._driver is None:
+            raise ScenarioError("Nothing is driven yet.", hint="Call start(policy, observation, limits) first.")
+        return self._driver
+
+
+class TownSetPoints(DriverLed):
+    """What parameters ask of a town's own driver, which steers by itself: how fast, which lane, and the way.
+
+    A target at the limit of the lane where it was planned is one for the limit, wherever the way leads.
+    """
+
+    def __init__(self, world: World) -> None:
+        """Args: a town."""
+        super().__init__(world)
+        self._policy_mps, self._free = 0.0, False
+        self._lane: str | None = None
+        self._turn: Turn | None = None
+
+    def start(
+        self, policy: Parameters, observation: Observation, limits: Limits, origin: VehicleState | None = None
+    ) -> None:
+        """See Executor."""
+        turn: Turn | None = next((one for one in TURNS if one == policy.route), None)
+        if policy.route and turn is None:
+            assert isinstance(self._world, TownPlaces)
+            self._world.head_for(policy.route)
+        here = (observation.ego if origin is None else origin).lane
+        beside = None if here is None else observation.road.neighbour(here, policy.lane)
+        self._lane, self._turn = beside if policy.lane else None, turn
+        sign = 0.0 if here is None else self._world.perception().speed_limit(here)
+        self._policy_mps, self._limits = number(policy.target_speed_mps, 0.0), limits
+        self._free = self._policy_mps >= sign
+
+    def tick(self) -> HeldWishes:
+        """See RunningPolicy."""
+        driver = self._world.driver()
+        here = self._world.observe().ego.lane
+        sign = 0.0 if here is None else self._world.perception().speed_limit(here)
+        most = self._limits.most_mps(sign)
+        speed = min(sign, most) if self._free else min(self._policy_mps, most)
+        self._setpoints = replace(
+            driver.settle(driver.initial_wishes()), target_speed_mps=speed, target_lane=self._lane, turn=self._turn
+        )
+        return HeldWishes(self._setpoints)

@@ -1,0 +1,84 @@
+"""What kind of weather it is: as a service words it, and as a passenger says it in passing.
+
+Services have a small vocabulary, which patterns read; memory tells trips apart by it. People have none ("the road's
+like glass by that stop line"), so a learned sorter reads them (`chauffeur.language.sorter`).
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Final, Literal
+
+from chauffeur.concept import Situation
+from chauffeur.language.denials import denied_words
+from chauffeur.language.sorter import Sorter, load_sorter
+from chauffeur.language.tokens import tokens_of
+
+WEATHER_FACT: Final = "weather"
+"""Name of the fact in `Situation.scene`; the words of a context say it as a sentence that begins with it."""
+
+UNKNOWN: Final = 0
+DRY, RAIN, SNOW, FOG = 1, 2, 4, 8
+"""Bits: sleet is rain and snow. Dry is what is known and none of the others."""
+
+SaidWeather = Literal["none", "night", "rain", "fog", "snow", "slippery"]
+SAID_WEATHERS: Final[tuple[SaidWeather, ...]] = "none", "night", "rain", "fog", "snow", "slippery"
+"""What a passenger may say of weather or road, as they are here and now; in the order in which they ask for care."""
+WEIGHTS: Final = Path(__file__).parent / "weights" / "weather.npz"
+SURE: Final = 0.5
+"""Share from which on a clause is taken to say something of the weather."""
+_NAMED: Final = 0.1
+"""The same where the clause has a word for it."""
+
+_KINDS: Final = (
+    (RAIN, re.compile(r"rain|drizzle|(?<!snow )shower|thunderstorm|sleet|\bwet\b|downpour")),
+    (SNOW, re.compile(r"snow|sleet|hail|\bic[ey]\b|freez|blizzard")),
+    (FOG, re.compile(r"fog|mist|haze|smoke|dust|sand|\bash\b")),
+)
+_NOT_KNOWN: Final = re.compile(r"\bnot known\b|\bunknown\b")
+_SENTENCE: Final = re.compile(r"\bWeather\b[^:.]{0,40}: (?P<words>.*?)(?:\.(?!\d)|$)", re.DOTALL)
+"""The sentence about the weather among the words of a context."""
+_CLAUSES: Final = re.compile(r"[,.;!?:]\s|\s-\s|\s(?:but|and|because|although|though|as|since|so)\s")
+
+
+def weather_of(situation: Situation) -> int:
+    """Bits of a situation's weather; `UNKNOWN` where nobody told it."""
+    return _kinds(" ".join(said for name, said in situation.scene if name == WEATHER_FACT))
+
+
+def weather_in(context: str) -> int:
+    """The same, from the words of a context."""
+    return _kinds(" ".join(match["words"] for match in _SENTENCE.finditer(context)))
+
+
+def said_weather(text: str, sorter: Sorter | None = None) -> SaidWeather:
+    """The worst that a passenger says of the weather or the road; "none" where nothing is said, or all is denied.
+
+    The text is read whole and clause by clause: in "I'm late, but it is slippery" half is about something else.
+
+    Args:
+        text: What was said.
+        sorter: Another reader than the one that ships.
+    """
+    sorter = sorter or load_sorter(WEIGHTS)
+    worst: SaidWeather = "none"
+    for clause in (text, *_CLAUSES.split(text)):
+        denied = denied_words(clause)
+        named = [word for word in tokens_of(clause) if any(pattern.match(word) for _, pattern in _KINDS)]
+        undenied = [word for word in named if word not in denied]
+        if named and not undenied:
+            continue
+        shares = sorter.shares(clause)
+        if 1.0 - shares["none"] < (_NAMED if undenied else SURE):
+            continue
+        likeliest = max(range(1, len(SAID_WEATHERS)), key=lambda place: shares[SAID_WEATHERS[place]])
+        worst = SAID_WEATHERS[max(likeliest, SAID_WEATHERS.index(worst))]
+    return worst
+
+
+def _kinds(words: str) -> int:
+    words = words.casefold().strip()
+    if not words or _NOT_KNOWN.search(words):
+        return UNKNOWN
+    return sum(bit for bit, pattern in _KINDS if pattern.search(words)) or DRY

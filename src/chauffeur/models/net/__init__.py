@@ -1,0 +1,1 @@
+"""The one network stack: a transformer, vision encoders, and the connector between them."""

@@ -1,0 +1,1 @@
+"""ViLaD: driving decisions by masked vision-language diffusion (paper Sec. VII)."""

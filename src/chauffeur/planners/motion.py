@@ -1,0 +1,174 @@
+"""Planners that give action matrices: a language model asked for gains, and the fixed gains it is compared with."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import time
+from collections.abc import Mapping
+from typing import Any, Final
+
+from chauffeur.concept import ActionMatrix, ConfigError, InstructionError, Plan, PlanRequest, Thoughts, Usage
+from chauffeur.planners.base import Answerer
+from chauffeur.planners.llm import INTENT_DECLINED, INTENT_UNUSABLE
+from chauffeur.planners.llm_model import ChatModel
+from chauffeur.planners.llm_reply import Reply, read_reply, without_thinking
+from chauffeur.planners.llm_settings import settings_from
+from chauffeur.planners.prompts.motion import ASK, MODERATE, matrix_words, motion_messages
+from chauffeur.planners.prompts.turns import repair_turns
+from chauffeur.safety.envelope import policy_findings
+from chauffeur.safety.gain_box import GAIN_NAMES
+
+_MATRIX: Final = re.compile(r"\[\s*\[[^\[\]]{1,200}\]\s*,\s*\[[^\[\]]{1,200}\]\s*\]")
+_INTENT: Final = "motion.gains"
+_IN_PROCESS: Final = "transformers/"
+MAX_TOKENS: Final = 256
+"""Of an answer of a model in this process: thoughts and a matrix."""
+
+
+def settings_of(policy: ActionMatrix) -> tuple[tuple[str, float], ...]:
+    """Its gains by name, as memory keeps them."""
+    return tuple(zip((name.lower() for name in GAIN_NAMES), (*policy.pid, *policy.mpc), strict=True))
+
+
+def read_matrix(text: str) -> tuple[ActionMatrix | None, Reply]:
+    """(the last action matrix of a reply, its thoughts or refusal or what is wrong). Never raises."""
+    visible = without_thinking(text)
+    found = _MATRIX.findall(visible)
+    words = _MATRIX.sub("", visible)
+    reply = read_reply(words)
+    thoughts = re.sub(r"[\s*`]{0,8}\bP\s{0,3}=\s{0,8}\Z", "", reply.thoughts or words.strip()).strip()
+    thoughts = re.sub(r"\A[\s*_#]*Thoughts?[*_ \t]*:\s*", "", thoughts)
+    if reply.refusal:
+        return None, reply
+    if not found:
+        return None, Reply(thoughts, problem="the answer holds no action matrix; give P = [[Kp, Ki, Kd], [Wl, Wh, Ws]]")
+    try:
+        rows: Any = json.loads(found[-1])
+        (kp, ki, kd), (wl, wh, ws) = ([float(value) for value in row] for row in rows)
+    except (ValueError, TypeError):
+        return None, Reply(thoughts, problem="the action matrix is no two rows of three numbers")
+    return ActionMatrix((kp, ki, kd), (wl, wh, ws)), Reply(thoughts)
+
+
+class MotionPlanner:
+    """Asks a language model for gains; what the checks find is said once, for it to repair."""
+
+    def __init__(self, model: Answerer, *, sees: bool = False) -> None:
+        """Args: who writes; whether pictures are taken for it."""
+        self._writer, self.sees = model, sees
+
+    @classmethod
+    def from_spec(
+        cls, argument: str, *, base_url: str | None = None, temperature: float | None = None, cache: bool = True
+    ) -> MotionPlanner:
+        """Planner for `motion/<model>`, at the endpoint that `openai/<model>` would ask, or
+        `motion/transformers/<folder>`: a vision-language model in this process, which is shown pictures.
+
+        Args:
+            argument: Model id.
+            base_url, temperature, cache: As of `openai/<model>`.
+
+        Raises:
+            ConfigError: A setting is missing or out of range.
+        """
+        if not argument.strip():
+            raise ConfigError("The motion planner needs a model.", hint="Write for example motion/gpt-4o.")
+        if argument.startswith(_IN_PROCESS):
+            from chauffeur.planners.transformers_vlm import TransformersAnswerer
+
+            folder = argument.removeprefix(_IN_PROCESS)
+            return cls(TransformersAnswerer.from_spec(folder, max_tokens=MAX_TOKENS), sees=True)
+        how = settings_from(os.environ, {"temperature": temperature})
+        return cls(ChatModel.of(argument.strip(), how, base_url=base_url, cache=cache))
+
+    @property
+    def id(self) -> str:
+        """`motion/<model>`."""
+        return f"motion/{self._writer.model}"
+
+    @property
+    def model(self) -> str:
+        """Model id as asked for."""
+        return self._writer.model
+
+    async def plan(self, request: PlanRequest) -> Plan:
+        """One plan.
+
+        Raises:
+            InstructionError: The wish is empty.
+            EndpointError: The endpoint gave no reply that can be read; a `PlannerError`.
+        """
+        if not request.instruction.text.strip():
+            raise InstructionError("The instruction is empty.", hint="Say how you want to be driven.")
+        begun = time.perf_counter()
+        messages = motion_messages(request)
+        prose = await self._writer.write(messages)
+        usage = [prose.usage]
+        policy, reply = read_matrix(prose.text)
+        findings = [reply.problem] if reply.problem else []
+        if policy is not None:
+            findings = policy_findings(policy, request.context.situation, request.limits)
+        if findings:
+            prose = await self._writer.write([*messages, *repair_turns(prose.text, findings, ask=ASK)])
+            usage.append(prose.usage)
+            policy, reply = read_matrix(prose.text)
+        unusable = f"The model gave no usable gains: {reply.problem}." if reply.problem else ""
+        return Plan(
+            thoughts=Thoughts(reply.thoughts),
+            policy=policy,
+            refusal=reply.refusal or unusable,
+            intent=INTENT_DECLINED if reply.refusal else INTENT_UNUSABLE if unusable else _INTENT,
+            settings=() if policy is None else settings_of(policy),
+            planner=self.id,
+            model=prose.model,
+            usage=_summed(usage),
+            latency_s=time.perf_counter() - begun,
+            raw=prose.text,
+        )
+
+    async def close(self) -> None:
+        """Close the model's connections, if it has any."""
+        close: Any = getattr(self._writer, "close", None)
+        if close is not None:
+            await close()
+
+
+class FixedGainsPlanner:
+    """The same moderate gains whatever is said: the baseline of the paper's Tab. XI."""
+
+    id = "gains"
+    model = "gains-v1"
+
+    @classmethod
+    def from_spec(cls, argument: str) -> FixedGainsPlanner:
+        """Planner for `gains`. Raises ConfigError: it takes no argument."""
+        if argument:
+            raise ConfigError(f"The planner 'gains' takes no argument, not {argument!r}.", hint="Write gains.")
+        return cls()
+
+    async def plan(self, request: PlanRequest) -> Plan:
+        """The fixed gains. Raises InstructionError: the wish is empty."""
+        if not request.instruction.text.strip():
+            raise InstructionError("The instruction is empty.", hint="Say how you want to be driven.")
+        return Plan(
+            Thoughts("I drive with my usual gains; I do not read the wish."),
+            MODERATE,
+            intent=_INTENT,
+            settings=settings_of(MODERATE),
+            planner=self.id,
+            model=self.model,
+            raw=matrix_words(MODERATE),
+        )
+
+
+def _summed(parts: list[Usage]) -> Usage:
+    costs: Mapping[int, float] = {i: part.cost_usd for i, part in enumerate(parts) if part.cost_usd is not None}
+    return Usage(
+        prompt_tokens=sum(part.prompt_tokens for part in parts),
+        completion_tokens=sum(part.completion_tokens for part in parts),
+        cost_usd=sum(costs.values()) if len(costs) == len(parts) else None,
+        requests=sum(part.requests for part in parts),
+        cached=all(part.cached for part in parts),
+    )

@@ -1,0 +1,154 @@
+"""The on-board VLM as a planner: wish, picture and what is remembered in; scene, thoughts and action matrix out."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from chauffeur.concept import CameraImage, History, InstructionError, Plan, PlanRequest, Situation, Thoughts, Usage
+from chauffeur.language.weather import FOG, RAIN, SNOW, UNKNOWN, said_weather, weather_of
+from chauffeur.planners.motion import settings_of
+from chauffeur.planners.prompts.motion import matrix_words
+from chauffeur.planners.vlm.engine import VlmEngine, shipped
+from chauffeur.planners.vlm.pictures import fault_of
+from chauffeur.planners.vlm.template import RECALLS
+from chauffeur.planners.vlm.words import AS_SEEN, SAID, more_careful, scene_words, thought_words
+
+INTENT: Final = "motion.gains"
+RECALL_SETTING: Final = "recall"
+"""Among a plan's settings: -1 where it was made gentler than the words alone, 1 brisker, 0 neither."""
+SIMILAR: Final = 0.6
+"""A remembered wish this much like the present one speaks for it."""
+_STANDS_MPS: Final = 1.0
+_DAMP: Final = ("sunny", "night")
+"""What the weather services' "dry" may look like."""
+
+
+@dataclass(frozen=True, slots=True)
+class VlmSight:
+    """What the planner makes of its camera before the model decides.
+
+    Attributes:
+        given: Slots that are not the model's to decide.
+        said: What is wrong, for the person; empty where nothing is.
+        blind: Whether there is no picture to speak of.
+    """
+
+    given: dict[str, str]
+    said: str = ""
+    blind: bool = False
+
+
+class VlmPlanner:
+    """Sets the gains of the motion controllers from what is said, seen and remembered (paper Sec. VI, Eq. 21-22)."""
+
+    id = "vlm"
+    sees = True
+    """Pictures are taken for it."""
+
+    def __init__(self, engine: VlmEngine) -> None:
+        """Args: the model."""
+        self._engine = engine
+        self._earlier: CameraImage | None = None
+
+    @classmethod
+    def from_spec(cls, argument: str) -> VlmPlanner:
+        """`vlm`, or `vlm/<folder>` for a model of one's own. Raises DataError where it cannot be read."""
+        return cls(VlmEngine(Path(argument)) if argument else shipped())
+
+    @property
+    def model(self) -> str:
+        """Version of the network."""
+        return self._engine.version
+
+    async def plan(self, request: PlanRequest) -> Plan:
+        """One plan: always an action matrix inside the certified box.
+
+        Raises:
+            InstructionError: The wish is empty.
+        """
+        begun = time.perf_counter()
+        text = request.instruction.text.strip()
+        if not text:
+            raise InstructionError("The instruction is empty.", hint="Say how you want to be driven.")
+        situation = request.context.situation
+        recall = recalled(request.history)
+        given = {"task": task_of(situation), "recall": RECALLS[recall]}
+        fault = fault_of(request.images, self._earlier)
+        self._earlier = request.images[-1] if request.images else None
+        if fault:
+            given |= {"style": "conservative", "weather": "snow", "grade": "heavy"}
+            read = self._engine.read(text, None, given)
+            scene = f"{fault}: I cannot see road or weather."
+            thoughts = f"{scene} I take my most careful gains until it shows something again."
+        else:
+            pixels = request.images[-1].pixels()
+            read = self._engine.read(text, pixels, given)
+            scene = scene_words(read.values, self._engine.trusted)
+            thoughts = f"{scene} {thought_words(read.values)}"
+            seen = read.values["weather"]
+            worst, doubts, where = seen, list[str](), ""
+            if served := _contradicted(seen, situation):
+                worst = more_careful(worst, served)
+                doubts.append(f"The weather service says otherwise ({served}).")
+            heard = said_weather(text)
+            if heard != "none" and more_careful(seen, AS_SEEN[heard]) != seen:
+                where = "on a slippery road" if heard == "slippery" and worst != AS_SEEN[heard] else ""
+                worst = more_careful(worst, AS_SEEN[heard])
+                doubts.append(f"You say that {SAID[heard]}.")
+            if doubts:
+                # Without the picture: what is seen outweighs the words that are given beside it.
+                held = {name: read.values[name] for name in ("style", "lead", "road")}
+                read = self._engine.read(text, None, given | held | {"weather": worst, "grade": "heavy"})
+                scene = " ".join([scene, *doubts])
+                of = "the worst of all" if len(doubts) > 1 else "the worse of the two"
+                thoughts = f"{scene} I go by {of}. {thought_words(read.values, where)}"
+        return Plan(
+            thoughts=Thoughts(thoughts),
+            policy=read.policy,
+            intent=INTENT,
+            settings=(*settings_of(read.policy), (RECALL_SETTING, float((0, -1, 1)[recall]))),
+            planner=self.id,
+            model=self.model,
+            usage=Usage(completion_tokens=read.passes, requests=1),
+            latency_s=time.perf_counter() - begun,
+            raw=f"{read.text}\nP = {matrix_words(read.policy)}",
+            scene=scene,
+        )
+
+
+def task_of(situation: Situation) -> str:
+    """Which manoeuvre is due, from speed and lanes: standing, to pull away; several lanes, to change; one, to turn."""
+    if situation.speed_mps < _STANDS_MPS:
+        return "acceleration"
+    return "lane_change" if situation.lane_count > 1 else "left_turn"
+
+
+def recalled(history: History) -> int:
+    """What the newest feedback on a similar wish asks for, as an index of `RECALLS`.
+
+    What was liked is done again as it was; what was too much or too little moves by one step from how it was.
+    """
+    similar = [item for item in history.items if item.intent == INTENT and item.similarity >= SIMILAR and item.feedback]
+    if not similar:
+        return 0
+    item = max(similar, key=lambda one: one.when)
+    before = int(dict(item.settings).get(RECALL_SETTING, 0.0))
+    said = item.feedback[-1]
+    signs = [sign for sign in (said.comfort, said.speed, said.gap) if sign]
+    step = 0 if not signs else 1 if sum(signs) > 0 else -1
+    moved = max(-1, min(1, before + step))
+    return RECALLS.index({-1: "gentler", 0: "none", 1: "brisker"}[moved])
+
+
+def _contradicted(seen: str, situation: Situation) -> str:
+    """The weather service's kind of weather where it is not what is seen; empty where it fits or is unknown."""
+    told = weather_of(situation)
+    if told == UNKNOWN:
+        return ""
+    kinds = [name for bit, name in ((SNOW, "snow"), (RAIN, "rain"), (FOG, "fog")) if told & bit]
+    if seen in kinds or (not kinds and seen in _DAMP):
+        return ""
+    return kinds[0] if kinds else "sunny"

@@ -1,0 +1,53 @@
+"""The shield of paved ground, and which shield fits a world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation
+from chauffeur.safety.shield.shield import Guarded, Shield
+from chauffeur.safety.shield.town import TownShield
+from chauffeur.worlds.base import World
+from chauffeur.worlds.parking.guard import Guard
+from chauffeur.worlds.parking.lot import LIMIT_MPS
+from chauffeur.worlds.places import PavedGround, TownPlaces
+
+
+class GroundShield(Shield):
+    """The shield of a parking lot and a test track: the same last word, said by rules for paved ground (Guard).
+
+    The shield of roads keeps a car in its lane and off others' by distances that no parking car has, and takes it for
+    one whose axles are at its ends.
+    """
+
+    def __init__(
+        self,
+        world: PavedGround,
+        dt_s: float,
+        limits: Limits | None = None,
+        limit_mps: Callable[[LaneId], float] | None = None,
+    ) -> None:
+        """Args: a world just reset; its control period; bounds no command may cross; speed limits (default a lot's)."""
+        super().__init__(dt_s, limits)
+        self._most = Limits() if limits is None else limits
+        self._guard = Guard(world.chassis, world.ground, dt_s, world.steering_rate)
+        self._limit = limit_mps
+
+    def guard(self, observation: Observation, command: Command, aim: LaneId | None = None) -> Guarded:
+        """The command, changed as little as needed."""
+        del aim
+        lane = observation.ego.lane
+        sign = LIMIT_MPS if self._limit is None or lane is None else self._limit(lane)
+        ruling = self._guard.judge(observation, command, self._most.most_mps(sign))
+        if not ruling.rule:
+            return Guarded(ruling.command)
+        return Guarded(ruling.command, (Intervention(ruling.rule, ruling.reason, command, ruling.command),))
+
+
+def shield_for(world: World, limits: Limits | None = None) -> Shield:
+    """The shield that fits a world, just reset: of roads, of paved ground, or of a town."""
+    if isinstance(world, PavedGround):
+        return GroundShield(world, world.dt_s, limits, world.perception().speed_limit)
+    if isinstance(world, TownPlaces):
+        return TownShield(world.dt_s, limits)
+    return Shield(world.dt_s, limits)

@@ -1,0 +1,60 @@
+"""What some worlds offer beyond the `World` contract, asked for by capability: paved ground, spots, a town's places."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+from chauffeur.geometry import Box
+from chauffeur.worlds.parking.following import Chassis
+from chauffeur.worlds.parking.lot import Spot
+from chauffeur.worlds.parking.routes import Way
+
+
+@runtime_checkable
+class PavedGround(Protocol):
+    """A world whose car may leave its lane: what is judged there is the ground."""
+
+    @property
+    def chassis(self) -> Chassis:
+        """The ego's size and axles."""
+        ...
+
+    @property
+    def ground(self) -> Box:
+        """What is paved."""
+        ...
+
+    @property
+    def steering_rate(self) -> float:
+        """How fast the ego's wheel turns, rad/s."""
+        ...
+
+
+@runtime_checkable
+class ParkingPlaces(PavedGround, Protocol):
+    """What a world with spots offers beyond the `World` contract."""
+
+    def spot(self, place: str) -> Spot:
+        """The free spot that is meant. Raises ScenarioError, saying why there is none."""
+        ...
+
+    def way_to(self, spot: Spot) -> Way | None:
+        """The way onto a spot from here."""
+        ...
+
+    def way_on(self) -> Way:
+        """The way on where no spot is meant."""
+        ...
+
+    def parked(self) -> str | None:
+        """Name of the spot the ego is parked in."""
+        ...
+
+
+@runtime_checkable
+class TownPlaces(Protocol):
+    """What a world with places to go to offers beyond the `World` contract; its driver knows the way."""
+
+    def head_for(self, place: str) -> None:
+        """Set out for a place. Raises ScenarioError: there is no such place, or no way there."""
+        ...

@@ -1,0 +1,8 @@
+"""The town: map packs, and a world on SUMO to drive them in."""
+
+from chauffeur.worlds.town.driver import TownDriver
+from chauffeur.worlds.town.perception import TownPerception
+from chauffeur.worlds.town.referee import TownReferee
+from chauffeur.worlds.town.world import TownWorld
+
+__all__ = ["TownDriver", "TownPerception", "TownReferee", "TownWorld"]

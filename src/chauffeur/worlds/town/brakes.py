@@ -1,0 +1,75 @@
+"""Traffic that brakes for the ego wherever it stands in the way, as CARLA's Traffic Manager does.
+
+SUMO's vehicles mind lanes and their right of way: one that has it turns through a car that waits inside the junction.
+Here whoever would touch the ego within the time that braking takes brakes, and goes on once the way is free.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from chauffeur.concept import VehicleState
+from chauffeur.geometry import Box, overlap, wrap_to_pi
+from chauffeur.worlds.town.sumo import MAKES, Mover, Sumo
+
+BRAKING_MPS2: Final = 6.0
+REACTS_S: Final = 0.4
+SIDE_M: Final = 0.3
+"""What is kept clear around the ego."""
+_NEAR_M: Final = 30.0
+_STEPS: Final = 6
+_MOST_YAW_RADPS: Final = 0.8
+
+
+class TrafficBrakes:
+    """Watches those around the ego, one control period after the other."""
+
+    def __init__(self, sumo: Sumo, dt_s: float) -> None:
+        self._sumo, self._dt_s = sumo, dt_s
+        self._held: set[str] = set()
+        self._headings: dict[str, float] = {}
+
+    def mind(self, ego: VehicleState, movers: Sequence[Mover]) -> None:
+        """Have those brake who would touch the ego, and let the others go."""
+        seen: dict[str, float] = {}
+        for one in movers:
+            away = math.hypot(one.x_m - ego.x_m, one.y_m - ego.y_m)
+            if away > _NEAR_M:
+                continue
+            before = self._headings.get(one.name, one.heading_rad)
+            seen[one.name] = one.heading_rad
+            yaw = wrap_to_pi(one.heading_rad - before) / self._dt_s
+            if self._touches(one, max(-_MOST_YAW_RADPS, min(_MOST_YAW_RADPS, yaw)), ego, away):
+                self._held.add(one.name)
+                self._sumo.hold(one.name, max(0.0, one.speed_mps - BRAKING_MPS2 * self._dt_s))
+            elif one.name in self._held:
+                self._held.discard(one.name)
+                self._sumo.hold(one.name, None)
+        for name in sorted(self._held - seen.keys()):
+            self._held.discard(name)
+            self._sumo.hold(name, None)
+        self._headings = seen
+
+    @staticmethod
+    def _touches(one: Mover, yaw_radps: float, ego: VehicleState, away_m: float) -> bool:
+        """Whether somebody who goes on as now touches the ego, which goes on as now, before it could stand."""
+        make = MAKES[one.make]
+        lasts = REACTS_S + one.speed_mps / BRAKING_MPS2
+        reach = (one.speed_mps + ego.speed_mps) * lasts + (make.length_m + ego.length_m) / 2.0 + 2.0 * SIDE_M
+        if one.speed_mps < 0.05 or away_m > reach:
+            return False
+        x, y, heading = one.x_m, one.y_m, one.heading_rad
+        ego_x, ego_y = ego.x_m, ego.y_m
+        step = lasts / _STEPS
+        c, s = math.cos(ego.heading_rad), math.sin(ego.heading_rad)
+        for _ in range(_STEPS):
+            heading += yaw_radps * step
+            x, y = x + one.speed_mps * step * math.cos(heading), y + one.speed_mps * step * math.sin(heading)
+            ego_x, ego_y = ego_x + ego.speed_mps * step * c, ego_y + ego.speed_mps * step * s
+            kept = Box(ego_x, ego_y, ego.heading_rad, ego.length_m + 2.0 * SIDE_M, ego.width_m + 2.0 * SIDE_M)
+            if overlap(kept, Box(x, y, heading, make.length_m, make.width_m)):
+                # Whoever is struck from behind cannot help it by braking.
+                return c * (x - ego_x) + s * (y - ego_y) < 0.0 or math.cos(heading - ego.heading_rad) < 0.7
+        return False

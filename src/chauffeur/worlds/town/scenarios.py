@@ -1,0 +1,36 @@
+"""Built-in scenarios: trips through our own towns, chosen to show a kind of wish well."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from chauffeur.concept import Scenario
+
+
+def _built_in(name: str, config: dict[str, Any], seed: int, wish: str, title: str) -> Scenario:
+    return Scenario(name, "town", config, seed, wish=wish, title=title)
+
+
+BUILT_IN: tuple[Scenario, ...] = (
+    _built_in(
+        "town",
+        {"town": "Gridford", "vehicles": 35, "people": 30},
+        4,
+        "Take me to the station.",
+        "Gridford, a town with lights: traffic, people on foot, places with names",
+    ),
+    _built_in(
+        "town-church",
+        {"town": "Oldbridge", "vehicles": 25, "people": 25},
+        6,
+        "Take me to the church, please.",
+        "Oldbridge, a town with stop signs and lights",
+    ),
+    _built_in(
+        "town-hospital",
+        {"town": "Ringstead", "vehicles": 25, "people": 15},
+        2,
+        "Drive me to the hospital.",
+        "Ringstead, a town with a ring road",
+    ),
+)

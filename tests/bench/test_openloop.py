@@ -1,0 +1,310 @@
+"""Open-loop planning: nuScenes' format, the three conventions, answers of all shapes, and a real endpoint."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from coached_data import server_module
+from openloop_data import ROTATION, SCENES, write_nuscenes
+from small_run import Inline, quiet
+from typer.testing import CliRunner
+
+from chauffeur.bench.kernel.calls import Patience
+from chauffeur.bench.kernel.conformance import faults
+from chauffeur.bench.kernel.run import BenchRun, Effort
+from chauffeur.bench.openloop import OpenLoopBenchmark
+from chauffeur.bench.openloop.asking import THOUGHTS, context_of, read_context, training_lines, waypoints_text
+from chauffeur.bench.openloop.benchmark import errors_of
+from chauffeur.bench.openloop.conventions import L2Errors, errors, fails, standing
+from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleration, constant_velocity, kind_of
+from chauffeur.bench.openloop.nuscenes import NuScenesTables
+from chauffeur.bench.openloop.reading import read_waypoints
+from chauffeur.bench.openloop.table12 import HEADER, our_line, paper_lines
+from chauffeur.cli.main import app
+from chauffeur.concept import ConfigError, DataError, Usage
+from chauffeur.planners.base import Prose
+from chauffeur.planners.registry import make_answerer
+
+EFFORT = Effort(workers=1, engine=Inline, patience=Patience(attempts=2, base_s=0.001))
+PATH = np.array([[4.0, 0.1], [8.0, 0.2], [12.0, -0.3], [16.0, 0.4], [20.0, 0.5], [24.0, 0.6]])
+
+
+class Scripted:
+    """Answers by a function of the last text; keeps what it was asked."""
+
+    id = model = "scripted"
+
+    def __init__(self, answer: Any) -> None:
+        self.answer, self.seen = answer, list[Any]()
+
+    async def write(self, messages: Sequence[Any]) -> Prose:
+        self.seen.append(messages)
+        content = messages[-1]["content"]
+        text = content if isinstance(content, str) else content[-1]["text"]
+        return Prose(self.answer(text), whole=True, model="scripted", usage=Usage())
+
+
+def run(folder: Path, who: Any, **options: Any) -> tuple[BenchRun, list[dict[str, Any]]]:
+    one = BenchRun(folder / f"run-{len(list(folder.iterdir()))}", OpenLoopBenchmark(str(folder), **options), who)
+    return one, one.run(quiet, EFFORT)
+
+
+def straight_on(text: str) -> str:
+    history, _ = read_context(text.partition("\n")[2] if text.startswith("You drive") else text)
+    return waypoints_text(constant_velocity(history))
+
+
+# The format -----------------------------------------------------------------------------------------------------------
+
+
+def test_poses_come_out_in_the_ego_frame(tmp_path: Path) -> None:
+    samples = NuScenesTables(write_nuscenes(tmp_path), "v1.0-mini").samples()
+    assert [one.id for one in samples if one.scene == "scene-0001"] == [f"scene-0001-{i}" for i in range(4, 12)]
+    first = samples[0]
+    assert ROTATION != 0.0
+    assert np.allclose(first.history, [[-16, 0, 0], [-12, 0, 0], [-8, 0, 0], [-4, 0, 0], [0, 0, 0]], atol=1e-9)
+    assert np.allclose(first.future, [[4 * i, 0] for i in range(1, 7)], atol=1e-9)
+    assert np.allclose(first.speeds_mps, 8.0)
+    assert first.picture == tmp_path / "samples" / "CAM_FRONT" / "scene-0001-4.jpg"
+    turning = next(one for one in samples if one.scene == "scene-0002")
+    assert turning.future[-1, 1] > 2.0 and turning.command == "turn left"
+    assert first.command == "go straight"
+
+
+def test_where_a_scene_ends_the_truth_is_not_known(tmp_path: Path) -> None:
+    samples = NuScenesTables(write_nuscenes(tmp_path), "v1.0-mini").samples(frozenset({"scene-0003"}))
+    assert [int(np.isfinite(one.future[:, 0]).sum()) for one in samples] == [3, 2, 1]
+    assert samples[0].command == ""
+    found = {name: errors(PATH, samples[0].future, name) for name in ("stp3", "uniad", "openemma")}
+    assert found["stp3"] == found["openemma"] == L2Errors(None, None, None)
+    assert found["uniad"].at_1s is not None and found["uniad"].at_2s is None and found["uniad"].average is None
+
+
+@pytest.mark.parametrize(
+    ("spoil", "named"),
+    [
+        (lambda folder: (folder / "ego_pose.json").unlink(), "ego_pose"),
+        (lambda folder: (folder / "sample.json").write_text("{nothing"), "sample.json"),
+        (lambda folder: (folder / "ego_pose.json").write_text("[]"), "no CAM_FRONT frame with a pose"),
+        (lambda folder: (folder / "openloop.json").write_text('[{"token": 1}]'), "openloop.json"),
+    ],
+)
+def test_damaged_tables_are_named(tmp_path: Path, spoil: Any, named: str) -> None:
+    spoil(write_nuscenes(tmp_path) / "v1.0-mini")
+    with pytest.raises(DataError, match=named):
+        NuScenesTables(tmp_path, "v1.0-mini").samples()
+
+
+def test_a_version_that_is_not_there_is_told_with_those_that_are(tmp_path: Path) -> None:
+    write_nuscenes(tmp_path)
+    with pytest.raises(DataError) as told:
+        NuScenesTables(tmp_path, "v1.0-trainval")
+    assert "v1.0-mini" in str(told.value.hint)
+
+
+# The conventions ------------------------------------------------------------------------------------------------------
+
+
+def test_the_conventions_by_hand() -> None:
+    truth = np.zeros((6, 2))
+    guess = np.array([[1.0, 0], [2.0, 0], [0, 3.0], [0, 4.0], [5.0, 0], [6.0, 0]])
+    assert errors(guess, truth, "uniad") == L2Errors(2.0, 4.0, 6.0)
+    assert errors(guess, truth, "stp3") == L2Errors(1.5, 2.5, 3.5)
+    assert errors(guess, truth, "openemma") == L2Errors(2.5, 2.5, 3.5)  # its first second is a step late
+    assert errors(guess, truth, "uniad").average == 4.0
+
+
+def test_a_failure_is_over_ten_metres_within_the_first_second() -> None:
+    truth = np.zeros((6, 2))
+    for place, limit in ((0, True), (1, True), (2, False)):
+        guess = np.zeros((6, 2))
+        guess[place] = 0.0, 10.1
+        assert fails(guess, truth) is limit
+        guess[place] = 0.0, 10.0
+        assert not fails(guess, truth)
+    assert fails(None, truth)
+    assert not standing().any()
+
+
+def test_what_motion_tells_and_what_it_does_not() -> None:
+    steady = np.array([[-20, 0, 0], [-15, 0, 0], [-10, 0, 0], [-5, 0, 0], [0, 0, 0]], float)
+    assert np.allclose(constant_velocity(steady)[-1], [30, 0])
+    assert np.allclose(constant_turn_and_acceleration(steady), constant_velocity(steady))
+    slowing = np.array([[-14, 0, 0], [-9, 0, 0], [-5, 0, 0], [-2, 0, 0], [0, 0, 0]], float)
+    stops = constant_turn_and_acceleration(slowing)
+    assert np.hypot(*stops[-1]) < 5.0 and np.all(np.diff(stops[:, 0]) >= 0.0)  # it stands, it does not go back
+    still = np.zeros((5, 3))
+    kinds = {
+        "goes on": kind_of(steady, constant_velocity(steady)),
+        "brakes": kind_of(steady, constant_velocity(steady) * 0.7),
+        "speeds up": kind_of(steady, constant_velocity(steady) * 1.3),
+        "turns": kind_of(steady, constant_velocity(steady) + np.outer(np.arange(1, 7), [0.0, 1.0])),
+        "stays": kind_of(still, np.zeros((6, 2))),
+        "starts": kind_of(still, PATH),
+    }
+    assert {name: name for name in kinds} == kinds
+
+
+# Answers --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        waypoints_text(PATH),
+        "```json\n" + json.dumps(PATH.tolist()) + "\n```",
+        json.dumps([{"x": x, "y": y} for x, y in PATH.tolist()]),
+        "The car was at (-8.0, 0.0) and (-4.0, 0.0).\nSo: " + waypoints_text(PATH),
+        "\n".join(f"{0.5 * (i + 1)} s: ({x:+}, {y:+})" for i, (x, y) in enumerate(PATH)),
+        " ".join(f"({0.5 * (i + 1)}, {x}, {y})" for i, (x, y) in enumerate(PATH)),
+        "\n".join(f"- x = {x} m, y = {y} m" for x, y in PATH),
+        waypoints_text(PATH).replace("-", "\u2212"),
+    ],
+)
+def test_waypoints_are_read_however_they_are_written(words: str) -> None:
+    found = read_waypoints(words)
+    assert found is not None and np.allclose(found, PATH)
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["", "I cannot say.", "[(1, 2), (3, 4)]", "(1e99, 0) " * 6, "(nan, nan) " * 6, "(1, 2, 3) " * 6, "(" * 100_000],
+)
+def test_what_are_no_waypoints_is_not_read_as_some(words: str) -> None:
+    assert read_waypoints(words) is None
+
+
+# Runs -----------------------------------------------------------------------------------------------------------------
+
+
+def test_it_is_a_benchmark_of_the_kernel(tmp_path: Path) -> None:
+    assert faults(OpenLoopBenchmark(str(write_nuscenes(tmp_path)))) == []
+
+
+def test_a_model_that_goes_straight_on_is_constant_velocity(tmp_path: Path) -> None:
+    who = Scripted(straight_on)
+    done, rows = run(write_nuscenes(tmp_path), who)
+    assert len(rows) == sum(len(poses) - 5 for poses in SCENES.values())
+    for row in rows:
+        for name in ("stp3", "uniad", "openemma"):
+            mine, theirs = errors_of(row, name), errors_of(row, name, "cv")
+            for part in ("at_1s", "at_2s", "at_3s"):
+                one, other = getattr(mine, part), getattr(theirs, part)
+                assert (one is None and other is None) or math.isclose(one, other, abs_tol=0.15)  # two decimals a text
+    assert not any(row["failed"] for row in rows)
+    content = who.seen[0][-1]["content"]
+    assert content[1]["image_url"]["url"].startswith("data:image/jpeg;base64,")
+    assert "Speed over each half second, m/s: 8.0, 8.0, 8.0, 8.0." in content[2]["text"]
+    assert "Navigation: go straight" in content[2]["text"]
+    table = (done.folder / "table.md").read_text()
+    assert all(part in table for part in ("OpenEMMA's convention", "UniAD's", "ST-P3's", "failures left out"))
+
+
+def test_failures_are_counted_both_ways(tmp_path: Path) -> None:
+    answers = iter(["I would rather not."] + [waypoints_text(PATH)] * 30)
+    _, rows = run(write_nuscenes(tmp_path), Scripted(lambda text: next(answers)), scenes="", limit=8)
+    assert [row["status"] for row in rows].count("unreadable") == 1
+    kept, counted = (our_line("us", "SFT", rows, failures=failures) for failures in (False, True))
+    assert kept[-1] == counted[-1] == f"{100 / 8:.2f}"
+    assert float(kept[4]) < float(counted[4])
+    bad = next(row for row in rows if row["failed"])
+    assert bad["l2_30"] == pytest.approx(24.0)  # it counts as a car that stays
+
+
+def test_an_endpoint_that_gives_nothing_counts_nowhere(tmp_path: Path) -> None:
+    def refuse(text: str) -> str:
+        raise DataError("down")
+
+    _, rows = run(write_nuscenes(tmp_path), Scripted(refuse), limit=3)
+    assert all(row["status"] == "no answer" and row["failed"] is None for row in rows)
+    assert our_line("us", "", rows)[2:] == ("n/a",) * 5
+
+
+def test_the_chain_of_thought_asks_before_it_asks(tmp_path: Path) -> None:
+    who = Scripted(lambda text: waypoints_text(PATH) if "Where will" in text else f"I think of: {text[:20]}")
+    _, rows = run(write_nuscenes(tmp_path), who, setting="chain-of-thought", limit=1)
+    assert [len(turns) for turns in who.seen] == [1, 3, 5, 7]
+    last = who.seen[-1]
+    assert [turn["role"] for turn in last] == ["user", "assistant"] * 3 + ["user"]
+    assert [last[2]["content"], last[4]["content"]] == list(THOUGHTS[1:])
+    assert rows[0]["status"] == "answered"
+
+
+def test_the_fine_tuning_lines_are_what_the_sft_setting_asks(tmp_path: Path) -> None:
+    bench = OpenLoopBenchmark(str(write_nuscenes(tmp_path)), setting="sft", limit=1)
+    who = Scripted(lambda text: waypoints_text(PATH))
+    run(tmp_path, who, setting="sft", limit=1)
+    line = json.loads(next(iter(training_lines(bench.samples, tmp_path))))
+    asked, answer = line["messages"]
+    assert asked["content"][1]["text"] == who.seen[0][-1]["content"][-1]["text"]
+    assert np.allclose(read_waypoints(answer["content"]), bench.samples[0].future, atol=0.01)
+    history, said = read_context(context_of(bench.samples[0]))
+    assert np.allclose(history, bench.samples[0].history, atol=0.01) and said == "go straight"
+
+
+def test_a_picture_that_is_missing_costs_its_own_frame(tmp_path: Path) -> None:
+    write_nuscenes(tmp_path)
+    (tmp_path / "samples" / "CAM_FRONT" / "scene-0001-5.jpg").unlink()
+    _, rows = run(tmp_path, Scripted(straight_on), limit=3)
+    assert [row["status"] for row in rows] == ["answered", "no answer", "answered"]
+    assert "scene-0001-5.jpg" in rows[1]["detail"]
+
+
+@pytest.mark.parametrize(
+    "options", [{"setting": "guessing"}, {"shown": "nothing"}, {"every": 0}, {"version": "v9"}, {"scenes": "no-file"}]
+)
+def test_options_that_make_no_sense_are_refused(tmp_path: Path, options: dict[str, Any]) -> None:
+    write_nuscenes(tmp_path)
+    with pytest.raises((ConfigError, DataError)):
+        OpenLoopBenchmark(str(tmp_path), **options)
+
+
+def test_a_model_behind_a_real_endpoint(tmp_path: Path) -> None:
+    write_nuscenes(tmp_path)
+    module = server_module()
+    server = module.ModelServer()
+    server.script(module.whole(f"Here: {waypoints_text(PATH)}"))
+    try:
+        who = make_answerer("openai/some-vlm", base_url=server.url, attempts=1, stream=False)
+        _, rows = run(tmp_path, who, limit=2)
+    finally:
+        server.close()
+    asked = server.requests[0].body["messages"][-1]["content"]
+    assert [row["status"] for row in rows] == ["answered", "answered"]
+    assert [part["type"] for part in asked] == ["text", "image_url", "text"]
+    assert rows[0]["l2_05"] == pytest.approx(0.1, abs=1e-3)
+
+
+def test_the_papers_table_stands_beside_ours() -> None:
+    lines = paper_lines()
+    assert len(lines) == 13 and all(len(line) == len(HEADER) for line in lines)
+    assert ("ViLaD-SFT (paper, nuScenes)", "SFT", "0.79", "1.92", "2.83", "1.85", "0.00") in lines
+    for line in lines:
+        values = [float(cell) for cell in line[2:6]]
+        assert sum(values[:3]) / 3 == pytest.approx(values[3], abs=0.016), line  # as printed: they add up
+
+
+def test_the_command_asks_and_shows_the_papers_rows(tmp_path: Path) -> None:
+    write_nuscenes(tmp_path / "data")
+    module = server_module()
+    server = module.ModelServer()
+    server.script(module.whole(waypoints_text(PATH)))
+    arguments = ["bench", "openloop", "--data", str(tmp_path / "data"), "--limit", "2", "--out", str(tmp_path / "run")]
+    try:
+        asked = CliRunner().invoke(app, [*arguments, "--planner", "openai/some-vlm", "--base-url", server.url])
+    finally:
+        server.close()
+    assert asked.exit_code == 0, asked.output
+    said = (tmp_path / "run" / "table12.md").read_text()
+    assert "ViLaD-Opt (paper, nuScenes)" in said and "constant velocity (nuScenes)" in said
+    assert "read off the true future" in asked.output
+    written = CliRunner().invoke(app, [*arguments, "--write-sft", str(tmp_path / "sft.jsonl")])
+    assert written.exit_code == 0 and len((tmp_path / "sft.jsonl").read_text().splitlines()) == 2
+    nobody = CliRunner().invoke(app, arguments)
+    assert nobody.exit_code != 0

@@ -1,0 +1,137 @@
+"""The paper's path for real weights, end to end on a random Qwen2.5-VL of some thousand weights."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("transformers")
+pytest.importorskip("tokenizers")
+pytest.importorskip("peft")
+
+from chauffeur.concept import ConfigError, Context, Instruction, PlanRequest, SystemMessage  # noqa: E402
+from chauffeur.models.vlm.lora import ChatExamples, LoraRecipe, encoded, fine_tune_vlm  # noqa: E402
+from chauffeur.planners.motion import MotionPlanner, read_matrix  # noqa: E402
+from chauffeur.planners.vlm_processor import PictureProcessor, load_processor  # noqa: E402
+from chauffeur.safety.gain_box import gain_box  # noqa: E402
+
+CHAT = (
+    "{% for m in messages %}<|im_start|> {% for c in m['content'] %}{% if c['type'] == 'image' %}"
+    "<|vision_start|><|image_pad|><|vision_end|>{% else %} {{ c['text'] }} {% endif %}{% endfor %}<|im_end|> "
+    "{% endfor %}"
+    "{% if add_generation_prompt %}<|im_start|> {% endif %}"
+)
+
+
+@pytest.fixture(scope="module")
+def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from tokenizers import Tokenizer
+    from tokenizers.models import WordLevel
+    from tokenizers.pre_tokenizers import WhitespaceSplit
+    from transformers import (
+        PreTrainedTokenizerFast,
+        Qwen2_5_VLConfig,
+        Qwen2_5_VLForConditionalGeneration,
+        Qwen2VLImageProcessorPil,
+    )
+
+    special = ["<|im_start|>", "<|im_end|>", "<|vision_start|>", "<|vision_end|>", "<|image_pad|>", "<|video_pad|>"]
+    words = ["<unk>", "<pad>", *special, "P", "=", "Thoughts:", "Weather,", "The", "road", "[[0.45,"]
+    raw = Tokenizer(WordLevel({word: place for place, word in enumerate(words)}, unk_token="<unk>"))
+    raw.pre_tokenizer = WhitespaceSplit()
+    tokenizer = PreTrainedTokenizerFast(
+        tokenizer_object=raw, pad_token="<pad>", eos_token="<|im_end|>", unk_token="<unk>",
+        additional_special_tokens=special,
+    )  # fmt: skip
+    sight = Qwen2VLImageProcessorPil(min_pixels=28 * 28, max_pixels=4 * 28 * 28)
+    processor = PictureProcessor(tokenizer, sight, CHAT)
+    ids = {name: words.index(f"<|{name}|>") for name in ("image_pad", "video_pad", "vision_start", "vision_end")}
+    config = Qwen2_5_VLConfig(
+        text_config={
+            "vocab_size": len(words), "hidden_size": 16, "intermediate_size": 16, "num_hidden_layers": 1,
+            "num_attention_heads": 2, "num_key_value_heads": 2, "max_position_embeddings": 4096,
+            "rope_parameters": {"rope_type": "default", "rope_theta": 10000.0, "mrope_section": [1, 1, 2]},
+            "pad_token_id": 1, "bos_token_id": None, "eos_token_id": words.index("<|im_end|>"),
+        },
+        vision_config={
+            "depth": 1, "hidden_size": 16, "intermediate_size": 16, "num_heads": 2, "out_hidden_size": 16,
+            "patch_size": 14, "fullatt_block_indexes": [0],
+        },
+        image_token_id=ids["image_pad"], video_token_id=ids["video_pad"],
+        vision_start_token_id=ids["vision_start"], vision_end_token_id=ids["vision_end"],
+    )  # fmt: skip
+    torch.manual_seed(0)
+    folder = tmp_path_factory.mktemp("qwen")
+    Qwen2_5_VLForConditionalGeneration(config).save_pretrained(folder)
+    processor.save_pretrained(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def examples() -> ChatExamples:
+    return ChatExamples(size=(112, 64))
+
+
+def test_the_preset_is_the_papers() -> None:
+    paper = LoraRecipe()
+    assert (paper.epochs, paper.batch, paper.accumulate, paper.rate, paper.pairs) == (5, 2, 8, 1e-5, 10_000)
+    assert paper.steps == 3125
+
+
+def test_an_example_answers_with_gains_of_the_certified_box(examples: ChatExamples) -> None:
+    for number in range(6):
+        one = examples[number]
+        policy, reply = read_matrix(one.answer)
+        assert policy is not None and not gain_box().outside(policy) and "camera" in reply.thoughts
+        assert any("image_url" in str(part) for part in one.messages[-1]["content"])
+    assert examples[0].messages[-1]["content"][1] == examples[2].messages[-1]["content"][1]  # one picture, three styles
+
+
+def test_only_the_answer_is_learned(checkpoint: Path, examples: ChatExamples) -> None:
+    processor = load_processor(str(checkpoint))
+    batch = encoded(processor, [examples[0], examples[1]])
+    learned = batch["labels"] != -100
+    assert learned.any(dim=1).all() and learned.float().mean() < 0.2
+    assert (batch["labels"][learned] == batch["input_ids"][learned]).all()
+
+
+def test_a_checkpoint_is_tuned_merged_resumed_and_asked_for_gains(
+    checkpoint: Path, examples: ChatExamples, tmp_path: Path
+) -> None:
+    recipe = LoraRecipe(epochs=1, pairs=8, batch=1, accumulate=2, rate=5e-2, rank=2, alpha=4, precision="float32")
+    seen: list[float] = []
+    merged = fine_tune_vlm(str(checkpoint), tmp_path, recipe, examples, lambda step, loss, _: seen.append(loss))
+    assert seen[-1] < seen[0]
+    from safetensors.torch import load_file
+
+    before, after = (load_file(folder / "model.safetensors") for folder in (checkpoint, merged))
+    changed = {name for name, value in after.items() if not torch.equal(value, before[name])}
+    assert changed and all("visual" not in name for name in changed)
+    fine_tune_vlm(str(checkpoint), tmp_path, recipe, examples, lambda step, loss, _: pytest.fail("it was finished"))
+    again = load_file(merged / "model.safetensors")  # its additions came back from the run's state
+    assert all(torch.equal(value, again[name]) for name, value in after.items())
+    planner = MotionPlanner.from_spec(f"transformers/{merged}")
+    assert planner.sees
+    plan = asyncio.run(planner.plan(_request()))
+    assert plan.policy is None and "no action matrix" in plan.refusal  # random weights write no matrix, and it is said
+
+
+def test_a_folder_without_a_checkpoint_is_refused(examples: ChatExamples, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no vision-language model"):
+        fine_tune_vlm(str(tmp_path / "none"), tmp_path, LoraRecipe(), examples)
+
+
+def _request() -> PlanRequest:
+    from chauffeur.describe.track import describe_track
+    from chauffeur.drive.seat import SeatCamera
+    from chauffeur.worlds.track import TrackWorld, track_scenario
+
+    world = TrackWorld()
+    observation = world.reset(track_scenario("left_turn", "snow"))
+    context: Context = describe_track(observation)
+    return PlanRequest(
+        Instruction("Gently, please."), context, SystemMessage(""), images=SeatCamera(world, 3).take(observation)
+    )

@@ -1,0 +1,185 @@
+"""Algorithms 1 and 2: properties for any logits, and the fast decoder against the plain one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chauffeur.concept import ConfigError, DataError
+from chauffeur.planners.vilad.template import (
+    MASK,
+    ActionSlot,
+    ActionTemplate,
+    digit_slots,
+    read_number,
+    write_number,
+)
+from chauffeur.planners.vilad.unmasking import (
+    PAPER,
+    Unmasking,
+    accepted,
+    distribution,
+    entropy_of,
+    unmask,
+    unmask_many,
+    unmasking,
+)
+
+WORDS = ("left", "right", "on")
+PIECES = st.lists(
+    st.one_of(
+        st.sampled_from((";", "to", ".")),
+        st.lists(st.sampled_from(WORDS), min_size=1, max_size=3, unique=True).map(tuple),
+        st.none(),
+    ),
+    min_size=1,
+    max_size=12,
+)
+
+
+def template_of(pieces: list[Any]) -> ActionTemplate:
+    return ActionTemplate(
+        tuple(
+            piece if isinstance(piece, str) else ActionSlot(str(at), piece or (), pointer=piece is None)
+            for at, piece in enumerate(pieces)
+        )
+    )
+
+
+templates = PIECES.map(template_of)
+hows = st.builds(
+    Unmasking,
+    steps=st.integers(1, 9),
+    tau=st.floats(0.05, 3.0),
+    rule=st.sampled_from(("threshold", "factor", "top-k", "entropy")),
+    base=st.sampled_from(("all", "maskable")),
+    temperature=st.sampled_from((0.0, 0.7)),
+    seed=st.integers(0, 3),
+)
+
+
+def network(template: ActionTemplate, candidates: int, seed: int, scale: float) -> Any:
+    """Any logits whatever: other ones for each sequence, the same for the same one."""
+
+    def predict(row: Any) -> Any:
+        rng = np.random.default_rng([seed, *(int(token) for token in row)])
+        return (scale * rng.standard_normal((template.length, template.size + candidates))).astype(np.float32)
+
+    return predict
+
+
+@settings(max_examples=150, deadline=None)
+@given(templates, hows, st.integers(1, 4), st.integers(0, 2**20), st.sampled_from((0.0, 1.0, 20.0)))
+def test_unmasking_ends_keeps_what_is_fixed_and_never_revisits(
+    template: ActionTemplate, how: Unmasking, candidates: int, seed: int, scale: float
+) -> None:
+    predict = network(template, candidates, seed, scale)
+    allowed = template.allowed(candidates)
+    before = template.canvas
+    steps = list(unmasking(predict, template.canvas, allowed, how))
+    assert len(steps) <= how.steps
+    for step in steps:
+        decided = before != MASK
+        assert np.array_equal(step.row[decided], before[decided])
+        assert step.fixed
+        assert set(step.fixed) == set(np.flatnonzero((before == MASK) & (step.row != MASK)).tolist())
+        if how.rule == "threshold":  # what is more certain than tau stays; of the rest only what the schedule asks for
+            sure = {int(i) for i in np.flatnonzero(~decided & (step.confidence > how.tau))}
+            assert sure <= set(step.fixed)
+            least = how.scheduled(template.length, int(template.maskable.sum()))
+            assert len(step.fixed) <= max(1, len(sure), least)
+        before = step.row
+    template.validate(before, candidates)
+    assert np.array_equal(before[~template.maskable], template.canvas[~template.maskable])
+    again = unmask(predict, template.canvas, allowed, how)
+    assert np.array_equal(again.row, before)
+    assert again.passes == len(steps)
+    assert (again.order[template.maskable] >= 1).all()
+    assert not again.order[~template.maskable].any()
+
+
+@settings(max_examples=60, deadline=None)
+@given(templates, hows, st.lists(st.integers(0, 2**20), min_size=1, max_size=4))
+def test_a_batch_is_decided_token_for_token_as_one_by_one(
+    template: ActionTemplate, how: Unmasking, seeds: list[int]
+) -> None:
+    networks = [network(template, 3, seed, 2.0) for seed in seeds]
+    many = len(seeds)
+    found = unmask_many(
+        lambda rows, which: np.stack([networks[b](row) for row, b in zip(rows, which, strict=True)]),
+        np.repeat(template.canvas[None], many, axis=0),
+        np.repeat(template.allowed(3)[None], many, axis=0),
+        how,
+    )
+    for predict, fast in zip(networks, found, strict=True):
+        plain = unmask(predict, template.canvas, template.allowed(3), how)
+        assert np.array_equal(fast.row, plain.row)
+        assert np.array_equal(fast.order, plain.order)
+        assert np.allclose(fast.confidence, plain.confidence)
+        assert fast.passes == plain.passes
+
+
+def test_the_papers_schedule_counts_all_tokens() -> None:
+    # 28 tokens of which 14 are actions, 8 steps: 4 a step as printed, 2 when only actions count.
+    assert PAPER.scheduled(28, 14) == 4
+    assert Unmasking(steps=8, base="maskable").scheduled(28, 14) == 2
+
+
+def test_rules_accept_what_they_say() -> None:
+    confidence = np.array([0.99, 0.2, 0.9, 0.6])
+    entropy = np.array([0.05, 1.5, 0.3, 0.8])
+    places = [0, 1, 2, 3]
+
+    def kept(rule: Any, tau: float, scheduled: int = 1) -> list[int]:
+        return accepted(places, confidence, entropy, Unmasking(rule=rule, tau=tau), scheduled)
+
+    assert kept("threshold", 0.5) == [0, 2, 3]
+    assert kept("threshold", 1.0) == [0]
+    assert kept("threshold", 1.0, scheduled=2) == [0, 2]
+    assert kept("factor", 0.5) == [0, 2]  # 2 * 0.01 and 3 * 0.1 are below 0.5, 4 * 0.4 is not
+    assert kept("factor", 0.25) == [0]
+    assert kept("top-k", 2) == [0, 2]
+    assert kept("entropy", 0.1) == [0, 2]  # before the second 0.05 nats are spent, before the third 0.35
+    assert kept("entropy", 0.4) == [0, 2, 3]
+
+
+def test_a_template_knows_its_decisions() -> None:
+    template = ActionTemplate(("go", ActionSlot("way", WORDS), "to", ActionSlot("spot", pointer=True)))
+    row = template.encode({"way": "right", "spot": 2})
+    assert template.decode(row) == {"way": "right", "spot": 2}
+    assert template.text(row) == "go right to #2"
+    assert template.text(template.canvas) == "go [M] to [M]"
+    with pytest.raises(DataError, match="no candidate"):
+        template.validate(row, candidates=2)
+    with pytest.raises(DataError, match="still masked"):
+        template.decode(template.canvas)
+    with pytest.raises(DataError, match="fixed"):
+        template.validate([template.ids["to"], *row[1:]])
+    with pytest.raises(DataError, match="cannot hold"):
+        template.validate([row[0], template.ids["go"], *row[2:]])
+    with pytest.raises(DataError, match="tokens"):
+        template.validate(row[:-1])
+    with pytest.raises(DataError, match="left, right, on"):
+        template.encode({"way": "back", "spot": 0})
+    with pytest.raises(DataError, match="two slots"):
+        ActionTemplate((ActionSlot("a", WORDS), ActionSlot("a", WORDS)))
+    with pytest.raises(ConfigError, match="at least one step"):
+        Unmasking(steps=0)
+
+
+@given(st.floats(-99.94, 99.94))
+def test_numbers_as_digits_come_back(value: float) -> None:
+    template = ActionTemplate(digit_slots("x", 2, 1))
+    row = template.encode(write_number("x", value, 2, 1))
+    assert read_number("x", template.decode(row), 2, 1) == pytest.approx(value, abs=0.0501)
+    assert template.length == 5
+
+
+def test_shares_and_entropy() -> None:
+    shares = distribution(np.array([[0.0, np.log(3.0)], [-1e9, 0.0]], np.float64))
+    assert np.allclose(shares, [[0.25, 0.75], [0.0, 1.0]])
+    assert np.allclose(entropy_of(shares), [0.5623, 0.0], atol=1e-4)

@@ -1,0 +1,146 @@
+"""Four toy plug-ins in new files and entry points alone: a world, a policy kind, a planner that looks, questions.
+
+`tests/bench/test_kernel.py` runs the benchmark of questions, `tests/worlds/test_conformance.py` checks the world.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import importlib
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from chauffeur.concept import (
+    CameraImage,
+    Instruction,
+    Limits,
+    Observation,
+    Plan,
+    PlanRequest,
+    Policy,
+    Scenario,
+    ScenarioError,
+    SystemMessage,
+    Thoughts,
+)
+from chauffeur.concept.registry import load_plugin
+from chauffeur.describe import describe
+from chauffeur.drive.loop import Stages, drive
+from chauffeur.drive.session import Forgetful, check_drive, declined, drive_policy, make_trip, make_world
+from chauffeur.planners.base import Planner
+from chauffeur.planners.registry import make_planner
+from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+POINTS = """[chauffeur.worlds]
+one-lane = one_lane:OneLane
+[chauffeur.executors]
+speed-profile = speed_profile:SpeedProfileExecutor
+unvouched = one_lane:OneLane
+[chauffeur.planners]
+lookout = lookout:Lookout
+[chauffeur.benchmarks]
+right-of-way = right_of_way:RightOfWay
+"""
+PLACE = Scenario("road", "one-lane", {}, 3)
+
+
+@pytest.fixture
+def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """The examples, installed as a package of somebody else's; the policy kind's module."""
+    meta = tmp_path / "toys-1.0.dist-info"
+    meta.mkdir()
+    (meta / "METADATA").write_text("Metadata-Version: 2.1\nName: toys\nVersion: 1.0\n")
+    (meta / "entry_points.txt").write_text(POINTS)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    return importlib.import_module("speed_profile")
+
+
+def planned(policy: Any) -> Plan:
+    return Plan(Thoughts("As a stranger's planner would."), policy, planner="stranger")
+
+
+def test_each_toy_is_found_by_its_name_and_is_short(toys: ModuleType) -> None:
+    for line in POINTS.splitlines():
+        if "=" in line:
+            name, _, module = (part.strip() for part in line.partition("="))
+            path = EXAMPLES / f"{module.partition(':')[0]}.py"
+            assert len(path.read_text(encoding="utf-8").splitlines()) < 80, name
+    assert make_planner("lookout").id == "lookout"
+    assert make_world(PLACE).engine == "one lane 1"
+    assert load_plugin("chauffeur.benchmarks", "right-of-way").id == "right-of-way-v1"
+
+
+@pytest.mark.parametrize("scenario", [PLACE, Scenario("road", "highway", {}, 3)], ids=["one-lane", "highway"])
+def test_a_policy_kind_of_ones_own_is_checked_bounded_and_driven(toys: ModuleType, scenario: Scenario) -> None:
+    from chauffeur.drive.scenarios import find
+
+    scenario = find("cruise") if scenario.world == "highway" else scenario
+    world = make_world(scenario)
+    start = world.reset(scenario)
+    policy = toys.SpeedProfile((18.0, 19.0, 17.0), 2.0)
+    assert not any(verdict.stops for verdict in run_checks(planned(policy), start, Limits(), DRIVE_CHECKS))
+    episode = drive_policy(world, policy, None, 20.0, Limits(max_speed_mps=18.5))
+    asked = dict.fromkeys(frame.wishes.target_speed_mps for frame in episode.frames)
+    assert list(asked) == [18.0, 18.5, 17.0], "what the person's limits forbid is brought within them"
+    assert dict(episode.bounded) == {"target_speed": 20}
+    assert episode.outcome == "ended"
+    assert episode.duration_s == pytest.approx(9.0, abs=0.2), "six seconds, and three after its end"
+
+
+@pytest.mark.parametrize(
+    ("speeds", "words"), [((60.0,), "not between 0 and"), ((), "no speeds"), ((float("nan"),), "not between")]
+)
+def test_a_policy_kind_of_ones_own_is_judged_by_its_executor(
+    toys: ModuleType, speeds: tuple[float, ...], words: str
+) -> None:
+    world = make_world(PLACE)
+    verdicts = run_checks(planned(toys.SpeedProfile(speeds, 1.0)), world.reset(PLACE), Limits(), DRIVE_CHECKS)
+    assert words in declined(planned(None), verdicts)
+
+
+def test_what_nobody_vouches_for_is_not_driven(toys: ModuleType) -> None:
+    world = make_world(PLACE)
+    start = world.reset(PLACE)
+    for kind, words in (("unvouched", "no `fault`"), ("telepathy", "no executor knows")):
+        policy: Policy = replace(toys.SpeedProfile((18.0,), 1.0), kind=kind)
+        verdicts = run_checks(planned(policy), start, Limits(), DRIVE_CHECKS)
+        assert verdicts[0].stops
+        assert words in verdicts[0].reason
+    with pytest.raises(ScenarioError, match=r"no executor.*|Known"):
+        drive_policy(world, replace(toys.SpeedProfile((18.0,), 1.0), kind="telepathy"), None, 1.0, Limits())
+
+
+@pytest.mark.parametrize(("brightness", "speed"), [(20, 14.0), (200, 18.0)])
+def test_a_planner_that_looks_is_given_pictures_and_drives_by_them(
+    toys: ModuleType, brightness: int, speed: float
+) -> None:
+    """All of the loop: the pictures reach the planner, and what it makes of them is checked and driven."""
+    world, planner = make_world(PLACE), make_planner("lookout")
+    seen: list[CameraImage] = []
+
+    def see(observation: Observation) -> tuple[CameraImage, ...]:
+        picture = np.full((6, 8, 3), brightness, dtype=np.uint8)
+        seen.append(CameraImage("front", observation.time_s, picture))
+        return tuple(seen)
+
+    def execute(request: PlanRequest, plan: Plan, verdicts: Any, scenario: Scenario, seed: int) -> Any:
+        assert request.images == tuple(seen)
+        assert not declined(plan, verdicts)
+        assert plan.policy is not None
+        episode = drive_policy(world, plan.policy, None, 12.0, request.limits)
+        return make_trip(request, plan, verdicts, scenario, seed, episode, "")
+
+    assert isinstance(planner, Planner)
+    stages = Stages(
+        world, describe, Forgetful(), lambda _: SystemMessage(""), planner, check_drive, execute, lambda *_: None, see
+    )
+    trip = asyncio.run(drive(Instruction("Drive as the light allows."), PLACE, 3, Limits(), stages))
+    assert dict(trip.plan.settings)["target_speed_mps"] == pytest.approx(speed, abs=0.01)
+    assert trip.outcome == "ended"

@@ -1,0 +1,114 @@
+"""The conformance kit: the built-in worlds and the example pass it, and what breaks the contract is found."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from chauffeur.concept import Command, Observation, Scenario
+from chauffeur.drive.scenarios import BUILT_IN
+from chauffeur.drive.session import make_world
+from chauffeur.geometry import Polyline, RoadGraph
+from chauffeur.worlds.conformance import check_world
+from chauffeur.worlds.highway import HighwayWorld
+
+SCENES = {scenario.id: scenario for scenario in BUILT_IN}
+
+
+def faults(make: Callable[[], Any], scenario: Scenario) -> dict[str, tuple[str, ...]]:
+    return {found.check: found.faults for found in check_world(make, scenario) if found.faults}
+
+
+@pytest.mark.parametrize("name", ["overtake", "emergency-lane", "intersection", "parking"])
+def test_the_built_in_worlds_keep_the_contract(name: str) -> None:
+    scenario = SCENES[name]
+    assert faults(lambda: make_world(scenario), scenario) == {}
+
+
+def test_the_example_world_keeps_it_in_under_80_lines() -> None:
+    path = Path(__file__).parents[2] / "examples" / "one_lane.py"
+    assert len(path.read_text(encoding="utf-8").splitlines()) < 80
+    spec = importlib.util.spec_from_file_location("one_lane", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert faults(module.OneLane, Scenario("one-lane", "one-lane", {}, 0)) == {}
+
+
+class _Forgetful(HighwayWorld):
+    """Whoever observes it changes it."""
+
+    looks = 0
+
+    def observe(self) -> Observation:
+        _Forgetful.looks += 1
+        return replace(super().observe(), time_s=float(_Forgetful.looks))
+
+
+class _Wild(HighwayWorld):
+    def step(self, command: Command) -> Command:
+        super().step(Command(0.0, 0.0))
+        return command
+
+
+class _Torn(HighwayWorld):
+    def observe(self) -> Observation:
+        shown = super().observe()
+        first, *rest = shown.road.lanes
+        return replace(shown, road=RoadGraph((replace(first, successors=("nowhere",)), *rest)))
+
+
+class _Immortal(HighwayWorld):
+    ended = False  # type: ignore[assignment]
+
+
+class _Modest(HighwayWorld):
+    capabilities = replace(HighwayWorld.capabilities, lane_changes=False, policies=())
+
+
+class _Mirrored(HighwayWorld):
+    """As in highway-env: y, headings and steering to the right."""
+
+    def observe(self) -> Observation:
+        shown = super().observe()
+        lanes = (
+            replace(lane, centre=Polyline.of((x, -y) for x, y in lane.centre.points_m)) for lane in shown.road.lanes
+        )
+        return replace(shown, road=RoadGraph(tuple(lanes)))
+
+    def step(self, command: Command) -> Command:
+        applied = super().step(replace(command, steering_rad=-command.steering_rad))
+        return replace(applied, steering_rad=-applied.steering_rad)
+
+
+class _Broken(HighwayWorld):
+    def driver(self) -> Any:
+        raise RuntimeError("no driver today")
+
+
+@pytest.mark.parametrize(
+    ("world", "check", "says"),
+    [
+        (_Forgetful, "same seed, same trip", "differs at tick 0"),
+        (_Forgetful, "time", "Two looks"),
+        (_Wild, "commands", "was applied as"),
+        (_Wild, "commands", "ValueError"),
+        (_Torn, "road graph", "nowhere, which is no lane"),
+        (_Torn, "observations are frozen", "another object"),
+        (_Mirrored, "right-handed", "lies to its left"),
+        (_Mirrored, "right-handed", "turned to the right"),
+        (_Immortal, "the end", "the trip goes on"),
+        (_Modest, "capabilities", "lanes abreast"),
+        (_Modest, "capabilities", "no kind of policy"),
+        (_Broken, "driver", "RuntimeError: no driver today"),
+    ],
+)
+def test_what_breaks_it_is_found_and_named(world: type[HighwayWorld], check: str, says: str) -> None:
+    found = faults(world, SCENES["overtake"])[check]
+    assert any(says in fault for fault in found), found
