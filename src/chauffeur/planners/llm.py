@@ -11,7 +11,7 @@ from typing import Literal
 from chauffeur.concept import ConfigError, InstructionError, Plan, PlanRequest, Program, Thoughts
 from chauffeur.planners.base import OnText, Prompt, Prose
 from chauffeur.planners.cache import Completion
-from chauffeur.planners.llm_model import CUT, Bill, ChatModel
+from chauffeur.planners.llm_model import CUT, ChatBill, ChatModel
 from chauffeur.planners.llm_reply import Reply, read_reply
 from chauffeur.planners.llm_settings import settings_from
 from chauffeur.planners.prompts import Message, build_messages, repair_turns
@@ -129,7 +129,7 @@ class LlmPlanner:
         if not request.instruction.text.strip():
             raise InstructionError("The instruction is empty.", hint="Say what you want the car to do.")
         started_s = self._chat.clock()
-        bill = Bill()
+        bill = ChatBill()
         completion, reply = await self._chat.within_budget(self._converse(request, bill))
         policy = _program(reply.source, request.system.library) if reply.source is not None else None
         goal = NO_GOAL if policy is None else goal_of(request)
@@ -159,7 +159,7 @@ class LlmPlanner:
         """Close the connections to the endpoint."""
         await self._chat.close()
 
-    async def _converse(self, request: PlanRequest, bill: Bill) -> tuple[Completion, Reply]:
+    async def _converse(self, request: PlanRequest, bill: ChatBill) -> tuple[Completion, Reply]:
         messages = build_messages(request)
         completion, reply, findings = await self._answer(messages, request, bill)
         for _ in range(self._repairs):
@@ -171,7 +171,7 @@ class LlmPlanner:
         return completion, reply
 
     async def _answer(
-        self, messages: list[Message], request: PlanRequest, bill: Bill
+        self, messages: list[Message], request: PlanRequest, bill: ChatBill
     ) -> tuple[Completion, Reply, list[str]]:
         completion = await self._chat.complete(messages, bill)
         reply = read_reply(completion.text, cut=completion.finish in CUT)

@@ -40,7 +40,7 @@ T = TypeVar("T")
 
 
 @dataclass(slots=True)
-class Bill:
+class ChatBill:
     """What one plan, or one answer, has cost so far."""
 
     prompt_tokens: int = 0
@@ -157,7 +157,7 @@ class ChatModel:
         Raises:
             EndpointError: The endpoint gave no reply that can be read; a `PlannerError`.
         """
-        bill = Bill()
+        bill = ChatBill()
         completion = await self.within_budget(self.complete(list(messages), bill))
         text = without_thinking(completion.text[:MAX_REPLY_CHARS]).strip()
         whole = completion.finish not in CUT
@@ -181,7 +181,7 @@ class ChatModel:
         """Close the connections to the endpoint."""
         await self._endpoint.close()
 
-    async def complete(self, messages: list[Message], bill: Bill) -> Completion:
+    async def complete(self, messages: list[Message], bill: ChatBill) -> Completion:
         """One reply, from the cache or the endpoint, and what it costs. Raises EndpointError."""
         bill.answers += 1
         key = endpoint_key(self._address.url, self.model, messages, self._sampling.parameters())
@@ -215,7 +215,7 @@ class ChatModel:
             self._cache.put(key, completion)
         return completion
 
-    def usage(self, bill: Bill) -> Usage:
+    def usage(self, bill: ChatBill) -> Usage:
         """A bill as it stands on a plan."""
         return Usage(
             prompt_tokens=bill.prompt_tokens,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from chauffeur.bench.leaderboard.planning import plan_official
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute
@@ -48,9 +49,9 @@ def test_who_is_farther_up_the_same_slope_is_seen() -> None:
 
 def test_a_route_over_a_bridge_keeps_to_it() -> None:
     """Two roads along each other at two heights: nothing in the plane tells them apart."""
-    town = load("Gridford")
-    town.__dict__["opendrive"] = made = _map(8.0, turned=0.02)
-    object.__setattr__(town, "road", made.road)
+    made = _map(8.0, turned=0.02)
+    town = replace(load("Gridford"), road=made.road)  # a copy: packs are read once for everybody
+    town.__dict__["opendrive"] = made
     points = tuple(made.road[STREET].centre.at(station) for station in (95.0, 110.0))
     for heights, lane in (((0.0, 0.0), STREET), ((8.0, 8.0), BRIDGE)):
         route = LeaderboardRoute("0", "Two", tuple(Pose(p.x_m, p.y_m, 0.01) for p in points), heights)

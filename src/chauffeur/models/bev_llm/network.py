@@ -163,7 +163,7 @@ class Resampler(nn.Module):
         return x
 
 
-class Meaning(nn.Module):
+class MeaningHead(nn.Module):
     """What class of what facet a question with an option means, from which words are in the one and in the other.
 
     Order is left out on purpose: taught a few wordings of each class, a network that reads in order knows these
@@ -206,7 +206,7 @@ class CompactBevLlm(nn.Module):
         if config.fusion.bev:
             self.occupied = nn.Linear(config.fusion.bev_width, config.kinds)
         self.decoder = _decoder(config)
-        self.means = Meaning(config.vocabulary, config.strange, config.hidden, sum(config.facets))
+        self.means = MeaningHead(config.vocabulary, config.strange, config.hidden, sum(config.facets))
         self.rarity: torch.Tensor
         self.register_buffer("rarity", torch.zeros(sum(config.facets)))
         self.fits = nn.Linear(config.hidden, 1)
