@@ -23,6 +23,7 @@ from chauffeur.bench.leaderboard.published import HEADER, PAPER, beside_the_pape
 from chauffeur.bench.leaderboard.rollout import RouteJob
 from chauffeur.concept import ConfigError, Limits, Plan, PlanRequest, Program, Scenario, Thoughts
 from chauffeur.memory.policies import PolicyRepository
+from chauffeur.planners.onboard.town import SNIPPETS
 from chauffeur.worlds.town.pack import load
 
 GO = "def go():\n    while True:\n        yield proceed(check_speed_limit())\n"
@@ -146,12 +147,20 @@ def test_options_that_cannot_be_are_refused(tmp_path: Path) -> None:
     for options in (
         {"driver": "nobody"},
         {"driver": "retrieval", "setting": "by-heart"},
-        {"driver": "retrieval", "setting": "human-feedback"},
         {"driver": "retrieval", "repository": str(tmp_path)},
         {"driver": "retrieval", "latency_s": -1.0},
     ):
         with pytest.raises(ConfigError):
             LeaderboardBenchmark(**options)  # type: ignore[arg-type]
+
+
+def test_without_a_repository_the_programs_that_ship_are_offered(tmp_path: Path) -> None:
+    half = (SNIPPETS / "policies.jsonl").read_text("utf-8").splitlines(keepends=True)[::2]
+    (tmp_path / "policies.jsonl").write_text("".join(half), "utf-8")
+    shipped = LeaderboardBenchmark(driver="retrieval", setting="human-feedback").config["planner"]
+    given = LeaderboardBenchmark(driver="retrieval", setting="human-feedback", repository=str(tmp_path))
+    assert PolicyRepository(SNIPPETS).digest in shipped
+    assert PolicyRepository(tmp_path).digest in given.config["planner"]
 
 
 def test_what_decides_a_result_decides_its_key() -> None:

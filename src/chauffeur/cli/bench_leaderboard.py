@@ -56,7 +56,7 @@ def leaderboard(
         typer.Option(help="`zero-shot`, `few-shot` or `human-feedback`.", rich_help_panel=_LANGUAGE),
     ] = "few-shot",
     repository: Annotated[
-        Path | None, typer.Option(help="Snippets of `human-feedback`.", rich_help_panel=_LANGUAGE)
+        Path | None, typer.Option(help="For `human-feedback`; else what ships.", rich_help_panel=_LANGUAGE)
     ] = None,
     latency: Annotated[
         float | None,
@@ -76,6 +76,7 @@ def leaderboard(
 ) -> None:
     """CARLA Leaderboard 1.0 anywhere: RC, IP and DS over routes with traffic, lights and scenarios."""
     import os
+    from collections import Counter
 
     from chauffeur.bench.kernel.report import tables
     from chauffeur.bench.kernel.run import BenchRun
@@ -83,7 +84,7 @@ def leaderboard(
     from chauffeur.bench.leaderboard.artefacts import write_artefacts
     from chauffeur.bench.leaderboard.benchmark import LeaderboardBenchmark
     from chauffeur.bench.leaderboard.published import ENGINES_DIFFER, HEADER, beside_the_paper
-    from chauffeur.bench.leaderboard.results import NOTE
+    from chauffeur.bench.leaderboard.results import NOT_DRIVEN, NOTE
     from chauffeur.bench.leaderboard.scoring import scoring_named
     from chauffeur.cli.bench_run import carry_out, effort, finish, show_tables
     from chauffeur.cli.console import stdout
@@ -113,6 +114,8 @@ def leaderboard(
     work = effort(workers, ray=ray)
     rows = carry_out(console, run, lambda watch: run.run(watch, work), f"Leaderboard 1.0, {planner}")
     show_tables(console, tables(bench.tables, rows))
+    for why, times in Counter(row["detail"] for row in rows if row["engine"] == NOT_DRIVEN).most_common():
+        console.print(f"Not driven, counted as 0: {times} of {len(rows)}. {why}", style="yellow", soft_wrap=True)
     if rows:
         results = {item.id: run.stages.outcome(item).result for item in run.items}
         written = write_artefacts(run.folder, bench, rows, results)

@@ -23,6 +23,7 @@ from chauffeur.bench.leaderboard.scoring import RouteScore, Scoring, penalty, ro
 from chauffeur.bench.leaderboard.triggers import Trigger, TriggerSet, read_triggers
 from chauffeur.concept import ConfigError
 from chauffeur.memory.policies import PolicyRepository
+from chauffeur.planners.onboard.town import SNIPPETS
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.shield import SHIELD_VERSION
 
@@ -133,7 +134,7 @@ class LeaderboardBenchmark(Unasked):
             limit: Only so many routes; 0 for all.
             shield: Whether the safety filter has the last word on every command.
             setting: How a planner learns its task: zero-shot, few-shot (three examples) or human-feedback.
-            repository: Folder of the policy repository, for human-feedback.
+            repository: Folder of the policy repository, for human-feedback; the programs that ship, if none is given.
             latency_s: What a plan takes in simulated time; None takes what it really took.
             base_url: Address of the planner's endpoint, where it has one.
 
@@ -267,11 +268,7 @@ def _planner_spec(name: str, setting: str, repository: str, latency_s: float | N
     make_planner(name, **dict(options))
     digest = ""
     if setting == "human-feedback":
-        if not repository:
-            raise ConfigError(
-                "The setting human-feedback needs a policy repository.",
-                hint="Give --repository FOLDER; `chauffeur bench coach-town` makes one.",
-            )
+        repository = repository or str(SNIPPETS)
         digest = PolicyRepository(Path(repository)).digest
     elif repository:
         raise ConfigError(f"The setting {setting} uses no policy repository.", hint="Add --setting human-feedback.")

@@ -6,6 +6,8 @@ import statistics
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from chauffeur.bench.leaderboard.results import NOT_DRIVEN
+
 ENGINES_DIFFER: Final = (
     "Engines differ: the paper's rows were driven in CARLA, ours in the engine named. In ours the world's driver keeps "
     "the gap, obeys lights and yields, and a program chooses way, lane and speed; in the paper programs did more. The "
@@ -37,7 +39,7 @@ def beside_the_paper(driver: str, setting: str, rows: Sequence[Mapping[str, Any]
     counted = [row for row in rows if not row["infra_failed"]]
     if not counted:
         return list(PAPER)
-    engines = " and ".join(sorted({str(row["engine"]) for row in counted if row["engine"] != "not driven"}))
+    engines = " and ".join(sorted({str(row["engine"]) for row in counted if row["engine"] != NOT_DRIVEN}))
     mean = {name: statistics.fmean(float(row[name]) for row in counted) for name in ("ds", "rc", "ip")}
     learned = _LEARNING.get(setting, "rules")
     navigation = "instruction" if setting else "route"

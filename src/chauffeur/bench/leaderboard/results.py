@@ -16,6 +16,8 @@ from typing_extensions import TypedDict  # pydantic reads the standard library's
 from chauffeur.bench.leaderboard.criteria import Infraction
 from chauffeur.bench.leaderboard.scoring import KINDS, Driven, RouteScore, mean_score, official_rates, rates
 
+NOT_DRIVEN: Final = "not driven"
+"""The engine of a route that could not be set up."""
 NOTE: Final = (
     "Scores with a SUMO engine use the official Leaderboard 1.0 routes, trigger points, time limits and formulae, but "
     "not CARLA: planar vehicle, SUMO traffic, no props, no perception. They compare policies with each other and must "

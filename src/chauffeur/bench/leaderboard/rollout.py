@@ -10,7 +10,7 @@ from chauffeur.bench.leaderboard.criteria import Referee
 from chauffeur.bench.leaderboard.drivers import RouteDriver, make_driver
 from chauffeur.bench.leaderboard.instructed import InstructedDriver, PlannerSpec, PlanningTally
 from chauffeur.bench.leaderboard.planning import plan_official
-from chauffeur.bench.leaderboard.results import infraction_rows, status_of
+from chauffeur.bench.leaderboard.results import NOT_DRIVEN, infraction_rows, status_of
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute
 from chauffeur.bench.leaderboard.staging import ScenarioWorld
 from chauffeur.bench.leaderboard.triggers import Trigger, place
@@ -224,7 +224,7 @@ def _result(job: RouteJob, *, failure: str = "", **values: Any) -> dict[str, Any
         "completion": 0.0,
         "infractions": [],
         "status": f"Failed - {failure}" if failure else "Failed",
-        "engine": "not driven",
+        "engine": NOT_DRIVEN,
         "length_m": 0.0,
         "simulated_s": 0.0,
         "cpu_s": 0.0,
