@@ -40,6 +40,7 @@ from chauffeur.cli import (
     unmasking,
     wheel,
 )
+from chauffeur.cli import quantise_vlm as quantising_vlm
 from chauffeur.cli.audit import audit_app
 from chauffeur.cli.bench import bench_app
 from chauffeur.cli.check import check_app
@@ -182,6 +183,7 @@ app.add_typer(check_app, name="check", rich_help_panel=BUILD)
 model_app.add_typer(train.train_app, name="train", epilog=train.ONBOARD_EXAMPLES)
 model_app.command(epilog=adapting.EXAMPLES)(adapting.adapt)
 model_app.command("adapt-vlm", epilog=adapting_vlm.EXAMPLES)(adapting_vlm.adapt_vlm)
+model_app.command("quantise-vlm", epilog=quantising_vlm.EXAMPLES)(quantising_vlm.quantise_vlm)
 model_app.command(epilog=serve.EXAMPLES)(serve.serve)
 model_app.command(epilog=train.GGUF_EXAMPLES)(train.gguf)
 model_app.add_typer(policies.policies_app, name="policies")

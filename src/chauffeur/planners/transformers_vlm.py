@@ -60,6 +60,8 @@ class TransformersAnswerer:
         try:
             processor: Any = load_processor(argument)
             model: Any = AutoModelForImageTextToText.from_pretrained(argument).eval()
+        except ImportError as error:  # what a quantised checkpoint is read with
+            raise MissingExtraError(f"{argument} cannot be read: {error}", hint="Install what it names.") from error
         except (OSError, ValueError) as error:
             raise ConfigError(
                 f"transformers has no vision-language model {argument!r}: {error}",

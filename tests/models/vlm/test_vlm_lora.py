@@ -12,62 +12,18 @@ pytest.importorskip("transformers")
 pytest.importorskip("tokenizers")
 pytest.importorskip("peft")
 
+from tiny_qwen import tiny_qwen  # noqa: E402
+
 from chauffeur.concept import ConfigError, Context, Instruction, PlanRequest, SystemMessage  # noqa: E402
 from chauffeur.models.vlm.lora import ChatExamples, LoraRecipe, encoded, fine_tune_vlm  # noqa: E402
 from chauffeur.planners.motion import MotionPlanner, read_matrix  # noqa: E402
-from chauffeur.planners.vlm_processor import PictureProcessor, load_processor  # noqa: E402
+from chauffeur.planners.vlm_processor import load_processor  # noqa: E402
 from chauffeur.safety.gain_box import gain_box  # noqa: E402
-
-CHAT = (
-    "{% for m in messages %}<|im_start|> {% for c in m['content'] %}{% if c['type'] == 'image' %}"
-    "<|vision_start|><|image_pad|><|vision_end|>{% else %} {{ c['text'] }} {% endif %}{% endfor %}<|im_end|> "
-    "{% endfor %}"
-    "{% if add_generation_prompt %}<|im_start|> {% endif %}"
-)
 
 
 @pytest.fixture(scope="module")
 def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from tokenizers import Tokenizer
-    from tokenizers.models import WordLevel
-    from tokenizers.pre_tokenizers import WhitespaceSplit
-    from transformers import (
-        PreTrainedTokenizerFast,
-        Qwen2_5_VLConfig,
-        Qwen2_5_VLForConditionalGeneration,
-        Qwen2VLImageProcessorPil,
-    )
-
-    special = ["<|im_start|>", "<|im_end|>", "<|vision_start|>", "<|vision_end|>", "<|image_pad|>", "<|video_pad|>"]
-    words = ["<unk>", "<pad>", *special, "P", "=", "Thoughts:", "Weather,", "The", "road", "[[0.45,"]
-    raw = Tokenizer(WordLevel({word: place for place, word in enumerate(words)}, unk_token="<unk>"))
-    raw.pre_tokenizer = WhitespaceSplit()
-    tokenizer = PreTrainedTokenizerFast(
-        tokenizer_object=raw, pad_token="<pad>", eos_token="<|im_end|>", unk_token="<unk>",
-        additional_special_tokens=special,
-    )  # fmt: skip
-    sight = Qwen2VLImageProcessorPil(min_pixels=28 * 28, max_pixels=4 * 28 * 28)
-    processor = PictureProcessor(tokenizer, sight, CHAT)
-    ids = {name: words.index(f"<|{name}|>") for name in ("image_pad", "video_pad", "vision_start", "vision_end")}
-    config = Qwen2_5_VLConfig(
-        text_config={
-            "vocab_size": len(words), "hidden_size": 16, "intermediate_size": 16, "num_hidden_layers": 1,
-            "num_attention_heads": 2, "num_key_value_heads": 2, "max_position_embeddings": 4096,
-            "rope_parameters": {"rope_type": "default", "rope_theta": 10000.0, "mrope_section": [1, 1, 2]},
-            "pad_token_id": 1, "bos_token_id": None, "eos_token_id": words.index("<|im_end|>"),
-        },
-        vision_config={
-            "depth": 1, "hidden_size": 16, "intermediate_size": 16, "num_heads": 2, "out_hidden_size": 16,
-            "patch_size": 14, "fullatt_block_indexes": [0],
-        },
-        image_token_id=ids["image_pad"], video_token_id=ids["video_pad"],
-        vision_start_token_id=ids["vision_start"], vision_end_token_id=ids["vision_end"],
-    )  # fmt: skip
-    torch.manual_seed(0)
-    folder = tmp_path_factory.mktemp("qwen")
-    Qwen2_5_VLForConditionalGeneration(config).save_pretrained(folder)
-    processor.save_pretrained(folder)
-    return folder
+    return tiny_qwen(tmp_path_factory.mktemp("qwen"))
 
 
 @pytest.fixture(scope="module")
