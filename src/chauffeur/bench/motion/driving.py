@@ -44,7 +44,7 @@ class MotionJob:
                 failed = found.unusable
                 return row | {"refused": not failed, "policy_failed": failed, "detail": found.refusal}
             assert isinstance(plan.policy, ActionMatrix)
-            return row | drive_gains(self.scenario, plan.policy) | {"baseline": baseline_of(_frozen(self.scenario))}
+            return row | drive_gains(self.scenario, plan.policy) | {"baseline": baseline_of(frozen(self.scenario))}
         except ChauffeurError as error:
             return row | {"infra_failed": True, "detail": str(error)}
 
@@ -79,7 +79,8 @@ def baseline_of(scenario: str) -> dict[str, Any]:
     return drive_gains(Scenario(**json.loads(scenario)), MODERATE)["measured"]
 
 
-def _frozen(scenario: Scenario) -> str:
+def frozen(scenario: Scenario) -> str:
+    """A scenario as a text, which a cache can be asked by."""
     return json.dumps(asdict(scenario), sort_keys=True)
 
 

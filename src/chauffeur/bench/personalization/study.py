@@ -130,7 +130,7 @@ class _Sitting:
         trips: list[Row] = []
         now = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)
         with tempfile.TemporaryDirectory(prefix="chauffeur-study-") as home:
-            clock = _Calendar(now)
+            clock = Calendar(now)
             vault = VaultMemory(Path(home), passphrase="", privacy=Privacy(None), clock=clock)
             memory = RecentToo(vault)
             person = PersonId(f"simulated {self._passenger.id}")
@@ -267,7 +267,7 @@ class _Sitting:
         }
 
 
-class _Calendar:
+class Calendar:
     """A clock that stands still until the next day."""
 
     def __init__(self, start: datetime) -> None:
