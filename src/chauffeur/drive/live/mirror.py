@@ -24,9 +24,14 @@ class Mirror:
         """How often the wheel has changed hands: odd while the person has it."""
 
     @property
+    def start(self) -> Start:
+        """Of the present trip."""
+        return self._starts[self.trip - 1]
+
+    @property
     def limits(self) -> Limits:
         """Of the present trip."""
-        return self._starts[self.trip - 1].limits
+        return self.start.limits
 
     def follow(self) -> bool:
         """Be at the newest instant; False where there is no newer one, or what is there is none."""

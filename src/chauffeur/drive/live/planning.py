@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from chauffeur.concept import ChauffeurError, Context, History, Instruction, Observation, PersonId, Plan
+from chauffeur.concept import CameraImage, ChauffeurError, Context, History, Instruction, Observation, PersonId, Plan
 from chauffeur.describe.services.sources import Sources, SourceSettings
 from chauffeur.drive.emergency import NO_SHOULDER, planned_for
 from chauffeur.drive.events import DriveEvent, WishEventKind
@@ -31,10 +31,11 @@ from chauffeur.drive.live.orders import (
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.loop import Memory
 from chauffeur.drive.planning import PLAN_WITHIN_S, RECALLED, START_WITHIN_S, Judged, PlanSteps, plan_once
+from chauffeur.drive.seat import SeatCamera
 from chauffeur.drive.session import parse_wish
 from chauffeur.drive.surroundings import describing, opened
 from chauffeur.memory.tolerant import TolerantMemory
-from chauffeur.planners.base import Planner
+from chauffeur.planners.base import Planner, looks
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.programs.catalogue import vocabulary_of
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
@@ -172,6 +173,7 @@ class Planning:
             own=lambda text: _own(text, observation),
             check=later,
             check_yes=now,
+            see=lambda: self._see(observation),
             within_s=PLAN_WITHIN_S,
         )
         planned = await plan_once(instruction, steps)
@@ -187,6 +189,12 @@ class Planning:
             start_by_ns=issued_ns + round(START_WITHIN_S / self._speed * 1e9),
             expires_ns=issued_ns + round(FOLLOW_FOR_S / self._speed * 1e9),
         )
+
+    def _see(self, observation: Observation) -> tuple[CameraImage, ...]:
+        """The view from the seat, rendered here: control never waits for a picture."""
+        if not looks(self._planner):
+            return ()
+        return SeatCamera(self._mirror.world, self._mirror.start.seed).take(observation)
 
     def _brief(self, brief: Brief) -> None:
         """Leave word of what the plan was made of; one that is too long without the history, or else not at all."""

@@ -122,6 +122,22 @@ class Scene:
 
 
 @dataclass(frozen=True, slots=True)
+class SeatView:
+    """The front camera's picture, rendered; sent while somebody looks (`Look`).
+
+    Attributes:
+        time_s: When it was taken, since the trip began, in the car's time.
+        png: The file, base64.
+        why: Why there is none; empty where there is one.
+    """
+
+    time_s: float
+    png: str
+    why: str = ""
+    kind: Literal["seat_view"] = "seat_view"
+
+
+@dataclass(frozen=True, slots=True)
 class Listening:
     """State of the microphone: `speaking` while somebody speaks, `button` while one is held."""
 
@@ -287,7 +303,20 @@ class Ended:
     kind: Literal["ended"] = "ended"
 
 
-Said = Session | Road | Scene | Listening | HeardWords | Conversation | HowWasIt | Answered | MemoryState | Note | Ended
+Said = (
+    Session
+    | Road
+    | Scene
+    | SeatView
+    | Listening
+    | HeardWords
+    | Conversation
+    | HowWasIt
+    | Answered
+    | MemoryState
+    | Note
+    | Ended
+)
 """All a session says."""
 
 # Told to the session -------------------------------------------------------------------------------------------------
@@ -344,6 +373,14 @@ class Hand:
 
 
 @dataclass(frozen=True, slots=True)
+class Look:
+    """Show the view from the seat, or no longer: pictures cost time, and are made only while they are looked at."""
+
+    on: bool
+    kind: Literal["look"] = "look"
+
+
+@dataclass(frozen=True, slots=True)
 class Stop:
     """Bring the car to a stand and end the drive."""
 
@@ -360,7 +397,9 @@ class MemoryOrder:
     kind: Literal["memory_order"] = "memory_order"
 
 
-Told = Annotated[Say | Confirm | Button | Evaluate | TakeOver | Hand | Stop | MemoryOrder, Field(discriminator="kind")]
+Told = Annotated[
+    Say | Confirm | Button | Evaluate | TakeOver | Hand | Look | Stop | MemoryOrder, Field(discriminator="kind")
+]
 """All a session is told."""
 
 _said: TypeAdapter[Said] = TypeAdapter(Said)

@@ -39,6 +39,7 @@ from chauffeur.drive.talk.messages import (
     Evaluate,
     Hand,
     HowWasIt,
+    Look,
     MemoryOrder,
     MemoryState,
     Note,
@@ -49,6 +50,7 @@ from chauffeur.drive.talk.messages import (
     TakeOver,
     Told,
 )
+from chauffeur.drive.talk.seat_view import SeatWindow
 from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.tally import Tally
 from chauffeur.drive.talk.view import View
@@ -131,6 +133,8 @@ class Talk:
         self._dt_s = make_world(settings.starts[0].scenario).dt_s
         self._runtime: Runtime | None = None
         self._view: View | None = None
+        self._window = SeatWindow()
+        self._looking = False
         self._keeper: Keeper | None = None
         self._asking = Asking(person, books)
         self._conversations = Conversations(settings.starts, self._dt_s, self._instant, time.monotonic)
@@ -246,6 +250,8 @@ class Talk:
             case Hand():
                 if self._runtime is not None:
                     self._runtime.hand(told.key)
+            case Look():
+                self._looking = told.on
             case Stop():
                 self._stop()
             case MemoryOrder():
@@ -472,6 +478,9 @@ class Talk:
             return
         for shown in view.look(runtime.report):
             self._say_if(shown)
+        if self._looking:
+            view.offer(self._window)
+            self._say_if(self._window.news())
         for said in self._conversations.look(self._ask_after_s):
             if isinstance(said, HowWasIt):
                 if self._stopping:
@@ -536,6 +545,7 @@ class Talk:
     def _close_parts(self) -> None:
         self._attention.close()
         self._conversations.close()
+        self._window.close()
         if self._runtime is not None:
             self._runtime.close()
         self._runtime = None

@@ -11,6 +11,7 @@ from chauffeur.drive.live.messages import MessageError, MirroredInstant, Report
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.talk.messages import Body, Road, RoadLane, Scene
+from chauffeur.drive.talk.seat_view import SeatWindow
 from chauffeur.worlds.base import MirroredWorld
 
 _INSTANTS: Final = 100
@@ -39,6 +40,11 @@ class View:
     def at(self, trip: int, tick: int) -> Observation | None:
         """An instant of the last seconds; None where it was not seen."""
         return self._instants.get((trip, tick))
+
+    def offer(self, window: SeatWindow) -> None:
+        """The newest instant to the view from the seat."""
+        if self._instants:
+            window.offer(self._world, self._starts[self._trip - 1].seed, next(reversed(self._instants.values())))
 
     def look(self, report: Report | None) -> tuple[Road | None, Scene | None]:
         """The road where it is another one, and the scene where there is a new one.

@@ -40,6 +40,7 @@ const does = {
   session(told) { session = told; showSession(); },
   road(told) { road.setRoad(told); },
   scene(told) { heardSceneAt = performance.now(); scene = told; showScene(); },
+  seat_view(told) { showSeat(told); },
   listening(told) { listening = told; showHeard(); },
   heard(told) { showHeardWords(told); },
   conversation(told) { conversation.told(told); },
@@ -69,6 +70,27 @@ const link = openLink({
     }
     showPlace();
   },
+});
+
+/* The view from the seat: rendered only while somebody looks, once a second. */
+let looking = false;
+
+function showSeat(told) {
+  if (!looking) return;
+  if (told.png) $('seat-picture').src = `data:image/png;base64,${told.png}`;
+  $('seat-picture').hidden = !told.png;
+  $('seat-picture').alt = `The road from the driver’s seat, ${told.time_s.toFixed(0)} s into the trip; rendered`;
+  write($('seat-words'), told.png ? 'Simulated camera, once a second' : `No picture: ${told.why}`);
+  $('seat').hidden = false;
+}
+
+$('look').addEventListener('click', () => {
+  if (!say('look', { on: !looking })) return;
+  looking = !looking;
+  $('look').setAttribute('aria-pressed', String(looking));
+  write($('seat-words'), 'Simulated camera: waiting for a picture');
+  $('seat-picture').hidden = true;
+  $('seat').hidden = !looking;
 });
 
 /* Whether it was said. What cannot be said is told to the person, and nothing that was typed is lost. */
@@ -102,6 +124,7 @@ function showPlace() {
   $('open-microphone').disabled = !able();
   for (const button of document.querySelectorAll('.opinions button, #take-over, #as-opinion, .type .main')) button.disabled = Boolean(ended);
   $('stop').disabled = Boolean(ended);
+  $('look').disabled = !able();
 }
 
 function showBanner(lost) {
