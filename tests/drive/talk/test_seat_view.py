@@ -14,7 +14,7 @@ from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import make_world
 from chauffeur.drive.talk import seat_view
-from chauffeur.drive.talk.messages import Conversation, Look, Said, Say, SeatView
+from chauffeur.drive.talk.messages import Conversation, ShowSeat, Said, Say, SeatView
 from chauffeur.drive.talk.seat_view import SeatWindow
 from chauffeur.drive.talk.session import Talk
 
@@ -81,9 +81,9 @@ def test_a_live_drive_is_planned_from_pictures_and_shown_while_somebody_looks() 
         _until(found, talk.poll)
         assert "cannot see" not in found()[-1].thoughts and "camera" in found()[-1].thoughts
         assert not any(isinstance(one, SeatView) for one in said), "nobody looks"
-        talk.take(Look(True))
+        talk.take(ShowSeat(True))
         _until(lambda: sum(isinstance(one, SeatView) and bool(one.png) for one in said) >= 2, talk.poll)
-        talk.take(Look(False))
+        talk.take(ShowSeat(False))
         talk.poll()
         before = len([one for one in said if isinstance(one, SeatView)])
         for _ in range(50):

@@ -44,7 +44,7 @@ _BIT: Final = 1.25
 
 
 @dataclass(frozen=True, slots=True)
-class Manner:
+class RidingTaste:
     """How one passenger wants to be driven.
 
     Attributes:
@@ -79,15 +79,15 @@ class MannerJudgement:
     deviation: float
 
 
-def draw_manners(count: int, seed: int) -> tuple[Manner, ...]:
+def draw_manners(count: int, seed: int) -> tuple[RidingTaste, ...]:
     """The first `count` passengers of a seed. Raises ConfigError: there is nobody to draw."""
-    found: list[Manner] = []
+    found: list[RidingTaste] = []
     for number, who in enumerate(draw_passengers(count, seed)):
         rng = np.random.default_rng([seed, number, 53])
         temper = (who.usual_share - _USUAL[0]) / _USUAL[1]
         taste = -_TASTE * temper + 0.03 * rng.normal()
         found.append(
-            Manner(
+            RidingTaste(
                 who,
                 float(np.clip(taste, -_MOST_TASTE, _MOST_TASTE)),
                 float(np.exp(0.3 * rng.normal())),
@@ -98,7 +98,7 @@ def draw_manners(count: int, seed: int) -> tuple[Manner, ...]:
     return tuple(found)
 
 
-def wanted(manner: Manner, style: Style, weather: Weather, day: float) -> float:
+def wanted(manner: RidingTaste, style: Style, weather: Weather, day: float) -> float:
     """How careful a passenger wants the gains, 0 to 1. `day` is a standard normal draw."""
     moved = manner.taste + manner.caution * CAUTION[weather] + manner.noise * day
     return float(np.clip(meant()[style] + moved, 0.0, 1.0))
@@ -116,7 +116,7 @@ def meant() -> Mapping[str, float]:
 
 
 def judged(
-    manner: Manner, want: float, policy: ActionMatrix | None, outcome: str, task: ManoeuvreName
+    manner: RidingTaste, want: float, policy: ActionMatrix | None, outcome: str, task: ManoeuvreName
 ) -> MannerJudgement:
     """What a passenger makes of a drive; `policy` is None where nothing was driven."""
     if policy is None:

@@ -123,7 +123,7 @@ class Scene:
 
 @dataclass(frozen=True, slots=True)
 class SeatView:
-    """The front camera's picture, rendered; sent while somebody looks (`Look`).
+    """The front camera's picture, rendered; sent while somebody looks (`ShowSeat`).
 
     Attributes:
         time_s: When it was taken, since the trip began, in the car's time.
@@ -373,11 +373,11 @@ class Hand:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class ShowSeat:
     """Show the view from the seat, or no longer: pictures cost time, and are made only while they are looked at."""
 
     on: bool
-    kind: Literal["look"] = "look"
+    kind: Literal["show_seat"] = "show_seat"
 
 
 @dataclass(frozen=True, slots=True)
@@ -398,7 +398,7 @@ class MemoryOrder:
 
 
 Told = Annotated[
-    Say | Confirm | Button | Evaluate | TakeOver | Hand | Look | Stop | MemoryOrder, Field(discriminator="kind")
+    Say | Confirm | Button | Evaluate | TakeOver | Hand | ShowSeat | Stop | MemoryOrder, Field(discriminator="kind")
 ]
 """All a session is told."""
 

@@ -39,7 +39,7 @@ from chauffeur.drive.talk.messages import (
     Evaluate,
     Hand,
     HowWasIt,
-    Look,
+    ShowSeat,
     MemoryOrder,
     MemoryState,
     Note,
@@ -250,7 +250,7 @@ class Talk:
             case Hand():
                 if self._runtime is not None:
                     self._runtime.hand(told.key)
-            case Look():
+            case ShowSeat():
                 self._looking = told.on
             case Stop():
                 self._stop()

@@ -85,7 +85,7 @@ function showSeat(told) {
 }
 
 $('look').addEventListener('click', () => {
-  if (!say('look', { on: !looking })) return;
+  if (!say('show_seat', { on: !looking })) return;
   looking = !looking;
   $('look').setAttribute('aria-pressed', String(looking));
   write($('seat-words'), 'Simulated camera: waiting for a picture');
