@@ -14,7 +14,7 @@ from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import make_world
 from chauffeur.drive.talk import seat_view
-from chauffeur.drive.talk.messages import Conversation, ShowSeat, Said, Say, SeatView
+from chauffeur.drive.talk.messages import Conversation, Said, Say, SeatView, ShowSeat
 from chauffeur.drive.talk.seat_view import SeatWindow
 from chauffeur.drive.talk.session import Talk
 
