@@ -44,6 +44,8 @@ def road() -> Any:
     [
         (one(-9.0, 0.0, 0.0, 6.0), True),  # from behind
         (one(-25.0, 0.0, 0.0, 6.0), False),  # still far
+        (one(-45.0, 1.5, 0.0, 22.0), True),  # as far, and fast
+        (one(-75.0, 1.5, 0.0, 22.0), False),  # so far that even the fast need not yet
         (one(0.0, -7.0, math.pi / 2.0, 6.0), True),  # from the side
         (one(0.0, -4.5, math.pi / 2.0, 0.0), False),  # stands
         (one(-9.0, 3.5, 0.0, 6.0), False),  # passes in the lane beside
@@ -54,6 +56,18 @@ def road() -> Any:
 def test_who_would_touch_the_ego_brakes(road: Any, mover: Mover, brakes: bool) -> None:
     TrafficBrakes(road, DT).mind(ego(), [mover])
     assert road.held == ({mover.name: pytest.approx(mover.speed_mps - BRAKING_MPS2 * DT)} if brakes else {})
+
+
+def test_who_is_fast_stands_before_an_ego_whose_nose_is_in_its_lane(road: Any) -> None:
+    brakes = TrafficBrakes(road, DT)
+    x, speed = -120.0, 22.0
+    for _ in range(400):
+        brakes.mind(ego(), [one(x, 1.8, 0.0, speed)])
+        held = road.held.get("v1", math.nan)
+        speed = min(22.0, speed + 2.0 * DT) if math.isnan(held) else held
+        x += speed * DT
+        assert not overlap(ego().box, Box(x, 1.8, 0.0, 4.6, 1.85))
+    assert speed < 0.5
 
 
 def test_who_turns_into_a_standing_ego_stops_before_it_and_goes_on_when_it_is_gone(road: Any) -> None:

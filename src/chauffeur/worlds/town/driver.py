@@ -409,10 +409,11 @@ class TownDriver:
         """Whether there is room in another lane, ahead and behind."""
         ego = seen.ego
         here = goal.line.nearest(ego.x_m, ego.y_m, 0.0, _first_m(goal))
-        low, high = goal.index(here - _NEAR_M), goal.index(here + _NEAR_M) + 1
+        reach = _NEAR_M + _COMING_S * max([0.0, *(one.speed_mps - ego.speed_mps for one in seen.others)])
+        low, high = goal.index(here - reach), goal.index(here + _NEAR_M) + 1
         x, y = goal.x[low:high], goal.y[low:high]
         for other in seen.others:
-            if math.dist((other.x_m, other.y_m), (ego.x_m, ego.y_m)) > _NEAR_M:
+            if math.dist((other.x_m, other.y_m), (ego.x_m, ego.y_m)) > reach:
                 continue
             away = (x - other.x_m) ** 2 + (y - other.y_m) ** 2
             at = int(away.argmin())
@@ -625,9 +626,9 @@ class TownDriver:
         at = meeting.first_m - before
         tail = self._chassis.length_m
         if meeting.first_m < nose - 0.5 and not (person and meeting.last_m > nose):
-            if meeting.last_m < nose:
-                return None
-            if not meeting.along and meeting.other.speed_mps < _GIVES_WAY_MPS:
+            if meeting.last_m < nose or meeting.along:
+                return None  # in the lane of somebody who comes up from behind: to stand there is worst
+            if meeting.other.speed_mps < _GIVES_WAY_MPS:
                 return None  # in their way already, and they wait for it: be gone
         pace = max(target, 1.0)
         arrives = _time_to(meeting.first_m - nose - 0.5, speed, pace)
