@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from chauffeur.bench.lampilot.understood import referee_for as lampilot_referee
 from chauffeur.concept import Parameters, Plan, Scenario, Trajectory
 from chauffeur.drive.episode import Referee
 from chauffeur.geometry import Pose
 from chauffeur.worlds.base import World
 
+RED_S: Final = 90.0
+"""Who drives a trajectory in a town may stand so long on the way: a light's cycle, and people."""
+
 
 def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
     """The judge of a trip: LaMPilot's by the scenario's own goal, else what the planner understood, else none. In a
-    parking lot, the judge of the spot that is meant; in a town, of the place; on an open road, of a trajectory's end.
+    parking lot, the judge of the spot that is meant; in a town, of the place; on an open road and in a town, of a
+    trajectory's end.
 
     Raises:
         ScenarioError: There is no such spot.
     """
+    if isinstance(plan.policy, Trajectory) and world.capabilities.turns and world.capabilities.places:
+        return _end_referee(world, plan.policy, waits_s=RED_S)
     if world.capabilities.places:
         return _town_referee(world) or _parking_referee(world, plan)
     if isinstance(plan.policy, Trajectory):
@@ -30,12 +38,16 @@ def _town_referee(world: World) -> Referee | None:
 
 
 def _street_referee(world: World, trajectory: Trajectory) -> Referee | None:
-    from chauffeur.worlds.track import StreetReferee, TrackWorld, end_of
+    from chauffeur.worlds.track import TrackWorld
 
-    if not isinstance(world, TrackWorld) or not world.open_road:
-        return None
+    return _end_referee(world, trajectory) if isinstance(world, TrackWorld) and world.open_road else None
+
+
+def _end_referee(world: World, trajectory: Trajectory, waits_s: float = 0.0) -> Referee:
+    from chauffeur.worlds.track import StreetReferee, end_of
+
     ego = world.observe().ego
-    return StreetReferee(world, end_of(trajectory, Pose(ego.x_m, ego.y_m, ego.heading_rad)))
+    return StreetReferee(world, end_of(trajectory, Pose(ego.x_m, ego.y_m, ego.heading_rad)), waits_s=waits_s)
 
 
 def _parking_referee(world: World, plan: Plan) -> Referee | None:

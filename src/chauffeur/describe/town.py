@@ -15,6 +15,7 @@ from chauffeur.describe.road import (
     situation_of,
     speed_sentence,
 )
+from chauffeur.describe.street import street_ahead
 from chauffeur.geometry import Pose, turns_ahead, wrap_to_pi
 
 SIGHT_M = 60.0
@@ -36,11 +37,11 @@ def describe_town(observation: Observation) -> Context:
     turns = turns_ahead(observation.road, lane.id, route)
     situation = situation_of(observation, turns)
     where = "crossing a junction" if lane.junction else f"in the {ordinal(situation.lane_index + 1)} lane from the left"
-    street = f" of {lane.street}" if lane.street else ""
+    of_street = f" of {lane.street}" if lane.street else ""
     of = "" if lane.junction else f" of {len(lanes)}"
     sentences = [
         speed_sentence(observation),
-        f"I am in a town, {where}{of}{street}.",
+        f"I am in a town, {where}{of}{of_street}.",
         limit_sentence(lane),
         front_sentence(front_in_sight(observation)),
         *_vehicles(observation),
@@ -51,7 +52,8 @@ def describe_town(observation: Observation) -> Context:
         sentences.append(f"A stop sign is {observation.stop_sign_m:.0f} m ahead.")
     if turns:
         sentences.append(f"At the next junction I can go {' or '.join(turns)}.")
-    return Context(text=" ".join(sentences), situation=situation)
+    street = None if lane.junction else street_ahead(observation)
+    return Context(text=" ".join(sentences), situation=situation, street=street)
 
 
 def _vehicles(observation: Observation) -> list[str]:

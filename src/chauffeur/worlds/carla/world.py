@@ -23,12 +23,13 @@ from chauffeur.concept import (
     SignalState,
     VehicleState,
 )
-from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle
+from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ
 from chauffeur.geometry import LanePlace, Pose, RoadGraph, Route, plan_route
 from chauffeur.geometry.opendrive import OpenDriveError, parse_opendrive
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.carla.frames import forward_mps, pose_of, transform_of
 from chauffeur.worlds.carla.server import EGO_BLUEPRINTS, connect, library
+from chauffeur.worlds.parking.following import Chassis
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
 from chauffeur.worlds.town.perception import TownPerception
 
@@ -92,9 +93,9 @@ class CarlaWorld:
         return DT_S
 
     @property
-    def chassis(self) -> KinematicBicycle:
+    def chassis(self) -> Chassis:
         """The ego's size and axles."""
-        return LINCOLN_MKZ
+        return Chassis.of(LINCOLN_MKZ)
 
     def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
         """Load the town, put in ego and traffic.

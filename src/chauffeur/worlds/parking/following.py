@@ -21,6 +21,7 @@ from typing import Final
 from chauffeur.concept import Command, VehicleState
 from chauffeur.control import IdmParameters
 from chauffeur.control.idm import idm_acceleration
+from chauffeur.control.kinematic_bicycle import KinematicBicycle
 from chauffeur.control.pure_pursuit import kept_within, look_ahead_distance, pursuit_curvature
 from chauffeur.control.pure_pursuit import steering_angle as angle_of
 from chauffeur.geometry import Box, Polyline, Pose, overlap, wrap_to_pi
@@ -69,6 +70,12 @@ class Chassis:
     wheelbase_m: float
     steering_rad: float
     acceleration_mps2: float
+
+    @classmethod
+    def of(cls, car: KinematicBicycle) -> Chassis:
+        """That of a car which is simulated by a kinematic bicycle."""
+        body = Body(car.length_m, car.width_m, car.rear_to_middle_m)
+        return cls(body, car.wheelbase_m, car.most_steering_rad, car.most_acceleration_mps2)
 
     def rear(self, ego: VehicleState) -> Pose:
         """Its rear axle."""

@@ -27,9 +27,10 @@ from chauffeur.concept import (
     SignalState,
     VehicleState,
 )
-from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, BicycleState, KinematicBicycle, advanced
+from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, BicycleState, advanced
 from chauffeur.geometry import LaneId, LanePlace, Pose, Route, overlap, plan_route
 from chauffeur.worlds.base import EGO
+from chauffeur.worlds.parking.following import Chassis
 from chauffeur.worlds.town import pack as packs
 from chauffeur.worlds.town.brakes import TrafficBrakes
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
@@ -127,9 +128,9 @@ class TownWorld:
         return DT_S
 
     @property
-    def chassis(self) -> KinematicBicycle:
+    def chassis(self) -> Chassis:
         """The ego's size, axles and bounds."""
-        return LINCOLN_MKZ
+        return Chassis.of(LINCOLN_MKZ)
 
     @property
     def town(self) -> MapPack:

@@ -8,7 +8,7 @@ from typing import Final
 
 from chauffeur.concept import Metric, Outcome, Trajectory
 from chauffeur.geometry import Pose
-from chauffeur.worlds.track.world import TrackWorld
+from chauffeur.worlds.base import World
 
 ALONG_M: Final = 2.0
 ACROSS_M: Final = 0.8
@@ -23,9 +23,16 @@ _SAME_M: Final = 0.2
 class StreetReferee:
     """Looks at a street after each control period."""
 
-    def __init__(self, world: TrackWorld, end: Pose, peak_mps: float | None = None) -> None:
-        """Args: the world, just reset; where the middle of the car is to stand; the highest speed, if one is meant."""
-        self._world, self._end, self._peak = world, end, peak_mps
+    def __init__(self, world: World, end: Pose, peak_mps: float | None = None, waits_s: float = 0.0) -> None:
+        """Take a place.
+
+        Args:
+            world: Just reset.
+            end: Where the middle of the car is to stand.
+            peak_mps: The highest speed, if one is meant.
+            waits_s: How long it may stand on the way, for lights and others.
+        """
+        self._world, self._end, self._peak, self._waits_s = world, end, peak_mps, waits_s
         self._stood_s, self._moved, self._most = 0.0, False, 0.0
 
     def observe(self) -> None:
@@ -38,16 +45,22 @@ class StreetReferee:
 
     @property
     def over(self) -> bool:
-        """Whether the car stands, or never began to move."""
-        return self._stood_s >= (_STANDS_S if self._moved else _PATIENCE_S) - 1e-9
+        """Whether the car stands for good, or never began to move."""
+        needed = _STANDS_S if self._moved else _PATIENCE_S
+        if not self._near:
+            needed = max(needed, self._waits_s)
+        return self._stood_s >= needed - 1e-9
+
+    @property
+    def _near(self) -> bool:
+        along, across = self._missed_m()
+        return abs(along) <= ALONG_M and abs(across) <= ACROSS_M
 
     @property
     def success(self) -> bool:
         """Whether it stands where it was to stand."""
-        along, across = self._missed_m()
-        near = abs(along) <= ALONG_M and abs(across) <= ACROSS_M
         paced = self._peak is None or abs(self._most - self._peak) <= PACE_MPS
-        return self.over and near and paced
+        return self.over and self._near and paced
 
     def outcome(self) -> Outcome:
         """What came of it, collisions apart."""
