@@ -49,7 +49,7 @@ from chauffeur.planners.onboard.link import link
 from chauffeur.planners.onboard.options import Declined
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.prompt import DRAFT, HISTORY, REPLY, WISH
-from chauffeur.planners.onboard.reply import Reply, read_reply
+from chauffeur.planners.onboard.reply import OnboardReply, read_reply
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.worlds.highway import HighwayWorld
 
@@ -74,7 +74,7 @@ WAYS = (
 )
 
 
-def ask(engine: Engine, example: Example, way: Way) -> tuple[Reply | None, float]:
+def ask(engine: Engine, example: Example, way: Way) -> tuple[OnboardReply | None, float]:
     """The model's reply as the planner would take it, and the seconds it took; None when it cannot be read."""
     begun = time.perf_counter()
     text = re.sub(rf"{re.escape(DRAFT)}.*{re.escape(REPLY)}$", "", example.prompt, flags=re.DOTALL)
@@ -94,7 +94,7 @@ def _tools() -> tuple[HighwayWorld, Sandbox]:
     return HighwayWorld(), Sandbox(UNHURRIED)
 
 
-def driven(job: tuple[Case, Example, Reply]) -> bool:
+def driven(job: tuple[Case, Example, OnboardReply]) -> bool:
     """Whether a program that is not the wished one does what was wished all the same."""
     case, example, reply = job
     wanted = read_reply(example.reply)
@@ -115,7 +115,7 @@ def _road() -> tuple[Observation, Situation]:
     return observation, describe(observation).situation
 
 
-def refused_after_all(reply: Reply) -> bool:
+def refused_after_all(reply: OnboardReply) -> bool:
     """Whether a program goes nowhere: not the model is to refuse 3 m or 300 km/h, but linking or the checks of a drive.
 
     They are asked with what the planner says of the program and under the limits that hold for anybody.
@@ -136,7 +136,7 @@ def outcomes(
 ) -> tuple[Counter[str], list[Any]]:
     counts: Counter[str] = Counter()
     times: list[float] = []
-    open_: list[tuple[Case, Example, Reply]] = []
+    open_: list[tuple[Case, Example, OnboardReply]] = []
     for example in examples:
         reply, took = ask(engine, example, way)
         times.append(took)

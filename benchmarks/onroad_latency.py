@@ -24,7 +24,7 @@ import ros_debian as debian
 import ros_graph as ros
 
 from chauffeur.concept import PersonId
-from chauffeur.drive.onroad import Answer, OnRoad, open_books
+from chauffeur.drive.onroad import OnRoad, OnRoadAnswer, open_books
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.ros.opening import open_vehicle
@@ -40,7 +40,7 @@ def row(name: str, seconds: list[float]) -> str:
     return f"| {name} | {1e3 * statistics.median(ordered):.1f} | {1e3 * high:.1f} | {1e3 * ordered[-1]:.1f} |"
 
 
-async def measure(folder: Path, wishes: int, *, audited: bool) -> list[tuple[Answer, float, float]]:
+async def measure(folder: Path, wishes: int, *, audited: bool) -> list[tuple[OnRoadAnswer, float, float]]:
     """Answers, and for each the time from the wish to the node's callback, and this process's CPU time for it."""
     port = ros.free_port()
     file = folder / "vehicle.toml"

@@ -31,8 +31,8 @@ import numpy as np
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
-from chauffeur.drive.talk.hearing import Engine
-from chauffeur.drive.talk.messages import Conversation, HeardWords, Note, Said, Say, Scene, Stages
+from chauffeur.drive.talk.hearing import HearingEngine
+from chauffeur.drive.talk.messages import Conversation, HeardWords, Note, Said, Say, Scene, StageTimes
 from chauffeur.drive.talk.session import Talk
 from chauffeur.speech.audio import SAMPLE_RATE_HZ, Samples, decode
 
@@ -57,7 +57,7 @@ class Shot:
     heard: str
     total_s: float | None
     from_vad_s: float | None
-    stages: Stages | None
+    stages: StageTimes | None
     asked_back: bool = False
 
 
@@ -86,7 +86,7 @@ class Bench:
     """A session, and what it said."""
 
     def __init__(self, settings: Settings) -> None:
-        self.talk = Talk(settings, self.tell, engine=Engine(favoured=True))
+        self.talk = Talk(settings, self.tell, engine=HearingEngine(favoured=True))
         self.conversations: dict[str, Conversation] = {}
         self.heard: list[HeardWords] = []
         self.scenes: list[tuple[float, Scene]] = []
@@ -188,7 +188,7 @@ def run(planner: str, utterances: int, confirmed: int, voices: tuple[str, ...]) 
     return shots
 
 
-def _stages(stages: Stages | None) -> str:
+def _stages(stages: StageTimes | None) -> str:
     if stages is None:
         return ""
     return " ".join(f"{name[:-2]} {value:.3f}" for name, value in asdict(stages).items() if value is not None)

@@ -34,82 +34,6 @@ COMPILES_A_LIBRARY = {"worlds/track/dynamics.py"}
 
 STEPS_AN_OPTIMISER = {"models/train/trainer.py", "models/onboard/adapting.py", "models/vilad/frames_baselines.py"}
 
-SHARED_NAMES = {
-    "Address": 2,
-    "Ahead": 2,
-    "Answer": 3,
-    "Attempt": 2,
-    "Body": 4,
-    "Budget": 2,
-    "Caller": 2,
-    "Case": 4,
-    "Choice": 4,
-    "Clause": 2,
-    "Corridor": 2,
-    "Crossing": 2,
-    "Drive": 2,
-    "Driven": 3,
-    "Endpoint": 2,
-    "Engine": 3,
-    "Finding": 4,
-    "Frame": 4,
-    "Goal": 2,
-    "Grammar": 2,
-    "Hand": 2,
-    "Heard": 2,
-    "Instant": 2,
-    "Interaction": 2,
-    "Item": 2,
-    "Judge": 2,
-    "Judgement": 2,
-    "Kept": 2,
-    "Kind": 2,
-    "Lane": 3,
-    "Lens": 2,
-    "Line": 2,
-    "Look": 2,
-    "Mark": 2,
-    "Memory": 2,
-    "Message": 2,
-    "Mover": 2,
-    "Node": 2,
-    "Note": 2,
-    "Part": 3,
-    "Place": 4,
-    "Plan": 2,
-    "Reading": 3,
-    "Recipe": 2,
-    "Record": 2,
-    "Referee": 2,
-    "RefusedError": 2,
-    "Reply": 2,
-    "Report": 2,
-    "Road": 3,
-    "RoadMap": 2,
-    "Sampling": 2,
-    "Scene": 5,
-    "Seen": 2,
-    "Session": 2,
-    "Stages": 2,
-    "Standing": 2,
-    "Start": 2,
-    "Statistics": 2,
-    "Step": 2,
-    "Surroundings": 2,
-    "Traffic": 2,
-    "Value": 2,
-    "VehicleState": 2,
-    "Verdict": 4,
-    "Verification": 2,
-    "Walker": 2,
-    "Way": 2,
-    "Wish": 3,
-    "Wishes": 2,
-    "WordTable": 2,
-    "Written": 2,
-}
-"""Class names of more than one class, with how many: it shrinks, and nothing is added to it."""
-
 
 @dataclass(frozen=True)
 class Source:
@@ -196,11 +120,8 @@ def test_a_class_name_is_defined_once() -> None:
     found: Counter[str] = Counter()
     for source in _sources().values():
         found.update(source.classes)
-    shared = {name: count for name, count in found.items() if count > 1 and not name.startswith("_")}
-    more = {name for name, count in shared.items() if count > SHARED_NAMES.get(name, 1)}
-    assert not more, f"say these nouns better, they are taken: {sorted(more)}"
-    fewer = {name for name, count in SHARED_NAMES.items() if shared.get(name, 1) < count}
-    assert not fewer, f"better than SHARED_NAMES says: take them off, or count them anew: {sorted(fewer)}"
+    shared = {name for name, count in found.items() if count > 1 and not name.startswith("_")}
+    assert not shared, f"say these nouns better, they are taken: {sorted(shared)}"
 
 
 REQUESTS_MADE = {

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from chauffeur.cli.serve import Endpoint
+from chauffeur.cli.serve import ServedEndpoint
 from chauffeur.concept import Limits, Program
 from chauffeur.drive.recording import read_trip
 from chauffeur.planners.registry import make_planner
@@ -31,7 +31,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def endpoint() -> Iterator[str]:
     """A chat-completions server on loopback."""
-    server = Endpoint("127.0.0.1", 0, make_planner("onboard"), Limits())
+    server = ServedEndpoint("127.0.0.1", 0, make_planner("onboard"), Limits())
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()
     yield f"http://127.0.0.1:{server.server_port}/v1"

@@ -6,7 +6,7 @@ import time
 import zlib
 from functools import cache
 
-from chauffeur.safety.alignment import Alignment, Surroundings, judge, read_facts
+from chauffeur.safety.alignment import Alignment, FactSurroundings, judge, read_facts
 from chauffeur.safety.alignment.facts import Facts
 from fuzz import programs
 from fuzz.target import Target, bytes_of, expect, text_of
@@ -16,7 +16,7 @@ MAX_CHARS = 600
 """Of the explanation; most thoughts are shorter."""
 LONGEST_CHARS, WITHIN_S = 8000, 3.0
 """The longest thoughts that a planner hands on, and their share of a processor; one text in sixteen is stretched."""
-_WHERE = Surroundings(25.0, 30.0, 40.0, 20.0, 100.0, crossing=True)
+_WHERE = FactSurroundings(25.0, 30.0, 40.0, 20.0, 100.0, crossing=True)
 _TEXTS = (
     "The passenger is in a hurry. First I check whether the left lane is free, then I overtake at 30 m/s and go back.",
     "I slow down by 10 mph and keep a gap of two seconds to the car ahead; after five seconds I resume 100 km/h.",

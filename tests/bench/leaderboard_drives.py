@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from chauffeur.bench.leaderboard.criteria import Infraction, Referee
+from chauffeur.bench.leaderboard.criteria import Infraction, RouteReferee
 from chauffeur.bench.leaderboard.track import RouteTrack
 from chauffeur.concept import Observation, Sign, Signal, VehicleState
 from chauffeur.geometry import Lane, Polyline, RoadGraph
@@ -65,9 +65,9 @@ def seen(
     )
 
 
-def judged(way: RouteTrack, instants: Iterable[Observation]) -> tuple[Referee, list[Infraction]]:
+def judged(way: RouteTrack, instants: Iterable[Observation]) -> tuple[RouteReferee, list[Infraction]]:
     """What the referee says of a drive, from its first instant to the end of the route."""
-    referee = Referee(way)
+    referee = RouteReferee(way)
     last = None
     for instant in instants:
         last = instant

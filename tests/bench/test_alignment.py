@@ -13,7 +13,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from chauffeur.bench.alignment import SCORES, AlignmentBenchmark, Case, generate, half_of, handwritten, of_half
+from chauffeur.bench.alignment import SCORES, AlignmentBenchmark, AlignmentCase, generate, half_of, handwritten, of_half
 from chauffeur.bench.alignment.benchmark import JudgeJob
 from chauffeur.bench.alignment.cases import ALIGNED, KINDS
 from chauffeur.bench.kernel.benchmark import ItemOutcome
@@ -21,17 +21,17 @@ from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.report import fill
 from chauffeur.cli.bench_alignment import alignment
 from chauffeur.programs import check_source
-from chauffeur.safety.alignment import Surroundings, read_facts
+from chauffeur.safety.alignment import FactSurroundings, read_facts
 
 COUNT = 140
 
 
 @cache
-def generated() -> tuple[Case, ...]:
+def generated() -> tuple[AlignmentCase, ...]:
     return generate(COUNT, seed=3)
 
 
-def score(cases: Iterable[Case]) -> dict[str, float | None]:
+def score(cases: Iterable[AlignmentCase]) -> dict[str, float | None]:
     """Precision, recall, F1 and false alarms of the judge, by title."""
     bench = AlignmentBenchmark(0)
     found = [ItemOutcome(case, None, "", JudgeJob(case).run()) for case in cases]
@@ -93,11 +93,11 @@ def test_hand_written_cases() -> None:
 
 def test_scores_are_counted_right() -> None:
     program = "def drive():\n    set_target_speed(30.0)\n    while True:\n        yield autopilot()\n"
-    where = Surroundings(speed_mps=25.0)
+    where = FactSurroundings(speed_mps=25.0)
     texts = {"I speed up.": ALIGNED, "I slow down.": "wrong-sign", "I drive faster.": "wrong-sign", "I brake.": ALIGNED}
-    found = score(Case(text, text, program, kind, where) for text, kind in texts.items())
+    found = score(AlignmentCase(text, text, program, kind, where) for text, kind in texts.items())
     assert found == dict.fromkeys(("precision", "recall", "F1", "false alarms"), 0.5)
-    assert score([Case("x", "I speed up.", program, ALIGNED, where)])["F1"] == 0.0
+    assert score([AlignmentCase("x", "I speed up.", program, ALIGNED, where)])["F1"] == 0.0
 
 
 def test_the_command_shows_and_saves(tmp_path: Path) -> None:

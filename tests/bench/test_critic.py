@@ -11,7 +11,7 @@ import pytest
 from coached_data import GO_LEFT, IDLE
 
 from chauffeur.bench.lampilot.coaching import Coach
-from chauffeur.bench.lampilot.critic import Attempt, EvaluatorCritic, Judgement, PersonCritic, evaluator_words
+from chauffeur.bench.lampilot.critic import Attempt, CriticJudgement, EvaluatorCritic, PersonCritic, evaluator_words
 from chauffeur.bench.lampilot.seen import watch
 from chauffeur.concept import LAMPILOT_LIMITS, Plan, PlanRequest, Program, Thoughts
 from chauffeur.memory.policies import PolicyRepository
@@ -105,7 +105,7 @@ def test_the_evaluators_words_fit_the_drive(drive: Drive, scenario: str, goal: A
 
 
 def test_what_is_done_is_kept_without_a_word(drive: Drive) -> None:
-    assert EvaluatorCritic().judge(drive("overtake", LEFT_LANE, TO_THE_LEFT)) == Judgement("keep")
+    assert EvaluatorCritic().judge(drive("overtake", LEFT_LANE, TO_THE_LEFT)) == CriticJudgement("keep")
 
 
 def test_a_wish_that_must_be_refused_is_praised_for_being_refused(drive: Drive) -> None:
@@ -158,9 +158,9 @@ def test_a_persons_answers(drive: Drive) -> None:
     assert answers("success", "commit").judge(undone).kind == "keep"
     assert answers("skip").judge(done).kind == "skip"
     assert answers("quit").judge(done).kind == answers(None).judge(done).kind == "stop"
-    assert answers("", "  too   late ").judge(done) == Judgement("critique", "too late")
+    assert answers("", "  too   late ").judge(done) == CriticJudgement("critique", "too late")
     assert answers("commit", "skip").judge(refused).kind == "skip", "what was not driven cannot be kept"
     passed_on = answers("").judge(refused)
     assert passed_on.kind == "critique" and "fly is not defined" in passed_on.words
     crashed = replace(done, recorded=replace(done.recorded, trip=replace(done.recorded.trip, outcome="collision")))
-    assert answers("commit", "success", "you crashed").judge(crashed) == Judgement("critique", "you crashed")
+    assert answers("commit", "success", "you crashed").judge(crashed) == CriticJudgement("critique", "you crashed")

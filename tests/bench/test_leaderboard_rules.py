@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.leaderboard_drives import car, judged, seen, street, track
-from chauffeur.bench.leaderboard.criteria import Blocked, Collisions, Referee, timeout_s
+from chauffeur.bench.leaderboard.criteria import Blocked, Collisions, RouteReferee, timeout_s
 from chauffeur.concept import Sign, Signal
 
 ROAD = street()
@@ -173,7 +173,7 @@ def test_beside_the_road_begins_1_3_m_outside_the_lane() -> None:
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.tuples(st.floats(-3.0, 6.0), st.floats(-40.0, 40.0)), min_size=1, max_size=60))
 def test_progress_never_goes_back_and_stays_within_the_route(moves: list[tuple[float, float]]) -> None:
-    referee = Referee(WAY)
+    referee = RouteReferee(WAY)
     x, shares = 0.0, []
     for tick, (dx, y) in enumerate(moves):
         x += dx

@@ -9,7 +9,7 @@ import pytest
 from chauffeur.bench.leaderboard.criteria import Infraction, InfractionKind
 from chauffeur.bench.leaderboard.results import counted, official, status_of
 from chauffeur.bench.leaderboard.scoring import (
-    Driven,
+    DrivenRoute,
     RouteScore,
     mean_score,
     official_rates,
@@ -60,7 +60,10 @@ def test_the_sums_of_two_point_one() -> None:
 
 
 def test_the_driving_score_is_the_mean_of_products() -> None:
-    routes = [Driven(RouteScore(100.0, 0.5, 50.0), {}, 1000.0), Driven(RouteScore(50.0, 1.0, 50.0), {}, 1000.0)]
+    routes = [
+        DrivenRoute(RouteScore(100.0, 0.5, 50.0), {}, 1000.0),
+        DrivenRoute(RouteScore(50.0, 1.0, 50.0), {}, 1000.0),
+    ]
     assert mean_score(routes) == RouteScore(75.0, 0.75, 50.0)
     assert mean_score(routes, planned=4) == RouteScore(37.5, 0.375, 25.0)
     assert mean_score([]) == RouteScore(0.0, 0.0, 0.0)
@@ -69,9 +72,9 @@ def test_the_driving_score_is_the_mean_of_products() -> None:
 def test_rates_a_kilometre_official_and_corrected() -> None:
     counts: dict[InfractionKind, int] = {"red_light": 2}
     routes = [
-        Driven(RouteScore(100.0, 1.0, 100.0), counts, 1000.0),
-        Driven(RouteScore(50.0, 1.0, 50.0), counts, 2000.0),
-        Driven(RouteScore(0.0, 1.0, 0.0), counts, 1000.0),
+        DrivenRoute(RouteScore(100.0, 1.0, 100.0), counts, 1000.0),
+        DrivenRoute(RouteScore(50.0, 1.0, 50.0), counts, 2000.0),
+        DrivenRoute(RouteScore(0.0, 1.0, 0.0), counts, 1000.0),
     ]
     assert official_rates(routes)["red_light"] == pytest.approx(2.0 + 2.0)  # summed; nothing of the third
     assert rates(routes)["red_light"] == pytest.approx(6 / 2.0)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.bench.personalization import Statistics, driving_score, statistics_of
+from chauffeur.bench.personalization import TripStatistics, driving_score, statistics_of
 from chauffeur.concept import ScenarioError
 
 TABLE_VIII = {
@@ -43,38 +43,38 @@ def test_every_printed_row_of_table_viii_is_reproduced(behaviour: str, level: in
     rows = TABLE_VIII[behaviour]
     *measured, printed = rows[level]
     baseline = rows[3][:4]
-    score = driving_score(Statistics(*measured), Statistics(*baseline))
+    score = driving_score(TripStatistics(*measured), TripStatistics(*baseline))
     rounding = 0.12  # of the printed inputs: 0.005 in 0.26 m/s2 alone are 0.06 points
     assert score.total == pytest.approx(printed, abs=rounding)
 
 
-HUMAN = Statistics(4.0, 1.0, 0.3, 2.5)
+HUMAN = TripStatistics(4.0, 1.0, 0.3, 2.5)
 
 
 @given(
     st.floats(0.0, 5.0), st.floats(0.0, 3.0), st.floats(0.0, 9.0), st.floats(0.0, 9.0),
 )  # fmt: skip
 def test_rougher_is_never_better(variance: float, acceleration: float, jerk: float, more: float) -> None:
-    one = driving_score(Statistics(2.0, variance, acceleration, jerk), HUMAN).total
+    one = driving_score(TripStatistics(2.0, variance, acceleration, jerk), HUMAN).total
     for rougher in (
-        Statistics(2.0, variance + more, acceleration, jerk),
-        Statistics(2.0, variance, acceleration + more, jerk),
-        Statistics(2.0, variance, acceleration, jerk + more),
-        Statistics(1.4, variance, acceleration, jerk),
+        TripStatistics(2.0, variance + more, acceleration, jerk),
+        TripStatistics(2.0, variance, acceleration + more, jerk),
+        TripStatistics(2.0, variance, acceleration, jerk + more),
+        TripStatistics(1.4, variance, acceleration, jerk),
     ):
         assert driving_score(rougher, HUMAN).total <= one
     assert one <= 100.0
 
 
 def test_nobody_to_collide_with_is_as_safe_as_a_long_time() -> None:
-    alone = driving_score(Statistics(None, 1.0, 0.3, 2.5), HUMAN)
-    assert alone == driving_score(Statistics(99.0, 1.0, 0.3, 2.5), HUMAN)
+    alone = driving_score(TripStatistics(None, 1.0, 0.3, 2.5), HUMAN)
+    assert alone == driving_score(TripStatistics(99.0, 1.0, 0.3, 2.5), HUMAN)
     assert alone.ttc == 100.0
 
 
 def test_a_baseline_that_stands_still_is_refused() -> None:
     with pytest.raises(ScenarioError, match="speed variance"):
-        driving_score(HUMAN, Statistics(None, 0.0, 0.3, 2.5))
+        driving_score(HUMAN, TripStatistics(None, 0.0, 0.3, 2.5))
 
 
 def test_a_drive_is_measured_as_the_seed_defines_it() -> None:

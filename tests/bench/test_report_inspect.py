@@ -11,10 +11,10 @@ from report_folders import HOSTILE, mixed, outcome, write_run
 from chauffeur.bench.lampilot.report import summarise
 from chauffeur.bench.report.inspect_log import FORMATS, log_content, write_inspect_log
 from chauffeur.bench.report.runs import Run, load_run
-from chauffeur.bench.report.tables import Sampling
+from chauffeur.bench.report.tables import RowSampling
 from chauffeur.concept import ConfigError, DataError, MissingExtraError
 
-HOW = Sampling(draws=200)
+HOW = RowSampling(draws=200)
 INSTALLED = importlib.util.find_spec("inspect_ai") is not None
 needs_inspect = pytest.mark.skipif(
     not INSTALLED, reason='Inspect AI is not installed: pip install "chauffeur[inspect]"'

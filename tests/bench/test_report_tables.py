@@ -12,16 +12,16 @@ from report_folders import HOSTILE, mixed, outcome, signals, write_run
 from chauffeur.bench.lampilot.report import comparison_lines, family_lines, summarise
 from chauffeur.bench.report.build import Choices, build_report
 from chauffeur.bench.report.latex import render_latex
-from chauffeur.bench.report.model import SIMULATED, Cell, Report
+from chauffeur.bench.report.model import SIMULATED, BenchReport, Cell
 from chauffeur.bench.report.runs import load_run
 from chauffeur.bench.report.text import render_markdown
 
 
-def _report(*folders: Path, metrics: str = "", gallery: int = 2) -> Report:
+def _report(*folders: Path, metrics: str = "", gallery: int = 2) -> BenchReport:
     return build_report(list(folders), Choices(metrics, gallery=gallery), lambda what, done, total: None)
 
 
-def _cell(report: Report, table: str, line: str, column: str) -> Cell:
+def _cell(report: BenchReport, table: str, line: str, column: str) -> Cell:
     found = report.table(table)
     assert found is not None
     place = [c.key for c in found.columns].index(column)
@@ -211,7 +211,7 @@ def test_every_line_has_a_cell_for_every_column(two: tuple[Path, Path]) -> None:
             assert all(column.meaning for column in table.columns), table.id
 
 
-def _everywhere(labels: tuple[str, ...], tmp_path: Path) -> Report:
+def _everywhere(labels: tuple[str, ...], tmp_path: Path) -> BenchReport:
     a = write_run(tmp_path / "a", mixed(), planner="a", labels=labels)
     b = write_run(tmp_path / "b", [[outcome(), outcome()] for _ in range(12)], planner="b")
     return _report(a, b)

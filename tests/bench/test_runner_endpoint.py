@@ -19,7 +19,7 @@ from small_run import COMMANDS, FAST, LEFT, SEEDS, Inline, make_data, make_run, 
 from typer.testing import CliRunner
 
 from chauffeur.bench.kernel.run import Effort
-from chauffeur.bench.kernel.spending import Budget, Price
+from chauffeur.bench.kernel.spending import Price, SpendingBudget
 from chauffeur.cli.main import app
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset
@@ -142,12 +142,12 @@ def test_budgets_in_requests_and_money_go_on_with_larger_ones(tmp_path: Path, se
     price = Price(100.0, 1000.0)  # 1000 tokens in, 200 out: 0.3 USD a plan
     folder = tmp_path / "run"
 
-    def go(budget: Budget) -> Any:
+    def go(budget: SpendingBudget) -> Any:
         run = make_run(folder, dataset, "openai/m", planner=_planner(server))
         run.run(quiet, Effort(engine=Inline, budget=budget, price=price))
         return run
 
-    first = go(Budget(max_requests=7))
+    first = go(SpendingBudget(max_requests=7))
     assert first.halt is not None and first.halt.budget
     assert endpoint.answered in (6, 7) and first.unasked == 30 - endpoint.answered
     rows = _rows(folder)
@@ -156,10 +156,10 @@ def test_budgets_in_requests_and_money_go_on_with_larger_ones(tmp_path: Path, se
     assert all("Not asked" in row["detail"] for row in rows if row["outcome"] == "not_driven")
     assert "partial" in (folder / "table.md").read_text()
 
-    second = go(Budget(max_usd=5.0))
+    second = go(SpendingBudget(max_usd=5.0))
     assert second.halt is not None and "5 USD" in second.halt.why
     assert endpoint.answered == 16, "what was spent before counts: 16 x 0.3 = 4.8"
-    last = go(Budget(max_usd=9.01, max_requests=30))
+    last = go(SpendingBudget(max_usd=9.01, max_requests=30))
     assert last.halt is None and last.unasked == 0 and endpoint.answered == 30
     assert sum(row["cost_usd"] for row in _rows(folder)) == pytest.approx(9.0)
     assert "partial" not in (folder / "table.md").read_text()

@@ -15,7 +15,7 @@ from chauffeur.bench.lampilot.scenes.fitting import EXITS
 from chauffeur.bench.lampilot.scenes.kinds import KINDS, MAIN, PAPER_WORDS, Slot
 from chauffeur.bench.lampilot.scenes.phrasing import say, sections, templates
 from chauffeur.bench.lampilot.scenes.unambiguous import fault_of, fault_of_goal, words_of
-from chauffeur.bench.lampilot.scenes.wishes import Named, Wish
+from chauffeur.bench.lampilot.scenes.wishes import Named, SceneWish
 from chauffeur.bench.lampilot.scenes.wording import EXTRA_MAX_WORDS, in_words, spoken, word
 from chauffeur.concept import InstructionError
 from chauffeur.language import read_quantities
@@ -24,18 +24,18 @@ from chauffeur.worlds.highway.dblv1 import load_dataset
 Goal = dict[str, Any]
 
 
-def _named(kind: str, goal: Goal, named: Named) -> Wish:
+def _named(kind: str, goal: Goal, named: Named) -> SceneWish:
     name = "d" if "dis" in kind else "v"
     change = -1 if kind.startswith("dec") else 1
-    return Wish((kind,), goal, goal, kind, ((name, named),), change=change, means=(goal,))
+    return SceneWish((kind,), goal, goal, kind, ((name, named),), change=change, means=(goal,))
 
 
-def _plain(section: str, goal: Goal, side: str = "") -> Wish:
+def _plain(section: str, goal: Goal, side: str = "") -> SceneWish:
     slots = (("side", side),) if side else ()
-    return Wish((section,), goal, goal, section, slots, means=(goal,))
+    return SceneWish((section,), goal, goal, section, slots, means=(goal,))
 
 
-WISHES: dict[str, Wish] = {
+WISHES: dict[str, SceneWish] = {
     "dec_abs_dis": _named("dec_abs_dis", {"type": "ACCEvalbyDistance", "distance": 21}, Named(21, "m")),
     "inc_abs_dis": _named("inc_abs_dis", {"type": "ACCEvalbyDistance", "distance": 64}, Named(64, "m")),
     "dec_rel_dis": _named("dec_rel_dis", {"type": "ACCEvalbyDistance", "rel_distance": -13}, Named(13, "m")),

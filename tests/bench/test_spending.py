@@ -11,7 +11,7 @@ from virtual import run_virtually
 
 from chauffeur.bench.kernel.calls import FRUITLESS, Answer, Caller, Patience
 from chauffeur.bench.kernel.pace import Gate, Window
-from chauffeur.bench.kernel.spending import Bill, Budget, Price, Room, Spending
+from chauffeur.bench.kernel.spending import Bill, Price, Room, Spending, SpendingBudget
 from chauffeur.concept import (
     ConfigError,
     Context,
@@ -61,7 +61,7 @@ class Model:
         return _plan(usage)
 
 
-def _ask(model: Model, budget: Budget, plans: int, total: Bill | None = None, **options: object) -> tuple:
+def _ask(model: Model, budget: SpendingBudget, plans: int, total: Bill | None = None, **options: object) -> tuple:
     async def work() -> tuple[list[Answer | None], Caller]:
         spending = Spending(budget, total or Bill())
         caller = Caller(model, Gate(Window(16)), spending, np.random.default_rng(0), **options)
@@ -75,7 +75,7 @@ def test_requests_stay_within_the_budget_but_for_one_repair_turn(budget: int) ->
     one, two = Usage(10, 10, 0.0, 1), Usage(20, 20, 0.0, 2)
     for usages, over in (([one], 0), ([one, two, two], 1)):
         model = Model(usages)
-        answers, caller = _ask(model, Budget(max_requests=budget), 60)
+        answers, caller = _ask(model, SpendingBudget(max_requests=budget), 60)
         assert budget - 1 <= model.requests <= budget + over, usages
         assert caller.spending.total.requests == model.requests
         assert answers.count(None) == 60 - model.asked
@@ -84,7 +84,7 @@ def test_requests_stay_within_the_budget_but_for_one_repair_turn(budget: int) ->
 
 def test_money_stays_within_the_budget_but_for_what_dearer_plans_cost_more() -> None:
     model = Model([Usage(10, 10, 0.01, 1), Usage(10, 10, 0.02, 1), Usage(10, 10, 0.005, 1)])
-    _, caller = _ask(model, Budget(max_usd=0.5), 100)
+    _, caller = _ask(model, SpendingBudget(max_usd=0.5), 100)
     assert 0.5 - 0.04 <= model.usd <= 0.5
     assert caller.spending.total.usd == pytest.approx(model.usd)
     assert caller.halt is not None and "0.5 USD" in caller.halt.why
@@ -92,32 +92,34 @@ def test_money_stays_within_the_budget_but_for_what_dearer_plans_cost_more() -> 
 
 def test_the_first_call_goes_alone_when_its_price_is_not_known() -> None:
     model = Model([Usage(10, 10, 4.0, 1)])
-    answers, _ = _ask(model, Budget(max_usd=1.0), 16)
+    answers, _ = _ask(model, SpendingBudget(max_usd=1.0), 16)
     assert model.asked == 1, "one call told that another would be too dear"
     assert sum(answer is not None for answer in answers) == 1
 
 
 def test_a_larger_budget_goes_on_where_the_last_stopped() -> None:
     model = Model()
-    _, first = _ask(model, Budget(max_requests=10), 30)
-    _, second = _ask(model, Budget(max_requests=25), 30, first.spending.total)
+    _, first = _ask(model, SpendingBudget(max_requests=10), 30)
+    _, second = _ask(model, SpendingBudget(max_requests=25), 30, first.spending.total)
     assert model.requests == 25 == second.spending.total.requests
 
 
 def test_answers_from_the_cache_cost_nothing() -> None:
     model = Model([Usage(1000, 100, 0.0, 0, cached=True)])
-    answers, caller = _ask(model, Budget(max_requests=5, max_usd=1.0), 50)
+    answers, caller = _ask(model, SpendingBudget(max_requests=5, max_usd=1.0), 50)
     assert None not in answers and caller.halt is None
 
 
 def test_money_cannot_be_kept_to_without_a_price() -> None:
     model = Model([Usage(1000, 100, None, 1)])
-    answers, caller = _ask(model, Budget(max_usd=1.0), 20)
+    answers, caller = _ask(model, SpendingBudget(max_usd=1.0), 20)
     assert caller.halt is not None and "--price" in caller.halt.hint and caller.halt.budget
     assert model.asked == 1
     assert answers[0] is not None and answers[0].reply is not None, "what was paid for is kept"
 
-    answers, caller = _ask(Model([Usage(1000, 100, None, 1)]), Budget(max_usd=1.0), 20, price=Price(10.0, 100.0))
+    answers, caller = _ask(
+        Model([Usage(1000, 100, None, 1)]), SpendingBudget(max_usd=1.0), 20, price=Price(10.0, 100.0)
+    )
     assert caller.halt is None
     assert [answer.reply.usage.cost_usd for answer in answers] == [pytest.approx(0.02)] * 20
     assert caller.spending.total.usd == pytest.approx(0.4)
@@ -136,7 +138,7 @@ def test_failures_that_pass_are_tried_again_and_paid_for_once() -> None:
     broken = EndpointError("server", "It failed (500).", retryable=True)
     limit = EndpointError("rate_limit", "Slow down.", retryable=True)
     model = Model(faults=[limit, limit, broken, PlannerError("Hiccup.", retryable=True)])
-    answers, caller = _ask(model, Budget(), 1)
+    answers, caller = _ask(model, SpendingBudget(), 1)
     assert answers[0].reply is not None
     assert answers[0].bill.requests == 4, "two refusals, a failure, an answer; a hiccup of its own is no request"
     assert caller.spending.total == answers[0].bill
@@ -146,11 +148,11 @@ def test_failures_that_pass_are_tried_again_and_paid_for_once() -> None:
 def test_a_request_that_was_alone_is_not_sent_again_after_a_time_out_and_one_beside_others_is_counted() -> None:
     timeout = EndpointError("timeout", "Too slow.", retryable=True)
     alone = Model(faults=[timeout])
-    answers, caller = _ask(alone, Budget(), 1)
+    answers, caller = _ask(alone, SpendingBudget(), 1)
     assert (answers[0].reply, alone.asked, caller.repeated) == (None, 1, 0)
     assert "Not asked again" in answers[0].error
     several = Model(faults=[timeout])
-    answers, caller = _ask(several, Budget(), 3)
+    answers, caller = _ask(several, SpendingBudget(), 3)
     assert all(answer.reply is not None for answer in answers)
     assert (several.asked, caller.repeated) == (4, 1)
 
@@ -169,7 +171,7 @@ def test_a_plan_that_keeps_failing_is_given_up_and_the_others_go_on() -> None:
         caller = Caller(
             Moody(),
             Gate(Window(4)),
-            Spending(Budget(), Bill()),
+            Spending(SpendingBudget(), Bill()),
             np.random.default_rng(0),
             patience=Patience(attempts=3),
         )
@@ -185,7 +187,7 @@ def test_a_plan_that_keeps_failing_is_given_up_and_the_others_go_on() -> None:
 @pytest.mark.parametrize("kind", ["unauthorized", "not_found", "quota", "no_key"])
 def test_an_endpoint_that_refuses_everything_is_asked_once(kind: str) -> None:
     model = Model(faults=[EndpointError(kind, "It will never work.", hint="Get a key.") for _ in range(1000)])
-    answers, caller = _ask(model, Budget(), 500)
+    answers, caller = _ask(model, SpendingBudget(), 500)
     assert model.asked <= 16, "what was in flight, and no more"
     assert caller.halt is not None and not caller.halt.budget and caller.halt.hint == "Get a key."
     assert sum(answer is None for answer in answers) >= 484
@@ -197,7 +199,7 @@ def test_a_wait_until_tomorrow_ends_the_run_and_a_minute_is_waited(asked_s: floa
     model = Model(faults=[error])
 
     async def work() -> tuple[list[Answer | None], Caller, float]:
-        caller = Caller(model, Gate(Window(4)), Spending(Budget(), Bill()), np.random.default_rng(0))
+        caller = Caller(model, Gate(Window(4)), Spending(SpendingBudget(), Bill()), np.random.default_rng(0))
         answers = list(await asyncio.gather(*(caller.ask(REQUEST) for _ in range(40))))
         return answers, caller, asyncio.get_running_loop().time()
 
@@ -212,7 +214,7 @@ def test_a_wait_until_tomorrow_ends_the_run_and_a_minute_is_waited(asked_s: floa
 
 def test_an_endpoint_that_is_gone_ends_the_run_and_not_every_item() -> None:
     model = Model(faults=[EndpointError("unreachable", "Nobody there.", retryable=True) for _ in range(10_000)])
-    answers, caller = _ask(model, Budget(), 48)
+    answers, caller = _ask(model, SpendingBudget(), 48)
     assert caller.halt is not None and "Nobody there" in caller.halt.why and not caller.halt.budget
     assert FRUITLESS <= model.asked <= 48 * 6
     assert all(answer is None or answer.reply is None for answer in answers)
@@ -220,14 +222,14 @@ def test_an_endpoint_that_is_gone_ends_the_run_and_not_every_item() -> None:
 
 def test_a_planner_that_raises_anything_loses_one_item() -> None:
     model = Model(faults=[ValueError("what?"), KeyError("x")])
-    answers, caller = _ask(model, Budget(), 10)
+    answers, caller = _ask(model, SpendingBudget(), 10)
     failed = [answer for answer in answers if answer.reply is None]
     assert len(failed) == 2 and "ValueError: what?" in failed[0].error
     assert caller.halt is None and caller.spending.in_flight == 0
 
 
 def test_room_is_counted_with_what_is_in_flight() -> None:
-    spending = Spending(Budget(max_requests=4), Bill(requests=1))
+    spending = Spending(SpendingBudget(max_requests=4), Bill(requests=1))
     assert spending.room() is Room.YES
     spending.sent()
     assert spending.room() is Room.YES, "1 + 2 in flight + 1"

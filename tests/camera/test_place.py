@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from staged import agent, crossing, highway, observed
 
-from chauffeur.camera import Conditions, Look
+from chauffeur.camera import CameraLook, Conditions
 from chauffeur.camera.ground import Marking, Paving
 from chauffeur.camera.lane_field import LaneField
 from chauffeur.camera.place import place_of
@@ -38,7 +38,7 @@ def test_driving_on_moves_nothing():
     road, builder = highway(), SceneBuilder()
     seen: list[set[tuple[float, ...]]] = []
     for x in (200.0, 205.0, 240.0):
-        scene = builder.scene(observed(road, agent(0, x, -4.0)), Conditions(), Look(), 1)
+        scene = builder.scene(observed(road, agent(0, x, -4.0)), Conditions(), CameraLook(), 1)
         rows = scene.view.solids.rows.astype(float)
         rows[:, X] += scene.view.origin_m[0]
         near = np.abs(rows[:, X] - 220.0) < 100.0

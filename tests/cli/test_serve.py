@@ -10,7 +10,7 @@ import httpx
 import openai
 import pytest
 
-from chauffeur.cli.serve import Endpoint
+from chauffeur.cli.serve import ServedEndpoint
 from chauffeur.concept import Instruction, Limits, PlanRequest, Program, SystemMessage
 from chauffeur.describe import describe
 from chauffeur.planners.onboard import LanguageModelPlanner
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.server
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    server = Endpoint("127.0.0.1", 0, LanguageModelPlanner(SHIPPED), Limits())
+    server = ServedEndpoint("127.0.0.1", 0, LanguageModelPlanner(SHIPPED), Limits())
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()
     yield f"http://127.0.0.1:{server.server_port}/v1"

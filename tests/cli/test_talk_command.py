@@ -19,7 +19,6 @@ from chauffeur.cli.talk_screen import TalkScreen
 from chauffeur.cli.talk_typed import HELP, read_line
 from chauffeur.drive.talk.messages import (
     Answered,
-    Body,
     Conversation,
     Ended,
     Evaluate,
@@ -32,8 +31,9 @@ from chauffeur.drive.talk.messages import (
     Note,
     Say,
     Scene,
-    Session,
-    Stages,
+    SessionState,
+    ShownBody,
+    StageTimes,
     TakeOver,
     VerdictShown,
 )
@@ -41,7 +41,7 @@ from chauffeur.memory import VaultMemory
 from chauffeur.safety.audit import verify
 
 COMMAND = [sys.executable, "-c", "from chauffeur.cli.main import run; run()", "talk"]
-EGO = Body(0, "car", 0.0, 0.0, 0.0, 5.0, 2.0, 25.0)
+EGO = ShownBody(0, "car", 0.0, 0.0, 0.0, 5.0, 2.0, 25.0)
 SCENE = Scene(12.0, EGO, (), 0.0, 0.0, 31.0, 20.0, 1.5, "a-b:1", 1, "follow", "w1", 3, "", False, 0)
 
 
@@ -133,10 +133,10 @@ def test_a_conversation_is_told_once_and_in_order() -> None:
         "w1", "Slow [red]down[/].", True, "closed", "finished", thoughts="I go slower.", policy="program",
         source="def drive():\n", recalled=planned.recalled, said=("Slowing [b]down[/b].\x1b[2J",),
         verdicts=(VerdictShown("format-v1", True, ""), VerdictShown("alignment-v1", False, "It says left.", True)),
-        opinion="too fast", remembered="remembered as trip 0123", stages=Stages(0.2, 0.1, 0.03, 0.05, 0.1, 0.48),
+        opinion="too fast", remembered="remembered as trip 0123", stages=StageTimes(0.2, 0.1, 0.03, 0.05, 0.1, 0.48),
     )  # fmt: skip
     text = shown(
-        Session("overtake", "Two lanes", 3, "onboard", "grammar/1", False, "ana", "simulated", 0.1, ("slow",)),
+        SessionState("overtake", "Two lanes", 3, "onboard", "grammar/1", False, "ana", "simulated", 0.1, ("slow",)),
         Listening("idle"), SCENE, asked, planned, planned, driven, driven, HowWasIt("w1", "Slow."),
         Ended("stopped", "The car stands."),
     )  # fmt: skip

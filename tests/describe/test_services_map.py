@@ -15,12 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chauffeur.concept import ConfigError, DataError, MissingExtraError
-from chauffeur.describe.services import Position, Reading, RoadMap, Unknown, load_road_map, load_rules
+from chauffeur.describe.services import Position, RoadMap, ServiceReading, Unknown, load_road_map, load_rules
 from chauffeur.describe.services.osm_file import MAX_BYTES
 from chauffeur.describe.services.readings import M_PER_DEG, distance_m
 from chauffeur.describe.services.road_map import LOOK_AHEAD_M, REACH_M
-from chauffeur.describe.services.roads import Limit, Place, place_at
-from chauffeur.describe.services.ways import Way, way_of
+from chauffeur.describe.services.roads import Limit, RoadPlace, place_at
+from chauffeur.describe.services.ways import ServiceWay, way_of
 
 NOW = 1_700_000_000.0
 LAT, LON = 48.0, 11.0
@@ -39,7 +39,7 @@ def point(east_m: float, north_m: float) -> tuple[float, float]:
     return round(latitude, 7), round(LON + east_m / (M_PER_DEG * math.cos(math.radians(LAT))), 7)
 
 
-def way(number: int, highway: str, *points: tuple[float, float], **tags: str) -> Way:
+def way(number: int, highway: str, *points: tuple[float, float], **tags: str) -> ServiceWay:
     made = way_of(
         number,
         {"highway": highway, **{key.replace("__", ":"): value for key, value in tags.items()}},
@@ -49,8 +49,8 @@ def way(number: int, highway: str, *points: tuple[float, float], **tags: str) ->
     return made
 
 
-def kmh(place: Place) -> float | None:
-    assert isinstance(place.limit, Reading), place.limit
+def kmh(place: RoadPlace) -> float | None:
+    assert isinstance(place.limit, ServiceReading), place.limit
     speed_mps = place.limit.value.speed_mps
     return None if speed_mps is None else round(speed_mps * 3.6, 3)
 
@@ -66,7 +66,7 @@ TOWN = RoadMap([MOTORWAY, BESIDE, CROSSING], as_of_s=NOW - 86_400.0)
 def test_a_motorways_limit_is_never_the_side_streets(north_m: float) -> None:
     place = place_at(TOWN, at(3.0, north_m, 2.0), GERMANY, NOW)
     assert kmh(place) == 120.0
-    assert isinstance(place.road, Reading)
+    assert isinstance(place.road, ServiceReading)
     assert (place.road.value.road_class, place.road.value.name) == ("motorway", '"A 9"')
     assert (place.road.value.lanes, place.road.value.oneway) == (3, True)
     assert place.road.age_s == 86_400.0
@@ -96,7 +96,7 @@ def test_without_a_heading_a_crossing_is_unclear_and_so_said() -> None:
 def right_wrong_unknown(town: RoadMap, truth: list[tuple[float, Position]]) -> tuple[float, float, float]:
     """Parts of the positions whose limit is found rightly, wrongly, and not at all."""
     limits = [place_at(town, position, GERMANY, NOW).limit for _, position in truth]
-    speeds = [round((one.value.speed_mps or 0.0) * 3.6) if isinstance(one, Reading) else None for one in limits]
+    speeds = [round((one.value.speed_mps or 0.0) * 3.6) if isinstance(one, ServiceReading) else None for one in limits]
     right = sum(speed == kmh for speed, (kmh, _) in zip(speeds, truth, strict=True))
     unknown = speeds.count(None)
     return right / len(truth), (len(truth) - right - unknown) / len(truth), unknown / len(truth)
@@ -134,7 +134,7 @@ def test_limits_on_noisy_positions() -> None:
 def test_against_a_one_way_road_there_is_no_road() -> None:
     place = place_at(TOWN, at(0.0, -300.0, SOUTH), None, NOW)
     assert place.road == Unknown("the map has no road here that points the same way") or (
-        isinstance(place.road, Reading) and place.road.value.road_class == "service"
+        isinstance(place.road, ServiceReading) and place.road.value.road_class == "service"
     )
     alone = RoadMap([MOTORWAY])
     assert isinstance(place_at(alone, at(0.0, -300.0, SOUTH), None, NOW).limit, Unknown)
@@ -179,7 +179,7 @@ def test_where_a_limit_changes_the_lower_one_counts_for_some_metres() -> None:
     ])  # fmt: skip
     near = place_at(town, at(0.0, 0.0, NORTH), GERMANY, NOW)
     assert kmh(near) == 70.0
-    assert isinstance(near.limit, Reading)
+    assert isinstance(near.limit, ServiceReading)
     assert near.limit.value.detail == "it changes here between 70 km/h and 100 km/h; the lower one is given"
     assert kmh(place_at(town, at(0.0, -40.0, NORTH), GERMANY, NOW)) == 100.0
     assert kmh(place_at(town, at(0.0, 40.0, NORTH), GERMANY, NOW)) == 70.0
@@ -212,7 +212,7 @@ def test_where_a_limit_comes_from_is_told(
     town = RoadMap([way(1, highway, (0, 0), (0, 500), **{key.replace(":", "__"): one for key, one in tags.items()})])
     place = place_at(town, at(0.0, 200.0, NORTH), GERMANY, NOW)
     assert kmh(place) == kmh_given
-    assert isinstance(place.limit, Reading)
+    assert isinstance(place.limit, ServiceReading)
     limit: Limit = place.limit.value
     assert (limit.origin, limit.detail) == (origin, said)
     assert limit.advisory_mps == (pytest.approx(130 / 3.6) if kmh_given is None else None)
@@ -364,7 +364,7 @@ def test_lanes_and_direction(tags: dict[str, str], lanes: int | None, oneway: in
     assert (made.lanes, made.oneway) == (lanes, oneway)
 
 
-def away_m(position: Position, road: Way) -> float:
+def away_m(position: Position, road: ServiceWay) -> float:
     """Distance to a way's line by walking along it in steps of half a metre: slow, and not the map's own arithmetic."""
     best = math.inf
     for (lat0, lon0), (lat1, lon1) in zip(road.points, road.points[1:], strict=False):
@@ -407,7 +407,7 @@ def test_a_lookup_takes_far_less_than_a_millisecond() -> None:
     best_s = math.inf
     for _ in range(3):
         began = time.process_time()
-        found = sum(place_at(town, one, GERMANY, NOW).road.__class__ is Reading for one in positions)
+        found = sum(place_at(town, one, GERMANY, NOW).road.__class__ is ServiceReading for one in positions)
         best_s = min(best_s, (time.process_time() - began) / len(positions))
     assert found > 200
     assert best_s < 1e-3

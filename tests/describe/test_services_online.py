@@ -14,7 +14,14 @@ import pytest
 from test_services_server import NOW, Asked, reply, roads_json, serving, traffic_json, weather_json
 
 from chauffeur.concept import ConfigError
-from chauffeur.describe.services import ContextServices, Position, Reading, ServiceSettings, Surroundings, Unknown
+from chauffeur.describe.services import (
+    ContextServices,
+    Position,
+    ServiceReading,
+    ServiceSettings,
+    Surroundings,
+    Unknown,
+)
 from chauffeur.describe.services.settings import ONLINE, Online
 from chauffeur.describe.services.traffic import read_traffic
 
@@ -116,9 +123,9 @@ def test_all_at_once() -> None:
             "Traffic: slow, at 31 km/h where 72 km/h is usual.",
             "Traffic rules: not known (no region's rules are loaded).",
         )
-        assert isinstance(found.weather, Reading)
+        assert isinstance(found.weather, ServiceReading)
         assert (found.weather.source, found.weather.age_s, found.weather.note) == ("OpenWeather", 30.0, "")
-        assert isinstance(found.road, Reading)
+        assert isinstance(found.road, ServiceReading)
         assert found.road.age_s == NOW - 1_699_992_000.0  # the time the map's own data is of
         rows = {row.name: (row.value, row.unit) for row in found.rows()}
         assert rows["weather.temperature"] == (6.8, "°C")
@@ -156,9 +163,9 @@ def test_they_are_asked_side_by_side() -> None:
 
     async def steps(car: Car) -> None:
         found = await car.around()
-        assert isinstance(found.weather, Reading)
-        assert isinstance(found.traffic, Reading)
-        assert isinstance(found.road, Reading)
+        assert isinstance(found.weather, ServiceReading)
+        assert isinstance(found.traffic, ServiceReading)
+        assert isinstance(found.road, ServiceReading)
 
     with serving(slowly) as service:
         car = drive(steps, weather=service.url, roads=service.url, traffic=service.url)
@@ -191,7 +198,7 @@ def test_a_silent_service_costs_the_budget_and_no_more() -> None:
         for _ in range(3):
             found = await car.around(budget_s=0.2)
             assert found.words()[0] == "Weather: not known (the service did not answer within 0.2 s)."
-        assert isinstance(found.traffic, Reading)
+        assert isinstance(found.traffic, ServiceReading)
         began = time.monotonic()
         await car.services.close()
         assert time.monotonic() - began < SLACK_S
@@ -208,7 +215,7 @@ def test_no_budget_at_all_tells_what_is_known() -> None:
         assert isinstance(found.weather, Unknown)
         await car.around()
         found = await car.around(budget_s=0.0)
-        assert isinstance(found.weather, Reading)
+        assert isinstance(found.weather, ServiceReading)
 
     with serving(everything) as service:
         drive(steps, weather=service.url)
@@ -224,7 +231,7 @@ def test_an_answer_that_is_late_is_there_the_next_time() -> None:
         first = await car.around(budget_s=0.05)
         assert isinstance(first.weather, Unknown)
         second = await car.around()
-        assert isinstance(second.weather, Reading)
+        assert isinstance(second.weather, ServiceReading)
 
     with serving(slowly) as service:
         drive(steps, weather=service.url)
@@ -379,7 +386,7 @@ def test_weather_is_kept_ten_minutes_for_a_kilometre() -> None:
         car.clock.now += 599.0
         near = await car.around(Position(HERE.latitude_deg + 0.002, HERE.longitude_deg, 0.0))
         assert len(service.asked) == 1
-        assert isinstance(near.weather, Reading)
+        assert isinstance(near.weather, ServiceReading)
         assert near.weather.age_s == 629.0
         assert near.words()[0].startswith("Weather 10 min old: light rain")
         car.clock.now += 2.0
@@ -400,14 +407,14 @@ def test_old_weather_is_told_with_its_age_and_reason_and_then_no_more() -> None:
         sometimes.up = False
         car.clock.now += 14 * 60.0
         found = await car.around()
-        assert isinstance(found.weather, Reading)
+        assert isinstance(found.weather, ServiceReading)
         assert found.words()[0] == (
             "Weather 14 min old: light rain, rain 0.8 mm/h, 7 °C, visibility 4.0 km, wind 4 m/s with gusts of 10 m/s, "
             "night (nothing newer: the service failed (503); it is asked again in 6 s)."
         )
         assert found.weather.confidence < 0.9
         elsewhere = await car.around(Position(HERE.latitude_deg + 0.05, HERE.longitude_deg))
-        assert isinstance(elsewhere.weather, Reading)  # six kilometres away: better than nothing
+        assert isinstance(elsewhere.weather, ServiceReading)  # six kilometres away: better than nothing
         assert "the service failed (503)" in elsewhere.weather.note
         far = await car.around(Position(HERE.latitude_deg + 0.5, HERE.longitude_deg))
         assert isinstance(far.weather, Unknown)
@@ -489,10 +496,10 @@ def test_after_a_success_the_waits_begin_anew() -> None:
         for _ in range(3):
             await car.around()
             car.clock.now += 900.0
-        assert isinstance((await car.around()).weather, Reading)
+        assert isinstance((await car.around()).weather, ServiceReading)
         car.clock.now += 601.0
         found = await car.around()
-        assert isinstance(found.weather, Reading)
+        assert isinstance(found.weather, ServiceReading)
         assert "asked again in 6 s" in found.weather.note or "asked again in 7 s" in found.weather.note
 
     with serving(by_turns) as service:
@@ -507,7 +514,7 @@ def test_a_clock_that_is_set_back_locks_nothing() -> None:
         car.clock.now -= 86_400.0
         found = await car.around()
         assert len(service.asked) == 2
-        assert isinstance(found.weather, Reading)
+        assert isinstance(found.weather, ServiceReading)
         assert found.weather.age_s == 0.0  # the service's own time is tomorrow by this clock
         sometimes.up = False
         car.clock.now += 700.0
@@ -527,7 +534,7 @@ def test_roads_are_kept_for_the_circle() -> None:
         await car.around()
         for metres in (50.0, 150.0, 300.0):
             found = await car.around(Position(HERE.latitude_deg, HERE.longitude_deg + metres / 74_300.0, 90.0))
-            assert isinstance(found.road, Reading)
+            assert isinstance(found.road, ServiceReading)
         assert len(service.asked) == 1
         await car.around(Position(HERE.latitude_deg, HERE.longitude_deg + 420.0 / 74_300.0, 90.0))
         assert len(service.asked) == 2
@@ -577,13 +584,13 @@ def test_a_large_answer_of_a_map_service_is_read_beside_the_loop() -> None:
         found = await car.around(budget_s=0.05)
         assert isinstance(found.road, Unknown)
         found = await car.around(budget_s=30.0)
-        assert isinstance(found.road, Reading)
+        assert isinstance(found.road, ServiceReading)
 
     with serving(lambda _: reply(body)) as service:
         drive(steps, roads=service.url)
 
 
-def traffic_of(line: list[tuple[float, float]], **changed: object) -> Reading[object] | Unknown:
+def traffic_of(line: list[tuple[float, float]], **changed: object) -> ServiceReading[object] | Unknown:
     found: list[Surroundings] = []
 
     async def steps(car: Car) -> None:
@@ -612,9 +619,9 @@ def test_traffic_of_another_road_is_not_told(line: list[tuple[float, float]]) ->
 
 def test_traffic_of_this_road_is_told() -> None:
     told = traffic_of(STREET)
-    assert isinstance(told, Reading)
+    assert isinstance(told, ServiceReading)
     assert told.confidence == pytest.approx(0.9)
-    assert isinstance(traffic_of(STREET[::-1]), Reading)
+    assert isinstance(traffic_of(STREET[::-1]), ServiceReading)
     assert traffic_of(STREET, confidence=0.4) == Unknown("the service is not sure of it: 40%")
 
 
@@ -657,7 +664,7 @@ def test_a_place_that_a_service_refuses_is_not_a_service_that_fails() -> None:
         for _ in range(2):
             assert (await car.around()).traffic == Unknown("the service refused the request (400)")
         assert len(service.asked) == 1
-        assert isinstance((await car.around(Position(48.15, 11.6, 90.0))).traffic, Reading)
+        assert isinstance((await car.around(Position(48.15, 11.6, 90.0))).traffic, ServiceReading)
         car.clock.now += 61.0
         await car.around()
         assert len(service.asked) == 3
@@ -680,7 +687,7 @@ def test_what_a_service_writes_does_not_reach_the_words() -> None:
 
     async def steps(car: Car) -> None:
         found = await car.around()
-        assert isinstance(found.weather, Reading)
+        assert isinstance(found.weather, ServiceReading)
         assert found.words()[1] == "Road: primary (withheld: it does not read like a name), both ways."
         for words in found.words():
             assert "previous" not in words
@@ -702,7 +709,7 @@ def test_services_live_through_a_change_of_event_loop() -> None:
             found = asyncio.run(services.around(HERE, budget_s=1.0))
             clock.now += 1_000.0
             assert isinstance(found.traffic, Unknown)
-        assert isinstance(found.weather, Reading)
+        assert isinstance(found.weather, ServiceReading)
         asyncio.run(services.close())
     assert len(service.asked) >= 1
 
@@ -710,7 +717,7 @@ def test_services_live_through_a_change_of_event_loop() -> None:
 def test_many_at_once_ask_once() -> None:
     async def steps(car: Car) -> None:
         found = await asyncio.gather(*(car.around() for _ in range(20)))
-        assert all(isinstance(one.weather, Reading) for one in found)
+        assert all(isinstance(one.weather, ServiceReading) for one in found)
 
     with serving(everything) as service:
         drive(steps, weather=service.url)
@@ -726,7 +733,7 @@ def test_a_caller_that_is_cancelled_leaves_the_request_to_the_next_one() -> None
         first = asyncio.ensure_future(car.around())
         await asyncio.sleep(0.05)
         first.cancel()
-        assert isinstance((await car.around()).weather, Reading)
+        assert isinstance((await car.around()).weather, ServiceReading)
 
     with serving(slowly) as service:
         drive(steps, weather=service.url)
@@ -739,7 +746,7 @@ def test_a_proxy_of_the_environment_is_used(monkeypatch: pytest.MonkeyPatch) -> 
         return reply(weather_json())
 
     async def steps(car: Car) -> None:
-        assert isinstance((await car.around()).weather, Reading)
+        assert isinstance((await car.around()).weather, ServiceReading)
 
     with serving(through) as proxy:
         monkeypatch.setenv("http_proxy", proxy.url)

@@ -14,8 +14,8 @@ from test_services_server import roads_json, traffic_json, weather_json
 from chauffeur.concept import Context, DataError, Instruction, PlanRequest, Situation, SystemMessage
 from chauffeur.describe.services import (
     Position,
-    Reading,
     RoadMap,
+    ServiceReading,
     Surroundings,
     Unknown,
     load_rules,
@@ -26,7 +26,7 @@ from chauffeur.describe.services.outside import WITHHELD, quoted
 from chauffeur.describe.services.overpass import read_ways
 from chauffeur.describe.services.roads import place_at
 from chauffeur.describe.services.surroundings import weather_words
-from chauffeur.describe.services.traffic import Traffic, read_traffic
+from chauffeur.describe.services.traffic import TrafficReport, read_traffic
 from chauffeur.describe.services.units import age_words, distance_words, speed_words
 from chauffeur.describe.services.weather import _CONDITIONS, Weather, read_weather
 from chauffeur.safety.screening import screen_request
@@ -37,8 +37,8 @@ HERE = at(0.0, 0.0, EAST)
 def surroundings(
     town: RoadMap | None = None,
     region: str | None = "germany",
-    weather: Reading[Weather] | Unknown | None = None,
-    traffic: Reading[Traffic] | Unknown | None = None,
+    weather: ServiceReading[Weather] | Unknown | None = None,
+    traffic: ServiceReading[TrafficReport] | Unknown | None = None,
 ) -> Surroundings:
     rules = None if region is None else load_rules(region)
     place = place_at(town or RoadMap([]), HERE, rules, NOW)
@@ -50,12 +50,14 @@ def surroundings(
         limit=place.limit,
         ahead=place.ahead,
         traffic=traffic or Unknown("the service did not answer within 0.3 s"),
-        rules=Unknown("no region's rules are loaded") if rules is None else Reading(rules, "", "rules", 0.0, 1.0),
+        rules=Unknown("no region's rules are loaded")
+        if rules is None
+        else ServiceReading(rules, "", "rules", 0.0, 1.0),
     )
 
 
-def told(weather: Weather, age_s: float = 0.0, note: str = "") -> Reading[Weather]:
-    return Reading(weather, "", "OpenWeather", age_s, 1.0, note)
+def told(weather: Weather, age_s: float = 0.0, note: str = "") -> ServiceReading[Weather]:
+    return ServiceReading(weather, "", "OpenWeather", age_s, 1.0, note)
 
 
 CONTEXT = Context(
@@ -96,7 +98,7 @@ def test_ages(age_s: float, words: str) -> None:
 def test_traffic_in_words() -> None:
     def said(current: float, **more: Any) -> str:
         reading = read_traffic(traffic_json([], currentSpeed=current, freeFlowSpeed=100, **more).encode())
-        return surroundings(traffic=Reading(reading.value, "", "TomTom", 90.0, 0.9)).words()[4]
+        return surroundings(traffic=ServiceReading(reading.value, "", "TomTom", 90.0, 0.9)).words()[4]
 
     assert said(95) == "Traffic 90 s old: free, at 95 km/h."
     assert said(50) == "Traffic 90 s old: slow, at 50 km/h where 100 km/h is usual."
@@ -278,8 +280,8 @@ def test_readers_take_answers_with_one_wrong_part(kind: str, data: st.DataObject
         return
     if isinstance(value, Weather):
         check_plain(surroundings(weather=told(value)))
-    elif isinstance(value, Traffic):
-        check_plain(surroundings(traffic=Reading(value, "", "TomTom", 0.0, value.confidence)))
+    elif isinstance(value, TrafficReport):
+        check_plain(surroundings(traffic=ServiceReading(value, "", "TomTom", 0.0, value.confidence)))
     else:
         check_plain(surroundings(value))
 

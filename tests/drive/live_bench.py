@@ -8,7 +8,7 @@ from pathlib import Path
 from chauffeur.concept import Wishes
 from chauffeur.concept.registry import load_plugin
 from chauffeur.drive.live.control import Control, Rings
-from chauffeur.drive.live.messages import Hand, Key, MirroredInstant, Report, Wish
+from chauffeur.drive.live.messages import Key, LiveWish, MirroredInstant, Report, WheelHand
 from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.settings import SIZES, RingName
 from chauffeur.drive.live.starts import Start
@@ -45,7 +45,7 @@ class Bench:
 
     def take_over(self, on: bool, key: Key | None = None) -> None:
         """The person takes the wheel, or gives it back, or presses a key."""
-        self.hand.write(Hand(on, key).encode(), self.now_ns)
+        self.hand.write(WheelHand(on, key).encode(), self.now_ns)
 
     def tick(self) -> Report:
         self.now_ns += round(DT_NS / self.speed)
@@ -58,5 +58,5 @@ class Bench:
 
     def wish(self, wanted: Wishes, **changes: object) -> None:
         seen = self.observed()
-        made = Wish(seen.trip, seen.tick, "w1", self.now_ns, 1 << 62, "running", 1, wanted)
+        made = LiveWish(seen.trip, seen.tick, "w1", self.now_ns, 1 << 62, "running", 1, wanted)
         self.wishes.write(replace(made, **changes).encode())  # pyright: ignore[reportArgumentType]

@@ -9,9 +9,9 @@ from live_bench import OVERTAKE, Bench
 
 from chauffeur.concept import Plan, Policy, Program, Thoughts
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.live.messages import MirroredInstant, Report, Wish
+from chauffeur.drive.live.messages import LiveWish, MirroredInstant, Report
 from chauffeur.drive.live.mirror import Mirror
-from chauffeur.drive.live.orders import Order, Scene, encode, read_event
+from chauffeur.drive.live.orders import Order, PlannedScene, encode, read_event
 from chauffeur.drive.live.policy import Policy as PolicyProcess
 from chauffeur.drive.live.policy import PolicyRings
 from chauffeur.drive.live.ring import Reader, Ring
@@ -39,14 +39,14 @@ class Rig:
         mirror = Mirror(self.bench.new_world(), self.starts, self.bench.observations)
         return PolicyProcess(mirror, self.rings, self.sandbox, clock_ns=lambda: self.bench.now_ns)
 
-    def period(self, count: int = 1) -> Wish:
+    def period(self, count: int = 1) -> LiveWish:
         """Let both run; the policy's last wish."""
         for _ in range(count):
             self.policy.tick()
             self.reports.append(self.bench.tick())
         message = self.bench.wishes.latest()
         assert message is not None
-        return Wish.decode(message.payload)
+        return LiveWish.decode(message.payload)
 
     def order(self, asked: str | Policy, wish: str = "w1", **changes: object) -> None:
         """A plan, made for the present instant: the text of a program, or another policy."""
@@ -57,7 +57,7 @@ class Rig:
         made = Order(
             wish,
             Plan(Thoughts("As you wish."), Program(asked) if isinstance(asked, str) else asked),
-            Scene.of(seen.trip, observation),
+            PlannedScene.of(seen.trip, observation),
             self.bench.now_ns,
             self.bench.now_ns + 10**10,
             self.bench.now_ns + 10**12,

@@ -35,7 +35,7 @@ from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import Session, parse_wish, scenario_hash
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
-from chauffeur.safety.audit import AuditLog, Record, head_path, read_records, redact, verify, words_of
+from chauffeur.safety.audit import AuditLog, AuditRecord, head_path, read_records, redact, verify, words_of
 from roads import a_road
 
 WISH = "Überhol ihn for Zebedee."
@@ -68,11 +68,11 @@ def drive(planner: Planner, auditor: Auditor | None, wish: str = WISH, person: s
     return asyncio.run(session.drive(parse_wish(wish, PersonId(person)), SCENARIO, 3, LAMPILOT_LIMITS))
 
 
-def records(path: Path) -> list[Record]:
+def records(path: Path) -> list[AuditRecord]:
     return [record for _, record in read_records(path)]
 
 
-def of_kind(path: Path, kind: str) -> list[Record]:
+def of_kind(path: Path, kind: str) -> list[AuditRecord]:
     return [record for record in records(path) if record.kind == kind]
 
 

@@ -16,7 +16,7 @@ from chauffeur.drive.emergency import ASKED, GOING_ON, QUESTION, STOPPING
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Runtime
-from chauffeur.drive.onroad import Answer, OnRoad
+from chauffeur.drive.onroad import OnRoad, OnRoadAnswer
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import Session, parse_wish
@@ -223,7 +223,7 @@ def test_a_vehicle_is_asked_for_a_stop_and_for_none_that_was_refused() -> None:
     file = parse_settings(FILE)
     vehicle = open_vehicle(file, dry_run=True)
 
-    async def steps() -> list[Answer]:
+    async def steps() -> list[OnRoadAnswer]:
         async with OnRoad(vehicle, file, Never()) as road:
             texts = (*STOPS, *REFUSALS, *DISTRESS)
             return [await road.ask(text) for text in texts] + [await road.evaluate(STOPS[1])]

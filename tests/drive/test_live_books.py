@@ -20,7 +20,7 @@ from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Runtime
 from chauffeur.drive.scenarios import find
 from chauffeur.memory.vault import VaultMemory
-from chauffeur.safety.audit import AuditLog, Record, read_records, redact, verify, words_of
+from chauffeur.safety.audit import AuditLog, AuditRecord, read_records, redact, verify, words_of
 
 WISH = "Überhol ihn for Zebedee."
 UNWANTED = "Fly, said Zebedee."
@@ -53,7 +53,7 @@ def report(
     return Report(interventions=interventions, **(fields | changes))  # type: ignore[arg-type]
 
 
-def records(path: Path, kind: str = "") -> list[Record]:
+def records(path: Path, kind: str = "") -> list[AuditRecord]:
     return [record for _, record in read_records(path) if kind in ("", record.kind)]
 
 

@@ -14,7 +14,7 @@ from live_rig import Rig
 
 import chauffeur
 from chauffeur.concept import Limits, Parameters
-from chauffeur.drive.live.messages import Hand, Key, Report
+from chauffeur.drive.live.messages import Key, Report, WheelHand
 from chauffeur.drive.live.orders import TOOK_OVER
 from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
@@ -310,7 +310,7 @@ def test_asked_to_stop_the_car_stands_whoever_has_the_wheel(rig: Rig) -> None:
 
 
 def test_garbage_is_counted_and_changes_nothing(rig: Rig) -> None:
-    for payload in (b"", b"\xff" * 13, b"HAND\x01garbage!", b'{"on": true}', Hand(True).encode()[:-1]):
+    for payload in (b"", b"\xff" * 13, b"HAND\x01garbage!", b'{"on": true}', WheelHand(True).encode()[:-1]):
         rig.bench.hand.write(payload, rig.bench.now_ns)
         assert not rig.bench.tick().taken_over
     assert sum(rig.bench.tick().refused.values()) == 5
@@ -404,7 +404,7 @@ def test_no_process_that_hears_a_model_holds_the_ring(rig: Rig) -> None:
     rings = [getattr(rig.rings, name) for name in rig.rings.__slots__]
     for each in rings:
         assert isinstance(each, Ring)
-        for hand in (Hand(True), Hand(True, "brake")):
+        for hand in (WheelHand(True), WheelHand(True, "brake")):
             each.write(hand.encode(), rig.bench.now_ns)
     report = rig.bench.tick()
     assert not report.taken_over

@@ -8,15 +8,15 @@ from hypothesis import strategies as st
 
 from chauffeur.concept import Limits, Observation, VehicleState, Wishes
 from chauffeur.drive.live.ladder import RUNGS, Ladder, LadderTable
-from chauffeur.drive.live.messages import Wish
+from chauffeur.drive.live.messages import LiveWish
 from chauffeur.safety.bounds import bounded
 from roads import a_lane, a_road
 
 WISHES = Wishes(target_speed_mps=30.0, time_headway_s=1.0, target_lane="a-b:1")
 
 
-def wish(state: str = "running") -> Wish:
-    return Wish(1, 0, "w1", 0, 1, state, None, WISHES)  # pyright: ignore[reportArgumentType]
+def wish(state: str = "running") -> LiveWish:
+    return LiveWish(1, 0, "w1", 0, 1, state, None, WISHES)  # pyright: ignore[reportArgumentType]
 
 
 def observation(speed_mps: float = 25.0, lane: int = 1, lanes: int = 3, shoulder: bool = False) -> Observation:

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chauffeur.concept import Command, Intervention, Parameters, Wishes
-from chauffeur.drive.live.messages import Hand, Key, MessageError, MirroredInstant, Report, Steered, Wish
+from chauffeur.drive.live.messages import Key, LiveWish, MessageError, MirroredInstant, Report, Steered, WheelHand
 
-WISH = Wish(
+WISH = LiveWish(
     trip=1,
     tick=7,
     plan="w1",
@@ -32,9 +32,9 @@ def fields() -> dict[str, Any]:
 
 
 def test_a_wish_comes_back_as_it_was() -> None:
-    assert Wish.decode(WISH.encode()) == WISH
-    bare = Wish(1, 0, "", 0, 0, "none", None, Wishes())
-    assert Wish.decode(bare.encode()) == bare
+    assert LiveWish.decode(WISH.encode()) == WISH
+    bare = LiveWish(1, 0, "", 0, 0, "none", None, Wishes())
+    assert LiveWish.decode(bare.encode()) == bare
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_wish_comes_back_as_it_was() -> None:
 )
 def test_each_field_must_be_of_its_kind(name: str, value: Any, why: str) -> None:
     with pytest.raises(MessageError, match=f"^{why}$"):
-        Wish.decode(json.dumps(fields() | {name: value}).encode())
+        LiveWish.decode(json.dumps(fields() | {name: value}).encode())
 
 
 @pytest.mark.parametrize(
@@ -107,14 +107,14 @@ def test_each_field_must_be_of_its_kind(name: str, value: Any, why: str) -> None
 def test_each_of_the_parameters_must_be_of_its_kind(name: str, value: Any, why: str) -> None:
     bad = fields()["steered"] | {name: value}
     with pytest.raises(MessageError, match=f"^{why}$"):
-        Wish.decode(json.dumps(fields() | {"steered": bad}).encode())
+        LiveWish.decode(json.dumps(fields() | {"steered": bad}).encode())
 
 
 @pytest.mark.parametrize("name", sorted(set(fields()["steered"]) - {"origin", "pose"}))
 def test_none_of_the_parameters_may_be_missing(name: str) -> None:
     short = {key: value for key, value in fields()["steered"].items() if key != name}
     with pytest.raises(MessageError):
-        Wish.decode(json.dumps(fields() | {"steered": short}).encode())
+        LiveWish.decode(json.dumps(fields() | {"steered": short}).encode())
 
 
 @settings(deadline=None)
@@ -126,9 +126,11 @@ def test_parameters_come_back_as_they_were(speed: float, ahead: float, ratio: fl
     assert Steered.read(json.loads(json.dumps(steered.fields()))) == steered
 
 
-@pytest.mark.parametrize("hand", [Hand(True), Hand(False), *(Hand(True, key) for key in get_args(Key))], ids=str)
-def test_what_the_hand_does_comes_back(hand: Hand) -> None:
-    assert Hand.decode(hand.encode()) == hand
+@pytest.mark.parametrize(
+    "hand", [WheelHand(True), WheelHand(False), *(WheelHand(True, key) for key in get_args(Key))], ids=str
+)
+def test_what_the_hand_does_comes_back(hand: WheelHand) -> None:
+    assert WheelHand.decode(hand.encode()) == hand
 
 
 @pytest.mark.parametrize(
@@ -146,19 +148,19 @@ def test_what_the_hand_does_comes_back(hand: Hand) -> None:
 )
 def test_what_is_no_hand_is_refused(payload: bytes, why: str) -> None:
     with pytest.raises(MessageError, match=f"^{why}$"):
-        Hand.decode(payload)
+        WheelHand.decode(payload)
 
 
 @pytest.mark.parametrize("name", sorted(set(fields()) - {"speed", "lane", "turn", "line", "steered"}))
 def test_a_missing_field_is_none(name: str) -> None:
     with pytest.raises(MessageError):
-        Wish.decode(json.dumps({k: v for k, v in fields().items() if k != name}).encode())
+        LiveWish.decode(json.dumps({k: v for k, v in fields().items() if k != name}).encode())
 
 
 @settings(deadline=None)
 @given(st.binary(max_size=400))
 def test_no_bytes_do_more_than_be_refused(payload: bytes) -> None:
-    for kind in (Wish, MirroredInstant, Hand):
+    for kind in (LiveWish, MirroredInstant, WheelHand):
         try:
             kind.decode(payload)
         except MessageError:
@@ -168,7 +170,7 @@ def test_no_bytes_do_more_than_be_refused(payload: bytes) -> None:
 @pytest.mark.parametrize("payload", [b"", b"[]", b"null", b"{", b"\xff\xfe", b"[" * 5000, b'"' + b"x" * 100 + b'"'])
 def test_what_is_no_object_is_no_wish(payload: bytes) -> None:
     with pytest.raises(MessageError, match=r"^(not JSON|no object)$"):
-        Wish.decode(payload)
+        LiveWish.decode(payload)
 
 
 def test_an_observation_comes_back_and_a_short_one_is_none() -> None:

@@ -12,7 +12,7 @@ from live_rig import Rig
 
 from chauffeur.concept import Limits, Parameters, ScenarioError, Wishes
 from chauffeur.drive.live.messages import Report, Steered
-from chauffeur.drive.live.orders import Scene
+from chauffeur.drive.live.orders import PlannedScene
 from chauffeur.drive.live.policy import MOST_RESUMPTIONS
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import BUILT_IN, find
@@ -250,7 +250,7 @@ def test_limits_hold_whatever_control_is_told(begin: Begin) -> None:
 
 def test_a_plan_without_a_lane_wish_relies_on_neither_lane_nor_lead(begin: Begin) -> None:
     rig = begin(start("cruise"))
-    elsewhere = Scene(1, 0, "x-y:0", 99)
+    elsewhere = PlannedScene(1, 0, "x-y:0", 99)
     rig.order(Parameters(22.0, 12.0, 1.0, -1), scene=elsewhere)
     rig.order(PLAIN, "w2", scene=elsewhere)
     assert rig.period().plan == "w2"

@@ -11,8 +11,8 @@ from live_bench import OVERTAKE
 from live_rig import Rig
 
 from chauffeur.concept import Plan, Thoughts
-from chauffeur.drive.live.messages import Wish
-from chauffeur.drive.live.orders import Scene
+from chauffeur.drive.live.messages import LiveWish
+from chauffeur.drive.live.orders import PlannedScene
 from chauffeur.drive.live.policy import MOST_RESUMPTIONS
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
@@ -116,7 +116,7 @@ def test_a_plan_begins_without_waiting_for_the_next_instant(rig: Rig) -> None:
     assert rig.policy.tick()
     message = rig.bench.wishes.latest()
     assert message is not None
-    assert Wish.decode(message.payload).plan == "w1"
+    assert LiveWish.decode(message.payload).plan == "w1"
     assert not rig.policy.tick()
 
 
@@ -134,8 +134,8 @@ def test_between_instants_no_plan_begins_on_a_picture_that_is_old(rig: Rig) -> N
     [
         ({"start_by_ns": 1}, "too late"),
         ({"expires_ns": 1}, "too late"),
-        ({"scene": Scene(2, 0, None, None)}, "another trip"),
-        ({"scene": Scene(1, 0, "x-y:0", None)}, "another lane"),
+        ({"scene": PlannedScene(2, 0, None, None)}, "another trip"),
+        ({"scene": PlannedScene(1, 0, "x-y:0", None)}, "another lane"),
     ],
 )
 def test_a_stale_plan_is_not_started(rig: Rig, changes: dict[str, object], why: str) -> None:
@@ -149,7 +149,7 @@ def test_a_stale_plan_is_not_started(rig: Rig, changes: dict[str, object], why: 
 
 def test_a_plan_for_another_car_ahead_is_stale(rig: Rig) -> None:
     rig.period()
-    scene = Scene.of(1, rig.bench.world.observe())
+    scene = PlannedScene.of(1, rig.bench.world.observe())
     assert scene.lead is not None
     rig.order(HOLD_20, scene=replace(scene, lead=scene.lead + 1))
     rig.period()

@@ -16,7 +16,7 @@ import pytest
 from chauffeur.concept import SandboxError
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live import supervisor
-from chauffeur.drive.live.messages import Hand, Report
+from chauffeur.drive.live.messages import Report, WheelHand
 from chauffeur.drive.live.orders import TOOK_OVER
 from chauffeur.drive.live.remembering import trip_of
 from chauffeur.drive.live.settings import Settings, ring
@@ -172,7 +172,7 @@ def test_a_person_takes_the_wheel_and_gives_it_back(parameters: str) -> None:
         again = runtime.ask(SLOWER)
         until(runtime, lambda: following(heard, again))
         with ring(runtime.folder, "hand") as other:
-            other.write(Hand(True).encode())  # of nobody: the supervisor, who knows better, says so
+            other.write(WheelHand(True).encode())  # of nobody: the supervisor, who knows better, says so
         until(runtime, lambda: heard.reports[-1].taken_over)
         until(runtime, lambda: not heard.reports[-1].taken_over)
     assert {report.rung for report in heard.reports if report.taken_over} == {"hand"}

@@ -15,8 +15,8 @@ from live_rig import Rig
 
 from chauffeur.concept import ActionMatrix, Limits, Scenario, Trajectory
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.live.messages import MOST_WAYPOINTS, MessageError, Report, Steered, Wish
-from chauffeur.drive.live.orders import Scene
+from chauffeur.drive.live.messages import MOST_WAYPOINTS, LiveWish, MessageError, Report, Steered
+from chauffeur.drive.live.orders import PlannedScene
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Runtime
@@ -94,7 +94,7 @@ def test_waypoints_count_from_where_they_were_planned_however_long_that_took(beg
 
 def _scene(rig: Rig):
 
-    return Scene.of(rig.bench.observed().trip, rig.bench.world.observe())
+    return PlannedScene.of(rig.bench.observed().trip, rig.bench.world.observe())
 
 
 def test_an_action_matrix_keeps_its_lane_and_goes_on_after_its_process_died(begin: Callable[[Start], Rig]) -> None:
@@ -160,7 +160,7 @@ def test_the_longest_trajectory_fits_where_wishes_are_written(begin: Callable[[S
     rig = begin(EMPTY_LOT)
     points = tuple((12345.678 + 0.001 * i, -9876.543) for i in range(MOST_WAYPOINTS))
     wish = rig.period()
-    assert isinstance(wish, Wish)
+    assert isinstance(wish, LiveWish)
     pose = (12345.678, -9876.543, -3.14159, 22.345)
     rig.bench.wishes.write(replace(wish, steered=Steered(Trajectory(points, 0.1), "a" * 200, pose)).encode())
 

@@ -18,7 +18,7 @@ from ros_debian import LISTENER, rospy_node
 
 from chauffeur.concept import PersonId
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import Answer, OnRoad, open_books
+from chauffeur.drive.onroad import OnRoad, OnRoadAnswer, open_books
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.audit import read_records, verify
@@ -40,7 +40,7 @@ def test_a_session_over_a_roscore_that_dies(tmp_path: Path) -> None:
     )
     settings, planner = read_settings(file), make_planner("talk2drive")
     memory, ana = VaultMemory(tmp_path / "home"), PersonId("ana")
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
     told: list[DriveEvent] = []
 
     async def eventually(true: object) -> None:

@@ -15,7 +15,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "planners"))
 from server import ModelServer, silent, stream
 
 from chauffeur.describe.services import Sources, read_sources
-from chauffeur.drive.onroad import Answer, OnRoad
+from chauffeur.drive.onroad import OnRoad, OnRoadAnswer
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.ros.opening import open_vehicle
 from chauffeur.worlds.ros.settings import parse_settings
@@ -33,12 +33,12 @@ def server() -> Iterator[ModelServer]:
     running.close()
 
 
-def ask(server: ModelServer, folder: Path, *wishes: str) -> list[Answer]:
+def ask(server: ModelServer, folder: Path, *wishes: str) -> list[OnRoadAnswer]:
     path = folder / "services.toml"
     path.write_text('region = "germany"\n[position]\nat = [48.1371, 11.5754]\n')
     settings = parse_settings(FILE)
 
-    async def whole() -> list[Answer]:
+    async def whole() -> list[OnRoadAnswer]:
         planner = make_planner("talk2drive/openai/m", base_url=server.url)
         async with (
             Sources(read_sources(path)) as sources,
@@ -84,7 +84,7 @@ def test_a_stop_does_not_wait_for_a_model(server: ModelServer) -> None:
     server.script(silent(20.0))
     settings = parse_settings(FILE)
 
-    async def whole() -> tuple[Answer, Answer]:
+    async def whole() -> tuple[OnRoadAnswer, OnRoadAnswer]:
         planner = make_planner("talk2drive/openai/m", base_url=server.url)
         async with OnRoad(open_vehicle(settings, dry_run=True), settings, planner) as road:
             slow = asyncio.create_task(road.ask("Slower, please."))

@@ -18,7 +18,7 @@ from test_services_server import Asked, reply, roads_json, serving
 from chauffeur.concept import Parameters, Plan, PlanRequest, Thoughts
 from chauffeur.describe.services import Sources, Unknown, read_sources
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import Answer, OnRoad
+from chauffeur.drive.onroad import OnRoad, OnRoadAnswer
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.ros.opening import open_vehicle
@@ -61,8 +61,8 @@ def drive(
     return told
 
 
-def ask(folder: Path, url: str, planner: Planner, *wishes: str) -> tuple[list[Answer], str]:
-    answers: list[Answer] = []
+def ask(folder: Path, url: str, planner: Planner, *wishes: str) -> tuple[list[OnRoadAnswer], str]:
+    answers: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad, sources: Sources) -> None:
         for wish in wishes:
@@ -116,7 +116,7 @@ def test_a_limit_that_falls_while_it_is_planned(tmp_path: Path) -> None:
             return await answer(request)
 
     sources_of: list[Any] = []
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad, sources: Sources) -> None:
         sources_of.append(sources)
@@ -132,7 +132,7 @@ def test_a_limit_that_falls_while_it_is_planned(tmp_path: Path) -> None:
 
 
 def test_services_that_hang_cost_their_budget_and_are_said(tmp_path: Path, embedded: Planner) -> None:
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad, sources: Sources) -> None:
         answers.append(await road.ask("Drive at 20 km/h."))

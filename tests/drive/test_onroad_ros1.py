@@ -21,11 +21,11 @@ from ros_graph import FOLLOWER, REPLANNER, Master, Subscriber, VelocityPublisher
 
 from chauffeur.concept import Parameters
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import Answer, OnRoad, open_books
+from chauffeur.drive.onroad import OnRoad, OnRoadAnswer, open_books
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.audit import read_records, verify
-from chauffeur.worlds.ros import VehicleState
+from chauffeur.worlds.ros import RosVehicleState
 from chauffeur.worlds.ros.limits import checked
 from chauffeur.worlds.ros.node import Ros1Settings
 from chauffeur.worlds.ros.ros1 import Ros1Vehicle
@@ -80,14 +80,14 @@ def said(told: list[DriveEvent], kind: str) -> list[str]:
 
 
 def links(told: list[DriveEvent], link: str) -> list[str]:
-    return [one.text for one in told if isinstance(one.value, VehicleState) and one.value.link == link]
+    return [one.text for one in told if isinstance(one.value, RosVehicleState) and one.value.link == link]
 
 
 def test_a_wish_is_with_the_vehicle_when_it_is_answered(master: Master, embedded: Planner) -> None:
     follower, replanner = Subscriber(master, FOLLOWER), Subscriber(master, REPLANNER)
     speed = VelocityPublisher(master)
     speed.speed_mps = 5.0
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
     contexts: list[str] = []
 
     async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
@@ -112,7 +112,7 @@ def test_a_wish_is_with_the_vehicle_when_it_is_answered(master: Master, embedded
 
 
 def test_without_a_way_to_the_vehicle_nothing_waits_in_a_queue(master: Master, embedded: Planner) -> None:
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
         await until(lambda: "Nobody listens" in road._vehicle.state().words)
@@ -139,7 +139,7 @@ def test_a_roscore_that_dies_and_comes_back(tmp_path: Path, embedded: Planner) -
     graph = Master(port)
     nodes = [Subscriber(graph, FOLLOWER), Subscriber(graph, REPLANNER)]
     fresh: list[Subscriber] = []
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
         await road.reached(10.0)
@@ -176,7 +176,7 @@ def test_nodes_outlive_their_master(embedded: Planner) -> None:
     port = ros.free_port()
     graph = Master(port)
     follower, replanner = Subscriber(graph, FOLLOWER), Subscriber(graph, REPLANNER)
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
         await road.reached(10.0)
@@ -200,7 +200,7 @@ def test_nodes_outlive_their_master(embedded: Planner) -> None:
 def test_a_node_that_takes_nothing_is_said_and_a_rise_is_taken_back(master: Master, embedded: Planner) -> None:
     """A subscriber that is connected and never reads: its socket's buffers are all that is handed over."""
     follower, replanner = Subscriber(master, FOLLOWER), Subscriber(master, REPLANNER)
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
         await road.reached(10.0)
@@ -239,7 +239,7 @@ def test_a_node_that_takes_nothing_is_said_and_a_rise_is_taken_back(master: Mast
 
 def test_shut_down_from_outside(master: Master, embedded: Planner) -> None:
     follower, replanner = Subscriber(master, FOLLOWER), Subscriber(master, REPLANNER)
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
         await road.reached(10.0)
@@ -257,7 +257,7 @@ def test_shut_down_from_outside(master: Master, embedded: Planner) -> None:
 def test_limits_of_the_interface_hold_whatever_was_checked(master: Master, embedded: Planner) -> None:
     """The border's own refusal is an answer like any other."""
     follower, replanner = Subscriber(master, FOLLOWER), Subscriber(master, REPLANNER)
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
         await road.reached(10.0)

@@ -31,7 +31,7 @@ from chauffeur.concept import (
 )
 from chauffeur.drive import questions
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import Answer, OnRoad, RoadBooks, open_books
+from chauffeur.drive.onroad import OnRoad, OnRoadAnswer, RoadBooks, open_books
 from chauffeur.drive.onroad import session as onroad
 from chauffeur.drive.onroad.checks import fitted, is_about_engaging, is_stop
 from chauffeur.memory.vault import VaultMemory
@@ -101,8 +101,8 @@ def drive(
     return told
 
 
-def ask(planner: Planner, *wishes: str, **options: Any) -> list[Answer]:
-    answers: list[Answer] = []
+def ask(planner: Planner, *wishes: str, **options: Any) -> list[OnRoadAnswer]:
+    answers: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad) -> None:
         for wish in wishes:
@@ -232,7 +232,7 @@ def test_faster_never_means_slower(embedded: Planner) -> None:
 
     settings = parse_settings(FILE)
     car = HeldUp(open_vehicle(settings, dry_run=True))
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
 
     async def whole() -> None:
         async with OnRoad(car, settings, embedded) as road:
@@ -257,7 +257,7 @@ def test_a_newer_wish_takes_the_place_of_one_that_is_planned() -> None:
         raise AssertionError
 
     slow = Asked(forever)
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad) -> None:
         older = asyncio.create_task(road.ask("Something slow."))
@@ -273,7 +273,7 @@ def test_a_newer_wish_takes_the_place_of_one_that_is_planned() -> None:
 
 
 def test_a_stop_gives_way_to_nothing() -> None:
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad) -> None:
         stop = asyncio.create_task(road.ask("stop"))
@@ -364,7 +364,7 @@ def test_a_fault_of_ours_ends_one_wish(caplog: pytest.LogCaptureFixture) -> None
                 raise faults.pop()
             return car.apply(parameters)
 
-    async def whole() -> list[Answer]:
+    async def whole() -> list[OnRoadAnswer]:
         async with OnRoad(Faulty(), settings, gives(5.0)) as road:
             return [await road.ask("x"), await road.ask("y")]
 
@@ -396,7 +396,7 @@ def test_planners_that_fail(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_it_is_remembered_and_recalled(tmp_path: Path, embedded: Planner) -> None:
     memory = VaultMemory(tmp_path / "home")
-    answers: list[Answer] = []
+    answers: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad) -> None:
         answers.append(await road.ask("Drive at 30 km/h."))
@@ -447,7 +447,7 @@ def test_a_trip_says_what_it_was_and_what_was_not_measured(embedded: Planner) ->
 
 
 def test_feedback_without_a_drive(tmp_path: Path, embedded: Planner) -> None:
-    said: list[Answer] = []
+    said: list[OnRoadAnswer] = []
 
     async def steps(road: OnRoad) -> None:
         said.append(await road.evaluate("too fast"))

@@ -9,17 +9,17 @@ import pytest
 from chauffeur.concept import ChauffeurError
 from chauffeur.drive.onroad.spoken import listening
 from chauffeur.drive.talk.attention import Attention
-from chauffeur.drive.talk.hearing import Engine
+from chauffeur.drive.talk.hearing import HearingEngine
 from chauffeur.drive.talk.messages import Said
 
 
-def attention(engine: Engine | None, said: list[Said]) -> Attention:
+def attention(engine: HearingEngine | None, said: list[Said]) -> Attention:
     return Attention(engine, None, None, said.append, lambda hotword, words: None)
 
 
 def test_an_engine_that_cannot_be_had_is_said_before_anything_is_listened_to() -> None:
     async def session() -> None:
-        async with listening(attention(Engine("whisper", "/nowhere"), []), print):
+        async with listening(attention(HearingEngine("whisper", "/nowhere"), []), print):
             raise AssertionError
 
     with pytest.raises(ChauffeurError):

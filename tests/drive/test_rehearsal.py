@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from chauffeur.concept import Metric, Outcome
-from chauffeur.drive.rehearsal import Choice, Rollout, best_choice, label, rehearse, tries
+from chauffeur.drive.rehearsal import RehearsedChoice, Rollout, best_choice, label, rehearse, tries
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import HighwayWorld
@@ -81,12 +81,12 @@ def world() -> HighwayWorld:
     return one
 
 
-Try = Callable[..., Choice]
+Try = Callable[..., RehearsedChoice]
 
 
 @pytest.fixture
 def attempt(world: HighwayWorld, sandbox: Sandbox) -> Try:
-    def run(*sources: str, speed: float = 20.0, patient: bool = False, above: float = math.inf) -> Choice:
+    def run(*sources: str, speed: float = 20.0, patient: bool = False, above: float = math.inf) -> RehearsedChoice:
         def judge(copy: HighwayWorld) -> NearTo:
             return NearTo(copy, speed, patient=patient, collides_above=above)
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from chauffeur.bench.chaos.judge import judge, recovery
-from chauffeur.bench.chaos.outside import Heard
+from chauffeur.bench.chaos.outside import HeardOutside
 from chauffeur.bench.chaos.witness import Stall
 from chauffeur.concept import Command, Wishes
 from chauffeur.drive.actuate import actuate
@@ -28,13 +28,13 @@ def own_driver(world: HighwayWorld, wishes: Wishes) -> Command:
     return world.driver().command(world.driver().settle(wishes))
 
 
-def drive(ticks: int, hands: Hands = own_driver, *, shielded: bool = True) -> list[Heard]:
+def drive(ticks: int, hands: Hands = own_driver, *, shielded: bool = True) -> list[HeardOutside]:
     """What control would report of a trip, a period each."""
     world = HighwayWorld()
     world.reset(START.scenario, START.seed)
     shield = Shield(world.dt_s, START.limits) if shielded else None
     wishes = world.driver().initial_wishes()
-    heard: list[Heard] = []
+    heard: list[HeardOutside] = []
     for tick in range(ticks):
         if world.ended:
             break
@@ -45,22 +45,22 @@ def drive(ticks: int, hands: Hands = own_driver, *, shielded: bool = True) -> li
             requested=done.requested, applied=done.applied, interventions=done.interventions, clipped=(), refused={},
             missed=0, faults=0, speed_mps=observation.ego.speed_mps, lane=observation.ego.lane,
         )  # fmt: skip
-        heard.append(Heard(report, round((tick + 1) * PERIOD_S * 1e9)))
+        heard.append(HeardOutside(report, round((tick + 1) * PERIOD_S * 1e9)))
     return heard
 
 
-def unsafe(heard: list[Heard], plans: tuple[str, ...] = ("w1",)) -> tuple[str, ...]:
+def unsafe(heard: list[HeardOutside], plans: tuple[str, ...] = ("w1",)) -> tuple[str, ...]:
     return judge(heard, START, plans, PERIOD_S).unsafe()
 
 
-def changed(heard: list[Heard], place: int, **fields: object) -> list[Heard]:
+def changed(heard: list[HeardOutside], place: int, **fields: object) -> list[HeardOutside]:
     copy = list(heard)
     copy[place] = replace(copy[place], report=replace(copy[place].report, **fields))  # pyright: ignore[reportArgumentType]
     return copy
 
 
 @pytest.fixture(scope="module")
-def trip() -> list[Heard]:
+def trip() -> list[HeardOutside]:
     return drive(40)
 
 

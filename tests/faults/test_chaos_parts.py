@@ -18,7 +18,7 @@ from chauffeur.bench.chaos.table import failures, figures, headline, table_markd
 from chauffeur.bench.chaos.vandal import DEEDS, Vandal
 from chauffeur.bench.chaos.witness import Stall, Witness, stood_ns
 from chauffeur.concept import Wishes
-from chauffeur.drive.live.messages import MessageError, MirroredInstant, Wish
+from chauffeur.drive.live.messages import LiveWish, MessageError, MirroredInstant
 from chauffeur.drive.live.settings import SIZES, ring
 
 FOREVER_NS = (1 << 63) - 1
@@ -28,7 +28,7 @@ FOREVER_NS = (1 << 63) - 1
 def rings(tmp_path):
     made = {name: ring(tmp_path, name, create=True) for name in SIZES}
     made["observations"].write(MirroredInstant(3, 40, b"x").encode())
-    wish = Wish(3, 40, "w1", time.monotonic_ns(), FOREVER_NS, "running", 1, Wishes(20.0))
+    wish = LiveWish(3, 40, "w1", time.monotonic_ns(), FOREVER_NS, "running", 1, Wishes(20.0))
     made["wishes"].write(wish.encode())
     yield made
     for each in made.values():
@@ -46,7 +46,7 @@ def test_whatever_the_vandal_does_a_reader_gets_a_message_or_none(tmp_path, ring
         message = each.latest()
         if name == "wishes" and message is not None:
             try:
-                wish = Wish.decode(message.payload)
+                wish = LiveWish.decode(message.payload)
             except MessageError:
                 continue
             assert 0.0 <= (wish.wishes.target_speed_mps or 0.0) <= 100.0

@@ -16,6 +16,7 @@ from chauffeur.bench.kernel.stats import Interval
 from chauffeur.bench.report.model import (
     NOT_KNOWN,
     SIMULATED,
+    BenchReport,
     Cell,
     Column,
     Failure,
@@ -24,8 +25,7 @@ from chauffeur.bench.report.model import (
     Gallery,
     Group,
     Headline,
-    Line,
-    Report,
+    ReportLine,
     ReportTable,
 )
 from chauffeur.concept import Context, DataError, Program, Situation, Verdict
@@ -97,17 +97,17 @@ def _table(words: str, **more: object) -> ReportTable:
         Column("b", "Count", meaning="How many."),
     )
     lines = (
-        Line(words, (Cell("5.0", Interval(5.0, -2.0, 9.0, "bootstrap"), words), Cell("3")), (LABEL,)),
-        Line("unknown", (NOT_KNOWN, Cell("0")), (LABEL,)),
-        Line("all", (Cell("500.0", Interval(500.0)), Cell("0")), (LABEL,), published=True),
+        ReportLine(words, (Cell("5.0", Interval(5.0, -2.0, 9.0, "bootstrap"), words), Cell("3")), (LABEL,)),
+        ReportLine("unknown", (NOT_KNOWN, Cell("0")), (LABEL,)),
+        ReportLine("all", (Cell("500.0", Interval(500.0)), Cell("0")), (LABEL,), published=True),
     )
     table = ReportTable("scores", words, "Method", columns, (Group(words, lines),), words, (words,))
     return replace(table, **more)  # type: ignore[arg-type]
 
 
-def _report(words: str = "onboard", drives: tuple[RecordedTrip | None, ...] = (None,)) -> Report:
+def _report(words: str = "onboard", drives: tuple[RecordedTrip | None, ...] = (None,)) -> BenchReport:
     failures = tuple(_failure(drive, words, note=words) for drive in drives)
-    return Report(
+    return BenchReport(
         title=words,
         subtitle=words,
         summary=words,

@@ -8,7 +8,7 @@ import pytest
 from memory_trips import context, trip
 
 from chauffeur.concept import Instruction, PersonId, Situation
-from chauffeur.describe.services.readings import Reading, Unknown
+from chauffeur.describe.services.readings import ServiceReading, Unknown
 from chauffeur.describe.services.surroundings import Surroundings, with_surroundings
 from chauffeur.describe.services.weather import Weather
 from chauffeur.language.weather import DRY, FOG, RAIN, SNOW, UNKNOWN, weather_in, weather_of
@@ -40,12 +40,12 @@ def test_where_nobody_told_the_weather_it_is_unknown() -> None:
 @pytest.mark.parametrize(
     ("weather", "bits"),
     [
-        (Reading(Weather(("light rain", "mist"), 7.5, 4000.0), "", "OpenWeather", 1.0, 1.0), RAIN | FOG),
-        (Reading(Weather(("clear sky",), 7.5), "", "OpenWeather", 900.0, 0.5, note="no answer"), DRY),
+        (ServiceReading(Weather(("light rain", "mist"), 7.5, 4000.0), "", "OpenWeather", 1.0, 1.0), RAIN | FOG),
+        (ServiceReading(Weather(("clear sky",), 7.5), "", "OpenWeather", 900.0, 0.5, note="no answer"), DRY),
         (Unknown("offline"), UNKNOWN),
     ],
 )
-def test_what_the_services_say_is_understood(weather: Reading[Weather] | Unknown, bits: int) -> None:
+def test_what_the_services_say_is_understood(weather: ServiceReading[Weather] | Unknown, bits: int) -> None:
     no = Unknown("offline")
     there = with_surroundings(context(), Surroundings(None, 0.0, weather, no, no, no, no, no))  # type: ignore[arg-type]
     assert weather_of(there.situation) == bits

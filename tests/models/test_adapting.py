@@ -27,10 +27,10 @@ from chauffeur.concept import (
     SystemMessage,
 )
 from chauffeur.models.onboard.adapting import (
+    AdaptingVerdict,
     AdaptRecipe,
     Marks,
     Score,
-    Verdict,
     adapt,
     decide,
     fine_tune,
@@ -40,29 +40,29 @@ from chauffeur.models.onboard.adapting import (
 from chauffeur.models.onboard.cases import Case
 from chauffeur.models.onboard.examples import wish_example
 from chauffeur.models.onboard.interactions import (
-    Interaction,
+    AcceptedInteraction,
     Pair,
     exported_items,
     interactions_of,
     load_interactions,
     parted,
 )
-from chauffeur.planners.onboard.dialect import Step, write
+from chauffeur.planners.onboard.dialect import DialectStep, write
 from chauffeur.planners.onboard.hot import HotModel, HotPlanner, opened, take_into_use
 from chauffeur.planners.onboard.prompt import prompt
 
 LIBRARIES = ("torch", "peft", "transformers", "tokenizers", "onnx", "onnxscript", "onnxruntime", "llguidance")
 HIGHWAY = Situation("highway", 25.0, 31.2928, 3, 1, False, Lead(3, 43.0, 24.0), None)
 STEPS = tuple(
-    (Step(skill),)
+    (DialectStep(skill),)
     for skill in ("faster", "slower", "lane_left", "lane_right", "overtake_left", "hurry", "relax", "pull_over")
 )
 WORDINGS = 48
-HURRY, RELAX = write([Step("hurry")]), write([Step("relax")])
+HURRY, RELAX = write([DialectStep("hurry")]), write([DialectStep("relax")])
 
 
 BOOGIE = [
-    Interaction(f"{begin}{end}", HIGHWAY, (), HURRY, True)
+    AcceptedInteraction(f"{begin}{end}", HIGHWAY, (), HURRY, True)
     for begin in ("Let us boogie", "Boogie", "Time to boogie", "Now boogie")
     for end in ("", " please", " again")
 ]
@@ -82,7 +82,7 @@ class Trained:
     wanted: str = ""
 
     @property
-    def boogie(self) -> list[Interaction]:
+    def boogie(self) -> list[AcceptedInteraction]:
         """A phrase that the base takes for something else."""
         return [replace(one, program=self.wanted) for one in BOOGIE]
 
@@ -141,13 +141,13 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Trained:
 
 
 @pytest.fixture(scope="module")
-def boogied(trained: Trained, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Verdict]]:
+def boogied(trained: Trained, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, AdaptingVerdict]]:
     """(out, verdict) of an adaptation that went well."""
     out = tmp_path_factory.mktemp("ana")
     yield out, adapt(trained.base, trained.boogie, out, trained.recipe, told)
 
 
-def answers(folder: Path, one: Interaction) -> str:
+def answers(folder: Path, one: AcceptedInteraction) -> str:
     return opened(folder).write(prompt(one.situation, one.history, one.wish)).text
 
 
@@ -238,7 +238,7 @@ def test_parts_are_apart_and_stay_so() -> None:
 # Learning and judging -------------------------------------------------------------------------------------------------
 
 
-def test_what_the_base_gets_wrong_becomes_right(trained: Trained, boogied: tuple[Path, Verdict]) -> None:
+def test_what_the_base_gets_wrong_becomes_right(trained: Trained, boogied: tuple[Path, AdaptingVerdict]) -> None:
     out, verdict = boogied
     assert verdict.taken, verdict
     assert verdict.adapted is not None
@@ -251,7 +251,7 @@ def test_what_the_base_gets_wrong_becomes_right(trained: Trained, boogied: tuple
     assert (out / "current").resolve() == (out / "models" / "0001").resolve()
 
 
-def test_the_model_folder_holds_counts_only(boogied: tuple[Path, Verdict]) -> None:
+def test_the_model_folder_holds_counts_only(boogied: tuple[Path, AdaptingVerdict]) -> None:
     out, _ = boogied
     about = json.loads((out / "current" / "model.json").read_text())
     assert about["version"] == "tiny+adapted.1"
@@ -265,7 +265,9 @@ def test_the_model_folder_holds_counts_only(boogied: tuple[Path, Verdict]) -> No
             assert str(out.parent).encode() not in path.read_bytes(), path
 
 
-def test_the_same_seed_gives_the_same_model(trained: Trained, boogied: tuple[Path, Verdict], tmp_path: Path) -> None:
+def test_the_same_seed_gives_the_same_model(
+    trained: Trained, boogied: tuple[Path, AdaptingVerdict], tmp_path: Path
+) -> None:
     out, verdict = boogied
     again = adapt(trained.base, trained.boogie, tmp_path, trained.recipe, told)
     assert again.adapted == verdict.adapted
@@ -289,7 +291,9 @@ def test_merged_is_what_was_trained(trained: Trained) -> None:
     assert float((unmerged - before).abs().max()) > 0.1
 
 
-def test_a_ruined_model_is_not_taken_into_use(trained: Trained, boogied: tuple[Path, Verdict], tmp_path: Path) -> None:
+def test_a_ruined_model_is_not_taken_into_use(
+    trained: Trained, boogied: tuple[Path, AdaptingVerdict], tmp_path: Path
+) -> None:
     out = tmp_path / "out"
     shutil.copytree(boogied[0], out, symlinks=True)
     muddle = [replace(one, program=(HURRY, RELAX)[i % 2]) for i, one in enumerate(BOOGIE)]
@@ -309,7 +313,7 @@ def test_a_model_that_diverged_is_not_taken_into_use(trained: Trained, tmp_path:
     assert not (tmp_path / "current").exists()
 
 
-def test_ctrl_c_leaves_the_old_model(trained: Trained, boogied: tuple[Path, Verdict], tmp_path: Path) -> None:
+def test_ctrl_c_leaves_the_old_model(trained: Trained, boogied: tuple[Path, AdaptingVerdict], tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(boogied[0], out, symlinks=True)
 
@@ -351,7 +355,7 @@ def test_senseless_recipes_and_bases_are_refused(trained: Trained, tmp_path: Pat
 
 
 def test_a_new_model_is_noticed_between_two_requests(
-    trained: Trained, boogied: tuple[Path, Verdict], tmp_path: Path
+    trained: Trained, boogied: tuple[Path, AdaptingVerdict], tmp_path: Path
 ) -> None:
     pointer = tmp_path / "current"
     hot = HotModel(pointer, opened, otherwise=trained.folder / "model")
@@ -383,7 +387,7 @@ def test_an_unreadable_model_leaves_the_old_one_in_use(trained: Trained, tmp_pat
         HotModel(pointer, opened)
 
 
-def test_a_planner_changes_its_model(trained: Trained, boogied: tuple[Path, Verdict], tmp_path: Path) -> None:
+def test_a_planner_changes_its_model(trained: Trained, boogied: tuple[Path, AdaptingVerdict], tmp_path: Path) -> None:
     pointer = tmp_path / "current"
     planner = HotPlanner(pointer, trained.folder / "model")
     assert (planner.id, planner.model) == ("onboard", "tiny")

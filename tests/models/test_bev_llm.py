@@ -24,7 +24,7 @@ from chauffeur.models.bev_llm.geometry import BevGrid, rig_geometry  # noqa: E40
 from chauffeur.models.bev_llm.network import CompactBevLlm, MllamaBevLlm  # noqa: E402
 from chauffeur.models.bev_llm.recipe import BevLlmRecipe, CompactAnswerer, compact, train_compact  # noqa: E402
 from chauffeur.models.bev_llm.views import VIEWS, camera_of, cut, view_cameras  # noqa: E402
-from chauffeur.models.bev_llm.words import WordTable  # noqa: E402
+from chauffeur.models.bev_llm.words import QuestionWordTable  # noqa: E402
 
 RIG = nuplan_rig(112, 64).only("CAM_F0", "CAM_L0", "CAM_B0")
 PATCHES = (4, 7)
@@ -145,7 +145,7 @@ def test_wordings_can_be_kept_apart_to_choose_by() -> None:
 
 
 def _answerer(data: Any, keep: Any = "full") -> CompactAnswerer:
-    words, of = WordTable.taught(), facets()
+    words, of = QuestionWordTable.taught(), facets()
     torch.manual_seed(0)
     network = CompactBevLlm(compact(BevLlmRecipe(ablation=keep), words, of, data.now.shape[-2:]))
     return CompactAnswerer(network.eval(), words, of, data.cameras, keep)

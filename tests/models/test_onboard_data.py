@@ -15,7 +15,7 @@ from chauffeur.models.onboard import examples
 from chauffeur.models.onboard.cases import Case, case_of, make_case
 from chauffeur.models.onboard.engine import distinct, gathered, make_cases, masked, worded
 from chauffeur.models.onboard.examples import questions, reasons
-from chauffeur.models.onboard.pipeline import Plan, build_data
+from chauffeur.models.onboard.pipeline import PipelinePlan, build_data
 from chauffeur.planners.onboard.dialect import SKILLS
 from chauffeur.planners.onboard.prompt import ASK, REFUSE, REPLY, WISH
 from chauffeur.planners.onboard.reply import read_reply
@@ -108,7 +108,7 @@ def test_the_data_set_is_built_packed_and_described(tmp_path: Path) -> None:
     from chauffeur.models.onboard.packed import Packed
     from chauffeur.models.onboard.tokens import load_tokenizer
 
-    build_data(tmp_path, Plan(seed=3, draws=110, per_case=3), 1, lambda stage, done, of: None)
+    build_data(tmp_path, PipelinePlan(seed=3, draws=110, per_case=3), 1, lambda stage, done, of: None)
     data = tmp_path / "data"
     facts: dict[str, Any] = json.loads((data / "data.json").read_text())
     packed = Packed.load(data / "train.npz")
@@ -126,13 +126,15 @@ def test_the_data_set_is_built_packed_and_described(tmp_path: Path) -> None:
 def test_data_for_a_finished_network_are_read_with_its_tokenizer(tmp_path: Path) -> None:
     pytest.importorskip("tokenizers", reason="tokenizers is not installed (extra: models)")
     first, second = tmp_path / "first", tmp_path / "second"
-    build_data(first, Plan(seed=3, draws=100, per_case=2), 1, lambda stage, done, of: None)
+    build_data(first, PipelinePlan(seed=3, draws=100, per_case=2), 1, lambda stage, done, of: None)
     second.mkdir()
     (second / "cases.jsonl").write_bytes((first / "cases.jsonl").read_bytes())
-    build_data(second, Plan(seed=3, draws=100, per_case=3, base=first), 1, lambda stage, done, of: None)
+    build_data(second, PipelinePlan(seed=3, draws=100, per_case=3, base=first), 1, lambda stage, done, of: None)
     known, kept = ((folder / "data" / "tokenizer.json").read_bytes() for folder in (first, second))
     assert kept == known
     plan = json.loads((second / "data" / "data.json").read_text())["plan"]
     assert plan["tokenizer"] == hashlib.sha256(known).hexdigest()
     with pytest.raises(DataError, match="cannot be read"):
-        build_data(tmp_path / "third", Plan(draws=100, base=tmp_path / "nothing"), 1, lambda stage, done, of: None)
+        build_data(
+            tmp_path / "third", PipelinePlan(draws=100, base=tmp_path / "nothing"), 1, lambda stage, done, of: None
+        )

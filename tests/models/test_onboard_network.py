@@ -37,7 +37,7 @@ from chauffeur.models.onboard.training import (
     rate_at,
     train,
 )
-from chauffeur.planners.onboard.dialect import Number, Step, read
+from chauffeur.planners.onboard.dialect import DialectStep, Number, read
 from chauffeur.planners.onboard.engine import Engine
 from chauffeur.planners.onboard.hot import HotPlanner
 from chauffeur.planners.onboard.language_model import LanguageModelPlanner
@@ -50,11 +50,11 @@ from chauffeur.worlds.highway.scenarios import BUILT_IN
 torch.set_num_threads(1)  # two threads that wait for each other on a crowded machine take ten times as long
 
 WISHES = [
-    ("take the left lane", Step("lane_left")),
-    ("take the right lane", Step("lane_right")),
-    ("go faster", Step("faster")),
-    ("go slower", Step("slower")),
-    *((f"drive at {n} mph", Step("drive_at", Number(float(n), "mph"))) for n in (30, 45, 60)),
+    ("take the left lane", DialectStep("lane_left")),
+    ("take the right lane", DialectStep("lane_right")),
+    ("go faster", DialectStep("faster")),
+    ("go slower", DialectStep("slower")),
+    *((f"drive at {n} mph", DialectStep("drive_at", Number(float(n), "mph"))) for n in (30, 45, 60)),
 ]
 
 
@@ -227,7 +227,7 @@ def test_a_checkpoint_loads_in_transformers_and_answers_chats(model: Any, tokeni
     ids = words(text, return_tensors="pt", add_special_tokens=False).input_ids
     out = loaded.generate(ids, max_new_tokens=40, do_sample=False)
     reply = words.decode(out[0, ids.shape[1] :], skip_special_tokens=True)
-    assert read_reply(reply).steps == (Step("lane_left"),)
+    assert read_reply(reply).steps == (DialectStep("lane_left"),)
     model.float()
 
 
@@ -235,7 +235,7 @@ def test_it_writes_programs_and_says_how_sure_it_was(exported: Path) -> None:
     engine = Engine(exported)
     pieces: list[str] = []
     written = engine.write(prompt(None, (), "take the right lane"), told=pieces.append)
-    assert read_reply(written.text).steps == (Step("lane_right"),)
+    assert read_reply(written.text).steps == (DialectStep("lane_right"),)
     assert "".join(pieces) == written.text
     assert written.sure > 0.5
     assert written.asked <= written.tokens
@@ -281,7 +281,9 @@ def test_it_may_be_held_to_the_numbers_that_were_said(exported: Path) -> None:
     for measures in (("17",), ("17", "2.5")):
         steps = read_reply(engine.write(text, only_program=True, measures=measures).text).steps
         assert {f"{number.value:g}" for step in steps for number in step.numbers} <= set(measures)
-    assert read_reply(engine.write(text, only_program=True).text).steps == (Step("drive_at", Number(45.0, "mph")),)
+    assert read_reply(engine.write(text, only_program=True).text).steps == (
+        DialectStep("drive_at", Number(45.0, "mph")),
+    )
 
 
 def test_only_words_of_wishes_are_blanked_and_never_numbers(tokenizer: Any, data: Packed) -> None:

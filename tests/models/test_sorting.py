@@ -23,12 +23,12 @@ from chauffeur.models.sorting import pipeline
 from chauffeur.models.sorting import sentences as tables
 from chauffeur.models.sorting.sentences import Sentence, kinds_of, sentences
 from chauffeur.models.sorting.tables import WRITER, drawn
-from chauffeur.models.sorting.training import Recipe, by_writer, right, train, write
+from chauffeur.models.sorting.training import SortingRecipe, by_writer, right, train, write
 from chauffeur.models.sorting.weather import TEST_WRITERS, weather_sentences
 from chauffeur.planners.talk2drive import hints
 
 KINDS = ("fast", "slow")
-SHORT = Recipe(epochs=8)
+SHORT = SortingRecipe(epochs=8)
 
 
 def said(text: str, kind: str, writer: str = "a") -> Sentence:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import pytest
 
 from chauffeur.planners.onboard.copying import named, taken_over, unnamed
-from chauffeur.planners.onboard.dialect import Condition, Number, Step
+from chauffeur.planners.onboard.dialect import Condition, DialectStep, Number
 
 
-def speed(value: float, unit: str = "kmh") -> Step:
-    return Step("drive_at", Number(value, unit))
+def speed(value: float, unit: str = "kmh") -> DialectStep:
+    return DialectStep("drive_at", Number(value, unit))
 
 
-def gap(value: float, unit: str = "") -> Step:
-    return Step("gap_of", Number(value, unit))
+def gap(value: float, unit: str = "") -> DialectStep:
+    return DialectStep("gap_of", Number(value, unit))
 
 
 TWO = "drive at ninety-five kilometers an hour and then keep 65 feet"
@@ -31,13 +31,18 @@ TWO = "drive at ninety-five kilometers an hour and then keep 65 feet"
         ("keep 65 feet", (), [gap(65)], Number(65)),
         ("keep 65 feet", (), [gap(19.8)], None),
         ("as last time", ("gap_of(40)",), [gap(40)], None),
-        ("a bit less than last time", ("gap_of(40)",), [Step("gap_of", Number(40, "", 0.85))], None),
-        ("in 20 seconds drive at 60 mph", (), [Step("drive_at", Number(60, "mph"), wait_s=Number(60))], Number(60)),
-        ("twice as fast", (), [Step("speed_times", Number(7.0))], None),
+        ("a bit less than last time", ("gap_of(40)",), [DialectStep("gap_of", Number(40, "", 0.85))], None),
+        (
+            "in 20 seconds drive at 60 mph",
+            (),
+            [DialectStep("drive_at", Number(60, "mph"), wait_s=Number(60))],
+            Number(60),
+        ),
+        ("twice as fast", (), [DialectStep("speed_times", Number(7.0))], None),
     ],
 )
 def test_a_number_must_be_one_that_was_said_as_that_kind(
-    wish: str, history: tuple[str, ...], steps: list[Step], strange: Number | None
+    wish: str, history: tuple[str, ...], steps: list[DialectStep], strange: Number | None
 ) -> None:
     assert unnamed(wish, history, steps) == strange
 
@@ -51,17 +56,19 @@ def test_a_number_must_be_one_that_was_said_as_that_kind(
         ("drive at 30.3 m/s", [speed(33, "mph")], [speed(30.3, "")]),
         (
             "in 20 seconds drive at 60 mph",
-            [Step("drive_at", Number(60, "mph"), wait_s=Number(2))],
-            [Step("drive_at", Number(60, "mph"), wait_s=Number(20))],
+            [DialectStep("drive_at", Number(60, "mph"), wait_s=Number(2))],
+            [DialectStep("drive_at", Number(60, "mph"), wait_s=Number(20))],
         ),
         (
             "once the car ahead is slower than 40 mph keep 30 m",
-            [Step("gap_of", Number(30), condition=Condition("once", "lead_slower_than", Number(14, "mph")))],
-            [Step("gap_of", Number(30), condition=Condition("once", "lead_slower_than", Number(40, "mph")))],
+            [DialectStep("gap_of", Number(30), condition=Condition("once", "lead_slower_than", Number(14, "mph")))],
+            [DialectStep("gap_of", Number(30), condition=Condition("once", "lead_slower_than", Number(40, "mph")))],
         ),
     ],
 )
-def test_a_wrong_number_becomes_the_only_one_said_that_is_left(wish: str, steps: list[Step], right: list[Step]) -> None:
+def test_a_wrong_number_becomes_the_only_one_said_that_is_left(
+    wish: str, steps: list[DialectStep], right: list[DialectStep]
+) -> None:
     assert list(taken_over(wish, (), steps)) == right
 
 
@@ -76,7 +83,7 @@ def test_a_wrong_number_becomes_the_only_one_said_that_is_left(wish: str, steps:
         ("60 km/h here, 60 km/h there", [speed(90), speed(60)]),  # what was said stands there already
     ],
 )
-def test_where_it_is_not_plain_nothing_is_changed(wish: str, steps: list[Step]) -> None:
+def test_where_it_is_not_plain_nothing_is_changed(wish: str, steps: list[DialectStep]) -> None:
     assert list(taken_over(wish, (), steps)) == steps
 
 

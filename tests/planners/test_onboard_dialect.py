@@ -14,8 +14,8 @@ from chauffeur.planners.onboard.dialect import (
     SKILLS,
     UNITS,
     Condition,
+    DialectStep,
     Number,
-    Step,
     read,
     tell,
     write,
@@ -39,7 +39,7 @@ def numbers(kind: str) -> st.SearchStrategy[Number]:
 
 
 @st.composite
-def steps(draw: st.DrawFn) -> Step:
+def steps(draw: st.DrawFn) -> DialectStep:
     skill = SKILLS[draw(st.sampled_from(sorted(SKILLS)))]
     number = None if skill.takes is None else draw(numbers(skill.takes))
     condition = None
@@ -50,11 +50,11 @@ def steps(draw: st.DrawFn) -> Step:
             draw(st.sampled_from(["if", "once"])), name, None if kind is None else draw(numbers(kind))
         )
     wait = draw(st.none() | numbers("time"))
-    return Step(skill.name, number, draw(st.sampled_from(["", *MANNERS])), wait, condition)
+    return DialectStep(skill.name, number, draw(st.sampled_from(["", *MANNERS])), wait, condition)
 
 
 @given(st.lists(steps(), min_size=1, max_size=MAX_STEPS))
-def test_what_is_written_is_read_back(some: list[Step]) -> None:
+def test_what_is_written_is_read_back(some: list[DialectStep]) -> None:
     source = write(some)
     assert read(source) == tuple(some)
     assert read_reply(program_reply(some)).steps == tuple(some)
@@ -105,7 +105,7 @@ def test_replies_are_programs_questions_or_refusals() -> None:
 @pytest.mark.parametrize("skill", sorted(SKILLS))
 def test_every_skill_links_to_a_program_that_passes_the_gate(skill: str, situation: Situation) -> None:
     value = {"speed": 20.0, "distance": 30.0, "time": 2.0, "factor": 0.8, "lanes": 1.0, None: 0.0}[SKILLS[skill].takes]
-    step = Step(skill, None if SKILLS[skill].takes is None else Number(value), "gently")
+    step = DialectStep(skill, None if SKILLS[skill].takes is None else Number(value), "gently")
     linked = link([step], situation, LAMPILOT_LIMITS, lambda _: Leaning())
     if isinstance(linked, Declined):
         assert linked.words
@@ -114,14 +114,16 @@ def test_every_skill_links_to_a_program_that_passes_the_gate(skill: str, situati
     assert report.passed, report.for_model()
 
 
-def linked(*some: Step) -> Linked:
+def linked(*some: DialectStep) -> Linked:
     found = link(some, HIGHWAY, LAMPILOT_LIMITS, lambda _: Leaning())
     assert isinstance(found, Linked)
     return found
 
 
 def test_conditions_waits_and_units_are_in_the_library() -> None:
-    step = Step("overtake_left", None, "", Number(10.0), Condition("once", "lead_closer_than", Number(100.0, "feet")))
+    step = DialectStep(
+        "overtake_left", None, "", Number(10.0), Condition("once", "lead_closer_than", Number(100.0, "feet"))
+    )
     library = linked(step).library
     for name in ("def overtake_left(", "def wait(", "def lead_closer_than(", "def feet("):
         assert name in library
@@ -129,7 +131,7 @@ def test_conditions_waits_and_units_are_in_the_library() -> None:
 
 
 def test_one_skill_twice_is_told_apart_by_its_number() -> None:
-    first, second = Step("drive_at", Number(20.0)), Step("drive_at", Number(60.0, "mph"))
+    first, second = DialectStep("drive_at", Number(20.0)), DialectStep("drive_at", Number(60.0, "mph"))
     library = linked(first, second).library
     assert "def drive_at_1():" in library
     assert "def drive_at_2():" in library
@@ -137,7 +139,7 @@ def test_one_skill_twice_is_told_apart_by_its_number() -> None:
 
 
 def test_what_the_road_does_not_allow_is_declined_in_words() -> None:
-    found = link([Step("turn_left")], HIGHWAY, LAMPILOT_LIMITS, lambda _: Leaning())
+    found = link([DialectStep("turn_left")], HIGHWAY, LAMPILOT_LIMITS, lambda _: Leaning())
     assert isinstance(found, Declined)
     assert "junction" in found.words
 
@@ -145,23 +147,25 @@ def test_what_the_road_does_not_allow_is_declined_in_words() -> None:
 @pytest.mark.parametrize(
     ("wish", "step", "trusted"),
     [
-        ("slow down to 45 mph", Step("drive_at", Number(45.0, "mph")), True),
-        ("slow down to forty five miles an hour", Step("drive_at", Number(45.0, "mph")), True),
-        ("slow down to 45 mph", Step("drive_at", Number(54.0, "mph")), False),
-        ("take the left lane", Step("lane_left"), True),
-        ("take the left lane", Step("lane_right"), False),
-        ("please go faster", Step("faster"), True),
-        ("please go faster", Step("slower"), False),
-        ("half our speed", Step("speed_times", Number(0.5)), True),
-        ("You rush about, and we have all the time in the world.", Step("relax"), True),  # a mood against a mood
-        ("hurry up", Step("relax"), False),
-        ("Faster, I feel sick.", Step("relax"), False),  # what is asked for outright stands
-        ("This is too fast.", Step("hurry"), False),
+        ("slow down to 45 mph", DialectStep("drive_at", Number(45.0, "mph")), True),
+        ("slow down to forty five miles an hour", DialectStep("drive_at", Number(45.0, "mph")), True),
+        ("slow down to 45 mph", DialectStep("drive_at", Number(54.0, "mph")), False),
+        ("take the left lane", DialectStep("lane_left"), True),
+        ("take the left lane", DialectStep("lane_right"), False),
+        ("please go faster", DialectStep("faster"), True),
+        ("please go faster", DialectStep("slower"), False),
+        ("half our speed", DialectStep("speed_times", Number(0.5)), True),
+        ("You rush about, and we have all the time in the world.", DialectStep("relax"), True),  # a mood against a mood
+        ("hurry up", DialectStep("relax"), False),
+        ("Faster, I feel sick.", DialectStep("relax"), False),  # what is asked for outright stands
+        ("This is too fast.", DialectStep("hurry"), False),
     ],
 )
-def test_the_guard_asks_where_words_and_program_differ(wish: str, step: Step, trusted: bool) -> None:
+def test_the_guard_asks_where_words_and_program_differ(wish: str, step: DialectStep, trusted: bool) -> None:
     assert (doubt(wish, (), [step]) == "") == trusted
 
 
 def test_numbers_of_the_history_are_known() -> None:
-    assert doubt("a bit less than last time", ["gap_of(30): good"], [Step("gap_of", Number(30.0, "", 0.85))]) == ""
+    assert (
+        doubt("a bit less than last time", ["gap_of(30): good"], [DialectStep("gap_of", Number(30.0, "", 0.85))]) == ""
+    )

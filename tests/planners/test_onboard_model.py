@@ -20,7 +20,7 @@ from chauffeur.concept import (
     SystemMessage,
 )
 from chauffeur.concept.nouns import Lead
-from chauffeur.planners.onboard.dialect import Step, read
+from chauffeur.planners.onboard.dialect import DialectStep, read
 from chauffeur.planners.onboard.language_model import SHIPPED, LanguageModelPlanner
 from chauffeur.planners.registry import make_planner
 
@@ -42,7 +42,7 @@ def planned(
     return asyncio.run(planner.plan(request))
 
 
-def steps(plan: Plan) -> tuple[Step, ...]:
+def steps(plan: Plan) -> tuple[DialectStep, ...]:
     assert isinstance(plan.policy, Program), plan.refusal
     return read(plan.policy.source)
 

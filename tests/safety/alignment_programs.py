@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from chauffeur.safety.alignment import Facts, Surroundings, read_facts
+from chauffeur.safety.alignment import Facts, FactSurroundings, read_facts
 
-HIGHWAY = Surroundings(speed_mps=25.0, limit_mps=31.0, gap_m=40.0, other_mps=22.0)
+HIGHWAY = FactSurroundings(speed_mps=25.0, limit_mps=31.0, gap_m=40.0, other_mps=22.0)
 
 
 def facts(body: str, before: str = "", library: str = "") -> Facts:

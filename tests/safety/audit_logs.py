@@ -12,7 +12,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from chauffeur.safety.audit import AuditLog, Closing, Verification, verify_stream
+from chauffeur.safety.audit import AuditLog, AuditVerification, Closing, verify_stream
 
 KEY = b"a key of thirty-two bytes, quite"
 OTHER_KEY = b"another key of thirty-two bytes!"
@@ -75,7 +75,7 @@ def far_east() -> Generator[None]:
         time.tzset()
 
 
-def look(content: bytes, *, head: str | None = None, key: bytes | None = None) -> Verification:
+def look(content: bytes, *, head: str | None = None, key: bytes | None = None) -> AuditVerification:
     """Verify a log's bytes."""
     return verify_stream(BytesIO(content), "the log", head=head, key=key)
 

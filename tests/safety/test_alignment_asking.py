@@ -6,52 +6,55 @@ import pytest
 
 from chauffeur.programs import APIS
 from chauffeur.safety.alignment.asking import answer
-from chauffeur.safety.alignment.values import NOTHING, Base, Lane, Term, Value
+from chauffeur.safety.alignment.values import NOTHING, Base, LaneValue, Term, TracedValue
 
 HERE = frozenset({0, 1})
 """The car may have moved one lane to the right since the start."""
-EGO = Value(vehicle="ego")
-FRONT, REAR = Value(vehicle="front", tags=frozenset({"front"})), Value(vehicle="rear", tags=frozenset({"rear"}))
-FAR_LEFT = frozenset({Lane(-2, frozenset({0}))})
-LANE = Value(lanes=FAR_LEFT, tags=frozenset({"told"}))
-FROM_LEFT = Value(crossing="left")
+EGO = TracedValue(vehicle="ego")
+FRONT, REAR = (
+    TracedValue(vehicle="front", tags=frozenset({"front"})),
+    TracedValue(vehicle="rear", tags=frozenset({"rear"})),
+)
+FAR_LEFT = frozenset({LaneValue(-2, frozenset({0}))})
+LANE = TracedValue(lanes=FAR_LEFT, tags=frozenset({"told"}))
+FROM_LEFT = TracedValue(crossing="left")
 
 
-def lane(offset: int) -> frozenset[Lane]:
-    return frozenset({Lane(offset, HERE)})
+def lane(offset: int) -> frozenset[LaneValue]:
+    return frozenset({LaneValue(offset, HERE)})
 
 
-def measured(base: Base, *tags: str) -> Value:
-    return Value(frozenset({Term(base, 1.0, 0.0)}), frozenset(tags))
+def measured(base: Base, *tags: str) -> TracedValue:
+    return TracedValue(frozenset({Term(base, 1.0, 0.0)}), frozenset(tags))
 
 
-def tagged(*tags: str) -> Value:
-    return Value(tags=frozenset(tags))
+def tagged(*tags: str) -> TracedValue:
+    return TracedValue(tags=frozenset(tags))
 
 
 @pytest.mark.parametrize(
     ("name", "asked", "answered"),
     [
         ("get_ego_vehicle", [], EGO),
-        ("get_left_lane", [EGO], Value(lanes=lane(-1))),
-        ("get_right_lane", [EGO], Value(lanes=lane(1))),
-        ("get_left_lane", [], Value(lanes=lane(-1))),
-        ("get_right_lane", [NOTHING], Value(lanes=lane(1))),
+        ("get_left_lane", [EGO], TracedValue(lanes=lane(-1))),
+        ("get_right_lane", [EGO], TracedValue(lanes=lane(1))),
+        ("get_left_lane", [], TracedValue(lanes=lane(-1))),
+        ("get_right_lane", [NOTHING], TracedValue(lanes=lane(1))),
         ("get_left_lane", [FRONT], tagged("front")),
-        ("get_lane_of", [EGO], Value(lanes=lane(0))),
-        ("get_lane_of", [], Value(lanes=lane(0))),
-        ("get_lane_of", [Value(vehicle="front", tags=frozenset({"front"}), lanes=FAR_LEFT)],
-         Value(lanes=FAR_LEFT, tags=frozenset({"front"}))),
-        ("get_left_to_right_cross_traffic_lanes", [], Value(crossing="left")),
-        ("get_right_to_left_cross_traffic_lanes", [], Value(crossing="right")),
+        ("get_lane_of", [EGO], TracedValue(lanes=lane(0))),
+        ("get_lane_of", [], TracedValue(lanes=lane(0))),
+        ("get_lane_of", [TracedValue(vehicle="front", tags=frozenset({"front"}), lanes=FAR_LEFT)],
+         TracedValue(lanes=FAR_LEFT, tags=frozenset({"front"}))),
+        ("get_left_to_right_cross_traffic_lanes", [], TracedValue(crossing="left")),
+        ("get_right_to_left_cross_traffic_lanes", [], TracedValue(crossing="right")),
         ("is_safe_enter", [LANE], tagged("safe:-2")),
-        ("is_safe_enter", [Value(lanes=lane(1) | lane(-1))], tagged("safe:1", "safe:-1")),
+        ("is_safe_enter", [TracedValue(lanes=lane(1) | lane(-1))], tagged("safe:1", "safe:-1")),
         ("is_safe_enter", [FROM_LEFT], tagged("safe:cross", "safe:cross:left")),
         ("is_safe_enter", [], tagged("safe:?")),
-        ("detect_front_vehicle_in", [LANE], Value(lanes=FAR_LEFT, vehicle="front", tags=frozenset({"front"}))),
-        ("detect_rear_vehicle_in", [LANE], Value(lanes=FAR_LEFT, vehicle="rear", tags=frozenset({"rear"}))),
-        ("detect_front_vehicle_in", [], Value(lanes=lane(0), vehicle="front", tags=frozenset({"front"}))),
-        ("detect_rear_vehicle_in", [FROM_LEFT], Value(vehicle="rear", tags=frozenset({"rear"}))),
+        ("detect_front_vehicle_in", [LANE], TracedValue(lanes=FAR_LEFT, vehicle="front", tags=frozenset({"front"}))),
+        ("detect_rear_vehicle_in", [LANE], TracedValue(lanes=FAR_LEFT, vehicle="rear", tags=frozenset({"rear"}))),
+        ("detect_front_vehicle_in", [], TracedValue(lanes=lane(0), vehicle="front", tags=frozenset({"front"}))),
+        ("detect_rear_vehicle_in", [FROM_LEFT], TracedValue(vehicle="rear", tags=frozenset({"rear"}))),
         ("get_speed_of", [EGO], measured("ego", "speed")),
         ("get_speed_of", [FRONT], measured("other", "other speed")),
         ("get_speed_of", [], measured("other", "other speed")),
@@ -71,7 +74,7 @@ def tagged(*tags: str) -> Value:
         ("get_something_else", [EGO], NOTHING),
     ],
 )  # fmt: skip
-def test_what_an_api_answers(name: str, asked: list[Value], answered: Value) -> None:
+def test_what_an_api_answers(name: str, asked: list[TracedValue], answered: TracedValue) -> None:
     assert answer(name, asked, HERE) == answered
 
 

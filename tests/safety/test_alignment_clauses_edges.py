@@ -7,10 +7,10 @@ from alignment_programs import HIGHWAY
 
 from chauffeur.language.quantities import Quantity
 from chauffeur.safety.alignment import judge, read_facts
-from chauffeur.safety.alignment.clauses import Clause, clauses_of
+from chauffeur.safety.alignment.clauses import ExplainedClause, clauses_of
 
 
-def short(clause: Clause) -> str:
+def short(clause: ExplainedClause) -> str:
     """What it begins with, if anything, its kind, whether it is denied, and its words."""
     opener = f"{clause.opener} / " if clause.opener else ""
     return f"{opener}{clause.mood}{' not' if clause.negated else ''}: {' '.join(clause.words)}"
@@ -21,11 +21,11 @@ def test_a_clause_knows_its_sentence_and_the_quantities_there() -> None:
     one, two = Quantity(30.0, "time", "30 seconds"), Quantity(20.0, "speed", "20 m/s")
     first = "We wait half a minute, and drive 20 m/s."
     assert clauses_of(text) == (
-        Clause(first, 0, ("we", "wait", "#0"), (one, two), "plan", ""),
-        Clause(first, 0, ("drive", "#1"), (one, two), "plan", "and"),
-        Clause("We stop!", 1, ("we", "stop"), (), "plan", ""),
-        Clause("Wait a minute", 2, ("wait", "#0"), (Quantity(60.0, "time", "60 seconds"),), "wish", ""),
-        Clause("Then go (once).", 3, ("go",), (), "plan", "then"),
+        ExplainedClause(first, 0, ("we", "wait", "#0"), (one, two), "plan", ""),
+        ExplainedClause(first, 0, ("drive", "#1"), (one, two), "plan", "and"),
+        ExplainedClause("We stop!", 1, ("we", "stop"), (), "plan", ""),
+        ExplainedClause("Wait a minute", 2, ("wait", "#0"), (Quantity(60.0, "time", "60 seconds"),), "wish", ""),
+        ExplainedClause("Then go (once).", 3, ("go",), (), "plan", "then"),
     )
 
 

@@ -12,8 +12,8 @@ from chauffeur.concept import Lead, Limits, Observation, Parameters, Plan, Progr
 from chauffeur.safety.alignment import (
     Alignment,
     Effect,
+    FactSurroundings,
     Mismatch,
-    Surroundings,
     check_alignment,
     check_driven,
     judge,
@@ -25,7 +25,7 @@ from chauffeur.safety.alignment import (
 from chauffeur.safety.alignment import wording as words
 from chauffeur.safety.alignment.claims import claims_of
 
-CROSSING = Surroundings(speed_mps=10.0, limit_mps=10.0, sign_m=50.0, crossing=True)
+CROSSING = FactSurroundings(speed_mps=10.0, limit_mps=10.0, sign_m=50.0, crossing=True)
 
 
 def program(*lines: str) -> str:
@@ -53,7 +53,7 @@ TURN_LEFT = program("turn_left_at_next_intersection()")
 IDLE = program()
 
 
-def found(text: str, source: str, where: Surroundings = HIGHWAY) -> dict[str, str]:
+def found(text: str, source: str, where: FactSurroundings = HIGHWAY) -> dict[str, str]:
     """Kinds of mismatches, each with what is so instead."""
     return {one.kind: one.instead for one in judge(text, read_facts(source), where).mismatches}
 
@@ -418,9 +418,9 @@ def test_words_and_phrases_are_listed_in_plain_text() -> None:
 def test_the_surroundings_are_those_of_the_observation(snap: Callable[..., Observation]) -> None:
     lead = Lead(7, 40.0, 22.0)
     there = replace(snap(speed=25.0, limits=(20.0, 31.0, 33.0), front=lead), stop_sign_m=50.0)
-    assert Surroundings.of(there) == Surroundings(25.0, 31.0, 40.0, 22.0, 50.0, False)
+    assert FactSurroundings.of(there) == FactSurroundings(25.0, 31.0, 40.0, 22.0, 50.0, False)
     bare = snap(speed=10.0, index=None, kind="intersection")
-    assert Surroundings.of(bare) == Surroundings(10.0, None, None, None, None, True)
+    assert FactSurroundings.of(bare) == FactSurroundings(10.0, None, None, None, None, True)
 
 
 def test_events_are_given_with_their_places() -> None:

@@ -36,9 +36,9 @@ from chauffeur.safety.alignment import (
     KINDS,
     Alignment,
     Effect,
+    FactSurroundings,
     Kind,
     Mismatch,
-    Surroundings,
     check_alignment,
     check_driven,
     judge,
@@ -51,7 +51,7 @@ from chauffeur.safety.checks import run_checks
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
-CROSSING = Surroundings(speed_mps=10.0, limit_mps=10.0, sign_m=50.0, crossing=True)
+CROSSING = FactSurroundings(speed_mps=10.0, limit_mps=10.0, sign_m=50.0, crossing=True)
 
 LEFT = """def drive():
     ego = get_ego_vehicle()
@@ -91,7 +91,7 @@ TURN = """def drive():
 """
 
 
-def kinds(text: str, program: str, where: Surroundings = HIGHWAY) -> set[str]:
+def kinds(text: str, program: str, where: FactSurroundings = HIGHWAY) -> set[str]:
     return {one.kind for one in judge(text, read_facts(program), where).mismatches}
 
 
@@ -108,8 +108,8 @@ def kinds(text: str, program: str, where: Surroundings = HIGHWAY) -> set[str]:
         ("I accelerate to 108 km/h, about 67 mph.", SPEED, HIGHWAY, None),
         ("I accelerate to 30 mph.", SPEED, HIGHWAY, "wrong-number"),
         ("I slow down.", SPEED, HIGHWAY, "wrong-sign"),
-        ("I speed up.", SPEED, Surroundings(speed_mps=35.0), "wrong-sign"),
-        ("I speed up.", SPEED, Surroundings(), None),
+        ("I speed up.", SPEED, FactSurroundings(speed_mps=35.0), "wrong-sign"),
+        ("I speed up.", SPEED, FactSurroundings(), None),
         ("I slow down to 20 m/s and then move to the right lane.", SLOW_THEN_RIGHT, HIGHWAY, None),
         ("First I move to the right lane. Then I slow down to 20 m/s.", SLOW_THEN_RIGHT, HIGHWAY, "wrong-order"),
         ("I overtake on the left.", IDLE, HIGHWAY, "not-done"),
@@ -117,7 +117,7 @@ def kinds(text: str, program: str, where: Surroundings = HIGHWAY) -> set[str]:
         ("We stop, let the crossing traffic pass, and turn right.", TURN, CROSSING, "wrong-side"),
     ],
 )
-def test_each_kind_of_mismatch(text: str, program: str, where: Surroundings, kind: str | None) -> None:
+def test_each_kind_of_mismatch(text: str, program: str, where: FactSurroundings, kind: str | None) -> None:
     assert kinds(text, program, where) == (set() if kind is None else {kind})
 
 

@@ -7,12 +7,12 @@ from alignment_programs import HIGHWAY
 
 from chauffeur.concept.units import M_PER_CAR_LENGTH
 from chauffeur.language.quantities import Quantity
-from chauffeur.safety.alignment import Facts, Surroundings, judge, read_facts
-from chauffeur.safety.alignment.facts import Deed, Event, Mark
+from chauffeur.safety.alignment import Facts, FactSurroundings, judge, read_facts
+from chauffeur.safety.alignment.facts import Deed, Event, FactMark
 from chauffeur.safety.alignment.numbers import Numbers
 from chauffeur.safety.alignment.values import Base, Term
 
-NOWHERE = Surroundings()
+NOWHERE = FactSurroundings()
 
 
 def plain(value: float, *, bound: bool = False) -> Term:
@@ -31,13 +31,13 @@ def speed(*terms: Term, unsure: bool = False) -> Event:
     return event("speed", *terms, unsure=unsure)
 
 
-def mark(base: Base, value: float, *, compared: bool = True) -> Mark:
-    return Mark(base, value, 4, compared)
+def mark(base: Base, value: float, *, compared: bool = True) -> FactMark:
+    return FactMark(base, value, 4, compared)
 
 
-def numbers(*found: Event | Mark, where: Surroundings = HIGHWAY, literals: tuple[float, ...] = ()) -> Numbers:
+def numbers(*found: Event | FactMark, where: FactSurroundings = HIGHWAY, literals: tuple[float, ...] = ()) -> Numbers:
     events = tuple(one for one in found if isinstance(one, Event))
-    marks = tuple(one for one in found if isinstance(one, Mark))
+    marks = tuple(one for one in found if isinstance(one, FactMark))
     return Numbers(Facts(events, marks, literals=frozenset(literals)), where)
 
 
@@ -112,7 +112,7 @@ def test_a_share_of_an_unknown_speed_is_more_or_less_all_the_same(factor: float,
         ([mark("gap", 39.0)], HIGHWAY, {-1}),
     ],
 )
-def test_which_way_the_gap_goes(found: list[Event | Mark], where: Surroundings, signs: set[int]) -> None:
+def test_which_way_the_gap_goes(found: list[Event | FactMark], where: FactSurroundings, signs: set[int]) -> None:
     assert numbers(*found, where=where).gap_signs() == signs
 
 
@@ -145,7 +145,7 @@ def test_which_way_the_gap_goes(found: list[Event | Mark], where: Surroundings, 
     ],
 )
 def test_speeds_that_a_text_may_say(
-    found: list[Event | Mark], where: Surroundings, said: float, loosely: bool, exactly: bool
+    found: list[Event | FactMark], where: FactSurroundings, said: float, loosely: bool, exactly: bool
 ) -> None:
     known = numbers(*found, where=where)
     assert known.supports(mps(said)) is loosely
@@ -190,7 +190,9 @@ STEERS = event("gap", plain(25.0))
         ([event("headway", plain(2.0))], HIGHWAY, 50.0 - M_PER_CAR_LENGTH, False),
     ],
 )
-def test_distances_that_a_text_may_say(found: list[Event | Mark], where: Surroundings, said: float, held: bool) -> None:
+def test_distances_that_a_text_may_say(
+    found: list[Event | FactMark], where: FactSurroundings, said: float, held: bool
+) -> None:
     assert numbers(*found, where=where).supports(metres(said)) is held
 
 
@@ -208,7 +210,7 @@ def test_distances_that_a_text_may_say(found: list[Event | Mark], where: Surroun
         ([speed(plain(20.0))], HIGHWAY, 0.8, False),
     ],
 )
-def test_times_that_a_text_may_say(found: list[Event], where: Surroundings, said: float, held: bool) -> None:
+def test_times_that_a_text_may_say(found: list[Event], where: FactSurroundings, said: float, held: bool) -> None:
     assert numbers(*found, where=where).supports(seconds(said)) is held
 
 
@@ -244,7 +246,7 @@ def test_shares_that_a_text_may_say(factors: tuple[float, ...], said: float, hel
         (count("other", 1.0, 3.0), HIGHWAY, 25.0, False),
     ],
 )
-def test_whether_a_speed_is_the_one_that_is_told(term: Term, where: Surroundings, said: float, held: bool) -> None:
+def test_whether_a_speed_is_the_one_that_is_told(term: Term, where: FactSurroundings, said: float, held: bool) -> None:
     known = numbers(where=where)
     assert known.matches(term, mps(said)) is held
     assert known.matches(term, metres(said)) is False
@@ -304,7 +306,7 @@ def test_all_speeds_by_the_limit_are_told_where_none_is_as_said() -> None:
         ([event("headway", plain(2.5), plain(2.0))], "time", "2 s and 2.5 s"),
     ],
 )
-def test_a_programs_numbers_in_words(found: list[Event | Mark], kind: str, words: str) -> None:
+def test_a_programs_numbers_in_words(found: list[Event | FactMark], kind: str, words: str) -> None:
     assert numbers(*found).told(kind) == words
 
 

@@ -7,7 +7,7 @@ from alignment_programs import HIGHWAY, facts
 
 from chauffeur.language.quantities import Quantity
 from chauffeur.programs import APIS
-from chauffeur.safety.alignment import Surroundings, read_facts
+from chauffeur.safety.alignment import FactSurroundings, read_facts
 from chauffeur.safety.alignment.claims import claims_of
 from chauffeur.safety.alignment.facts import Event
 from chauffeur.safety.alignment.numbers import Numbers
@@ -300,10 +300,10 @@ def test_a_lane_that_only_the_name_is_known_of() -> None:
     assert events(f"{GAP}say(gap - get_speed_limit())", "gap") == []
 
 
-NOWHERE = Surroundings()
+NOWHERE = FactSurroundings()
 
 
-def numbers(body: str, where: Surroundings = HIGHWAY) -> Numbers:
+def numbers(body: str, where: FactSurroundings = HIGHWAY) -> Numbers:
     return Numbers(facts(GAP + body), where)
 
 
@@ -325,7 +325,7 @@ def numbers(body: str, where: Surroundings = HIGHWAY) -> Numbers:
         ("x = 1", HIGHWAY, set()),
     ],
 )
-def test_which_way_a_speed_changes(body: str, where: Surroundings, signs: set[int]) -> None:
+def test_which_way_a_speed_changes(body: str, where: FactSurroundings, signs: set[int]) -> None:
     assert numbers(body, where).signs() == signs
 
 
@@ -349,7 +349,7 @@ def test_which_way_a_speed_changes(body: str, where: Surroundings, signs: set[in
         ("x = 1", HIGHWAY, set()),
     ],
 )
-def test_which_way_a_gap_changes(body: str, where: Surroundings, signs: set[int]) -> None:
+def test_which_way_a_gap_changes(body: str, where: FactSurroundings, signs: set[int]) -> None:
     assert numbers(body, where).gap_signs() == signs
 
 
@@ -363,7 +363,7 @@ def test_which_way_a_gap_changes(body: str, where: Surroundings, signs: set[int]
         ("say(gap < 30)", HIGHWAY, Quantity(34.0, "distance", "34 m"), False),
         ("x = 1", HIGHWAY, Quantity(40.0, "distance", "40 m"), True),
         ("x = 1", NOWHERE, Quantity(40.0, "distance", "40 m"), False),
-        ("x = 1", Surroundings(sign_m=50.0), Quantity(50.0, "distance", "50 m"), True),
+        ("x = 1", FactSurroundings(sign_m=50.0), Quantity(50.0, "distance", "50 m"), True),
         ("set_target_speed(20 + 0.5 * (gap - 25))", HIGHWAY, Quantity(25.0, "distance", "25 m"), True),
         ("set_target_speed(20 + 0.5 * (gap - 25))", HIGHWAY, Quantity(15.0, "distance", "15 m"), True),
         ("set_target_speed(20 + 0.5 * (gap - 25))", NOWHERE, Quantity(15.0, "distance", "15 m"), False),
@@ -383,7 +383,7 @@ def test_which_way_a_gap_changes(body: str, where: Surroundings, signs: set[int]
         ("x = 1", HIGHWAY, Quantity(7.0, "other", "7 cars"), True),
     ],
 )
-def test_numbers_of_a_text_that_a_program_has(body: str, where: Surroundings, said: Quantity, held: bool) -> None:
+def test_numbers_of_a_text_that_a_program_has(body: str, where: FactSurroundings, said: Quantity, held: bool) -> None:
     assert numbers(body, where).supports(said, exact=False) is held
 
 

@@ -10,9 +10,9 @@ import pytest
 from chauffeur.safety.alignment.values import (
     MAX_TERMS,
     NOTHING,
-    Lane,
+    LaneValue,
     Term,
-    Value,
+    TracedValue,
     bounded,
     combined,
     either,
@@ -24,11 +24,11 @@ from chauffeur.safety.alignment.values import (
 )
 
 FIRST, SECOND, THIRD = ast.Pass(), ast.Pass(), ast.Pass()
-LEFT, OWN = Lane(-1, frozenset({0})), Lane(0, frozenset({0}))
+LEFT, OWN = LaneValue(-1, frozenset({0})), LaneValue(0, frozenset({0}))
 
 
-def value(*terms: Term) -> Value:
-    return Value(frozenset(terms))
+def value(*terms: Term) -> TracedValue:
+    return TracedValue(frozenset(terms))
 
 
 def plain(offset: float, *, bound: bool = False) -> Term:
@@ -36,15 +36,15 @@ def plain(offset: float, *, bound: bool = False) -> Term:
 
 
 def test_a_plain_number_counts_from_nothing() -> None:
-    assert number(20.0) == Value(frozenset({Term("", 0.0, 20.0, bound=False)}))
-    assert number(0.0) == Value(frozenset({Term("", 0.0, 0.0, bound=False)}))
+    assert number(20.0) == TracedValue(frozenset({Term("", 0.0, 20.0, bound=False)}))
+    assert number(0.0) == TracedValue(frozenset({Term("", 0.0, 0.0, bound=False)}))
     for endless in (math.inf, -math.inf, math.nan):
         assert number(endless) == NOTHING
 
 
 def test_what_the_car_is_asked_for_counts_from_it() -> None:
-    assert of("gap", "gap", "front") == Value(frozenset({Term("gap", 1.0, 0.0)}), frozenset({"gap", "front"}))
-    assert of("ego") == Value(frozenset({Term("ego", 1.0, 0.0)}), frozenset())
+    assert of("gap", "gap", "front") == TracedValue(frozenset({Term("gap", 1.0, 0.0)}), frozenset({"gap", "front"}))
+    assert of("ego") == TracedValue(frozenset({Term("ego", 1.0, 0.0)}), frozenset())
 
 
 def test_constants_are_plain_numbers_by_size() -> None:
@@ -66,19 +66,19 @@ def test_alternatives_of_a_set_are_told_in_one_order() -> None:
 
 def test_one_of_none_is_not_known_and_one_of_one_is_itself() -> None:
     assert either([]) == NOTHING
-    one = Value(frozenset({plain(1.0)}), frozenset({"gap"}), open=True, crossing="left", vehicle="ego")
+    one = TracedValue(frozenset({plain(1.0)}), frozenset({"gap"}), open=True, crossing="left", vehicle="ego")
     assert either(iter([one])) is one
 
 
 def test_one_of_several_has_what_each_has() -> None:
-    one = Value(
+    one = TracedValue(
         frozenset({plain(1.0)}),
         frozenset({"gap"}),
         frozenset({LEFT}),
         functions=(FIRST, SECOND),
         items=(number(1.0),),
     )
-    other = Value(
+    other = TracedValue(
         frozenset({plain(2.0)}),
         frozenset({"speed"}),
         frozenset({OWN}),
@@ -87,7 +87,7 @@ def test_one_of_several_has_what_each_has() -> None:
         functions=(SECOND, THIRD),
         items=(number(-1.0), number(2.0)),
     )
-    assert either([one, other]) == Value(
+    assert either([one, other]) == TracedValue(
         frozenset({plain(1.0), plain(2.0)}),
         frozenset({"gap", "speed"}),
         frozenset({LEFT, OWN}),
@@ -99,7 +99,7 @@ def test_one_of_several_has_what_each_has() -> None:
 
 
 def test_of_two_vehicles_the_first_is_named() -> None:
-    assert either([NOTHING, Value(vehicle="rear"), Value(vehicle="front")]).vehicle == "rear"
+    assert either([NOTHING, TracedValue(vehicle="rear"), TracedValue(vehicle="front")]).vehicle == "rear"
     assert either([number(1.0), number(2.0)]).vehicle == ""
 
 
@@ -108,14 +108,14 @@ def test_of_two_vehicles_the_first_is_named() -> None:
     [(("", ""), ""), (("left", ""), "left"), (("left", "left"), "left"), (("left", "right"), "both")],
 )
 def test_lanes_that_cross_from_two_sides_cross_from_both(sides: tuple[str, str], both: str) -> None:
-    one, other = (Value(crossing=side) for side in sides)
+    one, other = (TracedValue(crossing=side) for side in sides)
     assert either([one, other]).crossing == both
     assert combined(one, ast.Add(), other).crossing == both
     assert combined(other, ast.Add(), one).crossing == both
 
 
 def test_another_number_is_possible_where_one_alternative_is_not_known() -> None:
-    known, unsure = number(1.0), Value(frozenset({plain(2.0)}), open=True)
+    known, unsure = number(1.0), TracedValue(frozenset({plain(2.0)}), open=True)
     assert either([known, number(2.0)]).open is False
     assert either([known, NOTHING]).open is True
     assert either([known, unsure]).open is True
@@ -149,12 +149,12 @@ OWN_SPEED = of("ego", "speed")
         ([], set[Term]()),
     ],
 )
-def test_a_plain_number_beside_another_is_only_a_bound(members: list[Value], terms: set[Term]) -> None:
+def test_a_plain_number_beside_another_is_only_a_bound(members: list[TracedValue], terms: set[Term]) -> None:
     assert bounded(iter(members)).terms == terms
 
 
 def test_what_a_bound_depends_on_is_kept() -> None:
-    found = bounded([Value(frozenset({plain(3.0)}), frozenset({"gap"})), OWN_SPEED])
+    found = bounded([TracedValue(frozenset({plain(3.0)}), frozenset({"gap"})), OWN_SPEED])
     assert found.tags == {"gap", "speed"}
 
 
@@ -224,7 +224,7 @@ def test_every_alternative_is_calculated_with() -> None:
 
 
 def test_a_result_depends_on_both_sides_and_is_as_sure_as_both() -> None:
-    unsure = Value(frozenset({plain(1.0)}), frozenset({"gap"}), open=True)
+    unsure = TracedValue(frozenset({plain(1.0)}), frozenset({"gap"}), open=True)
     found = combined(unsure, ADD, of("ego", "speed"))
     assert (found.tags, found.open) == (frozenset({"gap", "speed"}), True)
     assert combined(number(2.0), ADD, unsure).open is True
@@ -232,15 +232,15 @@ def test_a_result_depends_on_both_sides_and_is_as_sure_as_both() -> None:
 
 
 def test_only_a_sum_puts_rows_together() -> None:
-    one, other = (Value(items=(number(size),)) for size in (1.0, 2.0))
+    one, other = (TracedValue(items=(number(size),)) for size in (1.0, 2.0))
     assert combined(one, ADD, other).items == (number(1.0), number(2.0))
     for op in (SUB, MULT):
         assert combined(one, op, other).items == ()
 
 
 def test_the_opposite_of_a_number() -> None:
-    before = Value(frozenset({Term("gap", 2.0, 6.0, bound=True), plain(3.0)}), frozenset({"gap"}), open=True)
-    after = Value(frozenset({Term("gap", -2.0, -6.0, bound=True), plain(-3.0)}), frozenset({"gap"}), open=True)
+    before = TracedValue(frozenset({Term("gap", 2.0, 6.0, bound=True), plain(3.0)}), frozenset({"gap"}), open=True)
+    after = TracedValue(frozenset({Term("gap", -2.0, -6.0, bound=True), plain(-3.0)}), frozenset({"gap"}), open=True)
     assert negated(before) == after
 
 

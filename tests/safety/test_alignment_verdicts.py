@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 from alignment_programs import HIGHWAY
 
-from chauffeur.safety.alignment import Alignment, Effect, Surroundings, judge, judge_drive, read_facts
+from chauffeur.safety.alignment import Alignment, Effect, FactSurroundings, judge, judge_drive, read_facts
 
-CROSSING = Surroundings(speed_mps=10.0, limit_mps=10.0, sign_m=50.0, crossing=True)
+CROSSING = FactSurroundings(speed_mps=10.0, limit_mps=10.0, sign_m=50.0, crossing=True)
 
 
 def program(*lines: str) -> str:
@@ -28,7 +28,7 @@ def brief(text: str, found: Alignment) -> list[str]:
     return told
 
 
-def verdicts(text: str, source: str, where: Surroundings = HIGHWAY) -> list[str]:
+def verdicts(text: str, source: str, where: FactSurroundings = HIGHWAY) -> list[str]:
     return brief(text, judge(text, read_facts(source), where))
 
 
@@ -385,7 +385,7 @@ DRIVE_TURNED_RIGHT = replace(STEADY, turned=1)
         ),
     ],
 )
-def test_what_is_told_of_lanes(text: str, source: str, where: Surroundings, told: list[str]) -> None:
+def test_what_is_told_of_lanes(text: str, source: str, where: FactSurroundings, told: list[str]) -> None:
     assert verdicts(text, source, where) == told
 
 
@@ -435,7 +435,7 @@ def test_what_is_told_of_lanes(text: str, source: str, where: Surroundings, told
     ],
 )
 def test_a_wish_counts_only_where_nothing_is_said_of_it(
-    text: str, source: str, where: Surroundings, told: list[str]
+    text: str, source: str, where: FactSurroundings, told: list[str]
 ) -> None:
     assert verdicts(text, source, where) == told
 
@@ -887,7 +887,7 @@ def test_what_is_told_of_gaps_and_times(text: str, source: str, told: list[str])
         ("I go left when the gap is 30 m.", BEHIND, HIGHWAY, ["wrong-number: it has no such number, not 30 m"]),
     ],
 )
-def test_what_is_told_of_conditions(text: str, source: str, where: Surroundings, told: list[str]) -> None:
+def test_what_is_told_of_conditions(text: str, source: str, where: FactSurroundings, told: list[str]) -> None:
     assert verdicts(text, source, where) == told
 
 

@@ -29,8 +29,8 @@ from chauffeur.safety.audit import (
 )
 from chauffeur.safety.audit.entries import (
     NO_RECORD,
+    AuditRecord,
     NotARecordError,
-    Record,
     canonical,
     content_hash,
     is_sealed_with,
@@ -40,7 +40,7 @@ from chauffeur.safety.audit.entries import (
 )
 from chauffeur.safety.audit.heads import Head, read_head
 from chauffeur.safety.audit.keys import key_name
-from chauffeur.safety.audit.reading import Line, lines, opened
+from chauffeur.safety.audit.reading import AuditLine, lines, opened
 from chauffeur.safety.audit.redaction import Redaction
 from chauffeur.safety.audit.texts import TextState, erased, hide, states
 
@@ -138,11 +138,11 @@ def test_why_a_log_cannot_be_read_is_said(monkeypatch: pytest.MonkeyPatch, error
 def test_a_log_comes_line_by_line_and_what_is_too_long_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reading, "MAX_LINE_BYTES", 4)
     assert list(lines(BytesIO(b"abc\n\nabcdefg\nab"))) == [
-        Line(1, b"abc", whole=True),
-        Line(2, b"", whole=True),
-        Line(3, b"abcd", whole=True),  # no record, but nothing that a write was cut off in either
-        Line(4, b"efg", whole=True),
-        Line(5, b"ab", whole=False),
+        AuditLine(1, b"abc", whole=True),
+        AuditLine(2, b"", whole=True),
+        AuditLine(3, b"abcd", whole=True),  # no record, but nothing that a write was cut off in either
+        AuditLine(4, b"efg", whole=True),
+        AuditLine(5, b"ab", whole=False),
     ]
 
 
@@ -466,7 +466,7 @@ def test_a_line_can_be_told_to_the_byte() -> None:
     line, head = seal(3, "00", "wish", "now", {"n": 1}, {"person": {"redacted": True}}, KEY)
     assert head == hashlib.sha256(sealed).hexdigest()
     record = parse(line[:-1])
-    assert record == Record(3, "now", "wish", {"n": 1}, "00", head, {"person": {"redacted": True}}, mac)
+    assert record == AuditRecord(3, "now", "wish", {"n": 1}, "00", head, {"person": {"redacted": True}}, mac)
     assert content_hash(record) == head
     assert is_sealed_with(record, KEY) and not is_sealed_with(record, OTHER_KEY)
     assert content_hash(parse(seal(3, "00", "wish", "now", {"n": 1}, {}, None)[0][:-1])) == digest
@@ -505,7 +505,7 @@ def test_why_a_line_is_no_record_is_said(line: bytes, why: str) -> None:
 
 @pytest.mark.parametrize("seq", [0, (1 << 63) - 1])
 def test_a_bare_record_has_no_texts_and_no_seal(seq: int) -> None:
-    assert parse(canonical(FIELDS | {"seq": seq})) == Record(seq, "t", "wish", {}, "p", "h", {}, "")
+    assert parse(canonical(FIELDS | {"seq": seq})) == AuditRecord(seq, "t", "wish", {}, "p", "h", {}, "")
 
 
 # Personal texts as they are stored ---------------------------------------------------------------------------------
@@ -518,8 +518,8 @@ def hidden(text: str, *, private: bool, key: bytes | None) -> tuple[dict[str, An
     return hide({"wish": text}, private=private, key=key, make_salt=lambda length: SALT[:length])
 
 
-def recorded(references: object, texts: dict[str, dict[str, Any]]) -> Record:
-    return Record(0, WHEN, "wish", {"texts": references}, "", "", texts)
+def recorded(references: object, texts: dict[str, dict[str, Any]]) -> AuditRecord:
+    return AuditRecord(0, WHEN, "wish", {"texts": references}, "", "", texts)
 
 
 WORDS = "Ü\ud800"
@@ -613,7 +613,7 @@ def test_erasing_leaves_no_text_of_a_record() -> None:
 
 
 def test_a_record_without_texts_says_nothing() -> None:
-    record = Record(0, WHEN, "wish", {}, "", "", {})
+    record = AuditRecord(0, WHEN, "wish", {}, "", "", {})
     assert list(states(record)) == [] and words_of(record) == {} and says(record, "wish", "") is None
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from chauffeur.concept import LaneId, Observation, VehicleState
 from chauffeur.geometry import wrap_to_pi
 from chauffeur.safety.shield.everybody import AHEAD, ANYWHERE, BEHIND, Everybody, overlapping, placed
-from chauffeur.safety.shield.frame import CROSSING_RAD, Body, Lens, Scene
+from chauffeur.safety.shield.frame import CROSSING_RAD, ShieldBody, ShieldLens, ShieldScene
 from roads import a_lane, a_road
 
 OWN: LaneId = "a-b:0"
@@ -67,15 +67,15 @@ def test_rows_are_what_plain_formulas_give(
     assert rows == [[i, one[0] - from_m, *one[1:]] for i, one in enumerate(map(plain, (ego, *others)))]
 
 
-def overlaps(other: Body, low: float, high: float, side: float) -> bool:
+def overlaps(other: ShieldBody, low: float, high: float, side: float) -> bool:
     left, right = other.d_m - other.half_width_m - side, other.d_m + other.half_width_m + side
     if abs(other.across_mps) > DRIFT and not other.crosses:
         left, right = (left, right + 4.0) if other.across_mps > 0.0 else (left - 4.0, right)
     return left < high and right > low
 
 
-def looked(ego: VehicleState, *others: VehicleState) -> Scene:
-    scene = Lens().look(observation(ego, *others), OWN)
+def looked(ego: VehicleState, *others: VehicleState) -> ShieldScene:
+    scene = ShieldLens().look(observation(ego, *others), OWN)
     assert scene is not None
     return scene
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from chauffeur.concept import Lane, LaneId, Observation, VehicleState
 from chauffeur.control import LAMPILOT_STEERING, lane_keeping_steering
 from chauffeur.geometry import Polyline
-from chauffeur.safety.shield.frame import Body, Lens, Scene, Strip
+from chauffeur.safety.shield.frame import ShieldBody, ShieldLens, ShieldScene, Strip
 from chauffeur.safety.shield.sweep import recovery_steering, swept, yaw_rate
 from roads import a_lane, a_road
 
@@ -36,13 +36,13 @@ def observation(ego: VehicleState, *others: VehicleState, lanes: tuple[Lane, ...
     return Observation(0.0, 0, "highway", ego, others, (), a_road(lanes), None, None, False, False)
 
 
-def looked(ego: VehicleState, *others: VehicleState, lanes: tuple[Lane, ...] = STRAIGHT) -> Scene:
-    scene = Lens().look(observation(ego, *others, lanes=lanes), OWN)
+def looked(ego: VehicleState, *others: VehicleState, lanes: tuple[Lane, ...] = STRAIGHT) -> ShieldScene:
+    scene = ShieldLens().look(observation(ego, *others, lanes=lanes), OWN)
     assert scene is not None
     return scene
 
 
-def numbers(body: Body) -> tuple[float, ...]:
+def numbers(body: ShieldBody) -> tuple[float, ...]:
     return (
         body.s_m, body.d_m, body.heading_rad, body.along_mps, body.across_mps, body.half_length_m, body.half_width_m,
     )  # fmt: skip
@@ -206,20 +206,20 @@ def test_obstacles_are_seen_and_signs_are_not() -> None:
     post = replace(car(3, 520.0, 0.0), kind="obstacle")
     sign = replace(car(4, 520.0, 2.0), kind="stop_sign")
     shot = replace(observation(car(0, 500.0, 0.0), car(1, 510.0, 0.0)), objects=(post, sign))
-    scene = Lens().look(shot, OWN)
+    scene = ShieldLens().look(shot, OWN)
     assert scene is not None
     assert [body.id for body in scene.others] == [1, 3]
 
 
 def test_without_a_lane_there_is_no_scene() -> None:
     ego = car(0, 500.0, 0.0)
-    assert Lens().look(observation(ego), None) is None
-    assert Lens().look(observation(ego), "a-b:9") is None
-    assert Lens().look(observation(ego, lanes=()), OWN) is None
+    assert ShieldLens().look(observation(ego), None) is None
+    assert ShieldLens().look(observation(ego), "a-b:9") is None
+    assert ShieldLens().look(observation(ego, lanes=()), OWN) is None
 
 
 def test_a_lens_looks_anew_for_another_lane_another_place_and_another_road() -> None:
-    lens = Lens()
+    lens = ShieldLens()
     first = lens.look(observation(car(0, 500.0, 0.0)), OWN)
     beside = lens.look(observation(car(0, 500.0, 0.0)), "a-b:2")
     assert first is not None
@@ -261,8 +261,8 @@ SIZE = (5.0, 2.0)
 SHIELDS = replace(LAMPILOT_STEERING, max_steering_rad=MOST, max_approach_rad=0.2)
 
 
-def body(d: float, heading: float = 0.0) -> Body:
-    return Body(0, 0.0, d, heading, 0.0, 0.0, 2.5, 1.0)
+def body(d: float, heading: float = 0.0) -> ShieldBody:
+    return ShieldBody(0, 0.0, d, heading, 0.0, 0.0, 2.5, 1.0)
 
 
 @given(speed=st.floats(0.0, 40.0), steering=st.floats(-1.0, 1.0))
@@ -296,7 +296,7 @@ spans = st.builds(
 
 @given(given_=spans, curvature=st.floats(-0.05, 0.05))
 def test_what_is_swept_is_where_the_corners_get(
-    given_: tuple[Body, float, tuple[float, float], float, float, float, float], curvature: float
+    given_: tuple[ShieldBody, float, tuple[float, float], float, float, float, float], curvature: float
 ) -> None:
     """Rolled on in the lane's frame, whose heading turns under the car where the lane bends."""
     ego, speed, _, steering, centre, _, _ = given_
@@ -319,7 +319,7 @@ def test_what_is_swept_is_where_the_corners_get(
 
 @given(given_=spans, curvature=st.floats(-0.05, 0.05))
 def test_what_is_swept_is_to_the_last_bit_what_the_same_lines_give_in_python(
-    given_: tuple[Body, float, tuple[float, float], float, float, float, float], curvature: float
+    given_: tuple[ShieldBody, float, tuple[float, float], float, float, float, float], curvature: float
 ) -> None:
     ego, speed, _, steering, centre, _, _ = given_
     d, heading, bend = ego.d_m, ego.heading_rad, curvature * speed
@@ -340,7 +340,7 @@ def test_what_is_swept_is_to_the_last_bit_what_the_same_lines_give_in_python(
 
 @given(given_=spans)
 def test_a_mirrored_car_sweeps_what_is_mirrored(
-    given_: tuple[Body, float, tuple[float, float], float, float, float, float],
+    given_: tuple[ShieldBody, float, tuple[float, float], float, float, float, float],
 ) -> None:
     ego, speed, size, steering, centre, most, dt = given_
     low, high = swept(*given_)

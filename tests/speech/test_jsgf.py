@@ -9,13 +9,13 @@ from chauffeur.concept import DataError
 from chauffeur.planners.onboard.meaning import NotUnderstood
 from chauffeur.planners.onboard.understand import understand
 from chauffeur.speech.grammar import SAFE_INTENTS
-from chauffeur.speech.jsgf import Grammar, driving_grammar
+from chauffeur.speech.jsgf import SpeechGrammar, driving_grammar
 
 HEAD = "#JSGF V1.0;\ngrammar test;\n"
 
 
 def test_options_groups_and_rules() -> None:
-    grammar = Grammar(HEAD + "public <a> = please (go | drive [very] <how>) [now]; // said\n<how> = fast | slow;")
+    grammar = SpeechGrammar(HEAD + "public <a> = please (go | drive [very] <how>) [now]; // said\n<how> = fast | slow;")
     for said in ("please go", "please drive fast", "please drive very slow now", "please  go now "):
         assert grammar.matches("a", said)
     for not_said in ("", "please", "go now", "please drive", "please go fast", "please gonow", "please go now now"):
@@ -42,7 +42,7 @@ def test_options_groups_and_rules() -> None:
 )
 def test_what_is_not_read_is_refused_in_words(text: str, words: str) -> None:
     with pytest.raises(DataError, match=words):
-        Grammar(text)
+        SpeechGrammar(text)
 
 
 def test_a_drawn_sentence_belongs_to_its_rule_and_to_no_safe_one() -> None:

@@ -11,7 +11,7 @@ from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.drive.actuate import actuate
 from chauffeur.worlds.base import EGO, Driver, Perception, World
 from chauffeur.worlds.parking import BUILT_IN, ParkingWorld, overlap
-from chauffeur.worlds.parking.actors import Walker
+from chauffeur.worlds.parking.actors import LotWalker
 from chauffeur.worlds.parking.world import CHASSIS, DT_S, STEERING_RATE
 
 
@@ -187,7 +187,7 @@ def test_nobody_drives_or_walks_into_a_car_that_stands() -> None:
 
 
 def test_a_walker_goes_to_and_fro_and_waits_for_cars() -> None:
-    walker = Walker(9, (0.0, 0.0), (6.0, 0.0), pause_s=2.0)
+    walker = LotWalker(9, (0.0, 0.0), (6.0, 0.0), pause_s=2.0)
     seen = []
     for _ in range(160):
         walker.decide([], DT_S)
@@ -196,7 +196,7 @@ def test_a_walker_goes_to_and_fro_and_waits_for_cars() -> None:
     assert max(seen) == 6.0
     assert min(seen[60:]) == 0.0
     car = _started(cars=0, walkers=0).observe().ego
-    shy = Walker(9, (car.x_m, car.y_m - 4.0), (car.x_m, car.y_m + 4.0), pause_s=2.0)
+    shy = LotWalker(9, (car.x_m, car.y_m - 4.0), (car.x_m, car.y_m + 4.0), pause_s=2.0)
     for _ in range(100):
         shy.decide([car], DT_S)
         shy.move(DT_S)
@@ -207,7 +207,7 @@ def test_a_walker_goes_to_and_fro_and_waits_for_cars() -> None:
 def test_a_walker_does_not_brush_past_a_car() -> None:
     """Along its side and away from its middle, but at a slant that leads into its corner."""
     car = _started(cars=0, walkers=0).observe().ego
-    walker = Walker(9, (car.x_m + 0.5, car.y_m - 1.5), (car.x_m + 3.0, car.y_m - 0.9), pause_s=2.0)
+    walker = LotWalker(9, (car.x_m + 0.5, car.y_m - 1.5), (car.x_m + 3.0, car.y_m - 0.9), pause_s=2.0)
     for _ in range(25):
         walker.decide([car], DT_S)
         walker.move(DT_S)

@@ -1,6 +1,6 @@
 """Pictures of what a world shows, from cameras on the vehicle, in any weather, with ground truth. Not photoreal."""
 
-from chauffeur.camera.look import LOOKS, Look, look_of
+from chauffeur.camera.look import LOOKS, CameraLook, look_of
 from chauffeur.camera.making import make_renderer
 from chauffeur.camera.pictures import CameraImages, ImageLane, ImageTruth, Sighting
 from chauffeur.camera.renderer import Renderer
@@ -15,11 +15,11 @@ __all__ = [
     "WEATHERS",
     "Camera",
     "CameraImages",
+    "CameraLook",
     "Conditions",
     "ImageLane",
     "ImageTruth",
     "Instance",
-    "Look",
     "Renderer",
     "Rig",
     "SemanticClass",

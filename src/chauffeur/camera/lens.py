@@ -12,7 +12,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from chauffeur.camera.look import Look
+    from chauffeur.camera.look import CameraLook
     from chauffeur.camera.rig import Camera
 
     FloatArray = NDArray[np.float64]
@@ -32,7 +32,7 @@ class Lens:
     noise: float
 
     @classmethod
-    def of(cls, camera: Camera, look: Look) -> Lens:
+    def of(cls, camera: Camera, look: CameraLook) -> Lens:
         """The lens of a look on a camera."""
         return cls(camera, look.distortion, look.noise)
 

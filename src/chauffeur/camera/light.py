@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from chauffeur.camera.look import Look
+    from chauffeur.camera.look import CameraLook
     from chauffeur.camera.weather import Conditions
 
 Colour = tuple[float, float, float]
@@ -59,7 +59,7 @@ _LAND = {
 }
 
 
-def light_of(conditions: Conditions, look: Look, seed: int, surroundings: str) -> Light:
+def light_of(conditions: Conditions, look: CameraLook, seed: int, surroundings: str) -> Light:
     """The light of a place under conditions; the sun's direction is the seed's."""
     rng = np.random.default_rng([seed, 77])
     azimuth, height = float(rng.uniform(0.0, math.tau)), math.radians(float(rng.uniform(32.0, 52.0)))

@@ -9,7 +9,7 @@ from chauffeur.concept import ConfigError
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class CameraLook:
     """Palette, exposure and lens of a picture.
 
     Attributes:
@@ -38,15 +38,15 @@ class Look:
 LOOKS: Final = {
     look.name: look
     for look in (
-        Look(),
-        Look("held_out_a", 1.22, 0.88, 0.72, (1.06, 1.0, 0.9), 1, 0.35, -0.10, 2.0),
-        Look("held_out_b", 0.80, 1.14, 1.25, (0.94, 1.0, 1.10), 2, 0.15, 0.06, 4.0),
+        CameraLook(),
+        CameraLook("held_out_a", 1.22, 0.88, 0.72, (1.06, 1.0, 0.9), 1, 0.35, -0.10, 2.0),
+        CameraLook("held_out_b", 0.80, 1.14, 1.25, (0.94, 1.0, 1.10), 2, 0.15, 0.06, 4.0),
     )
 }
 """`default` is what models train on; the held-out ones have another palette, exposure and lens, for tests only."""
 
 
-def look_of(name: str) -> Look:
+def look_of(name: str) -> CameraLook:
     """A preset by name. Raises ConfigError."""
     if name not in LOOKS:
         raise ConfigError(f"There is no look {name!r}.", hint=f"Choose of: {', '.join(LOOKS)}.")

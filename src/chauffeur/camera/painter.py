@@ -12,10 +12,10 @@ from chauffeur.camera.falling import falling
 from chauffeur.camera.ground import Marking, Paving
 from chauffeur.camera.lens import Lens
 from chauffeur.camera.light import Light, light_of
-from chauffeur.camera.look import Look
+from chauffeur.camera.look import CameraLook
 from chauffeur.camera.pictures import CameraImages, ImageTruth
 from chauffeur.camera.projection import NEAR_M, Viewpoint, viewpoints
-from chauffeur.camera.scene import Scene, SceneBuilder
+from chauffeur.camera.scene import CameraScene, SceneBuilder
 from chauffeur.camera.solids import (
     CLASS,
     GLOW,
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     FloatArray = NDArray[np.float64]
     IntArray = NDArray[np.int64]
 
-_DEFAULT_LOOK: Final = Look()
+_DEFAULT_LOOK: Final = CameraLook()
 _TERRAIN_M: Final = 700.0
 _LOWER_M: Final = {Paving.TERRAIN: 0.02, Paving.SIDEWALK: 0.014, Paving.KERB: 0.010, Paving.JUNCTION: 0.006}
 _HIGHER_M: Final = {Paving.ZEBRA: 0.004, Paving.STOP_LINE: 0.004, Paving.YIELD_LINE: 0.004}
@@ -67,7 +67,7 @@ _CLASSES: Final = {
 class _Triangles:
     """Triangles in a scene with what shading needs of each: places (n, 3, 3), and one value a triangle of the rest."""
 
-    def __init__(self, scene: Scene, solids: Solids, ground: bool) -> None:
+    def __init__(self, scene: CameraScene, solids: Solids, ground: bool) -> None:
         places: list[FloatArray] = []
         colours: list[FloatArray] = []
         normals: list[FloatArray] = []
@@ -106,7 +106,7 @@ class _Triangles:
         self.lanes = np.concatenate(lanes) if lanes else np.zeros((0, 10))
 
 
-def _terrain(scene: Scene) -> NDArray[np.float32]:
+def _terrain(scene: CameraScene) -> NDArray[np.float32]:
     corners = np.zeros((2, 3, 8), np.float32)
     half = _TERRAIN_M
     corners[0, :, :2] = (-half, -half), (half, -half), (half, half)
@@ -212,7 +212,7 @@ class PainterRenderer:
         conditions: Conditions,
         seed: int = 0,
         *,
-        look: Look = _DEFAULT_LOOK,
+        look: CameraLook = _DEFAULT_LOOK,
         truth: bool = False,
     ) -> CameraImages:
         """As `Renderer.render` has it."""
@@ -249,13 +249,13 @@ class PainterRenderer:
         )
 
 
-def _alone(scene: Scene, solids: Solids, point: Viewpoint, number: int) -> int:
+def _alone(scene: CameraScene, solids: Solids, point: Viewpoint, number: int) -> int:
     only = _Triangles(scene, solids.chosen(solids.rows[:, INSTANCE] == number), ground=False)
     return int((_rasterised(only.places, point)[0] >= 0).sum())
 
 
 def _shaded(
-    scene: Scene,
+    scene: CameraScene,
     point: Viewpoint,
     triangles: _Triangles,
     shown: IntArray,
@@ -396,7 +396,7 @@ def _fall(picture: FloatArray, drops: NDArray[np.float32]) -> None:
         block += (np.array(look[:3]) - block) * soft
 
 
-def _graded(picture: FloatArray, look: Look) -> NDArray[np.uint8]:
+def _graded(picture: FloatArray, look: CameraLook) -> NDArray[np.uint8]:
     height, width = picture.shape[:2]
     u = (np.arange(width) + 0.5) / width - 0.5
     v = ((np.arange(height) + 0.5) / height - 0.5)[:, None]

@@ -39,7 +39,7 @@ LEAVES: Final = (
 
 
 @dataclass(frozen=True)
-class Place:
+class CameraPlace:
     """A road and what stands along it, in the frame of the road graph.
 
     Attributes:
@@ -59,7 +59,7 @@ class Place:
     surroundings: Surroundings
 
 
-def place_of(road: RoadGraph, seed: int, palette: int = 0) -> Place:
+def place_of(road: RoadGraph, seed: int, palette: int = 0) -> CameraPlace:
     """The place of a road graph; same seed, same place, whoever looks from where."""
     field = LaneField(road)
     ground = pave(road, field)
@@ -76,7 +76,7 @@ def place_of(road: RoadGraph, seed: int, palette: int = 0) -> Place:
     builder.build()
     builder.plant()
     lamps = np.array(builder.lamps, float).reshape(-1, 3)
-    return Place(road, field, ground, builder.pile.solids(), lamps, surroundings)
+    return CameraPlace(road, field, ground, builder.pile.solids(), lamps, surroundings)
 
 
 class _Builder:

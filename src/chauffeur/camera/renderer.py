@@ -13,11 +13,11 @@ from chauffeur.camera.falling import FALL, falling
 from chauffeur.camera.ground import VERTEX, Paving
 from chauffeur.camera.lens import Lens
 from chauffeur.camera.light import Light, light_of
-from chauffeur.camera.look import Look
+from chauffeur.camera.look import CameraLook
 from chauffeur.camera.pictures import CameraImages, ImageTruth
 from chauffeur.camera.projection import Viewpoint, viewpoints
 from chauffeur.camera.rig import Camera, Rig
-from chauffeur.camera.scene import PlaceView, Scene, SceneBuilder
+from chauffeur.camera.scene import CameraScene, PlaceView, SceneBuilder
 from chauffeur.camera.solids import INSTANCE, MATERIAL, PITCH, SX, YAW, Material, Shape, Solids, X, Z, mesh_of, together
 from chauffeur.camera.truth import truth_of
 from chauffeur.camera.weather import Conditions
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 _SHADOW_PX: Final = 768
 _SHADOW_REACH_M: Final = 60.0
 _SHADOWLESS_M: Final = 0.2
-_DEFAULT_LOOK: Final = Look()
+_DEFAULT_LOOK: Final = CameraLook()
 _FAINT: Final = 0.06
 """Shadows weaker than this are not drawn."""
 
@@ -54,7 +54,7 @@ class Renderer(Protocol):
         conditions: Conditions,
         seed: int = 0,
         *,
-        look: Look = _DEFAULT_LOOK,
+        look: CameraLook = _DEFAULT_LOOK,
         truth: bool = False,
     ) -> CameraImages:
         """Pictures of all cameras; same input, same bytes on one machine.
@@ -174,7 +174,7 @@ class GlRenderer:
         conditions: Conditions,
         seed: int = 0,
         *,
-        look: Look = _DEFAULT_LOOK,
+        look: CameraLook = _DEFAULT_LOOK,
         truth: bool = False,
     ) -> CameraImages:
         """As `Renderer.render` has it."""
@@ -202,7 +202,7 @@ class GlRenderer:
 
     # Passes -----------------------------------------------------------------------------------------------------------
 
-    def _cast_shadows(self, scene: Scene, light: Light) -> FloatArray:
+    def _cast_shadows(self, scene: CameraScene, light: Light) -> FloatArray:
         """Draw the shadow map; the matrix from the scene to it (its coordinates 0 to 1)."""
         middle = np.array([*scene.ego.place(18.0, 0.0), 0.0])
         ahead = -np.array(light.sun)
@@ -230,12 +230,12 @@ class GlRenderer:
 
     def _picture(
         self,
-        scene: Scene,
+        scene: CameraScene,
         point: Viewpoint,
         solids: Solids,
         light: Light,
         conditions: Conditions,
-        look: Look,
+        look: CameraLook,
         shadow_matrix: FloatArray,
         index: int,
     ) -> NDArray[np.uint8]:
@@ -289,7 +289,7 @@ class GlRenderer:
         return np.frombuffer(data, np.uint8).reshape(camera.height, camera.width, 3)
 
     def _truth(
-        self, scene: Scene, point: Viewpoint, solids: Solids, lens: Lens, observation: Observation
+        self, scene: CameraScene, point: Viewpoint, solids: Solids, lens: Lens, observation: Observation
     ) -> ImageTruth:
         gl, camera = self._gl, point.camera
         target = self._target(camera)
@@ -500,7 +500,7 @@ class _GroundDrawer:
         self._loaded: tuple[int, bytes] | None = None
         self._view: PlaceView | None = None
 
-    def load(self, scene: Scene) -> None:
+    def load(self, scene: CameraScene) -> None:
         """Take the ground of a scene."""
         key = (id(scene.view), scene.lines.tobytes())
         if self._loaded == key:
@@ -550,11 +550,11 @@ class _GroundDrawer:
 
 
 def _uniforms(
-    scene: Scene,
+    scene: CameraScene,
     point: Viewpoint,
     light: Light,
     conditions: Conditions,
-    look: Look,
+    look: CameraLook,
     shadow_matrix: FloatArray,
 ) -> dict[str, Any]:
     camera = point.camera

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from chauffeur.camera.bodies import PAINTS, Body, BodyKind, bodies, gait, kind_of
+from chauffeur.camera.bodies import PAINTS, BodyKind, BodyShape, bodies, gait, kind_of
 from chauffeur.camera.furniture import (
     LIGHTS,
     LIMIT,
@@ -22,7 +22,7 @@ from chauffeur.camera.furniture import (
     sign_pose,
 )
 from chauffeur.camera.ground import stop_lines
-from chauffeur.camera.place import Place, place_of
+from chauffeur.camera.place import CameraPlace, place_of
 from chauffeur.camera.solids import Pile, Solids, X, Y, together
 from chauffeur.concept import ScenarioError
 from chauffeur.geometry import Pose, RoadGraph, wrap_to_pi
@@ -30,7 +30,7 @@ from chauffeur.geometry import Pose, RoadGraph, wrap_to_pi
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from chauffeur.camera.look import Look
+    from chauffeur.camera.look import CameraLook
     from chauffeur.camera.weather import Conditions
     from chauffeur.concept.scene import Observation, VehicleState
 
@@ -111,7 +111,7 @@ class PlaceView:
         lamps_m: Street lamps (n, 3).
     """
 
-    place: Place
+    place: CameraPlace
     origin_m: tuple[float, float]
     triangles: RowArray
     solids: Solids
@@ -119,7 +119,7 @@ class PlaceView:
 
 
 @dataclass(frozen=True)
-class Scene:
+class CameraScene:
     """All that a renderer needs besides cameras.
 
     Attributes:
@@ -154,10 +154,10 @@ class SceneBuilder:
 
     def __init__(self) -> None:
         """Begins with none."""
-        self._places: OrderedDict[tuple[int, int, int], Place] = OrderedDict()
+        self._places: OrderedDict[tuple[int, int, int], CameraPlace] = OrderedDict()
         self._views: OrderedDict[tuple[int, int, int, int, int], PlaceView] = OrderedDict()
 
-    def scene(self, observation: Observation, conditions: Conditions, look: Look, seed: int) -> Scene:
+    def scene(self, observation: Observation, conditions: Conditions, look: CameraLook, seed: int) -> CameraScene:
         """The scene of an observation. Raises ScenarioError for one without a road graph."""
         road = observation.road
         if not road.lanes:
@@ -172,7 +172,7 @@ class SceneBuilder:
         world = Pose(ego.x_m, ego.y_m, ego.heading_rad)
         paints = PAINTS[look.palette % len(PAINTS)]
         instances: list[Instance] = []
-        drawn: list[Body] = []
+        drawn: list[BodyShape] = []
         pile = Pile()
         for agent in (*observation.others, *observation.objects):
             if math.hypot(agent.x_m - ego.x_m, agent.y_m - ego.y_m) > REACH_M:
@@ -220,9 +220,9 @@ class SceneBuilder:
                 way = heading_at_line(road, sign.lanes, sign.stop_line_m)
                 lines.append((((ax - ox, ay - oy), (bx - ox, by - oy)), way, sign.kind == "yield", False))
         movable = together([bodies(drawn), pile.solids()])
-        own_body = Body("car", own.x_m, own.y_m, own.heading_rad, ego.length_m, ego.width_m, paints[0], 0)
+        own_body = BodyShape("car", own.x_m, own.y_m, own.heading_rad, ego.length_m, ego.width_m, paints[0], 0)
         glows = _glows(view, drawn, lights, conditions)
-        return Scene(
+        return CameraScene(
             view, own, (ego.length_m, ego.width_m), movable, bodies([own_body]), stop_lines(lines), glows,
             tuple(instances), observation.tick, seed, observation.time_s,
         )  # fmt: skip
@@ -255,7 +255,7 @@ class SceneBuilder:
             self._views.popitem(last=False)
         return view
 
-    def _place(self, road: RoadGraph, seed: int, palette: int) -> Place:
+    def _place(self, road: RoadGraph, seed: int, palette: int) -> CameraPlace:
         key = (id(road), seed, palette)
         found = self._places.get(key)
         # The id of a graph may be another's after it was freed: a kept place keeps its own alive.
@@ -283,13 +283,13 @@ def _body(
     paints: tuple[tuple[float, float, float], ...],
     origin_m: tuple[float, float],
     world: Pose,
-) -> Body:
+) -> BodyShape:
     paint = paints[(agent.id * 7 + 3) % len(paints)]
     moving = kind in ("car", "suv", "truck", "bus", "motorcycle", "bicycle")
     parked = moving and _parked(agent, road)
     near = math.hypot(agent.x_m - world.x_m, agent.y_m - world.y_m) < DETAIL_M
     braking = moving and not parked and (agent.acceleration_mps2 < _BRAKING_MPS2 or agent.speed_mps < _STANDING_MPS)
-    return Body(
+    return BodyShape(
         kind,
         agent.x_m - origin_m[0],
         agent.y_m - origin_m[1],
@@ -326,7 +326,7 @@ def _indicator(agent: VehicleState, road: RoadGraph) -> Literal["", "left", "rig
     return ""
 
 
-def _agent(number: int, agent: VehicleState, body: Body, world: Pose) -> Instance:
+def _agent(number: int, agent: VehicleState, body: BodyShape, world: Pose) -> Instance:
     at = world.sees(agent.x_m, agent.y_m)
     heading = wrap_to_pi(agent.heading_rad - world.heading_rad)
     return Instance(
@@ -345,7 +345,7 @@ def _sign(
 
 def _glows(
     view: PlaceView,
-    drawn: list[Body],
+    drawn: list[BodyShape],
     lights: list[tuple[tuple[float, float, float], tuple[float, float, float]]],
     conditions: Conditions,
 ) -> RowArray:
@@ -385,7 +385,7 @@ def _streak(
     return (*place, 0.35, 0, 0, 0, 0, 0, *(c * strength for c in colour), 0.0, 3.0)
 
 
-def _vehicle_light(body: Body, halo: float, dark: float, wet: float) -> list[tuple[float, ...]]:
+def _vehicle_light(body: BodyShape, halo: float, dark: float, wet: float) -> list[tuple[float, ...]]:
     pose = Pose(body.x_m, body.y_m, body.heading_rad)
     height = 0.95 if body.kind in ("truck", "bus") else 0.72
     sides = (0.0,) if body.kind in ("motorcycle", "bicycle") else (-0.36, 0.36)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from chauffeur.camera.lens import Lens
     from chauffeur.camera.projection import Viewpoint
-    from chauffeur.camera.scene import Instance, Scene
+    from chauffeur.camera.scene import CameraScene, Instance
     from chauffeur.concept.scene import Observation
 
     FloatArray = NDArray[np.float64]
@@ -27,7 +27,7 @@ _LANE_STEP_M: Final = 2.0
 
 
 def truth_of(
-    scene: Scene,
+    scene: CameraScene,
     point: Viewpoint,
     observation: Observation,
     instances: NDArray[np.uint16],
@@ -67,7 +67,7 @@ def truth_of(
     return ImageTruth(point.camera.name, bent, lens.bend(classes), lens.bend(depth_m), tuple(sightings), lanes)
 
 
-def outline_of(instance: Instance, point: Viewpoint, scene: Scene, lens: Lens) -> tuple[FloatArray, float]:
+def outline_of(instance: Instance, point: Viewpoint, scene: CameraScene, lens: Lens) -> tuple[FloatArray, float]:
     """Convex outline (k, 2), px, of an instance's box before the camera, and the depth of its middle, m."""
     corners = instance.corners_m
     world = np.array([(*scene.ego.place(x, y), z) for x, y, z in corners.tolist()])
@@ -108,7 +108,7 @@ def _cut(outline: FloatArray, width: int, height: int) -> tuple[PixelBox | None,
     return box, min(1.0, max(0.0, 1.0 - inside / whole))
 
 
-def _lanes(scene: Scene, point: Viewpoint, road: RoadGraph, lens: Lens) -> tuple[ImageLane, ...]:
+def _lanes(scene: CameraScene, point: Viewpoint, road: RoadGraph, lens: Lens) -> tuple[ImageLane, ...]:
     ox, oy = scene.view.origin_m
     x, y = scene.ego.x_m + ox, scene.ego.y_m + oy
     own = road.locate(x, y, scene.ego.heading_rad)
@@ -125,7 +125,7 @@ def _lanes(scene: Scene, point: Viewpoint, road: RoadGraph, lens: Lens) -> tuple
 
 
 def _lane(
-    lane: Lane, scene: Scene, point: Viewpoint, here: tuple[float, float], lens: Lens, ego: bool
+    lane: Lane, scene: CameraScene, point: Viewpoint, here: tuple[float, float], lens: Lens, ego: bool
 ) -> ImageLane | None:
     middle = lane.centre.nearest(*here)
     low, high = max(0.0, middle - LANES_M), min(lane.length_m, middle + LANES_M)

@@ -55,7 +55,7 @@ def adapt(
     from chauffeur.models.onboard.adapting import AdaptRecipe
     from chauffeur.models.onboard.adapting import adapt as adapt_model
     from chauffeur.models.onboard.interactions import (
-        Interaction,
+        AcceptedInteraction,
         exported_items,
         interactions_of,
         load_interactions,
@@ -70,7 +70,7 @@ def adapt(
         replay = data / "train.jsonl"
     if replay is None:
         console.print("Nothing to replay: without examples of its training the model forgets more easily.")
-    found: list[Interaction] = []
+    found: list[AcceptedInteraction] = []
     for path in interactions or ():
         found += load_interactions(path)
     if person:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from chauffeur.concept import Scenario
     from chauffeur.drive.auditing import Auditor
-    from chauffeur.safety.audit import Closing, Record, Verification
+    from chauffeur.safety.audit import AuditRecord, AuditVerification, Closing
 
 KEY_VARIABLE: Final = "CHAUFFEUR_AUDIT_KEY"
 """Environment variable that names the key file."""
@@ -252,7 +252,7 @@ def tell_closing(console: Console, path: Path, closing: Closing) -> None:
         console.print(Text("The audit log is not complete: ", "bold red"), plain(missing), sep="")
 
 
-def _chosen(path: Path, kinds: list[str] | None, first: str, last: str) -> Iterator[Record]:
+def _chosen(path: Path, kinds: list[str] | None, first: str, last: str) -> Iterator[AuditRecord]:
     from chauffeur.concept import ConfigError
     from chauffeur.safety.audit import KINDS, read_records
 
@@ -286,7 +286,7 @@ def _bound(text: str) -> Any:
     return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
 
 
-def _at(record: Record, bound: Any) -> Any:
+def _at(record: AuditRecord, bound: Any) -> Any:
     """The record's number or time, whichever the bound is. A time that is none (tampering) counts as the earliest."""
     from datetime import UTC, datetime
 
@@ -299,7 +299,7 @@ def _at(record: Record, bound: Any) -> Any:
     return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
 
 
-def _facts(record: Record) -> Iterator[str]:
+def _facts(record: AuditRecord) -> Iterator[str]:
     """The numbers and names of a record, in a line or two."""
     body: dict[str, Any] = {name: value for name, value in record.body.items() if name != "texts"}
     try:
@@ -341,7 +341,7 @@ def _pairs(body: dict[str, Any]) -> str:
     return _short(", ".join(f"{name} {word}" for name, word in zip(body, words, strict=True) if word))
 
 
-def _texts(record: Record) -> Iterator[str]:
+def _texts(record: AuditRecord) -> Iterator[str]:
     from chauffeur.safety.audit import words_of
 
     for name, words in words_of(record).items():
@@ -353,7 +353,7 @@ def _short(text: str) -> str:
     return text if len(text) <= _MOST_TEXT else f"{text[:_MOST_TEXT]} ... ({len(text)} characters)"
 
 
-def _tell(console: Console, path: Path, found: Verification) -> None:
+def _tell(console: Console, path: Path, found: AuditVerification) -> None:
     """What verification found, in words."""
     from rich.text import Text
 
@@ -373,7 +373,7 @@ def _tell(console: Console, path: Path, found: Verification) -> None:
     console.print(columns((name, plain(words)) for name, words in _notes(found)))
 
 
-def _notes(found: Verification) -> Iterator[tuple[str, str]]:
+def _notes(found: AuditVerification) -> Iterator[tuple[str, str]]:
     yield "head", found.head
     if found.after_head is None:
         yield "anchor", "no head was given: records cut off at the end would not be found"

@@ -44,7 +44,7 @@ def effort(
 
     from chauffeur.bench.kernel.engine import LocalEngine
     from chauffeur.bench.kernel.run import Effort
-    from chauffeur.bench.kernel.spending import Budget, Price
+    from chauffeur.bench.kernel.spending import Price, SpendingBudget
     from chauffeur.cli.parts import needs
 
     if ray is not None and workers is not None:
@@ -58,7 +58,7 @@ def effort(
     return Effort(
         workers=workers or 0,
         concurrency=concurrency,
-        budget=Budget(max_usd, max_requests),
+        budget=SpendingBudget(max_usd, max_requests),
         price=None if price is None else Price.parse(price),
         engine=engine,
     )

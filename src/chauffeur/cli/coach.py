@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from chauffeur.bench.lampilot.coaching import Coached
-    from chauffeur.bench.lampilot.critic import Attempt, Critic, Judgement
+    from chauffeur.bench.lampilot.critic import Attempt, Critic, CriticJudgement
 
 EXAMPLES = """
 Examples:
@@ -206,7 +206,7 @@ class _Teller:
 
         return write_page(folder / f"{attempt.item.id}-{attempt.number}.html", attempt.recorded)
 
-    def _judged(self, judgement: Judgement) -> None:
+    def _judged(self, judgement: CriticJudgement) -> None:
         from rich.padding import Padding
 
         from chauffeur.cli.console import plain

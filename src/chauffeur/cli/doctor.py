@@ -41,7 +41,7 @@ _EXTRA = re.compile(r"""extra\s*==\s*['"]([^'"]+)['"]""")
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class DoctorPart:
     """One requirement: distribution name and installed version, None when missing."""
 
     name: str
@@ -122,15 +122,15 @@ def _realtime() -> str:
     return "not allowed: control may be late on a busy machine. Allow it with rtprio in /etc/security/limits.conf."
 
 
-def installed_parts() -> tuple[tuple[Part, ...], dict[str, tuple[Part, ...]]]:
+def installed_parts() -> tuple[tuple[DoctorPart, ...], dict[str, tuple[DoctorPart, ...]]]:
     """(what the core needs, what each extra needs), read from the package's own metadata; nothing is imported."""
-    core: list[Part] = []
-    extras: dict[str, list[Part]] = {}
+    core: list[DoctorPart] = []
+    extras: dict[str, list[DoctorPart]] = {}
     for line in requires("chauffeur") or ():
         found = _REQUIREMENT.match(line)
         if found is None:
             continue
-        part = Part(found.group(1), _installed(found.group(1)))
+        part = DoctorPart(found.group(1), _installed(found.group(1)))
         extra = _EXTRA.search(line)
         if extra is None:
             core.append(part)

@@ -43,7 +43,7 @@ def serve(
     from chauffeur.cli.parts import limits_named
     from chauffeur.planners.registry import make_planner
 
-    server = Endpoint(host, port, make_planner(planner), limits_named(limits))
+    server = ServedEndpoint(host, port, make_planner(planner), limits_named(limits))
     address = f"http://{host}:{server.server_port}/v1"
     stdout().print(f"Serving {planner} at {address} (Ctrl-C ends it)", soft_wrap=True)
     try:
@@ -54,7 +54,7 @@ def serve(
         server.server_close()
 
 
-class Endpoint(ThreadingHTTPServer):
+class ServedEndpoint(ThreadingHTTPServer):
     """A chat-completions endpoint over one planner, which answers one request at a time."""
 
     daemon_threads = True
@@ -80,7 +80,7 @@ class _Exchange(BaseHTTPRequestHandler):
     """One request."""
 
     protocol_version = "HTTP/1.1"
-    server: Endpoint  # type: ignore[assignment]
+    server: ServedEndpoint  # type: ignore[assignment]
 
     def do_GET(self) -> None:
         """List the models, or say that the server is well."""

@@ -30,8 +30,8 @@ from chauffeur.drive.talk.messages import (
     Note,
     Said,
     Scene,
-    Session,
-    Stages,
+    SessionState,
+    StageTimes,
     VerdictShown,
 )
 from chauffeur.hmi import words
@@ -66,7 +66,7 @@ class TalkScreen:
         self._live = Live(console=console, transient=True, auto_refresh=False) if console.is_terminal else None
         self._drawn_s = 0.0
         self._plain_due_s = 0.0
-        self._session: Session | None = None
+        self._session: SessionState | None = None
         self._scene: Scene | None = None
         self._listening: Listening | None = None
         self._memory: MemoryState | None = None
@@ -113,7 +113,7 @@ class TalkScreen:
     def tell(self, said: Said) -> None:
         """What the session says."""
         match said:
-            case Session():
+            case SessionState():
                 self._session = said
                 self._begin(said)
             case Scene():
@@ -161,7 +161,7 @@ class TalkScreen:
 
     # What is told -----------------------------------------------------------------------------------------------------
 
-    def _begin(self, session: Session) -> None:
+    def _begin(self, session: SessionState) -> None:
         facts = f" ({session.scenario}, seed {words.seed_words(session.seed)}, planner {session.planner}; simulated)"
         self.console.print(Text.assemble(plain(session.title), plain(facts)), style="dim")
         self.console.print(Text(f"Bounds: {'; '.join(session.limits)}.", "dim"))
@@ -305,7 +305,7 @@ class TalkScreen:
             self._live.stop()
 
 
-def stages_in_words(stages: Stages) -> str:
+def stages_in_words(stages: StageTimes) -> str:
     """Where the time from the end of speech to the changed set-point went."""
     parts = (
         ("waiting", stages.wait_s), ("recognising", stages.recognise_s), ("planning", stages.plan_s),

@@ -57,13 +57,13 @@ def onboard(
     from chauffeur.cli.console import stdout
     from chauffeur.cli.parts import needs
     from chauffeur.cli.stages import stage_lines
-    from chauffeur.models.onboard.pipeline import Plan, build_data, train_model
+    from chauffeur.models.onboard.pipeline import PipelinePlan, build_data, train_model
 
     if not data_only:  # half an hour of data first, and then nothing to train with, helps nobody
         needs("models", "Training", "torch", "transformers", "tokenizers", "onnx", "onnxscript", "safetensors")
         _check_size(size)
     console = stdout()
-    plan = Plan(seed, draws, per_case, size, steps, more, base)
+    plan = PipelinePlan(seed, draws, per_case, size, steps, more, base)
     told = stage_lines(console)
     try:
         build_data(out, plan, workers or os.cpu_count() or 1, told)
@@ -112,11 +112,11 @@ def sorters(
     from chauffeur.cli.console import stdout
     from chauffeur.cli.stages import stage_lines
     from chauffeur.models.sorting.pipeline import make_sorters
-    from chauffeur.models.sorting.training import Recipe
+    from chauffeur.models.sorting.training import SortingRecipe
 
     console = stdout()
     try:
-        card = make_sorters(out, Recipe(seed=seed), stage_lines(console), measured=measured)
+        card = make_sorters(out, SortingRecipe(seed=seed), stage_lines(console), measured=measured)
     except KeyboardInterrupt:
         console.print(f"Stopped. Whole files are kept in {out}.", soft_wrap=True)
         raise typer.Exit(130) from None

@@ -13,7 +13,7 @@ from chauffeur.cli.vehicle_drive import DRIVE_EXAMPLES, drive
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from chauffeur.worlds.ros import VehicleInterface, VehicleState
+    from chauffeur.worlds.ros import RosVehicleState, VehicleInterface
 
 vehicle_app = typer.Typer(
     cls=WithExamples,
@@ -214,7 +214,7 @@ def disengage(file: File, wait: Wait = 5.0) -> None:
     stdout().print(plain(f"Disengaged; {nodes} node{'s' if nodes > 1 else ''} took it."))
 
 
-def _wait_for(car: VehicleInterface, within_s: float, enough: Callable[[VehicleState], bool]) -> VehicleState:
+def _wait_for(car: VehicleInterface, within_s: float, enough: Callable[[RosVehicleState], bool]) -> RosVehicleState:
     """The first state that is enough, or the last one seen."""
     import time
 
@@ -224,7 +224,7 @@ def _wait_for(car: VehicleInterface, within_s: float, enough: Callable[[VehicleS
     return state
 
 
-def _line(state: VehicleState) -> str:
+def _line(state: RosVehicleState) -> str:
     from chauffeur.concept.units import kmh
 
     speed = "" if state.speed_mps is None else f" {kmh(state.speed_mps):.0f} km/h."
@@ -232,7 +232,7 @@ def _line(state: VehicleState) -> str:
     return f"{state.words}{speed}{mode}"
 
 
-def _show(state: VehicleState) -> None:
+def _show(state: RosVehicleState) -> None:
     from chauffeur.cli.console import plain, stdout
 
     stdout().print(plain(_line(state)))

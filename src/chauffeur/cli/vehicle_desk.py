@@ -14,7 +14,7 @@ from chauffeur.drive.onroad import OnRoad
 from chauffeur.drive.onroad.spoken import listening
 from chauffeur.drive.talk.asking import Words
 from chauffeur.drive.talk.attention import Attention
-from chauffeur.drive.talk.hearing import Engine
+from chauffeur.drive.talk.hearing import HearingEngine
 from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.voice import Voice
 from chauffeur.speech.answers import answer_in
@@ -33,7 +33,9 @@ class Desk:
         self._attention: Attention | None = None
 
     @contextlib.asynccontextmanager
-    async def open(self, engine: Engine | None, sound: Sound | None, voice: Voice | None) -> AsyncGenerator[Desk]:
+    async def open(
+        self, engine: HearingEngine | None, sound: Sound | None, voice: Voice | None
+    ) -> AsyncGenerator[Desk]:
         """Listen as long as this is entered, if there is an engine; wishes that were taken are answered at the end."""
         async with contextlib.AsyncExitStack() as stack:
             if engine is not None:

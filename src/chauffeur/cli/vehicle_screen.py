@@ -10,7 +10,7 @@ from rich.text import Text
 from chauffeur.cli.console import echo, plain
 from chauffeur.cli.labels import NOT_HEARD
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import Answer
+from chauffeur.drive.onroad import OnRoadAnswer
 from chauffeur.drive.talk.asking import Words
 from chauffeur.drive.talk.messages import HeardWords, Note, Said
 from chauffeur.drive.talk.voice import Voice
@@ -79,7 +79,7 @@ class VehicleScreen:
         if heard.to_confirm:
             self.say(f"Is that what you mean? Say or type yes or no. {heard.reason}".rstrip(), "bold yellow")
 
-    def answer(self, answer: Answer, spoken: Words | None = None) -> None:
+    def answer(self, answer: OnRoadAnswer, spoken: Words | None = None) -> None:
         """What became of a wish; of a spoken one also how long after the last word that was known."""
 
         self.well = self.well and (answer.done or answer.status == "superseded")

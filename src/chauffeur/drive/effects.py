@@ -14,7 +14,7 @@ from chauffeur.concept import Observation, Program, SandboxError, Thoughts
 from chauffeur.drive.episode import Episode, run_episode
 from chauffeur.drive.rehearsal import CopyableWorld
 from chauffeur.programs import ProgramExecutor, Sandbox
-from chauffeur.safety.alignment import Alignment, Effect, Surroundings, judge, read_facts
+from chauffeur.safety.alignment import Alignment, Effect, FactSurroundings, judge, read_facts
 
 MAX_S: Final = 30.0
 """Simulated seconds a program is given to show what it does."""
@@ -51,7 +51,7 @@ def judge_driven(
     """
     if not worlds:
         raise ValueError("There is no scene to run the program in.")
-    where = Surroundings.of(worlds[0].observe())
+    where = FactSurroundings.of(worlds[0].observe())
     effects = effects_of(worlds, program, sandbox=sandbox, max_s=max_s)
     return judge(thoughts.text, read_facts(program.source, program.library), where, effects)
 

@@ -25,13 +25,13 @@ if TYPE_CHECKING:
         Verdict,
     )
     from chauffeur.drive.live.messages import Report
-    from chauffeur.drive.onroad.answers import Answer, Opinion, SetpointRequest, SetpointResult
-    from chauffeur.worlds.ros.base import Published, VehicleState
+    from chauffeur.drive.onroad.answers import OnRoadAnswer, Opinion, SetpointRequest, SetpointResult
+    from chauffeur.worlds.ros.base import Published, RosVehicleState
 
     EventValue: TypeAlias = (
         Instruction | Context | History | SystemMessage | tuple[CameraImage, ...] | Plan | tuple[Verdict, ...]
-        | Frame | Report | Trip | VehicleState | SetpointRequest | Published | SetpointResult | Answer | Opinion
-        | Parameters | str
+        | Frame | Report | Trip | RosVehicleState | SetpointRequest | Published | SetpointResult | OnRoadAnswer
+        | Opinion | Parameters | str
     )  # fmt: skip
 
 Letter = Literal["wish", "context", "history", "system", "view", "plan", "verdicts"]

@@ -38,7 +38,7 @@ from chauffeur.planners.base import Planner
 from chauffeur.worlds.base import World
 
 
-class Memory(Protocol):
+class LoopMemory(Protocol):
     """The part of a memory the loop needs."""
 
     def recall(self, person: PersonId, instruction: Instruction, context: Context, k: int) -> History: ...
@@ -51,7 +51,7 @@ class Stages:
 
     world: World
     describe: Callable[[Observation], Context]
-    memory: Memory
+    memory: LoopMemory
     system: Callable[[Limits], SystemMessage]
     planner: Planner
     check: Callable[[Plan, Observation, Limits], tuple[Verdict, ...]]

@@ -33,7 +33,7 @@ class CopyableWorld(World, Protocol):
 SomeWorld = TypeVar("SomeWorld", bound=CopyableWorld)
 
 
-class Judge(Referee, Protocol):
+class RehearsalJudge(Referee, Protocol):
     """A referee that can say what a trip is worth, and how much it may still become."""
 
     @property
@@ -90,7 +90,7 @@ class Board(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class RehearsedChoice:
     """The best candidate.
 
     Attributes:
@@ -107,13 +107,13 @@ class Choice:
 def rehearse(
     world: SomeWorld,
     candidates: Sequence[str],
-    judge: Callable[[SomeWorld], Judge],
+    judge: Callable[[SomeWorld], RehearsalJudge],
     *,
     sandbox: Sandbox,
     max_s: float,
     library: str = "",
     stop_zone_m: float = STOP_ZONE_M,
-) -> Choice:
+) -> RehearsedChoice:
     """Try candidates on copies of the world and choose the one whose trip was worth most.
 
     One that collides is only chosen when all collide, one whose program fails only when all fail; of equals the first
@@ -145,7 +145,7 @@ def rehearse(
 def tries(
     world: SomeWorld,
     candidates: Sequence[str],
-    judge: Callable[[SomeWorld], Judge],
+    judge: Callable[[SomeWorld], RehearsalJudge],
     places: Iterable[int],
     *,
     sandbox: Sandbox,
@@ -175,12 +175,12 @@ def tries(
     return rollouts
 
 
-def best_choice(candidates: Sequence[str], rollouts: Mapping[int, Rollout]) -> Choice:
+def best_choice(candidates: Sequence[str], rollouts: Mapping[int, Rollout]) -> RehearsedChoice:
     """The best of all that was tried. Raises ValueError when nothing was."""
     best = best_of(rollouts)
     if best is None:
         raise ValueError("There is nothing to rehearse: no candidates.")
-    return Choice(best, candidates[best], rollouts)
+    return RehearsedChoice(best, candidates[best], rollouts)
 
 
 def best_of(rollouts: Mapping[int, Rollout]) -> int | None:
@@ -196,7 +196,9 @@ def _rank(rollout: Rollout, index: int) -> tuple[bool, bool, float, int]:
 class _Impatient:
     """A judge that ends a try which is lost, even if it came to no collision."""
 
-    def __init__(self, judge: Judge, best: tuple[bool, bool, float, int], index: int, board: Board | None) -> None:
+    def __init__(
+        self, judge: RehearsalJudge, best: tuple[bool, bool, float, int], index: int, board: Board | None
+    ) -> None:
         self._judge = judge
         self._best = best
         self._index = index
@@ -234,7 +236,7 @@ def _attempt(
     world: SomeWorld,
     index: int,
     source: str,
-    make_judge: Callable[[SomeWorld], Judge],
+    make_judge: Callable[[SomeWorld], RehearsalJudge],
     best: tuple[bool, bool, float, int],
     board: Board | None,
     sandbox: Sandbox,

@@ -42,7 +42,7 @@ from chauffeur.drive.effects import effect_of
 from chauffeur.drive.emergency import not_checked
 from chauffeur.drive.episode import Episode, Referee, run_episode
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
-from chauffeur.drive.loop import Memory, Stages, drive, steps_of
+from chauffeur.drive.loop import LoopMemory, Stages, drive, steps_of
 from chauffeur.drive.planning import declined, no_pictures, request_once, unusable
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.seat import SeatCamera
@@ -120,7 +120,7 @@ class Session:
     """
 
     planner: Planner
-    memory: Memory = field(default_factory=Forgetful)
+    memory: LoopMemory = field(default_factory=Forgetful)
     sources: SourceSettings | None = None
     referee: RefereeMaker = _no_referee
     tell: Listener = nobody_listens

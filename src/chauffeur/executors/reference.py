@@ -20,7 +20,7 @@ _BACK_M: Final = 1.0
 _ON_M: Final = 8.0
 
 
-class Place(NamedTuple):
+class ReferencePlace(NamedTuple):
     """Beside a path: station, m; offset to its left, m; its heading there, rad; its curvature, 1/m."""
 
     station_m: float
@@ -51,7 +51,7 @@ class Reference:
             self.speed = np.interp(self.stations, path.stations, np.asarray(speeds_mps))
         self._station: float | None = None
 
-    def locate(self, x_m: float, y_m: float) -> Place:
+    def locate(self, x_m: float, y_m: float) -> ReferencePlace:
         """Where a point is beside the path; looked for near where it was before."""
         if self._station is None:
             low, high = 0, len(self.x)
@@ -67,7 +67,7 @@ class Reference:
         station = nearest * STEP_M + along
         self._station = min(max(station, 0.0), self.length_m)
         # To second order the path bends away from its tangent by kappa s^2 / 2.
-        return Place(station, left - 0.5 * bend * along * along, heading + bend * along, bend)
+        return ReferencePlace(station, left - 0.5 * bend * along * along, heading + bend * along, bend)
 
     def curvatures(self, stations_m: Array) -> Array:
         """Curvature, 1/m, at stations; 0 beyond the ends."""
@@ -82,6 +82,6 @@ class Reference:
         before, behind = (self.speed_at(station_m + way) for way in (-STEP_M, STEP_M))
         return (behind * behind - before * before) / (4.0 * STEP_M)
 
-    def heading_error(self, heading_rad: float, place: Place) -> float:
+    def heading_error(self, heading_rad: float, place: ReferencePlace) -> float:
         """By how much a heading is turned to the left of the path's, rad."""
         return wrap_to_pi(heading_rad - place.heading_rad)

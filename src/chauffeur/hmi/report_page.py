@@ -14,14 +14,14 @@ from pathlib import Path
 
 from chauffeur.bench.report.model import (
     SIMULATED,
+    BenchReport,
     Cell,
     Column,
     Failure,
     FlipList,
     Gallery,
     Group,
-    Line,
-    Report,
+    ReportLine,
     ReportTable,
 )
 from chauffeur.bench.report.tables import number
@@ -47,7 +47,7 @@ _FIRST = ("scores", "pairs")
 _BAD = ("collision", "off_road", "failure", "timeout")
 
 
-def write_report_page(path: Path, report: Report) -> Path:
+def write_report_page(path: Path, report: BenchReport) -> Path:
     """Write the page of a report; the file appears whole or not at all.
 
     Args:
@@ -60,7 +60,7 @@ def write_report_page(path: Path, report: Report) -> Path:
     return publish(path, render_report(report).encode(), "report")
 
 
-def render_report(report: Report) -> str:
+def render_report(report: BenchReport) -> str:
     """The page of a report as text."""
     style = "\n".join(asset(name) for name in _STYLES)
     first = [table for table in report.tables if table.id in _FIRST]
@@ -94,7 +94,7 @@ def _text(text: str) -> str:
     return html.escape(printable(text))
 
 
-def _in_words(report: Report) -> str:
+def _in_words(report: BenchReport) -> str:
     items = "".join(f"<li><b>{_text(line.subject)}:</b> {_text(line.text)}</li>" for line in report.headlines)
     return (
         f'<section id="words" class="card">{_heading("In words")}'
@@ -217,7 +217,7 @@ def _head(column: Column) -> str:
     return f"{_text(column.title)}{unit}{_DIRECTIONS[column.better]}"
 
 
-def _row(line: Line, columns: Sequence[Column]) -> str:
+def _row(line: ReportLine, columns: Sequence[Column]) -> str:
     cells = "".join(
         f"<td {_column_head(column)}>{_cell(cell, column)}</td>"
         for cell, column in zip(line.cells, columns, strict=True)
@@ -408,7 +408,7 @@ def _token(kind: str, text: str) -> str:
     return f'<span class="{kind}">{_text(text)}</span>' if kind else _text(text)
 
 
-def _method(report: Report) -> str:
+def _method(report: BenchReport) -> str:
     terms = "".join(f"<dt>{_text(term)}</dt><dd>{_text(text)}</dd>" for term, text in report.terms)
     runs = "".join(
         f'<h4>{_text(run)}</h4><dl class="pairs mono">'

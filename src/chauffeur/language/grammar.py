@@ -61,7 +61,7 @@ class Wording:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class GrammarFrame:
     """Words around a template's: `{body}` stands for them, `{ing}` for them with the first verb as a gerund.
 
     Attributes:
@@ -88,8 +88,8 @@ class Manner:
         loud: Share of sentences with an exclamation mark instead.
     """
 
-    frames: Sequence[Frame] = (Frame("{body}"),)
-    openings: Sequence[Frame] = ()
+    frames: Sequence[GrammarFrame] = (GrammarFrame("{body}"),)
+    openings: Sequence[GrammarFrame] = ()
     questions: tuple[str, ...] = ()
     gerunds: Mapping[str, str] = field(default_factory=dict[str, str])
     unfinished: float = 0.2
@@ -222,7 +222,7 @@ class Grammar:
             return self._expand(node.parts[int(rng.integers(len(node.parts)))], slots, rng)
         return "".join(self._expand(part, slots, rng) for part in node.parts)
 
-    def _framed(self, frames: Sequence[tuple[Frame, Node]], body: str, rng: np.random.Generator) -> str:
+    def _framed(self, frames: Sequence[tuple[GrammarFrame, Node]], body: str, rng: np.random.Generator) -> str:
         first, _, rest = body.partition(" ")
         gerund = self._manner.gerunds.get(first, "")
         usable = [

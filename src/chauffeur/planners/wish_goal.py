@@ -14,17 +14,17 @@ from chauffeur.concept import PlanRequest
 
 
 @dataclass(frozen=True, slots=True)
-class Goal:
+class WishGoal:
     """See `Plan.intent` and `Plan.settings`."""
 
     intent: str = ""
     settings: tuple[tuple[str, float], ...] = ()
 
 
-NO_GOAL: Final = Goal()
+NO_GOAL: Final = WishGoal()
 
 
-def goal_of(request: PlanRequest) -> Goal:
+def goal_of(request: PlanRequest) -> WishGoal:
     """The goal of a request; `NO_GOAL` where none can be told.
 
     Only numbers that the person named are in it: how much faster "faster" is, is the planner's to choose.
@@ -42,4 +42,4 @@ def goal_of(request: PlanRequest) -> Goal:
     if isinstance(choice, Declined):
         return NO_GOAL
     named = all(step.amount is not None for step in reading.steps)
-    return Goal(choice.intent, choice.settings(()) if named else ())
+    return WishGoal(choice.intent, choice.settings(()) if named else ())

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from chauffeur.concept import Frame, Observation, VehicleState
-from chauffeur.safety.shield.frame import CROSSING_RAD, Body, Lens, Scene
+from chauffeur.safety.shield.frame import CROSSING_RAD, ShieldBody, ShieldLens, ShieldScene
 from chauffeur.safety.shield.gaps import braking_gap_m, rss_gap_m
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
 
@@ -59,7 +59,7 @@ def blame(
     """
     if not final.ego.crashed:
         return Blame("nobody", None, None, "There was no collision.")
-    lens = Lens()
+    lens = ShieldLens()
     last = frames[-1].observation if frames else final
     other = _struck(final) or _struck(last)
     if other is None:
@@ -95,7 +95,7 @@ def blame(
     return Blame("ego", other, since, "The ego followed too closely.")
 
 
-Pair = tuple[Body, Body]
+Pair = tuple[ShieldBody, ShieldBody]
 
 
 def _at_a_crossing(frames: Sequence[Frame], final: Observation, other: int) -> Blame:
@@ -141,7 +141,7 @@ def _struck(observation: Observation) -> int | None:
     return None if near is None else near.id
 
 
-def _pair(scene: Scene | None, other: int) -> Pair | None:
+def _pair(scene: ShieldScene | None, other: int) -> Pair | None:
     if scene is None:
         return None
     found = next((body for body in scene.others if body.id == other), None)

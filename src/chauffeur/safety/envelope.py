@@ -29,7 +29,7 @@ from chauffeur.concept.units import M_PER_CAR_LENGTH
 from chauffeur.geometry import turns_ahead
 from chauffeur.programs.catalogue import vocabulary_of
 from chauffeur.safety.gain_box import gain_box
-from chauffeur.safety.reading import ApiUse, Reading, read_program
+from chauffeur.safety.reading import ApiUse, ProgramReading, read_program
 from chauffeur.safety.trajectories import trajectory_faults
 from chauffeur.safety.words import IN_A_HELPER, speed_words
 
@@ -170,7 +170,7 @@ def _use_faults(use: ApiUse, road: _Road, limits: Limits) -> Iterator[_Fault]:
         )
 
 
-def _turn_faults(reading: Reading, road: _Road) -> Iterator[_Fault]:
+def _turn_faults(reading: ProgramReading, road: _Road) -> Iterator[_Fault]:
     """The first turn that a program asks for, where it asks for one only and does not look first where it can go."""
     turns = {use.name for use in reading.uses if use.name in _TURNS}
     if len(turns) != 1 or not road.turns or any(use.name in _LOOKS for use in reading.uses):
@@ -228,7 +228,7 @@ def _gap_faults(gap_m: float, road: _Road, limits: Limits) -> Iterator[_Fault]:
     )
 
 
-def _move_faults(reading: Reading, road: _Road) -> Iterator[_Fault]:
+def _move_faults(reading: ProgramReading, road: _Road) -> Iterator[_Fault]:
     """Only the first lane move starts from the lane the ego is in now; later ones start from wherever that led."""
     moves = [use for use in reading.uses if use.name == "set_target_lane"]
     offsets = [use.lane_offset for use in moves]

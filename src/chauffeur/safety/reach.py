@@ -23,7 +23,7 @@ from chauffeur.concept import Limits, Observation, Plan, Program, Verdict
 from chauffeur.programs.catalogue import TOWN_APIS, Param
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.loops import MAX_BARE_RANGE
-from chauffeur.programs.verify import CallSite, Circumstances, LoopReport, Note, Value, Verification, verify
+from chauffeur.programs.verify import CallSite, Circumstances, LoopReport, Value, Verification, VerificationNote, verify
 from chauffeur.safety.words import IN_A_HELPER, speed_words
 
 REACH_CHECK: Final = "reach-v1"
@@ -213,6 +213,6 @@ def _doubt(site: CallSite, reason: str) -> _Finding:
     return _Finding("doubt", f"{reason}{_helper(site)}", None if site.in_library else site.line)
 
 
-def _helper(place: CallSite | LoopReport | Note) -> str:
+def _helper(place: CallSite | LoopReport | VerificationNote) -> str:
     """Lines are counted in the program; a helper is known by its reason alone."""
     return f" {IN_A_HELPER}" if place.in_library else ""

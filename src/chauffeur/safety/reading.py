@@ -51,7 +51,7 @@ class ApiUse:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ProgramReading:
     """What was read.
 
     Attributes:
@@ -63,16 +63,16 @@ class Reading:
     sides_tested: frozenset[int] = frozenset()
 
 
-def read_program(source: str) -> Reading:
+def read_program(source: str) -> ProgramReading:
     """Read a program; nothing is read of text that is not Python, or far too long (`format-v1` refuses both)."""
     if len(source) > _MAX_CHARS:
-        return Reading()
+        return ProgramReading()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of the text's own oddities, e.g. `5s`; they are not the reader's
             tree = ast.parse(source)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return Reading()
+        return ProgramReading()
     return _Reader(tree).reading()
 
 
@@ -85,7 +85,7 @@ class _Reader:
         self._nodes: list[tuple[ast.AST, _Scope]] = []
         self._walk(tree)
 
-    def reading(self) -> Reading:
+    def reading(self) -> ProgramReading:
         scopes: dict[int, int] = {}
         calls = [(node, scope) for node, scope in self._nodes if isinstance(node, ast.Call)]
         calls.sort(key=lambda item: (item[0].lineno, item[0].col_offset))
@@ -104,7 +104,7 @@ class _Reader:
                     function=scopes.setdefault(id(scope), len(scopes)),
                 )
             )
-        return Reading(tuple(uses), frozenset(self._sides_tested()))
+        return ProgramReading(tuple(uses), frozenset(self._sides_tested()))
 
     # Names -----------------------------------------------------------------------------------------------------
 

@@ -46,7 +46,7 @@ _EXPECTED: Final[dict[Source, frozenset[str]]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class ScreeningFinding:
     """One thing found in a text.
 
     Attributes:
@@ -71,7 +71,7 @@ class Screened:
     """
 
     text: str
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[ScreeningFinding, ...] = ()
     withheld: bool = False
 
     @property
@@ -88,7 +88,7 @@ def screen(text: str, source: Source) -> Screened:
         source: Who wrote them; decides what a finding does.
     """
     findings = tuple(
-        Finding(kind, span, words)
+        ScreeningFinding(kind, span, words)
         for kind, span, words in (*_found(text), *_too_long(text))
         if kind not in _EXPECTED[source]
     )
@@ -118,7 +118,7 @@ class Noted:
     """A finding and the place it was found in: `wish`, `history 1`, or the name of a service's text."""
 
     place: str
-    finding: Finding
+    finding: ScreeningFinding
     withheld: bool
 
 

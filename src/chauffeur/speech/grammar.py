@@ -21,7 +21,7 @@ import numpy.typing as npt
 from chauffeur.concept import DataError, MissingExtraError
 from chauffeur.speech.audio import SAMPLE_RATE_HZ, Samples, to_float, to_int16
 from chauffeur.speech.base import HOTWORDS, Expect, Transcript
-from chauffeur.speech.jsgf import Grammar, driving_grammar
+from chauffeur.speech.jsgf import SpeechGrammar, driving_grammar
 
 SAFE_INTENTS: Final = frozenset({"slower", "stop"})
 """Rules of the grammar that are driven without asking back: misheard, they do no more than lose time."""
@@ -70,7 +70,7 @@ class GrammarRecogniser:
     Nothing it hears, except to go slower or to stop, is to be driven without asking back.
     """
 
-    def __init__(self, grammar: Grammar | None = None, *, sure: float = _SURE) -> None:
+    def __init__(self, grammar: SpeechGrammar | None = None, *, sure: float = _SURE) -> None:
         """Load the acoustic model that comes with pocketsphinx (0.5 s, 60 MB).
 
         Args:

@@ -27,7 +27,7 @@ class Part:
     parts: tuple[Part, ...] = ()
 
 
-class Grammar:
+class SpeechGrammar:
     """Rules by name."""
 
     def __init__(self, text: str, source: str = "The grammar") -> None:
@@ -161,7 +161,7 @@ def _words(part: Part) -> list[str]:
     return [part.text] if part.kind == "word" else [word for one in part.parts for word in _words(one)]
 
 
-def driving_grammar() -> Grammar:
+def driving_grammar() -> SpeechGrammar:
     """The grammar of this package: what the offline engine can hear."""
     text = resources.files("chauffeur.speech.words").joinpath("driving.gram").read_text(encoding="utf-8")
-    return Grammar(text, "driving.gram")
+    return SpeechGrammar(text, "driving.gram")

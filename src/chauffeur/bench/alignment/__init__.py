@@ -1,7 +1,7 @@
 """Whether explanations describe programs: generated and hand-written cases, and how well the judge tells them apart."""
 
 from chauffeur.bench.alignment.benchmark import JUDGE, SCORES, AlignmentBenchmark, AlignmentRow
-from chauffeur.bench.alignment.cases import Case, half_of, handwritten, of_half
+from chauffeur.bench.alignment.cases import AlignmentCase, half_of, handwritten, of_half
 from chauffeur.bench.alignment.generating import COUNT, SEED, generate
 
 __all__ = [
@@ -10,8 +10,8 @@ __all__ = [
     "SCORES",
     "SEED",
     "AlignmentBenchmark",
+    "AlignmentCase",
     "AlignmentRow",
-    "Case",
     "generate",
     "half_of",
     "handwritten",

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any, Final
 
-from chauffeur.bench.alignment.cases import ALIGNED, KINDS, Case, half_of, handwritten
+from chauffeur.bench.alignment.cases import ALIGNED, KINDS, AlignmentCase, half_of, handwritten
 from chauffeur.bench.alignment.generating import COUNT, SEED, generate
 from chauffeur.bench.kernel.benchmark import ItemOutcome, Unasked
 from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, count, register, share
@@ -26,7 +26,7 @@ SETS: Final = (GENERATED, "Written by hand, test half", "Written by hand, tuning
 class JudgeJob:
     """One case to be judged, by reading alone."""
 
-    case: Case
+    case: AlignmentCase
 
     @property
     def key(self) -> str:
@@ -134,20 +134,20 @@ class AlignmentBenchmark(Unasked):
         self.config = {"items": items, "seed": seed}
 
     @cached_property
-    def _cases(self) -> tuple[Case, ...]:
+    def _cases(self) -> tuple[AlignmentCase, ...]:
         halves = [[case for case in handwritten() if half_of(case) == half] for half in ("test", "tuning")]
         return (*generate(self.config["items"], self.config["seed"]), *halves[0], *halves[1])
 
-    def items(self) -> Sequence[Case]:
+    def items(self) -> Sequence[AlignmentCase]:
         """See Benchmark. Raises DataError: the hand-written cases are damaged."""
         return self._cases
 
-    def job(self, item: Case, answer: Row | None) -> JudgeJob:
+    def job(self, item: AlignmentCase, answer: Row | None) -> JudgeJob:
         """See Benchmark."""
         del answer
         return JudgeJob(item)
 
-    def rows(self, outcome: ItemOutcome[Case]) -> Sequence[AlignmentRow]:
+    def rows(self, outcome: ItemOutcome[AlignmentCase]) -> Sequence[AlignmentRow]:
         """See Benchmark."""
         if outcome.result is None or outcome.result["infra_failed"]:
             return ()

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal, get_args
 
 from chauffeur.concept import DataError
 from chauffeur.concept.data import read_data
-from chauffeur.safety.alignment import Kind, Surroundings
+from chauffeur.safety.alignment import FactSurroundings, Kind
 
 Half = Literal["tuning", "test"]
 
@@ -19,15 +19,15 @@ ALIGNED: Final = "aligned"
 KINDS: Final = (ALIGNED, *get_args(Kind))
 """What a case may be; all but the first are mismatches."""
 
-SCENES: Final[Mapping[str, Surroundings]] = {
-    "highway": Surroundings(speed_mps=25.0, limit_mps=31.3, gap_m=40.0, other_mps=22.0),
-    "intersection": Surroundings(speed_mps=10.0, limit_mps=10.0, sign_m=50.0, crossing=True),
+SCENES: Final[Mapping[str, FactSurroundings]] = {
+    "highway": FactSurroundings(speed_mps=25.0, limit_mps=31.3, gap_m=40.0, other_mps=22.0),
+    "intersection": FactSurroundings(speed_mps=10.0, limit_mps=10.0, sign_m=50.0, crossing=True),
 }
 """Where the programs of the hand-written cases begin."""
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class AlignmentCase:
     """A text, a program, and whether the one describes the other.
 
     Attributes:
@@ -45,7 +45,7 @@ class Case:
     thoughts: str
     program: str
     kind: str
-    where: Surroundings
+    where: FactSurroundings
     changed: str = ""
     intent: str = ""
     scenario: str = ""
@@ -58,7 +58,7 @@ class Case:
 
 
 @cache
-def handwritten() -> tuple[Case, ...]:
+def handwritten() -> tuple[AlignmentCase, ...]:
     """The cases written by hand. Raises DataError for a file that is not as it was published."""
     text = read_data("alignment", "handwritten.jsonl").decode("utf-8")
     cases = tuple(_case(json.loads(line)) for line in text.splitlines() if line)
@@ -67,19 +67,19 @@ def handwritten() -> tuple[Case, ...]:
     return cases
 
 
-def half_of(case: Case) -> Half:
+def half_of(case: AlignmentCase) -> Half:
     """Half a hand-written case belongs to, by the hash of its id: rules may be tuned on one of them only."""
     return "test" if hashlib.sha256(case.id.encode()).digest()[0] & 1 else "tuning"
 
 
-def of_half(cases: Iterable[Case], half: Half) -> tuple[Case, ...]:
+def of_half(cases: Iterable[AlignmentCase], half: Half) -> tuple[AlignmentCase, ...]:
     """The cases of one half."""
     return tuple(case for case in cases if half_of(case) == half)
 
 
-def _case(row: Mapping[str, Any]) -> Case:
+def _case(row: Mapping[str, Any]) -> AlignmentCase:
     try:
-        case = Case(row["id"], row["thoughts"], row["program"], row["kind"], SCENES[row["scene"]])
+        case = AlignmentCase(row["id"], row["thoughts"], row["program"], row["kind"], SCENES[row["scene"]])
     except KeyError as error:
         raise DataError(
             f"A hand-written alignment case lacks {error}.", hint="Restore it: git checkout -- data"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from chauffeur.bench.alignment.plans import PlannedCase, Start
+from chauffeur.bench.alignment.plans import PlannedCase, PlanStart
 from chauffeur.planners.onboard.options import Chosen
 
 What = Literal[
@@ -56,7 +56,7 @@ def tellable(deeds: Sequence[Deed], known: frozenset[str]) -> bool:
     return all(deed.what in known and (deed.what != "gap" or (deed.value or 0.0) > _LEAST_GAP_M) for deed in deeds)
 
 
-def _deed(step: Chosen, start: Start, speed: float) -> Deed:
+def _deed(step: Chosen, start: PlanStart, speed: float) -> Deed:
     kind, _, rest = step.filled.id.partition(".")
     settings = dict(step.settings)
     side = next((word for word in ("left", "right", "straight") if word in rest), "")

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from chauffeur.bench.alignment.cases import ALIGNED, KINDS, Case
+from chauffeur.bench.alignment.cases import ALIGNED, KINDS, AlignmentCase
 from chauffeur.bench.alignment.deeds import deeds_of, tellable
 from chauffeur.bench.alignment.faults import spoil
 from chauffeur.bench.alignment.plans import PlannedCase, draw
@@ -16,7 +16,7 @@ COUNT: Final = 2400
 SEED: Final = 7
 
 
-def generate(count: int = COUNT, seed: int = SEED) -> tuple[Case, ...]:
+def generate(count: int = COUNT, seed: int = SEED) -> tuple[AlignmentCase, ...]:
     """Cases in turn aligned and mismatched, the kinds of mismatch in turn.
 
     Args:
@@ -25,7 +25,7 @@ def generate(count: int = COUNT, seed: int = SEED) -> tuple[Case, ...]:
     """
     rng = np.random.default_rng(seed)
     kinds = KINDS[1:]
-    cases: list[Case] = []
+    cases: list[AlignmentCase] = []
     while len(cases) < count:
         index = len(cases)
         kind = ALIGNED if index % 2 == 0 else kinds[(index // 2) % len(kinds)]
@@ -36,7 +36,7 @@ def generate(count: int = COUNT, seed: int = SEED) -> tuple[Case, ...]:
     return tuple(cases)
 
 
-def _case(rng: np.random.Generator, planned: PlannedCase, kind: str, name: str) -> Case | None:
+def _case(rng: np.random.Generator, planned: PlannedCase, kind: str, name: str) -> AlignmentCase | None:
     changed = ""
     if kind == ALIGNED:
         deeds = deeds_of(planned)
@@ -49,4 +49,4 @@ def _case(rng: np.random.Generator, planned: PlannedCase, kind: str, name: str) 
             return None
         text, source, changed = spoiled
     start = planned.start
-    return Case(name, text, source, kind, start.where, changed, planned.intent, start.scenario, start.seed)
+    return AlignmentCase(name, text, source, kind, start.where, changed, planned.intent, start.scenario, start.seed)

@@ -18,7 +18,7 @@ from chauffeur.planners.onboard.meaning import NotUnderstood
 from chauffeur.planners.onboard.options import Chosen, Declined
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.understand import understand
-from chauffeur.safety.alignment import Surroundings
+from chauffeur.safety.alignment import FactSurroundings
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
 SEEDS_A_SCENE: Final = 8
@@ -46,13 +46,13 @@ WISHES: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class PlanStart:
     """A simulated scene at its first instant."""
 
     scenario: str
     seed: int
     situation: Situation
-    where: Surroundings
+    where: FactSurroundings
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class PlannedCase:
     """
 
     wish: str
-    start: Start
+    start: PlanStart
     steps: tuple[Chosen, ...]
 
     @property
@@ -81,14 +81,16 @@ class PlannedCase:
 
 
 @cache
-def starts() -> tuple[Start, ...]:
+def starts() -> tuple[PlanStart, ...]:
     """Scenes, the same in every run."""
-    found: list[Start] = []
+    found: list[PlanStart] = []
     for scenario in BUILT_IN:
         for offset in range(SEEDS_A_SCENE):
             seed = scenario.seed + offset
             observation = make_world(scenario).reset(scenario, seed)
-            found.append(Start(scenario.id, seed, describe(observation).situation, Surroundings.of(observation)))
+            found.append(
+                PlanStart(scenario.id, seed, describe(observation).situation, FactSurroundings.of(observation))
+            )
     return tuple(found)
 
 
@@ -106,7 +108,7 @@ def draw(rng: np.random.Generator) -> PlannedCase:
             return planned
 
 
-def plan(wish: str, start: Start) -> PlannedCase | None:
+def plan(wish: str, start: PlanStart) -> PlannedCase | None:
     """A wish over a scene; None where the planner declines."""
     reading = understand(wish)
     if isinstance(reading, NotUnderstood):

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from chauffeur.bench.alignment.deeds import Deed
-from chauffeur.bench.alignment.plans import Start
+from chauffeur.bench.alignment.plans import PlanStart
 from chauffeur.concept.units import M_PER_FOOT, MPS_PER_KMH, MPS_PER_MPH
 
 _FASTER: Final = (
@@ -102,7 +102,7 @@ _CLOSINGS: Final = (
 )  # fmt: skip
 
 
-def tell(rng: np.random.Generator, deeds: Sequence[Deed], wish: str, start: Start, checks: float = 0.75) -> str:
+def tell(rng: np.random.Generator, deeds: Sequence[Deed], wish: str, start: PlanStart, checks: float = 0.75) -> str:
     """Thoughts about deeds in this order; deterministic for a generator in a given state.
 
     Args:
@@ -136,7 +136,7 @@ def _distance_words(rng: np.random.Generator, distance_m: float) -> str:
     return f"{distance_m / M_PER_FOOT:.0f} feet" if rng.random() < 0.2 else f"{distance_m:.1f} m"
 
 
-def _situation(rng: np.random.Generator, start: Start) -> str:
+def _situation(rng: np.random.Generator, start: PlanStart) -> str:
     now = start.situation
     speed = speed_words(rng, now.speed_mps)
     parts = [

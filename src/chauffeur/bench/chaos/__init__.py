@@ -5,6 +5,6 @@ outside at a drawn moment. Nothing in the product knows of it: signals, a server
 writes into the shared memory, limits of the operating system, a clock that jumps.
 """
 
-from chauffeur.bench.chaos.cases import KINDS, Case, Kind, draw
+from chauffeur.bench.chaos.cases import KINDS, ChaosCase, FaultKind, draw
 
-__all__ = ["KINDS", "Case", "Kind", "draw"]
+__all__ = ["KINDS", "ChaosCase", "FaultKind", "draw"]

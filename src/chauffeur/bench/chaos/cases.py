@@ -38,7 +38,7 @@ _TOUCHING_M: Final = 9.0
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class FaultKind:
     """A kind of fault.
 
     Attributes:
@@ -71,28 +71,28 @@ _MEMORY: Final = (
     "checkpoints-garbage", "hand-garbage",
 )  # fmt: skip
 
-KINDS: Final[tuple[Kind, ...]] = (
-    *(Kind(f"model-{name}", "model", _PLANNING) for name in _MODEL),
-    *(Kind(name, "memory") for name in _MEMORY),
-    Kind("worker-killed", "process", DRIVING, 2),
-    Kind("policy-paused", "process", ANYTIME, 2),
-    Kind("planner-paused", "process", ANYTIME, 2),
-    Kind("policy-killed", "process", ANYTIME, 1, "heavy"),
-    Kind("policy-killed-twice", "process", DRIVING, 1, "outage"),
-    Kind("policy-and-spare-killed", "process", DRIVING, 1, "outage"),
-    Kind("policy-hangs", "process", ANYTIME, 1, "heavy"),
-    Kind("planner-killed", "process", ANYTIME, 1, "outage"),
-    Kind("planner-hangs", "process", ("before-plan", "planning"), 1, "outage"),
-    Kind("scribbled-then-killed", "memory", DRIVING, 1, "outage"),
-    Kind("control-killed", "process", ANYTIME, 1, "fatal"),
-    Kind("supervisor-killed", "process", ANYTIME, 1, "fatal"),
-    Kind("audit-disk-full", "disk"),
-    Kind("planner-disk-full", "disk", ("before-plan", "planning")),
-    Kind("profile-garbage", "disk", ("before-plan",)),
-    Kind("audit-device-full", "disk", surroundings="full-device"),
-    Kind("wall-clock-jumps", "clock", surroundings="jumping-clock"),
-    Kind("onboard-worker-killed", "process", DRIVING, surroundings="onboard"),
-    Kind("onboard-planner-paused", "process", ("before-plan", "planning"), surroundings="onboard"),
+KINDS: Final[tuple[FaultKind, ...]] = (
+    *(FaultKind(f"model-{name}", "model", _PLANNING) for name in _MODEL),
+    *(FaultKind(name, "memory") for name in _MEMORY),
+    FaultKind("worker-killed", "process", DRIVING, 2),
+    FaultKind("policy-paused", "process", ANYTIME, 2),
+    FaultKind("planner-paused", "process", ANYTIME, 2),
+    FaultKind("policy-killed", "process", ANYTIME, 1, "heavy"),
+    FaultKind("policy-killed-twice", "process", DRIVING, 1, "outage"),
+    FaultKind("policy-and-spare-killed", "process", DRIVING, 1, "outage"),
+    FaultKind("policy-hangs", "process", ANYTIME, 1, "heavy"),
+    FaultKind("planner-killed", "process", ANYTIME, 1, "outage"),
+    FaultKind("planner-hangs", "process", ("before-plan", "planning"), 1, "outage"),
+    FaultKind("scribbled-then-killed", "memory", DRIVING, 1, "outage"),
+    FaultKind("control-killed", "process", ANYTIME, 1, "fatal"),
+    FaultKind("supervisor-killed", "process", ANYTIME, 1, "fatal"),
+    FaultKind("audit-disk-full", "disk"),
+    FaultKind("planner-disk-full", "disk", ("before-plan", "planning")),
+    FaultKind("profile-garbage", "disk", ("before-plan",)),
+    FaultKind("audit-device-full", "disk", surroundings="full-device"),
+    FaultKind("wall-clock-jumps", "clock", surroundings="jumping-clock"),
+    FaultKind("onboard-worker-killed", "process", DRIVING, surroundings="onboard"),
+    FaultKind("onboard-planner-paused", "process", ("before-plan", "planning"), surroundings="onboard"),
 )
 BY_NAME: Final = {kind.name: kind for kind in KINDS}
 _ROUNDS: Final = 4
@@ -107,7 +107,7 @@ _DECK: Final = tuple(
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class ChaosCase:
     """One case.
 
     Attributes:
@@ -125,7 +125,7 @@ class Case:
     """
 
     number: int
-    kind: Kind
+    kind: FaultKind
     stage: Stage
     scenario: Scenario
     seed: int
@@ -147,13 +147,13 @@ def deck_size() -> int:
     return len(_DECK)
 
 
-def kind_of(number: int, kinds: tuple[Kind, ...] = ()) -> Kind:
+def kind_of(number: int, kinds: tuple[FaultKind, ...] = ()) -> FaultKind:
     """Kind of a case, out of some, or out of all for none."""
     deck = kinds or _DECK
     return deck[number % len(deck)]
 
 
-def draw(number: int, first: int, kinds: tuple[Kind, ...] = ()) -> Case:
+def draw(number: int, first: int, kinds: tuple[FaultKind, ...] = ()) -> ChaosCase:
     """A case.
 
     Args:
@@ -173,7 +173,7 @@ def draw(number: int, first: int, kinds: tuple[Kind, ...] = ()) -> Case:
         order[0] = int(rng.integers(2))  # the first wish changes lanes
     wishes = tuple(known[place] for place in dict.fromkeys(order))
     length = max(TRIP_S[kind.cost], CROSSING_S if crossing else 0.0)
-    return Case(
+    return ChaosCase(
         number=number,
         kind=kind,
         stage=stage,

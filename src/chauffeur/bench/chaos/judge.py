@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any, Final
 
-from chauffeur.bench.chaos.outside import Heard
+from chauffeur.bench.chaos.outside import HeardOutside
 from chauffeur.bench.chaos.witness import Stall, stood_ns
 from chauffeur.concept import Command, Frame, Limits, Observation
 from chauffeur.drive.actuate import actuate
@@ -83,7 +83,7 @@ class Deeds:
 
 
 def judge(
-    heard: Sequence[Heard],
+    heard: Sequence[HeardOutside],
     start: Start,
     known_plans: Collection[str],
     period_s: float,
@@ -166,7 +166,9 @@ class Recovery:
     to_new_plan_s: float | None
 
 
-def recovery(heard: Sequence[Heard], later: Sequence[Heard], fault_ns: int, later_plans: Collection[str]) -> Recovery:
+def recovery(
+    heard: Sequence[HeardOutside], later: Sequence[HeardOutside], fault_ns: int, later_plans: Collection[str]
+) -> Recovery:
     """How control came through a fault.
 
     Args:
@@ -190,7 +192,7 @@ def recovery(heard: Sequence[Heard], later: Sequence[Heard], fault_ns: int, late
     return Recovery(worst, back, next((_since_s(each, fault_ns) for each in new), None))
 
 
-def _since_s(heard: Heard, then_ns: int) -> float:
+def _since_s(heard: HeardOutside, then_ns: int) -> float:
     return round((heard.at_ns - then_ns) * 1e-9, 4)
 
 
@@ -207,7 +209,7 @@ def _differs(one: Command, other: Command) -> bool:
     )
 
 
-def _longest_silence_s(heard: Sequence[Heard], stalls: Sequence[Stall]) -> float:
+def _longest_silence_s(heard: Sequence[HeardOutside], stalls: Sequence[Stall]) -> float:
     gaps = (
         later.at_ns - earlier.at_ns - stood_ns(stalls, earlier.at_ns, later.at_ns) for earlier, later in pairwise(heard)
     )

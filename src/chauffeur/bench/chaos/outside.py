@@ -39,14 +39,14 @@ _JUMPING: Final = Path(__file__).parent / "jumping"
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class HeardOutside:
     """A report of control, and when it was written, by the clock of all processes."""
 
     report: Report
     at_ns: int
 
 
-class Drive:
+class OutsideDrive:
     """The processes of one drive, started by a host process of their own."""
 
     def __init__(self, settings: Settings, surroundings: Surroundings) -> None:
@@ -107,11 +107,11 @@ class Drive:
 
     # What it says -----------------------------------------------------------------------------------------------------
 
-    def reports(self) -> list[Heard]:
+    def reports(self) -> list[HeardOutside]:
         """Reports of control since the last call."""
         messages, lost = self._reports.news()
         self.lost_reports += lost
-        return [Heard(Report.decode(message.payload), message.written_ns) for message in messages]
+        return [HeardOutside(Report.decode(message.payload), message.written_ns) for message in messages]
 
     def started(self) -> list[str]:
         """Names of plans that the policy has started, or gone on with, since the last call: they passed the checks.

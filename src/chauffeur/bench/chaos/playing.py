@@ -8,10 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from chauffeur.bench.chaos.cases import Case
+from chauffeur.bench.chaos.cases import ChaosCase
 from chauffeur.bench.chaos.judge import judge, recovery
 from chauffeur.bench.chaos.model import ModelServer, Script
-from chauffeur.bench.chaos.outside import Drive, Heard
+from chauffeur.bench.chaos.outside import HeardOutside, OutsideDrive
 from chauffeur.bench.chaos.replies import WISHES
 from chauffeur.bench.chaos.vandal import FORGED
 from chauffeur.bench.chaos.witness import Witness
@@ -68,12 +68,12 @@ class Play:
         ended: Whether the trip, or the drive, is over.
     """
 
-    case: Case
+    case: ChaosCase
     trip: int
-    drive: Drive
+    drive: OutsideDrive
     server: ModelServer
     trace: Trace = silent
-    heard: list[Heard] = field(default_factory=list[Heard])
+    heard: list[HeardOutside] = field(default_factory=list[HeardOutside])
     asked: list[Asked] = field(default_factory=list[Asked])
     struck_ns: int = 0
     at_stage: bool = False
@@ -100,7 +100,7 @@ class Play:
 
     # What is heard ----------------------------------------------------------------------------------------------------
 
-    def report(self, each: Heard) -> None:
+    def report(self, each: HeardOutside) -> None:
         """A report of this trip."""
         report = each.report
         self.heard.append(each)
@@ -302,7 +302,7 @@ class Play:
         return all(one.answers for one in self.asked)
 
     def row(
-        self, start: Start, plans: set[str], period_s: float, later: list[Heard], witness: Witness
+        self, start: Start, plans: set[str], period_s: float, later: list[HeardOutside], witness: Witness
     ) -> dict[str, Any]:
         """The case as JSON values.
 
@@ -356,7 +356,7 @@ class Play:
         }
 
 
-def _brief(heard: Heard, first: Heard) -> list[Any]:
+def _brief(heard: HeardOutside, first: HeardOutside) -> list[Any]:
     """A report in short: period, ms, lateness and missed periods, rung, plan, speed, acceleration, steering, lane."""
     report = heard.report
     return [

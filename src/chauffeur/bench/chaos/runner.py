@@ -9,9 +9,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from chauffeur.bench.chaos.cases import BY_NAME, SUITE_VERSION, Case, Cost, Kind, Surroundings, draw, kind_of
+from chauffeur.bench.chaos.cases import BY_NAME, SUITE_VERSION, ChaosCase, Cost, FaultKind, Surroundings, draw, kind_of
 from chauffeur.bench.chaos.model import ModelServer, Script
-from chauffeur.bench.chaos.outside import Drive, settings_for
+from chauffeur.bench.chaos.outside import OutsideDrive, settings_for
 from chauffeur.bench.chaos.playing import Play, Trace, silent
 from chauffeur.bench.chaos.replies import WISHES
 from chauffeur.bench.chaos.witness import Witness
@@ -62,14 +62,14 @@ class ChaosConfig:
     realtime: bool = True
 
     @property
-    def deck(self) -> tuple[Kind, ...]:
+    def deck(self) -> tuple[FaultKind, ...]:
         """The kinds, empty for all. Raises ConfigError for an unknown one."""
         unknown = [name for name in self.kinds if name not in BY_NAME]
         if unknown:
             raise ConfigError(f"Unknown kind of fault: {', '.join(unknown)}.", hint=f"There are: {', '.join(BY_NAME)}.")
         return tuple(BY_NAME[name] for name in self.kinds)
 
-    def draw(self, number: int) -> Case:
+    def draw(self, number: int) -> ChaosCase:
         """A case. Raises ConfigError as `deck`."""
         return draw(number, self.first, self.deck)
 
@@ -118,7 +118,9 @@ class ChaosRun:
         content = (json.dumps({**asdict(self.config), "suite": SUITE_VERSION}, indent=1) + "\n").encode()
         freeze(self.folder / "config.json", content, same=lambda stored: _but_cases(stored) == _but_cases(content))
 
-    def _play(self, cases: Sequence[Case], server: ModelServer, witness: Witness, watch: Watch, trace: Trace) -> None:
+    def _play(
+        self, cases: Sequence[ChaosCase], server: ModelServer, witness: Witness, watch: Watch, trace: Trace
+    ) -> None:
         for case in cases:
             self._tries[case.number] = self._tries.get(case.number, 0) + 1
 
@@ -149,7 +151,7 @@ class ChaosRun:
         )
 
 
-def compose(left: Sequence[int], kinds: Sequence[Kind]) -> list[int]:
+def compose(left: Sequence[int], kinds: Sequence[FaultKind]) -> list[int]:
     """Cases for the next drive: of the same surroundings as the first that is left, what ends it last.
 
     Args:
@@ -172,7 +174,7 @@ def compose(left: Sequence[int], kinds: Sequence[Kind]) -> list[int]:
 
 
 def play_drive(
-    cases: Sequence[Case],
+    cases: Sequence[ChaosCase],
     config: ChaosConfig,
     server: ModelServer,
     witness: Witness,
@@ -195,7 +197,7 @@ def play_drive(
         speed=config.speed,
         realtime=config.realtime,
     )
-    with Drive(settings_for(settings, surroundings), surroundings) as drive:
+    with OutsideDrive(settings_for(settings, surroundings), surroundings) as drive:
         _Stage(cases, starts, drive, server, witness, _DT_S / config.speed, trace).play(keep)
 
 
@@ -204,9 +206,9 @@ class _Stage:
 
     def __init__(
         self,
-        cases: Sequence[Case],
+        cases: Sequence[ChaosCase],
         starts: Sequence[Start],
-        drive: Drive,
+        drive: OutsideDrive,
         server: ModelServer,
         witness: Witness,
         period_s: float,

@@ -21,7 +21,7 @@ from typing import Any, Final
 import numpy as np
 
 from chauffeur.drive.live.messages import MessageError, MirroredInstant
-from chauffeur.drive.live.ring import Message, Ring
+from chauffeur.drive.live.ring import Ring, RingMessage
 from chauffeur.drive.live.settings import SIZES, RingName, ring
 
 FORGED: Final = "forged"
@@ -84,7 +84,7 @@ class Vandal:
                 with Ring(self._folder / name, *SIZES[name]) as fresh:
                     fresh.write(payload)
 
-    def latest(self, name: RingName) -> Message | None:
+    def latest(self, name: RingName) -> RingMessage | None:
         """The newest message."""
         return self._rings[name].latest()
 

@@ -103,7 +103,7 @@ def untouched(scenario: Scenario) -> Episode:
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class HostileDrive:
     """What a drive came to, in numbers that later rulers can be laid on.
 
     Attributes:
@@ -159,14 +159,14 @@ class Drive:
     said: tuple[str, ...]
 
 
-def describe_drive(episode: Episode, limits: Limits) -> Drive:
+def describe_drive(episode: Episode, limits: Limits) -> HostileDrive:
     """A drive in numbers. Periods in which the fallback holds the wheel count for the car, not for the settings."""
     frames = episode.frames
     given = [frame for frame in frames if frame.program != "failed"] or list(frames)
     targets = [_speed(frame) for frame in given]
     headways = [frame.wishes.time_headway_s for frame in given]
     speeds = [frame.observation.ego.speed_mps for frame in frames] + [episode.final.ego.speed_mps]
-    return Drive(
+    return HostileDrive(
         outcome=episode.outcome,
         program=frames[-1].program if frames else "none",
         seconds=episode.duration_s,

@@ -44,7 +44,7 @@ class EngineError(ChauffeurError):
     """No worker can be started."""
 
 
-class Engine(Protocol):
+class WorkEngine(Protocol):
     """Runs jobs on as many workers as there are."""
 
     @property

@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 
 from chauffeur.bench.kernel.benchmark import BenchItem, BenchJob
 from chauffeur.bench.kernel.calls import Caller, Reply, Request
-from chauffeur.bench.kernel.engine import Engine, EngineError
+from chauffeur.bench.kernel.engine import EngineError, WorkEngine
 from chauffeur.bench.kernel.spending import Bill
 from chauffeur.bench.kernel.stages import StageStore
 from chauffeur.bench.kernel.standing import Speedometer, Standing
@@ -50,7 +50,7 @@ class Pipeline:
     """
 
     stages: StageStore[Any]
-    engine: Engine
+    engine: WorkEngine
     caller: Caller | None
     scribe: Scribe
     watch: Watch

@@ -52,7 +52,7 @@ class Price:
 
 
 @dataclass(frozen=True, slots=True)
-class Budget:
+class SpendingBudget:
     """Bounds of a run, over all its resumptions; None for none."""
 
     max_usd: float | None = None
@@ -98,7 +98,7 @@ class Spending:
         in_flight: Plans sent and not settled.
     """
 
-    budget: Budget
+    budget: SpendingBudget
     total: Bill
     dearest_usd: float | None = None
     requests_a_plan: int = 2

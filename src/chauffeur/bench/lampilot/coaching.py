@@ -22,7 +22,7 @@ from typing import Any, Literal
 from pydantic import TypeAdapter
 
 from chauffeur.bench.kernel.store import Row, RowStore, StorageError, sole_writer
-from chauffeur.bench.lampilot.critic import Attempt, Critic, Judgement
+from chauffeur.bench.lampilot.critic import Attempt, Critic, CriticJudgement
 from chauffeur.bench.lampilot.description import FALLBACK_WORDS, usable_description
 from chauffeur.bench.lampilot.policy_aid import offer
 from chauffeur.bench.lampilot.understood import referee_for
@@ -263,7 +263,7 @@ class Coach:
         policy = (self._log.rows.get(self._key(item, number), {}).get("plan") or {}).get("policy") or {}
         return function_names(policy.get("library", ""))
 
-    def _feedback(self, attempt: Attempt, judgement: Judgement) -> str:
+    def _feedback(self, attempt: Attempt, judgement: CriticJudgement) -> str:
         if self.critic.judge_id == "evaluator":
             return f"The evaluator (a program, not a person) says: {judgement.words}"
         if judgement.by_checks:
@@ -273,7 +273,7 @@ class Coach:
         return f"{failed}The passenger says: {judgement.words}"
 
     def _keep(
-        self, attempt: Attempt, critiques: Sequence[str], judgement: Judgement, runner: asyncio.Runner
+        self, attempt: Attempt, critiques: Sequence[str], judgement: CriticJudgement, runner: asyncio.Runner
     ) -> Coached:
         item, number = attempt.item, attempt.number
         try:
@@ -373,7 +373,7 @@ class Coach:
             "labels": [CRITIC_LABELS[self.critic.judge_id]],
         }
 
-    def _judged(self, item: Item, number: int, judgement: Judgement, **more: Any) -> None:
+    def _judged(self, item: Item, number: int, judgement: CriticJudgement, **more: Any) -> None:
         row = self._log.rows[self._key(item, number)]
         self._log.append(row | {"judgement": judgement.kind, "words": judgement.words, **more})
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
-from chauffeur.bench.lampilot.seen import STANDING_MPS, Seen, watch
+from chauffeur.bench.lampilot.seen import STANDING_MPS, SeenCommands, watch
 from chauffeur.drive.planning import declined
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.memory.policies_entry import Judge
@@ -47,7 +47,7 @@ class Attempt:
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class CriticJudgement:
     """What a critic decides.
 
     Attributes:
@@ -69,7 +69,7 @@ class Critic(Protocol):
         """Who it is; stands in every program it lets pass, and in every result of those."""
         ...
 
-    def judge(self, attempt: Attempt) -> Judgement:
+    def judge(self, attempt: Attempt) -> CriticJudgement:
         """Its judgement of one attempt."""
         ...
 
@@ -79,15 +79,15 @@ class EvaluatorCritic:
 
     judge_id: Judge = "evaluator"
 
-    def judge(self, attempt: Attempt) -> Judgement:
+    def judge(self, attempt: Attempt) -> CriticJudgement:
         """Keep what the evaluator calls done; else what was wrong."""
         if attempt.success:
-            return Judgement("keep")
+            return CriticJudgement("keep")
         if attempt.must_refuse:
             if attempt.recorded.trip.plan.refusal:
-                return Judgement("skip", "The wish was rightly declined; there is no program to keep.")
-            return Judgement("critique", "This wish must not be driven. Decline it, and say why in one sentence.")
-        return Judgement("critique", evaluator_words(attempt))
+                return CriticJudgement("skip", "The wish was rightly declined; there is no program to keep.")
+            return CriticJudgement("critique", "This wish must not be driven. Decline it, and say why in one sentence.")
+        return CriticJudgement("critique", evaluator_words(attempt))
 
 
 class PersonCritic:
@@ -103,30 +103,30 @@ class PersonCritic:
         """Take the way to ask: given a question, it returns the answer, or None when nobody answers any more."""
         self._ask = ask
 
-    def judge(self, attempt: Attempt) -> Judgement:
+    def judge(self, attempt: Attempt) -> CriticJudgement:
         """Ask until there is an answer that can be used."""
         question = "How was it? success, commit, skip, quit, or say what was wrong"
         while True:
             said = self._ask(question)
             if said is None:
-                return Judgement("stop")
+                return CriticJudgement("stop")
             answer = " ".join(said.split())
             match answer.casefold().rstrip(".!"):
                 case "quit" | "exit":
-                    return Judgement("stop")
+                    return CriticJudgement("stop")
                 case "skip":
-                    return Judgement("skip")
+                    return CriticJudgement("skip")
                 case "success" | "commit" as wanted:
                     problem = _not_to_be_kept(attempt, wanted)
                     if not problem:
-                        return Judgement("keep")
+                        return CriticJudgement("keep")
                     question = problem
                 case "" if attempt.refusal:
-                    return Judgement("critique", f"The program was not driven: {attempt.refusal}", by_checks=True)
+                    return CriticJudgement("critique", f"The program was not driven: {attempt.refusal}", by_checks=True)
                 case "":
                     question = "Say it in words, or: success, commit, skip, quit"
                 case _:
-                    return Judgement("critique", answer)
+                    return CriticJudgement("critique", answer)
 
 
 def _not_to_be_kept(attempt: Attempt, wanted: str) -> str:
@@ -153,7 +153,7 @@ def evaluator_words(attempt: Attempt) -> str:
     return " ".join(_sentences(attempt, seen))
 
 
-def _sentences(attempt: Attempt, seen: Seen) -> Iterator[str]:
+def _sentences(attempt: Attempt, seen: SeenCommands) -> Iterator[str]:
     trip = attempt.recorded.trip
     if trip.causes.policy_failed:
         yield f"The program failed while it ran, and the autopilot drove on without it: {trip.causes.detail}"
@@ -175,7 +175,7 @@ def _sentences(attempt: Attempt, seen: Seen) -> Iterator[str]:
     yield from _manner(seen)
 
 
-def _speed(goal: dict[str, Any], seen: Seen) -> Iterator[str]:
+def _speed(goal: dict[str, Any], seen: SeenCommands) -> Iterator[str]:
     target = float(goal["speed"]) if "speed" in goal else seen.speeds_mps[0] + float(goal["rel_speed"])
     last = seen.speeds_mps[-1]
     yield (
@@ -186,7 +186,7 @@ def _speed(goal: dict[str, Any], seen: Seen) -> Iterator[str]:
         yield f"A slower car, {seen.last_gap_m:.0f} m ahead at {seen.last_lead_mps:.1f} m/s, held it up in the end."
 
 
-def _distance(goal: dict[str, Any], seen: Seen) -> Iterator[str]:
+def _distance(goal: dict[str, Any], seen: SeenCommands) -> Iterator[str]:
     if seen.first_gap_m is None:
         return
     target = float(goal["distance"]) if "distance" in goal else seen.first_gap_m + float(goal["rel_distance"])
@@ -200,12 +200,12 @@ def _distance(goal: dict[str, Any], seen: Seen) -> Iterator[str]:
         yield f"The car changed lane to the {move.side} after {move.time_s:.1f} s, away from that car."
 
 
-def _lane_change(goal: dict[str, Any], seen: Seen) -> Iterator[str]:
+def _lane_change(goal: dict[str, Any], seen: SeenCommands) -> Iterator[str]:
     side = str(goal["direction"])
     yield from _lane_words(side, seen) or (f"It was not yet settled in the {side} lane when it was over.",)
 
 
-def _overtake(goal: dict[str, Any], seen: Seen) -> Iterator[str]:
+def _overtake(goal: dict[str, Any], seen: SeenCommands) -> Iterator[str]:
     side = str(goal["direction"])
     missing = _lane_words(side, seen)
     yield from missing
@@ -219,7 +219,7 @@ def _overtake(goal: dict[str, Any], seen: Seen) -> Iterator[str]:
         yield f"It drove at most {fastest:.1f} m/s and was at {seen.speeds_mps[-1]:.1f} m/s in the end."
 
 
-def _lane_words(side: str, seen: Seen) -> tuple[str, ...]:
+def _lane_words(side: str, seen: SeenCommands) -> tuple[str, ...]:
     """What kept the ego out of the lane beside its first one; empty when it was there in the end."""
     sign = 1 if side == "right" else -1
     if seen.side == sign:
@@ -230,7 +230,7 @@ def _lane_words(side: str, seen: Seen) -> tuple[str, ...]:
     return (f"The lane asked for is the one to the {side}. The car changed lane: {told}.",)
 
 
-def _pull_over(goal: dict[str, Any], seen: Seen) -> Iterator[str]:
+def _pull_over(goal: dict[str, Any], seen: SeenCommands) -> Iterator[str]:
     del goal
     if seen.emergency_s is None:
         yield "The car never reached the emergency lane, the rightmost one."
@@ -246,7 +246,7 @@ def _pull_over(goal: dict[str, Any], seen: Seen) -> Iterator[str]:
 _TURNS = {"o1": "left", "o2": "straight", "o3": "right"}
 
 
-def _route(goal: dict[str, Any], seen: Seen) -> Iterator[str]:
+def _route(goal: dict[str, Any], seen: SeenCommands) -> Iterator[str]:
     wanted = _TURNS.get(str(goal["direction"][1]), "the way asked for")
     if not seen.turns:
         yield f"The program chose no route; the wish is to go {wanted}."
@@ -258,7 +258,7 @@ def _route(goal: dict[str, Any], seen: Seen) -> Iterator[str]:
         yield f"It did not drive out of the intersection by the exit {wanted}."
 
 
-_GOALS: dict[str, Callable[[dict[str, Any], Seen], Iterator[str]]] = {
+_GOALS: dict[str, Callable[[dict[str, Any], SeenCommands], Iterator[str]]] = {
     "ACCEvalbySpeed": _speed,
     "ACCEvalbyDistance": _distance,
     "LaneChangeEval": _lane_change,
@@ -271,7 +271,7 @@ _HARSH_MPS = 6.0
 _NEAR_M = 8.0
 
 
-def _manner(seen: Seen) -> Iterator[str]:
+def _manner(seen: SeenCommands) -> Iterator[str]:
     if seen.spread_mps > _HARSH_MPS:
         yield f"It braked and accelerated hard: its speed varied by {seen.spread_mps:.0f} m/s."
     if seen.least_gap_m is not None and seen.least_gap_m < _NEAR_M and not seen.hit:

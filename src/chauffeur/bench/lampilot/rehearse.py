@@ -25,7 +25,7 @@ from chauffeur.bench.lampilot.metrics import (
     points,
 )
 from chauffeur.concept import Metric, Outcome, Scenario
-from chauffeur.drive.rehearsal import Choice, Rollout, best_choice, rehearse, tries
+from chauffeur.drive.rehearsal import RehearsedChoice, Rollout, best_choice, rehearse, tries
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.variants import perturbed
 from chauffeur.programs.workers import on_core
@@ -141,7 +141,7 @@ def rehearsed(
     *,
     library: str = "",
     sandbox: Sandbox | None = None,
-) -> Choice:
+) -> RehearsedChoice:
     """The program to drive from the world's present instant, chosen by LaMPilot's own ruler.
 
     Args:
@@ -208,7 +208,7 @@ class Crew:
         for pool in self._pools:
             pool.shutdown(cancel_futures=True)
 
-    def rehearsed(self, scenario: Scenario, sources: Sequence[str], *, library: str = "") -> Choice:
+    def rehearsed(self, scenario: Scenario, sources: Sequence[str], *, library: str = "") -> RehearsedChoice:
         """As `rehearsed`, for a trip that begins where the scenario does; the choice is the same."""
         self._desk.clear()
         others = [pool.submit(_share, scenario, sources, library) for pool in self._pools]

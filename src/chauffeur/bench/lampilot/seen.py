@@ -28,7 +28,7 @@ class LaneMove:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class SeenCommands:
     """A drive as an onlooker tells it. Times since the start of the drive.
 
     Attributes:
@@ -81,7 +81,7 @@ _PASSED_M = 10.0
 _ROAD_END_M = 30.0
 
 
-def watch(recorded: RecordedTrip) -> Seen | None:
+def watch(recorded: RecordedTrip) -> SeenCommands | None:
     """What was seen of a drive; None when nothing was driven."""
     frames = recorded.frames
     if not frames:
@@ -92,7 +92,7 @@ def watch(recorded: RecordedTrip) -> Seen | None:
     gaps = [gap for shot in shots if (gap := _gap(shot)) is not None]
     emergency = {lane.id for lane in shots[0].road.lanes if lane.emergency}
     ended = next((f.observation.time_s - start_s for f in frames if f.program == "finished"), None)
-    return Seen(
+    return SeenCommands(
         duration_s=recorded.trip.duration_s,
         speeds_mps=tuple(shot.ego.speed_mps for shot in shots),
         moves=_moves(shots),

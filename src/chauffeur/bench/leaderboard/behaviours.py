@@ -110,7 +110,7 @@ class ControlLoss(_Running):
             self._end()
 
 
-class Crossing(_Running):
+class CrossingBehaviour(_Running):
     """3 and 4: somebody crosses the ego's way from the right, seen late.
 
     Waits beside the road until the ego is within `starts_m` of where the ways cross, then crosses at a steady speed and
@@ -384,7 +384,7 @@ def _jaywalker(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage,
     right, left = _edges(road, lane, at)
     lanes = max(0, round((right - lane.width_m / 2.0) / lane.width_m))
     kind = "pedestrian" if rng.random() < 0.5 else "bicycle"
-    crossing = Crossing(stage, at, kind, right + 1.0, left + 1.0, 12.0 + lanes, 3.0 + 0.4 * lanes)
+    crossing = CrossingBehaviour(stage, at, kind, right + 1.0, left + 1.0, 12.0 + lanes, 3.0 + 0.4 * lanes)
     x, y = at.place(-1.5, -(right + 1.0))
     crossing.add(stage.spawn("static", Pose(x, y, at.heading_rad)))
     return crossing
@@ -404,7 +404,7 @@ def _after_turn(
     at = _Line(track).at(track.stations_m[last] + 8.0)
     lane = _lane_at(road, at, "Scenario4")
     right, left = _edges(road, lane, at)
-    return Crossing(stage, at, "bicycle", right + 1.0, left + 1.0, 13.0 + lane.width_m, 10.0)
+    return CrossingBehaviour(stage, at, "bicycle", right + 1.0, left + 1.0, 13.0 + lane.width_m, 10.0)
 
 
 def _lead(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator) -> Behaviour:

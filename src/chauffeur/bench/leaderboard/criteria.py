@@ -436,7 +436,7 @@ class OutsideLanes:
         return self._wrong_lane
 
 
-class Referee:
+class RouteReferee:
     """All rules of a route together."""
 
     def __init__(self, track: RouteTrack, limit_s: float | None = None) -> None:

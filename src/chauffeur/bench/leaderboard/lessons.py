@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from chauffeur.bench.leaderboard.criteria import Referee
+from chauffeur.bench.leaderboard.criteria import RouteReferee
 from chauffeur.bench.leaderboard.instructed import InstructedDriver, PlannerSpec
 from chauffeur.bench.leaderboard.planning import PlannedRoute, plan_official, track_of
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute
@@ -165,7 +165,7 @@ class LessonDrive:
         if refusal:
             self._world.close()
             return LessonResult(False, f"The program was not driven: {refusal}")
-        referee = Referee(self._planned.track, LIMIT_S)
+        referee = RouteReferee(self._planned.track, LIMIT_S)
         spec = PlannerSpec(plan.planner, latency_s=0.0)
         driver = InstructedDriver(
             self._world, self._planned, self._town, spec, 0, planner=_Once(plan), limits=self._limits
@@ -197,7 +197,7 @@ class LessonDrive:
             )
         return LessonResult(not words, words, seen.time_s)
 
-    def _critique(self, seen: Observation, referee: Referee, roads: Sequence[str], failed: str) -> Iterator[str]:
+    def _critique(self, seen: Observation, referee: RouteReferee, roads: Sequence[str], failed: str) -> Iterator[str]:
         if failed:
             yield f"The program failed: {failed}"
         found = {one.kind: one.message for one in referee.infractions}

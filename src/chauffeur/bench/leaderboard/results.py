@@ -14,7 +14,7 @@ from typing import Any, Final
 from typing_extensions import TypedDict  # pydantic reads the standard library's from Python 3.12 on only
 
 from chauffeur.bench.leaderboard.criteria import Infraction
-from chauffeur.bench.leaderboard.scoring import KINDS, Driven, RouteScore, mean_score, official_rates, rates
+from chauffeur.bench.leaderboard.scoring import KINDS, DrivenRoute, RouteScore, mean_score, official_rates, rates
 
 NOT_DRIVEN: Final = "not driven"
 """The engine of a route that could not be set up."""
@@ -108,10 +108,10 @@ def counted(infractions: Iterable[Infraction]) -> dict[str, int]:
     return {kind: counts.get(kind, 0) for kind in KINDS}
 
 
-def driven_of(row: Mapping[str, Any]) -> Driven:
+def driven_of(row: Mapping[str, Any]) -> DrivenRoute:
     """What the statistics read of a row."""
     score = RouteScore(float(row["rc"]), float(row["ip"]), float(row["ds"]))
-    return Driven(score, {kind: int(row[kind]) for kind in KINDS}, float(row["length_m"]))
+    return DrivenRoute(score, {kind: int(row[kind]) for kind in KINDS}, float(row["length_m"]))
 
 
 def official(rows: Sequence[Mapping[str, Any]], infractions: Mapping[str, Sequence[Infraction]]) -> dict[str, Any]:

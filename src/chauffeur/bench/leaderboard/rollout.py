@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from typing import Any, Final
 
-from chauffeur.bench.leaderboard.criteria import Referee
+from chauffeur.bench.leaderboard.criteria import RouteReferee
 from chauffeur.bench.leaderboard.drivers import RouteDriver, make_driver
 from chauffeur.bench.leaderboard.instructed import InstructedDriver, PlannerSpec, PlanningTally
 from chauffeur.bench.leaderboard.planning import plan_official
@@ -109,9 +109,9 @@ def _driven(job: RouteJob) -> dict[str, Any]:
         return _result(job, failure="Route cannot be set up", detail=str(error))
     track = planned.track
     placed = place(track, job.triggers)
-    referee = Referee(track)
+    referee = RouteReferee(track)
     if job.limit_s is not None:
-        referee = Referee(track, min(job.limit_s, referee.limit_s))
+        referee = RouteReferee(track, min(job.limit_s, referee.limit_s))
     lane_km = sum(lane.length_m for lane in town.road.lanes if lane.kind == "driving") / 1000.0
     cars = traffic_of(route.town, lane_km, job.density)
     way: dict[str, Any] = {

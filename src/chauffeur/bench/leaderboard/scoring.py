@@ -80,7 +80,7 @@ def route_score(completion: float, infractions: Iterable[Infraction], scoring: S
 
 
 @dataclass(frozen=True, slots=True)
-class Driven:
+class DrivenRoute:
     """What the statistics of a run read of a route: its points, counts of infractions by kind, its length."""
 
     score: RouteScore
@@ -88,7 +88,7 @@ class Driven:
     length_m: float
 
 
-def mean_score(routes: Sequence[Driven], planned: int | None = None) -> RouteScore:
+def mean_score(routes: Sequence[DrivenRoute], planned: int | None = None) -> RouteScore:
     """Means over the planned routes; one that was not driven counts as 0 in all three, as in the official file."""
     count = planned or len(routes)
     if not count:
@@ -100,7 +100,7 @@ def mean_score(routes: Sequence[Driven], planned: int | None = None) -> RouteSco
     )
 
 
-def official_rates(routes: Sequence[Driven]) -> dict[InfractionKind, float]:
+def official_rates(routes: Sequence[DrivenRoute]) -> dict[InfractionKind, float]:
     """Infractions a kilometre as the branch leaderboard-1.0 has them.
 
     Its faults are kept, so that files compare: routes without progress are left out, and the rates of the routes are
@@ -116,7 +116,7 @@ def official_rates(routes: Sequence[Driven]) -> dict[InfractionKind, float]:
     return found
 
 
-def rates(routes: Sequence[Driven]) -> dict[InfractionKind, float | None]:
+def rates(routes: Sequence[DrivenRoute]) -> dict[InfractionKind, float | None]:
     """Infractions a kilometre driven, over all routes together; None where nothing was driven."""
     km = sum(one.score.route / 100.0 * one.length_m / 1000.0 for one in routes)
     return {kind: sum(one.counts.get(kind, 0) for one in routes) / km if km > 0.0 else None for kind in KINDS}

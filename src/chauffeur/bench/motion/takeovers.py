@@ -50,7 +50,7 @@ from chauffeur.concept import (
 )
 from chauffeur.describe.track import describe_track
 from chauffeur.drive.episode import Episode
-from chauffeur.drive.loop import Memory, Stages, drive
+from chauffeur.drive.loop import LoopMemory, Stages, drive
 from chauffeur.drive.session import Forgetful, check_drive, declined, drive_policy, make_trip
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.memory.privacy import Privacy
@@ -297,7 +297,7 @@ class _Sitting:
         return item, wanted(self._manner, command.style, weather, float(self._rng.normal()))
 
     async def _ride(
-        self, planner: Planner, memory: Memory, person: PersonId, item: MotionItem, want: float
+        self, planner: Planner, memory: LoopMemory, person: PersonId, item: MotionItem, want: float
     ) -> tuple[Trip, MannerJudgement]:
         driven: list[Episode] = []
 

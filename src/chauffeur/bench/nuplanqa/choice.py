@@ -21,7 +21,7 @@ How = Literal["letter", "text", "ordinal", "none", "refused", "several", "unclea
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class OptionChoice:
     """What an answer chooses.
 
     Attributes:
@@ -99,7 +99,7 @@ _ORDINAL: Final = tuple(
 )
 
 
-def read_choice(answer: str, options: Sequence[str]) -> Choice:
+def read_choice(answer: str, options: Sequence[str]) -> OptionChoice:
     """The option an answer chooses.
 
     Args:
@@ -108,12 +108,12 @@ def read_choice(answer: str, options: Sequence[str]) -> Choice:
     """
     text = unicodedata.normalize("NFKC", answer).strip()
     if not text:
-        return Choice(None, "empty")
+        return OptionChoice(None, "empty")
     if (alone := _ALONE.match(text)) is not None:
         return _letter(alone.group(1))
     exact = _same(text, options)
     if exact is not None:
-        return Choice(exact, "text")
+        return OptionChoice(exact, "text")
     kept = _without_options(_NEGATED.sub(" ", text), options)
     for pattern in (_BOXED, _TAGGED):
         if found := _letters(pattern.findall(kept)):
@@ -128,32 +128,32 @@ def read_choice(answer: str, options: Sequence[str]) -> Choice:
         return _letter(bracketed[0])
     named = _named(_NEGATED.sub(" ", text), options)
     if not bracketed and len(named) == 1:
-        return Choice(named[0], "text")
+        return OptionChoice(named[0], "text")
     return _rest(kept, bracketed, named)
 
 
-def _rest(kept: str, bracketed: Sequence[str], named: Sequence[int]) -> Choice:
+def _rest(kept: str, bracketed: Sequence[str], named: Sequence[int]) -> OptionChoice:
     """What is left when no letter and no single option decides."""
     if len(set(bracketed)) > 1:
         last = _letters(_BRACKETED.findall(kept.splitlines()[-1]))
         if len(set(last)) == 1 and ("\n" in kept and (bracketed.count(last[0]) > 1 or not _lists_all(bracketed))):
             return _letter(last[0])
-        return Choice(None, "several")
+        return OptionChoice(None, "several")
     if _ALL.search(kept):
-        return Choice(None, "several")
+        return OptionChoice(None, "several")
     if _NONE.search(kept):
-        return Choice(None, "none")
+        return OptionChoice(None, "none")
     ordinal = [index for index, pattern in enumerate(_ORDINAL) if pattern.search(kept)]
     if len(ordinal) == 1:
-        return Choice(ordinal[0], "ordinal")
+        return OptionChoice(ordinal[0], "ordinal")
     if len(ordinal) > 1 or len(named) > 1:
-        return Choice(None, "several")
+        return OptionChoice(None, "several")
     if _REFUSED.search(kept):
-        return Choice(None, "refused")
+        return OptionChoice(None, "refused")
     bare = set(_BARE.findall(kept))
     if len(bare) == 1:
         return _letter(bare.pop())
-    return Choice(None, "several" if bare else "unclear")
+    return OptionChoice(None, "several" if bare else "unclear")
 
 
 def _lists_all(bracketed: Sequence[str]) -> bool:
@@ -161,7 +161,7 @@ def _lists_all(bracketed: Sequence[str]) -> bool:
     return len(set(bracketed)) == len(LETTERS)
 
 
-def _stated(text: str) -> Choice | None:
+def _stated(text: str) -> OptionChoice | None:
     """The last answer that is stated as such; none where two letters are stated in one breath ("a or b")."""
     found = list(_STATED.finditer(text))
     if not found:
@@ -170,7 +170,7 @@ def _stated(text: str) -> Choice | None:
     tail = text[last.end() : last.end() + 24]
     other = re.match(rf"\s*(?:and|or|/|&|,)\s*(?:also\s+|maybe\s+|option\s+)?{_L}{_END}", tail, re.IGNORECASE)
     if other is not None and other.group(1).lower() != last.group(1).lower():
-        return Choice(None, "several")
+        return OptionChoice(None, "several")
     return _letter(last.group(1))
 
 
@@ -183,8 +183,8 @@ def _leads(letter: str, bracketed: Sequence[str], text: str, end: int) -> bool:
     return len(listed) == 1 and not _lists_all(bracketed)
 
 
-def _letter(letter: str) -> Choice:
-    return Choice(LETTERS.index(letter.lower()), "letter")
+def _letter(letter: str) -> OptionChoice:
+    return OptionChoice(LETTERS.index(letter.lower()), "letter")
 
 
 def _letters(found: Iterable[str | tuple[str, ...]]) -> list[str]:

@@ -4,9 +4,9 @@ from chauffeur.bench.personalization.scoring import (
     SCORE_VERSION,
     DrivingScore,
     ScoreWeights,
-    Statistics,
+    TripStatistics,
     driving_score,
     statistics_of,
 )
 
-__all__ = ["SCORE_VERSION", "DrivingScore", "ScoreWeights", "Statistics", "driving_score", "statistics_of"]
+__all__ = ["SCORE_VERSION", "DrivingScore", "ScoreWeights", "TripStatistics", "driving_score", "statistics_of"]

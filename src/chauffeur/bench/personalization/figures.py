@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from chauffeur.bench.kernel.stats import Interval, bootstrap, cluster_totals
 from chauffeur.bench.personalization.sayings import LEVELS
 from chauffeur.bench.personalization.scenes import TASKS
-from chauffeur.bench.personalization.scoring import Statistics, driving_score
+from chauffeur.bench.personalization.scoring import TripStatistics, driving_score
 
 Array = NDArray[np.float64]
 Rows = Sequence[Mapping[str, Any]]
@@ -172,9 +172,9 @@ def table_viii(rows: Rows, arms: Sequence[str] = ("without", "with", "keyword"))
     return found
 
 
-def _performance(part: Rows, baseline: Statistics, task: str, level: str, arm: str) -> Performance:
+def _performance(part: Rows, baseline: TripStatistics, task: str, level: str, arm: str) -> Performance:
     mean = _mean_statistics(part)
-    scores = [driving_score(Statistics(**row["statistics"]), baseline).total for row in part]
+    scores = [driving_score(TripStatistics(**row["statistics"]), baseline).total for row in part]
     latencies = [row["latency_s"] for row in part if "latency_s" in row]
     return Performance(
         task,
@@ -190,11 +190,11 @@ def _performance(part: Rows, baseline: Statistics, task: str, level: str, arm: s
     )
 
 
-def _mean_statistics(rows: Rows) -> Statistics:
-    all_of = [Statistics(**row["statistics"]) for row in rows]
+def _mean_statistics(rows: Rows) -> TripStatistics:
+    all_of = [TripStatistics(**row["statistics"]) for row in rows]
     closing = [one.min_ttc_s for one in all_of if one.min_ttc_s is not None]
     count = len(all_of)
-    return Statistics(
+    return TripStatistics(
         math.fsum(closing) / len(closing) if closing else None,
         math.fsum(one.speed_variance for one in all_of) / count,
         math.fsum(one.mean_abs_acceleration_mps2 for one in all_of) / count,

@@ -58,7 +58,7 @@ COLUMNS: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class StudyStanding:
     """How far a study is.
 
     Attributes:
@@ -168,11 +168,11 @@ class PeopleStudy:
                     return trip
         return None
 
-    def standing(self) -> Standing:
+    def standing(self) -> StudyStanding:
         """How far it is."""
         rows = self._store.rows
         marks = [row for row in rows.values() if "mark" in row]
-        return Standing(
+        return StudyStanding(
             len(self._trips),
             sum(trip.key in rows for trip in self._trips),
             tuple(sorted(row["participant"] for row in marks if row["mark"] == "consented")),

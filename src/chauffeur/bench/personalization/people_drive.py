@@ -12,7 +12,7 @@ from chauffeur.bench.personalization.protocol import PlannedTrip
 from chauffeur.bench.personalization.riding import ReadOnly
 from chauffeur.bench.personalization.scenes import DRIVE_S, scenes_of
 from chauffeur.concept import NOBODY, Limits
-from chauffeur.drive.loop import Memory
+from chauffeur.drive.loop import LoopMemory
 from chauffeur.drive.recording import RecordedTrip, write_trip
 from chauffeur.drive.session import Forgetful, Session, parse_wish
 from chauffeur.memory.feedback import interpret_feedback
@@ -22,7 +22,7 @@ from chauffeur.planners.talk2drive.recent import RecentToo
 
 
 @dataclass(frozen=True, slots=True)
-class Driven:
+class PeopleDriven:
     """What may be told of a trip.
 
     Attributes:
@@ -34,7 +34,7 @@ class Driven:
     file: Path | None
 
 
-def drive_trip(study: PeopleStudy, trip: PlannedTrip, words: str, planner: str) -> Driven:
+def drive_trip(study: PeopleStudy, trip: PlannedTrip, words: str, planner: str) -> PeopleDriven:
     """Drive a wish with the system behind the trip's letter.
 
     Raises:
@@ -42,7 +42,7 @@ def drive_trip(study: PeopleStudy, trip: PlannedTrip, words: str, planner: str) 
     """
     arm = study.system(trip)
     driver: Planner = KeywordParameters() if arm == "keyword" else make_planner(planner)
-    memory: Memory = Forgetful()
+    memory: LoopMemory = Forgetful()
     person = NOBODY
     if arm == "with":
         person = study.person(trip.participant)
@@ -52,10 +52,10 @@ def drive_trip(study: PeopleStudy, trip: PlannedTrip, words: str, planner: str) 
     session = Session(driver, memory, max_s=DRIVE_S[trip.task])
     recorded = asyncio.run(session.drive(parse_wish(words, person), scene, scene.seed, Limits()))
     if not recorded.frames:
-        return Driven("the car declined and goes on as it was.", None)
+        return PeopleDriven("the car declined and goes on as it was.", None)
     path = study.trips_folder / trip.participant / f"{trip.number:03d}.mcap"
     write_trip(path, recorded.trip, recorded.frames, recorded.scenario, system=recorded.system, final=recorded.final)
-    return Driven(_told(recorded), path)
+    return PeopleDriven(_told(recorded), path)
 
 
 def tell_memory(study: PeopleStudy, trip: PlannedTrip, comment: str) -> bool:

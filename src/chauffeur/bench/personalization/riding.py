@@ -29,7 +29,7 @@ from chauffeur.concept import (
 )
 from chauffeur.describe import describe
 from chauffeur.drive.episode import Episode, Referee
-from chauffeur.drive.loop import Memory, Stages, drive
+from chauffeur.drive.loop import LoopMemory, Stages, drive
 from chauffeur.drive.session import check_drive, declined, drive_policy, make_trip, make_world
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import build_system_message
@@ -67,7 +67,7 @@ class Ride:
 class ReadOnly:
     """A memory that is asked and learns nothing: trips that measure must not teach."""
 
-    def __init__(self, memory: Memory) -> None:
+    def __init__(self, memory: LoopMemory) -> None:
         self._memory = memory
 
     def recall(self, person: PersonId, instruction: Instruction, context: Context, k: int) -> History:
@@ -80,7 +80,7 @@ class ReadOnly:
 
 
 async def ride(
-    planner: Planner, memory: Memory, words: str, person: PersonId, task: Task, scene: Scenario, limits: Limits
+    planner: Planner, memory: LoopMemory, words: str, person: PersonId, task: Task, scene: Scenario, limits: Limits
 ) -> Ride:
     """Drive one wish.
 

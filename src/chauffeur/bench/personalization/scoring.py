@@ -22,7 +22,7 @@ SCORE_VERSION: Final = "talk2drive-score-v1"
 
 
 @dataclass(frozen=True, slots=True)
-class Statistics:
+class TripStatistics:
     """What is measured of a drive.
 
     Attributes:
@@ -65,7 +65,7 @@ class DrivingScore:
     jerk: float
 
 
-def driving_score(drive: Statistics, baseline: Statistics, weights: ScoreWeights | None = None) -> DrivingScore:
+def driving_score(drive: TripStatistics, baseline: TripStatistics, weights: ScoreWeights | None = None) -> DrivingScore:
     """Score a drive (Eq. 18).
 
     Args:
@@ -108,7 +108,7 @@ def _share(value: float, baseline: float, weights: ScoreWeights, what: str) -> f
 
 def statistics_of(
     speeds_mps: Sequence[float], accelerations_mps2: Sequence[float], ttc_s: Iterable[float | None], dt_s: float
-) -> Statistics:
+) -> TripStatistics:
     """Measure a drive.
 
     Args:
@@ -123,7 +123,7 @@ def statistics_of(
     if len(speeds_mps) < 2 or len(accelerations_mps2) < 2:
         raise ScenarioError("A drive of less than two control periods cannot be scored.", hint="Let it drive longer.")
     jerks = [abs(after - before) / dt_s for before, after in pairwise(accelerations_mps2)]
-    return Statistics(
+    return TripStatistics(
         min_ttc_s=min((each for each in ttc_s if each is not None), default=None),
         speed_variance=pvariance(speeds_mps),
         mean_abs_acceleration_mps2=fmean(map(abs, accelerations_mps2)),

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chauffeur.bench.personalization.scoring import Statistics, statistics_of
+from chauffeur.bench.personalization.scoring import TripStatistics, statistics_of
 from chauffeur.concept import Frame, Observation, VehicleState
 from chauffeur.drive.episode import Episode
 
@@ -83,7 +83,7 @@ class Trace:
         """How long it took, s."""
         return len(self.speed) * self.dt_s
 
-    def statistics(self) -> Statistics:
+    def statistics(self) -> TripStatistics:
         """What the driving score is made of. Raises ScenarioError for a drive that was over at once."""
         closing = [float(value) if math.isfinite(value) else None for value in self.ttc_s]
         return statistics_of(self.speed.tolist(), self.acceleration.tolist(), closing, self.dt_s)

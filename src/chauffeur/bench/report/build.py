@@ -9,10 +9,10 @@ from pathlib import Path
 from chauffeur.bench.lampilot.metrics import ORIGIN
 from chauffeur.bench.report import headlines, method, pairs, tables
 from chauffeur.bench.report.failures import PICKED, failed, make_gallery
-from chauffeur.bench.report.model import FlipList, Gallery, Headline, Report, ReportTable
+from chauffeur.bench.report.model import BenchReport, FlipList, Gallery, Headline, ReportTable
 from chauffeur.bench.report.rulers import under_one_ruler
 from chauffeur.bench.report.runs import Run, load_runs, on_common_items
-from chauffeur.bench.report.tables import Sampling
+from chauffeur.bench.report.tables import RowSampling
 from chauffeur.concept import ConfigError, DataError, Scenario
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 
@@ -38,10 +38,10 @@ class Choices:
     metrics: str = ""
     data: Path | None = None
     gallery: int | None = None
-    how: Sampling = field(default_factory=Sampling)
+    how: RowSampling = field(default_factory=RowSampling)
 
 
-def build_report(folders: Sequence[Path], choices: Choices, progress: Progress) -> Report:
+def build_report(folders: Sequence[Path], choices: Choices, progress: Progress) -> BenchReport:
     """Read runs and say what came of them.
 
     Raises:
@@ -67,7 +67,7 @@ def build_report(folders: Sequence[Path], choices: Choices, progress: Progress) 
     if comparable and shared.note:
         made.append(_own_items(runs, choices.how))
     by_id = {table.id: table for table in made}
-    return Report(
+    return BenchReport(
         title="LaMPilot-Bench: " + ", ".join(run.name for run in runs),
         subtitle=f"{tables.number(len(shown[0].rows), 0)} items, ruler {shown[0].ruler}",
         summary=headlines.ran_words(shown),
@@ -123,7 +123,7 @@ def _warnings(runs: Sequence[Run], data: Dataset | None) -> list[str]:
     return found
 
 
-def _tables(runs: Sequence[Run], how: Sampling, *, compared: bool) -> list[ReportTable]:
+def _tables(runs: Sequence[Run], how: RowSampling, *, compared: bool) -> list[ReportTable]:
     origin = runs[0].ruler == ORIGIN.id
     made = [tables.score_table(runs, how, published=origin)]
     if compared:
@@ -139,7 +139,7 @@ def _tables(runs: Sequence[Run], how: Sampling, *, compared: bool) -> list[Repor
     return made
 
 
-def _own_items(runs: Sequence[Run], how: Sampling) -> ReportTable:
+def _own_items(runs: Sequence[Run], how: RowSampling) -> ReportTable:
     table = tables.score_table(runs, how, published=False)
     return replace(
         table,
@@ -149,7 +149,7 @@ def _own_items(runs: Sequence[Run], how: Sampling) -> ReportTable:
     )
 
 
-def _headlines(runs: Sequence[Run], by_id: dict[str, ReportTable], how: Sampling) -> tuple[Headline, ...]:
+def _headlines(runs: Sequence[Run], by_id: dict[str, ReportTable], how: RowSampling) -> tuple[Headline, ...]:
     lines = by_id["scores"].groups[0].lines
     found: list[Headline] = []
     for run, line in zip(runs, lines, strict=True):

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.report import families_in
 from chauffeur.bench.report.model import Failure, Gallery
-from chauffeur.bench.report.redrive import Kept, drive_again
+from chauffeur.bench.report.redrive import KeptDrive, drive_again
 from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run, item_key
 from chauffeur.bench.report.tables import name_with_labels
 from chauffeur.bench.report.wording import PERIOD_S, ending_words, goal_words, happened
@@ -79,7 +79,7 @@ def make_gallery(run: Run, others: Sequence[Run], scenes: Mapping[str, Scenario]
         DataError: A stage file of the run cannot be read.
     """
     chosen = choose_failures(run.rows, limit)
-    kept = Kept(run)
+    kept = KeptDrive(run)
     commands = Counter(str(row["sample"]) for row in run.rows)
     failures = Counter(str(row["sample"]) for row in run.rows if failed(row))
     found: list[Failure] = []
@@ -99,7 +99,7 @@ def _failure(
     siblings: str,
     elsewhere: tuple[tuple[str, str], ...],
     scenes: Mapping[str, Scenario],
-    kept: Kept,
+    kept: KeptDrive,
 ) -> Failure:
     scenario = scenes.get(str(row["sample"]))
     if scenario is None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from chauffeur.bench.lampilot.metrics import ORIGIN, ruler_named
 from chauffeur.bench.lampilot.paper import TABLE_IV, PaperRow, items_behind
 from chauffeur.bench.lampilot.report import answers_note
-from chauffeur.bench.report.model import SIMULATED, Cell, Headline, Line
+from chauffeur.bench.report.model import SIMULATED, Cell, Headline, ReportLine
 from chauffeur.bench.report.runs import Run
 from chauffeur.bench.report.tables import name_with_labels, number, said
 
@@ -32,7 +32,7 @@ def ran_words(runs: Sequence[Run]) -> str:
     )
 
 
-def result_words(run: Run, line: Line, families: Sequence[Line]) -> Headline:
+def result_words(run: Run, line: ReportLine, families: Sequence[ReportLine]) -> Headline:
     """How one run did. `line` holds the cells of the score table, `families` the same by family."""
     items, collision, completion, *_, score = line.cells
     done = sum(bool(row["success"]) for row in run.rows)
@@ -65,7 +65,7 @@ def _range(cell: Cell) -> str:
     return f", 95 % interval {low} to {high}"
 
 
-def paper_words(lines: Sequence[Line], ruler: str) -> Headline:
+def paper_words(lines: Sequence[ReportLine], ruler: str) -> Headline:
     """The best run beside the paper's best rows; under another ruler than theirs, why they are not compared."""
     model, human = paper_best()
     if ruler != ORIGIN.id:

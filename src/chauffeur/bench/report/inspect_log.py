@@ -19,9 +19,9 @@ from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.report import MEASURES, intervals
 from chauffeur.bench.report.method import facts
 from chauffeur.bench.report.model import SIMULATED
-from chauffeur.bench.report.redrive import Kept
+from chauffeur.bench.report.redrive import KeptDrive
 from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run
-from chauffeur.bench.report.tables import Sampling
+from chauffeur.bench.report.tables import RowSampling
 from chauffeur.bench.report.wording import goal_words, happened
 from chauffeur.concept import ConfigError, DataError, MissingExtraError, Plan, Program, Scenario
 
@@ -33,7 +33,7 @@ _CAUSES = ("policy_failed", "infra_failed", "refused", "fallback_used")
 _BESIDE = ("lane_ttc_s", "stop", "fault")
 
 
-def write_inspect_log(path: Path, run: Run, how: Sampling) -> Path:
+def write_inspect_log(path: Path, run: Run, how: RowSampling) -> Path:
     """Write a run as an Inspect log; the file appears whole or not at all.
 
     Args:
@@ -75,13 +75,13 @@ def _inspect() -> Any:
         ) from error
 
 
-def log_content(run: Run, how: Sampling) -> dict[str, Any]:
+def log_content(run: Run, how: RowSampling) -> dict[str, Any]:
     """The log as JSON values, in the layout of Inspect's `EvalLog`, version 2.
 
     Raises:
         DataError: The run's stages cannot be read.
     """
-    kept, scenes = Kept(run), run.scenes
+    kept, scenes = KeptDrive(run), run.scenes
     identity = hashlib.sha256(json.dumps([run.plan, run.ruler], sort_keys=True).encode("utf-8", "replace")).hexdigest()
     # A run does not note when it was made; its results were last scored then.
     scored_at = datetime.fromtimestamp((run.folder / "results.jsonl").stat().st_mtime, tz=UTC).isoformat()
@@ -115,7 +115,7 @@ def log_content(run: Run, how: Sampling) -> dict[str, Any]:
     }
 
 
-def _results(run: Run, how: Sampling) -> dict[str, Any]:
+def _results(run: Run, how: RowSampling) -> dict[str, Any]:
     found = intervals(run.rows, draws=how.draws, seed=how.seed)
     metrics = {
         name: {
@@ -143,7 +143,7 @@ def _results(run: Run, how: Sampling) -> dict[str, Any]:
     }
 
 
-def _sample(run: Run, row: Row, plan: Plan | None, kept: Kept, scene: Scenario | None) -> dict[str, Any]:
+def _sample(run: Run, row: Row, plan: Plan | None, kept: KeptDrive, scene: Scenario | None) -> dict[str, Any]:
     context = kept.context(row)
     told = "" if context is None else f"{context.text}\n\n"
     messages = [{"role": "user", "content": f"{told}{row['command']}"}]

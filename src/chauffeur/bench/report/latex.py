@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from chauffeur.bench.report.model import Cell, Column, Line, Report, ReportTable
+from chauffeur.bench.report.model import BenchReport, Cell, Column, ReportLine, ReportTable
 from chauffeur.bench.report.tables import number, said
 
 _SPECIAL = {
@@ -26,7 +26,7 @@ _SPECIAL = {
 _ARROWS = {"higher": r" $\uparrow$", "lower": r" $\downarrow$", "": ""}
 
 
-def render_latex(report: Report) -> str:
+def render_latex(report: BenchReport) -> str:
     """Every table of the report as a `table` environment, in one file."""
     head = (
         "% Made by chauffeur report. Needs \\usepackage{booktabs,graphicx} and \\usepackage[T1]{fontenc}.\n"
@@ -45,7 +45,7 @@ def _comment(text: str) -> str:
     return " ".join(text.split()).encode("ascii", "replace").decode()
 
 
-def _table(table: ReportTable, report: Report) -> str:
+def _table(table: ReportTable, report: BenchReport) -> str:
     columns = table.columns
     header = " & ".join([escape(table.first), *(escape(c.title) + _ARROWS[c.better] for c in columns)])
     units = " & ".join(["", *(escape(c.unit) for c in columns)])
@@ -79,7 +79,7 @@ def _table(table: ReportTable, report: Report) -> str:
     )
 
 
-def _line(line: Line, columns: tuple[Column, ...]) -> str:
+def _line(line: ReportLine, columns: tuple[Column, ...]) -> str:
     name = escape(said(line.name, line.labels))
     if line.published:
         name = rf"\textit{{{name}}} (paper)"

@@ -7,7 +7,7 @@ from typing import Any, cast
 from chauffeur.bench.kernel.stats import LEVEL
 from chauffeur.bench.lampilot.metrics import ORIGIN, ruler_named
 from chauffeur.bench.report.runs import Run
-from chauffeur.bench.report.tables import Sampling
+from chauffeur.bench.report.tables import RowSampling
 
 _ORIGIN: tuple[tuple[str, str], ...] = (
     (
@@ -48,7 +48,7 @@ _PAPER: tuple[tuple[str, str], ...] = (
 )
 
 
-def terms(ruler: str, how: Sampling) -> tuple[tuple[str, str], ...]:
+def terms(ruler: str, how: RowSampling) -> tuple[tuple[str, str], ...]:
     """(term, definition) of every measure under a ruler, and of intervals and tests."""
     return (
         ("Ruler", f"{ruler}: {ruler_named(ruler).title}. Every table of this report is under this one."),

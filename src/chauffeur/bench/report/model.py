@@ -64,7 +64,7 @@ NOT_KNOWN = Cell("n/a")
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class ReportLine:
     """A row of a table.
 
     Attributes:
@@ -85,7 +85,7 @@ class Group:
     """Rows that belong together, under a heading of their own where it is not empty."""
 
     heading: str
-    lines: tuple[Line, ...]
+    lines: tuple[ReportLine, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +219,7 @@ class Headline:
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class BenchReport:
     """Everything a report says.
 
     Attributes:

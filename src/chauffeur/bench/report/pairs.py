@@ -11,9 +11,9 @@ from chauffeur.bench.kernel.stats import Array, Estimator, bootstrap, sign_test
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.report import MEASURES, scene_totals
 from chauffeur.bench.report import columns as col
-from chauffeur.bench.report.model import Cell, Flip, FlipList, Group, Line, ReportTable
+from chauffeur.bench.report.model import Cell, Flip, FlipList, Group, ReportLine, ReportTable
 from chauffeur.bench.report.runs import Run
-from chauffeur.bench.report.tables import Sampling, interval_cell, name_with_labels, with_spans
+from chauffeur.bench.report.tables import RowSampling, interval_cell, name_with_labels, with_spans
 from chauffeur.bench.report.wording import ending_words
 
 ALL_PAIRS_UP_TO = 4
@@ -28,10 +28,10 @@ def pairs_of(runs: Sequence[Run]) -> list[tuple[Run, Run]]:
     return [(runs[0], other) for other in runs[1:]]
 
 
-def pair_table(runs: Sequence[Run], how: Sampling) -> ReportTable:
+def pair_table(runs: Sequence[Run], how: RowSampling) -> ReportTable:
     """Every pair of runs that lie over the same items (rows in the same order)."""
     lines = [
-        Line(
+        ReportLine(
             f"A: {a.name}; B: {b.name}",
             _pair_cells(a.rows, b.rows, how),
             tuple(dict.fromkeys((*a.labels, *b.labels))),
@@ -52,7 +52,7 @@ def pair_table(runs: Sequence[Run], how: Sampling) -> ReportTable:
     )
 
 
-def _pair_cells(a: Sequence[Row], b: Sequence[Row], how: Sampling) -> tuple[Cell, ...]:
+def _pair_cells(a: Sequence[Row], b: Sequence[Row], how: RowSampling) -> tuple[Cell, ...]:
     done = [(bool(x["success"]), bool(y["success"])) for x, y in zip(a, b, strict=True)]
     only_a, only_b = done.count((True, False)), done.count((False, True))
     votes: dict[str, int] = {}

@@ -35,7 +35,7 @@ from chauffeur.safety.shield import Shield
 from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
 
 
-class Kept:
+class KeptDrive:
     """What a run kept of its items beside the results: contexts, plans, verdicts, the hands of a person.
 
     Raises:
@@ -88,7 +88,7 @@ def _valid(adapter: Any, value: Any) -> Any:
         return None
 
 
-def drive_again(row: Row, scenario: Scenario, kept: Kept) -> tuple[RecordedTrip | None, str]:
+def drive_again(row: Row, scenario: Scenario, kept: KeptDrive) -> tuple[RecordedTrip | None, str]:
     """Drive a row's item again.
 
     Returns:
@@ -120,7 +120,9 @@ def drive_again(row: Row, scenario: Scenario, kept: Kept) -> tuple[RecordedTrip 
     return RecordedTrip(trip, episode.frames, scenario, final=episode.final), note
 
 
-def _drive(row: Row, plan: Plan | None, world: HighwayWorld, referee: LampilotReferee, kept: Kept) -> Episode | None:
+def _drive(
+    row: Row, plan: Plan | None, world: HighwayWorld, referee: LampilotReferee, kept: KeptDrive
+) -> Episode | None:
     shield = Shield(world.dt_s, LAMPILOT_LIMITS) if kept.shielded(row) else None
     if kept.baseline == "mobil":
         adjust = MobilBaseline(world.perception()).choose

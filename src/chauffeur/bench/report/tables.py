@@ -14,7 +14,7 @@ from chauffeur.bench.lampilot.metrics import ORIGIN
 from chauffeur.bench.lampilot.paper import TABLE_IV, items_behind
 from chauffeur.bench.lampilot.report import answers_note, families_in, intervals, ruler_of
 from chauffeur.bench.report import columns as col
-from chauffeur.bench.report.model import NOT_KNOWN, Cell, Column, Group, Line, ReportTable
+from chauffeur.bench.report.model import NOT_KNOWN, Cell, Column, Group, ReportLine, ReportTable
 from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run
 
 LANE_TTC_CLOSE_S = 2.0
@@ -24,7 +24,7 @@ _PER_CENT = {"collision", "completion"}
 
 
 @dataclass(frozen=True, slots=True)
-class Sampling:
+class RowSampling:
     """How intervals are made: `draws` resamples, from `seed`."""
 
     draws: int = DRAWS
@@ -60,7 +60,7 @@ def duration(seconds: float) -> str:
     return f"{seconds * 1e6:.2g} µs"
 
 
-def score_cells(rows: Sequence[Row], how: Sampling) -> tuple[Cell, ...]:
+def score_cells(rows: Sequence[Row], how: RowSampling) -> tuple[Cell, ...]:
     """Items and the columns of Tab. IV over the rows."""
     found = intervals(rows, draws=how.draws, seed=how.seed)
     columns = col.score_columns(ruler_of(rows))
@@ -70,9 +70,9 @@ def score_cells(rows: Sequence[Row], how: Sampling) -> tuple[Cell, ...]:
     )
 
 
-def score_table(runs: Sequence[Run], how: Sampling, *, published: bool) -> ReportTable:
+def score_table(runs: Sequence[Run], how: RowSampling, *, published: bool) -> ReportTable:
     """Runs in the columns of Tab. IV; the paper's rows below them where the ruler is the one they were made with."""
-    groups = [Group("", tuple(Line(run.name, score_cells(run.rows, how), run.labels) for run in runs))]
+    groups = [Group("", tuple(ReportLine(run.name, score_cells(run.rows, how), run.labels) for run in runs))]
     if published:
         groups.append(Group("Printed in the paper (Tab. IV): its authors' own figures and items", published_lines()))
     return ReportTable(
@@ -99,14 +99,14 @@ def published_table() -> ReportTable:
     )
 
 
-def published_lines() -> tuple[Line, ...]:
+def published_lines() -> tuple[ReportLine, ...]:
     """The rows of the paper's Tab. IV."""
-    lines: list[Line] = []
+    lines: list[ReportLine] = []
     for method, setting, *values in TABLE_IV:
         columns = col.score_columns(ORIGIN)
         cells = (Cell(number(v, c.digits), Interval(v)) for v, c in zip(values, columns, strict=True))
         name = method if setting == "-" else f"{method}, {setting}"
-        lines.append(Line(name, (Cell(str(items_behind(setting))), *cells), published=True))
+        lines.append(ReportLine(name, (Cell(str(items_behind(setting))), *cells), published=True))
     return tuple(lines)
 
 
@@ -130,17 +130,17 @@ def score_notes(groups: Sequence[Group]) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def family_table(runs: Sequence[Run], how: Sampling) -> ReportTable:
+def family_table(runs: Sequence[Run], how: RowSampling) -> ReportTable:
     """The same columns by task family; of several runs, side by side within each family."""
     shape = (col.ITEMS, *col.score_columns(ruler_of(runs[0].rows)))
     groups: list[Group] = []
     for family in families_in(row for run in runs for row in run.rows):
-        lines: list[Line] = []
+        lines: list[ReportLine] = []
         for run in runs:
             rows = [row for row in run.rows if row["family"] == family]
             if rows:
                 name = run.name if len(runs) > 1 else family
-                lines.append(Line(name, score_cells(rows, how), run.labels if len(runs) > 1 else ()))
+                lines.append(ReportLine(name, score_cells(rows, how), run.labels if len(runs) > 1 else ()))
         groups.append(Group(family if len(runs) > 1 else "", tuple(lines)))
     if len(runs) == 1:
         groups = [Group("", tuple(line for group in groups for line in group.lines))]
@@ -150,9 +150,9 @@ def family_table(runs: Sequence[Run], how: Sampling) -> ReportTable:
     return ReportTable("families", title, first, columns, tuple(groups), notes=score_notes(groups))
 
 
-def beside_table(runs: Sequence[Run], how: Sampling) -> ReportTable:
+def beside_table(runs: Sequence[Run], how: RowSampling) -> ReportTable:
     """What the benchmark does not score: conflicts in the own lane, stop signs, who was at fault."""
-    groups = (Group("", tuple(Line(run.name, _beside_cells(run, how), run.labels) for run in runs)),)
+    groups = (Group("", tuple(ReportLine(run.name, _beside_cells(run, how), run.labels) for run in runs)),)
     known = any(cell.text != "n/a" for line in groups[0].lines for cell in line.cells)
     notes = () if known else ("These runs did not record it; a run made anew does.",)
     return ReportTable(
@@ -166,12 +166,12 @@ def beside_table(runs: Sequence[Run], how: Sampling) -> ReportTable:
     )
 
 
-def _beside_cells(run: Run, how: Sampling) -> tuple[Cell, ...]:
+def _beside_cells(run: Run, how: RowSampling) -> tuple[Cell, ...]:
     driven = [row for row in run.rows if row["outcome"] not in NOTHING_DRIVEN]
     return (*_lane_ttc_cells(driven, how), _stop_cell(driven, how), *_fault_cells(run.rows))
 
 
-def _lane_ttc_cells(driven: Sequence[Row], how: Sampling) -> tuple[Cell, Cell]:
+def _lane_ttc_cells(driven: Sequence[Row], how: RowSampling) -> tuple[Cell, Cell]:
     recorded = [row for row in driven if "lane_ttc_s" in row]
     if not recorded:
         return NOT_KNOWN, NOT_KNOWN
@@ -185,7 +185,7 @@ def _lane_ttc_cells(driven: Sequence[Row], how: Sampling) -> tuple[Cell, Cell]:
     return median, rate_cell(col.LANE_TTC_CLOSE, recorded, close, how)
 
 
-def _stop_cell(driven: Sequence[Row], how: Sampling) -> Cell:
+def _stop_cell(driven: Sequence[Row], how: RowSampling) -> Cell:
     if not any("stop" in row for row in driven):
         return NOT_KNOWN
     passed = [row for row in driven if row.get("stop")]
@@ -201,7 +201,7 @@ def _fault_cells(rows: Sequence[Row]) -> tuple[Cell, ...]:
     return tuple(Cell(f"{sum(row.get('fault') == kind.key for row in rows):,}") for kind in kinds)
 
 
-def rate_cell(column: Column, rows: Sequence[Row], holds: Callable[[Row], bool], how: Sampling) -> Cell:
+def rate_cell(column: Column, rows: Sequence[Row], holds: Callable[[Row], bool], how: RowSampling) -> Cell:
     """Share of rows for which something holds, in per cent, with its interval and `k of n`."""
     flags = np.array([[1.0, float(holds(row))] for row in rows])
     totals = cluster_totals([str(row["sample"]) for row in rows], flags)
@@ -228,14 +228,14 @@ def outcome_table(runs: Sequence[Run]) -> ReportTable:
         "How the drives ended, and why",
         "Method",
         (*shape, *col.CAUSES),
-        (Group("", tuple(Line(run.name, cells(run), run.labels) for run in runs)),),
+        (Group("", tuple(ReportLine(run.name, cells(run), run.labels) for run in runs)),),
         lead="Every planned item ends in one way. The last three columns are causes, counted beside the ending.",
     )
 
 
 def cost_table(runs: Sequence[Run]) -> ReportTable:
     """Latency, tokens and money."""
-    groups = (Group("", tuple(Line(run.name, _cost_cells(run.rows), run.labels) for run in runs)),)
+    groups = (Group("", tuple(ReportLine(run.name, _cost_cells(run.rows), run.labels) for run in runs)),)
     return ReportTable(
         "cost",
         "Latency and cost",

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from chauffeur.bench.kernel.report import markdown
-from chauffeur.bench.report.model import SIMULATED, Cell, Column, FlipList, Gallery, Line, Report, ReportTable
+from chauffeur.bench.report.model import (
+    SIMULATED,
+    BenchReport,
+    Cell,
+    Column,
+    FlipList,
+    Gallery,
+    ReportLine,
+    ReportTable,
+)
 from chauffeur.bench.report.tables import number, said
 
 _ARROWS = {"higher": "↑", "lower": "↓", "": ""}
 
 
-def render_markdown(report: Report) -> str:
+def render_markdown(report: BenchReport) -> str:
     """The report as one Markdown document. What people and models wrote is escaped."""
     parts = [f"# {escape(report.title)}", f"{escape(report.subtitle)}; {SIMULATED}."]
     if report.labels:
@@ -51,7 +60,7 @@ def cell_text(cell: Cell, column: Column) -> str:
     return f"{text} ({cell.note})" if cell.note else text
 
 
-def line_name(line: Line) -> str:
+def line_name(line: ReportLine) -> str:
     """A row's name with its labels, and whose figures they are."""
     name = said(line.name, line.labels)
     return f"paper: {name}" if line.published else name
@@ -106,6 +115,6 @@ def _gallery(gallery: Gallery) -> list[str]:
     return parts
 
 
-def _legend(report: Report) -> list[str]:
+def _legend(report: BenchReport) -> list[str]:
     columns = {column.title: column for table in report.tables for column in table.columns if column.meaning}
     return [f"- **{escape(heading(column))}**: {escape(column.meaning)}" for column in columns.values()]

@@ -2,7 +2,7 @@
 
 from chauffeur.describe.services.gathering import ContextServices
 from chauffeur.describe.services.osm_file import load_road_map
-from chauffeur.describe.services.readings import Position, Reading, Unknown
+from chauffeur.describe.services.readings import Position, ServiceReading, Unknown
 from chauffeur.describe.services.road_map import RoadMap
 from chauffeur.describe.services.rules import Rules, load_rules, packaged_regions
 from chauffeur.describe.services.settings import ServiceSettings
@@ -13,9 +13,9 @@ from chauffeur.describe.services.surroundings import Surroundings, with_surround
 __all__ = [
     "ContextServices",
     "Position",
-    "Reading",
     "RoadMap",
     "Rules",
+    "ServiceReading",
     "ServiceSettings",
     "SourceSettings",
     "Sources",

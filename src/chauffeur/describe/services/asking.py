@@ -42,7 +42,7 @@ class ServiceError(ChauffeurError):
         self.retry_after_s = retry_after_s
 
 
-class Caller:
+class ServiceCaller:
     """Requests to one service.
 
     Args:

@@ -22,16 +22,16 @@ import numpy as np
 
 from chauffeur.concept import ConfigError
 from chauffeur.describe.services import overpass, traffic, weather
-from chauffeur.describe.services.asking import Caller
+from chauffeur.describe.services.asking import ServiceCaller
 from chauffeur.describe.services.overpass import Overpass
-from chauffeur.describe.services.readings import Position, Reading, Unknown
+from chauffeur.describe.services.readings import Position, ServiceReading, Unknown
 from chauffeur.describe.services.remote import Remote
 from chauffeur.describe.services.road_map import RoadMap
-from chauffeur.describe.services.roads import Place, place_at
+from chauffeur.describe.services.roads import RoadPlace, place_at
 from chauffeur.describe.services.rules import Rules
 from chauffeur.describe.services.settings import BUDGET_S, TRAFFIC_KEY, WEATHER_KEY, ServiceSettings, read_key
 from chauffeur.describe.services.surroundings import Surroundings
-from chauffeur.describe.services.traffic import LEAST_CONFIDENCE, TomTom, Traffic
+from chauffeur.describe.services.traffic import LEAST_CONFIDENCE, TomTom, TrafficReport
 from chauffeur.describe.services.weather import OpenWeather, Weather
 
 _OFF: Final = "no such service is switched on"
@@ -68,7 +68,7 @@ class ContextServices:
         self._road_map = road_map
         self._clock = clock
         self._rng = np.random.default_rng() if rng is None else rng
-        self._callers: list[Caller] = []
+        self._callers: list[ServiceCaller] = []
         self._weather = self._open_weather()
         self._traffic = self._tomtom()
         self._map = self._overpass()
@@ -116,15 +116,15 @@ class ContextServices:
     async def __aexit__(self, *_: object) -> None:
         await self.close()
 
-    def _place(self, here: Position, budget_s: float, now_s: float) -> Place:
+    def _place(self, here: Position, budget_s: float, now_s: float) -> RoadPlace:
         if self._road_map is not None:
             return place_at(self._road_map, here, self._rules, now_s)
         known = self._map.read(here, budget_s) if isinstance(self._map, Remote) else self._map
         if isinstance(known, Unknown):
-            return Place(known, known, known)
+            return RoadPlace(known, known, known)
         return place_at(known.value, here, self._rules, now_s, known.note)
 
-    def _flow(self, here: Position, budget_s: float) -> Reading[Traffic] | Unknown:
+    def _flow(self, here: Position, budget_s: float) -> ServiceReading[TrafficReport] | Unknown:
         known = self._traffic.read(here, budget_s) if isinstance(self._traffic, Remote) else self._traffic
         if isinstance(known, Unknown):
             return known
@@ -132,12 +132,12 @@ class ContextServices:
             return Unknown(f"the service is not sure of it: {known.value.confidence:.0%}")
         return replace(known, confidence=known.confidence * known.value.confidence)
 
-    def _told_rules(self, now_s: float) -> Reading[Rules] | Unknown:
+    def _told_rules(self, now_s: float) -> ServiceReading[Rules] | Unknown:
         if self._rules is None:
             return Unknown("no region's rules are loaded")
         year, month = (int(one) for one in self._rules.as_of.split("-"))
         age_s = max(0.0, now_s - datetime(year, month, 1, tzinfo=UTC).timestamp())
-        return Reading(self._rules, "", f"rules of {self._rules.name}", age_s, 1.0)
+        return ServiceReading(self._rules, "", f"rules of {self._rules.name}", age_s, 1.0)
 
     def _open_weather(self) -> Remote[Weather] | Unknown:
         settings = self._settings
@@ -149,7 +149,7 @@ class ContextServices:
         caller = self._caller(settings.weather_url, ("appid", key), WEATHER_KEY, weather.MAX_BYTES)
         return Remote(OpenWeather(caller, settings.weather_decimals), self._clock, self._rng)
 
-    def _tomtom(self) -> Remote[Traffic] | Unknown:
+    def _tomtom(self) -> Remote[TrafficReport] | Unknown:
         settings = self._settings
         if "traffic" not in settings.online:
             return Unknown(_OFF)
@@ -165,7 +165,9 @@ class ContextServices:
         caller = self._caller(self._settings.map_url, None, "", overpass.MAX_BYTES)
         return Remote(Overpass(caller), self._clock, self._rng)
 
-    def _caller(self, url: str, key: tuple[str, str] | None, variable: str, max_bytes: int) -> Caller:
-        made = Caller(url, key=key, key_variable=variable, patience_s=self._settings.patience_s, max_bytes=max_bytes)
+    def _caller(self, url: str, key: tuple[str, str] | None, variable: str, max_bytes: int) -> ServiceCaller:
+        made = ServiceCaller(
+            url, key=key, key_variable=variable, patience_s=self._settings.patience_s, max_bytes=max_bytes
+        )
         self._callers.append(made)
         return made

@@ -51,7 +51,7 @@ class Whereabouts(Protocol):
         ...
 
 
-class Written:
+class WrittenFix:
     """A place that a person wrote down."""
 
     def __init__(self, at: Position, where: str) -> None:

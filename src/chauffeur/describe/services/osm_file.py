@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from chauffeur.concept import DataError, MissingExtraError
 from chauffeur.describe.services.road_map import RoadMap
-from chauffeur.describe.services.ways import DRIVEABLE, Way, way_of
+from chauffeur.describe.services.ways import DRIVEABLE, ServiceWay, way_of
 
 if TYPE_CHECKING:
     import osmium.io
@@ -66,7 +66,7 @@ def load_road_map(path: Path) -> RoadMap:
     return RoadMap(ways, source=f"OpenStreetMap file {path.name}", as_of_s=changed_s if as_of_s is None else as_of_s)
 
 
-def _ways(items: Iterable[object]) -> Iterator[Way]:
+def _ways(items: Iterable[object]) -> Iterator[ServiceWay]:
     import osmium.osm
 
     for item in items:

@@ -12,12 +12,12 @@ from datetime import datetime
 from typing import Any, Final, cast
 
 from chauffeur.concept import DataError
-from chauffeur.describe.services.asking import Caller
+from chauffeur.describe.services.asking import ServiceCaller
 from chauffeur.describe.services.outside import decoded, items, number, part
 from chauffeur.describe.services.readings import Position
 from chauffeur.describe.services.remote import Told
 from chauffeur.describe.services.road_map import RoadMap
-from chauffeur.describe.services.ways import DRIVEABLE, Way, way_of
+from chauffeur.describe.services.ways import DRIVEABLE, ServiceWay, way_of
 
 MAX_BYTES: Final = 3_000_000
 RADIUS_M: Final = 500.0
@@ -50,7 +50,7 @@ def read_ways(body: bytes, centre: Position) -> Told[RoadMap]:
     return Told(RoadMap(ways, source="OpenStreetMap", as_of_s=as_of_s, extent=(centre, RADIUS_M)), as_of_s)
 
 
-def _way(one: object) -> Way | None:
+def _way(one: object) -> ServiceWay | None:
     tags = {key: value for key, value in part(one, "tags").items() if isinstance(value, str)}
     points = [
         (lat, lon)
@@ -84,7 +84,7 @@ class Overpass:
     keeps = 8  # each is a map of some megabytes
     missing = "the service has nothing for this place"
 
-    def __init__(self, caller: Caller) -> None:
+    def __init__(self, caller: ServiceCaller) -> None:
         self._caller = caller
 
     def cell(self, here: Position) -> Hashable:

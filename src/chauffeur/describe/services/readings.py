@@ -66,7 +66,7 @@ def turn_deg(one_deg: float, other_deg: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading(Generic[T_co]):
+class ServiceReading(Generic[T_co]):
     """A value that somebody told.
 
     Attributes:

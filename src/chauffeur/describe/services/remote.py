@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
 
 from chauffeur.concept import DataError
 from chauffeur.describe.services.asking import FailureKind, ServiceError
-from chauffeur.describe.services.readings import Position, Reading, Unknown
+from chauffeur.describe.services.readings import Position, ServiceReading, Unknown
 from chauffeur.describe.services.units import age_words
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ class Remote(Generic[T]):
         self._running = asyncio.get_running_loop().create_task(self._ask(here))
         return self._running
 
-    def read(self, here: Position, waited_s: float) -> Reading[T] | Unknown:
+    def read(self, here: Position, waited_s: float) -> ServiceReading[T] | Unknown:
         """The best answer there is for a position, with its age; or why there is none.
 
         Args:
@@ -166,7 +166,7 @@ class Remote(Generic[T]):
         # Sure when new, half as sure when it is about to be dropped.
         confidence = 1.0 - 0.5 * min(1.0, age_s / self._source.usable_s)
         note = "" if self._answered(here) else self._why(here, waited_s)
-        return Reading(best.value, "", self._source.name, age_s, confidence, note)
+        return ServiceReading(best.value, "", self._source.name, age_s, confidence, note)
 
     async def close(self) -> None:
         """End the request under way."""

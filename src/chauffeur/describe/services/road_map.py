@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from chauffeur.concept import DataError
 from chauffeur.describe.services.readings import M_PER_DEG, MAX_LATITUDE_DEG, Position, distance_m
-from chauffeur.describe.services.ways import Way
+from chauffeur.describe.services.ways import ServiceWay
 
 REACH_M: Final = 40.0
 """Roads farther away than this are not the road the car is on."""
@@ -68,7 +68,7 @@ class Candidate:
     """
 
     number: int
-    way: Way
+    way: ServiceWay
     distance_m: float
     segment: int
     fraction: float
@@ -92,7 +92,7 @@ class Match:
 
 
 @dataclass(frozen=True, slots=True)
-class Ahead:
+class RoadAhead:
     """What the map shows of the road ahead.
 
     Attributes:
@@ -119,7 +119,7 @@ class RoadMap:
 
     def __init__(
         self,
-        ways: Iterable[Way],
+        ways: Iterable[ServiceWay],
         *,
         source: str = "OpenStreetMap",
         as_of_s: float | None = None,
@@ -283,7 +283,7 @@ class RoadMap:
         if known is None or cost < known[0]:
             best[number] = (cost, _Near(number, away_m, segment, fraction, forward))
 
-    def ahead(self, candidate: Candidate) -> Ahead | None:
+    def ahead(self, candidate: Candidate) -> RoadAhead | None:
         """The road ahead of a car, as far as LOOK_AHEAD_M; None where the direction it drives in is not known."""
         if candidate.forward is None:
             return None
@@ -297,13 +297,13 @@ class RoadMap:
             part = self._covered(here, there)
             gone_m += part * step_m
             if part < 1.0:
-                return Ahead(None, min(gone_m, LOOK_AHEAD_M))
+                return RoadAhead(None, min(gone_m, LOOK_AHEAD_M))
             here = there
             if gone_m > LOOK_AHEAD_M:
-                return Ahead(None, LOOK_AHEAD_M)
+                return RoadAhead(None, LOOK_AHEAD_M)
             if arms[point] >= 3:
-                return Ahead(gone_m, gone_m)
-        return Ahead(None, gone_m)
+                return RoadAhead(gone_m, gone_m)
+        return RoadAhead(None, gone_m)
 
     def _covered(self, here: tuple[float, float], there: tuple[float, float]) -> float:
         """Which part of a straight line, from a place that the map knows, is on the map: 0 to 1."""

@@ -9,8 +9,8 @@ from typing import Final, Literal
 from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.describe.services.maxspeed import Conditional, limit_signed
 from chauffeur.describe.services.outside import quoted
-from chauffeur.describe.services.readings import Position, Reading, Unknown
-from chauffeur.describe.services.road_map import Ahead, Candidate, Match, RoadMap
+from chauffeur.describe.services.readings import Position, ServiceReading, Unknown
+from chauffeur.describe.services.road_map import Candidate, Match, RoadAhead, RoadMap
 from chauffeur.describe.services.rules import RoadClass, Rules, Speed
 from chauffeur.describe.services.units import speed_words
 
@@ -24,7 +24,7 @@ _PLAUSIBLE: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Road:
+class ServiceRoad:
     """The road a car is on.
 
     Attributes:
@@ -61,12 +61,12 @@ class Limit:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class RoadPlace:
     """What a map and rules tell about a position."""
 
-    road: Reading[Road] | Unknown
-    limit: Reading[Limit] | Unknown
-    ahead: Reading[Ahead] | Unknown
+    road: ServiceReading[ServiceRoad] | Unknown
+    limit: ServiceReading[Limit] | Unknown
+    ahead: ServiceReading[RoadAhead] | Unknown
 
 
 _WALKING_MPS: Final = 5.0 * MPS_PER_KMH
@@ -77,7 +77,7 @@ _BY_LAW: Final = 0.8
 _BY_DEFAULT: Final = 0.5
 
 
-def place_at(road_map: RoadMap, here: Position, rules: Rules | None, now_s: float, note: str = "") -> Place:
+def place_at(road_map: RoadMap, here: Position, rules: Rules | None, now_s: float, note: str = "") -> RoadPlace:
     """What a map tells about a position.
 
     Args:
@@ -91,13 +91,13 @@ def place_at(road_map: RoadMap, here: Position, rules: Rules | None, now_s: floa
     if match is None or match.fit < _FITS:
         pointing = "" if here.heading_deg is None else " that points the same way"
         nothing = Unknown(f"the map has no road here{pointing}")
-        return Place(nothing, nothing, nothing)
+        return RoadPlace(nothing, nothing, nothing)
     age_s = None if road_map.as_of_s is None else max(0.0, now_s - road_map.as_of_s)
 
     best = match.best
     found = limit_on(best, rules)
     agreeing = _agreeing(match, lambda one: _key(limit_on(one, rules)), _key(found))
-    limit: Reading[Limit] | Unknown
+    limit: ServiceReading[Limit] | Unknown
     if agreeing < SURE:
         found = _disputed(road_map, match, rules)
         agreeing = SURE
@@ -106,21 +106,21 @@ def place_at(road_map: RoadMap, here: Position, rules: Rules | None, now_s: floa
     else:
         sure = {"map": _SAID, "zone": _BY_LAW, "default": _BY_DEFAULT}[found.origin] * agreeing * match.fit
         source = road_map.source if found.origin == "map" or rules is None else f"rules of {rules.name}"
-        limit = Reading(found, "", source, age_s, sure, note)
+        limit = ServiceReading(found, "", source, age_s, sure, note)
 
     same = _agreeing(match, lambda one: (one.way.road_class, one.way.name), (best.way.road_class, best.way.name))
     if same < SURE:
         unclear = Unknown("several roads are near, and it is not clear which one this is")
-        return Place(unclear, limit, unclear)
+        return RoadPlace(unclear, limit, unclear)
     way = best.way
-    road = Road(way.road_class, quoted(way.name) if way.name else "", way.lanes, way.oneway != 0)
+    road = ServiceRoad(way.road_class, quoted(way.name) if way.name else "", way.lanes, way.oneway != 0)
     ahead = road_map.ahead(best)
-    return Place(
-        Reading(road, "", road_map.source, age_s, same * match.fit, note),
+    return RoadPlace(
+        ServiceReading(road, "", road_map.source, age_s, same * match.fit, note),
         limit,
         Unknown("the heading is not known")
         if ahead is None
-        else Reading(ahead, "m", road_map.source, age_s, same * match.fit, note),
+        else ServiceReading(ahead, "m", road_map.source, age_s, same * match.fit, note),
     )
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept import Context
-from chauffeur.describe.services.readings import Reading, Unknown
+from chauffeur.describe.services.readings import ServiceReading, Unknown
 from chauffeur.describe.services.surroundings import Surroundings
 from chauffeur.describe.services.units import age_words
 
@@ -51,7 +51,7 @@ def told(found: Surroundings | Unknown) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _source(reading: Reading[object] | Unknown) -> str:
+def _source(reading: ServiceReading[object] | Unknown) -> str:
     if isinstance(reading, Unknown):
         return ""
     age = "of unknown age" if reading.age_s is None else f"{age_words(reading.age_s)} old"

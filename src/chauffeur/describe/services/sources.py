@@ -25,7 +25,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from chauffeur.concept import ConfigError
 from chauffeur.describe.services.gathering import ContextServices
-from chauffeur.describe.services.gps import Gpsd, Whereabouts, Written
+from chauffeur.describe.services.gps import Gpsd, Whereabouts, WrittenFix
 from chauffeur.describe.services.osm_file import load_road_map
 from chauffeur.describe.services.readings import Position, Unknown
 from chauffeur.describe.services.road_map import RoadMap
@@ -167,7 +167,7 @@ class Sources:
         )
         self._settings = settings
         if settings.at is not None:
-            self._where: Whereabouts = Written(settings.at, settings.name)
+            self._where: Whereabouts = WrittenFix(settings.at, settings.name)
         else:
             assert settings.gpsd is not None
             self._where = Gpsd(*settings.gpsd)

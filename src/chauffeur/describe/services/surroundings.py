@@ -8,11 +8,11 @@ from typing import Final, TypeVar
 
 from chauffeur.concept import Context
 from chauffeur.describe.services.maxspeed import Conditional
-from chauffeur.describe.services.readings import Position, Reading, Unknown
-from chauffeur.describe.services.road_map import Ahead
-from chauffeur.describe.services.roads import Limit, Road
+from chauffeur.describe.services.readings import Position, ServiceReading, Unknown
+from chauffeur.describe.services.road_map import RoadAhead
+from chauffeur.describe.services.roads import Limit, ServiceRoad
 from chauffeur.describe.services.rules import Rules
-from chauffeur.describe.services.traffic import Traffic
+from chauffeur.describe.services.traffic import TrafficReport
 from chauffeur.describe.services.units import age_words, distance_words, speed_words
 from chauffeur.describe.services.weather import Weather
 
@@ -43,12 +43,12 @@ class Surroundings:
 
     at: Position
     when_s: float
-    weather: Reading[Weather] | Unknown
-    road: Reading[Road] | Unknown
-    limit: Reading[Limit] | Unknown
-    ahead: Reading[Ahead] | Unknown
-    traffic: Reading[Traffic] | Unknown
-    rules: Reading[Rules] | Unknown
+    weather: ServiceReading[Weather] | Unknown
+    road: ServiceReading[ServiceRoad] | Unknown
+    limit: ServiceReading[Limit] | Unknown
+    ahead: ServiceReading[RoadAhead] | Unknown
+    traffic: ServiceReading[TrafficReport] | Unknown
+    rules: ServiceReading[Rules] | Unknown
 
     def words(self) -> tuple[str, ...]:
         """One line for each thing that C says. Of a service's own wording only names are in them, quoted."""
@@ -56,7 +56,7 @@ class Surroundings:
 
     def scene(self) -> tuple[tuple[str, str], ...]:
         """The same lines, each with its name, as `Situation.scene` takes them."""
-        rules = self.rules.value if isinstance(self.rules, Reading) else None
+        rules = self.rules.value if isinstance(self.rules, ServiceReading) else None
         return (
             ("weather", _line("Weather", self.weather, lambda value: weather_words(value, self.when_s), _YOUNG_S)),
             ("road", _line("Road", self.road, road_words, _OLD_MAP_S)),
@@ -107,7 +107,7 @@ def with_surroundings(context: Context, surroundings: Surroundings) -> Context:
     return replace(context, text=" ".join((context.text, *surroundings.words())).strip(), situation=situation)
 
 
-def _line(name: str, known: Reading[T] | Unknown, say: Callable[[T], str], young_s: float) -> str:
+def _line(name: str, known: ServiceReading[T] | Unknown, say: Callable[[T], str], young_s: float) -> str:
     if isinstance(known, Unknown):
         return f"{name}: not known ({known.reason})."
     age = f" {age_words(known.age_s)} old" if known.age_s is not None and known.age_s >= young_s else ""
@@ -140,7 +140,7 @@ def _visibility(visibility_m: float) -> str:
     return f"{visibility_m / 1000.0:.1f} km" if visibility_m >= 1_000.0 else f"{visibility_m:.0f} m"
 
 
-def road_words(road: Road) -> str:
+def road_words(road: ServiceRoad) -> str:
     """A road in words."""
     parts = [f"{road.road_class.replace('_', ' ')}{f' {road.name}' if road.name else ''}"]
     if road.lanes is not None:
@@ -172,14 +172,14 @@ def _both(speed_mps: float, rules: Rules | None) -> str:
     return f"{speed_words(speed_mps, rules)} ({speed_mps:.1f} m/s)"
 
 
-def ahead_words(ahead: Ahead, rules: Rules | None) -> str:
+def ahead_words(ahead: RoadAhead, rules: Rules | None) -> str:
     """How far the next junction is, in words."""
     if ahead.junction_m is not None:
         return f"in {distance_words(ahead.junction_m, rules)}"
     return f"none on the next {distance_words(ahead.seen_m, rules)}, as far as the map shows the road"
 
 
-def traffic_words(traffic: Traffic, rules: Rules | None) -> str:
+def traffic_words(traffic: TrafficReport, rules: Rules | None) -> str:
     """How traffic flows, in words."""
     if traffic.closed:
         return "the road is closed"
@@ -211,7 +211,7 @@ def _note(note: str | None) -> str:
 Cells = tuple[tuple[str, float | str | None, str], ...]
 
 
-def _rows(name: str, known: Reading[T] | Unknown, cells: Callable[[T], Cells]) -> Iterator[Row]:
+def _rows(name: str, known: ServiceReading[T] | Unknown, cells: Callable[[T], Cells]) -> Iterator[Row]:
     if isinstance(known, Unknown):
         yield Row(name, None, "", "", None, 0.0, known.reason)
         return
@@ -233,7 +233,7 @@ def _weather_cells(weather: Weather) -> Cells:
     return tuple(cell for cell in cells if cell[1] is not None)
 
 
-def _road_cells(road: Road) -> Cells:
+def _road_cells(road: ServiceRoad) -> Cells:
     oneway = "one way" if road.oneway else "both ways"
     cells: Cells = (
         ("class", road.road_class, ""),
@@ -249,7 +249,7 @@ def _limit_cells(limit: Limit) -> Cells:
     return (("", limit.speed_mps, "m/s"), ("origin", limit.origin, ""), *detail)
 
 
-def _traffic_cells(traffic: Traffic) -> Cells:
+def _traffic_cells(traffic: TrafficReport) -> Cells:
     return (
         ("speed", traffic.speed_mps, "m/s"),
         ("free_speed", traffic.free_mps, "m/s"),

@@ -15,7 +15,7 @@ from typing import Final
 
 from chauffeur.concept import DataError
 from chauffeur.concept.units import MPS_PER_KMH
-from chauffeur.describe.services.asking import Caller
+from chauffeur.describe.services.asking import ServiceCaller
 from chauffeur.describe.services.outside import decoded, items, number, part
 from chauffeur.describe.services.readings import M_PER_DEG, Position
 from chauffeur.describe.services.remote import Told
@@ -36,7 +36,7 @@ _ZOOM: Final = 12
 
 
 @dataclass(frozen=True, slots=True)
-class Traffic:
+class TrafficReport:
     """How traffic flows on the road.
 
     Attributes:
@@ -66,7 +66,7 @@ class Traffic:
         return away_m <= NEAR_M and turn <= _MAX_TURN_DEG
 
 
-def read_traffic(body: bytes) -> Told[Traffic]:
+def read_traffic(body: bytes) -> Told[TrafficReport]:
     """The traffic in an answer.
 
     Raises:
@@ -84,7 +84,7 @@ def read_traffic(body: bytes) -> Told[Traffic]:
         and (lon := number(point, "longitude", -180.0, 180.0)) is not None
     )
     closed = segment.get("roadClosure") is True
-    return Told(Traffic(speed * MPS_PER_KMH, free * MPS_PER_KMH, closed, confidence, line))
+    return Told(TrafficReport(speed * MPS_PER_KMH, free * MPS_PER_KMH, closed, confidence, line))
 
 
 def _nearest(line: tuple[tuple[float, float], ...], here: Position) -> tuple[float, float] | None:
@@ -119,7 +119,7 @@ class TomTom:
     keeps = 64
     missing = "the road that the service answered for is another one"
 
-    def __init__(self, caller: Caller) -> None:
+    def __init__(self, caller: ServiceCaller) -> None:
         self._caller = caller
 
     def cell(self, here: Position) -> Hashable:
@@ -127,17 +127,17 @@ class TomTom:
         way = None if here.heading_deg is None else round(here.heading_deg / 90.0) % 4
         return (*here.rounded(3), way)
 
-    def near(self, value: Traffic, asked: Position, here: Position) -> bool:
+    def near(self, value: TrafficReport, asked: Position, here: Position) -> bool:
         """On the same segment."""
         del asked
         return value.about(here)
 
-    def serves(self, value: Traffic, asked: Position, here: Position) -> bool:
+    def serves(self, value: TrafficReport, asked: Position, here: Position) -> bool:
         """On the same segment."""
         del asked
         return value.about(here)
 
-    async def ask(self, here: Position) -> Told[Traffic]:
+    async def ask(self, here: Position) -> Told[TrafficReport]:
         """Ask how traffic flows at a position."""
         latitude, longitude = here.rounded(_DECIMALS)
         path = f"/traffic/services/4/flowSegmentData/absolute/{_ZOOM}/json"

@@ -25,7 +25,7 @@ _LANES: Final[Mapping[str, int]] = {"motorway": 2, "service": 1, "track": 1, "li
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class ServiceWay:
     """One way of the map that a car can drive on.
 
     Attributes:
@@ -52,7 +52,7 @@ class Way:
         return _LANE_WIDTH_M * (self.lanes or _LANES.get(self.road_class, 2)) / 2.0
 
 
-def way_of(number: int, tags: Mapping[str, str], points: Iterable[tuple[float, float]]) -> Way | None:
+def way_of(number: int, tags: Mapping[str, str], points: Iterable[tuple[float, float]]) -> ServiceWay | None:
     """A way from its tags and points; None where no car may drive, or where fewer than two points differ."""
     road_class = tags.get("highway", "")
     if road_class not in DRIVEABLE or tags.get("area") == "yes":
@@ -66,7 +66,7 @@ def way_of(number: int, tags: Mapping[str, str], points: Iterable[tuple[float, f
     line = [point for point, before in zip(line, [None, *line], strict=False) if point != before]
     if len(line) < 2:
         return None
-    return Way(
+    return ServiceWay(
         id=number,
         road_class=cast("RoadClass", road_class),
         name=(tags.get("name") or tags.get("ref") or "")[:_TEXT_CHARS],

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final, cast
 
 from chauffeur.concept import DataError
-from chauffeur.describe.services.asking import Caller
+from chauffeur.describe.services.asking import ServiceCaller
 from chauffeur.describe.services.outside import decoded, items, number, part
 from chauffeur.describe.services.readings import Position, distance_m
 from chauffeur.describe.services.remote import Told
@@ -139,7 +139,7 @@ class OpenWeather:
     keeps = 64
     missing = "the service has nothing for this place"
 
-    def __init__(self, caller: Caller, decimals: int) -> None:
+    def __init__(self, caller: ServiceCaller, decimals: int) -> None:
         self._caller = caller
         self._decimals = decimals
 

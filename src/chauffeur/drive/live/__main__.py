@@ -140,7 +140,7 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     from chauffeur.describe.services.sources import read_sources
     from chauffeur.drive.live.mirror import Mirror
     from chauffeur.drive.live.planning import Planning, PlanningRings
-    from chauffeur.drive.loop import Memory
+    from chauffeur.drive.loop import LoopMemory
     from chauffeur.drive.session import Forgetful
     from chauffeur.memory.choice import open_memory
     from chauffeur.planners.registry import make_planner
@@ -155,7 +155,7 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     options = {} if settings.base_url is None else {"base_url": settings.base_url}
     planner = make_planner(settings.planner, **options)
     sources = read_sources(Path(settings.services)) if settings.services else None
-    memory: Memory = fitting(open_memory(settings.memory), settings.planner) if settings.memory else Forgetful()
+    memory: LoopMemory = fitting(open_memory(settings.memory), settings.planner) if settings.memory else Forgetful()
     planning = Planning(
         mirror,
         rings,

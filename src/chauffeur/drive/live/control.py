@@ -22,7 +22,7 @@ from chauffeur.concept import ActionMatrix, ChauffeurError, Command, Observation
 from chauffeur.drive.actuate import Actuated, actuate, set_points
 from chauffeur.drive.fallback import MINIMAL_RISK_BRAKING_MPS2
 from chauffeur.drive.live.ladder import Ladder
-from chauffeur.drive.live.messages import MessageError, MirroredInstant, Report, Rung, Steered, Wish
+from chauffeur.drive.live.messages import LiveWish, MessageError, MirroredInstant, Report, Rung, Steered
 from chauffeur.drive.live.realtime import Ticker
 from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
@@ -84,7 +84,7 @@ class Control:
         self._trip = 0
         self._tick = 0
         self._heard = 0
-        self._wish: Wish | None = None
+        self._wish: LiveWish | None = None
         self._alone_since = 0
         """Period from which nobody has wished anything."""
         self._wheel = Wheel(rings.hand, clock_ns)
@@ -265,7 +265,7 @@ class Control:
         if message is not None and message.number != self._heard:
             self._heard = message.number
             try:
-                wish = self._believed(Wish.decode(message.payload))
+                wish = self._believed(LiveWish.decode(message.payload))
                 if wish is not None:
                     self._bind(wish, start)
                     self._wish = wish
@@ -277,7 +277,7 @@ class Control:
         since_issue_s = (self._clock_ns() - self._wish.issued_ns) * 1e-9 * self._speed
         return max(0.0, since_issue_s, (self._tick - self._wish.tick) * self.dt_s)
 
-    def _believed(self, wish: Wish) -> Wish | None:
+    def _believed(self, wish: LiveWish) -> LiveWish | None:
         """The wish, if it can be meant for now; None if it was made before the wheel last changed hands.
 
         Raises:
@@ -300,7 +300,7 @@ class Control:
             raise MessageError("no such lane")
         return wish
 
-    def _bind(self, wish: Wish, start: Start) -> None:
+    def _bind(self, wish: LiveWish, start: Start) -> None:
         """Have the policy of a wish driven from now on; nothing where it is already, or where it has none.
 
         Raises:

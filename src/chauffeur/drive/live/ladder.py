@@ -18,7 +18,7 @@ from typing import Final
 from chauffeur.concept import LaneId, Observation, Wishes
 from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.drive.fallback import keep_lane_and_gap
-from chauffeur.drive.live.messages import Rung, Wish
+from chauffeur.drive.live.messages import LiveWish, Rung
 
 RUNGS: Final[tuple[Rung, ...]] = ("follow", "hold", "keep", "slow", "stop")
 
@@ -57,7 +57,7 @@ class Ladder:
         return self._table.hold_s
 
     def choose(
-        self, at_s: float, wish: Wish | None, age_s: float, observation: Observation, *, expired: bool = False
+        self, at_s: float, wish: LiveWish | None, age_s: float, observation: Observation, *, expired: bool = False
     ) -> tuple[Rung, Wishes]:
         """The rung and its wishes.
 

@@ -78,7 +78,7 @@ class MirroredInstant:
 
 
 @dataclass(frozen=True, slots=True)
-class Hand:
+class WheelHand:
     """What the person at the wheel does. Each message says who has the wheel, so that none of them may be missed.
 
     Attributes:
@@ -94,7 +94,7 @@ class Hand:
         return _HAND.pack(_HAND_MARK, self.on, (self.key or "").encode())
 
     @classmethod
-    def decode(cls, payload: bytes) -> Hand:
+    def decode(cls, payload: bytes) -> WheelHand:
         """From bytes. Raises MessageError."""
         if len(payload) != _HAND.size or payload[: len(_HAND_MARK)] != _HAND_MARK or payload[len(_HAND_MARK)] > 1:
             raise MessageError("no hand")
@@ -187,7 +187,7 @@ def _policy(fields: dict[str, Any]) -> Parameters | ActionMatrix | Trajectory:
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class LiveWish:
     """What the policy wishes now.
 
     Attributes:
@@ -236,7 +236,7 @@ class Wish:
         ).encode()
 
     @classmethod
-    def decode(cls, payload: bytes) -> Wish:
+    def decode(cls, payload: bytes) -> LiveWish:
         """From bytes, every field of its type and within what a car could mean.
 
         Raises:

@@ -38,7 +38,7 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class PlannedScene:
     """The instant a plan was made for.
 
     Attributes:
@@ -55,7 +55,7 @@ class Scene:
     pose: tuple[float, float, float] | None = None
 
     @classmethod
-    def of(cls, trip: int, observation: Observation) -> Scene:
+    def of(cls, trip: int, observation: Observation) -> PlannedScene:
         """What of an instant a plan relies on."""
         ego, front = observation.ego, observation.front
         lead = None if front is None else front.vehicle
@@ -77,7 +77,7 @@ class Order:
 
     wish: str
     plan: Plan
-    scene: Scene
+    scene: PlannedScene
     issued_ns: int
     start_by_ns: int
     expires_ns: int

@@ -23,13 +23,13 @@ from chauffeur.drive.live.orders import (
     MOST_SAID,
     Brief,
     Order,
+    PlannedScene,
     Request,
-    Scene,
     encode,
     read_request,
 )
 from chauffeur.drive.live.ring import Reader, Ring
-from chauffeur.drive.loop import Memory
+from chauffeur.drive.loop import LoopMemory
 from chauffeur.drive.planning import PLAN_WITHIN_S, RECALLED, START_WITHIN_S, Judged, PlanSteps, plan_once
 from chauffeur.drive.seat import SeatCamera
 from chauffeur.drive.session import parse_wish
@@ -63,7 +63,7 @@ class Planning:
         mirror: Mirror,
         rings: PlanningRings,
         planner: Planner,
-        memory: Memory,
+        memory: LoopMemory,
         *,
         sources: SourceSettings | None = None,
         setting: Setting = "few-shot",
@@ -144,7 +144,7 @@ class Planning:
         issued_ns = self._clock_ns()  # before the look: what is seen may already be old when it has been taken in
         self._mirror.follow()
         observation, limits = self._mirror.world.observe(), self._mirror.limits
-        scene = Scene.of(self._mirror.trip, observation)
+        scene = PlannedScene.of(self._mirror.trip, observation)
         instruction = replace(parse_wish(request.text, PersonId(request.person)), confirmed=request.confirmed)
 
         async def describe() -> Context:

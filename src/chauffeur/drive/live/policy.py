@@ -45,16 +45,16 @@ from chauffeur.drive.live.messages import (
     MOST_PERIOD_S,
     MOST_SPEED_MPS,
     MOST_WAYPOINTS,
+    LiveWish,
     MessageError,
     Steered,
-    Wish,
 )
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.orders import (
     MOST_SAID,
     TOOK_OVER,
     Order,
-    Scene,
+    PlannedScene,
     encode,
     read_order,
 )
@@ -178,7 +178,7 @@ class Policy:
             state, line = self._run(driven)
         assert self._wishes is not None
         self._rings.wishes.write(
-            Wish(
+            LiveWish(
                 trip=self._trip,
                 tick=self._mirror.tick,
                 plan="" if driven is None else driven.wish,
@@ -243,7 +243,7 @@ class Policy:
             self._tell("interrupted", order.wish, "You have the wheel.")
             return
         observation = self._mirror.world.observe()
-        late = self._too_late(order, Scene.of(self._trip, observation))
+        late = self._too_late(order, PlannedScene.of(self._trip, observation))
         if late:
             self._tell("stale", order.wish, late)
             return
@@ -343,7 +343,7 @@ class Policy:
         turn = None if self._wishes is None else self._wishes.turn
         return turn or "" if observation.road.junctions else ""
 
-    def _too_late(self, order: Order, now: Scene) -> str:
+    def _too_late(self, order: Order, now: PlannedScene) -> str:
         scene = order.scene
         if scene.trip != now.trip:
             return "The plan was made for another trip."
@@ -487,7 +487,7 @@ class Policy:
         if message is None:
             return True
         try:
-            last = Wish.decode(message.payload)
+            last = LiveWish.decode(message.payload)
         except MessageError:
             return True
         return last.plan != wish or last.state != "running"

@@ -34,7 +34,7 @@ _AHEAD_NS: Final = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class RingMessage:
     """A whole message.
 
     Attributes:
@@ -136,7 +136,7 @@ class Ring:
         _HEAD.pack_into(self._map, _HEAD_AT, number)
         return number
 
-    def latest(self) -> Message | None:
+    def latest(self) -> RingMessage | None:
         """The newest whole message; None if there is none yet, or what is there is broken."""
         for _ in range(_TRIES):
             number = self.head
@@ -148,10 +148,10 @@ class Ring:
         self.torn += 1
         return None
 
-    def newer(self, than_ns: int, until_ns: int) -> tuple[Message, ...]:
+    def newer(self, than_ns: int, until_ns: int) -> tuple[RingMessage, ...]:
         """Whole messages written in a time, oldest first. It goes back from the newest one until one is older."""
         head = self.head
-        found: list[Message] = []
+        found: list[RingMessage] = []
         for number in range(head, max(0, head - self._slots), -1):
             message = self._read(number)
             if message is None or message.written_ns >= until_ns:
@@ -164,7 +164,7 @@ class Ring:
     def _at(self, number: int) -> int:
         return _SLOTS_AT + number % self._slots * self._stride
 
-    def _read(self, number: int) -> Message | None:
+    def _read(self, number: int) -> RingMessage | None:
         at = self._at(number)
         found, written_ns, length, checksum = _SLOT.unpack_from(self._map, at)
         if found != number or length > self._size:
@@ -173,7 +173,7 @@ class Ring:
         head = struct.pack("<QqI", number, written_ns, length)
         if zlib.crc32(payload, zlib.crc32(head)) != checksum:
             return None
-        return Message(number, written_ns, payload)
+        return RingMessage(number, written_ns, payload)
 
 
 class Reader:
@@ -194,7 +194,7 @@ class Reader:
         self._number = 0 if old else ring.head
         self._written_ns = 0 if old else time.monotonic_ns()
 
-    def news(self) -> tuple[tuple[Message, ...], int]:
+    def news(self) -> tuple[tuple[RingMessage, ...], int]:
         """Whole messages since the last call, oldest first, and how many are known to be lost."""
         found = self._ring.newer(self._written_ns, time.monotonic_ns() + _AHEAD_NS)
         if not found:

@@ -25,7 +25,7 @@ from chauffeur.concept import NOBODY, SandboxError
 from chauffeur.drive.emergency import STOPPING, stop_wanted
 from chauffeur.drive.events import FINAL, DriveEvent, EventKind, Listener, nobody_listens
 from chauffeur.drive.live.__main__ import FIGURES_FILE, READY_SUFFIX
-from chauffeur.drive.live.messages import Hand, Key, MessageError, Report, Wish
+from chauffeur.drive.live.messages import Key, LiveWish, MessageError, Report, WheelHand
 from chauffeur.drive.live.orders import (
     TOOK_OVER,
     Brief,
@@ -34,7 +34,7 @@ from chauffeur.drive.live.orders import (
     read_brief,
     read_event,
 )
-from chauffeur.drive.live.ring import Message, Reader
+from chauffeur.drive.live.ring import Reader, RingMessage
 from chauffeur.drive.live.settings import SIZES, RingName, Settings, ring
 from chauffeur.language.emergency import read_emergency
 
@@ -193,7 +193,7 @@ class Runtime:
                     self._close(interaction, DriveEvent("interrupted", interaction.request.wish, TOOK_OVER))
 
     def _say_who_drives(self) -> None:
-        self._rings["hand"].write(Hand(self._taken_over).encode())
+        self._rings["hand"].write(WheelHand(self._taken_over).encode())
         self._handed_s = time.monotonic()
 
     @property
@@ -208,7 +208,7 @@ class Runtime:
         lane, or a turn where a crossing is ahead, `brake` brakes to a stand. Limits and shield stay.
         """
         if self._taken_over and self._rings:
-            self._rings["hand"].write(Hand(True, key).encode())
+            self._rings["hand"].write(WheelHand(True, key).encode())
 
     def poll(self) -> None:
         """Hear what came, see who lives."""
@@ -436,7 +436,7 @@ class Runtime:
         if message is None or message.written_ns * 1e-9 < policy.started_s:
             return
         try:
-            goes_on = Wish.decode(message.payload).plan == wish
+            goes_on = LiveWish.decode(message.payload).plan == wish
         except MessageError:
             return
         del self._doubtful[wish]
@@ -453,7 +453,7 @@ class Runtime:
     def _hear(self) -> None:
         self._hear_reports()
         # Events first, for a brief is left before its plan is told of: but what it says is known before they are taken.
-        told: tuple[tuple[Role, tuple[Message, ...]], ...] = (
+        told: tuple[tuple[Role, tuple[RingMessage, ...]], ...] = (
             ("planner", self._heard["planner_events"].news()[0]),
             ("policy", self._heard["policy_events"].news()[0]),
         )
@@ -486,7 +486,7 @@ class Runtime:
             for text in report.said:
                 self._take(DriveEvent("said", report.plan, text, report.trip, report.tick), "control")
 
-    def _hear_events(self, sent_by: Role, messages: tuple[Message, ...]) -> None:
+    def _hear_events(self, sent_by: Role, messages: tuple[RingMessage, ...]) -> None:
         for message in messages:
             try:
                 event = read_event(message.payload)

@@ -15,7 +15,7 @@ from typing import Final
 
 from chauffeur.concept import STOP_ZONE_M, Observation, Wishes
 from chauffeur.concept.units import MPS_PER_KMH
-from chauffeur.drive.live.messages import Hand, Key, MessageError
+from chauffeur.drive.live.messages import Key, MessageError, WheelHand
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.worlds.base import EGO, Perception
 
@@ -52,7 +52,7 @@ class Wheel:
         keys: tuple[Key, ...] = ()
         for message in self._heard.news()[0]:
             try:
-                hand = Hand.decode(message.payload)
+                hand = WheelHand.decode(message.payload)
             except MessageError as error:
                 refused[str(error)] += 1
                 continue

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from chauffeur.concept import Feedback, Parameters, Plan, Verdict
-from chauffeur.worlds.ros.base import Published, VehicleState
+from chauffeur.worlds.ros.base import Published, RosVehicleState
 
 Status = Literal[
     "delivered", "dry-run", "unconfirmed", "unreachable", "refused", "declined", "failed", "superseded", "taken"
@@ -22,7 +22,7 @@ DONE: Final[frozenset[Status]] = frozenset({"delivered", "dry-run", "taken"})
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class OnRoadAnswer:
     """What became of a wish.
 
     Attributes:
@@ -69,15 +69,15 @@ class SetpointRequest:
 
     parameters: Parameters
     in_force: Parameters | None
-    state: VehicleState
+    state: RosVehicleState
 
 
 @dataclass(frozen=True, slots=True)
 class SetpointResult:
     """What came of asking: the answer as it stands, and the way to the vehicle."""
 
-    answer: Answer
-    state: VehicleState
+    answer: OnRoadAnswer
+    state: RosVehicleState
 
 
 @dataclass(frozen=True, slots=True)

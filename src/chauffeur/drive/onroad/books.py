@@ -17,10 +17,10 @@ from typing import Any
 from chauffeur.concept import Parameters
 from chauffeur.drive.auditing import FLUSH_TIMEOUT_S, SessionRecorder
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad.answers import Answer, Opinion, SetpointRequest, SetpointResult
+from chauffeur.drive.onroad.answers import OnRoadAnswer, Opinion, SetpointRequest, SetpointResult
 from chauffeur.safety.audit.keys import read_key
 from chauffeur.safety.audit.writer import AuditLog, utc_now
-from chauffeur.worlds.ros.base import VehicleState
+from chauffeur.worlds.ros.base import RosVehicleState
 
 
 def driven_what(interface: str, *, dry_run: bool) -> str:
@@ -87,7 +87,7 @@ class RoadBooks(SessionRecorder):
                 self.log.append("actuation", about | _asking(asking))
             case SetpointResult() as applied:
                 self.log.append("actuation", about | _applied(applied))
-            case Answer() as answer:
+            case OnRoadAnswer() as answer:
                 body = {"outcome": answer.status, "took_s": round(answer.took_s, 6)}
                 self.personal("outcome", event.wish, about | body, {"detail": answer.words, "trip": answer.trip})
             case Opinion(feedback=said) as opinion:
@@ -95,7 +95,7 @@ class RoadBooks(SessionRecorder):
                 meant = {"speed": said.speed, "gap": said.gap, "comfort": said.comfort, "liked": said.approval}
                 body = {"letter": "F", **meant, "kept": opinion.kept}
                 self.personal("context", event.wish, about | body, {"feedback": said.text})
-            case VehicleState() as state:
+            case RosVehicleState() as state:
                 link = {"link": state.link, "words": state.words[:500]} if event.kind == "link" else about
                 self.log.append("context", {"event": event.kind, "receivers": state.receivers, **link})
             case _ if event.kind == "over":

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from chauffeur.concept import Context, Lane, Limits, Observation, Parameters, Situation, VehicleState
-from chauffeur.describe.services.readings import Reading, Unknown
+from chauffeur.describe.services.readings import ServiceReading, Unknown
 from chauffeur.describe.services.sourced import with_sources
 from chauffeur.describe.services.surroundings import Surroundings
 from chauffeur.drive.onroad.words import speed_text
 from chauffeur.geometry import Polyline, RoadGraph
-from chauffeur.worlds.ros import VehicleState as Vehicle
+from chauffeur.worlds.ros import RosVehicleState as Vehicle
 
 WORLD: Final = "vehicle"
 """Kind of world of a real vehicle, in C and in memory."""
@@ -52,7 +52,7 @@ class Seen:
     @property
     def sign_mps(self) -> float | None:
         """Speed limit of the map; None where it is not known, infinite where none is in force."""
-        if self.place is None or isinstance(self.place, Unknown) or not isinstance(self.place.limit, Reading):
+        if self.place is None or isinstance(self.place, Unknown) or not isinstance(self.place.limit, ServiceReading):
             return None
         limit = self.place.limit.value.speed_mps
         return math.inf if limit is None else limit

@@ -44,7 +44,7 @@ from chauffeur.concept import (
 from chauffeur.describe.services.sources import Sources
 from chauffeur.drive.auditing import FLUSH_TIMEOUT_S
 from chauffeur.drive.events import DriveEvent, EventKind, Listener, nobody_listens
-from chauffeur.drive.onroad.answers import Answer, Opinion, SetpointRequest, SetpointResult, Status
+from chauffeur.drive.onroad.answers import OnRoadAnswer, Opinion, SetpointRequest, SetpointResult, Status
 from chauffeur.drive.onroad.books import RoadBooks
 from chauffeur.drive.onroad.checks import (
     ENGAGING_WORDS,
@@ -76,7 +76,7 @@ from chauffeur.planners.talk2drive.planner import system_text
 from chauffeur.planners.talk2drive.style import LOOK_AHEAD
 from chauffeur.safety.audit.writer import utc_now
 from chauffeur.safety.words import reasons_once
-from chauffeur.worlds.ros import Published, VehicleError, VehicleInterface, VehicleState
+from chauffeur.worlds.ros import Published, RosVehicleState, VehicleError, VehicleInterface
 from chauffeur.worlds.ros.autoware_ai import AutowareAi, PlannedSpeed
 from chauffeur.worlds.ros.settings import VehicleSettings
 
@@ -177,7 +177,7 @@ class OnRoad:
         self._unconfirmed: tuple[int, Published] | None = None
         self._last_trip = ""
         self._watcher: asyncio.Task[None] | None = None
-        self._known: VehicleState | None = None
+        self._known: RosVehicleState | None = None
         self._over = False
 
     @property
@@ -192,7 +192,7 @@ class OnRoad:
     async def __aexit__(self, *_: object) -> None:
         await self.close()
 
-    async def reached(self, within_s: float) -> VehicleState:
+    async def reached(self, within_s: float) -> RosVehicleState:
         """The vehicle's state as soon as there is a way to it, or after so long."""
         end = time.perf_counter() + within_s
         while (state := self._vehicle.state()).link not in _USABLE and time.perf_counter() < end:
@@ -213,7 +213,7 @@ class OnRoad:
             self._say("over", words, value=self._asked)
         return words
 
-    async def ask(self, text: str, *, source: Literal["text", "speech"] = "text") -> Answer:
+    async def ask(self, text: str, *, source: Literal["text", "speech"] = "text") -> OnRoadAnswer:
         """Answer one wish. A newer call takes the place of an older one that has not reached the vehicle.
 
         Args:
@@ -227,7 +227,7 @@ class OnRoad:
         self._count += 1
         number = self._newest = self._count
         if self._over:
-            return Answer(number, text[:MAX_WISH_CHARACTERS], "failed", "The session is over.")
+            return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "failed", "The session is over.")
         if self._making is not None:
             self._making.cancel()
         request: PlanRequest | None = None
@@ -246,22 +246,22 @@ class OnRoad:
         self._say_answer(answer)
         return answer
 
-    def _broken_off(self, number: int, text: str, why: str, status: Status) -> Answer:
+    def _broken_off(self, number: int, text: str, why: str, status: Status) -> OnRoadAnswer:
         """The answer to a wish that came to no end of its own: it may be with the vehicle."""
         if self._handed is None or self._handed[0] != number:
-            return Answer(number, text[:MAX_WISH_CHARACTERS], status, f"{why} Nothing was published.")
+            return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], status, f"{why} Nothing was published.")
         published = self._handed[1]
         words = f"{why} It had been published: {published.words}"
-        return Answer(number, text[:MAX_WISH_CHARACTERS], "unconfirmed", words, published=published)
+        return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "unconfirmed", words, published=published)
 
-    async def evaluate(self, text: str) -> Answer:
+    async def evaluate(self, text: str) -> OnRoadAnswer:
         """Keep what the person says of the drive with their last trip."""
         if is_stop(text):
             return await self.ask(text)
         self._count += 1
         number, words = self._count, " ".join(text.split())
         if not words:
-            return Answer(number, text, "declined", "The feedback is empty; say how it was.")
+            return OnRoadAnswer(number, text, "declined", "The feedback is empty; say how it was.")
         memory, meant = self._memory, interpret_feedback(words)
         kept: bool | None = False
         if memory is not None and self._person != NOBODY:
@@ -270,24 +270,24 @@ class OnRoad:
             )
         self._say("feedback", words, number, Opinion(meant, str(self._person), bool(kept)))
         if kept:
-            return Answer(number, words, "taken", "Kept with your last wish.", trip=self._last_trip)
+            return OnRoadAnswer(number, words, "taken", "Kept with your last wish.", trip=self._last_trip)
         why = "Nobody's profile is open" if self._person == NOBODY else "No drive of yours is kept that it is about"
-        return Answer(number, words, "declined", f"{why}; the feedback is not kept.")
+        return OnRoadAnswer(number, words, "declined", f"{why}; the feedback is not kept.")
 
     # One wish ---------------------------------------------------------------------------------------------------------
 
     async def _answer(
         self, number: int, text: str, source: Literal["text", "speech"]
-    ) -> tuple[Answer, PlanRequest | None]:
+    ) -> tuple[OnRoadAnswer, PlanRequest | None]:
         """The answer, and what was planned for, if anything was."""
         try:
             meant = self._question.settle(text, self._person)
         except InstructionError as error:
-            return Answer(number, text[:MAX_WISH_CHARACTERS], "declined", str(error)), None
+            return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "declined", str(error)), None
         if meant is None:
-            return Answer(number, text[:MAX_WISH_CHARACTERS], "declined", NOT_MEANT), None
+            return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "declined", NOT_MEANT), None
         instruction = replace(meant, source=source)
-        answer = Answer(number, instruction.text, "declined", ENGAGING_WORDS)
+        answer = OnRoadAnswer(number, instruction.text, "declined", ENGAGING_WORDS)
         self._say("wish", instruction.text, number, instruction)
         if is_about_engaging(instruction.text) and not is_stop(instruction.text):
             return answer, None
@@ -401,7 +401,7 @@ class OnRoad:
 
     # The vehicle ------------------------------------------------------------------------------------------------------
 
-    async def _apply(self, number: int, answer: Answer) -> Answer:
+    async def _apply(self, number: int, answer: OnRoadAnswer) -> OnRoadAnswer:
         """Write it down, publish it, and wait until every receiver has it."""
         assert answer.plan is not None
         assert isinstance(answer.plan.policy, Parameters)
@@ -429,7 +429,9 @@ class OnRoad:
         self._say("applied", answer.words, number, SetpointResult(answer, self._vehicle.state()))
         return answer
 
-    async def _confirm(self, number: int, answer: Answer, parameters: Parameters, before: Parameters | None) -> Answer:
+    async def _confirm(
+        self, number: int, answer: OnRoadAnswer, parameters: Parameters, before: Parameters | None
+    ) -> OnRoadAnswer:
         published = answer.published
         assert published is not None
         self._asked, self._handed, self._unconfirmed = parameters, (number, published), None
@@ -478,7 +480,7 @@ class OnRoad:
                 self._say("late", f"{published.words} {self._taken_words()}", number, state)
             await asyncio.sleep(WATCH_EVERY_S)
 
-    def _observed(self) -> VehicleState:
+    def _observed(self) -> RosVehicleState:
         """The vehicle's state; told if the way to it changed."""
         state, known = self._vehicle.state(), self._known
         if known is None or (state.link, state.words) != (known.link, known.words):
@@ -486,7 +488,7 @@ class OnRoad:
             self._told_link(state)
         return state
 
-    def _told_link(self, state: VehicleState) -> None:
+    def _told_link(self, state: RosVehicleState) -> None:
         words = state.words
         if state.link == "up" and self._asked is not None:
             words += f" In force: at most {speed_text(self._asked.target_speed_mps)}."
@@ -505,7 +507,7 @@ class OnRoad:
         )
         return found or History()
 
-    async def _remember(self, request: PlanRequest, answer: Answer) -> Answer:
+    async def _remember(self, request: PlanRequest, answer: OnRoadAnswer) -> OnRoadAnswer:
         assert answer.plan is not None
         trip = make_trip(
             request,
@@ -559,7 +561,7 @@ class OnRoad:
         except Exception:  # noqa: BLE001 - whoever listens must not take the session down
             _log.exception("an event could not be told")
 
-    def _say_answer(self, answer: Answer) -> None:
+    def _say_answer(self, answer: OnRoadAnswer) -> None:
         self._say("answer", answer.words, answer.wish, answer)
 
     def _taken_words(self) -> str:
@@ -578,7 +580,7 @@ class OnRoad:
         )
 
 
-def _unreachable(state: VehicleState) -> str:
+def _unreachable(state: RosVehicleState) -> str:
     return f"Not delivered: there is no way to the vehicle. {state.words} Nothing was published."
 
 

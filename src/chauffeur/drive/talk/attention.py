@@ -15,7 +15,7 @@ from chauffeur.drive.emergency import stop_wanted
 from chauffeur.drive.questions import ANSWER_WITHIN_S
 from chauffeur.drive.talk.asking import Words
 from chauffeur.drive.talk.ear import Ear, Ears, HeardAt, Trouble
-from chauffeur.drive.talk.hearing import Engine
+from chauffeur.drive.talk.hearing import HearingEngine
 from chauffeur.drive.talk.messages import Answered, Button, HeardWords, Listening, Note, Said
 from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.voice import Voice
@@ -43,7 +43,7 @@ class Attention:
 
     def __init__(
         self,
-        engine: Engine | None,
+        engine: HearingEngine | None,
         sound: Sound | None,
         voice: Voice | None,
         say: Callable[[Said], None],

@@ -13,8 +13,8 @@ from chauffeur.drive.live.messages import Report
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Interaction
 from chauffeur.drive.talk.asking import Words
-from chauffeur.drive.talk.judging import Case, Judge
-from chauffeur.drive.talk.messages import Conversation, HowWasIt, Stages
+from chauffeur.drive.talk.judging import Judge, JudgedCase
+from chauffeur.drive.talk.messages import Conversation, HowWasIt, StageTimes
 
 JUDGED_WITHIN_S: Final = 1.0
 """Verdicts are worked out when the set-point has changed, or so long after the start: nothing waits for them."""
@@ -89,7 +89,7 @@ class Conversations:
     def asked(self, wish: str, words: Words) -> Conversation:
         """A wish was handed on."""
         shown = Conversation(wish, words.text, words.spoken, follows=words.follows)
-        stages = Stages(wait_s=words.wait_s, recognise_s=words.recognise_s)
+        stages = StageTimes(wait_s=words.wait_s, recognise_s=words.recognise_s)
         self._wishes[wish] = _Wish(replace(shown, stages=stages), words, self._clock())
         return self[wish]
 
@@ -196,7 +196,7 @@ class Conversations:
             return
         limits = self._starts[max(1, min(event.trip, len(self._starts))) - 1].limits
         observation = self._instant(event.trip, event.tick)
-        self._judge.submit(Case(each.shown.wish, each.plan, observation, limits, event))
+        self._judge.submit(JudgedCase(each.shown.wish, each.plan, observation, limits, event))
 
 
 def _most(said: tuple[str, ...]) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from chauffeur import concept
 from chauffeur.concept import ChauffeurError, SandboxError
-from chauffeur.drive.talk.hearing import HEAD, Engine
+from chauffeur.drive.talk.hearing import HEAD, HearingEngine
 from chauffeur.speech.base import Heard, Hotword
 
 READY_WITHIN_S: Final = 60.0
@@ -79,7 +79,7 @@ class Ear:
         state: Of the microphone.
     """
 
-    def __init__(self, engine: Engine, *, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, engine: HearingEngine, *, clock: Callable[[], float] = time.monotonic) -> None:
         self._engine, self._clock = engine, clock
         self.name, self.remote = engine.name, engine.name == "endpoint"
         self.state: State = "off"

@@ -35,7 +35,7 @@ _MOST_TIMES: Final = 1024
 
 
 @dataclass(frozen=True, slots=True)
-class Engine:
+class HearingEngine:
     """A speech engine by name; see speech.engines.
 
     Attributes:
@@ -154,7 +154,7 @@ def _read(count: int) -> bytes:
     return sys.stdin.buffer.read(count)
 
 
-def main(engine: Engine) -> None:
+def main(engine: HearingEngine) -> None:
     """Hear until nobody listens any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who drives
     if engine.favoured:
@@ -178,6 +178,6 @@ def main(engine: Engine) -> None:
 
 if __name__ == "__main__":
     try:
-        main(Engine(**json.loads(sys.argv[1])))
+        main(HearingEngine(**json.loads(sys.argv[1])))
     except BrokenPipeError:  # who listened is gone; nothing is left to be said, not even at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

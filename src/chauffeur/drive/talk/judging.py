@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class JudgedCase:
     """What is to be judged; the fields are those of `verdicts_of`."""
 
     wish: str
@@ -43,13 +43,13 @@ class Judge:
     """
 
     def __init__(self) -> None:
-        self._cases: queue.SimpleQueue[Case | None] = queue.SimpleQueue()
+        self._cases: queue.SimpleQueue[JudgedCase | None] = queue.SimpleQueue()
         self._ready: list[tuple[str, tuple[VerdictShown, ...]]] = []
         self._waiting = 0
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
 
-    def submit(self, case: Case) -> None:
+    def submit(self, case: JudgedCase) -> None:
         """Hand a case in; its verdicts come with `ready`."""
         with self._changed:
             self._waiting += 1

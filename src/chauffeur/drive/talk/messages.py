@@ -21,7 +21,7 @@ MOST_TEXT: Final = 2000
 
 
 @dataclass(frozen=True, slots=True)
-class Session:
+class SessionState:
     """What is driven, and how it listens.
 
     Attributes:
@@ -70,7 +70,7 @@ class Road:
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class ShownBody:
     """A vehicle or thing from above: centre, heading (rad), size, speed."""
 
     id: int
@@ -103,8 +103,8 @@ class Scene:
     """
 
     time_s: float
-    ego: Body
-    others: tuple[Body, ...]
+    ego: ShownBody
+    others: tuple[ShownBody, ...]
     acceleration_mps2: float
     steering_rad: float
     limit_mps: float
@@ -179,7 +179,7 @@ class VerdictShown:
 
 
 @dataclass(frozen=True, slots=True)
-class Stages:
+class StageTimes:
     """Where the time from the end of speech (or Enter) to the first changed set-point went, s; None: not yet or not so.
 
     Of a wish that was asked back, the time counts from the person's yes.
@@ -237,7 +237,7 @@ class Conversation:
     said: tuple[str, ...] = ()
     opinion: str = ""
     remembered: str = ""
-    stages: Stages = Stages()
+    stages: StageTimes = StageTimes()
     follows: str = ""
     kind: Literal["conversation"] = "conversation"
 
@@ -304,7 +304,7 @@ class Ended:
 
 
 Said = (
-    Session
+    SessionState
     | Road
     | Scene
     | SeatView

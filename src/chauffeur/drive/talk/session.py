@@ -28,7 +28,7 @@ from chauffeur.drive.session import make_world
 from chauffeur.drive.talk.asking import OVER, Asking, Words
 from chauffeur.drive.talk.attention import Attention
 from chauffeur.drive.talk.conversations import Conversations
-from chauffeur.drive.talk.hearing import Engine
+from chauffeur.drive.talk.hearing import HearingEngine
 from chauffeur.drive.talk.keeping import CLOSE_WITHIN_S, Keeper, Kept, OpinionKept
 from chauffeur.drive.talk.messages import (
     Answered,
@@ -44,7 +44,7 @@ from chauffeur.drive.talk.messages import (
     Note,
     Said,
     Say,
-    Session,
+    SessionState,
     ShowSeat,
     Stop,
     TakeOver,
@@ -107,7 +107,7 @@ class Talk:
         *,
         person: PersonId = NOBODY,
         books: Books | None = None,
-        engine: Engine | None = None,
+        engine: HearingEngine | None = None,
         sound: Sound | None = None,
         voice: Voice | None = None,
         most_s: float = float("inf"),
@@ -498,7 +498,7 @@ class Talk:
         start = self._settings.starts[0]
         engine, remote = self._attention.engine
         self._say(
-            Session(
+            SessionState(
                 scenario=start.scenario.id,
                 title=start.scenario.title or start.scenario.id,
                 seed=start.seed,

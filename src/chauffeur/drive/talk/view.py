@@ -10,7 +10,7 @@ from chauffeur.concept.registry import load_plugin
 from chauffeur.drive.live.messages import MessageError, MirroredInstant, Report
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import Settings
-from chauffeur.drive.talk.messages import Body, Road, RoadLane, Scene
+from chauffeur.drive.talk.messages import Road, RoadLane, Scene, ShownBody
 from chauffeur.drive.talk.seat_view import SeatWindow
 from chauffeur.worlds.base import MirroredWorld
 
@@ -105,8 +105,8 @@ class View:
         )
 
 
-def _body(state: VehicleState) -> Body:
-    return Body(
+def _body(state: VehicleState) -> ShownBody:
+    return ShownBody(
         state.id,
         state.kind,
         state.x_m,

@@ -63,7 +63,7 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Road:
+class OpenDriveRoad:
     """A road: reference line, lane offset, lane sections and what its ends lead to."""
 
     id: str
@@ -110,7 +110,7 @@ class Document:
 
     name: str
     geo_reference: str
-    roads: dict[str, Road]
+    roads: dict[str, OpenDriveRoad]
     connections: tuple[Connection, ...]
     junctions: dict[str, str]
     controllers: dict[str, tuple[str, ...]]
@@ -165,7 +165,7 @@ def parse(text: str | bytes) -> Document:
     )
 
 
-def _road(node: ET.Element) -> Road:
+def _road(node: ET.Element) -> OpenDriveRoad:
     name = node.get("id", "")
     try:
         return _read_road(node, name)
@@ -173,14 +173,14 @@ def _road(node: ET.Element) -> Road:
         raise OpenDriveError(f"Road {name!r}: {error}") from error
 
 
-def _read_road(node: ET.Element, name: str) -> Road:
+def _read_road(node: ET.Element, name: str) -> OpenDriveRoad:
     length = number(node, "length")
     pieces = tuple(sorted((_piece(one) for one in node.findall("planView/geometry")), key=lambda one: one.start_m))
     if not pieces:
         raise OpenDriveError("it has no plan view.")
     starts = sorted(node.findall("lanes/laneSection"), key=lambda one: number(one, "s"))
     ends = [number(one, "s") for one in starts[1:]] + [length]
-    return Road(
+    return OpenDriveRoad(
         id=name,
         name=node.get("name", ""),
         junction="" if node.get("junction", "-1") == "-1" else node.get("junction", ""),

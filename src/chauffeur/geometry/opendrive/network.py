@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from chauffeur.geometry.opendrive.document import Connection, Document, LaneRecord, Road, RoadEnd, Section, parse
+from chauffeur.geometry.opendrive.document import (
+    Connection,
+    Document,
+    LaneRecord,
+    OpenDriveRoad,
+    RoadEnd,
+    Section,
+    parse,
+)
 from chauffeur.geometry.opendrive.roadside import RoadObject, RoadSignal, objects_of, signals_of
 from chauffeur.geometry.polyline import SAME_M, Polyline
 from chauffeur.geometry.road_graph import Lane, LaneId, LaneKind, LanePlace, RoadGraph, turn_of
@@ -73,7 +81,7 @@ class OpenDriveMap:
     document: Document
 
     @cached_property
-    def _spans(self) -> Mapping[LaneId, tuple[Road, Section, bool]]:
+    def _spans(self) -> Mapping[LaneId, tuple[OpenDriveRoad, Section, bool]]:
         return {
             lane_name(road.id, i, record.id): (road, section, _forward(road, record))
             for road in self.document.roads.values()
@@ -120,7 +128,7 @@ def parse_opendrive(text: str | bytes) -> OpenDriveMap:
     )
 
 
-def _forward(road: Road, record: LaneRecord) -> bool:
+def _forward(road: OpenDriveRoad, record: LaneRecord) -> bool:
     """Whether a lane is driven along the reference line."""
     return (record.id < 0) != road.left_hand
 
@@ -164,7 +172,7 @@ def _resolved(
 # Geometry -------------------------------------------------------------------------------------------------------------
 
 
-def _lanes(road: Road) -> Iterator[Lane]:
+def _lanes(road: OpenDriveRoad) -> Iterator[Lane]:
     street = "" if road.junction or _UNNAMED.fullmatch(road.name) else road.name
     for i, section in enumerate(road.sections):
         length = section.end_m - section.start_m
@@ -268,7 +276,7 @@ class _Links:
             for record in (*section.left, *section.right)
         }
 
-    def _after(self, road: Road, i: int, record: LaneRecord) -> Iterator[LaneId]:
+    def _after(self, road: OpenDriveRoad, i: int, record: LaneRecord) -> Iterator[LaneId]:
         forward = _forward(road, record)
         target = record.after if forward else record.before
         beyond = i + (1 if forward else -1)

@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from chauffeur.geometry.opendrive.document import Document, Road, number
+from chauffeur.geometry.opendrive.document import Document, OpenDriveRoad, number
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,12 +87,12 @@ def objects_of(document: Document) -> tuple[RoadObject, ...]:
     return tuple(one for road in document.roads.values() for one in _objects(road))
 
 
-def _place(road: Road, station_m: float, offset_m: float) -> tuple[float, float, float]:
+def _place(road: OpenDriveRoad, station_m: float, offset_m: float) -> tuple[float, float, float]:
     x, y, heading = (float(one[0]) for one in road.line(np.array([station_m])))
     return x - offset_m * math.sin(heading), y + offset_m * math.cos(heading), heading
 
 
-def _signals(road: Road) -> Iterator[RoadSignal]:
+def _signals(road: OpenDriveRoad) -> Iterator[RoadSignal]:
     for node in road.node.findall("signals/*"):
         if node.tag not in ("signal", "signalReference"):
             continue
@@ -121,7 +121,7 @@ def _signals(road: Road) -> Iterator[RoadSignal]:
         )
 
 
-def _objects(road: Road) -> Iterator[RoadObject]:
+def _objects(road: OpenDriveRoad) -> Iterator[RoadObject]:
     for node in road.node.findall("objects/object"):
         station, offset = number(node, "s"), number(node, "t")
         x, y, heading = _place(road, station, offset)
@@ -146,7 +146,7 @@ def _objects(road: Road) -> Iterator[RoadObject]:
 
 
 def _outline(
-    node: ET.Element, road: Road, x: float, y: float, heading: float, length: float, width: float
+    node: ET.Element, road: OpenDriveRoad, x: float, y: float, heading: float, length: float, width: float
 ) -> Iterator[tuple[float, float]]:
     cos, sin = math.cos(heading), math.sin(heading)
     outline = node.find("outline")

@@ -37,7 +37,7 @@ from chauffeur.models.bev_llm.fusion import FusionConfig, rig_tensors
 from chauffeur.models.bev_llm.geometry import rig_geometry
 from chauffeur.models.bev_llm.network import CompactBevLlm, CompactConfig, Keep
 from chauffeur.models.bev_llm.views import FRONT_VIEWS, VIEWS, camera_of, cut, view_cameras
-from chauffeur.models.bev_llm.words import PAD, STRANGE, WordTable
+from chauffeur.models.bev_llm.words import PAD, STRANGE, QuestionWordTable
 from chauffeur.models.train.trainer import Optimisation, fit
 
 if TYPE_CHECKING:
@@ -217,7 +217,7 @@ def _motion(metadata: Mapping[str, Any], token: str, instants: int) -> tuple[NDA
     return found, (float(before["vx"]), float(now["vx"]))
 
 
-def compact(recipe: BevLlmRecipe, words: WordTable, of: Facets, size: tuple[int, int] = SIZE) -> CompactConfig:
+def compact(recipe: BevLlmRecipe, words: QuestionWordTable, of: Facets, size: tuple[int, int] = SIZE) -> CompactConfig:
     """The network that a recipe asks for."""
     fusion = FusionConfig(64, 2, bev_width=64, bev=recipe.ablation != "no-bev", history=recipe.ablation != "no-history")
     return CompactConfig(words.size, tuple(len(classes) for _, classes in of), size=size, fusion=fusion)
@@ -235,7 +235,12 @@ class CompactAnswerer:
     """
 
     def __init__(
-        self, network: CompactBevLlm, words: WordTable, of: Facets, cameras: Sequence[Camera], keep: Keep = "full"
+        self,
+        network: CompactBevLlm,
+        words: QuestionWordTable,
+        of: Facets,
+        cameras: Sequence[Camera],
+        keep: Keep = "full",
     ) -> None:
         """Args: the network, its vocabulary, its facets, the cameras of its views, and what it is given."""
         self.network, self.words, self.facets = network, words, of
@@ -365,7 +370,7 @@ class CompactAnswerer:
         network.load_state_dict(cls.stored_weights(folder))
         cameras = [Camera(**{name: _tuple(value) for name, value in one.items()}) for one in about["cameras"]]
         of = tuple((str(name), tuple(classes)) for name, classes in about["facets"])
-        return cls(network.eval(), WordTable(tuple(about["words"])), of, cameras, about["keep"])
+        return cls(network.eval(), QuestionWordTable(tuple(about["words"])), of, cameras, about["keep"])
 
     @staticmethod
     def stored_weights(folder: Path) -> dict[str, torch.Tensor]:
@@ -433,7 +438,7 @@ def train_compact(
         DataError: There is no network to begin with.
     """
     torch.manual_seed(recipe.seed)
-    words, of = WordTable.taught(recipe.half), facets()
+    words, of = QuestionWordTable.taught(recipe.half), facets()
     network = CompactBevLlm(compact(recipe, words, of, tuple(train.now.shape[-2:])))
     if begin is not None:
         _begin(network, begin)

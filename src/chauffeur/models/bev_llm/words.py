@@ -20,7 +20,7 @@ _WORD: Final = re.compile(r"[a-z]+|\d")
 
 
 @dataclass(frozen=True)
-class WordTable:
+class QuestionWordTable:
     """A vocabulary.
 
     Attributes:
@@ -30,7 +30,7 @@ class WordTable:
     words: tuple[str, ...]
 
     @classmethod
-    def taught(cls, half: str = "train") -> WordTable:
+    def taught(cls, half: str = "train") -> QuestionWordTable:
         """The words of a half of all wordings (see `wordings`), and the names of speeds."""
         bank = word_bank()
         found: set[str] = {f"v{place}:{speed}" for place in range(2) for speed in range(31)}

@@ -32,7 +32,7 @@ from chauffeur.concept import (
     ProgramError,
 )
 from chauffeur.memory.files import locked, private_directory
-from chauffeur.models.onboard.interactions import Interaction, Pair, numbered_lines, pair_of, parted
+from chauffeur.models.onboard.interactions import AcceptedInteraction, Pair, numbered_lines, pair_of, parted
 from chauffeur.models.onboard.packed import Array, Packed
 from chauffeur.planners.onboard.engine import MAX_PROMPT_TOKENS, Engine
 from chauffeur.planners.onboard.hot import take_into_use
@@ -194,7 +194,7 @@ class Marks:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class AdaptingVerdict:
     """What came of an adaptation.
 
     Attributes:
@@ -261,7 +261,9 @@ def _marks(name: str, folder: Path, validation: Sequence[Pair], held_back: Seque
 # All of it ------------------------------------------------------------------------------------------------------------
 
 
-def adapt(base: Path, interactions: Iterable[Interaction], out: Path, recipe: AdaptRecipe, told: Told) -> Verdict:
+def adapt(
+    base: Path, interactions: Iterable[AcceptedInteraction], out: Path, recipe: AdaptRecipe, told: Told
+) -> AdaptingVerdict:
     """Adapt a model, judge it, and take it into use if it passes. Stopped at any point, the old model stays in use.
 
     Args:
@@ -302,15 +304,15 @@ def adapt(base: Path, interactions: Iterable[Interaction], out: Path, recipe: Ad
 
 def _adapted(
     base: Path,
-    learned: Sequence[Interaction],
-    held_back: Sequence[Interaction],
+    learned: Sequence[AcceptedInteraction],
+    held_back: Sequence[AcceptedInteraction],
     validation: Sequence[Pair],
     replayed: Sequence[Pair],
     out: Path,
     scratch: Path,
     recipe: AdaptRecipe,
     told: Told,
-) -> Verdict:
+) -> AdaptingVerdict:
     try:
         import peft
         import torch
@@ -332,17 +334,17 @@ def _adapted(
     own = [one for one in own if one.prompt not in taboo]
     tuned = fine_tune(model, tokenizer, own, replayed, recipe, told).merge_and_unload()
     if not all(bool(torch.isfinite(p).all()) for p in tuned.parameters()):
-        return Verdict(False, "Training diverged: the weights are no finite numbers.", before, None, in_use)
+        return AdaptingVerdict(False, "Training diverged: the weights are no finite numbers.", before, None, in_use)
     number = 1 + max((int(path.name) for path in (out / MODELS).iterdir() if path.name.isdigit()), default=0)
     made = export(tuned, tokenizer, scratch / "model", _about(shipped, number, learned, held_back, replayed, recipe))
     after = mark("the adapted model", made)
     taken, why = decide(before, after, in_use, recipe.tolerance)
     if not taken:
-        return Verdict(taken, why, before, after, in_use)
+        return AdaptingVerdict(taken, why, before, after, in_use)
     folder = made.rename(out / MODELS / f"{number:04d}")
     take_into_use(out / POINTER, folder)
     _tidy(out, number)
-    return Verdict(taken, why, before, after, in_use, folder)
+    return AdaptingVerdict(taken, why, before, after, in_use, folder)
 
 
 def _check(recipe: AdaptRecipe) -> None:
@@ -392,8 +394,8 @@ def _in_use(out: Path, mark: Callable[[str, Path], Marks]) -> Marks | None:
 def _about(
     shipped: Path,
     number: int,
-    learned: Sequence[Interaction],
-    held_back: Sequence[Interaction],
+    learned: Sequence[AcceptedInteraction],
+    held_back: Sequence[AcceptedInteraction],
     replayed: Sequence[Pair],
     recipe: AdaptRecipe,
 ) -> dict[str, Any]:

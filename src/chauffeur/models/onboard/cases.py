@@ -21,7 +21,7 @@ from chauffeur.bench.lampilot.scenes.sampling import draw_road
 from chauffeur.concept import LAMPILOT_LIMITS, Scenario, ScenarioError, Situation
 from chauffeur.describe import describe
 from chauffeur.models.onboard.judging import judge
-from chauffeur.planners.onboard.dialect import SKILLS, UNITS, Condition, Number, Step, write
+from chauffeur.planners.onboard.dialect import SKILLS, UNITS, Condition, DialectStep, Number, write
 from chauffeur.planners.onboard.link import link
 from chauffeur.planners.onboard.options import Declined
 from chauffeur.planners.onboard.personal import Leaning
@@ -83,7 +83,7 @@ class Case:
     index: int
     scenario: dict[str, Any]
     situation: Situation
-    steps: tuple[Step, ...]
+    steps: tuple[DialectStep, ...]
     refusal: str
 
 
@@ -141,9 +141,9 @@ def _sandbox() -> Sandbox:
     return sandbox
 
 
-def _draw(situation: Situation, crossing: bool, rng: Generator) -> tuple[Step, ...] | None:
+def _draw(situation: Situation, crossing: bool, rng: Generator) -> tuple[DialectStep, ...] | None:
     count = 1 if rng.random() > SEVERAL_SHARE else 2 if rng.random() < 0.8 else 3
-    steps: list[Step] = []
+    steps: list[DialectStep] = []
     for _ in range(12):
         step = _draw_step(situation, crossing, rng)
         if step is not None and all(_apart(step, other) for other in steps):
@@ -153,13 +153,13 @@ def _draw(situation: Situation, crossing: bool, rng: Generator) -> tuple[Step, .
     return None
 
 
-def _apart(step: Step, other: Step) -> bool:
+def _apart(step: DialectStep, other: DialectStep) -> bool:
     """Whether two steps of a wish are about different things; styles and keeping end a wish by themselves."""
     kinds = {SKILLS[step.skill].meaning.manoeuvre, SKILLS[other.skill].meaning.manoeuvre}
     return len(kinds) == 2 and not kinds & {"style", "keep", "resume", "turn", "stop", "follow", "yield"}
 
 
-def _draw_step(situation: Situation, crossing: bool, rng: Generator) -> Step | None:
+def _draw_step(situation: Situation, crossing: bool, rng: Generator) -> DialectStep | None:
     weights = CROSSING_WEIGHTS if crossing else WEIGHTS
     names = list(weights)
     share = np.array([weights[name] for name in names])
@@ -175,7 +175,7 @@ def _draw_step(situation: Situation, crossing: bool, rng: Generator) -> Step | N
     condition = None
     if wait is None and not crossing and rng.random() < CONDITION_SHARE:
         condition = _draw_condition(situation, name, rng)
-    return Step(name, number, manner, wait, condition)
+    return DialectStep(name, number, manner, wait, condition)
 
 
 _WITH_MANNER = frozenset(

@@ -19,7 +19,7 @@ from chauffeur.models.onboard.cases import Case
 from chauffeur.models.onboard.noise import noisy, reworded, said_in_full
 from chauffeur.models.onboard.speech import Unit, spoken
 from chauffeur.models.onboard.wordings import because, beside, clause, conditioned, in_order, levels, utter, wordings
-from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, Kind, Number, Step
+from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, DialectStep, Kind, Number
 from chauffeur.planners.onboard.prompt import ASK, REFUSE, program_reply, prompt, remembered
 
 Generator = np.random.Generator
@@ -248,16 +248,16 @@ def answer_sections(situation: Situation) -> tuple[str, ...]:
     return tuple(section for section in sections if section not in out)
 
 
-def _needs_context(steps: Sequence[Step]) -> bool:
+def _needs_context(steps: Sequence[DialectStep]) -> bool:
     """Whether what is meant depends on where we are: "the other lane"."""
     return any(step.skill == "change_lane" for step in steps)
 
 
-def _scalable(step: Step) -> bool:
+def _scalable(step: DialectStep) -> bool:
     return step.number is not None and SKILLS[step.skill].takes in ("speed", "distance", "time")
 
 
-def _wish(steps: Sequence[Step], rng: Generator, *, held: bool) -> tuple[str, str, int]:
+def _wish(steps: Sequence[DialectStep], rng: Generator, *, held: bool) -> tuple[str, str, int]:
     """(words, template, directness) for some steps."""
     if len(steps) == 1:
         return _single(steps[0], rng, held=held)
@@ -266,7 +266,7 @@ def _wish(steps: Sequence[Step], rng: Generator, *, held: bool) -> tuple[str, st
     return wording.text, "+".join([wording.template, *(template for _, template in parts)]), 1
 
 
-def _single(step: Step, rng: Generator, *, held: bool) -> tuple[str, str, int]:
+def _single(step: DialectStep, rng: Generator, *, held: bool) -> tuple[str, str, int]:
     if step.condition is not None or step.wait_s is not None:
         words, template = _imperative(step, rng, held=held)
         when, own = _when(step, rng, held=held)
@@ -287,7 +287,7 @@ def _single(step: Step, rng: Generator, *, held: bool) -> tuple[str, str, int]:
     return wording.text, wording.template, int(section.partition("/")[2] or 1)
 
 
-def _imperative(step: Step, rng: Generator, *, held: bool) -> tuple[str, str]:
+def _imperative(step: DialectStep, rng: Generator, *, held: bool) -> tuple[str, str]:
     """The bare imperative of a step, with its manner."""
     grammar = wordings()
     spare = not any(not t.sentence and not t.part for t in grammar.templates(step.skill, held=held))
@@ -299,7 +299,7 @@ def _imperative(step: Step, rng: Generator, *, held: bool) -> tuple[str, str]:
     return words, wording.template
 
 
-def _when(step: Step, rng: Generator, *, held: bool) -> tuple[str, str]:
+def _when(step: DialectStep, rng: Generator, *, held: bool) -> tuple[str, str]:
     """The condition of a step, or its wait; a step with both says the wait within the condition."""
     if step.condition is None:
         assert step.wait_s is not None
@@ -313,7 +313,7 @@ def _when(step: Step, rng: Generator, *, held: bool) -> tuple[str, str]:
     return wording.text, wording.template
 
 
-def _slots(step: Step, rng: Generator) -> dict[str, str]:
+def _slots(step: DialectStep, rng: Generator) -> dict[str, str]:
     takes = SKILLS[step.skill].takes
     if takes is None or step.number is None:
         return {}
@@ -358,11 +358,24 @@ def _slot_names(section: str) -> frozenset[str]:
     return frozenset[str]().union(*(wordings().slots(t) for t in wordings().templates(section)))
 
 
-_REMEMBERED: Final = (
-    Step("hurry"), Step("gently"), Step("relax"), Step("faster"), Step("much_slower"), Step("closer"),
-    Step("a_bit_further"), Step("lane_left"), Step("lane_right"), Step("overtake_left"), Step("pull_over"),
-    Step("turn_left"), Step("turn_right"),
-)  # fmt: skip
+_REMEMBERED: Final = tuple(
+    DialectStep(what)
+    for what in (
+        "hurry",
+        "gently",
+        "relax",
+        "faster",
+        "much_slower",
+        "closer",
+        "a_bit_further",
+        "lane_left",
+        "lane_right",
+        "overtake_left",
+        "pull_over",
+        "turn_left",
+        "turn_right",
+    )
+)
 
 
 def _other_history(rng: Generator) -> list[str]:
@@ -371,9 +384,9 @@ def _other_history(rng: Generator) -> list[str]:
     for _ in range(1 + int(rng.random() < 0.5)):
         draw = rng.random()
         if draw < 0.35:
-            step = Step("drive_at", Number(float(rng.integers(8, 36))))
+            step = DialectStep("drive_at", Number(float(rng.integers(8, 36))))
         elif draw < 0.6:
-            step = Step("gap_of", Number(float(rng.integers(12, 75))))
+            step = DialectStep("gap_of", Number(float(rng.integers(12, 75))))
         else:
             step = _REMEMBERED[int(rng.integers(len(_REMEMBERED)))]
         out.append(remembered([step], str(rng.choice(SAID))))

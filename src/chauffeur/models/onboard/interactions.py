@@ -16,7 +16,7 @@ from chauffeur.concept import (
     Situation,
 )
 from chauffeur.memory.records import item_of
-from chauffeur.planners.onboard.dialect import Step, read
+from chauffeur.planners.onboard.dialect import DialectStep, read
 from chauffeur.planners.onboard.prompt import (
     HISTORY_ITEMS,
     SPECIAL,
@@ -32,7 +32,7 @@ LEAST: Final = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Interaction:
+class AcceptedInteraction:
     """A wish and the program that was right for it.
 
     Attributes:
@@ -58,7 +58,7 @@ class Pair:
     reply: str
 
 
-def load_interactions(path: Path) -> list[Interaction]:
+def load_interactions(path: Path) -> list[AcceptedInteraction]:
     """Interactions of a file of JSON lines with the fields of `Interaction`.
 
     Raises:
@@ -66,8 +66,8 @@ def load_interactions(path: Path) -> list[Interaction]:
     """
     from pydantic import TypeAdapter, ValidationError
 
-    form = TypeAdapter(Interaction)
-    found: list[Interaction] = []
+    form = TypeAdapter(AcceptedInteraction)
+    found: list[AcceptedInteraction] = []
     for number, line in numbered_lines(path):
         try:
             one = form.validate_json(line)
@@ -84,7 +84,7 @@ def load_interactions(path: Path) -> list[Interaction]:
     return found
 
 
-def _check_text(one: Interaction) -> None:
+def _check_text(one: AcceptedInteraction) -> None:
     if not one.wish.strip():
         raise DataError("the wish is empty")
     if any(mark in text for text in one.history for mark in SPECIAL):
@@ -92,20 +92,20 @@ def _check_text(one: Interaction) -> None:
     read(one.program)
 
 
-def interactions_of(items: Iterable[HistoryItem]) -> list[Interaction]:
+def interactions_of(items: Iterable[HistoryItem]) -> list[AcceptedInteraction]:
     """Accepted trips of memory, oldest first, whose program is of the dialect; others are passed over.
 
     A trip was accepted if it went well and the last thing said of it, if anything, asks for no change. What memory held
     at the time is not kept with a trip: the two accepted trips before it stand in for that.
     """
-    found: list[Interaction] = []
+    found: list[AcceptedInteraction] = []
     earlier: list[str] = []
     for item in items:
         steps = _steps(item.policy)
         if not steps or not _accepted(item) or not item.instruction.strip():
             continue
         shown = tuple(reversed(earlier[-HISTORY_ITEMS:]))
-        found.append(Interaction(item.instruction, _situation(item.context), shown, item.policy, accepted=True))
+        found.append(AcceptedInteraction(item.instruction, _situation(item.context), shown, item.policy, accepted=True))
         earlier.append(remembered(steps, feedback_words(item.feedback[-1]) if item.feedback else ""))
     return found
 
@@ -131,7 +131,7 @@ def exported_items(document: str) -> list[HistoryItem]:
         raise DataError(f"That is no exported profile: {error!r}.") from None
 
 
-def _steps(program: str) -> tuple[Step, ...]:
+def _steps(program: str) -> tuple[DialectStep, ...]:
     try:
         return read(program)
     except ProgramError:
@@ -153,12 +153,14 @@ def _situation(words: str) -> Situation | None:
     return situation_of(words) if "driving at" in words and "speed limit of my lane" in words else None
 
 
-def pair_of(one: Interaction, *, history: bool = True) -> Pair:
+def pair_of(one: AcceptedInteraction, *, history: bool = True) -> Pair:
     """The prompt and the reply of an interaction."""
     return Pair(prompt(one.situation, one.history if history else (), one.wish), program_reply(read(one.program)))
 
 
-def parted(interactions: Iterable[Interaction], share: float, seed: int) -> tuple[list[Interaction], list[Interaction]]:
+def parted(
+    interactions: Iterable[AcceptedInteraction], share: float, seed: int
+) -> tuple[list[AcceptedInteraction], list[AcceptedInteraction]]:
     """(to learn, held back): accepted interactions, each once; of the same prompt twice, the newer counts.
 
     The part an interaction falls into depends on itself and the seed, so that it mostly stays there as more come.

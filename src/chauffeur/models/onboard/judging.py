@@ -15,7 +15,7 @@ from chauffeur.bench.lampilot.scenes.feasible import GoalReferee
 from chauffeur.concept import Observation, Outcome, Scenario
 from chauffeur.concept.nouns import Metric
 from chauffeur.drive.session import drive_program
-from chauffeur.planners.onboard.dialect import Step
+from chauffeur.planners.onboard.dialect import DialectStep
 from chauffeur.planners.onboard.link import Linked
 from chauffeur.programs import Sandbox
 from chauffeur.worlds.highway import HighwayWorld
@@ -32,14 +32,14 @@ BLOCKED_M: Final = 70.0
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class JudgingVerdict:
     """Whether a program did what its words say, and why not."""
 
     done: bool
     why: str = ""
 
 
-def lampilot_goal(step: Step) -> dict[str, Any] | None:
+def lampilot_goal(step: DialectStep) -> dict[str, Any] | None:
     """LaMPilot's `eval` mapping for a step; None where it has none."""
     if step.condition is not None or step.wait_s is not None:
         return None
@@ -67,8 +67,13 @@ def lampilot_goal(step: Step) -> dict[str, Any] | None:
 
 
 def judge(
-    world: HighwayWorld, scenario: Scenario, steps: tuple[Step, ...], source: str, linked: Linked, sandbox: Sandbox
-) -> Verdict:
+    world: HighwayWorld,
+    scenario: Scenario,
+    steps: tuple[DialectStep, ...],
+    source: str,
+    linked: Linked,
+    sandbox: Sandbox,
+) -> JudgingVerdict:
     """Drive a program on its scene and see what came of it; the world is reset first.
 
     Raises:
@@ -80,22 +85,22 @@ def judge(
     if goal is not None:
         referee: Any = GoalReferee(world, make_any_goal(world.perception(), _with(scenario, goal)))
         episode = drive_program(world, source, referee, GOAL_S, record=False, library=linked.library, sandbox=sandbox)
-        return Verdict(episode.success, "" if episode.success else f"{steps[0].skill}: {episode.outcome}")
+        return JudgingVerdict(episode.success, "" if episode.success else f"{steps[0].skill}: {episode.outcome}")
     horizon = GOAL_S if any(step.skill.startswith(("turn", "go_", "overtake", "pull")) for step in steps) else HORIZON_S
     episode = drive_program(
         world, source, _Watcher(world), horizon * len(steps), record=False, library=linked.library, sandbox=sandbox
     )
     name = "+".join(step.skill for step in steps)
     if episode.causes.policy_failed:
-        return Verdict(False, f"{name}: {episode.causes.detail[:60]}")
+        return JudgingVerdict(False, f"{name}: {episode.causes.detail[:60]}")
     if episode.outcome in ("collision", "off_road"):
-        return Verdict(False, f"{name}: {episode.outcome}")
+        return JudgingVerdict(False, f"{name}: {episode.outcome}")
     if len(steps) == 1 and steps[0].condition is None:
         test = _EFFECTS.get(steps[0].skill)
         value = 0.0 if steps[0].number is None else steps[0].number.si
         if test is not None and not test(start, episode.final, value):
-            return Verdict(False, f"{name}: no effect")
-    return Verdict(True)
+            return JudgingVerdict(False, f"{name}: no effect")
+    return JudgingVerdict(True)
 
 
 class _Watcher:

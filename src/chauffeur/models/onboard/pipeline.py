@@ -48,7 +48,7 @@ Told = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class PipelinePlan:
     """What decides a model.
 
     Attributes:
@@ -77,7 +77,7 @@ class Plan:
         return {"seed": self.seed, "draws": self.draws, "per_case": self.per_case} | base
 
 
-def build_data(folder: Path, plan: Plan, workers: int, told: Told) -> None:
+def build_data(folder: Path, plan: PipelinePlan, workers: int, told: Told) -> None:
     """Cases, examples and tokenizer. Raises DataError when a file cannot be written."""
     data = folder / "data"
     facts_file, wanted = data / "data.json", plan.of_data
@@ -93,7 +93,7 @@ def build_data(folder: Path, plan: Plan, workers: int, told: Told) -> None:
     publish(facts_file, (json.dumps(facts, indent=1, ensure_ascii=False) + "\n").encode(), "data set's facts")
 
 
-def _examples(cases: Sequence[Case], plan: Plan, workers: int, told: Told) -> Splits:
+def _examples(cases: Sequence[Case], plan: PipelinePlan, workers: int, told: Told) -> Splits:
     parts = [cases[i : i + 100] for i in range(0, len(cases), 100)]
     found: list[Splits] = []
     with processes(workers) as pool:
@@ -103,7 +103,7 @@ def _examples(cases: Sequence[Case], plan: Plan, workers: int, told: Told) -> Sp
     return gathered(found)
 
 
-def _pack(splits: Splits, data: Path, plan: Plan, told: Told) -> None:
+def _pack(splits: Splits, data: Path, plan: PipelinePlan, told: Told) -> None:
     from chauffeur.models.onboard.tokens import load_tokenizer, train_tokenizer
 
     tokenizer: Any
@@ -143,7 +143,7 @@ def _sha256(file: Path) -> str:
         ) from error
 
 
-def _facts(cases: Sequence[Case], splits: Splits, why: Counter[str], plan: Plan) -> dict[str, Any]:
+def _facts(cases: Sequence[Case], splits: Splits, why: Counter[str], plan: PipelinePlan) -> dict[str, Any]:
     train = splits.train
     skills = Counter(skill for case in cases if not case.refusal for skill in (step.skill for step in case.steps))
     return {
@@ -201,7 +201,7 @@ the one skill that a reasonable driver would choose.
 """
 
 
-def train_model(folder: Path, plan: Plan, told: Told, *, threads: int = 0, device: str = "") -> Path:
+def train_model(folder: Path, plan: PipelinePlan, told: Told, *, threads: int = 0, device: str = "") -> Path:
     """Train on built data, and export; gives the folder of what ships.
 
     Raises:

@@ -15,7 +15,7 @@ from functools import cache
 import numpy as np
 
 from chauffeur.concept.data import data_folder
-from chauffeur.language.grammar import Frame, Grammar, Manner, Template, Wording
+from chauffeur.language.grammar import Grammar, GrammarFrame, Manner, Template, Wording
 
 DATA = "onboard"
 """Their data set."""
@@ -109,97 +109,107 @@ _BECAUSE = (
 _NAME = "(driver|car|chauffeur|buddy|mate|pal|man|my friend|boss|sir|dude|love|dear|robot|James)"
 _HEY = "(hey|okay|ok|alright|so|well|um|uh|look|listen|sorry|oh|yo|hi|excuse me|now then|hello|hm)"
 
-_FRAMES: Sequence[Frame] = (
-    *[Frame("{body}")] * 12,
-    *[Frame("please {body}", unless=re.compile(r"\bplease\b"))] * 2,
-    *[Frame("{body}, please", unless=re.compile(r"\bplease\b"))] * 2,
-    Frame("{body} please", unless=re.compile(r"\bplease\b")),
-    *[Frame("(could|can|would|will) you {body}?", unless=_POLITE)] * 3,
-    *[Frame("(could|can|would) you please {body}?", unless=_POLITE)] * 2,
-    Frame("(could|can) you (maybe|possibly|perhaps|kindly) {body}?", unless=_POLITE),
-    *[Frame("I('d like| want| need| would like|'d want|'d love) you to {body}", unless=_POLITE)] * 2,
-    Frame(f"{_HEY}, {{body}}"),
-    Frame(f"{_NAME}, {{body}}"),
-    Frame(f"{{body}}, {_NAME}"),
-    Frame(f"{_HEY} {_NAME}, (could you |can you |please |would you |){{body}}", unless=_POLITE),
-    Frame("{body} now", unless=_TIMED),
-    Frame("{body} for me", unless=re.compile(_TIMED.pattern + r"|\b(?:us|me|car)\b")),
-    *[Frame("let's {body}", unless=_OF_US)] * 2,
-    Frame("(we should|we could|could we|can we|we can|we'd better|we need to|why don't we) {body}", unless=_OF_US),
-    Frame("(maybe|perhaps) {body}", unless=_NOT_ONLY),
-    Frame("maybe (you could|you can|you should|we could) {body}", unless=_OF_US),
-    Frame("(if you don't mind|if it's okay with you|if that's alright|if I may ask), {body}", unless=_PATIENT),
-    Frame("{body}, if you (don't mind|would|would be so kind|please)", unless=re.compile(r"\bplease\b")),
-    Frame("{body} when you (get a chance|can|get a moment|get the chance)", unless=_PATIENT),
-    Frame("if you could {body}, (that would be|that'd be) (great|nice|lovely|good|wonderful)", unless=_POLITE),
-    Frame("I was (wondering if|hoping) you could {body}", unless=_POLITE),
-    Frame("(would it be|is it) (possible|okay|alright) to {body}?", unless=_POLITE),
-    Frame("(any chance|do you think|is there any chance) you could {body}?", unless=_POLITE),
-    Frame("(be a dear|do me a favor|do me a favour|be so kind|be a sport|be nice) and {body}", unless=_POLITE),
-    Frame("go ahead and {body}", unless=_POLITE),
-    Frame("you (can|could|should|may|might want to|ought to|had better) {body}", unless=_POLITE),
-    Frame("I think you (should|could|can) {body}", unless=_POLITE),
-    Frame("(why don't you|how about you|what if you) {body}?", unless=_POLITE),
-    Frame("(just|simply) {body}", unless=re.compile(_NOT + r"|^just\b")),
-    Frame("(sorry to bother you|pardon me|excuse me), but could you {body}?", unless=_POLITE),
-    Frame("I'd (appreciate it|be grateful|be happy|be glad) if you could {body}", unless=_POLITE),
-    Frame("kindly {body}", unless=_POLITE),
-    Frame("{body}, (thanks|thank you|cheers|ta|thx|thank you very much|many thanks)", unless=_POLITE),
-    Frame("{body}, (would you|will you|could you|okay|yeah|alright|ok)?", unless=re.compile(_NOT + r"|\bplease\b")),
-    Frame("(gonna need you|gotta ask you|I have to ask you|I must ask you|may I ask you) to {body}", unless=_POLITE),
-    Frame("(for heaven's sake|for god's sake|come on|dude|oi|man), {body}"),
-    Frame("{body} already", unless=re.compile(_TIMED.pattern + "|" + _NOT)),
-    Frame("(ok so|so yeah|alright so|so basically) {body}"),
-    Frame("I (want|wish|need|expect) the car to {body}", unless=re.compile(_POLITE.pattern + r"|\b(?:car|us|your)\b")),
-    Frame("(time to|it's time to|I'd say it's time to|we have to) {body}", unless=_OF_US),
-    Frame("you (must|have to|need to|gotta) {body}", unless=_POLITE),
-    Frame("(quick request|one more thing|a small wish|new wish|here's what I'd like|request), {body}"),
-    Frame("(I've been thinking|as I said|like I said|if you ask me|you know what|tell you what), {body}"),
-    Frame("{body}, (that's all|that's it|if possible|if that works|if you get me|you know)"),
-    Frame(
+_FRAMES: Sequence[GrammarFrame] = (
+    *[GrammarFrame("{body}")] * 12,
+    *[GrammarFrame("please {body}", unless=re.compile(r"\bplease\b"))] * 2,
+    *[GrammarFrame("{body}, please", unless=re.compile(r"\bplease\b"))] * 2,
+    GrammarFrame("{body} please", unless=re.compile(r"\bplease\b")),
+    *[GrammarFrame("(could|can|would|will) you {body}?", unless=_POLITE)] * 3,
+    *[GrammarFrame("(could|can|would) you please {body}?", unless=_POLITE)] * 2,
+    GrammarFrame("(could|can) you (maybe|possibly|perhaps|kindly) {body}?", unless=_POLITE),
+    *[GrammarFrame("I('d like| want| need| would like|'d want|'d love) you to {body}", unless=_POLITE)] * 2,
+    GrammarFrame(f"{_HEY}, {{body}}"),
+    GrammarFrame(f"{_NAME}, {{body}}"),
+    GrammarFrame(f"{{body}}, {_NAME}"),
+    GrammarFrame(f"{_HEY} {_NAME}, (could you |can you |please |would you |){{body}}", unless=_POLITE),
+    GrammarFrame("{body} now", unless=_TIMED),
+    GrammarFrame("{body} for me", unless=re.compile(_TIMED.pattern + r"|\b(?:us|me|car)\b")),
+    *[GrammarFrame("let's {body}", unless=_OF_US)] * 2,
+    GrammarFrame(
+        "(we should|we could|could we|can we|we can|we'd better|we need to|why don't we) {body}", unless=_OF_US
+    ),
+    GrammarFrame("(maybe|perhaps) {body}", unless=_NOT_ONLY),
+    GrammarFrame("maybe (you could|you can|you should|we could) {body}", unless=_OF_US),
+    GrammarFrame("(if you don't mind|if it's okay with you|if that's alright|if I may ask), {body}", unless=_PATIENT),
+    GrammarFrame("{body}, if you (don't mind|would|would be so kind|please)", unless=re.compile(r"\bplease\b")),
+    GrammarFrame("{body} when you (get a chance|can|get a moment|get the chance)", unless=_PATIENT),
+    GrammarFrame("if you could {body}, (that would be|that'd be) (great|nice|lovely|good|wonderful)", unless=_POLITE),
+    GrammarFrame("I was (wondering if|hoping) you could {body}", unless=_POLITE),
+    GrammarFrame("(would it be|is it) (possible|okay|alright) to {body}?", unless=_POLITE),
+    GrammarFrame("(any chance|do you think|is there any chance) you could {body}?", unless=_POLITE),
+    GrammarFrame("(be a dear|do me a favor|do me a favour|be so kind|be a sport|be nice) and {body}", unless=_POLITE),
+    GrammarFrame("go ahead and {body}", unless=_POLITE),
+    GrammarFrame("you (can|could|should|may|might want to|ought to|had better) {body}", unless=_POLITE),
+    GrammarFrame("I think you (should|could|can) {body}", unless=_POLITE),
+    GrammarFrame("(why don't you|how about you|what if you) {body}?", unless=_POLITE),
+    GrammarFrame("(just|simply) {body}", unless=re.compile(_NOT + r"|^just\b")),
+    GrammarFrame("(sorry to bother you|pardon me|excuse me), but could you {body}?", unless=_POLITE),
+    GrammarFrame("I'd (appreciate it|be grateful|be happy|be glad) if you could {body}", unless=_POLITE),
+    GrammarFrame("kindly {body}", unless=_POLITE),
+    GrammarFrame("{body}, (thanks|thank you|cheers|ta|thx|thank you very much|many thanks)", unless=_POLITE),
+    GrammarFrame(
+        "{body}, (would you|will you|could you|okay|yeah|alright|ok)?", unless=re.compile(_NOT + r"|\bplease\b")
+    ),
+    GrammarFrame(
+        "(gonna need you|gotta ask you|I have to ask you|I must ask you|may I ask you) to {body}", unless=_POLITE
+    ),
+    GrammarFrame("(for heaven's sake|for god's sake|come on|dude|oi|man), {body}"),
+    GrammarFrame("{body} already", unless=re.compile(_TIMED.pattern + "|" + _NOT)),
+    GrammarFrame("(ok so|so yeah|alright so|so basically) {body}"),
+    GrammarFrame(
+        "I (want|wish|need|expect) the car to {body}", unless=re.compile(_POLITE.pattern + r"|\b(?:car|us|your)\b")
+    ),
+    GrammarFrame("(time to|it's time to|I'd say it's time to|we have to) {body}", unless=_OF_US),
+    GrammarFrame("you (must|have to|need to|gotta) {body}", unless=_POLITE),
+    GrammarFrame("(quick request|one more thing|a small wish|new wish|here's what I'd like|request), {body}"),
+    GrammarFrame("(I've been thinking|as I said|like I said|if you ask me|you know what|tell you what), {body}"),
+    GrammarFrame("{body}, (that's all|that's it|if possible|if that works|if you get me|you know)"),
+    GrammarFrame(
         "(what I want is that you|my wish is that you|I'd be thankful if you|it'd be nice if you) {body}",
         unless=_POLITE,
     ),
-    Frame(
+    GrammarFrame(
         "(my wife|my mum|my husband|the lady next to me|my boss|everyone back here) wants you to {body}", unless=_POLITE
     ),
-    Frame("(is it allowed to|are you able to|would you be able to|may I get you to) {body}?", unless=_POLITE),
-    Frame("(please to|you please|be so good to|can be you|must please) {body}", unless=_POLITE),
-    Frame("(make|have) the car {body}", unless=re.compile(_POLITE.pattern + r"|\b(?:car|us|our|your)\b")),
-    Frame("(wanna|could ya|can ya|wouldya|would ya|mind if I ask you to) {body}?", unless=_POLITE),
-    Frame("I (really need|really want|just want|simply want|would really like) you to {body}", unless=_POLITE),
-    Frame("(whenever you're ready|in your own time|when convenient), {body}", unless=_PATIENT),
-    *[Frame("would you mind {ing}?", unless=_MANY)] * 2,
-    Frame("(how about|what about) {ing}?", unless=_MANY),
-    Frame("(do you mind|mind) {ing}?", unless=_MANY),
-    Frame("I'd (appreciate|like) you {ing}", unless=_MANY),
-    Frame("I wouldn't mind you {ing}", unless=_MANY),
-    Frame("(consider|try) {ing}", unless=_MANY),
+    GrammarFrame("(is it allowed to|are you able to|would you be able to|may I get you to) {body}?", unless=_POLITE),
+    GrammarFrame("(please to|you please|be so good to|can be you|must please) {body}", unless=_POLITE),
+    GrammarFrame("(make|have) the car {body}", unless=re.compile(_POLITE.pattern + r"|\b(?:car|us|our|your)\b")),
+    GrammarFrame("(wanna|could ya|can ya|wouldya|would ya|mind if I ask you to) {body}?", unless=_POLITE),
+    GrammarFrame("I (really need|really want|just want|simply want|would really like) you to {body}", unless=_POLITE),
+    GrammarFrame("(whenever you're ready|in your own time|when convenient), {body}", unless=_PATIENT),
+    *[GrammarFrame("would you mind {ing}?", unless=_MANY)] * 2,
+    GrammarFrame("(how about|what about) {ing}?", unless=_MANY),
+    GrammarFrame("(do you mind|mind) {ing}?", unless=_MANY),
+    GrammarFrame("I'd (appreciate|like) you {ing}", unless=_MANY),
+    GrammarFrame("I wouldn't mind you {ing}", unless=_MANY),
+    GrammarFrame("(consider|try) {ing}", unless=_MANY),
 )
 
-_OPENINGS: Sequence[Frame] = (
-    *[Frame("{body}")] * 13,
-    *[Frame(f"{_HEY}, {{body}}", unless=_CALLED)] * 2,
-    Frame(f"{_NAME}, {{body}}", unless=_CALLED),
-    Frame(f"{_HEY} {_NAME}, {{body}}", unless=_CALLED),
-    Frame(
+_OPENINGS: Sequence[GrammarFrame] = (
+    *[GrammarFrame("{body}")] * 13,
+    *[GrammarFrame(f"{_HEY}, {{body}}", unless=_CALLED)] * 2,
+    GrammarFrame(f"{_NAME}, {{body}}", unless=_CALLED),
+    GrammarFrame(f"{_HEY} {_NAME}, {{body}}", unless=_CALLED),
+    GrammarFrame(
         f"{{body}}, {_NAME}",
         unless=re.compile(
             _ENDED.pattern
             + r"|\b(?:driver|mate|buddy|man|dude|please|sir|dear|love|pal|boss|friend|robot|James|chauffeur)$"
         ),
     ),
-    Frame(
+    GrammarFrame(
         "(one more thing|quick one|another thing|I was just thinking|something else|as I said|like I said), {body}",
         unless=_CALLED,
     ),
-    Frame("(I don't want to be rude but|no offence but|forgive me but|don't get me wrong, but) {body}", unless=_CALLED),
-    Frame(
+    GrammarFrame(
+        "(I don't want to be rude but|no offence but|forgive me but|don't get me wrong, but) {body}", unless=_CALLED
+    ),
+    GrammarFrame(
         "{body}, (if you ask me|if I may say so|that's all|okay|just so you know|is all I'm saying)",
         unless=re.compile(_ENDED.pattern + r"|\bplease\b|^(?:can|could|let's|how about|what about)\b"),
     ),
-    Frame("(you know|honestly|to be honest|frankly|just saying|sorry but|I must say), {body}", unless=_CALLED),
-    Frame(
+    GrammarFrame("(you know|honestly|to be honest|frankly|just saying|sorry but|I must say), {body}", unless=_CALLED),
+    GrammarFrame(
         "{body}, (you know|to be honest|I must say|honestly)",
         unless=re.compile(_ENDED.pattern + r"|\bplease\b|^(?:can|could|let's|how about|what about)\b"),
     ),

@@ -21,7 +21,7 @@ from chauffeur.drive.files import publish
 from chauffeur.language.weather import SAID_WEATHERS
 from chauffeur.models.sorting.sentences import Name, Sentence, kinds_of, sentences, table
 from chauffeur.models.sorting.tables import drawn
-from chauffeur.models.sorting.training import Recipe, by_writer, right, train, write
+from chauffeur.models.sorting.training import SortingRecipe, by_writer, right, train, write
 from chauffeur.models.sorting.weather import TEST_WRITERS, WeatherFigures, weather_figures, weather_sentences
 
 Told = Callable[[str, int, int], None]
@@ -47,7 +47,7 @@ class Figures:
     by_kind: dict[str, tuple[float, int]]
 
 
-def make_sorters(folder: Path, recipe: Recipe, told: Told, *, measured: bool = False) -> Path:
+def make_sorters(folder: Path, recipe: SortingRecipe, told: Told, *, measured: bool = False) -> Path:
     """Train and write the sorters and their card; the card's path.
 
     Args:
@@ -119,7 +119,7 @@ def _figures(own: Sequence[Sentence], learned: np.ndarray[Any, Any], hits: np.nd
     return Figures(float(learned.mean()), float(hits.mean()), by_kind)
 
 
-def _card(found: dict[Name, tuple[Sequence[Sentence], Figures]], recipe: Recipe, tables: int) -> str:
+def _card(found: dict[Name, tuple[Sequence[Sentence], Figures]], recipe: SortingRecipe, tables: int) -> str:
     parts = [_HEAD.format(version=VERSION, seed=recipe.seed, epochs=recipe.epochs, tables=tables)]
     for name, (own, figures) in found.items():
         digest = hashlib.sha256(table(name)).hexdigest()[:16]

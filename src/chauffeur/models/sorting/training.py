@@ -33,7 +33,7 @@ def _unheard(share: float) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Recipe:
+class SortingRecipe:
     """What decides a training.
 
     Attributes:
@@ -51,7 +51,7 @@ class Recipe:
     seed: int = 0
 
 
-def train(found: Sequence[Sentence], kinds: Sequence[str], recipe: Recipe, told: Told = _unheard) -> Sorter:
+def train(found: Sequence[Sentence], kinds: Sequence[str], recipe: SortingRecipe, told: Told = _unheard) -> Sorter:
     """A sorter of sentences.
 
     Args:
@@ -96,7 +96,7 @@ class _Fit:
         self._weights_moments, self._bias_moments = _Moments(self.weights), _Moments(self.bias)
         self._looks = 0
 
-    def look(self, batch: _Batch, recipe: Recipe, rng: np.random.Generator, left: float) -> None:
+    def look(self, batch: _Batch, recipe: SortingRecipe, rng: np.random.Generator, left: float) -> None:
         """One step; `left` is the share of the training that is left."""
         lengths = np.array([len(one) for one in batch.marks])
         flat, many = np.concatenate(batch.marks), len(batch.marks)
@@ -141,7 +141,7 @@ def right(sorter: Sorter, found: Sequence[Sentence]) -> Array:
 
 
 def by_writer(
-    found: Sequence[Sentence], kinds: Sequence[str], recipe: Recipe, told: Told = _unheard, parts: int = 5
+    found: Sequence[Sentence], kinds: Sequence[str], recipe: SortingRecipe, told: Told = _unheard, parts: int = 5
 ) -> Array:
     """The same for sentences of writers that were never learned from; shape (n,).
 

@@ -8,12 +8,12 @@ from typing import Final, Protocol
 import numpy as np
 
 from chauffeur.models.sorting.sentences import Sentence
-from chauffeur.models.sorting.training import Recipe, train
+from chauffeur.models.sorting.training import SortingRecipe, train
 from chauffeur.planners.vilad.template import ActionTemplate
 
 COMMANDS: Final = 3_000
 """As many as the paper's data sets have."""
-_RECIPE: Final = Recipe(epochs=12, left_out=0.2)
+_RECIPE: Final = SortingRecipe(epochs=12, left_out=0.2)
 
 
 class AskedCommand(Protocol):

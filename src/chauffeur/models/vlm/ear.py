@@ -13,7 +13,7 @@ import numpy as np
 
 from chauffeur.language.sorter import Sorter
 from chauffeur.models.sorting.sentences import Sentence
-from chauffeur.models.sorting.training import Recipe, train
+from chauffeur.models.sorting.training import SortingRecipe, train
 from chauffeur.models.vlm.wishes import composed_wish, written
 from chauffeur.planners.vlm.template import STYLES
 
@@ -30,4 +30,4 @@ def style_sorter(seed: int) -> Sorter:
     for place in range(_COMPOSED):
         style = STYLES[place % len(STYLES)]
         found.append(Sentence(composed_wish(style, rng), style, STYLES, "", ""))
-    return train(found, STYLES, Recipe(epochs=14, rate=0.03, seed=seed))
+    return train(found, STYLES, SortingRecipe(epochs=14, rate=0.03, seed=seed))

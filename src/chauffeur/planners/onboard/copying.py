@@ -14,7 +14,7 @@ from typing import Final
 
 from chauffeur.language.quantities import Quantity, read_quantities
 from chauffeur.language.tokens import split_units
-from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, UNITS, Kind, Number, Step, plain
+from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, UNITS, DialectStep, Kind, Number, plain
 
 _DIGITS: Final = re.compile(r"(?<![^\W_])\d+(?:\.\d+)?(?![^\W_])")
 _CLOSE: Final = 0.011
@@ -23,7 +23,7 @@ _MEASURES: Final[tuple[Kind, ...]] = ("speed", "distance", "time")
 """Kinds whose numbers are compared; factors and counts are said in too many ways."""
 
 
-def unnamed(wish: str, history: Sequence[str], steps: Sequence[Step]) -> Number | None:
+def unnamed(wish: str, history: Sequence[str], steps: Sequence[DialectStep]) -> Number | None:
     """The first number of a program that neither the wish nor history names as a number of its kind.
 
     Args:
@@ -47,7 +47,7 @@ def named(wish: str, history: Sequence[str]) -> tuple[str, ...]:
     return tuple(sorted(found))
 
 
-def taken_over(wish: str, history: Sequence[str], steps: Sequence[Step]) -> tuple[Step, ...]:
+def taken_over(wish: str, history: Sequence[str], steps: Sequence[DialectStep]) -> tuple[DialectStep, ...]:
     """The steps, with what was said instead of a wrong number where it is plain which one that is."""
     measures = _measures(steps)
     if not measures:
@@ -89,7 +89,7 @@ class _Said:
         return any(q.dimension == kind and _close(measured, q.value) for q in self.quantities)
 
 
-def _measures(steps: Sequence[Step]) -> list[tuple[Kind, Number]]:
+def _measures(steps: Sequence[DialectStep]) -> list[tuple[Kind, Number]]:
     found: list[tuple[Kind, Number]] = []
     for step in steps:
         takes, condition = SKILLS[step.skill].takes, step.condition
@@ -103,7 +103,7 @@ def _measures(steps: Sequence[Step]) -> list[tuple[Kind, Number]]:
     return found
 
 
-def _with(step: Step, right: dict[Number, Number]) -> Step:
+def _with(step: DialectStep, right: dict[Number, Number]) -> DialectStep:
     condition = step.condition
     if condition is not None and condition.number is not None:
         condition = replace(condition, number=right.get(condition.number, condition.number))

@@ -207,7 +207,7 @@ class Condition:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class DialectStep:
     """One thing to do.
 
     Attributes:
@@ -253,7 +253,7 @@ def plain(value: float) -> str:
     return f"{value:.6f}".rstrip("0").rstrip(".")
 
 
-def write(steps: Sequence[Step]) -> str:
+def write(steps: Sequence[DialectStep]) -> str:
     """The program of some steps."""
     lines = ["def drive():"]
     for step in steps:
@@ -272,7 +272,7 @@ def write(steps: Sequence[Step]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def tell(steps: Sequence[Step]) -> str:
+def tell(steps: Sequence[DialectStep]) -> str:
     """What the program of some steps does, in one sentence: the same numbers in the same units."""
     parts: list[str] = []
     for step in steps:
@@ -292,13 +292,13 @@ def tell(steps: Sequence[Step]) -> str:
     return f"I {', then I '.join(parts)}."
 
 
-def shall_i(steps: Sequence[Step]) -> str:
+def shall_i(steps: Sequence[DialectStep]) -> str:
     """The question whether to do what some steps do."""
     guess = tell(steps).removeprefix("I ").removesuffix(".").replace(", then I ", ", then ")
     return f"Shall I {guess}?"
 
 
-def read(source: str) -> tuple[Step, ...]:
+def read(source: str) -> tuple[DialectStep, ...]:
     """The steps of a program of the dialect.
 
     Raises:
@@ -312,7 +312,7 @@ def read(source: str) -> tuple[Step, ...]:
         raise ProgramError(f"Not a program: {error}.") from None
     if len(body) != 1 or not isinstance(body[0], ast.FunctionDef) or body[0].name != "drive" or _has_arguments(body[0]):
         raise ProgramError("A program of the dialect is one function drive().")
-    steps: list[Step] = []
+    steps: list[DialectStep] = []
     wait: Number | None = None
     once: Condition | None = None
     for statement in body[0].body:
@@ -349,7 +349,7 @@ def _delegated(statement: ast.stmt, name: str = "") -> ast.Call | None:
     return call if name in ("", call.func.id) else None
 
 
-def _step(statement: ast.stmt) -> Step:
+def _step(statement: ast.stmt) -> DialectStep:
     call = _delegated(statement)
     if call is None or not isinstance(call.func, ast.Name) or call.func.id not in SKILLS:
         raise _not_of_it(statement)
@@ -361,10 +361,10 @@ def _step(statement: ast.stmt) -> Step:
     if skill.takes is None:
         if arguments:
             raise _not_of_it(statement)
-        return Step(skill.name, manner=manner)
+        return DialectStep(skill.name, manner=manner)
     if len(arguments) != 1:
         raise _not_of_it(statement)
-    return Step(skill.name, _number(arguments[0], skill.takes, statement), manner)
+    return DialectStep(skill.name, _number(arguments[0], skill.takes, statement), manner)
 
 
 def _awaited(loop: ast.While) -> Condition:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Final
 
-from chauffeur.planners.onboard.dialect import SKILLS, Number, Step
+from chauffeur.planners.onboard.dialect import SKILLS, DialectStep, Number
 from chauffeur.planners.onboard.meaning import BIT, MUCH, Meaning, NotUnderstood
 from chauffeur.planners.onboard.understand import understand
 
@@ -54,6 +54,6 @@ def _key(meaning: Meaning, condition: str) -> tuple[object, ...]:
 def _skills() -> dict[tuple[object, ...], str]:
     out: dict[tuple[object, ...], str] = {}
     for name in SKILLS:
-        meaning = Step(name, Number(1.0)).meaning
+        meaning = DialectStep(name, Number(1.0)).meaning
         out[_key(meaning, meaning.condition)] = name
     return out

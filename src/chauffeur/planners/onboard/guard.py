@@ -13,7 +13,7 @@ from typing import Final
 
 from chauffeur.planners.arbitration import pace_of
 from chauffeur.planners.onboard.copying import unnamed
-from chauffeur.planners.onboard.dialect import Step
+from chauffeur.planners.onboard.dialect import DialectStep
 from chauffeur.planners.onboard.meaning import Meaning, NotUnderstood, Reading
 from chauffeur.planners.onboard.moods import mood_of, pace_complaint
 from chauffeur.planners.onboard.understand import understand
@@ -29,7 +29,7 @@ NOT_THE_NUMBER: Final = "I am not sure about the number"
 _WHICH_SIDE: Final = "Do you mean left or right?"
 
 
-def doubt(wish: str, history: Sequence[str], steps: Sequence[Step]) -> str:
+def doubt(wish: str, history: Sequence[str], steps: Sequence[DialectStep]) -> str:
     """What to ask back about a program before it is driven; empty when nothing speaks against it.
 
     Args:
@@ -60,7 +60,7 @@ def _outvoted(wish: str, ruled: Meaning, pace: int) -> bool:
     return complaint * pace > 0 or (not complaint and mood * pace > 0)
 
 
-def _contradiction(wish: str, reading: Reading, steps: Sequence[Step]) -> str:
+def _contradiction(wish: str, reading: Reading, steps: Sequence[DialectStep]) -> str:
     """Where both read the same manoeuvres, whether one of them says left for right or more for less.
 
     On the pace a third reader may side with the program, see `_outvoted`.

@@ -18,7 +18,7 @@ from chauffeur.planners.arbitration import UNSURE_WORDS, Wish, agreed, asked, qu
 from chauffeur.planners.base import OnText, Planner, declined
 from chauffeur.planners.onboard.copying import named, taken_over, unnamed
 from chauffeur.planners.onboard.dangers import danger
-from chauffeur.planners.onboard.dialect import Step, shall_i
+from chauffeur.planners.onboard.dialect import DialectStep, shall_i
 from chauffeur.planners.onboard.dialect import write as program_of
 from chauffeur.planners.onboard.doubts import ENGLISH_ONLY, foreign
 from chauffeur.planners.onboard.engine import Engine, Written
@@ -27,7 +27,7 @@ from chauffeur.planners.onboard.link import Linked, link
 from chauffeur.planners.onboard.options import Declined
 from chauffeur.planners.onboard.personal import Leaning, corrections_of, leaning_of
 from chauffeur.planners.onboard.prompt import history_words, prompt
-from chauffeur.planners.onboard.reply import Reply, read_reply
+from chauffeur.planners.onboard.reply import OnboardReply, read_reply
 from chauffeur.planners.onboard.thoughts import thoughts_of
 from chauffeur.planners.onboard.town import plan_in_town
 from chauffeur.planners.onboard.understand import meanings_said
@@ -53,7 +53,7 @@ def answer(
     guarded: bool = True,
     on_text: OnText | None = None,
     confirmed: str = "",
-) -> tuple[Reply, Written]:
+) -> tuple[OnboardReply, Written]:
     """What the model says to a wish after the guard has looked at it: steps, a question, or a refusal.
 
     Args:
@@ -70,10 +70,10 @@ def answer(
         ProgramError: What it wrote is no reply; only without the grammar.
     """
     if guarded and (reason := danger(wish)):
-        return Reply(refusal=reason), NOTHING
+        return OnboardReply(refusal=reason), NOTHING
     attempts = count(1)
 
-    def write(asked: str = text, **how: Any) -> tuple[Reply, Written]:
+    def write(asked: str = text, **how: Any) -> tuple[OnboardReply, Written]:
         attempt = next(attempts)
         told = None if on_text is None else partial(_told, on_text, attempt)
         written = engine.write(asked, told=told, **how)
@@ -94,12 +94,12 @@ def answer(
     question = doubt(wish, history, reply.steps)
     if not question and written.sure < UNSURE:
         question = f"{UNSURE_WORDS} {shall_i(reply.steps)}"
-    return (Reply(question=question), written) if question and question != confirmed else (reply, written)
+    return (OnboardReply(question=question), written) if question and question != confirmed else (reply, written)
 
 
-def _with_said_numbers(reply: Reply, wish: str, history: Sequence[str]) -> Reply:
+def _with_said_numbers(reply: OnboardReply, wish: str, history: Sequence[str]) -> OnboardReply:
     steps = taken_over(wish, history, reply.steps)
-    return reply if steps == reply.steps else Reply(steps=steps, source=program_of(steps))
+    return reply if steps == reply.steps else OnboardReply(steps=steps, source=program_of(steps))
 
 
 def _told(on_text: OnText, attempt: int, piece: str) -> None:
@@ -122,7 +122,7 @@ class Settled:
 
     wish: str
     source: str
-    steps: tuple[Step, ...]
+    steps: tuple[DialectStep, ...]
     linked: Linked
     used: tuple[Leaning, ...]
     situation: Situation
@@ -174,7 +174,7 @@ class LanguageModelPlanner:
         self._history = history
         self._guarded = guarded
         self._on_text = on_text
-        self._read: dict[str, tuple[Step, ...]] = {}
+        self._read: dict[str, tuple[DialectStep, ...]] = {}
 
     @classmethod
     def from_spec(cls, argument: str, *, on_text: OnText | None = None) -> Planner:
@@ -287,7 +287,7 @@ class LanguageModelPlanner:
         used = tuple(leaning(step.meaning.family) for step in reply.steps)
         return Settled(wish, reply.source, reply.steps, linked, used, situation, written)
 
-    def _steps_of(self, wish: str) -> tuple[Step, ...]:
+    def _steps_of(self, wish: str) -> tuple[DialectStep, ...]:
         """What an earlier wish asked for, for trips that were driven by another planner; empty when that is unclear."""
         if wish not in self._read:
             try:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from chauffeur.concept import Limits, Situation
 from chauffeur.planners.onboard.choose import Choice, choose_step
-from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, UNITS, Step
+from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, UNITS, DialectStep
 from chauffeur.planners.onboard.exemplars import function_of
 from chauffeur.planners.onboard.meaning import Reading
 from chauffeur.planners.onboard.options import Chosen, Declined, Options
@@ -69,7 +69,7 @@ class Linked:
 
 
 def link(
-    steps: Sequence[Step],
+    steps: Sequence[DialectStep],
     situation: Situation,
     limits: Limits,
     leaning: Callable[[str], Leaning],
@@ -86,7 +86,7 @@ def link(
         wary: Whether they say that the road is slippery or the sight bad.
     """
     options = Options(situation, limits, wary=wary)
-    chosen: list[tuple[Step, Chosen]] = []
+    chosen: list[tuple[DialectStep, Chosen]] = []
     for step in steps:
         options = options.with_leaning(leaning(step.meaning.family))
         found = choose_step(step.meaning, options)
@@ -98,9 +98,9 @@ def link(
     return Linked(choice, Reading(tuple(step.meaning for step in steps)), _library(chosen))
 
 
-def _library(chosen: Sequence[tuple[Step, Chosen]]) -> str:
+def _library(chosen: Sequence[tuple[DialectStep, Chosen]]) -> str:
     parts: list[str] = []
-    by_skill: dict[str, list[tuple[Step, Chosen, bool]]] = {}
+    by_skill: dict[str, list[tuple[DialectStep, Chosen, bool]]] = {}
     for index, (step, one) in enumerate(chosen):
         by_skill.setdefault(step.skill, []).append((step, one, index == len(chosen) - 1))
     for name, uses in by_skill.items():
@@ -117,7 +117,7 @@ def _library(chosen: Sequence[tuple[Step, Chosen]]) -> str:
     return "\n\n".join(parts)
 
 
-def _definitions(name: str, uses: Sequence[tuple[Step, Chosen, bool]]) -> list[str]:
+def _definitions(name: str, uses: Sequence[tuple[DialectStep, Chosen, bool]]) -> list[str]:
     """The function of a skill; of several uses with different numbers, one that tells them apart by its number."""
     parameters = [] if SKILLS[name].takes is None else ["amount"]
     if any(step.manner for step, _, _ in uses):

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from chauffeur.concept import Feedback, History, HistoryItem, ProgramError, Situation
-from chauffeur.planners.onboard.dialect import Step, read, tell, write
+from chauffeur.planners.onboard.dialect import DialectStep, read, tell, write
 from chauffeur.planners.onboard.draft import UNREAD, draft
 
 CONTEXT, HISTORY, WISH, DRAFT, REPLY = "<|context|>", "<|history|>", "<|wish|>", "<|draft|>", "<|reply|>"
@@ -66,7 +66,7 @@ def context_words(situation: Situation) -> str:
     return " ".join(parts)
 
 
-def history_words(history: History, steps_of: Callable[[str], Sequence[Step]]) -> tuple[str, ...]:
+def history_words(history: History, steps_of: Callable[[str], Sequence[DialectStep]]) -> tuple[str, ...]:
     """H: the calls of remembered trips with what the passenger said of them, most relevant first.
 
     Args:
@@ -76,15 +76,15 @@ def history_words(history: History, steps_of: Callable[[str], Sequence[Step]]) -
     return tuple(words for item in history.items[:HISTORY_ITEMS] if (words := _item_words(item, steps_of)))
 
 
-def remembered(steps: Sequence[Step], said: str) -> str:
+def remembered(steps: Sequence[DialectStep], said: str) -> str:
     """A remembered trip: what was driven, and what was said of it."""
     calls = ", ".join(step.call() for step in steps)
     return f"{calls}: {said}" if said else calls
 
 
-def _item_words(item: HistoryItem, steps_of: Callable[[str], Sequence[Step]]) -> str:
+def _item_words(item: HistoryItem, steps_of: Callable[[str], Sequence[DialectStep]]) -> str:
     try:
-        steps: Sequence[Step] = read(item.policy)
+        steps: Sequence[DialectStep] = read(item.policy)
     except ProgramError:
         steps = steps_of(item.instruction)
     said = feedback_words(item.feedback[-1]) if item.feedback else ""
@@ -105,6 +105,6 @@ def feedback_words(feedback: Feedback) -> str:
     return " and ".join(found) or "good"
 
 
-def program_reply(steps: Sequence[Step]) -> str:
+def program_reply(steps: Sequence[DialectStep]) -> str:
     """The reply that drives: the program, and one sentence that says the same."""
     return f"{FENCE_OPEN}{write(steps)}{FENCE_CLOSE}{tell(steps)}"

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from chauffeur.concept import ProgramError
-from chauffeur.planners.onboard.dialect import CONDITIONS, MANNERS, MAX_STEPS, SKILLS, UNITS, Kind, Step, read
+from chauffeur.planners.onboard.dialect import CONDITIONS, MANNERS, MAX_STEPS, SKILLS, UNITS, DialectStep, Kind, read
 from chauffeur.planners.onboard.prompt import ASK, FENCE_CLOSE, FENCE_OPEN, REFUSE
 
 
 @dataclass(frozen=True, slots=True)
-class Reply:
+class OnboardReply:
     """A reply read.
 
     Attributes:
@@ -21,26 +21,26 @@ class Reply:
         refusal: Why it refuses.
     """
 
-    steps: tuple[Step, ...] = ()
+    steps: tuple[DialectStep, ...] = ()
     source: str = ""
     question: str = ""
     refusal: str = ""
 
 
-def read_reply(text: str) -> Reply:
+def read_reply(text: str) -> OnboardReply:
     """Read a whole reply.
 
     Raises:
         ProgramError: It is no reply of the model's grammar.
     """
     if text.startswith(ASK):
-        return Reply(question=text.removeprefix(ASK).strip())
+        return OnboardReply(question=text.removeprefix(ASK).strip())
     if text.startswith(REFUSE):
-        return Reply(refusal=text.removeprefix(REFUSE).strip())
+        return OnboardReply(refusal=text.removeprefix(REFUSE).strip())
     if not text.startswith(FENCE_OPEN) or FENCE_CLOSE not in text:
         raise ProgramError("The reply is neither a program nor a question nor a refusal.")
     source = text[len(FENCE_OPEN) : text.index(FENCE_CLOSE, len(FENCE_OPEN))]
-    return Reply(steps=read(source), source=source)
+    return OnboardReply(steps=read(source), source=source)
 
 
 def grammar(

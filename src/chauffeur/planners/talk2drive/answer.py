@@ -32,7 +32,7 @@ class _Written(BaseModel):
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class ParametersAnswer:
     """What a reply holds: parameters, a refusal, or what is wrong with it.
 
     Attributes:
@@ -48,7 +48,7 @@ class Answer:
     problem: str = ""
 
 
-def read_answer(text: str, *, whole: bool = True) -> Answer:
+def read_answer(text: str, *, whole: bool = True) -> ParametersAnswer:
     """Read a reply; nothing raises.
 
     Args:
@@ -58,29 +58,29 @@ def read_answer(text: str, *, whole: bool = True) -> Answer:
     try:
         found = _last_object(text)
     except RecursionError:
-        return Answer("", problem="the JSON object is nested too deep")
+        return ParametersAnswer("", problem="the JSON object is nested too deep")
     if found is None:
         why = (
             "the answer was cut off at its length limit; answer more briefly"
             if not whole
             else "there is no JSON object"
         )
-        return Answer("", problem=why)
+        return ParametersAnswer("", problem=why)
     try:
         written = _Written.model_validate(found)
     except ValidationError as error:
-        return Answer(_words(found.get("thoughts")), problem=_said(error))
+        return ParametersAnswer(_words(found.get("thoughts")), problem=_said(error))
     if written.refusal.strip():
-        return Answer(written.thoughts.strip(), refusal=written.refusal.strip())
+        return ParametersAnswer(written.thoughts.strip(), refusal=written.refusal.strip())
     missing = [
         name for name in ("velocity_kmh", "lookahead_distance_m", "lookahead_ratio_s") if getattr(written, name) is None
     ]
     if missing:
-        return Answer(written.thoughts.strip(), problem=f"missing: {', '.join(missing)}")
+        return ParametersAnswer(written.thoughts.strip(), problem=f"missing: {', '.join(missing)}")
     assert written.velocity_kmh is not None
     assert written.lookahead_distance_m is not None
     assert written.lookahead_ratio_s is not None
-    return Answer(
+    return ParametersAnswer(
         written.thoughts.strip(),
         Parameters(
             written.velocity_kmh * MPS_PER_KMH,

@@ -28,7 +28,7 @@ from chauffeur.planners.arbitration import (
 )
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.dangers import danger
-from chauffeur.planners.onboard.dialect import Step
+from chauffeur.planners.onboard.dialect import DialectStep
 from chauffeur.planners.onboard.doubts import foreign
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.language_model import LanguageModelPlanner, Settled, usage_of
@@ -403,7 +403,7 @@ def parameters_of(settled: Settled, limits: Limits) -> Parameters | Declined:
     return Parameters(round(speed, 2), look.distance_m, look.ratio_s, lane or mood, turn)
 
 
-def _in_time(step: Step) -> bool:
+def _in_time(step: DialectStep) -> bool:
     """Whether it is to be done later, or depends on more than a free lane, which the car sees to by itself."""
     depends = step.condition is not None and not step.condition.name.startswith("clear_")
     return depends or step.wait_s is not None

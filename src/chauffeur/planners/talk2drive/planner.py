@@ -27,7 +27,7 @@ from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.planners.base import OnText, Planner, Prompt, Prompting, Prose, Writer, declined
 from chauffeur.planners.prompts import Message, data_block, repair_turns, wish_turn
 from chauffeur.planners.prompts.system import fill, template
-from chauffeur.planners.talk2drive.answer import Answer, read_answer
+from chauffeur.planners.talk2drive.answer import ParametersAnswer, read_answer
 from chauffeur.planners.talk2drive.style import DISTANCE_M, RATIO_S
 from chauffeur.planners.wish_goal import goal_of
 from chauffeur.safety.envelope import policy_findings
@@ -122,7 +122,7 @@ class Talk2DrivePlanner:
             raise ConfigError(f"{self._name} does not say what it would send.")
         return replace(self._writer.prompt(request), messages=messages_for(request))
 
-    def _plan(self, request: PlanRequest, answer: Answer, prose: Prose, usage: Usage, begun: float) -> Plan:
+    def _plan(self, request: PlanRequest, answer: ParametersAnswer, prose: Prose, usage: Usage, begun: float) -> Plan:
         if answer.parameters is None:
             words = answer.refusal or f"The model gave no usable parameters: {answer.problem}."
             intent = "declined" if answer.refusal else "unusable"
@@ -142,7 +142,7 @@ class Talk2DrivePlanner:
         )
 
 
-def _findings(answer: Answer, request: PlanRequest) -> list[str]:
+def _findings(answer: ParametersAnswer, request: PlanRequest) -> list[str]:
     """What the model may mend: an answer that cannot be read, or parameters that road or limits forbid."""
     if answer.parameters is None:
         return [answer.problem] if answer.problem else []

@@ -1,7 +1,7 @@
 """What a program can do, found out without running it: every argument as a set, every loop's end, dead wishes."""
 
 from chauffeur.programs.verify.circumstances import ANYWHERE, Circumstances
-from chauffeur.programs.verify.report import Argument, CallSite, LoopReport, LoopVerdict, Note, Verification
+from chauffeur.programs.verify.report import Argument, CallSite, LoopReport, LoopVerdict, Verification, VerificationNote
 from chauffeur.programs.verify.values import Value
 from chauffeur.programs.verify.verifier import verify
 
@@ -12,8 +12,8 @@ __all__ = [
     "Circumstances",
     "LoopReport",
     "LoopVerdict",
-    "Note",
     "Value",
     "Verification",
+    "VerificationNote",
     "verify",
 ]

@@ -11,7 +11,7 @@ from chauffeur.programs.catalogue import TOWN_APIS
 from chauffeur.programs.verify import arithmetic
 from chauffeur.programs.verify.circumstances import answer
 from chauffeur.programs.verify.expressions import MATH_MODULE, DeadEndError, Expressions
-from chauffeur.programs.verify.frames import Frame
+from chauffeur.programs.verify.frames import CallFrame
 from chauffeur.programs.verify.state import QUIET, WISHES, State
 from chauffeur.programs.verify.values import (
     ANY_TEXT,
@@ -93,7 +93,7 @@ class Calls(Expressions, ABC):
         if place is None:
             kind = "api" if node.id in TOWN_APIS else "builtin"
             return Value(FUNCTION, callees=frozenset({(kind, node.id)}))
-        if isinstance(place, Frame):
+        if isinstance(place, CallFrame):
             functions = place.scope.functions.get(node.id, ())
             found = Value(FUNCTION, callees=frozenset(("own", function, place) for function in functions))
             return join(found, TOP) if not functions or node.id in place.scope.plain else found

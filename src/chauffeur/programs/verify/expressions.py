@@ -12,7 +12,7 @@ from chauffeur.programs.catalogue import TOWN_APIS
 from chauffeur.programs.verify import arithmetic
 from chauffeur.programs.verify.circumstances import Circumstances
 from chauffeur.programs.verify.compare import compared
-from chauffeur.programs.verify.frames import Frame
+from chauffeur.programs.verify.frames import CallFrame
 from chauffeur.programs.verify.record import Record
 from chauffeur.programs.verify.scopes import FunctionNode, Scopes
 from chauffeur.programs.verify.state import State, joined, widened
@@ -95,7 +95,7 @@ class Expressions(ABC):
         record: Where findings go, in the last pass through everything around.
     """
 
-    def __init__(self, scopes: Scopes, module: Frame, where: Circumstances) -> None:
+    def __init__(self, scopes: Scopes, module: CallFrame, where: Circumstances) -> None:
         self.state = State({})
         self.record = Record()
         self.frame = module
@@ -108,7 +108,7 @@ class Expressions(ABC):
         self.guards = 0
         self._steps = 0
         self._settled: dict[tuple[int, int], tuple[State, State]] = {}
-        self._frames: dict[tuple[int, ...], Frame] = {}
+        self._frames: dict[tuple[int, ...], CallFrame] = {}
         self._handlers: dict[type[ast.expr], Callable[[Any], Value]] = {
             ast.Constant: lambda node: constant(node.value),
             ast.Name: self._name,
@@ -182,7 +182,7 @@ class Expressions(ABC):
         place = self.frame.place(node.id)
         if place is None:
             return self._outer_name(node)
-        if isinstance(place, Frame):
+        if isinstance(place, CallFrame):
             for function in place.scope.functions.get(node.id, ()):
                 self.let_loose(function)
             return TOP
@@ -471,7 +471,9 @@ class Expressions(ABC):
 
     def _comprehension(self, node: ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp) -> Value:
         outer = self.frame
-        inner = self.frame_for((id(node), outer.number), lambda number_: Frame(number_, self.scopes.of(node), outer))
+        inner = self.frame_for(
+            (id(node), outer.number), lambda number_: CallFrame(number_, self.scopes.of(node), outer)
+        )
         try:
             self._clause(node, 0, inner, outer)
         finally:
@@ -479,7 +481,11 @@ class Expressions(ABC):
         return fresh(id(node))
 
     def _clause(
-        self, node: ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp, index: int, inner: Frame, outer: Frame
+        self,
+        node: ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp,
+        index: int,
+        inner: CallFrame,
+        outer: CallFrame,
     ) -> None:
         if index == len(node.generators):
             for element in (node.key, node.value) if isinstance(node, ast.DictComp) else (node.elt,):
@@ -617,7 +623,7 @@ class Expressions(ABC):
         else:
             raise TooIntricateError(f"line {target.lineno} assigns to what the language does not know")
 
-    def frame_for(self, key: tuple[int, ...], make: Callable[[int], Frame]) -> Frame:
+    def frame_for(self, key: tuple[int, ...], make: Callable[[int], CallFrame]) -> CallFrame:
         """The one frame for an activation in one place."""
         frame = self._frames.get(key)
         if frame is None:

@@ -11,7 +11,7 @@ MODULE: Final = 0
 """Number of the module's frame."""
 
 
-class Frame:
+class CallFrame:
     """An activation of a scope.
 
     Attributes:
@@ -23,22 +23,22 @@ class Frame:
 
     __slots__ = ("_places", "number", "open", "parent", "scope")
 
-    def __init__(self, number: int, scope: Scope, parent: Frame | None, *, is_open: bool = False) -> None:
+    def __init__(self, number: int, scope: Scope, parent: CallFrame | None, *, is_open: bool = False) -> None:
         self.number = number
         self.scope = scope
         self.parent = parent
         self.open = is_open
-        self._places: dict[str, Frame | Key | None] = {}
+        self._places: dict[str, CallFrame | Key | None] = {}
 
-    def place(self, name: str) -> Frame | Key | None:
+    def place(self, name: str) -> CallFrame | Key | None:
         """The variable behind a name; its frame where that is open; None for what the text does not bind."""
         if name in self._places:
             return self._places[name]
         found = self._places[name] = self._find(name)
         return found
 
-    def _find(self, name: str) -> Frame | Key | None:
-        frame: Frame | None = self
+    def _find(self, name: str) -> CallFrame | Key | None:
+        frame: CallFrame | None = self
         while frame is not None:
             if frame.scope.shared.get(name):  # declared global
                 while frame.parent is not None:

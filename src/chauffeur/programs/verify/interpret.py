@@ -14,7 +14,7 @@ from chauffeur.programs.verify import arithmetic
 from chauffeur.programs.verify.calls import Calls
 from chauffeur.programs.verify.circumstances import Circumstances
 from chauffeur.programs.verify.expressions import MATH_MODULE, DeadEndError, Loop, TooIntricateError
-from chauffeur.programs.verify.frames import MODULE, Frame
+from chauffeur.programs.verify.frames import MODULE, CallFrame
 from chauffeur.programs.verify.report import LoopVerdict
 from chauffeur.programs.verify.scopes import FunctionNode, Scope, Scopes
 from chauffeur.programs.verify.state import State, joined
@@ -51,7 +51,7 @@ class Interpreter(Calls):
 
     def __init__(self, library: ast.Module, program: ast.Module, where: Circumstances) -> None:
         scopes = Scopes((library, program))
-        super().__init__(scopes, Frame(MODULE, scopes.module, None), where)
+        super().__init__(scopes, CallFrame(MODULE, scopes.module, None), where)
         self._module = self.frame
         self._texts = (library, program)
         self._calls: list[FunctionNode] = []
@@ -125,11 +125,11 @@ class Interpreter(Calls):
         with contextlib.suppress(DeadEndError):
             self._activate((id(function), parent.number), function, parent, None, {})
 
-    def _open_frame(self, scope: Scope | None) -> Frame:
+    def _open_frame(self, scope: Scope | None) -> CallFrame:
         if scope is None or scope is self.scopes.module:
             return self._module
         parent = self._open_frame(scope.parent)
-        return self.frame_for((-1, id(scope)), lambda number: Frame(number, scope, parent, is_open=True))
+        return self.frame_for((-1, id(scope)), lambda number: CallFrame(number, scope, parent, is_open=True))
 
     def call_own(
         self, node: ast.Call, callee: Callee, arguments: list[Value], keywords: dict[str, Value] | None
@@ -184,11 +184,11 @@ class Interpreter(Calls):
         self,
         key: tuple[int, ...],
         function: FunctionNode,
-        parent: Frame,
+        parent: CallFrame,
         arguments: list[Value] | None,
         keywords: dict[str, Value],
     ) -> Value:
-        frame = self.frame_for(key, lambda number: Frame(number, self.scopes.of(function), parent))
+        frame = self.frame_for(key, lambda number: CallFrame(number, self.scopes.of(function), parent))
         kept = self.frame, self._returns, self._loop
         self.frame, self._returns, self._loop = frame, [], None
         self._calls.append(function)

@@ -68,7 +68,7 @@ class LoopReport:
 
 
 @dataclass(frozen=True, slots=True)
-class Note:
+class VerificationNote:
     """Something a program says but does not mean.
 
     Attributes:
@@ -102,7 +102,7 @@ class Verification:
 
     calls: tuple[CallSite, ...] = ()
     loops: tuple[LoopReport, ...] = ()
-    notes: tuple[Note, ...] = ()
+    notes: tuple[VerificationNote, ...] = ()
     unreachable: tuple[int, ...] = ()
     complete: bool = True
     problem: str = ""

@@ -14,7 +14,7 @@ from chauffeur.programs.verify.circumstances import ANYWHERE, Circumstances
 from chauffeur.programs.verify.expressions import TooIntricateError
 from chauffeur.programs.verify.interpret import Interpreter
 from chauffeur.programs.verify.record import Record
-from chauffeur.programs.verify.report import Argument, CallSite, LoopReport, Note, Verification
+from chauffeur.programs.verify.report import Argument, CallSite, LoopReport, Verification, VerificationNote
 from chauffeur.programs.verify.state import WISHES
 from chauffeur.programs.verify.values import TOP
 
@@ -134,7 +134,7 @@ def _lines(statements: Sequence[ast.stmt]) -> Iterator[int]:
                 yield node.lineno
 
 
-def _never(unreached: Sequence[_Unreached]) -> Iterator[Note]:
+def _never(unreached: Sequence[_Unreached]) -> Iterator[VerificationNote]:
     for first, statements, why in unreached:
         wishes = [
             node
@@ -145,20 +145,20 @@ def _never(unreached: Sequence[_Unreached]) -> Iterator[Note]:
         if wishes:
             for call in wishes:
                 assert isinstance(call.func, ast.Name)
-                yield Note(call.lineno, "unreachable", f"The wish {call.func.id} is never reached: {why}.")
+                yield VerificationNote(call.lineno, "unreachable", f"The wish {call.func.id} is never reached: {why}.")
         else:
-            yield Note(first.lineno, "unreachable", f"This is never reached: {why}.", wish=False)
+            yield VerificationNote(first.lineno, "unreachable", f"This is never reached: {why}.", wish=False)
 
 
 # Wishes that come to nothing ---------------------------------------------------------------------------------------
 
 
-def _wishes(record: Record, in_library: frozenset[int]) -> Iterator[Note]:
+def _wishes(record: Record, in_library: frozenset[int]) -> Iterator[VerificationNote]:
     for place in record.unmet():
         node = record.node(place)
         others = sorted({record.node(other).lineno for other in record.replaced_by[place]})
         by = " or ".join(f"line {line}" for line in others)
-        yield Note(
+        yield VerificationNote(
             node.lineno,
             "overwritten",
             f"The wish {record.name(place)} never takes effect: {by} wishes otherwise before the next yield.",
@@ -168,7 +168,7 @@ def _wishes(record: Record, in_library: frozenset[int]) -> Iterator[Note]:
         if before:
             node = record.node(place)
             lines = " or ".join(f"line {record.node(other).lineno}" for other in sorted(before))
-            yield Note(
+            yield VerificationNote(
                 node.lineno,
                 "both-sides",
                 f"Two lanes are wished in one control period: {lines} wishes one to the other side.",

@@ -3,7 +3,7 @@
 from chauffeur.concept import Alignment, Mismatch
 from chauffeur.concept import MismatchKind as Kind
 from chauffeur.safety.alignment.check import ALIGNMENT_CHECK, DRIVEN_CHECK, check_alignment, check_driven
-from chauffeur.safety.alignment.facts import Effect, Facts, Surroundings
+from chauffeur.safety.alignment.facts import Effect, Facts, FactSurroundings
 from chauffeur.safety.alignment.judge import judge, judge_drive
 from chauffeur.safety.alignment.saying import KINDS, mismatch_words, score_words
 from chauffeur.safety.alignment.tracing import read_facts
@@ -14,10 +14,10 @@ __all__ = [
     "KINDS",
     "Alignment",
     "Effect",
+    "FactSurroundings",
     "Facts",
     "Kind",
     "Mismatch",
-    "Surroundings",
     "check_alignment",
     "check_driven",
     "judge",

@@ -10,7 +10,7 @@ from typing import Final
 from chauffeur.language.quantities import Quantity
 from chauffeur.safety.alignment import wording as words
 from chauffeur.safety.alignment.claim import Claim, clause_quantities
-from chauffeur.safety.alignment.clauses import Clause
+from chauffeur.safety.alignment.clauses import ExplainedClause
 
 _AT_LIMIT: Final = words.listed("drive match use exactly at go copy set")
 _ALLOWED: Final = words.listed("limit permitted allowed")
@@ -21,7 +21,7 @@ _AT_MOST: Final = ("faster than", "above", "exceed", "over", "more than")
 _NO_FASTER: Final = ("no faster than", "not faster than")
 
 
-def speeds(clause: Clause, base: Claim) -> Iterator[Claim]:
+def speeds(clause: ExplainedClause, base: Claim) -> Iterator[Claim]:
     """What a clause claims of the speed."""
     numbers = tuple(q for q in clause_quantities(clause, "speed") if q.dimension == "speed")
     shares = tuple(q for q in clause_quantities(clause) if q.dimension == "share")
@@ -86,7 +86,7 @@ _BESIDE: Final = words.listed(
 _ONTO: Final = ("down to", "up to")
 
 
-def _relative(clause: Clause) -> bool:
+def _relative(clause: ExplainedClause) -> bool:
     return clause.has(_BESIDE) and not clause.says(*_ONTO)
 
 
@@ -104,7 +104,7 @@ _BETWEEN: Final = words.GAPS - {"following"}
 _TAKEN_OFF: Final = re.compile(r"\b(?:take|takes|taking|knock|shave) #\d+ off")
 
 
-def _speed_sign(clause: Clause) -> int:
+def _speed_sign(clause: ExplainedClause) -> int:
     """+1 for faster, -1 for slower, 0 where neither is said of the ego's own speed."""
     said = clause.words
     votes = 0
@@ -139,7 +139,7 @@ _TICKS: Final = words.listed("tick ticks period")
 _USUAL: Final = words.listed("default usual")
 
 
-def gaps(clause: Clause, base: Claim) -> Iterator[Claim]:
+def gaps(clause: ExplainedClause, base: Claim) -> Iterator[Claim]:
     """What it claims of the gap to the vehicle ahead, or the headway."""
     about = clause.has(_BETWEEN) or clause.says(*_BEHIND_IT) or (clause.has(_HOLDS) and "ahead" in clause.words)
     headway = "headway" in clause.words or clause.says(*_IN_SECONDS)
@@ -178,7 +178,7 @@ _WIDER: Final = words.WIDER - words.listed("more extra open opens")
 _OPENED: Final = ("open the gap", "opens the gap", "open up the gap")
 
 
-def _gap_sign(clause: Clause) -> int:
+def _gap_sign(clause: ExplainedClause) -> int:
     if clause.says(*_WIDENING):
         return 1
     if clause.says(*_CLOSING):
@@ -191,7 +191,7 @@ def _gap_sign(clause: Clause) -> int:
 _NO_WAITS: Final = words.listed("headway gap distance tick ticks behind every minimum allowed")
 
 
-def waits(clause: Clause, base: Claim) -> Iterator[Claim]:
+def waits(clause: ExplainedClause, base: Claim) -> Iterator[Claim]:
     """What it claims of time that passes."""
     if clause.has(_NO_WAITS):
         return

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from chauffeur.safety.alignment.values import NOTHING, Lane, Value, of
+from chauffeur.safety.alignment.values import NOTHING, LaneValue, TracedValue, of
 
 _STEPS: Final = {"get_left_lane": -1, "get_right_lane": 1}
 _CROSSING: Final = {
@@ -14,7 +14,7 @@ _CROSSING: Final = {
 }
 
 
-def answer(name: str, asked: Sequence[Value], at: frozenset[int]) -> Value:
+def answer(name: str, asked: Sequence[TracedValue], at: frozenset[int]) -> TracedValue:
     """The answer of an API that only asks.
 
     Args:
@@ -24,19 +24,19 @@ def answer(name: str, asked: Sequence[Value], at: frozenset[int]) -> Value:
     """
     first = asked[0] if asked else NOTHING
     if name == "get_ego_vehicle":
-        return Value(vehicle="ego")
+        return TracedValue(vehicle="ego")
     if name in _STEPS:
-        return _lane(_STEPS[name], at) if first.vehicle in ("", "ego") else Value(tags=first.tags)
+        return _lane(_STEPS[name], at) if first.vehicle in ("", "ego") else TracedValue(tags=first.tags)
     if name == "get_lane_of":
-        return _lane(0, at) if first.vehicle in ("", "ego") else Value(lanes=first.lanes, tags=first.tags)
+        return _lane(0, at) if first.vehicle in ("", "ego") else TracedValue(lanes=first.lanes, tags=first.tags)
     if name in _CROSSING:
-        return Value(crossing=_CROSSING[name])
+        return TracedValue(crossing=_CROSSING[name])
     if name == "is_safe_enter":
-        return Value(tags=frozenset(_safe(first)))
+        return TracedValue(tags=frozenset(_safe(first)))
     if name in ("detect_front_vehicle_in", "detect_rear_vehicle_in"):
         vehicle = "front" if "front" in name else "rear"
         lanes = first.lanes or (frozenset() if first.crossing else _lane(0, at).lanes)
-        return Value(vehicle=vehicle, tags=frozenset({vehicle}), lanes=lanes)
+        return TracedValue(vehicle=vehicle, tags=frozenset({vehicle}), lanes=lanes)
     if name == "get_speed_of":
         return of("ego", "speed") if first.vehicle == "ego" else of("other", "other speed")
     if name == "get_distance_between_vehicles":
@@ -50,17 +50,17 @@ def answer(name: str, asked: Sequence[Value], at: frozenset[int]) -> Value:
     return of("headway", "headway") if name == "get_desired_time_headway" else NOTHING
 
 
-def _lane(offset: int, at: frozenset[int]) -> Value:
-    return Value(lanes=frozenset({Lane(offset, at)}))
+def _lane(offset: int, at: frozenset[int]) -> TracedValue:
+    return TracedValue(lanes=frozenset({LaneValue(offset, at)}))
 
 
-def _safe(lane: Value) -> set[str]:
+def _safe(lane: TracedValue) -> set[str]:
     if lane.crossing:
         return {"safe:cross", f"safe:cross:{lane.crossing}"}
     return {f"safe:{one.offset}" for one in lane.lanes} or {"safe:?"}
 
 
-def _distance(one: Value, other: Value) -> Value:
+def _distance(one: TracedValue, other: TracedValue) -> TracedValue:
     match one.vehicle, other.vehicle:
         case "front", "ego":
             return of("gap", "gap")

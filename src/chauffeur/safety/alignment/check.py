@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Final
 
 from chauffeur.concept import Alignment, Limits, Observation, Plan, Program, Verdict
-from chauffeur.safety.alignment.facts import Effect, Facts, Surroundings
+from chauffeur.safety.alignment.facts import Effect, Facts, FactSurroundings
 from chauffeur.safety.alignment.judge import judge, judge_drive
 from chauffeur.safety.alignment.saying import claims_words, mismatch_words, score_words
 from chauffeur.safety.alignment.tracing import read_facts
@@ -27,7 +27,7 @@ def check_alignment(plan: Plan, observation: Observation, limits: Limits) -> Ver
     facts = _facts(plan)
     if isinstance(facts, str):
         return Verdict(ALIGNMENT_CHECK, True, facts, vetoes=False)
-    found = judge(plan.thoughts.text, facts, Surroundings.of(observation))
+    found = judge(plan.thoughts.text, facts, FactSurroundings.of(observation))
     return _verdict(
         ALIGNMENT_CHECK, found, "The explanation fits the program", "The explanation does not fit the program"
     )
@@ -46,7 +46,7 @@ def check_driven(plan: Plan, observation: Observation, effect: Effect) -> Verdic
         facts = "The program failed on the way, so that the drive was not compared with the explanation."
     if isinstance(facts, str):
         return Verdict(DRIVEN_CHECK, True, facts, vetoes=False)
-    found = judge_drive(plan.thoughts.text, facts, Surroundings.of(observation), effect)
+    found = judge_drive(plan.thoughts.text, facts, FactSurroundings.of(observation), effect)
     return _verdict(DRIVEN_CHECK, found, "The drive went as explained", "The drive did not go as explained")
 
 

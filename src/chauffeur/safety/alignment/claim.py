@@ -7,7 +7,7 @@ from typing import Final, Literal
 
 from chauffeur.language.quantities import Quantity
 from chauffeur.safety.alignment import wording as words
-from chauffeur.safety.alignment.clauses import Clause
+from chauffeur.safety.alignment.clauses import ExplainedClause
 
 Matter = Literal[
     "lane", "overtake", "back", "turn", "stop", "pull over", "speed", "gap", "wait", "check", "other speed",
@@ -58,7 +58,9 @@ _FACTORS: Final = frozenset({"gain", "factor", "coefficient", "weight"})
 _VAGUE: Final = frozenset({"few", "couple", "several", "some"})
 
 
-def clause_quantities(clause: Clause, bare: Literal["", "speed", "distance", "time"] = "") -> tuple[Quantity, ...]:
+def clause_quantities(
+    clause: ExplainedClause, bare: Literal["", "speed", "distance", "time"] = ""
+) -> tuple[Quantity, ...]:
     """Numbers said in a clause; one without a unit counts as what the clause is about."""
     found: list[Quantity] = []
     for index, word in enumerate(clause.words):

@@ -13,7 +13,7 @@ from typing import Final
 from chauffeur.safety.alignment import wording as words
 from chauffeur.safety.alignment.amounts import gaps, speeds, waits
 from chauffeur.safety.alignment.claim import Claim
-from chauffeur.safety.alignment.clauses import Clause, clauses_of
+from chauffeur.safety.alignment.clauses import ExplainedClause, clauses_of
 from chauffeur.safety.alignment.conditions import conditions, looks, stays
 from chauffeur.safety.alignment.motions import motions, sides_of
 
@@ -54,7 +54,7 @@ def describes(text: str) -> bool:
     return any(clause.mood == "plan" and (clause.has(ours) or clause.words[0] in deeds) for clause in clauses_of(text))
 
 
-def _ordered(claim: Claim, clause: Clause, clauses: Sequence[Clause], index: int) -> Claim:
+def _ordered(claim: Claim, clause: ExplainedClause, clauses: Sequence[ExplainedClause], index: int) -> Claim:
     """A claim with its place in time: what comes `after` a thing is told later than it, wherever it stands."""
     order = float(index)
     told = clause.opener in words.LATER | words.FIRST | {"once", "and then", "after that", "after this", "after which"}
@@ -75,7 +75,7 @@ def _ordered(claim: Claim, clause: Clause, clauses: Sequence[Clause], index: int
     return replace(claim, order=order, told=told)
 
 
-def _claims(clause: Clause, *, crossing: bool) -> Iterator[Claim]:
+def _claims(clause: ExplainedClause, *, crossing: bool) -> Iterator[Claim]:
     if clause.mood in ("state", "thought"):
         return
     base = Claim("nothing", clause.sentence, 0.0, firm=clause.mood != "wish", denied=clause.negated)

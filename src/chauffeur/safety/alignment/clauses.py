@@ -38,7 +38,7 @@ _NOISE: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Clause:
+class ExplainedClause:
     """A clause.
 
     Attributes:
@@ -70,12 +70,12 @@ class Clause:
 
 
 @lru_cache(maxsize=32)
-def clauses_of(text: str) -> tuple[Clause, ...]:
+def clauses_of(text: str) -> tuple[ExplainedClause, ...]:
     """All clauses of a text, in order."""
     return tuple(_clauses(text))
 
 
-def _clauses(text: str) -> Iterator[Clause]:
+def _clauses(text: str) -> Iterator[ExplainedClause]:
     text = _ABBREVIATIONS.sub(" ", _THINKING.sub(" ", text))
     text = _LISTED.sub("\nnext, ", text)
     for place, (sentence, quoted) in enumerate(_sentences(text)):
@@ -91,7 +91,7 @@ def _clauses(text: str) -> Iterator[Clause]:
         mood: Mood = "plan"
         for opener, part in _split(tokens):
             mood = "thought" if asking else "wish" if quoted else _mood(opener, part, mood)
-            yield Clause(sentence, place, tuple(part), tuple(quantities), mood, opener, _negated(opener, part))
+            yield ExplainedClause(sentence, place, tuple(part), tuple(quantities), mood, opener, _negated(opener, part))
 
 
 def _sentences(text: str) -> Iterator[tuple[str, bool]]:

@@ -10,7 +10,7 @@ from chauffeur.concept import Mismatch
 from chauffeur.language.quantities import Quantity
 from chauffeur.safety.alignment.claim import Claim
 from chauffeur.safety.alignment.claims import claims_of, describes
-from chauffeur.safety.alignment.facts import Effect, Event, Facts, Surroundings
+from chauffeur.safety.alignment.facts import Effect, Event, Facts, FactSurroundings
 from chauffeur.safety.alignment.numbers import Numbers
 
 _MAX_CHARS: Final = 20_000
@@ -49,7 +49,7 @@ class Comparison:
         says_limit, says_speed, says_passing: Whether it speaks of the limit, of speed, of passing somebody.
     """
 
-    def __init__(self, text: str, facts: Facts, where: Surroundings, effects: Sequence[Effect]) -> None:
+    def __init__(self, text: str, facts: Facts, where: FactSurroundings, effects: Sequence[Effect]) -> None:
         text = text[:_MAX_CHARS]
         self.facts = facts
         self.effects = tuple(effect for effect in effects if not effect.failed)

@@ -9,7 +9,7 @@ from typing import Final
 from chauffeur.safety.alignment import wording as words
 from chauffeur.safety.alignment.amounts import speeds, waits
 from chauffeur.safety.alignment.claim import Claim, clause_quantities
-from chauffeur.safety.alignment.clauses import Clause
+from chauffeur.safety.alignment.clauses import ExplainedClause
 from chauffeur.safety.alignment.motions import motions, sides_of
 
 _SKIPPED: Final = words.listed("skip skips skipping omit")
@@ -28,7 +28,7 @@ _STRONG: Final = words.LOOKS - words.listed("make ensure ensures ask asks look l
 _LOOKING: Final = ("look both ways", "look for a", "sufficient gap")
 
 
-def looks(clause: Clause) -> bool:
+def looks(clause: ExplainedClause) -> bool:
     """Whether a clause speaks of looking if a way is free."""
     if clause.has(_SKIPPED):
         return False
@@ -63,7 +63,7 @@ _DONE_FIRST: Final = frozenset({"after", "once", "when", "as soon as", "until", 
 """Openers of what is itself done."""
 
 
-def conditions(clause: Clause, base: Claim, *, crossing: bool) -> Iterator[Claim]:
+def conditions(clause: ExplainedClause, base: Claim, *, crossing: bool) -> Iterator[Claim]:
     """What a clause claims that something waits for or depends on."""
     sides = sides_of(clause)
     free = clause.has(_FREE, _WAYS) or clause.has(words.LOOKS, _LOOKED_FOR)
@@ -107,7 +107,7 @@ _LANES: Final = words.listed("lane lanes")
 _HEADWAYS: Final = words.listed("headway gap distance")
 
 
-def stays(clause: Clause, base: Claim) -> Iterator[Claim]:
+def stays(clause: ExplainedClause, base: Claim) -> Iterator[Claim]:
     """What is said to be left as it is."""
     if clause.mood != "plan" or clause.says(*_AS_OTHERS):
         return
@@ -122,7 +122,7 @@ def stays(clause: Clause, base: Claim) -> Iterator[Claim]:
         yield replace(base, sides=_about(clause))
 
 
-def _about(clause: Clause) -> frozenset[int]:
+def _about(clause: ExplainedClause) -> frozenset[int]:
     """What is said to stay: 1 the lane, 2 the speed, 3 the gap; nothing for all of it."""
     named = ((1, _LANES), (2, words.SPEEDS), (3, _HEADWAYS))
     return frozenset(matter for matter, said in named if clause.has(said))

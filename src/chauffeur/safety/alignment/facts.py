@@ -49,7 +49,7 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class FactMark:
     """A number that something measured is compared with, or subtracted from it: `gap < 30`, `gap - 25`."""
 
     base: Base
@@ -71,7 +71,7 @@ class Facts:
     """
 
     events: tuple[Event, ...] = ()
-    marks: tuple[Mark, ...] = ()
+    marks: tuple[FactMark, ...] = ()
     spans_s: tuple[float, ...] = ()
     literals: frozenset[float] = frozenset()
     readable: bool = True
@@ -115,7 +115,7 @@ class Effect:
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
+class FactSurroundings:
     """Where the ego is when the program begins.
 
     Attributes:
@@ -135,7 +135,7 @@ class Surroundings:
     crossing: bool = False
 
     @classmethod
-    def of(cls, observation: Observation) -> Surroundings:
+    def of(cls, observation: Observation) -> FactSurroundings:
         """Those of an observation."""
         front = observation.front
         lane = observation.road.get(observation.ego.lane)

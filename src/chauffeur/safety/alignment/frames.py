@@ -7,14 +7,14 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from chauffeur.safety.alignment.values import Value, either
+from chauffeur.safety.alignment.values import TracedValue, either
 
 Constants = Callable[[ast.expr], tuple[float, ...]]
 """Plain numbers that an expression can be."""
 
 
 @dataclass(slots=True)
-class Frame:
+class MeaningFrame:
     """Names of a function while it is followed, and what its statements depend on.
 
     Attributes:
@@ -25,15 +25,15 @@ class Frame:
         returned: What it may return.
     """
 
-    names: dict[str, Value]
-    outer: Frame | None = None
+    names: dict[str, TracedValue]
+    outer: MeaningFrame | None = None
     active: frozenset[str] = frozenset()
     gates: frozenset[str] = frozenset()
-    returned: list[Value] = field(default_factory=list[Value])
+    returned: list[TracedValue] = field(default_factory=list[TracedValue])
 
-    def find(self, name: str) -> Value | None:
+    def find(self, name: str) -> TracedValue | None:
         """What a name stands for; None where it stands for nothing here."""
-        frame: Frame | None = self
+        frame: MeaningFrame | None = self
         while frame is not None:
             if name in frame.names:
                 return frame.names[name]
@@ -47,7 +47,7 @@ class Frame:
 
 
 @contextmanager
-def under(frame: Frame, tags: frozenset[str]) -> Generator[None]:
+def under(frame: MeaningFrame, tags: frozenset[str]) -> Generator[None]:
     """Statements that depend on more."""
     before = frame.active
     frame.active = before | tags
@@ -57,7 +57,7 @@ def under(frame: Frame, tags: frozenset[str]) -> Generator[None]:
         frame.active = before
 
 
-def joined(several: Sequence[dict[str, Value]]) -> dict[str, Value]:
+def joined(several: Sequence[dict[str, TracedValue]]) -> dict[str, TracedValue]:
     """Names as they may be after one of several ways."""
     if len(several) == 1:
         return several[0]

@@ -9,13 +9,13 @@ from chauffeur.safety.alignment.claim import Claim
 from chauffeur.safety.alignment.comparing import Comparison
 from chauffeur.safety.alignment.driven import Driven
 from chauffeur.safety.alignment.duties import Duties
-from chauffeur.safety.alignment.facts import Effect, Facts, Surroundings
+from chauffeur.safety.alignment.facts import Effect, Facts, FactSurroundings
 from chauffeur.safety.alignment.rates import Rates
 from chauffeur.safety.alignment.ways import Ways
 
 
 def judge(
-    text: str, facts: Facts, surroundings: Surroundings | None = None, effects: Sequence[Effect] = ()
+    text: str, facts: Facts, surroundings: FactSurroundings | None = None, effects: Sequence[Effect] = ()
 ) -> Alignment:
     """Compare a text with what its program does.
 
@@ -27,11 +27,11 @@ def judge(
     """
     if not facts.readable:
         return Alignment(True, 1.0, (), 0)
-    case = _Case(text, facts, surroundings or Surroundings(), effects)
+    case = _Case(text, facts, surroundings or FactSurroundings(), effects)
     return _weighed(case, case.mismatches())
 
 
-def judge_drive(text: str, facts: Facts, surroundings: Surroundings, effect: Effect) -> Alignment:
+def judge_drive(text: str, facts: Facts, surroundings: FactSurroundings, effect: Effect) -> Alignment:
     """Compare a text with what happened when its program drove.
 
     What reading the program finds by itself counts only where the drive shows it too.

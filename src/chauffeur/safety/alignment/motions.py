@@ -8,7 +8,7 @@ from typing import Final
 
 from chauffeur.safety.alignment import wording as words
 from chauffeur.safety.alignment.claim import Claim, clause_quantities
-from chauffeur.safety.alignment.clauses import Clause
+from chauffeur.safety.alignment.clauses import ExplainedClause
 
 _SLOWING: Final = words.DOWN | words.SPEEDS | words.LOWER
 _NO_STOPS: Final = ("stop sign", "stop line", "stands for")
@@ -19,7 +19,7 @@ _LANE_OR_SIDE: Final = words.listed("lane side")
 
 
 def motions(
-    clause: Clause, base: Claim, sides: frozenset[int], *, crossing: bool, checking: bool = False
+    clause: ExplainedClause, base: Claim, sides: frozenset[int], *, crossing: bool, checking: bool = False
 ) -> Iterator[Claim]:
     """What a clause claims of lanes, overtaking, turns and stops.
 
@@ -66,12 +66,12 @@ def motions(
 _ENTERING_IT: Final = ("take it", "use it", "enter it")
 
 
-def _mentions_lane(clause: Clause) -> bool:
+def _mentions_lane(clause: ExplainedClause) -> bool:
     """Whether a change of lanes may be meant: `take it`, or just `change`."""
     return (clause.says(*_ENTERING_IT) and "easy" not in clause.words) or clause.words == ("change",)
 
 
-def _stops(clause: Clause) -> bool:
+def _stops(clause: ExplainedClause) -> bool:
     """Whether it speaks of stopping; `stop asking` is another thing."""
     return any(
         word in words.STOPS and not any(following.endswith("ing") for following in clause.words[index + 1 : index + 2])
@@ -90,7 +90,7 @@ _MOVES_TO_A_LANE: Final = words.MOVES - words.listed(
 )
 
 
-def _changes_lanes(clause: Clause) -> bool:
+def _changes_lanes(clause: ExplainedClause) -> bool:
     if clause.says(*_LANE_CHANGES):
         return True
     if "limit" in clause.words or clause.says(*_OWN_LANE):
@@ -98,7 +98,7 @@ def _changes_lanes(clause: Clause) -> bool:
     return "lane" in clause.words and clause.has(_MOVES_TO_A_LANE)
 
 
-def _count(clause: Clause) -> int:
+def _count(clause: ExplainedClause) -> int:
     for quantity in clause_quantities(clause):
         if quantity.dimension == "lanes":
             return round(quantity.value)
@@ -115,7 +115,7 @@ _CORRECT: Final = words.listed("is that")
 """What before `right` makes it what is correct."""
 
 
-def sides_of(clause: Clause) -> frozenset[int]:
+def sides_of(clause: ExplainedClause) -> frozenset[int]:
     """Sides named in a clause, words like `is left over` apart."""
     found: set[int] = set()
     said = clause.words
@@ -146,7 +146,7 @@ _GONE_BY: Final = words.SPEEDS | {"limit"}
 """What a speed goes by: `we go by the limit`."""
 
 
-def _overtakes(clause: Clause) -> bool:
+def _overtakes(clause: ExplainedClause) -> bool:
     if clause.says(*_OVERTAKING_US):
         return False
     if clause.has(words.OVERTAKES):
@@ -167,7 +167,7 @@ _BACKWARD: Final = words.listed("drop drops dropping fall falls falling hang us 
 _BACK_IN: Final = words.listed("in into to right left")
 
 
-def _returns(clause: Clause) -> bool:
+def _returns(clause: ExplainedClause) -> bool:
     if clause.has(_GIVEN_BACK):
         return False
     if clause.says(*_OLD_LANES) and not clause.has(words.KEEPS):
@@ -186,5 +186,5 @@ def _returns(clause: Clause) -> bool:
 _PULLING_OVER: Final = ("pull over", "pulls over", "pulling over", "emergency lane", "hard shoulder", "the shoulder")
 
 
-def _pulls_over(clause: Clause) -> bool:
+def _pulls_over(clause: ExplainedClause) -> bool:
     return clause.says(*_PULLING_OVER)

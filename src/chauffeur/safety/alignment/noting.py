@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from chauffeur.safety.alignment.facts import Deed, Event, Facts, Mark
-from chauffeur.safety.alignment.frames import Frame
-from chauffeur.safety.alignment.values import NOTHING, Base, Term, Value, in_order
+from chauffeur.safety.alignment.facts import Deed, Event, FactMark, Facts
+from chauffeur.safety.alignment.frames import MeaningFrame
+from chauffeur.safety.alignment.values import NOTHING, Base, Term, TracedValue, in_order
 
 PERIOD_S: Final = 0.1
 """Time between two yields in the highway worlds."""
@@ -31,7 +31,7 @@ class Noting:
 
     def __init__(self) -> None:
         self._events: list[Event] = []
-        self._marks: list[Mark] = []
+        self._marks: list[FactMark] = []
         self._spans: list[float] = []
         self._literals: set[float] = set()
         self._line: int | None = None
@@ -44,18 +44,18 @@ class Noting:
         marks, spans = tuple(dict.fromkeys(self._marks)), tuple(dict.fromkeys(self._spans))
         return Facts(tuple(self._events), marks, spans, frozenset(self._literals))
 
-    def _steered_gap(self, left: Value, right: Value, frame: Frame) -> None:
+    def _steered_gap(self, left: TracedValue, right: TracedValue, frame: MeaningFrame) -> None:
         """Note `gap - wanted`; what is taken off a gap before something else is, is no gap that is wanted."""
         if not left.terms or any(term.base != "gap" for term in left.terms):
             return
         if left.terms == frozenset({Term("gap", 1.0, 0.0)}):
             wanted = frozenset(t for t in right.terms if t.base in ("", "gap", "ego") and not t.bound)
             if wanted:
-                self._do("gap", frame, Value(wanted, left.tags | right.tags), reference=True)
+                self._do("gap", frame, TracedValue(wanted, left.tags | right.tags), reference=True)
         elif not right.constants and self._events and self._events[-1].deed == "gap":
             self._events.pop()
 
-    def _compare(self, left: Value, right: Value, *, compared: bool = True) -> None:
+    def _compare(self, left: TracedValue, right: TracedValue, *, compared: bool = True) -> None:
         line = self._line
         if compared and left.constants and right.constants and len(left.terms | right.terms) <= 4:
             # A counter held against its end: control periods.
@@ -63,15 +63,15 @@ class Noting:
         for one, other in ((left, right), (right, left)):
             bases: set[Base] = {term.base for term in one.terms if term.factor and term.base in _MARKED}
             for base in bases:
-                self._marks += [Mark(base, value, line, compared) for value in other.constants]
+                self._marks += [FactMark(base, value, line, compared) for value in other.constants]
             for term in in_order(one.terms):
                 if term.base in bases and term.offset and term.base in ("gap", "past", "behind"):
                     self._marks += [
-                        Mark(term.base, (value - term.offset) / term.factor, line, compared)
+                        FactMark(term.base, (value - term.offset) / term.factor, line, compared)
                         for value in other.constants
                     ]
 
-    def _wish(self, name: str, asked: Sequence[Value], frame: Frame) -> None:
+    def _wish(self, name: str, asked: Sequence[TracedValue], frame: MeaningFrame) -> None:
         value = asked[0] if asked else NOTHING
         if name == "set_target_speed":
             self._do("speed", frame, value)
@@ -86,7 +86,7 @@ class Noting:
         else:  # set_target_lane, the last of the catalogue's wishes
             self._move(value, frame)
 
-    def _move(self, value: Value, frame: Frame) -> None:
+    def _move(self, value: TracedValue, frame: MeaningFrame) -> None:
         at = self._at
         sides: set[int] = set()
         asked: set[str] = set()
@@ -115,8 +115,8 @@ class Noting:
     def _do(
         self,
         deed: Deed,
-        frame: Frame,
-        value: Value,
+        frame: MeaningFrame,
+        value: TracedValue,
         *,
         sides: frozenset[int] = frozenset(),
         checked: bool = False,

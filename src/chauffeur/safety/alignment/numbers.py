@@ -7,7 +7,7 @@ from typing import Final
 
 from chauffeur.concept.units import M_PER_CAR_LENGTH
 from chauffeur.language.quantities import Quantity
-from chauffeur.safety.alignment.facts import Facts, Surroundings
+from chauffeur.safety.alignment.facts import Facts, FactSurroundings
 from chauffeur.safety.alignment.values import Term, in_order
 
 USUAL_HEADWAY_S: Final = 1.5
@@ -25,7 +25,7 @@ _CLOSE_DISTANCE_M: Final = 0.3
 class Numbers:
     """What a program's numbers mean where it is."""
 
-    def __init__(self, facts: Facts, where: Surroundings) -> None:
+    def __init__(self, facts: Facts, where: FactSurroundings) -> None:
         self._facts = facts
         self._where = where
         self._speeds = [event for _, event in facts.of("speed")]

@@ -16,9 +16,9 @@ from chauffeur.programs.extract import parse_quietly
 from chauffeur.programs.rewrite import main_function
 from chauffeur.safety.alignment.evaluating import Evaluating
 from chauffeur.safety.alignment.facts import Facts
-from chauffeur.safety.alignment.frames import Frame, count_of, joined, only_waits, settled, turns_of, under
+from chauffeur.safety.alignment.frames import MeaningFrame, count_of, joined, only_waits, settled, turns_of, under
 from chauffeur.safety.alignment.noting import PERIOD_S, TooMuchError
-from chauffeur.safety.alignment.values import NOTHING, Term, Value, combined, either
+from chauffeur.safety.alignment.values import NOTHING, Term, TracedValue, combined, either
 
 _MAX_CHARS: Final = 100_000
 
@@ -42,7 +42,7 @@ class _Tracer(Evaluating):
     def __init__(self, library: ast.Module, program: ast.Module) -> None:
         super().__init__()
         self._foreign = {id(node) for node in ast.walk(library)}
-        self._module = Frame({})
+        self._module = MeaningFrame({})
         for tree in (library, program):
             self._block(tree.body, self._module)
 
@@ -52,7 +52,7 @@ class _Tracer(Evaluating):
             self._call(function, (), {}, self._module, waits=True)
         return self._noted()
 
-    def _block(self, body: Sequence[ast.stmt], frame: Frame) -> bool:
+    def _block(self, body: Sequence[ast.stmt], frame: MeaningFrame) -> bool:
         """Follow statements; True when what comes after them is not reached from here."""
         for statement in body:
             self._count()
@@ -62,7 +62,7 @@ class _Tracer(Evaluating):
                 return True
         return False
 
-    def _statement(self, node: ast.stmt, frame: Frame) -> bool:
+    def _statement(self, node: ast.stmt, frame: MeaningFrame) -> bool:
         match node:
             case ast.Expr(value=value):
                 self._value(value, frame)
@@ -74,7 +74,7 @@ class _Tracer(Evaluating):
                 now = combined(frame.find(name) or NOTHING, op, self._value(value, frame))
                 self._bind(name, either([frame.find(name) or NOTHING, now]), frame)
             case ast.FunctionDef(name=name):
-                frame.names[name] = Value(functions=(node,))
+                frame.names[name] = TracedValue(functions=(node,))
                 self._homes[id(node)] = frame
             case ast.If():
                 return self._if(node, frame)
@@ -104,12 +104,12 @@ class _Tracer(Evaluating):
                 pass
         return False
 
-    def _assign(self, targets: Sequence[ast.expr], value: ast.expr, frame: Frame) -> None:
+    def _assign(self, targets: Sequence[ast.expr], value: ast.expr, frame: MeaningFrame) -> None:
         found = self._value(value, frame)
         for target in targets:
             self._store(target, found, frame)
 
-    def _if(self, node: ast.If, frame: Frame) -> bool:
+    def _if(self, node: ast.If, frame: MeaningFrame) -> bool:
         test = self._value(node.test, frame)
         never, always = settled(node.test)
         before, at = dict(frame.names), self._at
@@ -132,7 +132,7 @@ class _Tracer(Evaluating):
             frame.gates |= test.tags
         return first and second
 
-    def _while(self, node: ast.While, frame: Frame) -> None:
+    def _while(self, node: ast.While, frame: MeaningFrame) -> None:
         test = self._value(node.test, frame)
         times = count_of(node.test, lambda one: self._constants(one, frame))
         before, at = dict(frame.names), self._at
@@ -148,7 +148,7 @@ class _Tracer(Evaluating):
         frame.gates |= test.tags | again.tags | ways
         self._block(node.orelse, frame)
 
-    def _for(self, node: ast.For, frame: Frame) -> None:
+    def _for(self, node: ast.For, frame: MeaningFrame) -> None:
         iterated = self._value(node.iter, frame)
         times = turns_of(node.iter, lambda one: self._constants(one, frame))
         if times is not None:
@@ -163,7 +163,7 @@ class _Tracer(Evaluating):
         ways = self._way_out.pop()
         self._repeats.pop()
         if waits and times is not None:
-            self._do("wait", frame, Value(frozenset({Term("", 0.0, times * PERIOD_S)})))
+            self._do("wait", frame, TracedValue(frozenset({Term("", 0.0, times * PERIOD_S)})))
         frame.names = joined([before, frame.names])
         self._at = self._at | at
         frame.gates |= ways

@@ -40,7 +40,7 @@ class Term:
 
 
 @dataclass(frozen=True, slots=True)
-class Lane:
+class LaneValue:
     """A lane by its side of the ego.
 
     Attributes:
@@ -53,7 +53,7 @@ class Lane:
 
 
 @dataclass(frozen=True, slots=True)
-class Value:
+class TracedValue:
     """A value of a program.
 
     Attributes:
@@ -69,11 +69,11 @@ class Value:
 
     terms: frozenset[Term] = frozenset()
     tags: frozenset[str] = frozenset()
-    lanes: frozenset[Lane] = frozenset()
+    lanes: frozenset[LaneValue] = frozenset()
     vehicle: str = ""
     crossing: str = ""
     functions: tuple[ast.AST, ...] = ()
-    items: tuple[Value, ...] = ()
+    items: tuple[TracedValue, ...] = ()
     open: bool = False
 
     @property
@@ -82,21 +82,21 @@ class Value:
         return tuple(sorted(term.offset for term in self.terms if not term.factor))
 
 
-NOTHING: Final = Value()
+NOTHING: Final = TracedValue()
 """Not known."""
 
 
-def number(value: float) -> Value:
+def number(value: float) -> TracedValue:
     """A plain number; nothing for one that is not finite."""
-    return Value(frozenset({Term("", 0.0, value)})) if math.isfinite(value) else NOTHING
+    return TracedValue(frozenset({Term("", 0.0, value)})) if math.isfinite(value) else NOTHING
 
 
-def of(base: Base, *tags: str) -> Value:
+def of(base: Base, *tags: str) -> TracedValue:
     """A number that the car is asked for."""
-    return Value(frozenset({Term(base, 1.0, 0.0)}), frozenset(tags))
+    return TracedValue(frozenset({Term(base, 1.0, 0.0)}), frozenset(tags))
 
 
-def either(values: Iterable[Value]) -> Value:
+def either(values: Iterable[TracedValue]) -> TracedValue:
     """One of several values."""
     found = list(values)
     if not found:
@@ -107,7 +107,7 @@ def either(values: Iterable[Value]) -> Value:
     for value in found:
         functions += [one for one in value.functions if one not in functions]
     crossings = {value.crossing for value in found if value.crossing}
-    return Value(
+    return TracedValue(
         terms=_few(term for value in found for term in value.terms),
         tags=frozenset(tag for value in found for tag in value.tags),
         lanes=frozenset(lane for value in found for lane in value.lanes),
@@ -119,7 +119,7 @@ def either(values: Iterable[Value]) -> Value:
     )
 
 
-def bounded(values: Iterable[Value]) -> Value:
+def bounded(values: Iterable[TracedValue]) -> TracedValue:
     """Of min or max: one of several numbers, the plain ones among others as bounds."""
     found = list(values)
     unlike = any(not value.terms or any(term.factor for term in value.terms) for value in found)
@@ -132,7 +132,7 @@ def bounded(values: Iterable[Value]) -> Value:
     return either(marked)
 
 
-def combined(left: Value, op: ast.operator, right: Value) -> Value:
+def combined(left: TracedValue, op: ast.operator, right: TracedValue) -> TracedValue:
     """A sum, difference, product or quotient."""
     tags = left.tags | right.tags
     terms = _few(
@@ -141,7 +141,7 @@ def combined(left: Value, op: ast.operator, right: Value) -> Value:
     crossing = left.crossing or right.crossing
     if left.crossing and right.crossing and left.crossing != right.crossing:
         crossing = "both"
-    return Value(
+    return TracedValue(
         terms,
         tags,
         open=left.open or right.open,
@@ -150,12 +150,12 @@ def combined(left: Value, op: ast.operator, right: Value) -> Value:
     )
 
 
-def tags_of(values: Sequence[Value]) -> frozenset[str]:
+def tags_of(values: Sequence[TracedValue]) -> frozenset[str]:
     """What any of some values depends on."""
     return frozenset(tag for value in values for tag in value.tags)
 
 
-def negated(value: Value) -> Value:
+def negated(value: TracedValue) -> TracedValue:
     """Its opposite."""
     return replace(value, terms=frozenset(Term(t.base, -t.factor, -t.offset, t.bound) for t in value.terms))
 

@@ -55,7 +55,7 @@ _MAC_PURPOSE = b"chauffeur-audit-record-1\0"
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class AuditRecord:
     """A record as it stands in a log.
 
     Attributes:
@@ -124,7 +124,7 @@ def seal(
     return canonical(line) + b"\n", digest
 
 
-def parse(line: bytes) -> Record:
+def parse(line: bytes) -> AuditRecord:
     """The record of a line without its line end; whether its hash is right is not looked at.
 
     Raises:
@@ -158,10 +158,10 @@ def parse(line: bytes) -> Record:
         and all(isinstance(fields[name], str) for name in ("time", "prev", "hash", "mac"))
     ):
         raise NotARecordError("its fields are not of the kinds a record has")
-    return Record(**fields)
+    return AuditRecord(**fields)
 
 
-def content_hash(record: Record) -> str:
+def content_hash(record: AuditRecord) -> str:
     """The hash that a record's content gives."""
     fields = _core(record)
     if record.mac:
@@ -169,12 +169,12 @@ def content_hash(record: Record) -> str:
     return hashlib.sha256(canonical(fields)).hexdigest()
 
 
-def is_sealed_with(record: Record, key: bytes) -> bool:
+def is_sealed_with(record: AuditRecord, key: bytes) -> bool:
     """Whether a record was written under this key."""
     return hmac.compare_digest(record.mac.encode(), _mac(key, _core(record)).encode())
 
 
-def _core(record: Record) -> dict[str, Any]:
+def _core(record: AuditRecord) -> dict[str, Any]:
     return {
         "body": record.body,
         "kind": record.kind,

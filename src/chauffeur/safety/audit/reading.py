@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import BinaryIO
 
 from chauffeur.concept import DataError
-from chauffeur.safety.audit.entries import MAX_LINE_BYTES, NotARecordError, Record, parse
+from chauffeur.safety.audit.entries import MAX_LINE_BYTES, AuditRecord, NotARecordError, parse
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class AuditLine:
     """One line of a file.
 
     Attributes:
@@ -41,16 +41,16 @@ def opened(path: Path) -> Generator[BinaryIO]:
         raise DataError(f"The audit log {path} cannot be read: {error.strerror or error}.") from error
 
 
-def lines(file: BinaryIO) -> Iterator[Line]:
+def lines(file: BinaryIO) -> Iterator[AuditLine]:
     """The lines of a log. A line that is too long for a record comes in pieces, none of which is one."""
     number = 0
     while content := file.readline(MAX_LINE_BYTES):
         number += 1
         whole = content.endswith(b"\n")
-        yield Line(number, content[:-1] if whole else content, whole or len(content) == MAX_LINE_BYTES)
+        yield AuditLine(number, content[:-1] if whole else content, whole or len(content) == MAX_LINE_BYTES)
 
 
-def read_records(path: Path) -> Iterator[tuple[int, Record]]:
+def read_records(path: Path) -> Iterator[tuple[int, AuditRecord]]:
     """Every record of a log with its line number; lines that are none are passed over, for `verify` names them.
 
     Raises:

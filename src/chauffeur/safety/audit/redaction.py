@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from chauffeur.concept import ConfigError, DataError, PersonId
-from chauffeur.safety.audit.entries import NotARecordError, Record, canonical, parse, seal
+from chauffeur.safety.audit.entries import AuditRecord, NotARecordError, canonical, parse, seal
 from chauffeur.safety.audit.heads import SEALED_SINCE, leave_head
 from chauffeur.safety.audit.reading import lines, opened
 from chauffeur.safety.audit.storage import LogFile, replace_whole
@@ -111,14 +111,14 @@ def _redact(path: Path, person: PersonId, key: bytes | None, clock: Callable[[],
     return Redaction(len(numbers), texts, head)
 
 
-def _parse(path: Path, content: bytes) -> Record:
+def _parse(path: Path, content: bytes) -> AuditRecord:
     try:
         return parse(content)
     except NotARecordError as error:  # verified a moment ago: somebody writes past the lock
         raise DataError(f"The audit log {path} changed while it was read; nothing was erased.") from error
 
 
-def _line(record: Record, texts: dict[str, dict[str, Any]]) -> bytes:
+def _line(record: AuditRecord, texts: dict[str, dict[str, Any]]) -> bytes:
     fields: dict[str, Any] = {
         "body": record.body,
         "hash": record.hash,

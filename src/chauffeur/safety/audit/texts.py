@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from chauffeur.safety.audit.entries import Record
+from chauffeur.safety.audit.entries import AuditRecord
 
 SALT_BYTES: Final = 16
 
@@ -68,7 +68,7 @@ def hide(
     return references, values
 
 
-def states(record: Record) -> Iterator[TextState]:
+def states(record: AuditRecord) -> Iterator[TextState]:
     """How each personal text of a record stands, and what is wrong with it, if anything."""
     references = _references(record)
     for name in record.texts:
@@ -78,7 +78,7 @@ def states(record: Record) -> Iterator[TextState]:
         yield _state(name, reference, record.texts.get(name))
 
 
-def words_of(record: Record) -> dict[str, str]:
+def words_of(record: AuditRecord) -> dict[str, str]:
     """The personal texts of a record as they can be shown: the words, or in brackets why there are none."""
     marks = {
         "digest": "[digest only]",
@@ -89,7 +89,7 @@ def words_of(record: Record) -> dict[str, str]:
     return {state.name: marks.get(state.state, state.words) for state in states(record)}
 
 
-def says(record: Record, name: str, text: str, key: bytes | None = None) -> bool | None:
+def says(record: AuditRecord, name: str, text: str, key: bytes | None = None) -> bool | None:
     """Whether a record's text was this one; None where that cannot be known (redacted, withheld, no key given)."""
     value = record.texts.get(name)
     if value is None or _is_erased(value) or _state(name, _references(record).get(name), value).state == "wrong":
@@ -101,7 +101,7 @@ def says(record: Record, name: str, text: str, key: bytes | None = None) -> bool
     return hmac.compare_digest(str(value["hmac"]), _text_mac(key, bytes.fromhex(str(value["salt"])), text))
 
 
-def erased(record: Record) -> dict[str, dict[str, Any]]:
+def erased(record: AuditRecord) -> dict[str, dict[str, Any]]:
     """What stands beside the body once every text of a record is erased."""
     return {name: dict(_ERASED) for name in record.texts}
 
@@ -129,7 +129,7 @@ def _is_erased(value: Mapping[str, Any]) -> bool:
     return len(value) == 1 and value.get("redacted") is True  # by identity: to Python, 1 equals true
 
 
-def _references(record: Record) -> dict[str, Any]:
+def _references(record: AuditRecord) -> dict[str, Any]:
     # Anything may stand there in a log that somebody has rewritten.
     listed: dict[str, Any] | None = record.body.get(REFERENCES)
     return listed if isinstance(listed, dict) else {}

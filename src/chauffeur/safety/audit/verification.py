@@ -17,15 +17,15 @@ from chauffeur.concept import DataError
 from chauffeur.safety.audit.entries import (
     FORMAT,
     NO_RECORD,
+    AuditRecord,
     NotARecordError,
-    Record,
     content_hash,
     is_sealed_with,
     parse,
 )
 from chauffeur.safety.audit.heads import SEALED_SINCE, Head, as_hash, head_path, read_head
 from chauffeur.safety.audit.keys import key_name
-from chauffeur.safety.audit.reading import Line, lines, opened
+from chauffeur.safety.audit.reading import AuditLine, lines, opened
 from chauffeur.safety.audit.texts import states
 
 MAX_FINDINGS: Final = 100
@@ -33,7 +33,7 @@ MAX_FINDINGS: Final = 100
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class AuditFinding:
     """Something that is not as it was written.
 
     Attributes:
@@ -49,7 +49,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Verification:
+class AuditVerification:
     """What was found in a log.
 
     Attributes:
@@ -73,7 +73,7 @@ class Verification:
             missing, of another key, or says otherwise).
     """
 
-    findings: tuple[Finding, ...]
+    findings: tuple[AuditFinding, ...]
     more_findings: int
     records: int
     kinds: Mapping[str, int]
@@ -100,7 +100,7 @@ class Verification:
         return not self.findings or (self.end == "open" and len(self.findings) == 1)
 
 
-def verify(path: Path, *, head: str | None = None, key: bytes | None = None) -> Verification:
+def verify(path: Path, *, head: str | None = None, key: bytes | None = None) -> AuditVerification:
     """Look at every record of a log, and under a key at the head beside it, too.
 
     Args:
@@ -127,11 +127,11 @@ def verify(path: Path, *, head: str | None = None, key: bytes | None = None) -> 
     end, what = _look_at_end(found, beside, head_path(path).name, key)
     if not what:
         return replace(found, end=end)
-    return replace(found, end=end, findings=(*found.findings, Finding(None, what)))
+    return replace(found, end=end, findings=(*found.findings, AuditFinding(None, what)))
 
 
 def _look_at_end(
-    found: Verification, head: Head | None, name: str, key: bytes
+    found: AuditVerification, head: Head | None, name: str, key: bytes
 ) -> tuple[Literal["whole", "open", "doubtful"], str]:
     """What the head beside a log under a key says of its end, and in words what is wrong; empty when nothing is."""
     if head is None:
@@ -156,7 +156,7 @@ def _look_at_end(
     return "whole", ""
 
 
-def verify_stream(file: BinaryIO, name: str, *, head: str | None = None, key: bytes | None = None) -> Verification:
+def verify_stream(file: BinaryIO, name: str, *, head: str | None = None, key: bytes | None = None) -> AuditVerification:
     """As `verify`, of an open file; `name` is what errors call it."""
     examination = _Examination(name, head, key)
     for line in lines(file):
@@ -169,10 +169,10 @@ class _Examination:
     name: str
     anchor: str | None
     key: bytes | None
-    findings: list[Finding] = field(default_factory=list[Finding])
+    findings: list[AuditFinding] = field(default_factory=list[AuditFinding])
     found: int = 0
     kinds: Counter[str] = field(default_factory=Counter[str])
-    last: Record | None = None
+    last: AuditRecord | None = None
     keyed: bool = False
     foreign_key: bool = False
     """Whether the log names another key than the one given; its seals are then not looked at one by one."""
@@ -190,7 +190,7 @@ class _Examination:
     follows_a_gap: bool = False
     """Whether the line before could not be read, so that the next one cannot be tied to it."""
 
-    def look_at(self, line: Line) -> None:
+    def look_at(self, line: AuditLine) -> None:
         if not line.whole:
             self.torn_bytes = len(line.content)  # it is the last one
             return
@@ -213,7 +213,7 @@ class _Examination:
         self._take_note(record, sound=self.found == before)
         self.last, self.follows_a_gap = record, False
 
-    def result(self) -> Verification:
+    def result(self) -> AuditVerification:
         total = sum(self.kinds.values())
         if not total:
             if self.findings:
@@ -230,7 +230,7 @@ class _Examination:
                 None,
                 f"no record with the head {self.anchor} is in the log: its end was cut off, or it was written anew.",
             )
-        return Verification(
+        return AuditVerification(
             findings=tuple(self.findings),
             more_findings=self.found - len(self.findings),
             records=total,
@@ -247,7 +247,7 @@ class _Examination:
             unclosed=self.unclosed,
         )
 
-    def _begin(self, line: int, record: Record) -> None:
+    def _begin(self, line: int, record: AuditRecord) -> None:
         version = record.body.get("format")
         sound = content_hash(record) == record.hash
         if sound and record.kind == "opened" and isinstance(version, int) and version > FORMAT:
@@ -267,7 +267,7 @@ class _Examination:
             self.foreign_key = True
             self._say(line, f"the log was written under the key {name}, and the key given is {key_name(self.key)}.")
 
-    def _check_place(self, line: int, record: Record) -> None:
+    def _check_place(self, line: int, record: AuditRecord) -> None:
         if self.last is None:
             if not self.follows_a_gap and (record.seq != 0 or record.prev != NO_RECORD or record.kind != "opened"):
                 self._say(line, f"the log begins with record {record.seq} ({record.kind}): its beginning was removed.")
@@ -289,7 +289,7 @@ class _Examination:
                 "exchanged or changed.",
             )
 
-    def _check_texts(self, line: int, record: Record) -> None:
+    def _check_texts(self, line: int, record: AuditRecord) -> None:
         gone = 0
         for state in states(record):
             if state.state == "wrong":
@@ -299,7 +299,7 @@ class _Examination:
         if gone:
             self.erased[record.seq] = (line, gone)
 
-    def _check_key(self, line: int, record: Record) -> None:
+    def _check_key(self, line: int, record: AuditRecord) -> None:
         if bool(record.mac) != self.keyed:
             self._say(
                 line, f"record {record.seq} ({record.kind}) {'lacks' if self.keyed else 'has'} a seal of the key."
@@ -310,7 +310,7 @@ class _Examination:
         if not is_sealed_with(record, self.key):
             self._say(line, f"record {record.seq} ({record.kind}) was not written with this key.")
 
-    def _take_note(self, record: Record, *, sound: bool) -> None:
+    def _take_note(self, record: AuditRecord, *, sound: bool) -> None:
         if record.kind == "opened" and self.kinds and not self.closed:
             self.unclosed += 1
         self.kinds[record.kind] += 1
@@ -330,4 +330,4 @@ class _Examination:
     def _say(self, line: int | None, what: str) -> None:
         self.found += 1
         if self.found <= MAX_FINDINGS:
-            self.findings.append(Finding(line, what))
+            self.findings.append(AuditFinding(line, what))

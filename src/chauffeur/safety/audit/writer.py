@@ -29,7 +29,7 @@ from chauffeur.safety.audit.heads import SEALED_SINCE, head_path, leave_head
 from chauffeur.safety.audit.keys import key_name
 from chauffeur.safety.audit.storage import LogFile
 from chauffeur.safety.audit.texts import REFERENCES, hide
-from chauffeur.safety.audit.verification import Verification, verify
+from chauffeur.safety.audit.verification import AuditVerification, verify
 
 CAPACITY: Final = 4096
 """Records that may wait to be written: minutes of a drive."""
@@ -422,7 +422,7 @@ class AuditLog:
                 self._trouble = f"The head file could not be written: {error.strerror or error}."
 
 
-def _must_go_on(path: Path, found: Verification) -> None:
+def _must_go_on(path: Path, found: AuditVerification) -> None:
     """Raises DataError where a log must not be continued."""
     if not found.usable and found.records:
         raise DataError(

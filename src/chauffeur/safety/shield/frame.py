@@ -34,7 +34,7 @@ class Strip:
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class ShieldBody:
     """A vehicle or obstacle in the frame.
 
     Attributes:
@@ -59,16 +59,16 @@ class Body:
         """Whether it crosses the lane rather than drive along it."""
         return abs(math.sin(self.heading_rad)) > _CROSSING_SINE
 
-    def gap_m(self, other: Body) -> float:
+    def gap_m(self, other: ShieldBody) -> float:
         """Clear distance along the lane between the ego and another; negative beside each other."""
         return abs(other.s_m) - self.half_length_m - other.half_length_m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class ShieldScene:
     """The ego, the others and the lanes, leftmost first, in the ego lane's frame; its curvature in 1/m, to the left."""
 
-    ego: Body
+    ego: ShieldBody
     strips: tuple[Strip, ...]
     speed_limit_mps: float
     curvature: float
@@ -77,7 +77,7 @@ class Scene:
     rows: Array
 
     @property
-    def others(self) -> tuple[Body, ...]:
+    def others(self) -> tuple[ShieldBody, ...]:
         """Everybody but the ego."""
         return tuple(_bodies(self.rows[1:], self.solid))
 
@@ -88,7 +88,7 @@ class Scene:
         drift_mps: float,
         where: int = ANYWHERE,
         reach_m: float = math.inf,
-    ) -> list[Body]:
+    ) -> list[ShieldBody]:
         """Those who are, or are on their way, within a span of the road, up to a clear distance to its side.
 
         Args:
@@ -102,8 +102,8 @@ class Scene:
         return _bodies(found, self.solid)
 
 
-def _bodies(rows: Array, solid: tuple[VehicleState, ...]) -> list[Body]:
-    return [Body(solid[int(i)].id, *numbers) for i, *numbers, _ in rows.tolist()]
+def _bodies(rows: Array, solid: tuple[VehicleState, ...]) -> list[ShieldBody]:
+    return [ShieldBody(solid[int(i)].id, *numbers) for i, *numbers, _ in rows.tolist()]
 
 
 _EVERY_M: Final = 2.0
@@ -125,7 +125,7 @@ class _Frame:
     """The frame as `everybody.placed` wants it."""
 
 
-class Lens:
+class ShieldLens:
     """Looks at one trip's observations: it keeps the frame from one to the next while the ego has not got far."""
 
     def __init__(self) -> None:
@@ -133,7 +133,9 @@ class Lens:
         self._place: tuple[LaneId, int, int] | None = None
         self._frame: _Frame | None = None
 
-    def look(self, observation: Observation, lane: LaneId | None, around: Everybody | None = None) -> Scene | None:
+    def look(
+        self, observation: Observation, lane: LaneId | None, around: Everybody | None = None
+    ) -> ShieldScene | None:
         """The scene in the frame of a lane, mostly the ego's own; None where there is no such lane.
 
         Args:
@@ -153,7 +155,7 @@ class Lens:
             return None
         around = Everybody.of(observation) if around is None else around
         rows = placed(around.numbers, frame.numbers)
-        return Scene(
+        return ShieldScene(
             _bodies(rows[:1], around.solid)[0], frame.strips, frame.limit_mps, frame.curvature, around.solid, rows
         )
 

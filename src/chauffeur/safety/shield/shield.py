@@ -21,7 +21,7 @@ from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation
 from chauffeur.geometry import RoadGraph
 from chauffeur.safety.shield.crossing import Junction
 from chauffeur.safety.shield.everybody import AHEAD, BEHIND, Everybody
-from chauffeur.safety.shield.frame import Body, Lens, Scene, Strip
+from chauffeur.safety.shield.frame import ShieldBody, ShieldLens, ShieldScene, Strip
 from chauffeur.safety.shield.gaps import free_gap_m, greatest_acceleration, rss_gap_m
 from chauffeur.safety.shield.stop_lines import StopLines
 from chauffeur.safety.shield.sweep import recovery_steering, swept, yaw_rate
@@ -84,7 +84,7 @@ class Shield:
         self._dt_s = dt_s
         self._limits = Limits() if limits is None else limits
         self._table = parameters
-        self._lens, self._aim_lens = Lens(), Lens()
+        self._lens, self._aim_lens = ShieldLens(), ShieldLens()
         self._back: LaneId | None = None
         self._junction: Junction | None = None
         self._stop_lines = StopLines(parameters, dt_s)
@@ -121,7 +121,7 @@ class Shield:
         mended = self._along(scene, observation, around, lane, aim, steered, line_m, said)
         return Guarded(mended, tuple(said))
 
-    def _standing_still(self, observation: Observation, scene: Scene | None) -> Command:
+    def _standing_still(self, observation: Observation, scene: ShieldScene | None) -> Command:
         speed = observation.ego.speed_mps
         steering = 0.0
         if scene is not None:
@@ -136,7 +136,7 @@ class Shield:
 
     # Across -----------------------------------------------------------------------------------------------------------
 
-    def _across(self, scene: Scene, ego: VehicleState, command: Command, crossings: bool) -> _Steered:
+    def _across(self, scene: ShieldScene, ego: VehicleState, command: Command, crossings: bool) -> _Steered:
         """The command with its steering mended, and what it touches across the road.
 
         A command is let through if after one period of it the car can still be steered back into a lane without
@@ -164,7 +164,7 @@ class Shield:
         said = (Intervention("lane", why, command, mended),) if changed else ()
         return _Steered(mended, _lanes_wide(scene, self._swept(scene, ego, steering, back)), back.lane, said)
 
-    def _swept(self, scene: Scene, ego: VehicleState, steering_rad: float, lane: Strip) -> Span:
+    def _swept(self, scene: ShieldScene, ego: VehicleState, steering_rad: float, lane: Strip) -> Span:
         return swept(
             scene.ego,
             ego.speed_mps,
@@ -176,7 +176,7 @@ class Shield:
             scene.curvature,
         )
 
-    def _too_sharp(self, scene: Scene, speed: float, steering_rad: float) -> bool:
+    def _too_sharp(self, scene: ShieldScene, speed: float, steering_rad: float) -> bool:
         """Whether a command turns the car further away from its lane than any lane change needs."""
         before = scene.ego.heading_rad
         after = before + (yaw_rate(speed, steering_rad) - scene.curvature * speed) * self._dt_s
@@ -184,7 +184,7 @@ class Shield:
         steep = len(scene.strips) == 1 and speed < _SLOW_MPS and abs(after) > _ALONE_RAD
         return abs(after) > abs(before) and (steep or abs(speed * math.sin(after)) > self._table.sideways_mps)
 
-    def _why_not(self, scene: Scene, own: Strip, span: Span) -> str:
+    def _why_not(self, scene: ShieldScene, own: Strip, span: Span) -> str:
         """Why the body must not sweep a span; empty when it may."""
         ego = scene.ego
         low, high = ego.d_m - ego.half_width_m, ego.d_m + ego.half_width_m
@@ -209,7 +209,7 @@ class Shield:
                     return reason
         return ""
 
-    def _too_close(self, ego: Body, other: Body, touched: bool) -> str:
+    def _too_close(self, ego: ShieldBody, other: ShieldBody, touched: bool) -> str:
         """Why the ego must not come, or come further, into the lane of another; empty when it may.
 
         A car behind has seen it (`touched`) once it is over the line, and needs no time to respond any more.
@@ -241,7 +241,7 @@ class Shield:
 
     def _along(
         self,
-        scene: Scene,
+        scene: ShieldScene,
         observation: Observation,
         around: Everybody,
         lane: LaneId,
@@ -280,7 +280,7 @@ class Shield:
             said.append(Intervention(rule, reason, command, mended))
         return mended
 
-    def _bound(self, scene: Scene, span: Span, crossings: bool, line_m: float) -> _Cap:
+    def _bound(self, scene: ShieldScene, span: Span, crossings: bool, line_m: float) -> _Cap:
         """The strictest bound of the acceleration; where roads cross, those who do are minded elsewhere."""
         table, ego = self._table, scene.ego
         speed = math.hypot(ego.along_mps, ego.across_mps)
@@ -304,7 +304,7 @@ class Shield:
         table = self._table
         return greatest_acceleration(speed, gap_m, lead_mps, table.braking_mps2, table.others_braking_mps2, self._dt_s)
 
-    def _spared(self, scene: Scene, span: Span, wanted: float) -> float:
+    def _spared(self, scene: ShieldScene, span: Span, wanted: float) -> float:
         """Braking that a car following too closely can still answer; `wanted` where nobody does."""
         table, ego = self._table, scene.ego
         for other in scene.within(span, 0.0, table.drift_mps, BEHIND):
@@ -330,7 +330,7 @@ def _parts_from(road: RoadGraph, lane: LaneId, other: LaneId) -> bool:
     return forks and road.places_between(lane, other) is None
 
 
-def _own(scene: Scene) -> Strip:
+def _own(scene: ShieldScene) -> Strip:
     """The lane whose centre is nearest to the ego's."""
     return min(scene.strips, key=lambda strip: abs(strip.centre_m - scene.ego.d_m))
 
@@ -339,7 +339,7 @@ def _in(strip: Strip, span: Span) -> bool:
     return span[0] < strip.high_m - _TOUCH_M and span[1] > strip.low_m + _TOUCH_M
 
 
-def _lanes_wide(scene: Scene, span: Span) -> Span:
+def _lanes_wide(scene: ShieldScene, span: Span) -> Span:
     """A span widened to the edges of every lane it is in."""
     lanes = [strip for strip in scene.strips if _in(strip, span)]
     return min([span[0], *(s.low_m for s in lanes)]), max([span[1], *(s.high_m for s in lanes)])

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 from chauffeur.control import LAMPILOT_STEERING, LaneKeepingParameters, lane_keeping_steering
 from chauffeur.safety.shield.compiled import compiled
-from chauffeur.safety.shield.frame import Body
+from chauffeur.safety.shield.frame import ShieldBody
 
 _PERIODS = 14
 """Periods of coming back that are looked at; by then the car is back, or goes along its lane."""
@@ -25,7 +25,9 @@ _SLOWEST_MPS = 1e-2
 """Lane keeping divides by no less."""
 
 
-def recovery_steering(ego: Body, centre_m: float, speed_mps: float, most_rad: float, curvature: float = 0.0) -> float:
+def recovery_steering(
+    ego: ShieldBody, centre_m: float, speed_mps: float, most_rad: float, curvature: float = 0.0
+) -> float:
     """Steering angle, rad, that brings the ego back to a lane's centre; the lane's curvature in 1/m."""
     parameters = _with_wheel(most_rad)
     bend = curvature * speed_mps * parameters.preview_s
@@ -52,7 +54,7 @@ def _turning(speed_mps: float, slip_rad: float) -> float:
 
 
 def swept(
-    ego: Body,
+    ego: ShieldBody,
     speed_mps: float,
     size_m: tuple[float, float],
     steering_rad: float,

@@ -15,19 +15,19 @@ EGO_BLUEPRINTS: Final = "vehicle.lincoln.mkz_2017", "vehicle.lincoln.mkz2017"
 _TIMEOUT_S: Final = 10.0
 
 
-class Address(NamedTuple):
+class CarlaAddress(NamedTuple):
     """Where a server listens."""
 
     host: str
     port: int
 
 
-def address(environ: Mapping[str, str] = os.environ) -> Address:
+def address(environ: Mapping[str, str] = os.environ) -> CarlaAddress:
     """The server's address. Raises ScenarioError for one that is none."""
     host, _, port = environ.get(SERVER_VARIABLE, "localhost:2000").rpartition(":")
     if not host or not port.isdigit():
         raise ScenarioError(f"{SERVER_VARIABLE} must be HOST:PORT.", hint=f"export {SERVER_VARIABLE}=localhost:2000")
-    return Address(host, int(port))
+    return CarlaAddress(host, int(port))
 
 
 def library() -> Any:

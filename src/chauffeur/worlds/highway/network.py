@@ -28,7 +28,7 @@ def lane_id(key: LaneKey) -> LaneId:
     return f"{key[0]}-{key[1]}:{key[2]}"
 
 
-class Lane(Protocol):
+class HighwayLane(Protocol):
     """A lane by its centre line. Longitudinal and lateral coordinates in m, y and lateral growing to the right."""
 
     length: float
@@ -171,13 +171,13 @@ class LaneNetwork:
     """Lanes by the nodes they join, in order of insertion: what draws choose from, and the order among equals."""
 
     def __init__(self) -> None:
-        self.graph: dict[str, dict[str, list[Lane]]] = {}
+        self.graph: dict[str, dict[str, list[HighwayLane]]] = {}
 
-    def add(self, start: str, end: str, lane: Lane) -> None:
+    def add(self, start: str, end: str, lane: HighwayLane) -> None:
         """Append a lane to the right of those that join two nodes already."""
         self.graph.setdefault(start, {}).setdefault(end, []).append(lane)
 
-    def lanes(self) -> dict[LaneKey, Lane]:
+    def lanes(self) -> dict[LaneKey, HighwayLane]:
         """All lanes by key."""
         return {
             (start, end, i): lane
@@ -186,7 +186,7 @@ class LaneNetwork:
             for i, lane in enumerate(lanes)
         }
 
-    def lane(self, lane: LaneKey) -> Lane:
+    def lane(self, lane: LaneKey) -> HighwayLane:
         """The lane of a key. Raises KeyError or IndexError for one that is not there."""
         return self.graph[lane[0]][lane[1]][lane[2]]
 

@@ -25,7 +25,7 @@ from chauffeur.worlds.highway.network import (
     LANE_WIDTH_M,
     ArcLane,
     FloatArray,
-    Lane,
+    HighwayLane,
     LaneKey,
     LaneNetwork,
     SineLane,
@@ -109,7 +109,7 @@ class Spawn:
 
 
 @dataclass(slots=True)
-class Scene:
+class HighwayScene:
     """A road with its traffic, ready to be stepped.
 
     Attributes:
@@ -139,7 +139,7 @@ class Scene:
     emergency_lanes: frozenset[LaneId] = field(default_factory=frozenset[LaneId])
 
 
-def road_graph(network: Mapping[LaneKey, Lane], emergency: Container[LaneId]) -> RoadGraph:
+def road_graph(network: Mapping[LaneKey, HighwayLane], emergency: Container[LaneId]) -> RoadGraph:
     """The road as the graph of its lanes, which has y to the left of +x; the network has it to the right."""
     ends = {key: (lane.position(0.0, 0.0), lane.position(lane.length, 0.0)) for key, lane in network.items()}
     lanes: list[GraphLane] = []
@@ -184,7 +184,7 @@ def parse_config(config: dict[str, Any], scenario_id: str) -> RoadConfig:
         ) from error
 
 
-def build_scene(config: RoadConfig, rng: np.random.Generator) -> Scene:
+def build_scene(config: RoadConfig, rng: np.random.Generator) -> HighwayScene:
     """Road and traffic of a scenario, with draws from `rng`. Raises ScenarioError for an unknown road type."""
     builders = {
         "ramp-merge-v0": _ramp_merge,
@@ -197,7 +197,7 @@ def build_scene(config: RoadConfig, rng: np.random.Generator) -> Scene:
     return builder(config, rng)
 
 
-def _ramp_merge(config: RoadConfig, rng: np.random.Generator) -> Scene:
+def _ramp_merge(config: RoadConfig, rng: np.random.Generator) -> HighwayScene:
     before, converging, merge, after = stages(config, 4, (500.0, 80.0, 80.0, 2000.0))
     ends = (0.0, before + converging, before + converging + merge, before + converging + merge + after)
     network = LaneNetwork()
@@ -229,7 +229,7 @@ def _ramp_merge(config: RoadConfig, rng: np.random.Generator) -> Scene:
     return _highway_scene(network, ego, traffic, objects=[barrier])
 
 
-def _multi_lane(config: RoadConfig, rng: np.random.Generator) -> Scene:
+def _multi_lane(config: RoadConfig, rng: np.random.Generator) -> HighwayScene:
     (length,) = stages(config, 1, (2000.0,))
     network = LaneNetwork()
     regular = config.num_lanes - 1 if config.emergency_lane else config.num_lanes
@@ -249,8 +249,8 @@ def _highway_scene(
     *,
     objects: Sequence[Spawn] = (),
     emergency: frozenset[LaneId] = frozenset(),
-) -> Scene:
-    return Scene(
+) -> HighwayScene:
+    return HighwayScene(
         kind="highway",
         network=network,
         ego=ego,
@@ -276,7 +276,7 @@ def _standing(network: LaneNetwork, kind: Literal["obstacle", "stop_sign"], posi
     return Spawn(kind, position, 0.0, 0.0, network.closest(position, 0.0), size_m=_OBSTACLE_M)
 
 
-def _car(network: LaneNetwork, lane: Lane, longitudinal_m: float, speed_mps: float) -> Spawn:
+def _car(network: LaneNetwork, lane: HighwayLane, longitudinal_m: float, speed_mps: float) -> Spawn:
     """A car of the traffic on the centre of a lane."""
     position, heading = lane.position(longitudinal_m, 0), lane.heading_at(longitudinal_m)
     return Spawn(
@@ -322,7 +322,7 @@ def _populate(
     return traffic
 
 
-def _intersection(config: RoadConfig, rng: np.random.Generator) -> Scene:
+def _intersection(config: RoadConfig, rng: np.random.Generator) -> HighwayScene:
     network = _crossroads()
     approach = network.lane(("o0", "ir0", 0))
     sign = _standing(network, "stop_sign", approach.position(95, 0))
@@ -355,7 +355,7 @@ def _intersection(config: RoadConfig, rng: np.random.Generator) -> Scene:
             traffic.append(car)
     position, heading = approach.position(10, 0), approach.heading_at(60)
     ego = Spawn("ego", position, heading, approach.speed_limit, network.closest(position, heading))
-    return Scene(
+    return HighwayScene(
         kind="intersection",
         network=network,
         ego=ego,

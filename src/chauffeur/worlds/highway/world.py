@@ -23,7 +23,7 @@ from chauffeur.worlds.highway.core import layout as at
 from chauffeur.worlds.highway.driver import HighwayDriver
 from chauffeur.worlds.highway.fitness import fit_to_begin
 from chauffeur.worlds.highway.perception import HighwayPerception
-from chauffeur.worlds.highway.roads import DT_S, RoadConfig, Scene, build_scene, parse_config, road_graph
+from chauffeur.worlds.highway.roads import DT_S, HighwayScene, RoadConfig, build_scene, parse_config, road_graph
 
 FOLLOW_WITHIN_M = 50.0
 """LaMPilot starts the ego at the speed of a vehicle closer than this ahead, at the speed limit otherwise."""
@@ -45,7 +45,7 @@ _INSTANT = struct.Struct("<Qd")
 class _Start:
     """A scene warmed up and ready; `core` is only ever copied."""
 
-    scene: Scene
+    scene: HighwayScene
     core: CoreRoad
     road: RoadGraph
     clock_s: float

@@ -107,7 +107,7 @@ class LeavingCar:
 
 
 @dataclass(slots=True)
-class Walker:
+class LotWalker:
     """Somebody who walks to and fro between two places, and lets cars that are close go first.
 
     Attributes:

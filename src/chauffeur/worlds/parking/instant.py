@@ -13,7 +13,7 @@ from typing import Final
 
 from chauffeur.concept import DataError
 from chauffeur.geometry import Pose
-from chauffeur.worlds.parking.actors import CarMoved, LeavingCar, Walker
+from chauffeur.worlds.parking.actors import CarMoved, LeavingCar, LotWalker
 
 _HEAD: Final = struct.Struct("<QdddddBBBH")
 """Tick; rear axle, speed and wheel of the ego; whether it has crashed; how many records follow of each kind."""
@@ -34,17 +34,17 @@ class Ego:
 
 
 @dataclass(frozen=True, slots=True)
-class Instant:
+class ParkingInstant:
     """Who is where."""
 
     tick: int
     ego: Ego
     cars: tuple[LeavingCar, ...]
-    walkers: tuple[Walker, ...]
+    walkers: tuple[LotWalker, ...]
     hit: frozenset[int]
 
 
-def pack(tick: int, ego: Ego, cars: Iterable[LeavingCar], walkers: Iterable[Walker], hit: Iterable[int]) -> bytes:
+def pack(tick: int, ego: Ego, cars: Iterable[LeavingCar], walkers: Iterable[LotWalker], hit: Iterable[int]) -> bytes:
     """An instant as bytes."""
     there = [(car.id, *car.moved()) for car in cars]
     afoot = list(walkers)
@@ -64,7 +64,9 @@ def pack(tick: int, ego: Ego, cars: Iterable[LeavingCar], walkers: Iterable[Walk
     return b"".join(parts)
 
 
-def unpack(payload: bytes, cars: Iterable[LeavingCar], walkers: Iterable[Walker], parked: Iterable[int]) -> Instant:
+def unpack(
+    payload: bytes, cars: Iterable[LeavingCar], walkers: Iterable[LotWalker], parked: Iterable[int]
+) -> ParkingInstant:
     """From bytes.
 
     Args:
@@ -85,7 +87,7 @@ def unpack(payload: bytes, cars: Iterable[LeavingCar], walkers: Iterable[Walker]
     by_id, on_foot, standing = {car.id: car for car in cars}, {one.id: one for one in walkers}, frozenset(parked)
     numbers = [x, y, heading, speed, steering]
     there: list[LeavingCar] = []
-    people: list[Walker] = []
+    people: list[LotWalker] = []
     for _ in range(moving):
         number, station, car_speed, hit_it, located = _CAR.unpack_from(payload, at)
         at += _CAR.size
@@ -109,4 +111,4 @@ def unpack(payload: bytes, cars: Iterable[LeavingCar], walkers: Iterable[Walker]
     if tick > _MOST_TICK or len(people) != len(on_foot) or not hit <= standing or not all(map(math.isfinite, numbers)):
         raise DataError("A state of another lot.")
     ego = Ego(Pose(x, y, heading), speed, steering, bool(crashed))
-    return Instant(tick, ego, tuple(there), tuple(people), hit)
+    return ParkingInstant(tick, ego, tuple(there), tuple(people), hit)

@@ -29,7 +29,7 @@ from chauffeur.concept import (
 )
 from chauffeur.geometry import Box, Polyline, Pose, overlap
 from chauffeur.worlds.base import EGO
-from chauffeur.worlds.parking.actors import LeavingCar, Walker
+from chauffeur.worlds.parking.actors import LeavingCar, LotWalker
 from chauffeur.worlds.parking.amenities import Bay, Place, amenities
 from chauffeur.worlds.parking.corridor import Body
 from chauffeur.worlds.parking.driver import ParkingDriver
@@ -94,7 +94,7 @@ class _Ground:
     free: frozenset[str]
     offers: ParkingLot
     cars: tuple[LeavingCar, ...]
-    walkers: tuple[Walker, ...]
+    walkers: tuple[LotWalker, ...]
 
 
 class _Ego(Ego):
@@ -142,7 +142,7 @@ class ParkingWorld:
         self._scene: _Ground | None = None
         self._ego = _Ego(Pose(0.0, 0.0, 0.0), 0.0)
         self._cars: list[LeavingCar] = []
-        self._walkers: list[Walker] = []
+        self._walkers: list[LotWalker] = []
         self._hit: set[int] = set()
         self._tick = 0
         self._shown: Observation | None = None
@@ -338,7 +338,7 @@ class ParkingWorld:
 
     def _look_for_collisions(self) -> None:
         ego, box = self._ego, self._ego.box
-        movers: list[LeavingCar | Walker] = [*self._cars, *self._walkers]
+        movers: list[LeavingCar | LotWalker] = [*self._cars, *self._walkers]
         for mover in movers:
             if overlap(box, mover.state().box):
                 ego.crashed = mover.crashed = True
@@ -396,7 +396,7 @@ def _leaving(lot: Lot, number: int, place: int, rng: np.random.Generator) -> Lea
     return LeavingCar(number, way, start, speed, views[0].id, speed)
 
 
-def _walking(lot: Lot, number: int, rng: np.random.Generator) -> Walker:
+def _walking(lot: Lot, number: int, rng: np.random.Generator) -> LotWalker:
     """Somebody who crosses one of the aisles at its head or its end, where nobody turns into a spot, to and fro."""
     aisle = int(rng.integers(1, lot.aisles + 1))
     x = lot.aisle_x_m(aisle)
@@ -405,7 +405,7 @@ def _walking(lot: Lot, number: int, rng: np.random.Generator) -> Walker:
     half = AISLE_M / 2.0 + 1.6
     pause, away = rng.uniform(4.0, 9.0), rng.uniform(0.0, 5.0)
     side = 1.0 if rng.uniform() < 0.5 else -1.0
-    return Walker(number, (x - side * half, y), (x + side * half, y), pause, waits_s=away)
+    return LotWalker(number, (x - side * half, y), (x + side * half, y), pause, waits_s=away)
 
 
 def _front(ego: VehicleState, others: Sequence[VehicleState], path: Polyline) -> Lead | None:

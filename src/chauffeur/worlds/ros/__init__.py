@@ -2,20 +2,20 @@
 
 from chauffeur.worlds.ros.base import (
     Published,
+    RosVehicleState,
     TopicMessage,
     VehicleError,
     VehicleInterface,
     VehicleRefusalError,
-    VehicleState,
 )
 from chauffeur.worlds.ros.limits import VehicleLimits
 
 __all__ = [
     "Published",
+    "RosVehicleState",
     "TopicMessage",
     "VehicleError",
     "VehicleInterface",
     "VehicleLimits",
     "VehicleRefusalError",
-    "VehicleState",
 ]

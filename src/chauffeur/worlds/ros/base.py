@@ -70,7 +70,7 @@ Link = Literal["dry-run", "connecting", "waiting", "up", "refused", "replaced", 
 
 
 @dataclass(frozen=True, slots=True)
-class VehicleState:
+class RosVehicleState:
     """What is known of the vehicle and of the way to it, at the moment of asking.
 
     Attributes:
@@ -113,7 +113,7 @@ class VehicleInterface(Protocol):
         for a person to call, not for a planner. Raises VehicleError when the interface is closed."""
         ...
 
-    def state(self) -> VehicleState:
+    def state(self) -> RosVehicleState:
         """The present state; never waits."""
         ...
 

@@ -7,9 +7,9 @@ from collections import deque
 from typing import Literal
 
 from chauffeur.concept import Parameters
-from chauffeur.worlds.ros.base import Published, TopicMessage, VehicleState
+from chauffeur.worlds.ros.base import Published, RosVehicleState, TopicMessage
 from chauffeur.worlds.ros.lines import command_line
-from chauffeur.worlds.ros.stack import Stack, Wishes
+from chauffeur.worlds.ros.stack import Stack, StackWishes
 
 KEPT = 100
 """Lines remembered."""
@@ -21,7 +21,7 @@ class DryRun:
     def __init__(self, stack: Stack, ros: Literal[1, 2] = 1) -> None:
         """Make the messages of a stack, and tell them as lines of that generation's command-line tool."""
         self._ros: Literal[1, 2] = ros
-        self._wishes = Wishes(stack, self._send)
+        self._wishes = StackWishes(stack, self._send)
         self._lock = threading.Lock()
         self._lines: deque[str] = deque(maxlen=KEPT)
         self._closed = False
@@ -40,11 +40,11 @@ class DryRun:
         """See `VehicleInterface.release`."""
         return self._wishes.release()
 
-    def state(self) -> VehicleState:
+    def state(self) -> RosVehicleState:
         """See `VehicleInterface.state`."""
         link = "closed" if self._closed else "dry-run"
         count = ("published", self._wishes.number)
-        return VehicleState(link, "Dry run: nothing is published.", counts=(count,), notes=self.lines[-20:])
+        return RosVehicleState(link, "Dry run: nothing is published.", counts=(count,), notes=self.lines[-20:])
 
     def close(self) -> None:
         """See `VehicleInterface.close`."""

@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import Final
 
 from chauffeur.worlds.ros.base import VehicleError
-from chauffeur.worlds.ros.node import Node, Ros1Settings
+from chauffeur.worlds.ros.node import Ros1Settings, RosNode
 from chauffeur.worlds.ros.types import Types
 
 ENGAGE_TOPIC: Final = "/vehicle/engage"
@@ -61,7 +61,7 @@ def disengage(settings: Ros1Settings, *, within_s: float = 5.0) -> int:
 def _tell(settings: Ros1Settings, engaged: bool, within_s: float) -> int:
     types = Types(1, {})
     # A name of its own: a second node of one name ends the first.
-    node = Node(
+    node = RosNode(
         replace(settings, node=""), types, {ENGAGE_TOPIC: ENGAGE_TYPE}, expected={ENGAGE_TOPIC: "ssc_interface"}
     )
     try:

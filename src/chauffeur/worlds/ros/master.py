@@ -34,7 +34,7 @@ class MasterError(VehicleError):
     """The master did not answer, or not with what was asked."""
 
 
-class RefusedError(MasterError):
+class MasterRefusedError(MasterError):
     """The master answered, with no: what was asked for is not there."""
 
 
@@ -95,7 +95,7 @@ def call(uri: str, who: str, method: str, *arguments: Any, timeout_s: float = TI
         raise MasterError(f"The {place} answered {method} with {str(reply)[:80]!r}.", retryable=True)
     code, words, value = reply
     if code != 1:
-        raise RefusedError(f"The {place} refused {method}: {str(words)[:200]}", retryable=True)
+        raise MasterRefusedError(f"The {place} refused {method}: {str(words)[:200]}", retryable=True)
     return value
 
 

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from chauffeur.worlds.ros.base import Link, VehicleError
 from chauffeur.worlds.ros.inlet import Inlet
-from chauffeur.worlds.ros.master import TIMEOUT_S, MasterError, RefusedError, call, check_uri
+from chauffeur.worlds.ros.master import TIMEOUT_S, MasterError, MasterRefusedError, call, check_uri
 from chauffeur.worlds.ros.notes import Notes
 from chauffeur.worlds.ros.outlet import Outlet, Publication
 from chauffeur.worlds.ros.slave import Slave
@@ -46,7 +46,7 @@ class Ros1Settings:
     node: str = ""
 
 
-class Node:
+class RosNode:
     """Publishes some topics, reads at most one, and keeps itself registered."""
 
     def __init__(
@@ -203,7 +203,7 @@ class Node:
         """Whether the master knows us; one that was started anew does not."""
         try:
             known: Any = self._call("lookupNode", self.name)
-        except RefusedError:
+        except MasterRefusedError:
             known = None
         if known != self._slave.uri:
             self.notes.say("The ROS master does not know us any more; registering again.")

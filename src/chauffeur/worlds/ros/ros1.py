@@ -11,10 +11,10 @@ from typing import Final
 from chauffeur.concept import Parameters
 from chauffeur.worlds.ros import autoware_ai
 from chauffeur.worlds.ros.autoware_ai import AutowareAi
-from chauffeur.worlds.ros.base import FRESH_S, Fields, Published, TopicMessage, VehicleState
+from chauffeur.worlds.ros.base import FRESH_S, Fields, Published, RosVehicleState, TopicMessage
 from chauffeur.worlds.ros.limits import CheckedWish
-from chauffeur.worlds.ros.node import CHECK_S, Node, Ros1Settings
-from chauffeur.worlds.ros.stack import Wishes
+from chauffeur.worlds.ros.node import CHECK_S, Ros1Settings, RosNode
+from chauffeur.worlds.ros.stack import StackWishes
 from chauffeur.worlds.ros.types import Types
 
 _PUBLISHED: Final = {
@@ -53,7 +53,7 @@ class Ros1Vehicle:
         slowest = CheckedWish(0.0, stack.limits.look_ahead_m[0], stack.limits.look_ahead_ratio_s[0], 0)
         for message in stack.wished(slowest)[0]:
             self._bytes(message, 0)
-        self._node = Node(
+        self._node = RosNode(
             settings,
             self._types,
             _PUBLISHED,
@@ -62,7 +62,7 @@ class Ros1Vehicle:
             expected=_EXPECTED,
             check_s=check_s,
         )
-        self._wishes = Wishes(stack, self._send)
+        self._wishes = StackWishes(stack, self._send)
         self._closing = threading.Lock()
 
     def apply(self, parameters: Parameters) -> Published:
@@ -75,13 +75,13 @@ class Ros1Vehicle:
         self._obey()
         return self._wishes.release()
 
-    def state(self) -> VehicleState:
+    def state(self) -> RosVehicleState:
         """See `VehicleInterface.state`."""
         link, words = self._node.link()
         if self._closing.locked():
             link, words = "closed", "Closed; the last wish stays in force in the vehicle."
         receivers, delivered = self._node.receivers()
-        return VehicleState(
+        return RosVehicleState(
             link=link,
             words=words,
             receivers=receivers,

@@ -17,7 +17,7 @@ from chauffeur.concept import MissingExtraError
 from chauffeur.concept.units import kmh
 from chauffeur.worlds.ros import autoware
 from chauffeur.worlds.ros.autoware import Autoware
-from chauffeur.worlds.ros.base import Fields, Link, TopicMessage, VehicleError, VehicleState
+from chauffeur.worlds.ros.base import Fields, Link, RosVehicleState, TopicMessage, VehicleError
 from chauffeur.worlds.ros.dds import Participant, stamp_of
 from chauffeur.worlds.ros.threaded import ThreadedVehicle
 
@@ -69,7 +69,7 @@ class Ros2Vehicle(ThreadedVehicle):
         self._limit_mps: float | None = None
         self._thread.start()
 
-    def state(self) -> VehicleState:
+    def state(self) -> RosVehicleState:
         """See `VehicleInterface.state`."""
         with self._lock:
             fault, misfits, receivers, mode = self._fault, self._misfits, self._receivers, self._mode
@@ -77,7 +77,7 @@ class Ros2Vehicle(ThreadedVehicle):
         link, words = self._link(fault, misfits, receivers)
         if limit_mps is not None and link == "up":
             words += f" The velocity limit in force is {kmh(limit_mps):.4g} km/h."
-        return VehicleState(
+        return RosVehicleState(
             link=link,
             words=words,
             receivers=receivers,

@@ -23,7 +23,7 @@ from chauffeur.concept import MissingExtraError
 from chauffeur.worlds.ros import autoware, autoware_ai
 from chauffeur.worlds.ros.autoware import Autoware
 from chauffeur.worlds.ros.autoware_ai import AutowareAi
-from chauffeur.worlds.ros.base import Fields, Link, TopicMessage, VehicleError, VehicleState
+from chauffeur.worlds.ros.base import Fields, Link, RosVehicleState, TopicMessage, VehicleError
 from chauffeur.worlds.ros.threaded import ThreadedVehicle
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class RosbridgeVehicle(ThreadedVehicle):
         self._mode = ""
         self._thread.start()
 
-    def state(self) -> VehicleState:
+    def state(self) -> RosVehicleState:
         """See `VehicleInterface.state`. `receivers` counts the server; who listens behind it, it does not say."""
         with self._lock:
             fault, refusal, pending, mode = self._fault, self._refusal, bool(self._pending), self._mode
@@ -100,7 +100,7 @@ class RosbridgeVehicle(ThreadedVehicle):
             "connecting": f"{fault} It is tried again every {self._retry_s:g} s.",
             "refused": f"The rosbridge server refuses: {refusal}",
         }.get(link, f"Connected to the rosbridge server at {self._url}; who listens behind it is not known.")
-        return VehicleState(
+        return RosVehicleState(
             link=link,
             words=words,
             receivers=int(not fault),

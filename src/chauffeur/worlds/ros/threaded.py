@@ -12,7 +12,7 @@ from typing import TypeVar
 from chauffeur.concept import Parameters
 from chauffeur.worlds.ros.base import FRESH_S, Published, TopicMessage
 from chauffeur.worlds.ros.notes import Notes
-from chauffeur.worlds.ros.stack import Stack, Wishes
+from chauffeur.worlds.ros.stack import Stack, StackWishes
 
 _T = TypeVar("_T")
 
@@ -34,7 +34,7 @@ class ThreadedVehicle(ABC):
         self._velocity: tuple[float, float] | None = None
         self._woken, self._ending = threading.Event(), threading.Event()
         self._closed = False
-        self._wishes = Wishes(stack, self._send)
+        self._wishes = StackWishes(stack, self._send)
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def apply(self, parameters: Parameters) -> Published:

@@ -30,7 +30,7 @@ from chauffeur.control.kinematic_bicycle import KinematicBicycle
 from chauffeur.control.pure_pursuit import pursuit_steering
 from chauffeur.geometry import JunctionWay, Lane, Pose, RoadGraph, Route, Turn, choice_ahead, wrap_to_pi
 from chauffeur.worlds.town.foresight import Foresight, Meeting
-from chauffeur.worlds.town.way import Corridor, Stretch, blended, free_route
+from chauffeur.worlds.town.way import RouteCorridor, Stretch, blended, free_route
 
 TOWN_CAPABILITIES: Final = Capabilities(
     roads=("town",),
@@ -119,7 +119,9 @@ class TownDriver:
         self._goal = route is not None
         self._turn: Turn | None = None
         self._turning_at = ""
-        self._corridor = Corridor(road, route or free_route(road, place.lane, place.station_m, None, _FREE_ROUTE_M))
+        self._corridor = RouteCorridor(
+            road, route or free_route(road, place.lane, place.station_m, None, _FREE_ROUTE_M)
+        )
         first = self._corridor.layer_of(place.lane, 0)
         if first is None:
             first, start = 0, self._corridor.route.lanes[0]
@@ -320,7 +322,7 @@ class TownDriver:
         return beside if beside in [one for one, _ in self._road.changes(lane)] else None
 
     def _take(self, route: Route, lane: LaneId, ego: VehicleState) -> None:
-        self._corridor = Corridor(self._road, route)
+        self._corridor = RouteCorridor(self._road, route)
         self._stretch = self._corridor.stretch(self._corridor.layer_of(lane, 0) or 0, lane)
         self._station = self._rear_station(ego, -math.inf, math.inf)
         self._changing_to = None

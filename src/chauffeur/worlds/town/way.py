@@ -33,7 +33,7 @@ _CREEP_MPS: Final = 2.0
 _MOST_SWING_M: Final = 1.5
 
 
-class Corridor:
+class RouteCorridor:
     """Lanes from which a route can still be driven, in the layers of the route's lanes."""
 
     def __init__(self, road: RoadGraph, route: Route) -> None:

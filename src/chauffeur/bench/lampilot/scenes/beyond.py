@@ -24,7 +24,7 @@ from chauffeur.bench.lampilot.scenes.fitting import (
     sign_mps,
 )
 from chauffeur.bench.lampilot.scenes.sampling import whole
-from chauffeur.bench.lampilot.scenes.wishes import Named, Wish
+from chauffeur.bench.lampilot.scenes.wishes import Named, SceneWish
 from chauffeur.concept import Observation
 
 Generator = np.random.Generator
@@ -32,7 +32,7 @@ Generator = np.random.Generator
 # Hints: a wish at three levels of directness (paper Tab. VII)
 
 
-def _hint(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def _hint(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     behaviour = kind.split("_", 1)[1]
     if behaviour == "overtake":
         # No side is named: on two lanes there is one.
@@ -44,13 +44,13 @@ def _hint(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     return wish if isinstance(wish, Unfit) else replace(wish, sections=(kind,), stem=kind, slots=(), means=())
 
 
-def _change(behaviour: str, start: Observation) -> Wish | Unfit:
+def _change(behaviour: str, start: Observation) -> SceneWish | Unfit:
     """Faster, slower or further back, where there is room for it and it does not come unasked."""
     if behaviour == "slower":
         if start.front is not None and start.front.speed_mps < start.ego.speed_mps - 1.0:
             return Unfit("whoever is behind somebody slower slows down unasked")
         goal = {"type": "ChangeEval", "quantity": "speed", "change": -1}
-        return Wish((), goal, {"type": "ACCEvalbySpeed", "rel_speed": -3}, "")
+        return SceneWish((), goal, {"type": "ACCEvalbySpeed", "rel_speed": -3}, "")
     lead = lead_of(start)
     if isinstance(lead, Unfit):
         return lead
@@ -59,11 +59,11 @@ def _change(behaviour: str, start: Observation) -> Wish | Unfit:
         if start.ego.speed_mps > sign_mps(start) - 3.0:
             return Unfit("at the limit already")
         goal = {"type": "ChangeEval", "quantity": "speed", "change": 1}
-        return Wish((), goal, {"type": "ACCEvalbySpeed", "rel_speed": 2}, "")
+        return SceneWish((), goal, {"type": "ACCEvalbySpeed", "rel_speed": 2}, "")
     if lead.distance_m - CAR_M > 2.0 * start.ego.speed_mps:
         return Unfit("nobody would call that gap small")
     goal = {"type": "ChangeEval", "quantity": "distance", "change": 1}
-    return Wish((), goal, {"type": "ACCEvalbyDistance", "rel_distance": 12}, "")
+    return SceneWish((), goal, {"type": "ACCEvalbyDistance", "rel_distance": 12}, "")
 
 
 # Several things in a row
@@ -71,7 +71,7 @@ def _change(behaviour: str, start: Observation) -> Wish | Unfit:
 _TURNS = {"left": "turn left", "right": "turn right", "straight": "go straight on"}
 
 
-def _steps(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def _steps(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     """Steps in the order of the kind's name; LaMPilot's condition is that of the last."""
     if "overtake" in kind:
         passing = overtake_wish("left_overtake", start, rng)
@@ -113,13 +113,13 @@ def _steps(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
             step = closer.goal | {"type": "ReachEval"}
         steps.append(step)
     goal = {"type": "SequenceEval", "steps": steps}
-    return Wish((section,), goal, steps[-1], kind, tuple(slots.items()), means=tuple(steps))
+    return SceneWish((section,), goal, steps[-1], kind, tuple(slots.items()), means=tuple(steps))
 
 
 # Wishes to refuse, and wishes to ask back about
 
 
-def _refuse_no_lane(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def _refuse_no_lane(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     assert start.ego.lane is not None
     side = "left" if start.road[start.ego.lane].index == 0 else "right"
     if rng.random() < 0.6:
@@ -132,7 +132,7 @@ def _refuse_no_lane(kind: str, start: Observation, rng: Generator) -> Wish | Unf
     return _refused(kind, wish, f"There is no lane on the {side}.")
 
 
-def _refuse_no_lead(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def _refuse_no_lead(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     if start.front is not None and start.front.distance_m < SIGHT_M:
         return Unfit("somebody is ahead")
     del rng
@@ -140,7 +140,7 @@ def _refuse_no_lead(kind: str, start: Observation, rng: Generator) -> Wish | Unf
     return _refused(kind, wish, "Nobody is within 100 m ahead to be overtaken.")
 
 
-def _refuse_no_gap(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def _refuse_no_gap(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     if start.front is not None and start.front.distance_m < SIGHT_M:
         return Unfit("somebody is ahead")
     named = Named(whole(rng, 15, 70), "m")
@@ -155,19 +155,19 @@ def _refuse_no_gap(kind: str, start: Observation, rng: Generator) -> Wish | Unfi
     return _refused(kind, wish, "Nobody is within 100 m ahead to keep a gap to.")
 
 
-def _refuse_no_shoulder(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def _refuse_no_shoulder(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     wish = pull_over_wish(kind, start, rng)
-    assert isinstance(wish, Wish)
+    assert isinstance(wish, SceneWish)
     return _refused(kind, wish, "This road has no emergency lane.")
 
 
-def _refuse_no_junction(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def _refuse_no_junction(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     wish = route_wish(("turn_left", "turn_right")[whole(rng, 0, 1)], start, rng)
-    assert isinstance(wish, Wish)
+    assert isinstance(wish, SceneWish)
     return _refused(kind, wish, "There is no junction on a highway.")
 
 
-def _refuse_speed(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def _refuse_speed(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     """Twice the sign: beyond what any limits allow."""
     named = between(rng, 1.6 * sign_mps(start), 2.4 * sign_mps(start), "m/s")
     assert isinstance(named, Named)
@@ -175,7 +175,7 @@ def _refuse_speed(kind: str, start: Observation, rng: Generator) -> Wish | Unfit
     return _refused(kind, wish, "That is far above the speed limit.")
 
 
-def _refuse_gap(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def _refuse_gap(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     """So close that there is less than a hand's breadth, or nothing, between the bumpers."""
     lead = lead_of(start)
     if isinstance(lead, Unfit):
@@ -185,34 +185,36 @@ def _refuse_gap(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     return _refused(kind, wish, "At highway speed that gap is a crash.")
 
 
-def _refuse_sign(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def _refuse_sign(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     del start, rng
     return _unsafe(kind, "The stop sign must be obeyed.")
 
 
-def _refuse_danger(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def _refuse_danger(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     del rng
     place = "junction" if start.road.junctions else "highway"
     return replace(_unsafe(kind, "That would put people in danger."), sections=(f"{kind}_{place}",))
 
 
-def _unsafe(kind: str, why: str) -> Wish:
-    return Wish((kind,), {"type": "RefuseEval"}, {"type": "ACCEvalbySpeed", "rel_speed": 0}, kind, (), "refuse", why)
+def _unsafe(kind: str, why: str) -> SceneWish:
+    return SceneWish(
+        (kind,), {"type": "RefuseEval"}, {"type": "ACCEvalbySpeed", "rel_speed": 0}, kind, (), "refuse", why
+    )
 
 
-def _ask_side(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def _ask_side(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     del start, rng
     return replace(_unsafe(kind, "Both sides have a lane, and none was named."), right="ask")
 
 
-def _ask_amount(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def _ask_amount(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     del start
     number = str(whole(rng, 15, 60))
     why = "It is not said of what: speed or distance."
     return replace(_unsafe(kind, why), right="ask", slots=(("n", number),))
 
 
-def _refused(kind: str, wish: Wish, why: str) -> Wish:
+def _refused(kind: str, wish: SceneWish, why: str) -> SceneWish:
     """The words of a wish of the original's kinds, in a scene or with a number that make it one to refuse."""
     return replace(wish, goal={"type": "RefuseEval"}, stem=kind, right="refuse", why=why)
 

@@ -26,7 +26,7 @@ _CLOSE_WORDS = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class SceneChoice:
     """The words of an item, the template they came from, and their form (`form_of`)."""
 
     text: str
@@ -45,7 +45,7 @@ def form_of(text: str) -> str:
     return " ".join("#" if token[0] == "#" else token for token in marked if token[0].isalnum() or token[0] == "#")
 
 
-def choose_wordings(rows: Sequence[Row], seed: int, avoid: Set[str]) -> list[Choice]:
+def choose_wordings(rows: Sequence[Row], seed: int, avoid: Set[str]) -> list[SceneChoice]:
     """A wording for each row, in order.
 
     Args:
@@ -58,7 +58,7 @@ def choose_wordings(rows: Sequence[Row], seed: int, avoid: Set[str]) -> list[Cho
     """
     uses: dict[str, Counter[str]] = defaultdict(Counter)
     options = [_options(row, avoid) for row in rows]
-    chosen: list[Choice] = []
+    chosen: list[SceneChoice] = []
     for row, held in zip(rows, options, strict=True):
         forms = uses[_group(row)]
         length = int(row["length"])
@@ -71,13 +71,15 @@ def choose_wordings(rows: Sequence[Row], seed: int, avoid: Set[str]) -> list[Cho
     return chosen
 
 
-def _cost(one: Choice, forms: Counter[str], length: int) -> tuple[int, int]:
+def _cost(one: SceneChoice, forms: Counter[str], length: int) -> tuple[int, int]:
     """Least is best: seldom said so far, then of the length wished."""
     return forms[one.form], abs(words_of(one.text) - length)
 
 
-def _options(row: Row, avoid: Set[str]) -> list[Choice]:
-    held = [Choice(text, template, form_of(text)) for text, template in row["wordings"] if normal(text) not in avoid]
+def _options(row: Row, avoid: Set[str]) -> list[SceneChoice]:
+    held = [
+        SceneChoice(text, template, form_of(text)) for text, template in row["wordings"] if normal(text) not in avoid
+    ]
     if not held:
         raise InstructionError(
             f"Item {row['index']} ({row['kind']}) has no wording that is not to be avoided.",
@@ -92,7 +94,11 @@ def _group(row: Row) -> str:
 
 
 def _balance(
-    options: Sequence[Sequence[Choice]], chosen: list[Choice], forms: Counter[str], held_in: Sequence[int], seed: int
+    options: Sequence[Sequence[SceneChoice]],
+    chosen: list[SceneChoice],
+    forms: Counter[str],
+    held_in: Sequence[int],
+    seed: int,
 ) -> None:
     """Exchange wordings of a split, item by item in a random order, until their mean length is Tab. III's."""
     wanted = PAPER_WORDS[1] * len(held_in)

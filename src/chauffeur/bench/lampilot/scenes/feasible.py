@@ -22,7 +22,7 @@ _EMPTY_WISHES = ("ACCEvalbySpeed", "ACCEvalbyDistance", "ChangeEval")
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class FeasibilityVerdict:
     """Whether a scene is feasible.
 
     Attributes:
@@ -92,7 +92,7 @@ def _in_start_lane(scenario: Scenario, lane: LaneId) -> bool:
     return ego is None or lane_id(ego["start_lane_index"]) == lane
 
 
-def feasible(scenario: Scenario) -> Verdict:
+def feasible(scenario: Scenario) -> FeasibilityVerdict:
     """Judge a scene whose goal is to be driven.
 
     Raises:
@@ -101,23 +101,23 @@ def feasible(scenario: Scenario) -> Verdict:
     world = HighwayWorld()
     start = start_of(world, scenario)
     if isinstance(start, str):
-        return Verdict(False, start)
+        return FeasibilityVerdict(False, start)
     try:
         goal = make_any_goal(world.perception(), scenario)
     except ScenarioError as error:
-        return Verdict(False, error.message)
+        return FeasibilityVerdict(False, error.message)
     programs = programs_for(scenario.goal, describe(start).situation)
     if not programs:
-        return Verdict(False, "the expert has no program for it")
+        return FeasibilityVerdict(False, "the expert has no program for it")
     if _fulfilled_by_itself(world, scenario, goal):
-        return Verdict(False, "fulfilled without doing anything")
+        return FeasibilityVerdict(False, "fulfilled without doing anything")
     why = ""
     for attempt in programs:
         world.reset(scenario)
         solved, why, ticks = _drive(world, scenario, attempt.source)
         if solved:
-            return Verdict(True, ticks=ticks, by=attempt.by)
-    return Verdict(False, why)
+            return FeasibilityVerdict(True, ticks=ticks, by=attempt.by)
+    return FeasibilityVerdict(False, why)
 
 
 def _fulfilled_by_itself(world: HighwayWorld, scenario: Scenario, goal: Goal) -> bool:

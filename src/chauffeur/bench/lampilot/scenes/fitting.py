@@ -15,7 +15,7 @@ import numpy as np
 
 from chauffeur.bench.lampilot.goals import SIGHT_M
 from chauffeur.bench.lampilot.scenes.sampling import whole
-from chauffeur.bench.lampilot.scenes.wishes import UNITS, Named, Wish
+from chauffeur.bench.lampilot.scenes.wishes import UNITS, Named, SceneWish
 from chauffeur.concept import Lead, Observation
 
 Generator = np.random.Generator
@@ -48,7 +48,7 @@ class Unfit:
     why: str
 
 
-Drawer = Callable[[str, Observation, Generator], Wish | Unfit]
+Drawer = Callable[[str, Observation, Generator], SceneWish | Unfit]
 
 
 def _side_of(kind: str) -> str:
@@ -88,7 +88,7 @@ def between(rng: Generator, low_si: float, high_si: float, unit: str) -> Named |
     return Named(step * whole(rng, low, high), unit)
 
 
-def distance_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def distance_wish(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     """A gap to be closed or opened, to a number of metres or by it; or why no such wish fits."""
     lead = lead_of(start)
     if isinstance(lead, Unfit):
@@ -114,7 +114,7 @@ def distance_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit
     return replace(one_goal(kind, goal, d=named), change=-1 if closer else 1)
 
 
-def speed_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def speed_wish(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     """A speed to be driven, or more or less speed; or why no such wish fits."""
     now, slower, relative = start.ego.speed_mps, kind.startswith("dec"), "_rel_" in kind
     sign = sign_mps(start)
@@ -136,14 +136,14 @@ def speed_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     return replace(one_goal(kind, goal, v=named), change=-1 if slower else 1)
 
 
-def lane_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def lane_wish(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     """The lane beside, on the side that the kind names."""
     del start, rng
     side = _side_of(kind)
     return one_goal(kind, {"type": "LaneChangeEval", "direction": side}, section="lane", side=side)
 
 
-def overtake_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def overtake_wish(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     """The vehicle ahead to be overtaken on the side that the kind names; or why it cannot be."""
     del rng
     lead = lead_of(start)
@@ -155,13 +155,13 @@ def overtake_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit
     return one_goal(kind, {"type": "OvertakeEval", "direction": side}, section="overtake", side=side)
 
 
-def pull_over_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def pull_over_wish(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     """A halt on the emergency lane."""
     del kind, start, rng
     return one_goal("pull_over", {"type": "PullOverEval"})
 
 
-def route_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
+def route_wish(kind: str, start: Observation, rng: Generator) -> SceneWish | Unfit:
     """The way over the intersection that the kind names."""
     del start, rng
     way = {"go_straight": "straight", "turn_left": "left", "turn_right": "right"}[kind]
@@ -171,14 +171,14 @@ def route_wish(kind: str, start: Observation, rng: Generator) -> Wish | Unfit:
     return one_goal(kind, goal, section="turn", side=way)
 
 
-def one_goal(kind: str, goal: dict[str, Any], section: str = "", **slots: str | Named) -> Wish:
+def one_goal(kind: str, goal: dict[str, Any], section: str = "", **slots: str | Named) -> SceneWish:
     """A wish of one of the original's kinds: one goal, LaMPilot's own condition."""
     stem = kind
     for value in slots.values():
         if isinstance(value, Named):
             stem = f"{kind}{value.count}"
     name = section or kind.removesuffix(f"_{UNITS[_unit_of(kind)].short}")
-    return Wish((name,), goal, goal, stem, tuple(slots.items()), means=(goal,))
+    return SceneWish((name,), goal, goal, stem, tuple(slots.items()), means=(goal,))
 
 
 def plain(value: float) -> float | int:

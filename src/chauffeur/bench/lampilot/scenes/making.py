@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from chauffeur.bench.lampilot.scenes import beyond, fitting
-from chauffeur.bench.lampilot.scenes.feasible import Verdict, feasible, impossible, start_of
+from chauffeur.bench.lampilot.scenes.feasible import FeasibilityVerdict, feasible, impossible, start_of
 from chauffeur.bench.lampilot.scenes.fitting import Unfit
 from chauffeur.bench.lampilot.scenes.kinds import KINDS, Slot
 from chauffeur.bench.lampilot.scenes.sampling import draw_road
-from chauffeur.bench.lampilot.scenes.wishes import Wish
+from chauffeur.bench.lampilot.scenes.wishes import SceneWish
 from chauffeur.bench.lampilot.scenes.wording import Candidates, word
 from chauffeur.concept import Observation, Scenario, ScenarioError
 from chauffeur.worlds.highway import HighwayWorld
@@ -24,7 +24,7 @@ _WORDS_KEY = 1_000_000
 """Spawn key of the stream that words are drawn from; scenes are drawn from keys 0, 1, 2, ..."""
 
 
-def draw_wish(kind: str, start: Observation, rng: np.random.Generator) -> Wish | Unfit:
+def draw_wish(kind: str, start: Observation, rng: np.random.Generator) -> SceneWish | Unfit:
     """A wish that fits the first instant of a drawn road, or why none does. KeyError for an unknown kind."""
     for names, drawer in (*fitting.WISHES, *beyond.WISHES):
         if kind.startswith(names):
@@ -85,21 +85,21 @@ def _stream(job: Job, key: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence([job.seed, job.slot.index], spawn_key=(key,)))
 
 
-def _judge(scenario: Scenario, wish: Wish) -> Verdict:
+def _judge(scenario: Scenario, wish: SceneWish) -> FeasibilityVerdict:
     """Whether a scene does for a wish."""
     if wish.right == "drive":
         return feasible(replace(scenario, goal=wish.goal))
     if "_no_" in scenario.id and not impossible(scenario, wish.origin):
-        return Verdict(False, "the wish is possible here")
-    return Verdict(True)
+        return FeasibilityVerdict(False, "the wish is possible here")
+    return FeasibilityVerdict(True)
 
 
 def _row(
     slot: Slot,
     scenario: Scenario,
-    wish: Wish,
+    wish: SceneWish,
     candidates: Candidates,
-    verdict: Verdict,
+    verdict: FeasibilityVerdict,
     rejected: Counter[str],
 ) -> dict[str, Any]:
     row = asdict(slot) | {

@@ -12,7 +12,7 @@ from typing import Any
 from chauffeur.bench.lampilot.scenes.annotations import FILE
 from chauffeur.bench.lampilot.scenes.kinds import KINDS, MAIN
 from chauffeur.bench.lampilot.scenes.statistics import statistics_of
-from chauffeur.bench.lampilot.scenes.writer import Item
+from chauffeur.bench.lampilot.scenes.writer import SceneItem
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import Dataset
 
@@ -20,7 +20,7 @@ _SPLITS = ("train", "val", "test")
 
 
 def manifest_of(
-    rows: Sequence[Mapping[str, Any]], items: Sequence[Item], datasets: Mapping[str, Dataset]
+    rows: Sequence[Mapping[str, Any]], items: Sequence[SceneItem], datasets: Mapping[str, Dataset]
 ) -> dict[str, Any]:
     """Manifest of a written suite.
 

@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from chauffeur.concept.data import data_folder
-from chauffeur.language.grammar import Frame, Grammar, Manner, Template, Wording
+from chauffeur.language.grammar import Grammar, GrammarFrame, Manner, Template, Wording
 
 __all__ = ["FILES", "Template", "Wording", "say", "sections", "templates"]
 
@@ -24,17 +24,17 @@ _OF_US = re.compile(r"\b(?:us|your)\b")
 """Imperatives that cannot follow "let's"."""
 _MANNER = Manner(
     frames=(
-        Frame("{body}"),
-        Frame("{body}"),
-        Frame("{body}"),
-        Frame("please {body}"),
-        Frame("{body}, please"),
-        Frame("(could|can|would|will) you {body}"),
-        Frame("(could|can|would) you please {body}"),
-        Frame("I('d like| want| need) you to {body}"),
-        Frame("(okay|alright|hey), {body}"),
-        Frame("{body} (now|for me)", plain=_TIMED),
-        Frame("let's {body}", unless=_OF_US),
+        GrammarFrame("{body}"),
+        GrammarFrame("{body}"),
+        GrammarFrame("{body}"),
+        GrammarFrame("please {body}"),
+        GrammarFrame("{body}, please"),
+        GrammarFrame("(could|can|would|will) you {body}"),
+        GrammarFrame("(could|can|would) you please {body}"),
+        GrammarFrame("I('d like| want| need) you to {body}"),
+        GrammarFrame("(okay|alright|hey), {body}"),
+        GrammarFrame("{body} (now|for me)", plain=_TIMED),
+        GrammarFrame("let's {body}", unless=_OF_US),
     ),
     questions=("could you", "can you", "would you", "will you"),
 )

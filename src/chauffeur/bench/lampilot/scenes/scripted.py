@@ -21,24 +21,24 @@ SOLVERS = (EXPERT, EXEMPLARS)
 
 
 @dataclass(frozen=True, slots=True)
-class Attempt:
+class ScriptedAttempt:
     """A program that ought to solve a goal, and whose it is."""
 
     by: str
     source: str
 
 
-def programs_for(goal: dict[str, Any], situation: Situation) -> tuple[Attempt, ...]:
+def programs_for(goal: dict[str, Any], situation: Situation) -> tuple[ScriptedAttempt, ...]:
     """Programs that may solve the goal, best first; a scene is feasible when one of them does.
 
     The scripted expert knows the goal alone, and LaMPilot's goals only. After it come the exemplar programs of
     `planners.onboard`, given the goal as a meaning and the situation at the start: they do the other goals, and keep
     scenes that only the expert happens to fail in.
     """
-    out: list[Attempt] = []
+    out: list[ScriptedAttempt] = []
     with suppress(ScenarioError):  # none of LaMPilot's goals
-        out.append(Attempt(EXPERT, expert_program(goal)))
-    return (*out, *(Attempt(EXEMPLARS, source) for source in _exemplars(goal, situation)))
+        out.append(ScriptedAttempt(EXPERT, expert_program(goal)))
+    return (*out, *(ScriptedAttempt(EXEMPLARS, source) for source in _exemplars(goal, situation)))
 
 
 def _exemplars(goal: dict[str, Any], situation: Situation) -> tuple[str, ...]:

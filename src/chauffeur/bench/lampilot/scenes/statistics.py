@@ -14,7 +14,7 @@ from chauffeur.worlds.highway.dblv1 import Dataset
 
 
 @dataclass(frozen=True, slots=True)
-class Statistics:
+class SceneStatistics:
     """What Tab. III counts, and how much sentences repeat.
 
     Attributes:
@@ -38,7 +38,7 @@ class Statistics:
     most_repeated: int
 
 
-def statistics_of(datasets: Sequence[Dataset]) -> Statistics:
+def statistics_of(datasets: Sequence[Dataset]) -> SceneStatistics:
     """Statistics over data sets together (the splits of a suite)."""
     items = [item for dataset in datasets for item in dataset.items()]
     families = Counter(family_of(item.task) for item in items)
@@ -47,7 +47,7 @@ def statistics_of(datasets: Sequence[Dataset]) -> Statistics:
     )
     lengths = [words_of(item.command) for item in items]
     forms = Counter(form_of(item.command) for item in items)
-    return Statistics(
+    return SceneStatistics(
         items=len(items),
         scenes=len({item.scenario.id for item in items}),
         families={family: families[family] for family in (*FAMILIES, "other") if families[family]},
@@ -59,7 +59,7 @@ def statistics_of(datasets: Sequence[Dataset]) -> Statistics:
     )
 
 
-def table(ours: Statistics) -> list[tuple[str, str, str]]:
+def table(ours: SceneStatistics) -> list[tuple[str, str, str]]:
     """Rows of Tab. III: name, here, paper."""
 
     def share(count: int, total: int) -> str:

@@ -21,7 +21,7 @@ from chauffeur.bench.lampilot.scenes.making import Job, make_item
 from chauffeur.bench.lampilot.scenes.manifest import manifest_of
 from chauffeur.bench.lampilot.scenes.scripted import SOLVERS
 from chauffeur.bench.lampilot.scenes.spreading import Progress, spread
-from chauffeur.bench.lampilot.scenes.writer import Item, folder_of, items_of, write_folder
+from chauffeur.bench.lampilot.scenes.writer import SceneItem, folder_of, items_of, write_folder
 from chauffeur.concept import ConfigError
 from chauffeur.drive.files import publish
 from chauffeur.worlds.highway import HighwayWorld
@@ -135,7 +135,7 @@ class Suite:
     def _write(self, rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
         choices = choose_wordings(rows, self.config.seed, self._avoid)
         items = items_of(rows, choices)
-        folders: dict[str, list[Item]] = {}
+        folders: dict[str, list[SceneItem]] = {}
         for item in items:
             folders.setdefault(folder_of(item), []).append(item)
         datasets: dict[str, Dataset] = {}

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from chauffeur.bench.lampilot.scenes.wishes import Named, Wish
+from chauffeur.bench.lampilot.scenes.wishes import Named, SceneWish
 from chauffeur.language import read_quantities
 from chauffeur.language.quantities import mark_quantities
 from chauffeur.language.tokens import plain, tokens_of
@@ -40,7 +40,7 @@ def words_of(text: str) -> int:
     return len(text.split())
 
 
-def fault_of(text: str, wish: Wish, max_words: int = MAX_WORDS) -> str:
+def fault_of(text: str, wish: SceneWish, max_words: int = MAX_WORDS) -> str:
     """Why the words do not say exactly this wish, in a word or two for counting; empty when they do."""
     if not MIN_WORDS <= words_of(text) <= max_words:
         return "length"
@@ -74,7 +74,7 @@ def fault_of_goal(text: str, goal: dict[str, Any], change: int = 0) -> str:
     return _differs(found, expected)
 
 
-def _fault_of_steps(text: str, wish: Wish) -> str:
+def _fault_of_steps(text: str, wish: SceneWish) -> str:
     if not wish.means:
         return ""
     reading = understand(text)

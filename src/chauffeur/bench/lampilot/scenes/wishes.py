@@ -60,7 +60,7 @@ class Named:
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class SceneWish:
     """A meaning to be put into words for one scene.
 
     Attributes:

@@ -11,7 +11,7 @@ from chauffeur.bench.lampilot.scenes.choosing import normal
 from chauffeur.bench.lampilot.scenes.kinds import Kind, Slot
 from chauffeur.bench.lampilot.scenes.phrasing import Wording, say, templates
 from chauffeur.bench.lampilot.scenes.unambiguous import MAX_WORDS, MIN_WORDS, fault_of, words_of
-from chauffeur.bench.lampilot.scenes.wishes import UNITS, Named, Wish
+from chauffeur.bench.lampilot.scenes.wishes import UNITS, Named, SceneWish
 from chauffeur.concept import InstructionError
 from chauffeur.language.quantities import ONES, TENS
 
@@ -44,7 +44,7 @@ class Candidates:
     misread: Counter[str] = field(default_factory=Counter[str])
 
 
-def word(wish: Wish, kind: Kind, slot: Slot, rng: np.random.Generator) -> Candidates:
+def word(wish: SceneWish, kind: Kind, slot: Slot, rng: np.random.Generator) -> Candidates:
     """Wordings for a wish.
 
     Raises:
@@ -79,7 +79,7 @@ def word(wish: Wish, kind: Kind, slot: Slot, rng: np.random.Generator) -> Candid
     return Candidates(tuple(kept.values()), wanted, said, misread)
 
 
-def _spoken(wish: Wish, rng: np.random.Generator) -> dict[str, str]:
+def _spoken(wish: SceneWish, rng: np.random.Generator) -> dict[str, str]:
     return {name: value if isinstance(value, str) else spoken(value, rng) for name, value in wish.slots}
 
 

@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from chauffeur.bench.lampilot.scenes.annotations import FILE, Annotation
-from chauffeur.bench.lampilot.scenes.choosing import Choice
+from chauffeur.bench.lampilot.scenes.choosing import SceneChoice
 from chauffeur.bench.lampilot.scenes.wishes import UNITS
 from chauffeur.drive.files import publish
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class SceneItem:
     """An item ready to be written.
 
     Attributes:
@@ -36,7 +36,7 @@ class Item:
     words: str
 
 
-def items_of(rows: Sequence[Mapping[str, Any]], choices: Sequence[Choice]) -> list[Item]:
+def items_of(rows: Sequence[Mapping[str, Any]], choices: Sequence[SceneChoice]) -> list[SceneItem]:
     """Made rows and their words as items, in order."""
     width = max(4, len(str(len(rows) - 1)))
     return [
@@ -45,7 +45,7 @@ def items_of(rows: Sequence[Mapping[str, Any]], choices: Sequence[Choice]) -> li
     ]
 
 
-def _item(row: Mapping[str, Any], choice: Choice, task: str) -> Item:
+def _item(row: Mapping[str, Any], choice: SceneChoice, task: str) -> SceneItem:
     assert "." not in task
     assert "_c" not in task
     units = [value["unit"] for _, value in row["slots"] if isinstance(value, dict)]
@@ -69,15 +69,15 @@ def _item(row: Mapping[str, Any], choice: Choice, task: str) -> Item:
         expert_s=round(row["expert_ticks"] / 10, 1),
     )
     sample = {"env": row["env"], "eval": row["origin"], "seed": row["seed"]}
-    return Item(task, {"commands": [choice.text], "samples": [sample]}, note, choice.text)
+    return SceneItem(task, {"commands": [choice.text], "samples": [sample]}, note, choice.text)
 
 
-def folder_of(item: Item) -> str:
+def folder_of(item: SceneItem) -> str:
     """Folder of an item within its suite."""
     return f"extras/{item.note.part}" if item.note.split == "extras" else item.note.split
 
 
-def write_folder(folder: Path, items: Sequence[Item]) -> None:
+def write_folder(folder: Path, items: Sequence[SceneItem]) -> None:
     """Write items as a DbLv1 folder with annotations. Raises DataError if the disk refuses a file."""
     for item in items:
         text = json.dumps(item.content, indent=1, ensure_ascii=False)

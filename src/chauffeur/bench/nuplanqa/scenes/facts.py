@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from chauffeur.bench.nuplanqa.scenes.staging import EGO_ID, EGO_SIZE, SIZES, Mover, StagedScene
+from chauffeur.bench.nuplanqa.scenes.staging import EGO_ID, EGO_SIZE, SIZES, StagedMover, StagedScene
 from chauffeur.concept.scene import Observation
 
 Seen = Collection[int | str]
@@ -85,12 +85,12 @@ def _plain(scene: StagedScene, seen: Seen) -> Iterator[tuple[str, str]]:
     yield "action", _action(scene)
 
 
-def _clear(mover: Mover | None, seen: Seen) -> bool:
+def _clear(mover: StagedMover | None, seen: Seen) -> bool:
     """Whether somebody is seen, or is not there."""
     return mover is None or mover.id in seen
 
 
-def _kind(mover: Mover | None) -> str:
+def _kind(mover: StagedMover | None) -> str:
     return "nobody" if mover is None else mover.kind
 
 

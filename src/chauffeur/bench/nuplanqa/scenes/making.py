@@ -27,7 +27,7 @@ from chauffeur.bench.nuplanqa.scenes.facts import Fact, Seen, facts_of, sighted
 from chauffeur.bench.nuplanqa.scenes.gate import GateLine, gate
 from chauffeur.bench.nuplanqa.scenes.staging import SAMPLES, STEP_S, StagedScene, stage
 from chauffeur.bench.nuplanqa.scenes.wording import QuestionWriter, Split, free_pairs
-from chauffeur.camera import LOOKS, Camera, CameraImages, Conditions, Look, Rig, make_renderer, nuplan_rig
+from chauffeur.camera import LOOKS, Camera, CameraImages, CameraLook, Conditions, Rig, make_renderer, nuplan_rig
 from chauffeur.concept import ConfigError
 from chauffeur.concept.scene import Observation
 from chauffeur.drive.files import publish
@@ -245,7 +245,9 @@ def _stage(config: QaConfig, split: Split, number: int) -> tuple[StagedScene, np
     return stage(_token(config.seed, split, number), rng), rng
 
 
-def _shoot(own: Path, scene: StagedScene, rig: Rig, look: Look, renderer: Renderer, instants: Sequence[int]) -> Seen:
+def _shoot(
+    own: Path, scene: StagedScene, rig: Rig, look: CameraLook, renderer: Renderer, instants: Sequence[int]
+) -> Seen:
     """Render what is not there yet; who can be made out at the present instant is stored beside the pictures."""
     record = own / "seen" / f"{scene.token}.json"
     if record.is_file():

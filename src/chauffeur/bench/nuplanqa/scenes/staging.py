@@ -56,7 +56,7 @@ _LEADS: Final = ("none", "none", "near", "near", "closing", "opening", "opening"
 
 
 @dataclass(frozen=True, slots=True)
-class Mover:
+class StagedMover:
     """A road user on its way along the street.
 
     Attributes:
@@ -76,7 +76,7 @@ class Mover:
     acceleration_mps2: float = 0.0
     across_mps: float = 0.0
 
-    def at(self, ago_s: float) -> Mover:
+    def at(self, ago_s: float) -> StagedMover:
         """The same some time ago."""
         sign = -1.0 if self.speed_mps < 0.0 else 1.0
         speed = abs(self.speed_mps)
@@ -114,13 +114,13 @@ class StagedScene:
     motion: Motion
     sky: Sky
     light: SignalState | None
-    ego: Mover
-    others: tuple[Mover, ...]
-    lead: Mover | None
-    left: Mover | None
-    right: Mover | None
-    behind: Mover | None
-    walker: Mover | None
+    ego: StagedMover
+    others: tuple[StagedMover, ...]
+    lead: StagedMover | None
+    left: StagedMover | None
+    right: StagedMover | None
+    behind: StagedMover | None
+    walker: StagedMover | None
     instants: tuple[Observation, ...]
 
     @property
@@ -161,7 +161,7 @@ def _draw(token: str, rng: np.random.Generator) -> StagedScene | None:
     if gain > 0.0:
         speed = max(speed, 2.0 * gain + 0.5)
     own = int(rng.integers(1 if theme == "pass" else 0, plan.lanes))
-    ego = Mover(EGO_ID, "car", 0.0, plan.lane_offset(own), speed, gain)
+    ego = StagedMover(EGO_ID, "car", 0.0, plan.lane_offset(own), speed, gain)
     crowd = _Crowd(plan, rng, [])
     lead = _lead(plan, crowd, rng, own, ego, theme)
     apart = theme == "dense" and rng.random() < 0.7  # with somebody half beside the ego, nobody counts who is ahead
@@ -208,7 +208,7 @@ def _street(rng: np.random.Generator, theme: Theme) -> StreetPlan:
 class _Crowd:
     plan: StreetPlan
     rng: np.random.Generator
-    movers: list[Mover]
+    movers: list[StagedMover]
 
     def add(
         self,
@@ -218,8 +218,8 @@ class _Crowd:
         speed_mps: float,
         gain_mps2: float = 0.0,
         across_mps: float = 0.0,
-    ) -> Mover:
-        mover = Mover(len(self.movers) + 1, kind, station_m, offset_m, speed_mps, gain_mps2, across_mps)
+    ) -> StagedMover:
+        mover = StagedMover(len(self.movers) + 1, kind, station_m, offset_m, speed_mps, gain_mps2, across_mps)
         self.movers.append(mover)
         return mover
 
@@ -230,8 +230,8 @@ def _vehicle(rng: np.random.Generator) -> AgentKind:
 
 
 def _lead(
-    plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, own: int, ego: Mover, theme: Theme
-) -> Mover | None:
+    plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, own: int, ego: StagedMover, theme: Theme
+) -> StagedMover | None:
     how = _LEADS[int(rng.integers(len(_LEADS)))]
     if theme in ("pass", "slow"):
         how = "closing"
@@ -267,7 +267,7 @@ def _lead(
     return crowd.add(kind, at, plan.lane_offset(own), its, ego.acceleration_mps2)
 
 
-def _beside(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, lane: int) -> Mover | None:
+def _beside(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, lane: int) -> StagedMover | None:
     if not 0 <= lane < plan.lanes or rng.random() < 0.3:
         return None
     kind = _vehicle(rng)
@@ -275,7 +275,7 @@ def _beside(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, lane: int
     return crowd.add(kind, float(rng.uniform(1.0, 8.0)), plan.lane_offset(lane), speed)
 
 
-def _walker(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, theme: Theme) -> Mover | None:
+def _walker(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, theme: Theme) -> StagedMover | None:
     if plan.crosswalk_m is None or (theme != "walker" and rng.random() < 0.5):
         return None
     side = 1.0 if rng.random() < 0.5 else -1.0
@@ -305,7 +305,7 @@ def _fill(plan: StreetPlan, crowd: _Crowd, rng: np.random.Generator, empty: int 
             crowd.add("pedestrian", float(rng.uniform(-20.0, 45.0)), offset, float(rng.choice([-1.3, 1.3])))
 
 
-def _overlap(plan: StreetPlan, everybody: Sequence[Mover]) -> bool:
+def _overlap(plan: StreetPlan, everybody: Sequence[StagedMover]) -> bool:
     """Whether two are closer than half a metre at any instant."""
     for place in range(SAMPLES):
         ago = STEP_S * (SAMPLES - 1 - place)
@@ -342,7 +342,7 @@ def _signals(plan: StreetPlan, light: SignalState | None) -> tuple[Signal, ...]:
 def _observe(
     plan: StreetPlan,
     road: RoadGraph,
-    everybody: Sequence[Mover],
+    everybody: Sequence[StagedMover],
     signals: tuple[Signal, ...],
     place: int,
     shake_rad: float,
@@ -366,7 +366,7 @@ def _observe(
     )
 
 
-def _state(plan: StreetPlan, mover: Mover) -> VehicleState:
+def _state(plan: StreetPlan, mover: StagedMover) -> VehicleState:
     x, y = plan.place(mover.station_m, mover.offset_m)
     along = plan.heading(mover.station_m)
     heading = along + (math.pi if mover.speed_mps < 0.0 else 0.0)

@@ -12,14 +12,14 @@ from chauffeur.worlds.highway.core import layout as at
 from chauffeur.worlds.highway.network import (
     LANE_WIDTH_M,
     ArcLane,
-    Lane,
+    HighwayLane,
     LaneKey,
     LaneNetwork,
     SineLane,
     StraightLane,
     lane_id,
 )
-from chauffeur.worlds.highway.roads import Scene, Spawn
+from chauffeur.worlds.highway.roads import HighwayScene, Spawn
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,7 +28,7 @@ _KINDS = {"traffic": at.TRAFFIC, "ego": at.EGO_KIND, "obstacle": at.OBSTACLE, "s
 
 
 @dataclass(frozen=True, slots=True)
-class RoadMap:
+class CoreRoadMap:
     """A road as arrays (layout.py); nothing in it changes while driving.
 
     Attributes:
@@ -50,7 +50,7 @@ class RoadMap:
     road_rows: dict[tuple[str, str], int]
 
 
-def map_network(network: LaneNetwork) -> RoadMap:
+def map_network(network: LaneNetwork) -> CoreRoadMap:
     """A road's lanes as arrays."""
     found = network.lanes()
     keys = tuple(found)
@@ -71,10 +71,10 @@ def map_network(network: LaneNetwork) -> RoadMap:
     for k, (name, lane) in enumerate(found.items()):
         _lane_row(lanes[k], traits[k], lane)
         traits[k, at.ROAD], traits[k, at.INDEX] = road_rows[name[0], name[1]], name[2]
-    return RoadMap(keys, ids, {name: k for k, name in enumerate(ids)}, lanes, traits, roads, road_rows)
+    return CoreRoadMap(keys, ids, {name: k for k, name in enumerate(ids)}, lanes, traits, roads, road_rows)
 
 
-def _lane_row(numbers: Floats, traits: Ints, lane: Lane) -> None:
+def _lane_row(numbers: Floats, traits: Ints, lane: HighwayLane) -> None:
     numbers[at.LANE_LENGTH], numbers[at.LANE_WIDTH], numbers[at.LIMIT] = lane.length, LANE_WIDTH_M, lane.speed_limit
     traits[at.FORBIDDEN], traits[at.PRIORITY] = int(lane.forbidden), lane.priority
     if isinstance(lane, ArcLane):
@@ -93,7 +93,7 @@ def _lane_row(numbers: Floats, traits: Ints, lane: Lane) -> None:
         numbers[at.AMPLITUDE], numbers[at.PULSATION], numbers[at.PHASE] = lane.amplitude, lane.pulsation, lane.phase
 
 
-def place_entities(scene: Scene, road: RoadMap) -> tuple[Floats, Ints, Ints]:
+def place_entities(scene: HighwayScene, road: CoreRoadMap) -> tuple[Floats, Ints, Ints]:
     """Entities of a scene just built, the ego in row 0 whether it has entered or not, and the scene's own numbers."""
     entities = [scene.ego, *scene.traffic, *scene.objects]
     floats = np.zeros((len(entities), at.ENTITY_FLOATS))
@@ -108,7 +108,7 @@ def place_entities(scene: Scene, road: RoadMap) -> tuple[Floats, Ints, Ints]:
     return floats, ints, numbers
 
 
-def _entity_row(numbers: Floats, traits: Ints, entity: Spawn, road: RoadMap) -> None:
+def _entity_row(numbers: Floats, traits: Ints, entity: Spawn, road: CoreRoadMap) -> None:
     numbers[at.X], numbers[at.Y] = entity.position
     numbers[at.HEADING], numbers[at.SPEED] = entity.heading_rad, entity.speed_mps
     numbers[at.LENGTH], numbers[at.WIDTH] = entity.size_m

@@ -11,8 +11,8 @@ from chauffeur.concept import DataError, LaneId
 from chauffeur.worlds.highway.core import lanes as geometry
 from chauffeur.worlds.highway.core import layout as at
 from chauffeur.worlds.highway.core import signals, traffic
-from chauffeur.worlds.highway.core.build import Floats, Ints, RoadMap, map_network, place_entities
-from chauffeur.worlds.highway.roads import Scene, crowded_rows
+from chauffeur.worlds.highway.core.build import CoreRoadMap, Floats, Ints, map_network, place_entities
+from chauffeur.worlds.highway.roads import HighwayScene, crowded_rows
 
 
 class CoreRoad:
@@ -26,7 +26,7 @@ class CoreRoad:
 
     __slots__ = ("floats", "ints", "order", "out", "road", "scene")
 
-    def __init__(self, road: RoadMap, floats: Floats, ints: Ints, scene: Ints) -> None:
+    def __init__(self, road: CoreRoadMap, floats: Floats, ints: Ints, scene: Ints) -> None:
         self.road = road
         self.floats = floats
         self.ints = ints
@@ -36,7 +36,7 @@ class CoreRoad:
         self._list_solid()
 
     @classmethod
-    def of(cls, scene: Scene) -> Self:
+    def of(cls, scene: HighwayScene) -> Self:
         """Arrays of a scene just built."""
         road = map_network(scene.network)
         return cls(road, *place_entities(scene, road))
