@@ -11,7 +11,9 @@ from chauffeur.concept import Parameters, Plan, Thoughts, Verdict
 from chauffeur.concept.units import kmh
 from chauffeur.planners.talk2drive.embedded import does
 
-_ROAD: Final = re.compile(r"We drive \S{1,20} m/s where \S{1,20} m/s are allowed; [^.]{0,200}(?:\.\d[^.]{0,200}){0,8}\. ?")
+_ROAD: Final = re.compile(
+    r"We drive \S{1,20} m/s where \S{1,20} m/s are allowed; [^.]{0,200}(?:\.\d[^.]{0,200}){0,8}\. ?"
+)
 """The on-board model's sentence about the situation. It is made for worlds that show speed limit and traffic."""
 
 
