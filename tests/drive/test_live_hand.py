@@ -388,7 +388,7 @@ def test_one_hand_on_the_wheel(places: list[Place]) -> None:
     main = ast.parse((SOURCE / "drive/live/__main__.py").read_text(encoding="utf-8"))
     functions = [each for each in main.body if isinstance(each, ast.FunctionDef)]
     assert {each.name for each in functions if any(map(names_the_ring, ast.walk(each)))} == {"_control"}
-    live = {name for name, node in places if name.startswith("drive/live/") and calls(node, "Hand")}
+    live = {name for name, node in places if name.startswith("drive/live/") and calls(node, "WheelHand")}
     assert live == {"drive/live/supervisor.py"}
 
 

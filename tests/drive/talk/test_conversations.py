@@ -185,7 +185,9 @@ def test_nobody_waits_for_verdicts(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_thoughts_of_the_longest_kind_are_judged_at_once(thoughts: str) -> None:
     before = time.thread_time()
     assert verdicts_of(plan(thoughts=thoughts), instant(), Limits(), DriveEvent("started", "w1"))
-    assert time.thread_time() - before < 1.0
+    assert (
+        time.thread_time() - before < 5.0
+    )  # one second on an idle core; what grows faster than the text takes minutes
 
 
 def test_what_a_plan_says_does_not_grow_without_bound() -> None:
