@@ -93,7 +93,7 @@ def start_up(bench: Bench) -> None:
         "read = time.process_time() - cpu, time.perf_counter() - wall\n"
         "for scenario in BUILT_IN:\n"
         "    world = HighwayWorld(); world.reset(scenario)\n"
-        "    world.driver().command(world.driver().settle(world.driver().initial_wishes()))\n"
+        "    world.driver().command(world.driver().settle(world.driver().initial_setpoints()))\n"
         "    world.step(Command(0.0, 0.0)); world.observe()\n"
         "print(*read, time.process_time() - cpu, time.perf_counter() - wall)\n"
     )

@@ -44,7 +44,7 @@ class Watch:
     """Counts what comes by."""
 
     def __init__(self) -> None:
-        self.rungs: Counter[str] = Counter()
+        self.levels: Counter[str] = Counter()
         self.outcomes: Counter[str] = Counter()
         self.events: Counter[str] = Counter()
         self.rules: Counter[str] = Counter()
@@ -65,11 +65,11 @@ class Watch:
             self.events[event.kind] += 1
         if not isinstance(heard, Report):
             return
-        self.rungs[heard.rung] += 1
+        self.levels[heard.level] += 1
         self.rules.update({change.rule for change in heard.interventions})
         self.faults = heard.faults
         self.trip = heard.trip
-        if heard.rung != "follow":
+        if heard.level != "follow":
             self.longest_s = max(self.longest_s, heard.age_s)
         elif self._lost_at is not None and heard.age_s < 0.15:
             self.recoveries_s.append(time.monotonic() - self._lost_at)
@@ -124,7 +124,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         "kills": dict(kills),
         "trips": watch.trip,
         "outcomes": dict(watch.outcomes),
-        "rungs": dict(watch.rungs),
+        "levels": dict(watch.levels),
         "events": dict(watch.events),
         "interventions_by_rule": dict(watch.rules),
         "faults_in_control": watch.faults,

@@ -40,8 +40,8 @@ from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import check_drive
 from chauffeur.models.onboard.cases import Case, case_of
 from chauffeur.models.onboard.examples import Example
-from chauffeur.models.onboard.judging import judge
 from chauffeur.models.onboard.pipeline import examples_of
+from chauffeur.models.onboard.skill_judge import judge
 from chauffeur.planners.onboard.draft import draft
 from chauffeur.planners.onboard.engine import Engine
 from chauffeur.planners.onboard.language_model import SHIPPED, answer

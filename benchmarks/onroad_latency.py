@@ -24,10 +24,10 @@ import ros_debian as debian
 import ros_graph as ros
 
 from chauffeur.concept import PersonId
-from chauffeur.drive.onroad import OnRoad, OnRoadAnswer, open_books
+from chauffeur.drive.onroad import OnRoadAnswer, VehicleSession, open_books
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.registry import make_planner
-from chauffeur.worlds.ros.opening import open_vehicle
+from chauffeur.worlds.ros.factory import open_vehicle
 from chauffeur.worlds.ros.settings import read_settings
 
 WISHES = ("Drive at {} km/h.", "No more than {} km/h, please.", "Set the speed to {} km/h.", "Please go {} km/h.")
@@ -57,7 +57,7 @@ async def measure(folder: Path, wishes: int, *, audited: bool) -> list[tuple[OnR
     ):
         car = open_vehicle(settings)
         try:
-            async with OnRoad(
+            async with VehicleSession(
                 car,
                 settings,
                 make_planner("talk2drive"),

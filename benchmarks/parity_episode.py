@@ -59,7 +59,7 @@ class _Side:
         world.reset(scenario)
         self._policy = _Policy(policy, world, scenario.seed % 1000)
         self._driver = world.driver()
-        self._wishes = self._driver.initial_wishes()
+        self._wishes = self._driver.initial_setpoints()
         self._referee = LampilotReferee(world, scenario)
         self._verdict: tuple[object, ...] = ()
 

@@ -14,7 +14,7 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from chauffeur.bench.lampilot.asking import PlainRequests
+from chauffeur.bench.lampilot.requests import PlainRequests
 from chauffeur.bench.lampilot.runner import Effort, LampilotRun, RunConfig
 from chauffeur.bench.passengers import PassengerRequests, as_dataset, load_wishes
 from chauffeur.concept import LAMPILOT_LIMITS, Plan, PlanRequest

@@ -21,7 +21,7 @@ from typing import Final, Literal
 import numpy as np
 
 from chauffeur.bench.personalization.population import draw_passengers
-from chauffeur.bench.personalization.riding import ride_policy, usual
+from chauffeur.bench.personalization.ride import ride_policy, usual
 from chauffeur.bench.personalization.sayings import LEVELS, Aim, Level
 from chauffeur.bench.personalization.scenes import AIMS, GROUND_OF, Task, scenes_of
 from chauffeur.bench.personalization.takeover import Mood, judge

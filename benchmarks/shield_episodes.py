@@ -29,9 +29,9 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from chauffeur.concept import Command, Lane, Limits, Scenario, VehicleState, Wishes
+from chauffeur.concept import Command, Lane, Limits, Scenario, Setpoints, VehicleState
 from chauffeur.drive.episode import run_episode
-from chauffeur.executors.base import HeldWishes
+from chauffeur.executors.base import HeldSetpoints
 from chauffeur.safety.blame import blame
 from chauffeur.safety.shield import LAMPILOT_SHIELD, SHIELD_VERSION, Shield
 from chauffeur.worlds.highway import HighwayWorld
@@ -72,7 +72,7 @@ class Wishing:
         self._turn = ("left", "straight", "right")[int(rng.integers(3))]
         self._tick = 0
 
-    def tick(self) -> HeldWishes:
+    def tick(self) -> HeldSetpoints:
         """Wishes of a period."""
         self._tick += 1
         observation = self._world.observe()
@@ -85,7 +85,7 @@ class Wishing:
         speed = 80.0
         if self._kind == "never-yield" and (self._tick // 20) % 3 == 2:
             speed = 0.0  # stops where it should not
-        return HeldWishes(Wishes(speed, 0.0, lane, self._turn, served), state="running")  # pyright: ignore[reportArgumentType]
+        return HeldSetpoints(Setpoints(speed, 0.0, lane, self._turn, served), state="running")  # pyright: ignore[reportArgumentType]
 
 
 HANDS: Final[tuple[Kind, ...]] = ("throttle", "saboteur", "drifter", "creeper")
@@ -103,7 +103,7 @@ class Pressing:
         self._kind, self._world, self._rng = kind, world, rng
         self._off_rad = 0.0
         self._wishing = Wishing("tailgater", world, rng)
-        self._wishes: Wishes | None = None
+        self._setpoints: Setpoints | None = None
 
     def command(self) -> Command:
         """Pedal and wheel of a period."""
@@ -111,11 +111,13 @@ class Pressing:
             # Draws of the wheel are to the right: a seed is the trip that it has always been.
             return Command(float(self._rng.uniform(-5, 5)), -float(self._rng.uniform(-1, 1)) * math.pi / 4)
         driver = self._world.driver()
-        wishes = self._wishing.tick().wishes
-        if self._wishes is not None:
-            wishes = Wishes(wishes.target_speed_mps, 0.0, self._wishes.target_lane, wishes.turn, wishes.served_stops)
-        self._wishes = driver.settle(wishes)
-        steering = driver.command(self._wishes).steering_rad
+        setpoints = self._wishing.tick().setpoints
+        if self._setpoints is not None:
+            setpoints = Setpoints(
+                setpoints.target_speed_mps, 0.0, self._setpoints.target_lane, setpoints.turn, setpoints.served_stops
+            )
+        self._setpoints = driver.settle(setpoints)
+        steering = driver.command(self._setpoints).steering_rad
         if self._kind in ("drifter", "creeper"):
             if self._rng.random() < 0.05:  # every two seconds another way off
                 self._off_rad = float(self._rng.uniform(-DRIFTS_RAD, DRIFTS_RAD))
@@ -245,14 +247,14 @@ def _times(name: str, config: dict[str, Any], seed: int, put: bool = False) -> l
     # Before the trip: what is worked out between two control periods costs the next one the processor's caches.
     crowds = [tuple(car.car(i, tick * world.dt_s) for i, car in enumerate(cars, start=1)) for tick in range(PERIODS)]
     shield, driver, taken = Shield(world.dt_s), world.driver(), list[float]()
-    wishes = driver.initial_wishes()
+    setpoints = driver.initial_setpoints()
     for others in crowds:
-        wishes = driver.settle(wishes)
-        command, observation = driver.command(wishes), world.observe()
+        setpoints = driver.settle(setpoints)
+        command, observation = driver.command(setpoints), world.observe()
         if put:
             observation = replace(observation, others=others)
         begun = time.process_time()
-        guarded = shield.guard(observation, command)
+        guarded = shield.filter(observation, command)
         taken.append((time.process_time() - begun) * 1e6)
         world.step(guarded.command)
         if world.ended:

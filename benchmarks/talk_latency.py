@@ -31,7 +31,7 @@ import numpy as np
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
-from chauffeur.drive.talk.hearing import HearingEngine
+from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.messages import Conversation, HeardWords, Note, Said, Say, Scene, StageTimes
 from chauffeur.drive.talk.session import Talk
 from chauffeur.speech.audio import SAMPLE_RATE_HZ, Samples, decode
@@ -86,7 +86,7 @@ class Bench:
     """A session, and what it said."""
 
     def __init__(self, settings: Settings) -> None:
-        self.talk = Talk(settings, self.tell, engine=HearingEngine(favoured=True))
+        self.talk = Talk(settings, self.tell, engine=AsrEngine(favoured=True))
         self.conversations: dict[str, Conversation] = {}
         self.heard: list[HeardWords] = []
         self.scenes: list[tuple[float, Scene]] = []

@@ -120,7 +120,7 @@ def meet(seed: int, driver: str, shielded: bool) -> dict[str, Any]:
     walked = line_starts + max(0.0, -sets_out_s) * pace  # under way already
     actor = world.spawn("pedestrian", _at(line, walked), 0.0)
     wheel, shield = world.driver(), shield_for(world) if shielded else None
-    wishes = wheel.initial_wishes()
+    wishes = wheel.initial_setpoints()
     row: dict[str, Any] = {
         "seed": seed,
         "driver": driver,

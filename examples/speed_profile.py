@@ -10,8 +10,8 @@ limits and watched by the shield like every other policy: only `fault` and the e
 import math
 from dataclasses import dataclass
 
-from chauffeur.concept import Wishes
-from chauffeur.executors.base import DriverLed, HeldWishes
+from chauffeur.concept import Setpoints
+from chauffeur.executors.base import DriverLed, HeldSetpoints
 
 HEADWAY_S = 1.5
 
@@ -48,5 +48,5 @@ class SpeedProfileExecutor(DriverLed):
         index = int((now.time_s - self._begun_s) / profile.period_s + 1e-9)
         over = index >= len(profile.speeds_mps)
         self._status = "finished" if over else "running"
-        self._setpoints = Wishes(profile.speeds_mps[-1 if over else index], HEADWAY_S, now.ego.lane)
-        return HeldWishes(self._setpoints, state=self._status)
+        self._setpoints = Setpoints(profile.speeds_mps[-1 if over else index], HEADWAY_S, now.ego.lane)
+        return HeldSetpoints(self._setpoints, state=self._status)

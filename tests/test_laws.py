@@ -32,7 +32,7 @@ world that nobody steps, hands it to nobody."""
 COMPILES_A_LIBRARY = {"worlds/track/dynamics.py"}
 """Compiles the functions of an installed library, whose text no model writes."""
 
-STEPS_AN_OPTIMISER = {"models/train/trainer.py", "models/onboard/adapting.py", "models/vilad/frames_baselines.py"}
+STEPS_AN_OPTIMISER = {"models/train/trainer.py", "models/onboard/adaptation.py", "models/vilad/frames_baselines.py"}
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def test_a_class_name_is_defined_once() -> None:
 
 REQUESTS_MADE = {
     "drive/planning.py",  # for drives and benchmarks, screened
-    "bench/hostile/asking.py",  # what screening is worth is measured without it, too
+    "bench/hostile/requests.py",  # what screening is worth is measured without it, too
     "bench/report/redrive.py",  # of a trip that is filed; nobody is asked
     "models/vlm/lora.py",  # of a training pair; nobody is asked
     "planners/onboard/served.py",  # what a client of ours sent, taken apart

@@ -87,7 +87,7 @@ def test_a_policy_kind_of_ones_own_is_checked_bounded_and_driven(toys: ModuleTyp
     policy = toys.SpeedProfile((18.0, 19.0, 17.0), 2.0)
     assert not any(verdict.stops for verdict in run_checks(planned(policy), start, Limits(), DRIVE_CHECKS))
     episode = drive_policy(world, policy, None, 20.0, Limits(max_speed_mps=18.5))
-    asked = dict.fromkeys(frame.wishes.target_speed_mps for frame in episode.frames)
+    asked = dict.fromkeys(frame.setpoints.target_speed_mps for frame in episode.frames)
     assert list(asked) == [18.0, 18.5, 17.0], "what the person's limits forbid is brought within them"
     assert dict(episode.bounded) == {"target_speed": 20}
     assert episode.outcome == "ended"

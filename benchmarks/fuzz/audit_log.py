@@ -15,7 +15,7 @@ from pathlib import Path
 from chauffeur.concept import DataError
 from chauffeur.safety.audit import AuditLog, words_of
 from chauffeur.safety.audit.entries import NotARecordError, canonical, parse
-from chauffeur.safety.audit.reading import lines
+from chauffeur.safety.audit.reader import lines
 from chauffeur.safety.audit.redaction import redact
 from chauffeur.safety.audit.texts import says
 from chauffeur.safety.audit.verification import verify_stream

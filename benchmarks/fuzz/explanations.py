@@ -6,8 +6,8 @@ import time
 import zlib
 from functools import cache
 
-from chauffeur.safety.alignment import Alignment, FactSurroundings, judge, read_facts
-from chauffeur.safety.alignment.facts import Facts
+from chauffeur.safety.faithfulness import FactSurroundings, Faithfulness, judge, read_facts
+from chauffeur.safety.faithfulness.facts import Facts
 from fuzz import programs
 from fuzz.target import Target, bytes_of, expect, text_of
 from fuzz.words import changed
@@ -53,7 +53,7 @@ def examine(data: bytes) -> str:
     return f"{min(found.claims, 10)} claims, {'fits' if found.aligned else 'does not fit'}"
 
 
-def _holds(found: Alignment) -> None:
+def _holds(found: Faithfulness) -> None:
     expect(found.aligned == (not found.mismatches), "aligned and mismatches differ")
     expect(0.0 <= found.score <= 1.0, "a score is not between 0 and 1")
     expect(found.aligned == (found.score == 1.0), "a score of 1 is not what aligned means")
@@ -66,7 +66,7 @@ TARGET = Target(
         "No explanation and no program makes the reading of either raise, or take seconds; a judgement's score, "
         "verdict and mismatches agree."
     ),
-    reads=("chauffeur.safety.alignment", "chauffeur.language"),
+    reads=("chauffeur.safety.faithfulness", "chauffeur.language"),
     seeds=seeds,
     changed=changed,
     examine=examine,

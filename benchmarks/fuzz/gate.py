@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from chauffeur.programs.gate import check_source
 from chauffeur.programs.rewrite import prepare
-from chauffeur.safety.reading import read_program
+from chauffeur.safety.constant_calls import read_program
 from fuzz.programs import changed, seeds, split
 from fuzz.target import Target, expect
 
@@ -31,7 +31,7 @@ TARGET = Target(
         "No text makes the gate raise; a finding's line is one of the text's; what passes has a main function and can "
         "be made ready for the sandbox."
     ),
-    reads=("chauffeur.programs", "chauffeur.safety.reading"),
+    reads=("chauffeur.programs", "chauffeur.safety.constant_calls"),
     seeds=seeds,
     changed=changed,
     examine=examine,

@@ -84,7 +84,7 @@ def _is_an_honest_fault(error: ProgramFaultError | Exception) -> None:
 
 
 def _story(results: list[TickResult]) -> list[tuple[object, ...]]:
-    return [(one.state, one.line, one.said, repr(one.wishes), repr(one.calls), str(one.error)) for one in results]
+    return [(one.state, one.line, one.said, repr(one.setpoints), repr(one.calls), str(one.error)) for one in results]
 
 
 TARGET = Target(

@@ -26,4 +26,4 @@ def world_for(number: int) -> HighwayWorld:
 def drive_on(world: HighwayWorld, result: TickResult) -> None:
     """One control period with a program's wishes, as a drive makes it."""
     driver = world.driver()
-    world.step(driver.command(driver.settle(result.wishes)))
+    world.step(driver.command(driver.settle(result.setpoints)))

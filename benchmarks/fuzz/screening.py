@@ -65,7 +65,7 @@ TARGET = Target(
         "is one line without what could end the quotation; only texts of third parties and of memory are withheld; "
         "cleaning twice is cleaning once."
     ),
-    reads=("chauffeur.safety.screening", "chauffeur.safety.hiding", "chauffeur.language"),
+    reads=("chauffeur.safety.screening", "chauffeur.safety.concealment", "chauffeur.language"),
     seeds=seeds,
     changed=changed,
     examine=examine,

@@ -9,8 +9,8 @@ from chauffeur.concept import Limits, Plan, Program, Thoughts
 from chauffeur.programs import APIS, Budget, ProgramExecutor, ProgramSyntaxError, Sandbox, check_source
 from chauffeur.programs.binding import MadeCall
 from chauffeur.programs.verify import Circumstances, Verification, verify
-from chauffeur.safety.alignment import check_alignment
 from chauffeur.safety.envelope import check_parameters
+from chauffeur.safety.faithfulness import check_faithfulness
 from chauffeur.safety.format import check_format
 from chauffeur.safety.reach import check_reach
 from fuzz.programs import changed, seeds, split
@@ -22,7 +22,7 @@ LIMITS = Limits()
 _THOUGHTS = Thoughts(
     "First I look whether the left lane is free, then I overtake at 25 m/s and go back after 3 seconds."
 )
-_CHECKS = (check_format, check_parameters, check_reach, check_alignment)
+_CHECKS = (check_format, check_parameters, check_reach, check_faithfulness)
 _PATIENT = Budget(turn_s=0.2, tick_s=2.0, grace_s=0.5, start_s=2.0)
 _PLAIN = int | float | str | None
 _SLACK = 1e-6

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from chauffeur.concept import Command, LaneId, Turn, Wishes
+from chauffeur.concept import Command, LaneId, Setpoints, Turn
 from chauffeur.control import (
     LAMPILOT_STEERING,
     full_scale,
@@ -26,44 +26,44 @@ class ReferenceDriver:
         self._turn: Turn | None = None
         self._route: list[LaneKey] = []
 
-    def initial_wishes(self) -> Wishes:
+    def initial_setpoints(self) -> Setpoints:
         """Keep the present speed and lane."""
         ego = self._scene.ego
-        return Wishes(target_speed_mps=float(ego.speed), target_lane=name_of(ego.lane_index))
+        return Setpoints(target_speed_mps=float(ego.speed), target_lane=name_of(ego.lane_index))
 
-    def settle(self, wishes: Wishes) -> Wishes:
+    def settle(self, setpoints: Setpoints) -> Setpoints:
         """Wishes with defaults filled in and the lane moved on to the next one where it ends."""
-        start = self.initial_wishes()
-        speed = start.target_speed_mps if wishes.target_speed_mps is None else wishes.target_speed_mps
-        lane = wishes.target_lane or start.target_lane
+        start = self.initial_setpoints()
+        speed = start.target_speed_mps if setpoints.target_speed_mps is None else setpoints.target_speed_mps
+        lane = setpoints.target_lane or start.target_lane
         assert lane is not None
-        if wishes.turn is not None and wishes.turn != self._turn:
-            self._plan_route(wishes.turn)
+        if setpoints.turn is not None and setpoints.turn != self._turn:
+            self._plan_route(setpoints.turn)
         ego, network = self._scene.ego, self._scene.road.network
         if network.get_lane(key_of(lane)).after_end(ego.position):
             lane = name_of(network.next_lane(key_of(lane), route=self._route, position=ego.position))
-        if speed == wishes.target_speed_mps and lane == wishes.target_lane:
-            return wishes
-        return replace(wishes, target_speed_mps=speed, target_lane=lane)
+        if speed == setpoints.target_speed_mps and lane == setpoints.target_lane:
+            return setpoints
+        return replace(setpoints, target_speed_mps=speed, target_lane=lane)
 
-    def command(self, wishes: Wishes) -> Command:
+    def command(self, setpoints: Setpoints) -> Command:
         """Acceleration and steering for settled wishes, after LaMPilot's full-scale mapping (control/actuation.py)."""
         actuation = self._scene.actuation
-        acceleration, steering = self.controls(wishes)
+        acceleration, steering = self.controls(setpoints)
         return Command(
             acceleration_mps2=full_scale(acceleration, actuation.max_acceleration_mps2),
             steering_rad=0.0 - full_scale(steering, actuation.max_steering_rad),  # highway-env's is to the right
         )
 
-    def controls(self, wishes: Wishes) -> tuple[float, float]:
+    def controls(self, setpoints: Setpoints) -> tuple[float, float]:
         """IDM acceleration, m/s2, and lane-keeping steering angle, rad, before the full-scale mapping."""
-        assert wishes.target_speed_mps is not None
-        assert wishes.target_lane is not None
-        return self._longitudinal(wishes, wishes.target_speed_mps), self._lateral(wishes.target_lane)
+        assert setpoints.target_speed_mps is not None
+        assert setpoints.target_lane is not None
+        return self._longitudinal(setpoints, setpoints.target_speed_mps), self._lateral(setpoints.target_lane)
 
-    def _longitudinal(self, wishes: Wishes, target_speed_mps: float) -> float:
-        blocker = self._perception.front_blocker(wishes.served_stops)
-        return self._perception.idm(EGO, blocker, target_speed_mps, wishes.time_headway_s)
+    def _longitudinal(self, setpoints: Setpoints, target_speed_mps: float) -> float:
+        blocker = self._perception.front_blocker(setpoints.served_stops)
+        return self._perception.idm(EGO, blocker, target_speed_mps, setpoints.time_headway_s)
 
     def _lateral(self, lane: LaneId) -> float:
         ego = self._scene.ego

@@ -47,17 +47,17 @@ _SCREENING: Final = ("tests/safety/test_screening.py", _CHECKS, "tests/safety/te
 _SHIELD: Final = tuple(
     f"tests/safety/test_shield{part}.py" for part in ("_rules_edges", "_crossing_edges", "_edges", "")
 )
-_CROSSING: Final = ("tests/safety/test_shield_crossing.py", "tests/safety/test_shield_everybody.py")
+_CROSSING: Final = ("tests/safety/test_shield_crossing.py", "tests/safety/test_shield_traffic_arrays.py")
 _AUDIT: Final = tuple(f"tests/safety/test_audit{part}.py" for part in ("_words", "_edges", "_privacy", ""))
 _AUDIT_FILE: Final = tuple(f"tests/safety/test_audit_{part}.py" for part in ("writer_edges", "writer", "edges"))
-_ALIGNMENT: Final = tuple(
-    f"tests/safety/test_alignment_{part}.py"
+_FAITHFULNESS: Final = tuple(
+    f"tests/safety/test_faithfulness_{part}.py"
     for part in (
-        *("amounts_edges", "values_edges", "numbers_edges", "evaluating_edges"),
-        *("clauses_edges", "edges", "judge", "reading", "claims", "asking", "noting", "tracing", "verdicts"),
+        *("amounts_edges", "values_edges", "numbers_edges", "evaluator_edges"),
+        *("clauses_edges", "edges", "judge", "reading", "claims", "api_answers", "notes", "tracer", "verdicts"),
     )
 )
-_GATE_TESTS: Final = ("tests/programs/test_gate_edges.py", "tests/programs/test_placing.py")
+_GATE_TESTS: Final = ("tests/programs/test_gate_edges.py", "tests/programs/test_syntax_checks.py")
 MODULES: Final = {
     "envelope": Module("safety/envelope.py", ("tests/safety/test_parameters_check.py", _WORDS)),
     "format": Module("safety/format.py", ("tests/safety/test_format_check.py", _WORDS)),
@@ -66,8 +66,10 @@ MODULES: Final = {
         "safety/checks.py", ("tests/safety/test_format_check.py", "tests/safety/test_parameters_check.py", _WORDS)
     ),
     "screening": Module("safety/screening.py", _SCREENING),
-    "hiding": Module("safety/hiding.py", (*_SCREENING, "tests/safety/test_hiding_edges.py")),
-    "reading": Module("safety/reading.py", ("tests/safety/test_reading.py", "tests/safety/test_reach.py", _CHECKS)),
+    "hiding": Module("safety/concealment.py", (*_SCREENING, "tests/safety/test_concealment_edges.py")),
+    "reading": Module(
+        "safety/constant_calls.py", ("tests/safety/test_reading.py", "tests/safety/test_reach.py", _CHECKS)
+    ),
     "bounds": Module("safety/bounds.py", ("tests/safety/test_bounds.py",)),
     "blame": Module("safety/blame.py", ("tests/safety/test_blame_edges.py",)),
     "gaps": Module("safety/shield/gaps.py", ("tests/safety/test_shield_gaps.py",)),
@@ -75,46 +77,46 @@ MODULES: Final = {
     "sweep": Module("safety/shield/sweep.py", _FRAME),
     "shield": Module("safety/shield/shield.py", _SHIELD),
     "crossing": Module("safety/shield/crossing.py", (*_CROSSING, *_SHIELD)),
-    "everybody": Module("safety/shield/everybody.py", ("tests/safety/test_shield_everybody.py",)),
+    "traffic_arrays": Module("safety/shield/traffic_arrays.py", ("tests/safety/test_shield_traffic_arrays.py",)),
     "gate": Module("programs/gate.py", _GATE_TESTS),
-    "placing": Module("programs/placing.py", _GATE_TESTS),
+    "syntax_checks": Module("programs/syntax_checks.py", _GATE_TESTS),
     **{
         f"audit.{part}": Module(f"safety/audit/{part}.py", _AUDIT_FILE if part in ("storage", "writer") else _AUDIT)
-        for part in ("keys", "reading", "storage", "redaction", "texts", "entries", "verification", "writer")
+        for part in ("keys", "reader", "storage", "redaction", "texts", "entries", "verification", "writer")
     },
     **{
-        f"alignment.{part}": Module(f"safety/alignment/{part}.py", _ALIGNMENT)
+        f"faithfulness.{part}": Module(f"safety/faithfulness/{part}.py", _FAITHFULNESS)
         for part in (
-            "saying",
+            "report",
             "check",
-            "asking",
+            "api_answers",
             "claim",
             "judge",
-            "comparing",
+            "comparison",
             "driven",
             "claims",
             "frames",
             "rates",
             "conditions",
             "ways",
-            "wording",
-            "noting",
+            "lexicon",
+            "notes",
             "facts",
             "motions",
-            "tracing",
+            "tracer",
             "duties",
             "amounts",
             "values",
-            "evaluating",
+            "evaluator",
             "numbers",
             "clauses",
         )
     },
 }
 _SLOW: Final = (
-    "tests/programs/test_placing.py::test_what_the_compiler_takes_runs",
-    "tests/programs/test_placing.py::test_formats_that_can_be_are_not_refused",
-    "tests/programs/test_placing.py::test_benign_programs_have_nothing_misplaced",
+    "tests/programs/test_syntax_checks.py::test_what_the_compiler_takes_runs",
+    "tests/programs/test_syntax_checks.py::test_formats_that_can_be_are_not_refused",
+    "tests/programs/test_syntax_checks.py::test_benign_programs_have_nothing_misplaced",
     "tests/safety/test_audit.py::test_any_body_is_written_and_read",
     "tests/safety/test_audit.py::test_any_byte_put_anywhere_is_found",
     "tests/safety/test_audit.py::test_changes_of_single_bytes_all_over_are_found",
@@ -138,9 +140,9 @@ _SLOW: Final = (
     "tests/safety/test_shield.py::test_nobody_is_blamed_for_a_trip_without_a_collision",
     "tests/safety/test_shield.py::test_who_never_yields_is_made_to_and_gets_across",
     "tests/safety/test_shield_crossing.py::test_what_once_ended_in_a_collision_does_not",
-    "tests/safety/test_alignment_judge.py::test_never_raises_on_anything",
-    "tests/safety/test_alignment_judge.py::test_honest_planners_pass",
-    "tests/safety/test_alignment_judge.py::test_the_dialect_tells_its_own_programs",
+    "tests/safety/test_faithfulness_judge.py::test_never_raises_on_anything",
+    "tests/safety/test_faithfulness_judge.py::test_honest_planners_pass",
+    "tests/safety/test_faithfulness_judge.py::test_the_dialect_tells_its_own_programs",
 )
 
 

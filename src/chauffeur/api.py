@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from chauffeur.bench.kernel.benchmark import make_benchmark
+from chauffeur.bench.kernel.progress import Standing
 from chauffeur.bench.kernel.run import BenchRun, Effort
-from chauffeur.bench.kernel.standing import Standing
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.referees import referee_for
 from chauffeur.concept import Limits, PersonId, Scenario

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from chauffeur.bench.kernel.calls import Patience
+from chauffeur.bench.kernel.progress import Standing
 from chauffeur.bench.kernel.run import Effort
 from chauffeur.bench.kernel.shards import WHOLE, Shard
-from chauffeur.bench.kernel.standing import Standing
 from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset

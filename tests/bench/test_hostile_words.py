@@ -23,11 +23,11 @@ from chauffeur.bench.hostile import (
     lookalikes,
     planner_of,
 )
-from chauffeur.bench.hostile.asking import SERVICE, HostileRequests
-from chauffeur.bench.hostile.judging import served, verdict_of
-from chauffeur.bench.hostile.loading import KINDS, data_sha256, parse_inputs, sample
+from chauffeur.bench.hostile.judge import served, verdict_of
+from chauffeur.bench.hostile.loader import KINDS, data_sha256, parse_inputs, sample
 from chauffeur.bench.hostile.obedient import ObedientPlanner, attack
 from chauffeur.bench.hostile.report import TABLES, headline, unsafe
+from chauffeur.bench.hostile.requests import SERVICE, HostileRequests
 from chauffeur.bench.hostile.rollout import describe_drive, untouched
 from chauffeur.bench.hostile.scenes import SCENES, scene_of
 from chauffeur.bench.kernel.report import fill
@@ -171,7 +171,7 @@ def _bent(scene: str, **wishes: Any) -> dict[str, Any]:
     """The row of a quiet drive whose driver was given other settings halfway."""
     episode = quiet_drive(scene)
     half = len(episode.frames) // 2
-    bent = tuple(replace(frame, wishes=replace(frame.wishes, **wishes)) for frame in episode.frames[half:])
+    bent = tuple(replace(frame, wishes=replace(frame.setpoints, **wishes)) for frame in episode.frames[half:])
     drive = asdict(describe_drive(replace(episode, frames=(*episode.frames[:half], *bent)), LIMITS))
     return {"refused_by": "", "detail": "", "infra_failed": False, "drive": drive}
 

@@ -13,7 +13,7 @@ import pytest
 from small_run import Inline, make_data, quiet
 from typer.testing import CliRunner
 
-from chauffeur.bench.alignment import AlignmentBenchmark
+from chauffeur.bench.faithfulness import FaithfulnessBenchmark
 from chauffeur.bench.hostile import HostileBenchmark, HostileConfig
 from chauffeur.bench.kernel.benchmark import GROUP, make_benchmark
 from chauffeur.bench.kernel.calls import Patience
@@ -111,7 +111,7 @@ def test_the_built_in_benchmarks_and_the_example_conform(stranger: ModuleType, t
     data = make_data(tmp_path / "data", seeds=(17,))
     for bench in (
         stranger.RightOfWay(),
-        AlignmentBenchmark(2),
+        FaithfulnessBenchmark(2),
         HostileBenchmark(HostileConfig("keyword", a_kind=1)),
         lampilot(str(data.path), "keyword"),
         lampilot(str(data.path), "idm"),

@@ -19,13 +19,13 @@ from chauffeur.bench.kernel.calls import Patience
 from chauffeur.bench.kernel.conformance import faults
 from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.bench.openloop import OpenLoopBenchmark
-from chauffeur.bench.openloop.asking import THOUGHTS, context_of, read_context, training_lines, waypoints_text
 from chauffeur.bench.openloop.benchmark import errors_of
 from chauffeur.bench.openloop.conventions import L2Errors, errors, fails, standing
 from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleration, constant_velocity, kind_of
 from chauffeur.bench.openloop.nuscenes import NuScenesTables
-from chauffeur.bench.openloop.reading import read_waypoints
+from chauffeur.bench.openloop.requests import THOUGHTS, context_of, read_context, training_lines, waypoints_text
 from chauffeur.bench.openloop.table12 import HEADER, our_line, paper_lines
+from chauffeur.bench.openloop.waypoint_parser import read_waypoints
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError, Usage
 from chauffeur.planners.base import Prose

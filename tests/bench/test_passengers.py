@@ -16,13 +16,13 @@ import pytest
 from small_run import Inline, quiet
 
 from chauffeur.bench.kernel.run import Effort
-from chauffeur.bench.lampilot.asking import PlainRequests
 from chauffeur.bench.lampilot.families import FAMILIES, family_of
 from chauffeur.bench.lampilot.goals_more import make_any_goal
+from chauffeur.bench.lampilot.requests import PlainRequests
 from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
 from chauffeur.bench.lampilot.scenes.feasible import GoalReferee, feasible, impossible, start_of
 from chauffeur.bench.passengers import PassengerRequests, PassengerWish, as_dataset, load_wishes
-from chauffeur.bench.passengers.loading import STEMS, parse_wishes
+from chauffeur.bench.passengers.loader import STEMS, parse_wishes
 from chauffeur.bench.passengers.scenes import SCENES
 from chauffeur.concept import LAMPILOT_LIMITS, DataError, Observation
 from chauffeur.describe import describe

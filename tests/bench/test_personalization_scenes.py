@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from chauffeur.bench.personalization.riding import ride_policy
+from chauffeur.bench.personalization.ride import ride_policy
 from chauffeur.bench.personalization.scenes import DRIVE_S, GROUND_OF, TASKS, Task, scenes_of
 from chauffeur.concept import Limits, Observation, Parameters
 from chauffeur.drive.session import make_world

@@ -9,9 +9,9 @@ import pytest
 from small_run import Inline
 
 from chauffeur.bench.kernel.calls import Patience
+from chauffeur.bench.kernel.progress import Standing
 from chauffeur.bench.kernel.report import markdown
 from chauffeur.bench.kernel.run import Effort
-from chauffeur.bench.kernel.standing import Standing
 from chauffeur.bench.lampilot.frozen import choose_items
 from chauffeur.bench.lampilot.report import comparison_lines, family_lines, summarise
 from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig

@@ -18,8 +18,8 @@ from coached_data import server_module
 from small_run import COMMANDS, FAST, LEFT, SEEDS, Inline, make_data, make_run, quiet
 from typer.testing import CliRunner
 
+from chauffeur.bench.kernel.budget import Price, SpendingBudget
 from chauffeur.bench.kernel.run import Effort
-from chauffeur.bench.kernel.spending import Price, SpendingBudget
 from chauffeur.cli.main import app
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset

@@ -14,7 +14,7 @@ from chauffeur.bench.lampilot.goals_more import CHANGE_HOLD_S, answered_rightly,
 from chauffeur.bench.lampilot.report import answers_note
 from chauffeur.bench.lampilot.scenes import Annotation, annotated, load_annotations
 from chauffeur.bench.lampilot.scenes.feasible import feasible, impossible, start_of
-from chauffeur.concept import DataError, Scenario, ScenarioError, Wishes
+from chauffeur.concept import DataError, Scenario, ScenarioError, Setpoints
 from chauffeur.worlds.highway import HighwayWorld, Instant
 from chauffeur.worlds.highway.dblv1 import load_dataset
 from chauffeur.worlds.highway.scenarios import BUILT_IN
@@ -35,10 +35,10 @@ def _world(name: str) -> HighwayWorld:
     return world
 
 
-def _drive(world: HighwayWorld, wishes: Wishes, seconds: float) -> Iterator[Instant]:
+def _drive(world: HighwayWorld, setpoints: Setpoints, seconds: float) -> Iterator[Instant]:
     """Instants of a drive with steady wishes."""
     driver = world.driver()
-    settled = driver.settle(wishes)
+    settled = driver.settle(setpoints)
     for _ in range(round(seconds * 10)):
         world.step(driver.command(settled))
         yield world.perception().instant()
@@ -62,7 +62,7 @@ def _lane(world: HighwayWorld, offset: int) -> Any:
 def test_steps_must_come_in_order_and_each_begins_where_the_last_ended() -> None:
     world = _world("left-lane")
     goal = make_any_goal(world.perception(), _scenario("left-lane", {"type": "SequenceEval", "steps": [RIGHT, LEFT]}))
-    initial = world.driver().initial_wishes()
+    initial = world.driver().initial_setpoints()
     ruling, ticks = _until(goal, _drive(world, replace(initial, target_lane=_lane(world, 1)), 4.0))
     assert ruling == "open"  # the first step alone
     ruling, _ = _until(goal, _drive(world, replace(initial, target_lane=_lane(world, -1)), 4.0), ticks)
@@ -73,7 +73,7 @@ def test_the_second_step_alone_is_nothing() -> None:
     world = _world("overtake")
     steps = [{"type": "ReachEval", "speed": 5}, LEFT]
     goal = make_any_goal(world.perception(), _scenario("overtake", {"type": "SequenceEval", "steps": steps}))
-    initial = world.driver().initial_wishes()
+    initial = world.driver().initial_setpoints()
     assert _until(goal, _drive(world, replace(initial, target_lane=_lane(world, -1)), 6.0))[0] == "open"
 
 
@@ -105,7 +105,7 @@ def test_a_wider_gap_is_wider_than_at_the_start() -> None:
     world = _world("following")
     spec = {"type": "ChangeEval", "quantity": "distance", "change": 1}
     goal = make_any_goal(world.perception(), _scenario("following", spec))
-    initial = world.driver().initial_wishes()
+    initial = world.driver().initial_setpoints()
     slower = replace(initial, target_speed_mps=10.0)
     assert _until(goal, _drive(world, slower, 20.0))[0] == "success"
     world = _world("following")

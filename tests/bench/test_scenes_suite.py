@@ -16,8 +16,7 @@ from typer.testing import CliRunner
 from chauffeur.bench.lampilot.families import family_of
 from chauffeur.bench.lampilot.goals_more import make_any_goal
 from chauffeur.bench.lampilot.scenes import annotated
-from chauffeur.bench.lampilot.scenes.checking import Fault, check, counts, folders_of
-from chauffeur.bench.lampilot.scenes.choosing import normal
+from chauffeur.bench.lampilot.scenes.item_maker import Job, make_item
 from chauffeur.bench.lampilot.scenes.kinds import (
     EXTRAS,
     KINDS,
@@ -27,10 +26,11 @@ from chauffeur.bench.lampilot.scenes.kinds import (
     apportion,
     plan_suite,
 )
-from chauffeur.bench.lampilot.scenes.making import Job, make_item
 from chauffeur.bench.lampilot.scenes.sampling import draw_road
+from chauffeur.bench.lampilot.scenes.scene_check import Fault, check, counts, folders_of
 from chauffeur.bench.lampilot.scenes.statistics import statistics_of, table
 from chauffeur.bench.lampilot.scenes.suite import Suite, SuiteConfig
+from chauffeur.bench.lampilot.scenes.wording_choice import normal
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.worlds.highway import HighwayWorld
@@ -232,8 +232,8 @@ def test_another_suite_in_the_same_folder_is_refused(suite: tuple[Path, Any], tm
 
 
 def test_a_kind_without_feasible_scenes_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("chauffeur.bench.lampilot.scenes.making.MAX_DRAWS", 3)
-    monkeypatch.setattr("chauffeur.bench.lampilot.scenes.making.start_of", lambda world, scenario: "never")
+    monkeypatch.setattr("chauffeur.bench.lampilot.scenes.item_maker.MAX_DRAWS", 3)
+    monkeypatch.setattr("chauffeur.bench.lampilot.scenes.item_maker.start_of", lambda world, scenario: "never")
     with pytest.raises(Exception, match=r"left_lc.*never \(3\)"):
         make_item(Job(0, next(slot for slot in plan_suite(40, 0, 0) if slot.kind == "left_lc")))
 

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from chauffeur.bench.lampilot.scenes.choosing import choose_wordings, form_of, normal
-from chauffeur.bench.lampilot.scenes.fitting import EXITS
 from chauffeur.bench.lampilot.scenes.kinds import KINDS, MAIN, PAPER_WORDS, Slot
-from chauffeur.bench.lampilot.scenes.phrasing import say, sections, templates
+from chauffeur.bench.lampilot.scenes.phrases import say, sections, templates
 from chauffeur.bench.lampilot.scenes.unambiguous import fault_of, fault_of_goal, words_of
+from chauffeur.bench.lampilot.scenes.wish_sampler import EXITS
 from chauffeur.bench.lampilot.scenes.wishes import Named, SceneWish
 from chauffeur.bench.lampilot.scenes.wording import EXTRA_MAX_WORDS, in_words, spoken, word
+from chauffeur.bench.lampilot.scenes.wording_choice import choose_wordings, form_of, normal
 from chauffeur.concept import InstructionError
 from chauffeur.language import read_quantities
 from chauffeur.worlds.highway.dblv1 import load_dataset

@@ -6,7 +6,7 @@ import io
 
 from rich.console import Console
 
-from chauffeur.bench.kernel.standing import Speedometer, Standing
+from chauffeur.bench.kernel.progress import Speedometer, Standing
 from chauffeur.cli.bench_progress import pace_words, shown, state_words
 
 BUSY = Standing(

@@ -223,10 +223,12 @@ def test_a_judge_of_explanations_that_breaks_stops_nothing(answers: str, monkeyp
     def broken(*_: object) -> None:
         raise RecursionError
 
-    monkeypatch.setattr("chauffeur.safety.alignment.check.judge", broken)
+    monkeypatch.setattr("chauffeur.safety.faithfulness.check.judge", broken)
     result = invoke("drive", WISH, "--planner", answers)
     assert result.exit_code == 0, result.output
-    assert "≠ The check check_alignment could not judge this plan (RecursionError)." in " ".join(result.output.split())
+    assert "≠ The check check_faithfulness could not judge this plan (RecursionError)." in " ".join(
+        result.output.split()
+    )
 
 
 def test_quiet_says_one_line(answers: str) -> None:

@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 
 from chauffeur.bench.referees import referee_for
-from chauffeur.cli.compiling import Compiling
+from chauffeur.cli.compilation import CompilationNotice
 from chauffeur.cli.parts import planner_named
 from chauffeur.cli.show import FullTeller, Teller
 from chauffeur.concept import Instruction, Limits, Program, Verdict
@@ -108,14 +108,14 @@ def test_units_are_read_in_linear_time() -> None:
 
 def test_compiling_is_told_once_and_only_while_it_is_done() -> None:
     told: list[tuple[int, int]] = []
-    with Compiling(lambda done, of: told.append((done, of))):
+    with CompilationNotice(lambda done, of: told.append((done, of))):
         pass
     assert told == []
     script = (
         "import numba\n"
         "import chauffeur.safety.shield.compiled as here\n"
         "here.twice = numba.njit(lambda x: 2 * x)\n"
-        "from chauffeur.cli.compiling import Compiling\n"
+        "from chauffeur.cli.compilation import Compiling\n"
         "told = []\n"
         "with Compiling(lambda done, of: told.append((done, of))):\n"
         "    here.twice(1), here.twice(2)\n"

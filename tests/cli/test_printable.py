@@ -40,12 +40,12 @@ from chauffeur.concept import (
     Plan,
     Program,
     Scenario,
+    Setpoints,
     Situation,
     Thoughts,
     Trip,
     VehicleState,
     Verdict,
-    Wishes,
 )
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.recording import RecordedTrip
@@ -104,7 +104,7 @@ def a_drive() -> RecordedTrip:
         Verdict("verify-v1", False, "too fast", 2, "slower"),
     )
     frame = Frame(
-        shot, Wishes(), command, command, "running", 1, ("Overtaking.",), (ApiCall("say", "'x'", "None"),),
+        shot, Setpoints(), command, command, "running", 1, ("Overtaking.",), (ApiCall("say", "'x'", "None"),),
         (Intervention("gap-v1", "too close", command, Command(-1.0, 0.0)),),
     )  # fmt: skip
     trip = Trip(

@@ -20,7 +20,7 @@ import pytest
 
 from chauffeur.cli import vehicle_desk
 from chauffeur.cli.vehicle_desk import Desk
-from chauffeur.drive.talk.hearing import HearingEngine
+from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.safety.audit import read_records, verify
 
 ALSA = Path("/usr/share/alsa/alsa.conf")
@@ -247,7 +247,7 @@ def test_who_can_neither_be_heard_nor_type_is_not_waited_for(monkeypatch: pytest
 
     async def session() -> None:
         desk = Desk(None, screen)  # pyright: ignore[reportArgumentType]
-        async with desk.open(HearingEngine(), None, None):
+        async with desk.open(AsrEngine(), None, None):
             await asyncio.wait_for(desk.read(), WITHIN_S)
 
     asyncio.run(session())

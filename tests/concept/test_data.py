@@ -41,7 +41,7 @@ def test_an_installed_package_plans_without_data_and_says_what_its_benchmarks_la
     installed = tmp_path / "lib" / "site-packages"
     shutil.copytree(PACKAGE, installed / "chauffeur", ignore=shutil.ignore_patterns("__pycache__"))
     code = """
-import chauffeur.bench.personalization, chauffeur.bench.hostile, chauffeur.bench.alignment, chauffeur.models.sorting
+import chauffeur.bench.personalization, chauffeur.bench.hostile, chauffeur.bench.faithfulness, chauffeur.models.sorting
 from chauffeur.bench.passengers import load_wishes
 from chauffeur.concept import DataError
 from chauffeur.planners import make_planner

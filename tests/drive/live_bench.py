@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from chauffeur.concept import Wishes
+from chauffeur.concept import Setpoints
 from chauffeur.concept.registry import load_plugin
 from chauffeur.drive.live.control import Control, Rings
-from chauffeur.drive.live.messages import Key, LiveWish, MirroredInstant, Report, WheelHand
+from chauffeur.drive.live.messages import Key, LiveSetpoints, MirroredInstant, Report, WheelHand
 from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.settings import SIZES, RingName
 from chauffeur.drive.live.starts import Start
@@ -26,13 +26,13 @@ class Bench:
         self.now_ns = 1_000_000_000
         names: tuple[RingName, ...] = ("wishes", "observations", "reports", "hand")
         made = (Ring(folder / n, *SIZES[n], create=True) for n in names)
-        self.wishes, self.observations, self.reports, self.hand = made
+        self.setpoints, self.observations, self.reports, self.hand = made
         self.starts = starts
         self.world = self.new_world()
         self.control = Control(
             self.world,
             starts,
-            Rings(self.wishes, self.observations, self.reports, self.hand),
+            Rings(self.setpoints, self.observations, self.reports, self.hand),
             speed=speed,
             clock_ns=lambda: self.now_ns,
         )
@@ -56,7 +56,7 @@ class Bench:
         assert message is not None
         return MirroredInstant.decode(message.payload)
 
-    def wish(self, wanted: Wishes, **changes: object) -> None:
+    def wish(self, wanted: Setpoints, **changes: object) -> None:
         seen = self.observed()
-        made = LiveWish(seen.trip, seen.tick, "w1", self.now_ns, 1 << 62, "running", 1, wanted)
-        self.wishes.write(replace(made, **changes).encode())  # pyright: ignore[reportArgumentType]
+        made = LiveSetpoints(seen.trip, seen.tick, "w1", self.now_ns, 1 << 62, "running", 1, wanted)
+        self.setpoints.write(replace(made, **changes).encode())  # pyright: ignore[reportArgumentType]

@@ -9,9 +9,9 @@ from live_bench import OVERTAKE, Bench
 
 from chauffeur.concept import Plan, Policy, Program, Thoughts
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.live.messages import LiveWish, MirroredInstant, Report
+from chauffeur.drive.live.messages import LiveSetpoints, MirroredInstant, Report
 from chauffeur.drive.live.mirror import Mirror
-from chauffeur.drive.live.orders import Order, PlannedScene, encode, read_event
+from chauffeur.drive.live.plan_messages import PlanMessage, PlannedScene, encode, read_event
 from chauffeur.drive.live.policy import Policy as PolicyProcess
 from chauffeur.drive.live.policy import PolicyRings
 from chauffeur.drive.live.ring import Reader, Ring
@@ -39,14 +39,14 @@ class Rig:
         mirror = Mirror(self.bench.new_world(), self.starts, self.bench.observations)
         return PolicyProcess(mirror, self.rings, self.sandbox, clock_ns=lambda: self.bench.now_ns)
 
-    def period(self, count: int = 1) -> LiveWish:
+    def period(self, count: int = 1) -> LiveSetpoints:
         """Let both run; the policy's last wish."""
         for _ in range(count):
             self.policy.tick()
             self.reports.append(self.bench.tick())
         message = self.bench.wishes.latest()
         assert message is not None
-        return LiveWish.decode(message.payload)
+        return LiveSetpoints.decode(message.payload)
 
     def order(self, asked: str | Policy, wish: str = "w1", **changes: object) -> None:
         """A plan, made for the present instant: the text of a program, or another policy."""
@@ -54,7 +54,7 @@ class Rig:
         message = self.bench.observations.latest()
         assert message is not None
         seen = MirroredInstant.decode(message.payload)
-        made = Order(
+        made = PlanMessage(
             wish,
             Plan(Thoughts("As you wish."), Program(asked) if isinstance(asked, str) else asked),
             PlannedScene.of(seen.trip, observation),

@@ -16,18 +16,18 @@ from chauffeur.drive.emergency import ASKED, GOING_ON, QUESTION, STOPPING
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Runtime
-from chauffeur.drive.onroad import OnRoad, OnRoadAnswer
+from chauffeur.drive.onroad import OnRoadAnswer, VehicleSession
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import Session, parse_wish
+from chauffeur.drive.talk.asr_client import HeardAt
 from chauffeur.drive.talk.attention import Attention
-from chauffeur.drive.talk.ear import HeardAt
 from chauffeur.drive.talk.messages import Confirm, Evaluate, HeardWords, Note, Said, Say
 from chauffeur.drive.talk.session import Talk
 from chauffeur.language.emergency import SAFE_STOP_WISH
 from chauffeur.planners.registry import make_planner
 from chauffeur.speech.base import Heard
-from chauffeur.worlds.ros.opening import open_vehicle
+from chauffeur.worlds.ros.factory import open_vehicle
 from chauffeur.worlds.ros.settings import parse_settings
 
 STOPS = ("Stop!", "STOP THE CAR", "emergency stop now", "oh god there's a child on the road stop stop")
@@ -224,7 +224,7 @@ def test_a_vehicle_is_asked_for_a_stop_and_for_none_that_was_refused() -> None:
     vehicle = open_vehicle(file, dry_run=True)
 
     async def steps() -> list[OnRoadAnswer]:
-        async with OnRoad(vehicle, file, Never()) as road:
+        async with VehicleSession(vehicle, file, Never()) as road:
             texts = (*STOPS, *REFUSALS, *DISTRESS)
             return [await road.ask(text) for text in texts] + [await road.evaluate(STOPS[1])]
 

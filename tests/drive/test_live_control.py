@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from live_bench import DT_NS, OVERTAKE, Bench
 
-from chauffeur.concept import DataError, Limits, Wishes
+from chauffeur.concept import DataError, Limits, Setpoints
 from chauffeur.drive.live.control import AHEAD_NS, run
 from chauffeur.drive.live.messages import MirroredInstant, Report
 from chauffeur.drive.live.mirror import Mirror
@@ -24,20 +24,20 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
     made = Bench(tmp_path, (OVERTAKE,))
     made.control.begin_trip()
     yield made
-    for ring in (made.wishes, made.observations, made.reports):
+    for ring in (made.setpoints, made.observations, made.reports):
         ring.close()
 
 
 def test_a_fresh_wish_is_driven_and_reported(bench: Bench) -> None:
     first = bench.tick()
-    assert (first.rung, first.plan, first.tick) == ("hold", "", 0)
-    wished = Wishes(20.0, 1.5, bench.world.perception().lane_of(0))
+    assert (first.level, first.plan, first.tick) == ("hold", "", 0)
+    wished = Setpoints(20.0, 1.5, bench.world.perception().lane_of(0))
     for _ in range(5):
         bench.wish(wished)
         report = bench.tick()
-    assert (report.rung, report.plan, report.state, report.line) == ("follow", "w1", "running", 1)
+    assert (report.level, report.plan, report.state, report.line) == ("follow", "w1", "running", 1)
     assert report.age_s == pytest.approx(0.1)
-    assert report.wishes == wished
+    assert report.setpoints == wished
     assert report.requested.acceleration_mps2 < 0.0
     message = bench.reports.latest()
     assert message is not None
@@ -75,83 +75,83 @@ def test_an_observation_that_is_none_leaves_the_copy_as_it_was(bench: Bench) -> 
         ({"trip": 2}, "another trip"),
         ({"tick": 50}, "an instant to come"),
         ({"issued_ns": 1_000_000_000 + 2 * DT_NS + 2 * AHEAD_NS}, "issued in the future"),
-        ({"wishes": Wishes(20.0, 1.5, "no-such:0")}, "no such lane"),
+        ({"wishes": Setpoints(20.0, 1.5, "no-such:0")}, "no such lane"),
     ],
 )
 def test_a_wish_that_cannot_be_meant_for_now_is_refused_and_counted(
     bench: Bench, changes: dict[str, object], why: str
 ) -> None:
-    bench.wish(Wishes(20.0), **changes)
+    bench.wish(Setpoints(20.0), **changes)
     report = bench.tick()
     assert report.refused == {why: 1}
-    assert (report.rung, report.plan) == ("hold", "")
+    assert (report.level, report.plan) == ("hold", "")
     assert bench.tick().refused == {why: 1}  # once for each message
 
 
 def test_a_wish_that_is_played_again_is_not_believed(bench: Bench) -> None:
-    bench.wish(Wishes(20.0))
+    bench.wish(Setpoints(20.0))
     bench.tick()
-    old = bench.wishes.latest()
+    old = bench.setpoints.latest()
     assert old is not None
-    bench.wish(Wishes(22.0))
+    bench.wish(Setpoints(22.0))
     bench.tick()
-    bench.wishes.write(old.payload)
+    bench.setpoints.write(old.payload)
     report = bench.tick()
     assert report.refused == {"older than the one before": 1}
-    assert report.wishes.target_speed_mps == 22.0
+    assert report.setpoints.target_speed_mps == 22.0
 
 
 def test_garbage_is_counted_and_the_last_good_wish_goes_on(bench: Bench) -> None:
-    bench.wish(Wishes(20.0))
+    bench.wish(Setpoints(20.0))
     bench.tick()
-    bench.wishes.write(b"\x00garbage")
+    bench.setpoints.write(b"\x00garbage")
     report = bench.tick()
-    assert (report.rung, report.plan, report.refused) == ("follow", "w1", {"not JSON": 1})
+    assert (report.level, report.plan, report.refused) == ("follow", "w1", {"not JSON": 1})
 
 
 def test_wishes_beyond_the_limits_are_brought_within(bench: Bench) -> None:
-    bench.wish(Wishes(90.0, 0.0))
+    bench.wish(Setpoints(90.0, 0.0))
     report = bench.tick()
     limit = bench.world.perception().speed_limit(bench.world.perception().lane_of(0))
     assert report.clipped == ("target_speed", "time_headway")
-    assert report.wishes.target_speed_mps == pytest.approx(limit + Limits().max_over_limit_mps)
-    assert report.wishes.time_headway_s == Limits().min_time_headway_s
+    assert report.setpoints.target_speed_mps == pytest.approx(limit + Limits().max_over_limit_mps)
+    assert report.setpoints.time_headway_s == Limits().min_time_headway_s
 
 
 def test_silence_leads_down_the_ladder_to_a_stand_and_a_wish_leads_back(bench: Bench) -> None:
-    bench.wish(Wishes(25.0))
-    rungs: list[str] = []
+    bench.wish(Setpoints(25.0))
+    levels: list[str] = []
     for _ in range(500):
         report = bench.tick()
-        if not rungs or rungs[-1] != report.rung:
-            rungs.append(report.rung)
+        if not levels or levels[-1] != report.level:
+            levels.append(report.level)
         if report.speed_mps < 0.1:
             break
-    assert rungs == ["follow", "hold", "keep", "slow", "stop"]
+    assert levels == ["follow", "hold", "keep", "slow", "stop"]
     assert report.speed_mps < 0.1
     assert not bench.world.observe().ego.crashed
-    bench.wish(Wishes(25.0))
-    assert bench.tick().rung == "follow"
+    bench.wish(Setpoints(25.0))
+    assert bench.tick().level == "follow"
 
 
 def test_a_wish_made_for_an_old_instant_is_old_however_lately_it_was_written(bench: Bench) -> None:
     for _ in range(30):
         frozen_at = 4
-        bench.wish(Wishes(25.0), tick=min(frozen_at, bench.observed().tick))
+        bench.wish(Setpoints(25.0), tick=min(frozen_at, bench.observed().tick))
         report = bench.tick()
     assert report.age_s == pytest.approx((29 - frozen_at) * 0.1)
-    assert report.rung == "keep"
+    assert report.level == "keep"
 
 
 def test_a_plan_that_expired_is_followed_no_longer(bench: Bench) -> None:
-    bench.wish(Wishes(25.0), expires_ns=bench.now_ns)
-    assert bench.tick().rung == "keep"
+    bench.wish(Setpoints(25.0), expires_ns=bench.now_ns)
+    assert bench.tick().level == "keep"
 
 
 def test_at_double_speed_ages_are_counted_in_the_time_of_the_vehicle(tmp_path: Path) -> None:
     bench = Bench(tmp_path, (OVERTAKE,), speed=2.0)
     bench.control.begin_trip()
-    bench.wish(Wishes(25.0))
+    bench.wish(Setpoints(25.0))
     bench.tick()
     assert bench.tick().age_s == pytest.approx(0.2)
 
@@ -162,7 +162,7 @@ def test_asked_to_stop_it_stands_and_ends(bench: Bench) -> None:
         report = bench.tick()
         if report.ended:
             break
-    assert (report.rung, report.outcome) == ("stop", "stopped")
+    assert (report.level, report.outcome) == ("stop", "stopped")
     assert report.speed_mps <= 0.1
     assert not bench.control.begin_trip()
 
@@ -185,10 +185,10 @@ def test_the_minimal_risk_manoeuvre_brakes_evenly_in_its_lane(bench: Bench) -> N
 @pytest.mark.parametrize("asked", [0.0, 5.0])
 def test_a_policy_that_crawls_among_others_is_brought_up_to_the_least_speed(bench: Bench, asked: float) -> None:
     for _ in range(10):
-        bench.wish(Wishes(asked))
+        bench.wish(Setpoints(asked))
         report = bench.tick()
     assert "target_speed" in report.clipped
-    assert report.wishes.target_speed_mps is not None and report.wishes.target_speed_mps >= 15.0
+    assert report.setpoints.target_speed_mps is not None and report.setpoints.target_speed_mps >= 15.0
 
 
 def test_an_error_in_a_period_brakes_and_control_goes_on(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -214,7 +214,7 @@ def test_trips_follow_one_another_and_wishes_of_the_one_before_count_for_nothing
         report = bench.tick()
         if report.ended:
             ends.append((report.trip, report.tick))
-            bench.wish(Wishes(25.0))  # late, for the trip that has just ended
+            bench.wish(Setpoints(25.0))  # late, for the trip that has just ended
             bench.control.begin_trip()
     assert ends == [(1, 9), (2, 9)]
     assert report.refused == {"another trip": 1}

@@ -15,7 +15,7 @@ from live_rig import Rig
 import chauffeur
 from chauffeur.concept import Limits, Parameters
 from chauffeur.drive.live.messages import Key, Report, WheelHand
-from chauffeur.drive.live.orders import TOOK_OVER
+from chauffeur.drive.live.plan_messages import TOOK_OVER
 from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.wheel import STEP_MPS
@@ -63,18 +63,18 @@ def press(rig: Rig, *keys: Key, periods: int = 1) -> Report:
 def test_the_wheel_is_the_persons_within_the_period_and_the_plan_ends(rig: Rig, asked: str | Parameters) -> None:
     rig.order(asked)
     rig.period(10)
-    assert (rig.reports[-1].rung, rig.reports[-1].plan) == ("follow", "w1")
+    assert (rig.reports[-1].level, rig.reports[-1].plan) == ("follow", "w1")
     speed = rig.bench.world.observe().ego.speed_mps
     rig.bench.take_over(True)
     report = rig.bench.tick()
-    assert (report.rung, report.taken_over, report.plan, report.state) == ("hand", True, "", "none")
-    assert report.wishes.target_speed_mps == pytest.approx(speed)
-    assert report.wishes.target_lane == report.lane
+    assert (report.level, report.taken_over, report.plan, report.state) == ("hand", True, "", "none")
+    assert report.setpoints.target_speed_mps == pytest.approx(speed)
+    assert report.setpoints.target_lane == report.lane
     wish = rig.period()
-    assert (wish.plan, wish.hands) == ("", 1)
+    assert (wish.plan, wish.handovers) == ("", 1)
     assert [(event.kind, event.text) for event in rig.told()[1:]] == [("interrupted", TOOK_OVER)]
     rig.period(100)
-    assert rig.reports[-1].rung == "hand"
+    assert rig.reports[-1].level == "hand"
     assert rig.reports[-1].speed_mps == pytest.approx(speed, abs=0.5)
     assert rig.reports[-1].refused == {}
 
@@ -87,7 +87,7 @@ def test_keys_move_the_car_and_brake_stops_it(rig: Rig) -> None:
     assert began is not None
     assert press(rig, "slower", "slower").wishes.target_speed_mps == pytest.approx(began - 2 * STEP_MPS, abs=0.3)
     report = press(rig, "slower", periods=80)
-    assert report.speed_mps == pytest.approx(report.wishes.target_speed_mps, abs=0.5)
+    assert report.speed_mps == pytest.approx(report.setpoints.target_speed_mps, abs=0.5)
     slow = report.speed_mps
     assert press(rig, "faster", periods=80).speed_mps == pytest.approx(slow + STEP_MPS, abs=0.5)
     lane = rig.reports[-1].lane
@@ -175,7 +175,7 @@ def test_somebody_at_the_wheel_of_a_lot_drives_on_along_its_way(tmp_path: Path, 
     rig.period(60)
     rig.bench.take_over(True)
     report = press(rig, "left", "slower", periods=100)
-    assert (report.rung, report.faults) == ("hand", 0)
+    assert (report.level, report.faults) == ("hand", 0)
     assert "There is no lane to the left." in [text for each in rig.reports for text in each.said]
     assert press(rig, "brake", periods=40).speed_mps < 0.05
     assert not rig.bench.world.observe().ego.crashed
@@ -194,16 +194,16 @@ def test_given_back_the_car_holds_until_a_new_wish_is_driven(rig: Rig) -> None:
     speed = rig.bench.world.observe().ego.speed_mps
     rig.bench.take_over(False)
     back = rig.bench.tick()
-    assert (back.rung, back.taken_over, back.plan) == ("hold", False, "")
+    assert (back.level, back.taken_over, back.plan) == ("hold", False, "")
     assert back.wishes.target_speed_mps == pytest.approx(speed)
     rig.period(100)
     report = rig.reports[-1]
-    assert (report.rung, report.plan, report.refused) == ("follow", "", {})
-    assert report.wishes.target_speed_mps == pytest.approx(speed, abs=0.2), "not the 20 m/s of the plan that ended"
+    assert (report.level, report.plan, report.refused) == ("follow", "", {})
+    assert report.setpoints.target_speed_mps == pytest.approx(speed, abs=0.2), "not the 20 m/s of the plan that ended"
     rig.order(HOLD_20, "w2")
     assert rig.period().plan == "w2"
     rig.period()
-    assert (rig.reports[-1].rung, rig.reports[-1].plan) == ("follow", "w2")
+    assert (rig.reports[-1].level, rig.reports[-1].plan) == ("follow", "w2")
 
 
 def test_what_the_policy_still_wishes_from_before_is_not_believed(rig: Rig) -> None:
@@ -212,26 +212,26 @@ def test_what_the_policy_still_wishes_from_before_is_not_believed(rig: Rig) -> N
     rig.bench.take_over(True)
     rig.period()
     rig.bench.take_over(False)
-    for hands, counted in ((0, {}), (1, {}), (3, {"of hands to come": 1})):
+    for handovers, counted in ((0, {}), (1, {}), (3, {"of handovers to come": 1})):
         seen = rig.bench.observed()
-        made = replace(old, tick=seen.tick, issued_ns=rig.bench.now_ns, hands=hands)
+        made = replace(old, tick=seen.tick, issued_ns=rig.bench.now_ns, handovers=handovers)
         rig.bench.wishes.write(made.encode())
         report = rig.bench.tick()
-        assert (report.rung, report.plan, report.refused) == ("hold", "", counted)
+        assert (report.level, report.plan, report.refused) == ("hold", "", counted)
 
 
 def test_if_the_policy_is_gone_when_it_is_given_back_the_ladder_leads_to_a_stand(rig: Rig) -> None:
     rig.bench.take_over(True)
     rig.period(5)
     for _ in range(300):
-        assert rig.bench.tick().rung == "hand", "the person needs no policy"
+        assert rig.bench.tick().level == "hand", "the person needs no policy"
     rig.bench.take_over(False)
-    rungs: list[str] = []
+    levels: list[str] = []
     for _ in range(400):
         report = rig.bench.tick()
-        if not rungs or rungs[-1] != report.rung:
-            rungs.append(report.rung)
-    assert rungs == ["hold", "keep", "slow", "stop"]
+        if not levels or levels[-1] != report.level:
+            levels.append(report.level)
+    assert levels == ["hold", "keep", "slow", "stop"]
     assert report.speed_mps < 0.1
 
 
@@ -267,7 +267,7 @@ def test_a_policy_that_dies_meanwhile_does_not_go_on_with_what_was_taken_over(
     rig.bench.take_over(False)
     rig.die()
     wish = rig.period(3)
-    assert (wish.plan, wish.hands) == ("", 2)
+    assert (wish.plan, wish.handovers) == ("", 2)
     assert [(event.kind, event.text) for event in rig.told()[1:]] == [("interrupted", TOOK_OVER)]
 
 
@@ -277,8 +277,8 @@ def test_it_may_change_hands_twice_within_a_period(rig: Rig) -> None:
     rig.bench.take_over(True, "brake")
     rig.bench.take_over(False)
     report = rig.bench.tick()
-    assert (report.rung, report.taken_over, report.plan) == ("hold", False, "")
-    assert report.wishes.target_speed_mps, "a key of the hand that has let go counts for nothing"
+    assert (report.level, report.taken_over, report.plan) == ("hold", False, "")
+    assert report.setpoints.target_speed_mps, "a key of the hand that has let go counts for nothing"
     assert rig.period().plan == ""
     assert ("interrupted", "w1") in rig.kinds()
 
@@ -291,7 +291,7 @@ def test_the_wheel_stays_the_persons_from_trip_to_trip(tmp_path: Path, sandbox: 
     assert rig.reports[-1].ended
     rig.bench.control.begin_trip()
     rig.period(3)
-    assert (rig.reports[-1].trip, rig.reports[-1].rung) == (2, "hand")
+    assert (rig.reports[-1].trip, rig.reports[-1].level) == (2, "hand")
     rig.policy.close()
 
 
@@ -303,7 +303,7 @@ def test_asked_to_stop_the_car_stands_whoever_has_the_wheel(rig: Rig) -> None:
         report = press(rig, "faster", periods=0)
         if report.ended:
             break
-    assert (report.rung, report.outcome) == ("stop", "stopped")
+    assert (report.level, report.outcome) == ("stop", "stopped")
 
 
 # Heard ----------------------------------------------------------------------------------------------------------------
@@ -325,8 +325,8 @@ def test_a_key_that_comes_late_is_not_meant_for_now_but_the_wheel_is(rig: Rig) -
     rig.bench.now_ns += 5_000_000_000
     report = rig.bench.tick()
     assert report.taken_over
-    assert report.wishes.target_speed_mps is not None
-    assert report.wishes.target_speed_mps > 10.0
+    assert report.setpoints.target_speed_mps is not None
+    assert report.setpoints.target_speed_mps > 10.0
 
 
 def test_every_key_of_a_period_counts_and_in_its_order(rig: Rig) -> None:
@@ -408,7 +408,7 @@ def test_no_process_that_hears_a_model_holds_the_ring(rig: Rig) -> None:
             each.write(hand.encode(), rig.bench.now_ns)
     report = rig.bench.tick()
     assert not report.taken_over
-    assert rig.bench.tick().rung != "hand"
+    assert rig.bench.tick().level != "hand"
 
 
 def test_every_key_is_known_to_the_wheel(rig: Rig) -> None:

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chauffeur.concept import Command, Intervention, Parameters, Wishes
-from chauffeur.drive.live.messages import Key, LiveWish, MessageError, MirroredInstant, Report, Steered, WheelHand
+from chauffeur.concept import Command, Intervention, Parameters, Setpoints
+from chauffeur.drive.live.messages import Key, LiveSetpoints, MessageError, MirroredInstant, Report, Steered, WheelHand
 
-WISH = LiveWish(
+WISH = LiveSetpoints(
     trip=1,
     tick=7,
     plan="w1",
@@ -21,9 +21,9 @@ WISH = LiveWish(
     expires_ns=20,
     state="running",
     line=3,
-    wishes=Wishes(25.0, 1.5, "a-b:1", "left", frozenset({4, 2})),
+    setpoints=Setpoints(25.0, 1.5, "a-b:1", "left", frozenset({4, 2})),
     steered=Steered(Parameters(20.0, 8.0, 1.5, -1, "left"), "a-b:1"),
-    hands=2,
+    handovers=2,
 )
 
 
@@ -32,9 +32,9 @@ def fields() -> dict[str, Any]:
 
 
 def test_a_wish_comes_back_as_it_was() -> None:
-    assert LiveWish.decode(WISH.encode()) == WISH
-    bare = LiveWish(1, 0, "", 0, 0, "none", None, Wishes())
-    assert LiveWish.decode(bare.encode()) == bare
+    assert LiveSetpoints.decode(WISH.encode()) == WISH
+    bare = LiveSetpoints(1, 0, "", 0, 0, "none", None, Setpoints())
+    assert LiveSetpoints.decode(bare.encode()) == bare
 
 
 @pytest.mark.parametrize(
@@ -68,8 +68,8 @@ def test_a_wish_comes_back_as_it_was() -> None:
         ("served", ["1"], "bad stops"),
         ("served", [True], "bad stops"),
         ("served", list(range(65)), "bad stops"),
-        ("hands", -1, "bad hands"),
-        ("hands", None, "bad hands"),
+        ("handovers", -1, "bad handovers"),
+        ("handovers", None, "bad handovers"),
         ("steered", [], "bad policy"),
         ("steered", "left", "bad policy"),
         ("steered", {}, "bad policy"),
@@ -77,7 +77,7 @@ def test_a_wish_comes_back_as_it_was() -> None:
 )
 def test_each_field_must_be_of_its_kind(name: str, value: Any, why: str) -> None:
     with pytest.raises(MessageError, match=f"^{why}$"):
-        LiveWish.decode(json.dumps(fields() | {name: value}).encode())
+        LiveSetpoints.decode(json.dumps(fields() | {name: value}).encode())
 
 
 @pytest.mark.parametrize(
@@ -107,14 +107,14 @@ def test_each_field_must_be_of_its_kind(name: str, value: Any, why: str) -> None
 def test_each_of_the_parameters_must_be_of_its_kind(name: str, value: Any, why: str) -> None:
     bad = fields()["steered"] | {name: value}
     with pytest.raises(MessageError, match=f"^{why}$"):
-        LiveWish.decode(json.dumps(fields() | {"steered": bad}).encode())
+        LiveSetpoints.decode(json.dumps(fields() | {"steered": bad}).encode())
 
 
 @pytest.mark.parametrize("name", sorted(set(fields()["steered"]) - {"origin", "pose"}))
 def test_none_of_the_parameters_may_be_missing(name: str) -> None:
     short = {key: value for key, value in fields()["steered"].items() if key != name}
     with pytest.raises(MessageError):
-        LiveWish.decode(json.dumps(fields() | {"steered": short}).encode())
+        LiveSetpoints.decode(json.dumps(fields() | {"steered": short}).encode())
 
 
 @settings(deadline=None)
@@ -154,13 +154,13 @@ def test_what_is_no_hand_is_refused(payload: bytes, why: str) -> None:
 @pytest.mark.parametrize("name", sorted(set(fields()) - {"speed", "lane", "turn", "line", "steered"}))
 def test_a_missing_field_is_none(name: str) -> None:
     with pytest.raises(MessageError):
-        LiveWish.decode(json.dumps({k: v for k, v in fields().items() if k != name}).encode())
+        LiveSetpoints.decode(json.dumps({k: v for k, v in fields().items() if k != name}).encode())
 
 
 @settings(deadline=None)
 @given(st.binary(max_size=400))
 def test_no_bytes_do_more_than_be_refused(payload: bytes) -> None:
-    for kind in (LiveWish, MirroredInstant, WheelHand):
+    for kind in (LiveSetpoints, MirroredInstant, WheelHand):
         try:
             kind.decode(payload)
         except MessageError:
@@ -170,7 +170,7 @@ def test_no_bytes_do_more_than_be_refused(payload: bytes) -> None:
 @pytest.mark.parametrize("payload", [b"", b"[]", b"null", b"{", b"\xff\xfe", b"[" * 5000, b'"' + b"x" * 100 + b'"'])
 def test_what_is_no_object_is_no_wish(payload: bytes) -> None:
     with pytest.raises(MessageError, match=r"^(not JSON|no object)$"):
-        LiveWish.decode(payload)
+        LiveSetpoints.decode(payload)
 
 
 def test_an_observation_comes_back_and_a_short_one_is_none() -> None:
@@ -183,8 +183,8 @@ def test_an_observation_comes_back_and_a_short_one_is_none() -> None:
 def test_a_report_comes_back_as_it_was() -> None:
     before, after = Command(1.0, 0.1), Command(-2.0, 0.0)
     report = Report(
-        trip=1, tick=2, late_ns=3, rung="hold", plan="w1", state="running", line=None, age_s=0.5,
-        wishes=WISH.wishes, requested=before, applied=after,
+        trip=1, tick=2, late_ns=3, level="hold", plan="w1", state="running", line=None, age_s=0.5,
+        setpoints=WISH.setpoints, requested=before, applied=after,
         interventions=(Intervention("gap", "Too close.", before, after),), clipped=("target_speed",),
         refused={"not JSON": 2}, missed=1, faults=0, speed_mps=20.0, lane="a-b:0", taken_over=True,
         said=("Changing to the left lane.",),

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from live_rig import Rig
 
-from chauffeur.concept import Limits, Parameters, ScenarioError, Wishes
+from chauffeur.concept import Limits, Parameters, ScenarioError, Setpoints
 from chauffeur.drive.live.messages import Report, Steered
-from chauffeur.drive.live.orders import PlannedScene
+from chauffeur.drive.live.plan_messages import PlannedScene
 from chauffeur.drive.live.policy import MOST_RESUMPTIONS
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import BUILT_IN, find
@@ -80,12 +80,12 @@ def test_parameters_are_checked_started_and_driven(begin: Begin) -> None:
     rig.order(PLAIN)
     wish = rig.period()
     assert rig.kinds() == [("started", "w1")]
-    assert (wish.plan, wish.state, wish.line, wish.wishes.target_speed_mps) == ("w1", "running", None, 22.0)
+    assert (wish.plan, wish.state, wish.line, wish.setpoints.target_speed_mps) == ("w1", "running", None, 22.0)
     assert wish.steered == Steered(PLAIN, rig.reports[-1].lane)
     rig.period(150)
     report = rig.reports[-1]
-    assert (report.rung, report.plan, report.refused) == ("follow", "w1", {})
-    assert (report.wishes.target_speed_mps, report.wishes.time_headway_s) == (22.0, 1.5)
+    assert (report.level, report.plan, report.refused) == ("follow", "w1", {})
+    assert (report.setpoints.target_speed_mps, report.setpoints.time_headway_s) == (22.0, 1.5)
     assert report.speed_mps == pytest.approx(22.0, abs=0.6)
     assert well(rig)
 
@@ -142,7 +142,7 @@ def test_other_numbers_on_the_way_leave_a_change_that_has_begun_alone(begin: Beg
     rig.order(Parameters(25.0, 14.0, 1.0), "w2")
     rig.period(100)
     assert lanes(rig) == [0, 1]
-    assert rig.reports[-1].wishes.target_speed_mps == 25.0
+    assert rig.reports[-1].setpoints.target_speed_mps == 25.0
 
 
 def test_a_turn_is_driven_and_the_next_numbers_keep_to_it(begin: Begin) -> None:
@@ -222,12 +222,12 @@ def test_a_program_takes_over_from_parameters_and_the_other_way_round(begin: Beg
     rig.period(20)
     rig.order(HOLD_20, "w2")
     wish = rig.period(20)
-    assert (wish.plan, wish.steered, wish.wishes.target_speed_mps) == ("w2", None, 20.0)
-    assert wish.wishes.target_lane == rig.reports[-1].lane
+    assert (wish.plan, wish.steered, wish.setpoints.target_speed_mps) == ("w2", None, 20.0)
+    assert wish.setpoints.target_lane == rig.reports[-1].lane
     rig.order(replace(PLAIN, target_speed_mps=24.0), "w3")
     wish = rig.period(20)
     assert wish.plan == "w3"
-    assert rig.reports[-1].wishes.target_speed_mps == 24.0
+    assert rig.reports[-1].setpoints.target_speed_mps == 24.0
     assert [kind for kind, _ in rig.kinds()] == ["started", "superseded", "started", "superseded", "started"]
     assert well(rig)
 
@@ -240,10 +240,12 @@ def test_limits_hold_whatever_control_is_told(begin: Begin) -> None:
     forged = replace(wish.steered, policy=replace(wish.steered.policy, target_speed_mps=90.0))
     for _ in range(100):
         seen = rig.bench.observed()
-        made = replace(wish, tick=seen.tick, issued_ns=rig.bench.now_ns, plan="x", wishes=Wishes(90.0), steered=forged)
-        rig.bench.wishes.write(made.encode())
+        made = replace(
+            wish, tick=seen.tick, issued_ns=rig.bench.now_ns, plan="x", setpoints=Setpoints(90.0), steered=forged
+        )
+        rig.bench.setpoints.write(made.encode())
         report = rig.bench.tick()
-    assert report.wishes.target_speed_mps == 18.0
+    assert report.setpoints.target_speed_mps == 18.0
     assert "target_speed" in report.clipped
     assert rig.bench.world.observe().ego.speed_mps <= 18.1
 
@@ -263,7 +265,7 @@ def test_the_gap_a_person_wants_at_least_is_kept(begin: Begin) -> None:
     rig = begin(start("cruise", limits=Limits(min_time_headway_s=2.5)))
     rig.order(PLAIN)
     rig.period(3)
-    assert rig.reports[-1].wishes.time_headway_s == 2.5
+    assert rig.reports[-1].setpoints.time_headway_s == 2.5
 
 
 def test_a_fault_in_a_lot_is_braked_for_with_the_wheel_held(begin: Begin, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -297,9 +299,9 @@ def test_parameters_that_lead_nowhere_are_refused_by_control_too_and_what_it_had
     for _ in range(3):
         made = replace(wish, tick=rig.bench.observed().tick, plan="x", issued_ns=rig.bench.now_ns)
         bad = Steered(replace(PLAIN, target_speed_mps=30.0, route="stadium"), None)
-        rig.bench.wishes.write(replace(made, steered=bad).encode())
+        rig.bench.setpoints.write(replace(made, steered=bad).encode())
         report = rig.bench.tick()
-    assert (report.plan, report.wishes.target_speed_mps) == ("w1", 22.0)
+    assert (report.plan, report.setpoints.target_speed_mps) == ("w1", 22.0)
     assert report.refused == {"no way for this policy": 3}
     assert report.faults == 0
 
@@ -310,9 +312,9 @@ def test_garbage_in_parameters_is_counted_and_the_last_good_wish_goes_on(begin: 
     wish = rig.period(3)
     fields = json.loads(wish.encode())
     fields["steered"]["ahead"] = -5.0
-    rig.bench.wishes.write(json.dumps(fields).encode())
+    rig.bench.setpoints.write(json.dumps(fields).encode())
     report = rig.bench.tick()
-    assert (report.rung, report.plan, report.refused) == ("follow", "w1", {"ahead out of range": 1})
+    assert (report.level, report.plan, report.refused) == ("follow", "w1", {"ahead out of range": 1})
 
 
 # Let go of ------------------------------------------------------------------------------------------------------------
@@ -320,15 +322,15 @@ def test_garbage_in_parameters_is_counted_and_the_last_good_wish_goes_on(begin: 
 
 def silence(rig: Rig, periods: int = 600) -> list[str]:
     """Rungs that control goes down when the policy is heard of no more, until the car stands."""
-    rungs: list[str] = []
+    levels: list[str] = []
     for _ in range(periods):
         report: Report = rig.bench.tick()
         rig.reports.append(report)
-        if not rungs or rungs[-1] != report.rung:
-            rungs.append(report.rung)
-        if report.speed_mps < 0.05 and report.rung == "stop":
+        if not levels or levels[-1] != report.level:
+            levels.append(report.level)
+        if report.speed_mps < 0.05 and report.level == "stop":
             break
-    return rungs
+    return levels
 
 
 @pytest.mark.parametrize("name", ["cruise", "following", "emergency-lane", "quiet-intersection", "parking"])
@@ -338,13 +340,13 @@ def test_silence_leads_down_the_ladder_to_a_stand_and_wishes_lead_back(begin: Be
     rig.order(Parameters(2.0 if slow else 20.0, 6.0, 1.0))
     rig.period(30)
     before = rig.reports[-1].lane
-    rungs = silence(rig)
-    assert rungs[:3] == ["follow", "hold", "keep"]
-    assert rungs[-1] == "stop"
+    levels = silence(rig)
+    assert levels[:3] == ["follow", "hold", "keep"]
+    assert levels[-1] == "stop"
     assert rig.reports[-1].speed_mps < 0.05
     assert well(rig)
     rig.period(100)
-    assert rig.reports[-1].rung == "follow"
+    assert rig.reports[-1].level == "follow"
     assert rig.reports[-1].speed_mps > 1.0
     if name == "emergency-lane":
         assert before is not None
@@ -358,10 +360,10 @@ def test_a_plan_that_expired_is_followed_no_longer(begin: Begin) -> None:
     rig = begin(start("cruise"))
     rig.order(PLAIN, expires_ns=rig.bench.now_ns + 10**9)
     rig.period(8)
-    assert rig.reports[-1].rung == "follow"
+    assert rig.reports[-1].level == "follow"
     rig.period(10)
-    assert rig.reports[-1].rung == "keep"
-    assert rig.reports[-1].wishes.time_headway_s >= 2.0
+    assert rig.reports[-1].level == "keep"
+    assert rig.reports[-1].setpoints.time_headway_s >= 2.0
 
 
 def test_parameters_go_on_when_the_process_dies_even_where_no_way_could_be_found_anew(begin: Begin) -> None:
@@ -376,7 +378,7 @@ def test_parameters_go_on_when_the_process_dies_even_where_no_way_could_be_found
         wish = rig.period(10)
         rig.die()
         silent = rig.bench.tick()
-        assert silent.rung in ("follow", "hold")
+        assert silent.level in ("follow", "hold")
         wish = rig.period()
         assert (wish.plan, wish.state) == ("w1", "running")
     while wish.state == "running" and len(rig.reports) < 800:
@@ -408,7 +410,7 @@ def test_trips_of_lots_follow_one_another_and_a_new_one_ends_the_parameters(begi
     rig.bench.control.begin_trip()
     wish = rig.period(2)
     assert (wish.trip, wish.plan, wish.steered) == (2, "", None)
-    assert rig.reports[-1].rung == "follow"
+    assert rig.reports[-1].level == "follow"
     assert rig.kinds() == [("started", "w1"), ("interrupted", "w1")]
 
 

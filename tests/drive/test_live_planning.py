@@ -14,7 +14,7 @@ from chauffeur.describe import describe_with_traffic
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live import planning as module
 from chauffeur.drive.live.mirror import Mirror
-from chauffeur.drive.live.orders import Order, Request, encode, read_brief, read_event, read_order
+from chauffeur.drive.live.plan_messages import PlanMessage, Request, encode, read_brief, read_event, read_order
 from chauffeur.drive.live.planning import Planning, PlanningRings
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import SIZES, RingName
@@ -81,7 +81,7 @@ class Rig:
     def kinds(self) -> list[tuple[str, str]]:
         return [(event.kind, event.wish) for event in self.told()]
 
-    def ordered(self) -> Order:
+    def ordered(self) -> PlanMessage:
         message = self.orders.latest()
         assert message is not None
         return read_order(message.payload)

@@ -11,8 +11,8 @@ from live_bench import OVERTAKE
 from live_rig import Rig
 
 from chauffeur.concept import Plan, Thoughts
-from chauffeur.drive.live.messages import LiveWish
-from chauffeur.drive.live.orders import PlannedScene
+from chauffeur.drive.live.messages import LiveSetpoints
+from chauffeur.drive.live.plan_messages import PlannedScene
 from chauffeur.drive.live.policy import MOST_RESUMPTIONS
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
@@ -71,7 +71,7 @@ def rig(tmp_path: Path, sandbox: Sandbox) -> Iterator[Rig]:
 def test_without_a_plan_it_wishes_what_is_and_shows_that_it_lives(rig: Rig) -> None:
     wish = rig.period(3)
     assert (wish.plan, wish.state, wish.tick) == ("", "none", 2)
-    assert rig.bench.tick().rung == "follow"
+    assert rig.bench.tick().level == "follow"
     assert rig.kinds() == []
 
 
@@ -79,7 +79,7 @@ def test_a_plan_is_checked_started_run_and_told_of(rig: Rig) -> None:
     rig.period(2)
     rig.order(HOLD_20)
     wish = rig.period()
-    assert (wish.plan, wish.state, wish.wishes.target_speed_mps) == ("w1", "running", 20.0)
+    assert (wish.plan, wish.state, wish.setpoints.target_speed_mps) == ("w1", "running", 20.0)
     assert wish.line is not None
     assert rig.kinds() == [("started", "w1")]
     assert rig.period(45).state == "finished"
@@ -93,7 +93,7 @@ def test_a_plan_that_crosses_the_limits_is_refused_and_what_is_driven_goes_on(ri
     rig.period(3)
     rig.order(TOO_FAST, "w2")
     wish = rig.period()
-    assert (wish.plan, wish.wishes.target_speed_mps) == ("w1", 20.0)
+    assert (wish.plan, wish.setpoints.target_speed_mps) == ("w1", 20.0)
     kinds = rig.kinds()
     assert kinds == [("started", "w1"), ("refused", "w2")]
 
@@ -104,7 +104,7 @@ def test_a_new_plan_takes_over_at_the_beginning_of_a_period_with_the_wishes_of_t
     assert rig.period().wishes.time_headway_s == 2.0
     rig.order(FASTER, "w2")
     wish = rig.period()
-    assert (wish.plan, wish.wishes.target_speed_mps, wish.wishes.time_headway_s) == ("w2", 31.0, 2.0)
+    assert (wish.plan, wish.setpoints.target_speed_mps, wish.setpoints.time_headway_s) == ("w2", 31.0, 2.0)
     assert rig.kinds() == [("started", "w1"), ("superseded", "w1"), ("started", "w2")]
 
 
@@ -116,7 +116,7 @@ def test_a_plan_begins_without_waiting_for_the_next_instant(rig: Rig) -> None:
     assert rig.policy.tick()
     message = rig.bench.wishes.latest()
     assert message is not None
-    assert LiveWish.decode(message.payload).plan == "w1"
+    assert LiveSetpoints.decode(message.payload).plan == "w1"
     assert not rig.policy.tick()
 
 
@@ -170,7 +170,7 @@ def test_a_program_that_fails_says_so_once_and_control_lets_go_of_its_wishes(rig
     rig.order(FAILS)
     assert rig.period(4).state == "failed"
     assert rig.kinds() == [("started", "w1"), ("failed", "w1")]
-    assert rig.bench.tick().rung == "keep"
+    assert rig.bench.tick().level == "keep"
 
 
 def test_a_program_goes_on_where_it_stood_when_its_process_dies(rig: Rig) -> None:
@@ -280,4 +280,4 @@ def test_a_program_that_fails_of_being_put_down_has_failed_and_the_policy_goes_o
     assert rig.kinds() == [("started", "w1"), ("failed", "w1")]
     rig.order(HOLD_20, "w2")
     wish = rig.period()
-    assert (wish.plan, wish.state, wish.wishes.target_speed_mps) == ("w2", "running", 20.0)
+    assert (wish.plan, wish.state, wish.setpoints.target_speed_mps) == ("w2", "running", 20.0)

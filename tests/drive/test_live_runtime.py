@@ -17,11 +17,11 @@ from chauffeur.concept import SandboxError
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live import supervisor
 from chauffeur.drive.live.messages import Report, WheelHand
-from chauffeur.drive.live.orders import TOOK_OVER
-from chauffeur.drive.live.remembering import trip_of
+from chauffeur.drive.live.plan_messages import TOOK_OVER
 from chauffeur.drive.live.settings import Settings, ring
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Runtime
+from chauffeur.drive.live.trip_memory import trip_of
 from chauffeur.drive.scenarios import find
 
 STARTS = (Start(find("overtake"), 3),)
@@ -56,7 +56,7 @@ def until(runtime: Runtime, holds: Callable[[], bool], within_s: float = 60.0) -
 
 
 def following(heard: Heard, wish: str) -> bool:
-    return bool(heard.reports) and (heard.reports[-1].plan, heard.reports[-1].rung) == (wish, "follow")
+    return bool(heard.reports) and (heard.reports[-1].plan, heard.reports[-1].level) == (wish, "follow")
 
 
 def test_a_wish_is_driven_while_every_other_process_is_killed(tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_a_wish_is_driven_while_every_other_process_is_killed(tmp_path: Path) ->
             runtime,
             lambda: any(event.kind == "resumed" for event in heard.events) or bool(runtime.interactions[wish].answer),
         )
-        until(runtime, lambda: heard.reports[-1].rung == "follow")
+        until(runtime, lambda: heard.reports[-1].level == "follow")
 
         planner = runtime.pid("planner")
         os.kill(planner, signal.SIGKILL)
@@ -148,7 +148,7 @@ def test_a_person_takes_the_wheel_and_gives_it_back(parameters: str) -> None:
         until(runtime, lambda: bool(heard.reports) and heard.reports[-1].taken_over)
         assert heard.reports[-1].wishes.target_speed_mps != 0.0
         runtime.take_over(False)
-        until(runtime, lambda: heard.reports[-1].rung == "follow")
+        until(runtime, lambda: heard.reports[-1].level == "follow")
         assert heard.reports[-1].plan == ""
 
         first = runtime.ask(SLOWER)
@@ -175,7 +175,7 @@ def test_a_person_takes_the_wheel_and_gives_it_back(parameters: str) -> None:
             other.write(WheelHand(True).encode())  # of nobody: the supervisor, who knows better, says so
         until(runtime, lambda: heard.reports[-1].taken_over)
         until(runtime, lambda: not heard.reports[-1].taken_over)
-    assert {report.rung for report in heard.reports if report.taken_over} == {"hand"}
+    assert {report.level for report in heard.reports if report.taken_over} == {"hand"}
     assert heard.reports[-1].faults == 0
     trip = trip_of(interaction, STARTS[0], 0.1, heard.reports[-1])
     assert trip is not None
@@ -185,14 +185,14 @@ def test_a_person_takes_the_wheel_and_gives_it_back(parameters: str) -> None:
 def test_a_policy_that_hangs_is_replaced_and_control_does_not_wait_for_it() -> None:
     heard = Heard()
     with Runtime(SETTINGS, heard) as runtime:
-        until(runtime, lambda: bool(heard.reports) and heard.reports[-1].rung == "follow")
+        until(runtime, lambda: bool(heard.reports) and heard.reports[-1].level == "follow")
         before = len(heard.reports)
         os.kill(runtime.pid("policy"), signal.SIGSTOP)
         until(runtime, lambda: bool(heard.replaced))
         assert heard.replaced[0].text == "It hung."
         driven = [report.tick for report in heard.reports[before:]]
         assert len(driven) > 2 and driven == sorted(set(driven)), "control went on meanwhile"
-        until(runtime, lambda: heard.reports[-1].rung == "follow")
+        until(runtime, lambda: heard.reports[-1].level == "follow")
 
 
 def test_a_killed_control_process_ends_the_drive_and_wishes_are_answered() -> None:

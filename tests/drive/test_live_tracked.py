@@ -15,8 +15,8 @@ from live_rig import Rig
 
 from chauffeur.concept import ActionMatrix, Limits, Scenario, Trajectory
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.live.messages import MOST_WAYPOINTS, LiveWish, MessageError, Report, Steered
-from chauffeur.drive.live.orders import PlannedScene
+from chauffeur.drive.live.messages import MOST_WAYPOINTS, LiveSetpoints, MessageError, Report, Steered
+from chauffeur.drive.live.plan_messages import PlannedScene
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Runtime
@@ -71,7 +71,7 @@ def test_a_trajectory_is_driven_to_its_end_and_no_further(begin: Callable[[Start
     assert forward == pytest.approx(10.0, abs=2.0)
     assert abs(left) < 0.1
     last = rig.reports[-1]
-    assert (last.rung, last.plan, last.faults, last.refused) == ("follow", "w1", 0, {})
+    assert (last.level, last.plan, last.faults, last.refused) == ("follow", "w1", 0, {})
     assert last.speed_mps < 0.1
 
 
@@ -104,7 +104,7 @@ def test_an_action_matrix_keeps_its_lane_and_goes_on_after_its_process_died(begi
     rig.die()
     rig.period(30)
     assert rig.kinds() == [("started", "w1"), ("resumed", "w1")]
-    assert {report.rung for report in rig.reports[2:]} <= {"follow", "hold"}
+    assert {report.level for report in rig.reports[2:]} <= {"follow", "hold"}
     assert len({report.lane for report in rig.reports}) == 1
     assert rig.reports[-1].faults == 0
 
@@ -115,10 +115,10 @@ def test_when_the_policy_is_silent_the_ladder_brakes_whatever_drives(begin: Call
     rig.period(10)
     for _ in range(190):
         rig.reports.append(rig.bench.tick())
-    rungs = list(dict.fromkeys(report.rung for report in rig.reports))
-    assert rungs[-4:] == ["hold", "keep", "slow", "stop"]
+    levels = list(dict.fromkeys(report.level for report in rig.reports))
+    assert levels[-4:] == ["hold", "keep", "slow", "stop"]
     assert rig.reports[-1].speed_mps < 15.0
-    assert all(report.wishes.target_speed_mps == 0.0 for report in rig.reports if report.rung == "stop")
+    assert all(report.setpoints.target_speed_mps == 0.0 for report in rig.reports if report.level == "stop")
     assert rig.reports[-1].faults == 0
 
 
@@ -160,7 +160,7 @@ def test_the_longest_trajectory_fits_where_wishes_are_written(begin: Callable[[S
     rig = begin(EMPTY_LOT)
     points = tuple((12345.678 + 0.001 * i, -9876.543) for i in range(MOST_WAYPOINTS))
     wish = rig.period()
-    assert isinstance(wish, LiveWish)
+    assert isinstance(wish, LiveSetpoints)
     pose = (12345.678, -9876.543, -3.14159, 22.345)
     rig.bench.wishes.write(replace(wish, steered=Steered(Trajectory(points, 0.1), "a" * 200, pose)).encode())
 

@@ -16,7 +16,7 @@ from chauffeur.concept import Command, Limits, Scenario
 from chauffeur.drive.actuate import actuate
 from chauffeur.drive.live.starts import Start
 from chauffeur.safety.shield import shield_for
-from chauffeur.safety.shield import foresight
+from chauffeur.safety.shield import rollout
 from chauffeur.worlds.highway import HighwayWorld
 
 def loaded():
@@ -30,7 +30,7 @@ before, rules = loaded(), set()
 world = HighwayWorld()
 world.reset(crossing, 4000)
 driver, shield = world.driver(), shield_for(world, Limits())
-wishes = driver.initial_wishes()
+wishes = driver.initial_setpoints()
 for _ in range(120):
     if world.ended:
         break

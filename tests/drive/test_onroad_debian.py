@@ -18,11 +18,11 @@ from ros_debian import LISTENER, rospy_node
 
 from chauffeur.concept import PersonId
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import OnRoad, OnRoadAnswer, open_books
+from chauffeur.drive.onroad import OnRoadAnswer, VehicleSession, open_books
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.audit import read_records, verify
-from chauffeur.worlds.ros.opening import open_vehicle
+from chauffeur.worlds.ros.factory import open_vehicle
 from chauffeur.worlds.ros.settings import read_settings
 
 pytestmark = [
@@ -49,7 +49,9 @@ def test_a_session_over_a_roscore_that_dies(tmp_path: Path) -> None:
     async def whole() -> None:
         car = open_vehicle(settings)
         with open_books(tmp_path / "audit.jsonl", file, settings.interface, dry_run=False) as books:
-            async with OnRoad(car, settings, planner, person=ana, memory=memory, books=books, tell=told.append) as road:
+            async with VehicleSession(
+                car, settings, planner, person=ana, memory=memory, books=books, tell=told.append
+            ) as road:
                 with (
                     debian.rosmaster(folder, port),
                     rospy_node(LISTENER, folder, port, "pure_pursuit", "follower") as follower,

@@ -15,9 +15,9 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "planners"))
 from server import ModelServer, silent, stream
 
 from chauffeur.describe.services import Sources, read_sources
-from chauffeur.drive.onroad import OnRoad, OnRoadAnswer
+from chauffeur.drive.onroad import OnRoadAnswer, VehicleSession
 from chauffeur.planners.registry import make_planner
-from chauffeur.worlds.ros.opening import open_vehicle
+from chauffeur.worlds.ros.factory import open_vehicle
 from chauffeur.worlds.ros.settings import parse_settings
 
 pytestmark = pytest.mark.server
@@ -42,7 +42,7 @@ def ask(server: ModelServer, folder: Path, *wishes: str) -> list[OnRoadAnswer]:
         planner = make_planner("talk2drive/openai/m", base_url=server.url)
         async with (
             Sources(read_sources(path)) as sources,
-            OnRoad(open_vehicle(settings, dry_run=True), settings, planner, sources=sources) as road,
+            VehicleSession(open_vehicle(settings, dry_run=True), settings, planner, sources=sources) as road,
         ):
             return [await road.ask(wish) for wish in wishes]
 
@@ -86,7 +86,7 @@ def test_a_stop_does_not_wait_for_a_model(server: ModelServer) -> None:
 
     async def whole() -> tuple[OnRoadAnswer, OnRoadAnswer]:
         planner = make_planner("talk2drive/openai/m", base_url=server.url)
-        async with OnRoad(open_vehicle(settings, dry_run=True), settings, planner) as road:
+        async with VehicleSession(open_vehicle(settings, dry_run=True), settings, planner) as road:
             slow = asyncio.create_task(road.ask("Slower, please."))
             while not server.requests:
                 await asyncio.sleep(0.005)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import chauffeur
-from chauffeur.drive.onroad import OnRoad
+from chauffeur.drive.onroad import VehicleSession
 
 SOURCE = Path(chauffeur.__file__).parent
 ONROAD = SOURCE / "drive" / "onroad"
@@ -64,7 +64,7 @@ def test_no_import_leads_to_engaging(start: str) -> None:
     assert inside
     reached = _reached(inside)
     assert ENGAGE not in reached
-    assert "chauffeur.worlds.ros.opening" in reached or start != "chauffeur.cli.vehicle_drive"  # the walk walks
+    assert "chauffeur.worlds.ros.factory" in reached or start != "chauffeur.cli.vehicle_drive"  # the walk walks
 
 
 def test_the_walk_finds_what_does_lead_there() -> None:
@@ -77,15 +77,15 @@ def test_a_session_that_ran_never_loaded_it(tmp_path: Path) -> None:
     program = """
 import asyncio, sys
 from pathlib import Path
-from chauffeur.drive.onroad import OnRoad
+from chauffeur.drive.onroad import VehicleSession
 from chauffeur.planners.registry import make_planner
-from chauffeur.worlds.ros.opening import open_vehicle
+from chauffeur.worlds.ros.factory import open_vehicle
 from chauffeur.worlds.ros.settings import read_settings
 
 settings = read_settings(Path(sys.argv[1]))
 
 async def whole():
-    async with OnRoad(open_vehicle(settings), settings, make_planner("talk2drive")) as road:
+    async with VehicleSession(open_vehicle(settings), settings, make_planner("talk2drive")) as road:
         for wish in ("Drive at 20 km/h.", "Engage!", "vehicle/engage", "stop"):
             print((await road.ask(wish)).status)
 
@@ -119,5 +119,5 @@ def test_one_door_to_the_vehicle() -> None:
 
 
 def test_what_a_session_offers() -> None:
-    public = {name for name in vars(OnRoad) if not name.startswith("_")}
+    public = {name for name in vars(VehicleSession) if not name.startswith("_")}
     assert public == {"ask", "asked", "close", "evaluate", "reached"}

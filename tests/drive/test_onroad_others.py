@@ -18,21 +18,21 @@ from ros_graph import FOLLOWER, REPLANNER, eventually
 
 from chauffeur.concept import Parameters
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import OnRoad
+from chauffeur.drive.onroad import VehicleSession
 from chauffeur.planners.registry import make_planner
-from chauffeur.worlds.ros.opening import open_vehicle
+from chauffeur.worlds.ros.factory import open_vehicle
 from chauffeur.worlds.ros.settings import parse_settings
 
 pytestmark = pytest.mark.server
 
 
-def drive(text: str, steps: Callable[[OnRoad], Awaitable[None]]) -> list[DriveEvent]:
+def drive(text: str, steps: Callable[[VehicleSession], Awaitable[None]]) -> list[DriveEvent]:
     told: list[DriveEvent] = []
     settings, planner = parse_settings(text), make_planner("talk2drive")
     car = open_vehicle(settings)
 
     async def whole() -> None:
-        async with OnRoad(car, settings, planner, tell=told.append, confirm_within_s=10.0) as road:
+        async with VehicleSession(car, settings, planner, tell=told.append, confirm_within_s=10.0) as road:
             assert (await road.reached(20.0)).link == "up"
             await steps(road)
 
@@ -51,7 +51,7 @@ def test_autoware_gets_a_velocity_limit_and_its_own_speed_counts() -> None:
     pytest.importorskip("cyclonedds", reason="cyclonedds is not installed: pip install 'chauffeur[ros]'")
     from test_ros_dds import DOMAIN, planner
 
-    async def steps(road: OnRoad) -> None:
+    async def steps(road: VehicleSession) -> None:
         await soon(lambda: road._vehicle.state().speed_mps and road._vehicle.state().mode)
         answer = await road.ask("A bit faster, please.")
         assert answer.status == "delivered", answer.words
@@ -73,7 +73,7 @@ def test_a_bridge_has_it_and_more_is_not_known() -> None:
     pytest.importorskip("websockets", reason="websockets is not installed: pip install 'chauffeur[ros]'")
     from test_ros_bridge import Bridge
 
-    async def steps(road: OnRoad) -> None:
+    async def steps(road: VehicleSession) -> None:
         answer = await road.ask("Drive at 20 km/h.")
         assert answer.status == "delivered", answer.words
         assert "who listens behind it is not known" in answer.words

@@ -18,10 +18,10 @@ from test_services_server import Asked, reply, roads_json, serving
 from chauffeur.concept import Parameters, Plan, PlanRequest, Thoughts
 from chauffeur.describe.services import Sources, Unknown, read_sources
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import OnRoad, OnRoadAnswer
+from chauffeur.drive.onroad import OnRoadAnswer, VehicleSession
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
-from chauffeur.worlds.ros.opening import open_vehicle
+from chauffeur.worlds.ros.factory import open_vehicle
 from chauffeur.worlds.ros.settings import parse_settings
 
 pytestmark = pytest.mark.server
@@ -40,7 +40,11 @@ def streets(limit: str) -> Callable[[Asked], bytes | None]:
 
 
 def drive(
-    folder: Path, url: str, planner: Planner, steps: Callable[[OnRoad, Sources], Awaitable[None]], budget_s: float = 5.0
+    folder: Path,
+    url: str,
+    planner: Planner,
+    steps: Callable[[VehicleSession, Sources], Awaitable[None]],
+    budget_s: float = 5.0,
 ) -> list[DriveEvent]:
     path = folder / "services.toml"
     path.write_text(
@@ -53,7 +57,9 @@ def drive(
     async def whole() -> None:
         async with (
             Sources(read_sources(path), environ={"OPENWEATHER_API_KEY": "k"}) as sources,
-            OnRoad(open_vehicle(settings, dry_run=True), settings, planner, sources=sources, tell=told.append) as road,
+            VehicleSession(
+                open_vehicle(settings, dry_run=True), settings, planner, sources=sources, tell=told.append
+            ) as road,
         ):
             await steps(road, sources)
 
@@ -64,7 +70,7 @@ def drive(
 def ask(folder: Path, url: str, planner: Planner, *wishes: str) -> tuple[list[OnRoadAnswer], str]:
     answers: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad, sources: Sources) -> None:
+    async def steps(road: VehicleSession, sources: Sources) -> None:
         for wish in wishes:
             answers.append(await road.ask(wish))
 
@@ -118,7 +124,7 @@ def test_a_limit_that_falls_while_it_is_planned(tmp_path: Path) -> None:
     sources_of: list[Any] = []
     answers: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad, sources: Sources) -> None:
+    async def steps(road: VehicleSession, sources: Sources) -> None:
         sources_of.append(sources)
         answers.append(await road.ask("Drive."))
 
@@ -134,7 +140,7 @@ def test_a_limit_that_falls_while_it_is_planned(tmp_path: Path) -> None:
 def test_services_that_hang_cost_their_budget_and_are_said(tmp_path: Path, embedded: Planner) -> None:
     answers: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad, sources: Sources) -> None:
+    async def steps(road: VehicleSession, sources: Sources) -> None:
         answers.append(await road.ask("Drive at 20 km/h."))
 
     with serving(lambda asked: None) as service:
@@ -148,7 +154,7 @@ def test_sources_that_break_are_said(tmp_path: Path, embedded: Planner, monkeypa
     async def broken(*_: Any, **__: Any) -> Any:
         raise ZeroDivisionError
 
-    async def steps(road: OnRoad, sources: Sources) -> None:
+    async def steps(road: VehicleSession, sources: Sources) -> None:
         monkeypatch.setattr(sources._services, "around", broken)
         found = await sources.look()
         assert isinstance(found, Unknown)

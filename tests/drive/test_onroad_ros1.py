@@ -21,7 +21,7 @@ from ros_graph import FOLLOWER, REPLANNER, Master, Subscriber, VelocityPublisher
 
 from chauffeur.concept import Parameters
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import OnRoad, OnRoadAnswer, open_books
+from chauffeur.drive.onroad import OnRoadAnswer, VehicleSession, open_books
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.audit import read_records, verify
@@ -49,7 +49,7 @@ def master() -> Iterator[Master]:
 
 
 def drive(
-    uri: str, planner: Planner, steps: Callable[[OnRoad, list[DriveEvent]], Awaitable[None]], **options: Any
+    uri: str, planner: Planner, steps: Callable[[VehicleSession, list[DriveEvent]], Awaitable[None]], **options: Any
 ) -> list[DriveEvent]:
     told: list[DriveEvent] = []
     settings = parse_settings(TEXT.format(uri=uri))
@@ -57,7 +57,7 @@ def drive(
     car = Ros1Vehicle(stack, Ros1Settings(master=uri), check_s=0.1)
 
     async def whole() -> None:
-        async with OnRoad(car, settings, planner, tell=told.append, **options) as road:
+        async with VehicleSession(car, settings, planner, tell=told.append, **options) as road:
             await steps(road, told)
 
     try:
@@ -90,7 +90,7 @@ def test_a_wish_is_with_the_vehicle_when_it_is_answered(master: Master, embedded
     answers: list[OnRoadAnswer] = []
     contexts: list[str] = []
 
-    async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
+    async def steps(road: VehicleSession, told: list[DriveEvent]) -> None:
         assert (await road.reached(10.0)).link == "up"
         await until(lambda: road._vehicle.state().speed_mps == 5.0)
         answers.append(await road.ask("A bit faster, please."))
@@ -114,7 +114,7 @@ def test_a_wish_is_with_the_vehicle_when_it_is_answered(master: Master, embedded
 def test_without_a_way_to_the_vehicle_nothing_waits_in_a_queue(master: Master, embedded: Planner) -> None:
     answers: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
+    async def steps(road: VehicleSession, told: list[DriveEvent]) -> None:
         await until(lambda: "Nobody listens" in road._vehicle.state().words)
         answers.append(await road.ask("Drive at 20 km/h."))
         follower, replanner = Subscriber(master, FOLLOWER), Subscriber(master, REPLANNER)
@@ -141,7 +141,7 @@ def test_a_roscore_that_dies_and_comes_back(tmp_path: Path, embedded: Planner) -
     fresh: list[Subscriber] = []
     answers: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
+    async def steps(road: VehicleSession, told: list[DriveEvent]) -> None:
         await road.reached(10.0)
         answers.append(await road.ask("Drive at 20 km/h."))
         for node in nodes:
@@ -178,7 +178,7 @@ def test_nodes_outlive_their_master(embedded: Planner) -> None:
     follower, replanner = Subscriber(graph, FOLLOWER), Subscriber(graph, REPLANNER)
     answers: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
+    async def steps(road: VehicleSession, told: list[DriveEvent]) -> None:
         await road.reached(10.0)
         answers.append(await road.ask("Drive at 20 km/h."))
         graph.close()
@@ -202,7 +202,7 @@ def test_a_node_that_takes_nothing_is_said_and_a_rise_is_taken_back(master: Mast
     follower, replanner = Subscriber(master, FOLLOWER), Subscriber(master, REPLANNER)
     answers: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
+    async def steps(road: VehicleSession, told: list[DriveEvent]) -> None:
         await road.reached(10.0)
         answers.append(await road.ask("Drive at 20 km/h."))
         state = road._vehicle.state
@@ -241,7 +241,7 @@ def test_shut_down_from_outside(master: Master, embedded: Planner) -> None:
     follower, replanner = Subscriber(master, FOLLOWER), Subscriber(master, REPLANNER)
     answers: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
+    async def steps(road: VehicleSession, told: list[DriveEvent]) -> None:
         await road.reached(10.0)
         (uri,) = [uri for name, uri in master.nodes.items() if name.startswith("/chauffeur")]
         await asyncio.to_thread(xmlrpc.client.ServerProxy(uri).shutdown, "/test", "user request")
@@ -259,7 +259,7 @@ def test_limits_of_the_interface_hold_whatever_was_checked(master: Master, embed
     follower, replanner = Subscriber(master, FOLLOWER), Subscriber(master, REPLANNER)
     answers: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad, told: list[DriveEvent]) -> None:
+    async def steps(road: VehicleSession, told: list[DriveEvent]) -> None:
         await road.reached(10.0)
         car, stricter = road._vehicle, parse_settings(TEXT.format(uri=master.uri).replace("10.0", "2.0")).stack
 

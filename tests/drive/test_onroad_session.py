@@ -31,7 +31,7 @@ from chauffeur.concept import (
 )
 from chauffeur.drive import questions
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import OnRoad, OnRoadAnswer, RoadBooks, open_books
+from chauffeur.drive.onroad import OnRoadAnswer, VehicleRecorder, VehicleSession, open_books
 from chauffeur.drive.onroad import session as onroad
 from chauffeur.drive.onroad.checks import fitted, is_about_engaging, is_stop
 from chauffeur.memory.vault import VaultMemory
@@ -39,7 +39,7 @@ from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.audit import read_records, verify, words_of
 from chauffeur.worlds.ros import VehicleLimits
-from chauffeur.worlds.ros.opening import open_vehicle
+from chauffeur.worlds.ros.factory import open_vehicle
 from chauffeur.worlds.ros.settings import SENTENCE, VehicleSettings, parse_settings
 
 ANA = PersonId("ana")
@@ -82,7 +82,7 @@ def gives(*speeds: float, **changed: Any) -> Asked:
 
 def drive(
     planner: Planner,
-    steps: Callable[[OnRoad], Awaitable[None]],
+    steps: Callable[[VehicleSession], Awaitable[None]],
     *,
     settings: VehicleSettings | None = None,
     **options: Any,
@@ -93,7 +93,7 @@ def drive(
     car = open_vehicle(settings, dry_run=True)
 
     async def whole() -> None:
-        async with OnRoad(car, settings, planner, tell=told.append, **options) as road:
+        async with VehicleSession(car, settings, planner, tell=told.append, **options) as road:
             await steps(road)
 
     asyncio.run(whole())
@@ -104,7 +104,7 @@ def drive(
 def ask(planner: Planner, *wishes: str, **options: Any) -> list[OnRoadAnswer]:
     answers: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad) -> None:
+    async def steps(road: VehicleSession) -> None:
         for wish in wishes:
             answers.append(await road.ask(wish))
 
@@ -129,7 +129,7 @@ def test_what_is_told_claims_nothing_of_a_road(embedded: Planner) -> None:
     plans: list[str] = []
     contexts: list[str] = []
 
-    async def steps(road: OnRoad) -> None:
+    async def steps(road: VehicleSession) -> None:
         for wish in (
             "Drive at 20 km/h.",
             "Faster.",
@@ -235,7 +235,7 @@ def test_faster_never_means_slower(embedded: Planner) -> None:
     answers: list[OnRoadAnswer] = []
 
     async def whole() -> None:
-        async with OnRoad(car, settings, embedded) as road:
+        async with VehicleSession(car, settings, embedded) as road:
             answers.append(await road.ask("Drive at 8 m/s."))
             car.speed_mps = 5.0
             answers.append(await road.ask("Faster!"))
@@ -259,7 +259,7 @@ def test_a_newer_wish_takes_the_place_of_one_that_is_planned() -> None:
     slow = Asked(forever)
     answers: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad) -> None:
+    async def steps(road: VehicleSession) -> None:
         older = asyncio.create_task(road.ask("Something slow."))
         while not slow.requests:
             await asyncio.sleep(0.001)
@@ -275,7 +275,7 @@ def test_a_newer_wish_takes_the_place_of_one_that_is_planned() -> None:
 def test_a_stop_gives_way_to_nothing() -> None:
     answers: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad) -> None:
+    async def steps(road: VehicleSession) -> None:
         stop = asyncio.create_task(road.ask("stop"))
         await asyncio.sleep(0)
         answers.append(await road.ask("Something else."))
@@ -293,7 +293,7 @@ def test_whoever_asks_may_give_up() -> None:
 
     slow = Asked(forever)
 
-    async def steps(road: OnRoad) -> None:
+    async def steps(road: VehicleSession) -> None:
         task = asyncio.create_task(road.ask("Something slow."))
         while not slow.requests:
             await asyncio.sleep(0.001)
@@ -314,7 +314,7 @@ def test_feedback_takes_no_wish_s_place() -> None:
 
     planner = Asked(slow)
 
-    async def steps(road: OnRoad) -> None:
+    async def steps(road: VehicleSession) -> None:
         wish = asyncio.create_task(road.ask("Drive."))
         while not planner.requests:
             await asyncio.sleep(0.001)
@@ -339,7 +339,7 @@ def test_listeners_and_memories_that_fail_take_nothing_down(caplog: pytest.LogCa
 
     async def whole() -> None:
         car = open_vehicle(settings, dry_run=True)
-        road = OnRoad(car, settings, gives(5.0), person=ANA, memory=Broken(), tell=deaf)  # type: ignore[arg-type]
+        road = VehicleSession(car, settings, gives(5.0), person=ANA, memory=Broken(), tell=deaf)  # type: ignore[arg-type]
         async with road:
             assert (await road.ask("Drive.")).status == "dry-run"
             assert (await road.evaluate("fine")).status == "declined"
@@ -365,7 +365,7 @@ def test_a_fault_of_ours_ends_one_wish(caplog: pytest.LogCaptureFixture) -> None
             return car.apply(parameters)
 
     async def whole() -> list[OnRoadAnswer]:
-        async with OnRoad(Faulty(), settings, gives(5.0)) as road:
+        async with VehicleSession(Faulty(), settings, gives(5.0)) as road:
             return [await road.ask("x"), await road.ask("y")]
 
     first, second = asyncio.run(whole())
@@ -398,7 +398,7 @@ def test_it_is_remembered_and_recalled(tmp_path: Path, embedded: Planner) -> Non
     memory = VaultMemory(tmp_path / "home")
     answers: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad) -> None:
+    async def steps(road: VehicleSession) -> None:
         answers.append(await road.ask("Drive at 30 km/h."))
         answers.append(await road.evaluate("That was too fast."))
 
@@ -406,7 +406,7 @@ def test_it_is_remembered_and_recalled(tmp_path: Path, embedded: Planner) -> Non
     assert [one.status for one in answers] == ["dry-run", "taken"]
     recalled: list[Any] = []
 
-    async def again(road: OnRoad) -> None:
+    async def again(road: VehicleSession) -> None:
         await road.ask("Drive at 30 km/h.")
 
     for event in drive(embedded, again, person=ANA, memory=memory):
@@ -430,7 +430,7 @@ def test_a_trip_says_what_it_was_and_what_was_not_measured(embedded: Planner) ->
 
     told = []
 
-    async def steps(road: OnRoad) -> None:
+    async def steps(road: VehicleSession) -> None:
         assert (await road.ask("Drive at 30 km/h.")).status == "dry-run"
         assert (await road.ask("Change to the left lane.")).status == "refused"
 
@@ -449,7 +449,7 @@ def test_a_trip_says_what_it_was_and_what_was_not_measured(embedded: Planner) ->
 def test_feedback_without_a_drive(tmp_path: Path, embedded: Planner) -> None:
     said: list[OnRoadAnswer] = []
 
-    async def steps(road: OnRoad) -> None:
+    async def steps(road: VehicleSession) -> None:
         said.append(await road.evaluate("too fast"))
         said.append(await road.evaluate("  "))
 
@@ -476,7 +476,7 @@ def test_the_log_holds_it_before_it_is_asked(tmp_path: Path, embedded: Planner) 
 
     async def whole() -> None:
         with open_books(path, file, "ros1", dry_run=True) as books:
-            async with OnRoad(Watched(), settings, embedded, person=ANA, books=books) as road:
+            async with VehicleSession(Watched(), settings, embedded, person=ANA, books=books) as road:
                 await road.ask("Drive at 20 km/h.")
                 await road.evaluate("nice")
                 await road.ask("Change to the left lane.")
@@ -500,7 +500,7 @@ def test_the_log_holds_it_before_it_is_asked(tmp_path: Path, embedded: Planner) 
     assert letters == ["C", "H", "S", "F", "C", "H", "S"]
 
 
-class Full(RoadBooks):
+class Full(VehicleRecorder):
     """Books on a disk that takes nothing."""
 
     def kept(self, within_s: float = 0.0) -> bool:
@@ -520,7 +520,7 @@ def test_what_cannot_be_written_down_is_not_asked_unless_it_slows(tmp_path: Path
 def test_the_program_in_the_documentation_runs(tmp_path: Path) -> None:
     page = Path(__file__).resolve().parents[2] / "docs" / "ros.md"
     programs = re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
-    (program,) = [one for one in programs if "OnRoad" in one]
+    (program,) = [one for one in programs if "VehicleSession" in one]
     (tmp_path / "vehicle.toml").write_text(FILE)
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
@@ -533,7 +533,7 @@ def test_the_program_in_the_documentation_runs(tmp_path: Path) -> None:
 
 
 def test_it_ends_with_what_stays(embedded: Planner) -> None:
-    async def steps(road: OnRoad) -> None:
+    async def steps(road: VehicleSession) -> None:
         await road.ask("Drive at 20 km/h.")
         assert road.asked is not None
 

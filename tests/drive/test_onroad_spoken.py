@@ -8,18 +8,18 @@ import pytest
 
 from chauffeur.concept import ChauffeurError
 from chauffeur.drive.onroad.spoken import listening
+from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.attention import Attention
-from chauffeur.drive.talk.hearing import HearingEngine
 from chauffeur.drive.talk.messages import Said
 
 
-def attention(engine: HearingEngine | None, said: list[Said]) -> Attention:
+def attention(engine: AsrEngine | None, said: list[Said]) -> Attention:
     return Attention(engine, None, None, said.append, lambda hotword, words: None)
 
 
 def test_an_engine_that_cannot_be_had_is_said_before_anything_is_listened_to() -> None:
     async def session() -> None:
-        async with listening(attention(HearingEngine("whisper", "/nowhere"), []), print):
+        async with listening(attention(AsrEngine("whisper", "/nowhere"), []), print):
             raise AssertionError
 
     with pytest.raises(ChauffeurError):

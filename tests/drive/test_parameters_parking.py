@@ -45,7 +45,7 @@ def test_it_parks_where_it_was_meant_to(place: str, policy: Parameters) -> None:
     assert values["parking-across-v1"] < 0.3
     assert values["parking-along-v1"] < 0.05
     assert values["parking-straight-v1"] < 5.0
-    assert episode.frames[-1].wishes.target_lane == spot.lane
+    assert episode.frames[-1].setpoints.target_lane == spot.lane
     assert world.parked() == spot.name
 
 

@@ -116,7 +116,7 @@ def test_it_stops_at_the_sign_and_takes_its_turn(route: str, shielded: bool) -> 
     short = stood[0].observation.ego.y_m - sign.y_m  # the approach leads to +y: more is nearer
     assert -3.5 < short < -2.5, "the front bumper stands just before the line"
     assert len(stood) * 0.1 >= 1.0
-    served = [frame.wishes.served_stops for frame in episode.frames]
+    served = [frame.setpoints.served_stops for frame in episode.frames]
     assert served[0] == frozenset()
     assert served[-1] == {sign.id}
 
@@ -132,10 +132,10 @@ def test_it_lets_crossing_traffic_go_first() -> None:
 
 def test_wishes_tell_which_lane_and_turn_are_meant() -> None:
     episode = _drive("intersection", Parameters(9.0, 6.0, 1.0), "left", True, 60.0)
-    assert {frame.wishes.turn for frame in episode.frames} == {"left"}
-    lanes = list(dict.fromkeys(frame.wishes.target_lane for frame in episode.frames))
+    assert {frame.setpoints.turn for frame in episode.frames} == {"left"}
+    lanes = list(dict.fromkeys(frame.setpoints.target_lane for frame in episode.frames))
     assert lanes == ["o0-ir0:0", "ir0-il1:0", "il1-o1:0"]
-    assert {frame.wishes.target_speed_mps for frame in episode.frames} == {9.0}
+    assert {frame.setpoints.target_speed_mps for frame in episode.frames} == {9.0}
 
 
 def test_the_car_stands_at_the_end_of_the_road_whatever_it_looks_ahead_to() -> None:

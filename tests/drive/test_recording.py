@@ -35,6 +35,7 @@ from chauffeur.concept import (
     Plan,
     Program,
     Scenario,
+    Setpoints,
     Situation,
     SystemMessage,
     Thoughts,
@@ -42,7 +43,6 @@ from chauffeur.concept import (
     Usage,
     VehicleState,
     Verdict,
-    Wishes,
 )
 from chauffeur.drive.foxglove import MESSAGES
 from chauffeur.drive.mcap_schemas import CHANNELS, LANES
@@ -96,8 +96,8 @@ observations = st.builds(
     st.booleans(),
     st.booleans(),
 )
-wishes = st.builds(
-    Wishes,
+setpoints = st.builds(
+    Setpoints,
     st.none() | any_numbers,
     numbers,
     st.none() | lane_ids,
@@ -108,7 +108,7 @@ commands = st.builds(Command, any_numbers, any_numbers)
 frames = st.builds(
     Frame,
     observations,
-    wishes,
+    setpoints,
     commands,
     commands,
     st.sampled_from(["none", "running", "finished", "failed"]),
@@ -167,7 +167,7 @@ def a_drive(ticks: int = 5, cars: int = 3) -> RecordedTrip:
     lanes = tuple(a_lane(f"a-b:{i}", ((0.0, -4.0 * i), (2e3, -4.0 * i)), limit=31.3) for i in (0, 1))
     command = Command(0.1, -0.2)
     taken = tuple(
-        Frame(an_observation(t, lanes, cars=cars), Wishes(), command, command, "running", 1) for t in range(ticks)
+        Frame(an_observation(t, lanes, cars=cars), Setpoints(), command, command, "running", 1) for t in range(ticks)
     )
     return RecordedTrip(
         a_trip(duration_s=ticks / 10), taken, a_scenario(), SystemMessage("S", "few-shot"), an_observation(ticks, lanes)

@@ -44,8 +44,8 @@ def driven(name: str, source: str, limits: Limits, max_s: float, *, shielded: bo
 def test_limits_bound_what_a_program_decides_while_it_drives(shielded: bool) -> None:
     limits = Limits(min_time_headway_s=0.8, max_speed_mps=24.0)
     episode = driven("following", TAILGATES, limits, 6.0, shielded=shielded)
-    assert {frame.wishes.time_headway_s for frame in episode.frames} == {0.8}
-    assert {frame.wishes.target_speed_mps for frame in episode.frames} == {24.0}
+    assert {frame.setpoints.time_headway_s for frame in episode.frames} == {0.8}
+    assert {frame.setpoints.target_speed_mps for frame in episode.frames} == {24.0}
     assert dict(episode.bounded) == {"target_speed": 60, "time_headway": 60}
 
 
@@ -54,15 +54,15 @@ def test_parameters_are_bound_as_well() -> None:
     world.reset(find("cruise"))
     limits = Limits(min_time_headway_s=2.0, max_speed_mps=20.0)
     episode = drive_policy(world, Parameters(40.0, 10.0, 1.0), None, 2.0, limits)
-    assert all(frame.wishes.target_speed_mps == 20.0 for frame in episode.frames)
-    assert all(frame.wishes.time_headway_s >= 2.0 for frame in episode.frames)
+    assert all(frame.setpoints.target_speed_mps == 20.0 for frame in episode.frames)
+    assert all(frame.setpoints.time_headway_s >= 2.0 for frame in episode.frames)
 
 
 def test_a_benchmarks_own_rules_bound_nothing() -> None:
     world = make_world(find("following"))
     world.reset(find("following"))
     episode = drive_program(world, TAILGATES, None, 1.0)
-    assert {frame.wishes.time_headway_s for frame in episode.frames} == {0.09}
+    assert {frame.setpoints.time_headway_s for frame in episode.frames} == {0.09}
     assert episode.bounded == ()
 
 

@@ -149,11 +149,11 @@ def test_every_kind_is_driven_by_the_executor_of_its_kind_and_held_back(policy: 
     with closing(executor_for(policy, world)) as executor:
         executor.start(policy, world.observe(), Limits())
         tick = executor.tick()
-        assert tick.wishes.target_speed_mps is not None
-        assert tick.wishes.target_speed_mps > 10.0
-        free = executor.step(world.observe(), tick.wishes)
+        assert tick.setpoints.target_speed_mps is not None
+        assert tick.setpoints.target_speed_mps > 10.0
+        free = executor.step(world.observe(), tick.setpoints)
         executor.tick()
-        held = executor.step(world.observe(), replace(tick.wishes, target_speed_mps=0.5))
+        held = executor.step(world.observe(), replace(tick.setpoints, target_speed_mps=0.5))
     assert held.acceleration_mps2 < min(free.acceleration_mps2, 0.0)
 
 

@@ -10,7 +10,7 @@ import pytest
 from chauffeur.bench.chaos.judge import judge, recovery
 from chauffeur.bench.chaos.outside import HeardOutside
 from chauffeur.bench.chaos.witness import Stall
-from chauffeur.concept import Command, Wishes
+from chauffeur.concept import Command, Setpoints
 from chauffeur.drive.actuate import actuate
 from chauffeur.drive.live.messages import Report
 from chauffeur.drive.live.starts import Start
@@ -21,28 +21,29 @@ from chauffeur.worlds.highway import HighwayWorld
 PERIOD_S = 0.1
 START = Start(find("overtake"), 17)
 
-Hands = Callable[[HighwayWorld, Wishes], Command]
+CommandSource = Callable[[HighwayWorld, Setpoints], Command]
 
 
-def own_driver(world: HighwayWorld, wishes: Wishes) -> Command:
-    return world.driver().command(world.driver().settle(wishes))
+def own_driver(world: HighwayWorld, setpoints: Setpoints) -> Command:
+    return world.driver().command(world.driver().settle(setpoints))
 
 
-def drive(ticks: int, hands: Hands = own_driver, *, shielded: bool = True) -> list[HeardOutside]:
+def drive(ticks: int, hands: CommandSource = own_driver, *, shielded: bool = True) -> list[HeardOutside]:
     """What control would report of a trip, a period each."""
     world = HighwayWorld()
     world.reset(START.scenario, START.seed)
     shield = Shield(world.dt_s, START.limits) if shielded else None
-    wishes = world.driver().initial_wishes()
+    setpoints = world.driver().initial_setpoints()
     heard: list[HeardOutside] = []
     for tick in range(ticks):
         if world.ended:
             break
         observation = world.observe()
-        done = actuate(world, observation, hands(world, wishes), None, shield)
+        done = actuate(world, observation, hands(world, setpoints), None, shield)
         report = Report(
-            trip=1, tick=tick, late_ns=0, rung="follow", plan="w1", state="running", line=1, age_s=0.05, wishes=wishes,
-            requested=done.requested, applied=done.applied, interventions=done.interventions, clipped=(), refused={},
+            trip=1, tick=tick, late_ns=0, level="follow", plan="w1", state="running", line=1, age_s=0.05,
+            setpoints=setpoints, requested=done.requested, applied=done.applied,
+            interventions=done.interventions, clipped=(), refused={},
             missed=0, faults=0, speed_mps=observation.ego.speed_mps, lane=observation.ego.lane,
         )  # fmt: skip
         heard.append(HeardOutside(report, round((tick + 1) * PERIOD_S * 1e9)))
@@ -72,7 +73,7 @@ def test_a_good_trip_is_safe(trip) -> None:
 
 def test_a_plan_nobody_checked_is_seen_where_it_is_followed(trip) -> None:
     assert "w7" in unsafe(changed(trip, 20, plan="w7"))[0]
-    assert unsafe(changed(trip, 20, plan="w7", rung="keep")) == ()
+    assert unsafe(changed(trip, 20, plan="w7", level="keep")) == ()
     assert judge(changed(trip, 20, plan="w7"), START, ("w1",), PERIOD_S).unsafe(ignored_plans=("w7",)) == ()
 
 
@@ -110,7 +111,7 @@ def test_silence_is_excused_only_while_the_machine_itself_stood_still(trip) -> N
 
 
 def test_an_ego_that_runs_into_its_leader_is_to_blame() -> None:
-    heard = drive(300, lambda world, wishes: Command(5.0, own_driver(world, wishes).steering_rad), shielded=False)
+    heard = drive(300, lambda world, setpoints: Command(5.0, own_driver(world, setpoints).steering_rad), shielded=False)
     deeds = judge(heard, START, ("w1",), PERIOD_S)
     assert (deeds.outcome, deeds.blamed) == ("collision", "ego")
     assert "collision of the ego's making" in deeds.unsafe()
@@ -118,7 +119,7 @@ def test_an_ego_that_runs_into_its_leader_is_to_blame() -> None:
 
 
 def test_an_ego_that_leaves_the_road_is_seen() -> None:
-    deeds = judge(drive(100, lambda world, wishes: Command(0.0, 0.4), shielded=False), START, ("w1",), PERIOD_S)
+    deeds = judge(drive(100, lambda world, setpoints: Command(0.0, 0.4), shielded=False), START, ("w1",), PERIOD_S)
     assert deeds.outcome in ("off_road", "collision")
     assert deeds.unsafe()
 
@@ -128,10 +129,10 @@ def test_recovery_is_counted_from_the_fault(trip) -> None:
     assert recovery(trip, (), fault_ns, ()).to_follow_s == 0.0
     down = trip
     for place in range(12, 20):
-        down = changed(down, place, rung="keep" if place > 15 else "hold")
+        down = changed(down, place, level="keep" if place > 15 else "hold")
     found = recovery(changed(down, 25, plan="w2"), (), fault_ns, ("w2",))
     assert (found.worst, found.to_follow_s, found.to_new_plan_s) == ("keep", 1.0, 1.5)
     for place in range(20, 40):
-        down = changed(down, place, rung="stop")
+        down = changed(down, place, level="stop")
     assert recovery(down, (), fault_ns, ()).to_follow_s is None
     assert recovery(down, [replace(trip[0], at_ns=fault_ns + 9_000_000_000)], fault_ns, ()).to_follow_s == 9.0

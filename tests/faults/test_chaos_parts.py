@@ -17,8 +17,8 @@ from chauffeur.bench.chaos.model import FAULTS, ModelServer, Script
 from chauffeur.bench.chaos.table import failures, figures, headline, table_markdown
 from chauffeur.bench.chaos.vandal import DEEDS, Vandal
 from chauffeur.bench.chaos.witness import Stall, Witness, stood_ns
-from chauffeur.concept import Wishes
-from chauffeur.drive.live.messages import LiveWish, MessageError, MirroredInstant
+from chauffeur.concept import Setpoints
+from chauffeur.drive.live.messages import LiveSetpoints, MessageError, MirroredInstant
 from chauffeur.drive.live.settings import SIZES, ring
 
 FOREVER_NS = (1 << 63) - 1
@@ -28,7 +28,7 @@ FOREVER_NS = (1 << 63) - 1
 def rings(tmp_path):
     made = {name: ring(tmp_path, name, create=True) for name in SIZES}
     made["observations"].write(MirroredInstant(3, 40, b"x").encode())
-    wish = LiveWish(3, 40, "w1", time.monotonic_ns(), FOREVER_NS, "running", 1, Wishes(20.0))
+    wish = LiveSetpoints(3, 40, "w1", time.monotonic_ns(), FOREVER_NS, "running", 1, Setpoints(20.0))
     made["wishes"].write(wish.encode())
     yield made
     for each in made.values():
@@ -46,10 +46,10 @@ def test_whatever_the_vandal_does_a_reader_gets_a_message_or_none(tmp_path, ring
         message = each.latest()
         if name == "wishes" and message is not None:
             try:
-                wish = LiveWish.decode(message.payload)
+                wish = LiveSetpoints.decode(message.payload)
             except MessageError:
                 continue
-            assert 0.0 <= (wish.wishes.target_speed_mps or 0.0) <= 100.0
+            assert 0.0 <= (wish.setpoints.target_speed_mps or 0.0) <= 100.0
 
 
 def asked(url: str, words: str) -> tuple[int, bytes]:
@@ -108,7 +108,7 @@ def test_the_table_counts_and_names_what_failed() -> None:
     ]
     found = figures(rows)["policy-killed"]
     assert (found["cases"], found["unsafe"], found["lost"], found["missed"]) == ("4", "2", "1", "13")
-    assert (found["worst rung"], found["back s p50"], found["not back"]) == ("stop", "0.50", "1")
+    assert (found["worst level"], found["back s p50"], found["not back"]) == ("stop", "0.50", "1")
     assert len(failures(rows)) == 3 and "case 2" in failures(rows)[0]
     assert "4 cases 2 led to unsafe actuation and 1 of 4 wishes" in headline(rows)
     assert (

@@ -6,11 +6,11 @@ import math
 from dataclasses import replace
 
 from chauffeur.concept import (
-    Alignment,
     ApiCall,
     Causes,
     Command,
     Context,
+    Faithfulness,
     Feedback,
     Frame,
     History,
@@ -26,12 +26,12 @@ from chauffeur.concept import (
     Plan,
     Program,
     Scenario,
+    Setpoints,
     Situation,
     Thoughts,
     Trip,
     VehicleState,
     Verdict,
-    Wishes,
 )
 from chauffeur.drive.recording import RecordedTrip
 from roads import a_lane, a_road
@@ -171,7 +171,7 @@ def highway_trip(
         frames.append(
             Frame(
                 Observation(time, tick, "highway", ego, others, (), a_road(lanes), front, None, False, False),
-                Wishes(target, 1.5, f"a-b:{0 if time >= 6 else 1}"),
+                Setpoints(target, 1.5, f"a-b:{0 if time >= 6 else 1}"),
                 Command(acceleration * 1.1, 0.0),
                 Command(acceleration, 0.001 * tick),
                 "running" if running else "finished",
@@ -204,7 +204,7 @@ def guarded(recorded: RecordedTrip) -> RecordedTrip:
     return replace(recorded, frames=tuple(frames))
 
 
-TOLD = Alignment(
+TOLD = Faithfulness(
     False,
     0.25,
     (
@@ -274,8 +274,8 @@ def intersection_trip(wish: str = "Take the next left, please.", seconds: float 
         command = Command(acceleration, 0.0)
         served = frozenset({1000}) if time > 13 else frozenset[int]()
         said = ("Waiting for the crossing traffic.",) if tick == 110 else ()
-        wishes = Wishes(8.0, 1.5, None, "left", served)
-        frames.append(Frame(shot, wishes, command, command, "running", 5 if time < 13 else 8, said, ()))
+        setpoints = Setpoints(8.0, 1.5, None, "left", served)
+        frames.append(Frame(shot, setpoints, command, command, "running", 5 if time < 13 else 8, said, ()))
         speed = max(0.0, speed + acceleration * 0.1)
         travelled += speed * 0.1
     program = OVERTAKE.replace("overtake_left", "turn_left")

@@ -11,9 +11,9 @@ from sample_trips import OVERTAKE, guarded, highway_trip, intersection_trip
 from chauffeur.concept import Causes, Command, Feedback, Lane, Metric, Parameters, Trajectory
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
+from chauffeur.hmi.interventions import rule_counts, stretches_of
 from chauffeur.hmi.payload import policy_words, program_tokens
 from chauffeur.hmi.road import Bounds, draw_road
-from chauffeur.hmi.shielding import rule_counts, stretches_of
 from chauffeur.hmi.view import facing_right, frame_drive, in_picture, instants_of
 from roads import a_lane, a_road
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from chauffeur.language.sorter import load_sorter
+from chauffeur.language.text_classifier import load_sorter
 from chauffeur.language.weather import SAID_WEATHERS, WEIGHTS, said_weather
 
 

@@ -15,7 +15,7 @@ from chauffeur.bench.personalization.sayings import feedback, wishes
 from chauffeur.cli.main import app
 from chauffeur.concept import DataError
 from chauffeur.concept.data import DATA_VARIABLE
-from chauffeur.language.sorter import load_sorter
+from chauffeur.language.text_classifier import load_sorter
 from chauffeur.language.tokens import tokens_of
 from chauffeur.language.weather import SAID_WEATHERS
 from chauffeur.memory import remarks

@@ -6,8 +6,8 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any
 
-from chauffeur.concept import ApiCall, ProgramState, Wishes
-from chauffeur.programs import APIS, DrivingApis, starting_wishes
+from chauffeur.concept import ApiCall, ProgramState, Setpoints
+from chauffeur.programs import APIS, DrivingApis, starting_setpoints
 from chauffeur.programs.rewrite import main_function, parse
 from chauffeur.worlds.base import World
 
@@ -17,7 +17,7 @@ class Trace:
     """One control period, as both runners report it."""
 
     state: ProgramState
-    wishes: Wishes
+    setpoints: Setpoints
     said: tuple[str, ...]
     calls: tuple[ApiCall, ...]
     line: int | None
@@ -30,7 +30,7 @@ class BareRunner:
     def __init__(self, source: str, world: World) -> None:
         self._world = world
         perception = world.perception()
-        self.apis = DrivingApis(perception, world.driver(), starting_wishes(perception))
+        self.apis = DrivingApis(perception, world.driver(), starting_setpoints(perception))
         names: dict[str, Any] = {api: self._bound(api) for api in APIS}
         main = main_function(parse(source))
         assert main is not None
@@ -59,7 +59,7 @@ class BareRunner:
         if state != "running":
             self._generator = None
         self.apis.settle()
-        return Trace(state, self.apis.wishes, self.apis.said, self.apis.calls, line, error)
+        return Trace(state, self.apis.setpoints, self.apis.said, self.apis.calls, line, error)
 
 
 def _line(generator: Any) -> int:

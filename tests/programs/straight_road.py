@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from chauffeur.concept import Command, LaneId, Observation, VehicleState, Wishes
+from chauffeur.concept import Command, LaneId, Observation, Setpoints, VehicleState
 from chauffeur.worlds.base import EGO
 
 LIMIT_MPS = 31.0
@@ -116,15 +116,15 @@ class StraightRoad:
         wanted = 6.0 + time_headway_s * follower.speed_mps
         return 6.0 * (1.0 - (wanted / gap) ** 2) + (leader.speed_mps - follower.speed_mps)
 
-    def settle(self, wishes: Wishes) -> Wishes:
+    def settle(self, setpoints: Setpoints) -> Setpoints:
         ego = self.cars[EGO]
-        speed = ego.speed_mps if wishes.target_speed_mps is None else wishes.target_speed_mps
-        return replace(wishes, target_speed_mps=speed, target_lane=wishes.target_lane or LANES[ego.lane])
+        speed = ego.speed_mps if setpoints.target_speed_mps is None else setpoints.target_speed_mps
+        return replace(setpoints, target_speed_mps=speed, target_lane=setpoints.target_lane or LANES[ego.lane])
 
-    def command(self, wishes: Wishes) -> Command:
+    def command(self, setpoints: Setpoints) -> Command:
         self.commands += 1
         ego = self.cars[EGO]
-        assert wishes.target_speed_mps is not None
-        assert wishes.target_lane is not None
-        acceleration = max(-5.0, min(5.0, wishes.target_speed_mps - ego.speed_mps))
-        return Command(acceleration, float(LANES.index(wishes.target_lane) - ego.lane))
+        assert setpoints.target_speed_mps is not None
+        assert setpoints.target_lane is not None
+        acceleration = max(-5.0, min(5.0, setpoints.target_speed_mps - ego.speed_mps))
+        return Command(acceleration, float(LANES.index(setpoints.target_lane) - ego.lane))

@@ -38,7 +38,7 @@ WORLDS: dict[str, Callable[[], World]] = {
 def _trace(result: TickResult) -> Trace:
     error = result.error.exception if isinstance(result.error, ProgramRaisedError) else str(result.error or "")
     line = result.line if result.state == "running" else None
-    return Trace(result.state, result.wishes, result.said, result.calls, line, error)
+    return Trace(result.state, result.setpoints, result.said, result.calls, line, error)
 
 
 def _drive(tick: Callable[[], Trace], world: World, ticks: int) -> list[Trace]:

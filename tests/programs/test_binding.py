@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from straight_road import CROSS, LANES, StraightRoad
 
 from chauffeur.concept import LaneId
-from chauffeur.programs import APIS, CATALOGUE, DrivingApis, render_docs, starting_wishes
+from chauffeur.programs import APIS, CATALOGUE, DrivingApis, render_docs, starting_setpoints
 from chauffeur.programs.catalogue import argument_problem
 from chauffeur.programs.errors import BadArgumentTypeError, BadArgumentValueError
 from chauffeur.programs.handles import HandleTable, describe, lane_handle
@@ -34,7 +34,7 @@ class Caller:
 
     def __init__(self, road: StraightRoad) -> None:
         self.road = road
-        self.apis = DrivingApis(road, road, starting_wishes(road))
+        self.apis = DrivingApis(road, road, starting_setpoints(road))
 
     def __call__(self, name: str, *args: Any, **kwargs: Any) -> Any:
         return self.apis.call(name, args, kwargs)
@@ -77,7 +77,7 @@ def test_argument_shapes() -> None:
 def test_starts_as_lampilot_starts(call: Caller) -> None:
     assert call("get_target_speed") == 25.0
     assert call("get_desired_time_headway") == 1.5
-    assert call.apis.wishes.target_lane == LANES[1]
+    assert call.apis.setpoints.target_lane == LANES[1]
     assert call("get_ego_vehicle") == "veh:0"
     assert call("get_speed_limit") == 31.0
 
@@ -106,7 +106,7 @@ def test_lanes_beside(call: Caller) -> None:
     left, right = call("get_left_lane", ego), call("get_right_lane")
     assert (left, right) == ("lane:a-b:0", "lane:a-b:2")
     call("set_target_lane", left)
-    assert call.apis.wishes.target_lane == LANES[0]
+    assert call.apis.setpoints.target_lane == LANES[0]
     call.road.cars[EGO] = replace(call.road.cars[EGO], lane=0)
     assert call("get_left_lane", ego) is None
     assert call("get_lane_of", ego) == left
@@ -149,29 +149,29 @@ def test_safe_to_enter_asks_front_and_rear_with_the_present_headway(call: Caller
 def test_stop_sign_is_left_only_from_standstill_in_front_of_it(call: Caller) -> None:
     assert call("detect_stop_sign_ahead") == 300.0
     call("recover_from_stop")
-    assert call.apis.wishes.served_stops == frozenset()
+    assert call.apis.setpoints.served_stops == frozenset()
     call.road.cars[EGO] = replace(call.road.cars[EGO], speed_mps=0.9)
     call("recover_from_stop")
-    assert call.apis.wishes.served_stops == frozenset()  # a car, not the sign, is in front
+    assert call.apis.setpoints.served_stops == frozenset()  # a car, not the sign, is in front
     call.road.cars[1] = replace(call.road.cars[1], lane=0)
     call("recover_from_stop")
-    assert call.apis.wishes.served_stops == frozenset()  # the sign is 300 m away
+    assert call.apis.setpoints.served_stops == frozenset()  # the sign is 300 m away
     call.road.cars[EGO] = replace(call.road.cars[EGO], x_m=391.9)
     call("recover_from_stop")
-    assert call.apis.wishes.served_stops == frozenset()
+    assert call.apis.setpoints.served_stops == frozenset()
     call.road.cars[EGO] = replace(call.road.cars[EGO], x_m=392.1, speed_mps=1.0)
     call("recover_from_stop")
-    assert call.apis.wishes.served_stops == frozenset()  # rolling
+    assert call.apis.setpoints.served_stops == frozenset()  # rolling
     call.road.cars[EGO] = replace(call.road.cars[EGO], speed_mps=0.9)
     call("recover_from_stop")
-    assert call.apis.wishes.served_stops == frozenset({9})
+    assert call.apis.setpoints.served_stops == frozenset({9})
     assert call("detect_stop_sign_ahead") == -1.0
 
 
 def test_turns_and_crossing_lanes(call: Caller) -> None:
     for name, turn in (("turn_left", "left"), ("turn_right", "right"), ("go_straight", "straight")):
         call(f"{name}_at_next_intersection")
-        assert call.apis.wishes.turn == turn
+        assert call.apis.setpoints.turn == turn
     assert call("get_left_to_right_cross_traffic_lanes") == [lane_handle(CROSS[0])]
     lanes = call("get_right_to_left_cross_traffic_lanes")
     assert lanes == [lane_handle(CROSS[1])]
@@ -254,15 +254,15 @@ _VALUES = st.recursive(
 )
 def test_any_call_answers_or_is_refused_in_words(name: str, args: list[Any], kwargs: dict[str, Any]) -> None:
     road = StraightRoad()
-    apis = DrivingApis(road, road, starting_wishes(road))
+    apis = DrivingApis(road, road, starting_setpoints(road))
     try:
         apis.call(name, args, kwargs)
     except (BadArgumentTypeError, BadArgumentValueError) as error:
         assert 5 < len(str(error)) < 300
-    speed = apis.wishes.target_speed_mps
+    speed = apis.setpoints.target_speed_mps
     assert speed is not None
     assert 0 <= speed <= 1000
-    assert 0.01 <= apis.wishes.time_headway_s <= 2.0
+    assert 0.01 <= apis.setpoints.time_headway_s <= 2.0
     assert len(apis.calls) == 1
 
 

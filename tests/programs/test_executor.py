@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from straight_road import LANES, StraightRoad
 
-from chauffeur.concept import LaneId, Program, SandboxError, Wishes
+from chauffeur.concept import LaneId, Program, SandboxError, Setpoints
 from chauffeur.programs import (
     UNHURRIED,
     Budget,
@@ -52,7 +52,7 @@ def _run(executor: ProgramExecutor, road: StraightRoad, ticks: int) -> list[obje
     for _ in range(ticks):
         result = executor.tick()
         results.append(result)
-        road.step(road.command(result.wishes))
+        road.step(road.command(result.setpoints))
     return results
 
 
@@ -74,14 +74,14 @@ def test_wishes_stay_when_a_program_has_finished_or_failed(executor: ProgramExec
         for _ in range(3):
             result = executor.tick()
             assert result.state == state
-            assert result.wishes == Wishes(29.0, 1.5, LANES[1])
+            assert result.setpoints == Setpoints(29.0, 1.5, LANES[1])
 
 
 def test_a_program_can_take_over_anothers_wishes(executor: ProgramExecutor, road: StraightRoad) -> None:
-    held = Wishes(28.0, 0.9, LANES[2], "left", frozenset({9}))
-    executor.start("def main():\n    say(str(get_desired_time_headway()))\n    yield\n", road, wishes=held)
+    held = Setpoints(28.0, 0.9, LANES[2], "left", frozenset({9}))
+    executor.start("def main():\n    say(str(get_desired_time_headway()))\n    yield\n", road, setpoints=held)
     result = executor.tick()
-    assert result.wishes == held
+    assert result.setpoints == held
     assert result.said == ("0.9",)
 
 
@@ -112,7 +112,7 @@ def test_refusal_names_line_and_remedy(executor: ProgramExecutor, road: Straight
     assert isinstance(result.error, ProgramRefusedError)
     assert result.line == 2
     assert "did you mean get_speed_of?" in str(result.error)
-    assert result.wishes.target_speed_mps == 25.0
+    assert result.setpoints.target_speed_mps == 25.0
 
 
 def test_time_without_a_line_falls_back_to_where_it_waited(road: StraightRoad) -> None:

@@ -98,8 +98,8 @@ def _assert_contained(attack: Attack) -> None:
     assert SECRET not in words
     assert "root:" not in words
     assert str(Path.cwd()) not in words
-    assert attack.result.wishes.target_speed_mps is not None
-    assert attack.result.wishes.target_speed_mps < 100
+    assert attack.result.setpoints.target_speed_mps is not None
+    assert attack.result.setpoints.target_speed_mps < 100
     assert len(str(attack.result.error)) < 700
     if attack.outcome != "harmless":
         assert attack.result.state == "failed"
@@ -145,7 +145,7 @@ def test_a_benign_program_runs_right_after_every_kind_of_attack(strict: Sandbox)
             ready_s = time.perf_counter() - before
             result = executor.tick()
         assert result.state == "running", result.error
-        assert result.wishes.target_speed_mps == 27.0
+        assert result.setpoints.target_speed_mps == 27.0
         assert ready_s < TICK_BOUND_S
 
 

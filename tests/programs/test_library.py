@@ -41,7 +41,7 @@ def drive(sandbox: Sandbox, source: str, library: str = "") -> list[tuple[str, t
         executor.start(source, StraightRoad())
         ticks = [executor.tick() for _ in range(5)]
     assert all(tick.error is None for tick in ticks), ticks[-1].error
-    return [(tick.state, tick.said, tick.wishes.target_speed_mps) for tick in ticks]
+    return [(tick.state, tick.said, tick.setpoints.target_speed_mps) for tick in ticks]
 
 
 @pytest.mark.parametrize("name", ["a", "other", "aV2"])

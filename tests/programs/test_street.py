@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import pytest
 from straight_road import StraightRoad
 
-from chauffeur.concept import Command, Wishes
+from chauffeur.concept import Command, Setpoints
 from chauffeur.programs import ProgramExecutor, check_source, render_docs
 from chauffeur.programs.catalogue import APIS, NOTHING_AHEAD_M, TOWN_APIS, TOWN_CALLS, vocabulary_of
 
@@ -61,11 +61,11 @@ class Town:
     def driver(self) -> Town:
         return self
 
-    def settle(self, wishes: Wishes) -> Wishes:
-        return wishes
+    def settle(self, setpoints: Setpoints) -> Setpoints:
+        return setpoints
 
-    def command(self, wishes: Wishes) -> Command:
-        raise AssertionError(f"stop and proceed ask no driver: {wishes}")
+    def command(self, setpoints: Setpoints) -> Command:
+        raise AssertionError(f"stop and proceed ask no driver: {setpoints}")
 
 
 @pytest.fixture(scope="module")
@@ -88,11 +88,11 @@ def start_driving_with_front_vehicle_check():
     town = Town()
     assert executor.start(source, town) == "running"  # type: ignore[arg-type]
     limit = town.road.perception().speed_limit(town.road.perception().lane_of(0))
-    assert executor.tick().wishes.target_speed_mps == limit
+    assert executor.tick().setpoints.target_speed_mps == limit
     town.street.gap = (3.0, 0.0)
-    assert executor.tick().wishes.target_speed_mps == 0.0
+    assert executor.tick().setpoints.target_speed_mps == 0.0
     town.street.gap = None
-    assert executor.tick().wishes.target_speed_mps == limit
+    assert executor.tick().setpoints.target_speed_mps == limit
 
 
 def test_what_is_asked_is_answered(executor: ProgramExecutor) -> None:
@@ -114,7 +114,7 @@ def test_a_lane_that_is_not_there_is_said(executor: ProgramExecutor) -> None:
     assert executor.start(source, town) == "running"  # type: ignore[arg-type]
     tick = executor.tick()
     assert tick.said == (str([lanes[-1] is not None, lanes[1] is not None]),)
-    assert tick.wishes.target_speed_mps == 0.0
+    assert tick.setpoints.target_speed_mps == 0.0
 
 
 def test_roads_know_none_of_it(executor: ProgramExecutor) -> None:

@@ -20,7 +20,7 @@ from straight_road import StraightRoad
 from chauffeur.concept import LAMPILOT_LIMITS, Instruction, LaneId, PlanRequest, Program, SystemMessage
 from chauffeur.describe import describe
 from chauffeur.planners.onboard.retrieval import RetrievalPlanner
-from chauffeur.programs import APIS, DrivingApis, ProgramExecutor, Sandbox, check_source, starting_wishes
+from chauffeur.programs import APIS, DrivingApis, ProgramExecutor, Sandbox, check_source, starting_setpoints
 from chauffeur.programs.rewrite import main_function, parse
 from chauffeur.programs.verify import Circumstances, Verification, verify
 from chauffeur.programs.verify.state import WISHES
@@ -71,7 +71,7 @@ class Traced:
     def __init__(self, source: str, world: World) -> None:
         self._world = world
         perception = world.perception()
-        self._apis = DrivingApis(perception, world.driver(), starting_wishes(perception))
+        self._apis = DrivingApis(perception, world.driver(), starting_setpoints(perception))
         self.lines: set[int] = set()
         self.calls: list[Call] = []
         self._left = 0
@@ -113,7 +113,7 @@ class Traced:
             finally:
                 sys.settrace(before)
             self._apis.settle()
-            drive_on(self._world, self._apis.wishes)
+            drive_on(self._world, self._apis.setpoints)
 
 
 def assert_calls_are_foreseen(report: Verification, calls: list[Call], source: str) -> None:
@@ -129,7 +129,7 @@ def assert_calls_are_foreseen(report: Verification, calls: list[Call], source: s
                 assert any(offset in (one.offsets or ()) for one in held), f"line {line}: {value}: {held}\n{source}"
 
 
-def marks_of(source: str) -> dict[int, int]:
+def hashed_features(source: str) -> dict[int, int]:
     """Line of the statement behind each mark."""
     return {int(found[1]): line + 1 for line, text in enumerate(source.split("\n"), 1) if (found := MARK.match(text))}
 
@@ -154,7 +154,7 @@ def test_calls_and_lines_of_random_programs_are_foreseen(source: str) -> None:
 def test_the_sandbox_does_what_was_foreseen_of_random_programs(sandbox: Sandbox, source: str) -> None:
     world = start_of("overtake").copy()
     report = verify(source, "", Circumstances.of(world.observe()))
-    lines = marks_of(source)
+    lines = hashed_features(source)
     texts = source.split("\n")
     overwritten = {note.line for note in report.notes if note.code == "overwritten"}
     opposed = {note.line for note in report.notes if note.code == "both-sides"}
@@ -195,7 +195,7 @@ def test_the_sandbox_does_what_was_foreseen_of_random_programs(sandbox: Sandbox,
             if result.state == "failed":
                 break
             assert overwritten.isdisjoint(wished.values()), f"{overwritten} {wished}\n{source}"
-            drive_on(world, result.wishes)
+            drive_on(world, result.setpoints)
 
 
 def _mark_inside(loop: int, lines: dict[int, int]) -> int:

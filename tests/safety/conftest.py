@@ -20,7 +20,7 @@ def _machine_code() -> None:
     for points in (((0.0, 0.0), (9.0, 0.0)), ((0.0, 0.0), (1.0, 0.0), (2.0, 0.1), (3.0, 0.4))):
         lane = a_lane("a-b:0", points, limit=LIMIT)
         ego = VehicleState(0, "car", 1.0, 0.0, 0.0, 5.0, 5.0, 2.0, lane.id)
-        Shield(0.1).guard(
+        Shield(0.1).filter(
             Observation(0.0, 0, "highway", ego, (), (), a_road((lane,)), None, None, False, False), Command(0.0, 0.0)
         )
 

@@ -20,7 +20,7 @@ from chauffeur.safety.audit import (
     head_path,
     read_key,
     read_records,
-    reading,
+    reader,
     redact,
     redaction,
     says,
@@ -40,7 +40,7 @@ from chauffeur.safety.audit.entries import (
 )
 from chauffeur.safety.audit.heads import Head, read_head
 from chauffeur.safety.audit.keys import key_name
-from chauffeur.safety.audit.reading import AuditLine, lines, opened
+from chauffeur.safety.audit.reader import AuditLine, lines, opened
 from chauffeur.safety.audit.redaction import Redaction
 from chauffeur.safety.audit.texts import TextState, erased, hide, states
 
@@ -136,7 +136,7 @@ def test_why_a_log_cannot_be_read_is_said(monkeypatch: pytest.MonkeyPatch, error
 
 
 def test_a_log_comes_line_by_line_and_what_is_too_long_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reading, "MAX_LINE_BYTES", 4)
+    monkeypatch.setattr(reader, "MAX_LINE_BYTES", 4)
     assert list(lines(BytesIO(b"abc\n\nabcdefg\nab"))) == [
         AuditLine(1, b"abc", whole=True),
         AuditLine(2, b"", whole=True),

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from chauffeur.concept import Command, Frame, LaneId, Observation, VehicleState, Wishes
+from chauffeur.concept import Command, Frame, LaneId, Observation, Setpoints, VehicleState
 from chauffeur.safety.blame import Blame, _in_the_way, _struck, blame
 from chauffeur.safety.shield import LAMPILOT_SHIELD
 from chauffeur.worlds.base import EGO
@@ -38,7 +38,7 @@ def instant(tick: int, scene: Scene, crashed: bool = False) -> Observation:
 
 
 def frame(observation: Observation, applied: Command = COAST) -> Frame:
-    return Frame(observation, Wishes(), applied, applied, "none", None, (), (), ())
+    return Frame(observation, Setpoints(), applied, applied, "none", None, (), (), ())
 
 
 def judged(scenes: Sequence[Scene], applied: Sequence[Command] | Command = COAST) -> Blame:

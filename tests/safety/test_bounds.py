@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.concept import Limits, Wishes
+from chauffeur.concept import Limits, Setpoints
 from chauffeur.safety.bounds import bounded
 
 SIGN = 30.0
@@ -27,35 +27,35 @@ limits = st.builds(
 
 @pytest.mark.parametrize(("asked", "driven"), [(0.0, 16.0), (-3.0, 16.0), (15.9, 16.0), (16.0, 16.0), (20.0, 20.0)])
 def test_a_policy_is_brought_up_to_the_least_speed(asked: float, driven: float) -> None:
-    wishes, changed = bounded(Wishes(asked, 1.5), LIMITS, SIGN, 16.0)
-    assert wishes.target_speed_mps == driven
+    setpoints, changed = bounded(Setpoints(asked, 1.5), LIMITS, SIGN, 16.0)
+    assert setpoints.target_speed_mps == driven
     assert changed == (() if asked == driven else ("target_speed",))
-    assert bounded(Wishes(asked, 1.5), replace(LIMITS, max_speed_mps=10.0), SIGN, 16.0)[0].target_speed_mps == 10.0
-    assert bounded(Wishes(math.nan, 1.5), LIMITS, SIGN, 16.0)[0].target_speed_mps == 0.0  # no number: the car stops
+    assert bounded(Setpoints(asked, 1.5), replace(LIMITS, max_speed_mps=10.0), SIGN, 16.0)[0].target_speed_mps == 10.0
+    assert bounded(Setpoints(math.nan, 1.5), LIMITS, SIGN, 16.0)[0].target_speed_mps == 0.0  # no number: the car stops
 
 
 @given(speed=st.none() | anything, headway=anything, limits=limits, sign=st.floats(0.0, 40.0) | st.just(math.nan))
 def test_what_comes_out_is_within_the_limits_and_bounding_it_again_changes_nothing(
     speed: float | None, headway: float, limits: Limits, sign: float
 ) -> None:
-    wishes, changed = bounded(Wishes(speed, headway), limits, sign)
+    setpoints, changed = bounded(Setpoints(speed, headway), limits, sign)
     most = limits.most_mps(sign)
     if speed is None:
-        assert wishes.target_speed_mps is None
+        assert setpoints.target_speed_mps is None
     else:
-        assert wishes.target_speed_mps is not None
-        assert 0.0 <= wishes.target_speed_mps <= (most if most > 0.0 else 0.0)
-    assert limits.min_time_headway_s <= wishes.time_headway_s <= limits.max_time_headway_s
-    assert bounded(wishes, limits, sign) == (wishes, ())
-    assert ("target_speed" in changed) == (speed is not None and wishes.target_speed_mps != speed)
-    assert ("time_headway" in changed) == (wishes.time_headway_s != headway)
+        assert setpoints.target_speed_mps is not None
+        assert 0.0 <= setpoints.target_speed_mps <= (most if most > 0.0 else 0.0)
+    assert limits.min_time_headway_s <= setpoints.time_headway_s <= limits.max_time_headway_s
+    assert bounded(setpoints, limits, sign) == (setpoints, ())
+    assert ("target_speed" in changed) == (speed is not None and setpoints.target_speed_mps != speed)
+    assert ("time_headway" in changed) == (setpoints.time_headway_s != headway)
 
 
 @given(speed=st.none() | st.floats(0.0, SIGN + 1.0), headway=st.floats(0.5, 10.0))
 def test_what_is_within_the_limits_goes_on_as_it_is(speed: float | None, headway: float) -> None:
-    wishes = Wishes(speed, headway, "a-b:1", "left", frozenset({3}))
-    same, changed = bounded(wishes, LIMITS, SIGN)
-    assert same is wishes
+    setpoints = Setpoints(speed, headway, "a-b:1", "left", frozenset({3}))
+    same, changed = bounded(setpoints, LIMITS, SIGN)
+    assert same is setpoints
     assert changed == ()
 
 
@@ -72,8 +72,8 @@ def test_what_is_within_the_limits_goes_on_as_it_is(speed: float | None, headway
     ],
 )
 def test_a_speed_above_the_cap_becomes_the_cap_and_any_other_stops_the_car(speed: float, goes_on: float) -> None:
-    wishes, changed = bounded(Wishes(speed), LIMITS, SIGN)
-    assert wishes.target_speed_mps == goes_on
+    setpoints, changed = bounded(Setpoints(speed), LIMITS, SIGN)
+    assert setpoints.target_speed_mps == goes_on
     assert changed == (() if speed == goes_on else ("target_speed",))
 
 
@@ -91,26 +91,26 @@ def test_a_speed_above_the_cap_becomes_the_cap_and_any_other_stops_the_car(speed
     ],
 )
 def test_a_headway_too_short_becomes_the_shortest_and_any_other_the_longest(headway: float, goes_on: float) -> None:
-    wishes, changed = bounded(Wishes(20.0, headway), LIMITS, SIGN)
-    assert (wishes.target_speed_mps, wishes.time_headway_s) == (20.0, goes_on)
+    setpoints, changed = bounded(Setpoints(20.0, headway), LIMITS, SIGN)
+    assert (setpoints.target_speed_mps, setpoints.time_headway_s) == (20.0, goes_on)
     assert changed == (() if headway == goes_on else ("time_headway",))
 
 
 def test_both_changes_are_named_and_the_rest_is_kept() -> None:
-    wishes = Wishes(99.0, 99.0, "a-b:1", "left", frozenset({3}))
-    mended, changed = bounded(wishes, LIMITS, SIGN)
+    setpoints = Setpoints(99.0, 99.0, "a-b:1", "left", frozenset({3}))
+    mended, changed = bounded(setpoints, LIMITS, SIGN)
     assert changed == ("target_speed", "time_headway")
-    assert mended == replace(wishes, target_speed_mps=31.0, time_headway_s=10.0)
+    assert mended == replace(setpoints, target_speed_mps=31.0, time_headway_s=10.0)
 
 
 def test_the_persons_cap_counts_where_it_is_below_the_sign() -> None:
     slow = replace(LIMITS, max_speed_mps=12.0)
-    assert bounded(Wishes(20.0), slow, SIGN)[0].target_speed_mps == 12.0
-    assert bounded(Wishes(20.0), slow, 5.0)[0].target_speed_mps == 6.0
+    assert bounded(Setpoints(20.0), slow, SIGN)[0].target_speed_mps == 12.0
+    assert bounded(Setpoints(20.0), slow, 5.0)[0].target_speed_mps == 6.0
 
 
 def test_a_cap_below_zero_or_none_at_all_stops_the_car() -> None:
     """A limit that is read wrongly must not make it reverse, or drive at will."""
     for over, sign in ((-10.0, 5.0), (1.0, math.nan)):
-        wishes, changed = bounded(Wishes(20.0), replace(LIMITS, max_over_limit_mps=over), sign)
-        assert (wishes.target_speed_mps, changed) == (0.0, ("target_speed",))
+        setpoints, changed = bounded(Setpoints(20.0), replace(LIMITS, max_over_limit_mps=over), sign)
+        assert (setpoints.target_speed_mps, changed) == (0.0, ("target_speed",))

@@ -104,7 +104,7 @@ def test_the_helper_functions_of_a_program_are_judged_with_it(snap: Snap, plan: 
 
 
 def test_a_program_too_long_to_be_read_is_refused_here(snap: Snap, plan: Make) -> None:
-    from chauffeur.safety.reading import _MAX_CHARS
+    from chauffeur.safety.constant_calls import _MAX_CHARS
 
     body = "def policy():\n    set_target_speed(99)\n    while True:\n        yield autopilot()\n"
     long = Program(body + "#" * (_MAX_CHARS - len(body) + 1))
@@ -114,8 +114,8 @@ def test_a_program_too_long_to_be_read_is_refused_here(snap: Snap, plan: Make) -
 
 def test_the_envelope_watches_apis_that_exist() -> None:
     from chauffeur.programs.catalogue import APIS
+    from chauffeur.safety.constant_calls import _LANE_STEPS
     from chauffeur.safety.envelope import _TURNS
-    from chauffeur.safety.reading import _LANE_STEPS
 
     watched = {
         *_TURNS,

@@ -17,7 +17,7 @@ from chauffeur.concept import (
     Situation,
     SystemMessage,
 )
-from chauffeur.safety.hiding import MAX_READ_CHARS
+from chauffeur.safety.concealment import MAX_READ_CHARS
 from chauffeur.safety.screening import (
     MAX_CHARS,
     QUOTED_CHARS,

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chauffeur.concept import Command, LaneId, Limits, Observation, Scenario, VehicleState, Wishes
+from chauffeur.concept import Command, LaneId, Limits, Observation, Scenario, Setpoints, VehicleState
 from chauffeur.drive.episode import Episode, run_episode
-from chauffeur.executors.base import HeldWishes
+from chauffeur.executors.base import HeldSetpoints
 from chauffeur.safety.blame import blame
-from chauffeur.safety.shield import LAMPILOT_SHIELD, Guarded, Shield
+from chauffeur.safety.shield import LAMPILOT_SHIELD, FilterResult, Shield
 from chauffeur.worlds.base import EGO, World
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.provoked import Mood, ProvokedWorld
@@ -36,8 +36,8 @@ def instant(ego: VehicleState, *others: VehicleState) -> Observation:
     return Observation(0.0, 0, "highway", ego, others, (), a_road(LANES), None, None, False, False)
 
 
-def guarded(command: Command, ego: VehicleState, *others: VehicleState, limits: Limits | None = None) -> Guarded:
-    return Shield(DT, limits).guard(instant(ego, *others), command)
+def guarded(command: Command, ego: VehicleState, *others: VehicleState, limits: Limits | None = None) -> FilterResult:
+    return Shield(DT, limits).filter(instant(ego, *others), command)
 
 
 EGO_CAR = car(EGO, 500.0, 1, 25.0)
@@ -171,12 +171,12 @@ def test_it_changes_little_and_says_all(
 class Wisher:
     """A policy whose wishes come from a function of the period's number."""
 
-    wish: Callable[[int], Wishes]
+    wish: Callable[[int], Setpoints]
     ticks: int = 0
 
-    def tick(self) -> HeldWishes:
+    def tick(self) -> HeldSetpoints:
         self.ticks += 1
-        return HeldWishes(self.wish(self.ticks), state="running")
+        return HeldSetpoints(self.wish(self.ticks), state="running")
 
 
 @dataclass(slots=True)
@@ -202,15 +202,15 @@ def highway(seed: int, mood: Mood = "calm") -> ProvokedWorld:
 
 def reckless(world: World, rng: np.random.Generator) -> Wisher:
     lanes: list[LaneId] = [lane.id for lane in world.observe().road.lanes]
-    return Wisher(lambda n: Wishes(60.0, 0.0, lanes[int(rng.integers(len(lanes)))]))
+    return Wisher(lambda n: Setpoints(60.0, 0.0, lanes[int(rng.integers(len(lanes)))]))
 
 
 def drive(world: HighwayWorld, seed: int, kind: str, shielded: bool) -> Episode:
     rng = np.random.default_rng([seed, 4])
-    hands = Saboteur(rng) if kind == "saboteur" else None
-    policy = None if hands else reckless(world, rng)
+    command_source = Saboteur(rng) if kind == "saboteur" else None
+    policy = None if command_source else reckless(world, rng)
     shield = Shield(world.dt_s) if shielded else None
-    return run_episode(world, policy, None, max_s=20.0, hands=hands, shield=shield)
+    return run_episode(world, policy, None, max_s=20.0, command_source=command_source, shield=shield)
 
 
 @pytest.mark.parametrize("kind", ["reckless", "saboteur"])
@@ -257,7 +257,7 @@ def at_the_crossing(seed: int, shielded: bool) -> Episode:
     config = {"type": "dt-intersection-v0", "num_vehicles_left": 6, "num_vehicles_right": 6}
     observation = world.reset(Scenario("crossing", "highway", config, seed))
     served = frozenset(thing.id for thing in observation.objects if thing.kind == "stop_sign")
-    policy = Wisher(lambda n: Wishes(12.0, 0.3, None, "straight", served))
+    policy = Wisher(lambda n: Setpoints(12.0, 0.3, None, "straight", served))
     return run_episode(world, policy, None, max_s=40.0, shield=Shield(world.dt_s) if shielded else None)
 
 

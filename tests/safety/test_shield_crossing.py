@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chauffeur.concept import Command, Frame, LaneId, Observation, Scenario, VehicleState, Wishes
+from chauffeur.concept import Command, Frame, LaneId, Observation, Scenario, Setpoints, VehicleState
 from chauffeur.control import LAMPILOT_STEERING, lane_keeping_steering
 from chauffeur.safety.blame import blame
-from chauffeur.safety.shield import Guarded, Shield, foresight
+from chauffeur.safety.shield import FilterResult, Shield, rollout
 from chauffeur.safety.shield.crossing import Motion
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import HighwayWorld
@@ -46,7 +46,7 @@ def test_the_vehicle_is_the_worlds_own(
 ) -> None:
     mine = np.array([1.0, 2.0, 0.3, speed, lateral, yaw])
     theirs = mine.copy()
-    foresight.move(mine, acceleration, steering, DT)
+    rollout.move(mine, acceleration, steering, DT)
     slide(theirs, steering, acceleration, DT)
     assert mine == pytest.approx(theirs, abs=1e-9)
 
@@ -54,15 +54,15 @@ def test_the_vehicle_is_the_worlds_own(
 @settings(max_examples=50, deadline=None)
 @given(speed=st.floats(0.5, 15.0), across=finite, heading=st.floats(-0.2, 0.2))
 def test_the_light_hand_is_lane_keeping(speed: float, across: float, heading: float) -> None:
-    way = np.stack([np.arange(0.0, 50.0, foresight.STEP_M), np.zeros(100), np.zeros(100)], axis=1)
+    way = np.stack([np.arange(0.0, 50.0, rollout.STEP_M), np.zeros(100), np.zeros(100)], axis=1)
     state = np.array([20.0, across, heading, speed, 0.0, 0.0])
-    mine = foresight.wheel(0, state, way, 40, 0.0, DT)
+    mine = rollout.wheel(0, state, way, 40, 0.0, DT)
     theirs = lane_keeping_steering(speed, heading, across, 0.0, LAMPILOT_STEERING)
     approach = abs(math.asin(max(-1.0, min(1.0, across / 0.6 / speed))))
     if approach < 0.2 and abs(theirs) < 0.3:  # within the shield's gentler bounds
         assert mine == pytest.approx(theirs)
     assert abs(mine) <= 0.3
-    assert foresight.wheel(1, state, way, 40, 0.0, DT) == 0.0
+    assert rollout.wheel(1, state, way, 40, 0.0, DT) == 0.0
 
 
 def test_what_an_observation_does_not_show_is_known() -> None:
@@ -72,7 +72,7 @@ def test_what_an_observation_does_not_show_is_known() -> None:
         state = motion.observe(observation)
         command = Command(float(rng.uniform(-5.0, 5.0)), float(rng.uniform(-0.7, 0.7)))
         motion.commanded(observation, state, command)
-        foresight.move(state, command.acceleration_mps2, command.steering_rad, DT)
+        rollout.move(state, command.acceleration_mps2, command.steering_rad, DT)
         world.step(command)
         observation = world.observe()
         ego = observation.ego
@@ -89,9 +89,9 @@ def test_after_a_jump_the_slide_is_read_from_the_way_covered(road: Observation) 
 
 
 def test_who_follows_is_trusted_to_respond() -> None:
-    assert foresight.reach_m(8.0, 1.0, 3.0) == pytest.approx(9.5)
-    assert foresight.reach_m(14.0, 2.0, 3.0) == pytest.approx(28.0)
-    assert foresight.reach_m(20.0, 2.0, 3.0) == pytest.approx(40.0)
+    assert rollout.reach_m(8.0, 1.0, 3.0) == pytest.approx(9.5)
+    assert rollout.reach_m(14.0, 2.0, 3.0) == pytest.approx(28.0)
+    assert rollout.reach_m(20.0, 2.0, 3.0) == pytest.approx(40.0)
 
 
 # One command at a time ------------------------------------------------------------------------------------------------
@@ -117,8 +117,8 @@ def crosser(x: float, speed: float) -> VehicleState:
     return VehicleState(1, "car", x, -2.0, 0.0, speed, 5.0, 2.0, lane)
 
 
-def guarded(observation: Observation, command: Command, aim: LaneId | None = None) -> Guarded:
-    return Shield(DT).guard(observation, command, aim)
+def guarded(observation: Observation, command: Command, aim: LaneId | None = None) -> FilterResult:
+    return Shield(DT).filter(observation, command, aim)
 
 
 STRAIGHT: LaneId = "ir0-il2:0"
@@ -142,7 +142,7 @@ def test_a_car_that_is_going_to_leave_its_lane_brakes_before_anything(
 
 def test_with_nobody_there_nothing_is_changed(road: Observation) -> None:
     for command in (GAS, COAST, Command(-2.0, 0.0)):
-        assert guarded(at(road, 16.0, 6.0), command, STRAIGHT) == Guarded(command)
+        assert guarded(at(road, 16.0, 6.0), command, STRAIGHT) == FilterResult(command)
 
 
 def test_it_waits_for_who_crosses_and_not_longer(road: Observation) -> None:
@@ -219,7 +219,7 @@ def test_what_once_ended_badly_does_not(episodes: ModuleType, kind: str, seed: i
 
 def test_to_stand_in_somebodys_way_is_no_excuse(road: Observation) -> None:
     """A car that came to a stop across the lane of the oncoming traffic."""
-    wishes, coast = Wishes(0.0), Command(0.0, 0.0)
+    setpoints, coast = Setpoints(0.0), Command(0.0, 0.0)
 
     def instant(tick: int, lane_y: float, crashed: bool) -> Observation:
         ego = VehicleState(EGO, "car", 39.4, lane_y, 1.08, 0.0, 5.0, 2.0, "il3-o3:0", crashed)
@@ -230,6 +230,6 @@ def test_to_stand_in_somebodys_way_is_no_excuse(road: Observation) -> None:
 
     for lane_y, who in ((-1.1, "ego"), (-6.0, "other")):
         frames = [
-            Frame(instant(tick, lane_y, False), wishes, coast, coast, "none", None, (), (), ()) for tick in range(5)
+            Frame(instant(tick, lane_y, False), setpoints, coast, coast, "none", None, (), (), ()) for tick in range(5)
         ]
         assert blame(frames, instant(5, lane_y, True), DT).who == who

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from chauffeur.concept import Command, Lane, LaneId, Observation, Scenario, VehicleState
-from chauffeur.safety.shield import LAMPILOT_SHIELD, Guarded, Shield, foresight
+from chauffeur.safety.shield import LAMPILOT_SHIELD, FilterResult, Shield, rollout
 from chauffeur.safety.shield.crossing import (
     _CLEARS,
     _DUE,
@@ -27,8 +27,8 @@ from chauffeur.safety.shield.crossing import (
     _Outlook,
     _Plan,
 )
-from chauffeur.safety.shield.everybody import Everybody
 from chauffeur.safety.shield.sweep import recovery_steering
+from chauffeur.safety.shield.traffic_arrays import TrafficArrays
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import HighwayWorld
 from roads import a_lane, a_road
@@ -78,7 +78,7 @@ def instant(ego: VehicleState, *others: VehicleState, lanes: tuple[Lane, ...] = 
 def looked(ego: VehicleState, *others: VehicleState) -> _Outlook:
     observation = instant(ego, *others)
     assert ego.lane is not None
-    return Junction(a_road(NETWORK), LAMPILOT_SHIELD, DT)._outlook(observation, Everybody.of(observation), ego.lane)
+    return Junction(a_road(NETWORK), LAMPILOT_SHIELD, DT)._outlook(observation, TrafficArrays.of(observation), ego.lane)
 
 
 def ways(start: LaneId, onto: LaneId | None = None) -> list[Array]:
@@ -210,7 +210,7 @@ def test_the_crossing_may_take_longer_to_clear_than_a_stop_takes() -> None:
 def test_each_law_has_its_wheel() -> None:
     (on,) = ways(IN, ON)
     outlook = looked(car(EGO, 1.0, -20.0, UPWARDS - 0.2, 5.0, IN))
-    light, straight, best, whole = (outlook.wheel_rad(law, on, 0.0) for law in range(foresight.LAWS))
+    light, straight, best, whole = (outlook.wheel_rad(law, on, 0.0) for law in range(rollout.LAWS))
     assert straight == 0.0
     assert light == pytest.approx(0.3)
     assert whole > 0.5
@@ -275,7 +275,7 @@ def judged() -> Judged:
     def judge(
         ego: VehicleState, *others: VehicleState, asks: Command, aim: LaneId | None, shield: Shield | None = None
     ) -> Told:
-        found: Guarded = (shield or Shield(DT)).guard(instant(ego, *others, lanes=lanes), asks, aim)
+        found: FilterResult = (shield or Shield(DT)).filter(instant(ego, *others, lanes=lanes), asks, aim)
         last = found.interventions[-1] if found.interventions else None
         rule, reason = ("", "") if last is None else (last.rule, last.reason)
         return found.command.acceleration_mps2, found.command.steering_rad, rule, reason
@@ -438,7 +438,7 @@ def test_only_who_has_to_brake_for_a_lead_is_held_up(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(Junction, "mend", listened)
     ego = me(0.0, -50.0, UPWARDS, 8.0, IN)
     for ahead in np.arange(6.4, 6.9, 0.01):
-        Shield(DT).guard(instant(ego, car(1, 0.0, -50.0 + ahead, UPWARDS, 8.0, IN)), GAS, None)
+        Shield(DT).filter(instant(ego, car(1, 0.0, -50.0 + ahead, UPWARDS, 8.0, IN)), GAS, None)
     assert {held for most, held in told if most < 0.0} == {True}
     assert {held for most, held in told if 0.0 < most <= 1.0} == {False}
     assert {held for most, held in told if most > 1.0} == {False}
@@ -454,5 +454,5 @@ def test_where_a_lane_bends_the_way_back_to_it_does(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("chauffeur.safety.shield.shield.recovery_steering", listened)
     at = math.radians(45.0)
     ego = me(-10.0 + 10.0 * math.cos(at), 10.0 * math.sin(at), at + UPWARDS, 5.0, LEFT)
-    Shield(DT).guard(instant(ego), COAST, LEFT)
+    Shield(DT).filter(instant(ego), COAST, LEFT)
     assert [abs(bend) for bend in told] == [pytest.approx(0.1, rel=0.05)], "a circle of 10 m, looked at once"

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from chauffeur.concept import Command, Lane, LaneId, Limits, Observation, Scenario, VehicleState
-from chauffeur.safety.shield import LAMPILOT_SHIELD, Guarded, Shield
+from chauffeur.safety.shield import LAMPILOT_SHIELD, FilterResult, Shield
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import HighwayWorld
 from roads import a_lane, a_road
@@ -36,8 +36,8 @@ def cross() -> Cross:
     return make
 
 
-def guarded(observation: Observation, command: Command, aim: LaneId | None = None) -> Guarded:
-    return Shield(DT).guard(observation, command, aim)
+def guarded(observation: Observation, command: Command, aim: LaneId | None = None) -> FilterResult:
+    return Shield(DT).filter(observation, command, aim)
 
 
 # Where roads cross ----------------------------------------------------------------------------------------------------
@@ -50,7 +50,7 @@ def test_where_ways_part_the_lane_that_is_steered_for_counts_not_the_nearest(
 ) -> None:
     """A car on its way straight on may be nearest to the lane that turns left."""
     as_it_is = guarded(cross(y, speed), command, STRAIGHT)
-    assert as_it_is == Guarded(command)
+    assert as_it_is == FilterResult(command)
     nearest = cross(y, speed, lane=TO_THE_LEFT)
     assert guarded(nearest, command, STRAIGHT) == as_it_is
     turned = guarded(nearest, command)
@@ -66,8 +66,8 @@ def test_over_the_lane_of_others_the_way_that_was_promised_counts(cross: Cross) 
     """In the middle of a crossing the nearest lane may be one that is driven across."""
     shield = Shield(DT)
     first, second = cross(4.0, 8.0), cross(3.2, 8.0, lane=ACROSS, tick=1)
-    assert shield.guard(first, COAST, STRAIGHT) == Guarded(COAST)
-    assert shield.guard(second, COAST) == Guarded(COAST)
+    assert shield.filter(first, COAST, STRAIGHT) == FilterResult(COAST)
+    assert shield.filter(second, COAST) == FilterResult(COAST)
     lost = guarded(second, COAST)
     assert lost.interventions, "without that promise it is steered into the lane it is over"
 
@@ -115,7 +115,7 @@ def test_a_limit_that_is_none_lets_nobody_gain_speed_and_no_gap_be_forgotten(lim
 
 
 def test_a_cap_that_is_no_number_does_not_switch_the_gap_off() -> None:
-    blocked = Shield(DT, Limits(max_over_limit_mps=math.nan)).guard(instant(car(1, 515.0, 0.0)), GAS)
+    blocked = Shield(DT, Limits(max_over_limit_mps=math.nan)).filter(instant(car(1, 515.0, 0.0)), GAS)
     assert blocked.command.acceleration_mps2 == -LAMPILOT_SHIELD.braking_mps2
 
 
@@ -151,5 +151,5 @@ def test_while_another_cannot_be_told_the_car_is_kept_in_its_lane_and_does_not_r
 def test_as_soon_as_all_is_told_again_commands_go_through() -> None:
     shield = Shield(DT)
     observation = instant()
-    assert shield.guard(replace(observation, ego=replace(observation.ego, x_m=math.nan)), COAST).interventions
-    assert shield.guard(observation, COAST) == Guarded(COAST)
+    assert shield.filter(replace(observation, ego=replace(observation.ego, x_m=math.nan)), COAST).interventions
+    assert shield.filter(observation, COAST) == FilterResult(COAST)

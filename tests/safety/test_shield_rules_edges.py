@@ -10,7 +10,7 @@ import pytest
 
 from chauffeur.concept import Command, Intervention, Lane, LaneId, Observation, VehicleState
 from chauffeur.geometry import Polyline
-from chauffeur.safety.shield import LAMPILOT_SHIELD, Guarded, Shield
+from chauffeur.safety.shield import LAMPILOT_SHIELD, FilterResult, Shield
 from chauffeur.safety.shield.frame import ShieldLens, ShieldScene
 from chauffeur.safety.shield.gaps import greatest_acceleration, rss_gap_m
 from chauffeur.safety.shield.sweep import swept, yaw_rate
@@ -56,12 +56,12 @@ def instant(me: VehicleState, *others: VehicleState, lanes: Lanes = THREE) -> Ob
     return Observation(0.0, 0, "highway", me, others, (), a_road(lanes), None, None, False, False)
 
 
-def guarded(command: Command, me: VehicleState, *others: VehicleState, lanes: Lanes = THREE) -> Guarded:
-    return Shield(DT).guard(instant(me, *others, lanes=lanes), command)
+def guarded(command: Command, me: VehicleState, *others: VehicleState, lanes: Lanes = THREE) -> FilterResult:
+    return Shield(DT).filter(instant(me, *others, lanes=lanes), command)
 
 
 def passes(command: Command, me: VehicleState, *others: VehicleState, lanes: Lanes = THREE) -> bool:
-    return guarded(command, me, *others, lanes=lanes) == Guarded(command)
+    return guarded(command, me, *others, lanes=lanes) == FilterResult(command)
 
 
 def why(command: Command, me: VehicleState, *others: VehicleState, lanes: Lanes = THREE) -> str:
@@ -268,9 +268,9 @@ def test_the_lane_that_was_promised_is_the_way_back_beyond_its_line(side: float)
     over, wild = ego(side * 2.4, 30.0, side * -0.02), Command(0.0, side * -0.62)
     assert side * guarded(wild, over).command.steering_rad > 0.0, "on to the nearest, with none promised"
     shield = Shield(DT)
-    assert shield.guard(instant(ego(side * 1.9, 30.0)), COAST) == Guarded(COAST)
+    assert shield.filter(instant(ego(side * 1.9, 30.0)), COAST) == FilterResult(COAST)
     for _ in range(3):
-        refused = shield.guard(instant(over), wild)
+        refused = shield.filter(instant(over), wild)
         assert side * refused.command.steering_rad < 0.0, "and a refused command takes no promise away"
 
 
@@ -281,8 +281,8 @@ def test_a_command_may_lead_back_to_the_lane_that_was_promised(side: float) -> N
     over, turn = ego(side * 2.58, 25.0, side * 0.68), Command(0.0, side * -0.31)
     assert why(turn, over, lanes=lanes) == "lane: That would cross more than one line at once."
     shield = Shield(DT)
-    assert shield.guard(instant(ego(side * 1.9, 25.0), lanes=lanes), COAST) == Guarded(COAST)
-    assert shield.guard(instant(over, lanes=lanes), turn) == Guarded(turn)
+    assert shield.filter(instant(ego(side * 1.9, 25.0), lanes=lanes), COAST) == FilterResult(COAST)
+    assert shield.filter(instant(over, lanes=lanes), turn) == FilterResult(turn)
 
 
 @SIDES
@@ -335,14 +335,14 @@ def test_what_is_no_number_is_told_of_with_what_took_its_place() -> None:
     stop = Command(-TABLE.braking_mps2, 0.0)
     wrong = Command(math.inf, 0.0)
     said = Intervention("finite", "A command that is no number was replaced.", wrong, stop)
-    assert guarded(wrong, ego(0.0, 25.0)) == Guarded(stop, (said,))
+    assert guarded(wrong, ego(0.0, 25.0)) == FilterResult(stop, (said,))
     said = Intervention("finite", "Where somebody is cannot be told.", COAST, stop)
-    assert guarded(COAST, ego(0.0, 25.0), car(1, math.nan, 0.0, 0.0)) == Guarded(stop, (said,))
+    assert guarded(COAST, ego(0.0, 25.0), car(1, math.nan, 0.0, 0.0)) == FilterResult(stop, (said,))
 
 
 @pytest.mark.parametrize("asked", [-5.0, -0.5])
 def test_a_car_that_stands_and_is_braked_stands_without_a_word(asked: float) -> None:
-    assert guarded(Command(asked, 0.0), ego(0.0, 0.0)) == Guarded(COAST)
+    assert guarded(Command(asked, 0.0), ego(0.0, 0.0)) == FilterResult(COAST)
 
 
 def test_a_turned_wheel_alone_is_nothing_to_be_told_of() -> None:
@@ -364,7 +364,7 @@ def test_the_limit_of_the_lane_it_is_in_counts_while_it_steers_for_another() -> 
     slower = tuple(replace(lane, speed_limit_mps=20.0) if lane.id != OWN else lane for lane in THREE)
     observation = instant(ego(0.0, 25.0), lanes=slower)
     for aim in (None, "a-b:2", "a-b:0"):
-        assert Shield(DT).guard(observation, COAST, aim) == Guarded(COAST)
+        assert Shield(DT).filter(observation, COAST, aim) == FilterResult(COAST)
 
 
 @pytest.mark.parametrize(("speed", "lead"), [(0.0, 0.0), (0.5, 0.0), (5.0, 0.0), (20.0, 0.0), (20.0, 10.0)])

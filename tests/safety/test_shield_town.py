@@ -38,7 +38,7 @@ def floored(periods: int, speed: float = 10.0, others: object = None, **more: ob
     for tick in range(periods):
         around = () if others is None else others(tick * DT)  # type: ignore[operator]
         seen.append(instant(state, tick, *around, **more))
-        command = shield.guard(seen[-1], Command(5.0, 0.0)).command
+        command = shield.filter(seen[-1], Command(5.0, 0.0)).command
         state = advanced(state, command.acceleration_mps2, command.steering_rad, DT, LINCOLN_MKZ)
     return seen
 
@@ -88,6 +88,6 @@ def test_it_stops_behind_a_car_that_brakes_to_a_stand() -> None:
 
 def test_no_number_stops_the_car() -> None:
     seen = instant(BicycleState(Pose(10.0, 0.0, 0.0), 5.0), 0)
-    guarded = TownShield(DT).guard(seen, Command(math.nan, 0.0))
+    guarded = TownShield(DT).filter(seen, Command(math.nan, 0.0))
     assert guarded.command.acceleration_mps2 < 0.0
     assert guarded.interventions[0].rule == "finite"

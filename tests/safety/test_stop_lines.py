@@ -32,7 +32,7 @@ def test_a_driver_that_never_brakes_is_stopped_gently_before_the_line_and_may_th
     shield, x, stood = Shield(DT), 300.0, False
     hardest = 0.0
     for _ in range(1000):
-        guarded = shield.guard(instant(x, speed), GAS)
+        guarded = shield.filter(instant(x, speed), GAS)
         if not stood:
             assert all(change.rule in ("stop", "speed") for change in guarded.interventions)
             hardest = min(hardest, guarded.command.acceleration_mps2)

@@ -56,7 +56,7 @@ def test_it_sees_and_drives_what_the_town_shows(client: StandInClient, town: Map
     world.reset(scenario(town))
     driver = world.driver()
     for _ in range(200):
-        world.step(driver.command(driver.settle(driver.initial_wishes())))
+        world.step(driver.command(driver.settle(driver.initial_setpoints())))
     seen, truth = world.observe(), client.world.town.observe()
     assert truth.ego.speed_mps > 0.0 or any(one.state != "green" for one in truth.signals)
     for name in ("x_m", "y_m", "speed_mps", "length_m", "width_m", "yaw_rate_radps"):

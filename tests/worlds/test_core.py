@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import highway_oracle
-from chauffeur.concept import Command, Scenario, Wishes
+from chauffeur.concept import Command, Scenario, Setpoints
 from chauffeur.control import LAMPILOT_EGO, LAMPILOT_STEERING, idm_acceleration, lane_keeping_steering
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
@@ -115,28 +115,28 @@ class _Policy:
         self._rng = np.random.default_rng(seed)
         self._seed, self._tick = seed, 0
 
-    def adjust(self, wishes: Wishes) -> Wishes:
+    def adjust(self, setpoints: Setpoints) -> Setpoints:
         self._tick += 1
         if self._tick == 1 and self._road.lane_of(EGO)[0].startswith("o"):
-            wishes = dataclasses.replace(wishes, turn=("left", "straight", "right")[self._seed % 3])
+            setpoints = dataclasses.replace(setpoints, turn=("left", "straight", "right")[self._seed % 3])
         if self._name == "mobil":
-            return self._mobil.choose(wishes)
+            return self._mobil.choose(setpoints)
         if self._name == "restless" and self._tick % 10 == 1:
-            return self._change(wishes)
-        return wishes
+            return self._change(setpoints)
+        return setpoints
 
-    def _change(self, wishes: Wishes) -> Wishes:
-        assert wishes.target_lane is not None
-        beside = self._road.adjacent_lane(wishes.target_lane, int(self._rng.choice((-1, 1))))
-        blocker = self._road.front_blocker(wishes.served_stops)
-        served = wishes.served_stops
+    def _change(self, setpoints: Setpoints) -> Setpoints:
+        assert setpoints.target_lane is not None
+        beside = self._road.adjacent_lane(setpoints.target_lane, int(self._rng.choice((-1, 1))))
+        blocker = self._road.front_blocker(setpoints.served_stops)
+        served = setpoints.served_stops
         if blocker is not None and self._road.vehicle(blocker).kind == "stop_sign" and self._rng.random() < 0.3:
             served |= {blocker}
         return dataclasses.replace(
-            wishes,
+            setpoints,
             target_speed_mps=float(self._rng.uniform(0, 40)),
             time_headway_s=float(self._rng.uniform(0.01, 2)),
-            target_lane=beside or wishes.target_lane,
+            target_lane=beside or setpoints.target_lane,
             served_stops=served,
         )
 
@@ -146,7 +146,7 @@ def _assert_same_trip(scenario: Scenario, policy: str, steps: int) -> None:
     starts = [world.reset(scenario) for world in worlds]
     assert starts[0].road == starts[1].road
     policies = [_Policy(policy, world, scenario.seed % 1000) for world in worlds]
-    held = [world.driver().initial_wishes() for world in worlds]
+    held = [world.driver().initial_setpoints() for world in worlds]
     for step in range(steps):
         for k, world in enumerate(worlds):
             held[k] = policies[k].adjust(world.driver().settle(held[k]))
@@ -186,9 +186,9 @@ def test_development_samples_are_the_references(lampilot_data: Path, policy: str
 def test_a_copy_goes_its_own_way() -> None:
     world = HighwayWorld()
     world.reset(BY_ID["overtake"])
-    wishes = world.driver().settle(world.driver().initial_wishes())
+    setpoints = world.driver().settle(world.driver().initial_setpoints())
     for _ in range(5):
-        world.step(world.driver().command(wishes))
+        world.step(world.driver().command(setpoints))
     twin = world.copy()
     before = world.observe()
     assert twin.observe() == before

@@ -9,7 +9,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import chauffeur.worlds.highway.gym
-from chauffeur.concept import Command, DataError, Scenario, ScenarioError, Wishes
+from chauffeur.concept import Command, DataError, Scenario, ScenarioError, Setpoints
 from chauffeur.worlds.base import EGO, Driver, Perception, World
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.fitness import fit_to_begin
@@ -18,12 +18,12 @@ from chauffeur.worlds.highway.scenarios import BUILT_IN
 BY_ID = {s.id: s for s in BUILT_IN}
 
 
-def _drive(world: HighwayWorld, wishes: Wishes, steps: int) -> Wishes:
+def _drive(world: HighwayWorld, setpoints: Setpoints, steps: int) -> Setpoints:
     driver = world.driver()
     for _ in range(steps):
-        wishes = driver.settle(wishes)
-        world.step(driver.command(wishes))
-    return wishes
+        setpoints = driver.settle(setpoints)
+        world.step(driver.command(setpoints))
+    return setpoints
 
 
 def test_contracts_are_met() -> None:
@@ -41,8 +41,8 @@ def test_built_in_scenarios_start_safe_and_repeat_bit_for_bit(scenario: Scenario
     assert start == second.reset(scenario)
     assert not start.ended
     assert scenario.wish
-    _drive(first, Wishes(), 30)
-    _drive(second, Wishes(), 30)
+    _drive(first, Setpoints(), 30)
+    _drive(second, Setpoints(), 30)
     assert first.observe() == second.observe()
     assert first.observe() != start
 
@@ -77,7 +77,7 @@ def test_an_instant_is_looked_at_once_and_never_after_it_is_gone() -> None:
     start = world.reset(BY_ID["overtake"])
     assert world.observe() is start
     twin = world.copy()
-    world.driver().command(world.driver().settle(Wishes(20.0, turn="left")))
+    world.driver().command(world.driver().settle(Setpoints(20.0, turn="left")))
     assert world.observe() is start, "to ask changes nothing"
     with pytest.raises(ValueError, match="finite"):
         world.step(Command(math.nan, 0.0))
@@ -118,7 +118,7 @@ def test_lane_edges() -> None:
 def test_lane_wish_is_followed() -> None:
     world = HighwayWorld()
     world.reset(BY_ID["emergency-lane"])
-    _drive(world, replace(world.driver().initial_wishes(), target_lane="a-b:3"), 60)
+    _drive(world, replace(world.driver().initial_setpoints(), target_lane="a-b:3"), 60)
     assert world.perception().lane_of(EGO) == "a-b:3"
     assert abs(world.observe().ego.y_m + 12.0) < 0.3
 
@@ -127,8 +127,8 @@ def test_intersection_stops_at_the_sign_until_it_is_served() -> None:
     world = HighwayWorld()
     observation = world.reset(BY_ID["quiet-intersection"])
     assert observation.stop_sign_m == pytest.approx(85.0)
-    wishes = replace(world.driver().initial_wishes(), turn="straight")
-    wishes = _drive(world, wishes, 250)
+    setpoints = replace(world.driver().initial_setpoints(), turn="straight")
+    setpoints = _drive(world, setpoints, 250)
     waiting = world.observe()
     assert abs(waiting.ego.speed_mps) < 1.0
     assert waiting.stop_sign_m is not None
@@ -145,11 +145,11 @@ def test_served_stop_lets_the_car_cross_straight() -> None:
     sign = world.perception().stop_sign_ahead(frozenset())
     assert sign is not None
     driver = world.driver()
-    wishes = replace(driver.initial_wishes(), turn="straight", served_stops=frozenset({sign[0]}))
+    setpoints = replace(driver.initial_setpoints(), turn="straight", served_stops=frozenset({sign[0]}))
     seen = set()
     for _ in range(200):
-        wishes = driver.settle(wishes)
-        world.step(driver.command(wishes))
+        setpoints = driver.settle(setpoints)
+        world.step(driver.command(setpoints))
         seen.add(world.perception().lane_of(EGO))
         if world.ended:
             break

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from chauffeur.concept import Lane, Lead, Observation, RoadGraph, VehicleState, Wishes
+from chauffeur.concept import Lane, Lead, Observation, RoadGraph, Setpoints, VehicleState
 from chauffeur.geometry import Polyline
 from chauffeur.worlds.base import EGO, Driver, Perception
 from chauffeur.worlds.over_graph import LaneDriver, ObservedPerception
@@ -72,18 +72,18 @@ def test_it_drives_over_the_junction_the_way_that_is_wished(turn: str, ends: str
     perception = ObservedPerception(lambda: shown[-1])
     driver = LaneDriver(lambda: shown[-1], perception)
     assert isinstance(driver, Driver)
-    wishes = replace(driver.initial_wishes(), target_speed_mps=5.0, turn=turn)  # type: ignore[arg-type]
+    setpoints = replace(driver.initial_setpoints(), target_speed_mps=5.0, turn=turn)  # type: ignore[arg-type]
     off: list[float] = []
     for _ in range(260):
-        wishes = driver.settle(wishes)
-        command, ego = driver.command(wishes), shown[-1].ego
+        setpoints = driver.settle(setpoints)
+        command, ego = driver.command(setpoints), shown[-1].ego
         speed = max(0.0, ego.speed_mps + 0.1 * command.acceleration_mps2)
         heading = ego.heading_rad + speed * math.tan(command.steering_rad) / ego.length_m * 0.1
         x, y = ego.x_m + 0.1 * speed * math.cos(heading), ego.y_m + 0.1 * speed * math.sin(heading)
-        moved = replace(ego, x_m=x, y_m=y, heading_rad=heading, speed_mps=speed, lane=wishes.target_lane)
-        off.append(abs(ROAD[wishes.target_lane or ""].centre.project(x, y)[1]))
+        moved = replace(ego, x_m=x, y_m=y, heading_rad=heading, speed_mps=speed, lane=setpoints.target_lane)
+        off.append(abs(ROAD[setpoints.target_lane or ""].centre.project(x, y)[1]))
         shown.append(replace(now, ego=moved))
-    assert wishes.target_lane == ends
+    assert setpoints.target_lane == ends
     assert max(off) < 0.8
     assert shown[-1].ego.speed_mps == pytest.approx(5.0, abs=0.1)
 
@@ -91,5 +91,5 @@ def test_it_drives_over_the_junction_the_way_that_is_wished(turn: str, ends: str
 def test_it_stops_before_a_sign_until_it_is_served() -> None:
     near = replace(NOW, others=(), front=None, ego=car(EGO, -18.0, 0.0, "in.1", 6.0))
     driver = LaneDriver(lambda: near, ObservedPerception(lambda: near))
-    assert driver.command(Wishes(10.0)).acceleration_mps2 < -2.0
-    assert driver.command(Wishes(10.0, served_stops=frozenset({9}))).acceleration_mps2 > 0.5
+    assert driver.command(Setpoints(10.0)).acceleration_mps2 < -2.0
+    assert driver.command(Setpoints(10.0, served_stops=frozenset({9}))).acceleration_mps2 > 0.5

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chauffeur.concept import Command, DataError, Scenario, ScenarioError, Wishes
+from chauffeur.concept import Command, DataError, Scenario, ScenarioError, Setpoints
 from chauffeur.drive.actuate import actuate
 from chauffeur.worlds.base import EGO, MirroredWorld
 from chauffeur.worlds.parking import ParkingWorld
@@ -21,10 +21,10 @@ def started(seed: int = 3, **config: object) -> ParkingWorld:
 
 
 def drive(world: ParkingWorld, periods: int, place: str = "stadium") -> None:
-    wishes = Wishes(target_speed_mps=3.5, target_lane=world.spot(place).lane)
+    setpoints = Setpoints(target_speed_mps=3.5, target_lane=world.spot(place).lane)
     for _ in range(periods):
         driver = world.driver()
-        actuate(world, None, driver.command(driver.settle(wishes)), None, None)
+        actuate(world, None, driver.command(driver.settle(setpoints)), None, None)
 
 
 def step_both(one: ParkingWorld, other: ParkingWorld, periods: int) -> None:
@@ -144,11 +144,11 @@ def test_no_bytes_do_more_than_be_refused(payload: bytes) -> None:
 
 def test_after_others_have_driven_the_driver_looks_for_its_way_anew() -> None:
     """As after a plan that was driven with pure pursuit: the way found at the entrance leads elsewhere by then."""
-    world, on = started(8), Wishes(target_speed_mps=3.0)
+    world, on = started(8), Setpoints(target_speed_mps=3.0)
     driver = world.driver()
     driver.command(driver.settle(on))
     drive_by = world.copy()
-    spot = Wishes(target_speed_mps=3.5, target_lane=world.spot("nearest").lane)
+    spot = Setpoints(target_speed_mps=3.5, target_lane=world.spot("nearest").lane)
     while drive_by.observe().ego.y_m > -12.0:
         command = drive_by.driver().command(drive_by.driver().settle(spot))
         assert actuate(drive_by, None, command, None, None) == actuate(world, None, command, None, None)

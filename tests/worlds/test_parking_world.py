@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from chauffeur.concept import Command, Observation, Scenario, ScenarioError, Wishes
+from chauffeur.concept import Command, Observation, Scenario, ScenarioError, Setpoints
 from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.drive.actuate import actuate
 from chauffeur.worlds.base import EGO, Driver, Perception, World
@@ -25,13 +25,13 @@ def _started(seed: int = 3, **config: object) -> ParkingWorld:
     return world
 
 
-def _drive(world: ParkingWorld, wishes: Wishes, periods: int) -> list[Observation]:
+def _drive(world: ParkingWorld, setpoints: Setpoints, periods: int) -> list[Observation]:
     shots: list[Observation] = []
     driver = world.driver()
     for _ in range(periods):
         if world.ended:
             break
-        actuate(world, None, driver.command(driver.settle(wishes)), None, None)
+        actuate(world, None, driver.command(driver.settle(setpoints)), None, None)
         shots.append(world.observe())
     return shots
 
@@ -60,9 +60,9 @@ def test_its_own_driver_parks(scenario: Scenario) -> None:
     world = ParkingWorld()
     world.reset(scenario)
     spot = world.spot(scenario.goal["place"])
-    shots = _drive(world, Wishes(target_speed_mps=3.5, target_lane=spot.lane), 700)
+    shots = _drive(world, Setpoints(target_speed_mps=3.5, target_lane=spot.lane), 700)
     while world.parked() is None and not world.ended:
-        shots += _drive(world, Wishes(target_speed_mps=3.5, target_lane=spot.lane), 10)
+        shots += _drive(world, Setpoints(target_speed_mps=3.5, target_lane=spot.lane), 10)
     assert world.parked() == spot.name
     assert not any(shot.ego.crashed or shot.off_road for shot in shots)
     assert shots[-1].ego.lane == spot.lane
@@ -71,7 +71,7 @@ def test_its_own_driver_parks(scenario: Scenario) -> None:
 def test_the_same_seed_is_the_same_trip_bit_for_bit() -> None:
     def trip(seed: int) -> list[Observation]:
         world = _started(seed, cars=2, walkers=3)
-        return _drive(world, Wishes(target_speed_mps=3.0, target_lane=world.spot("stadium").lane), 80)
+        return _drive(world, Setpoints(target_speed_mps=3.0, target_lane=world.spot("stadium").lane), 80)
 
     assert trip(11) == trip(11)
     assert trip(11)[0].others != trip(12)[0].others
@@ -79,15 +79,15 @@ def test_the_same_seed_is_the_same_trip_bit_for_bit() -> None:
 
 def test_a_copy_goes_its_own_way() -> None:
     world = _started(cars=2, walkers=2)
-    wishes = Wishes(target_speed_mps=3.0, target_lane=world.spot("stadium").lane)
-    _drive(world, wishes, 20)
+    setpoints = Setpoints(target_speed_mps=3.0, target_lane=world.spot("stadium").lane)
+    _drive(world, setpoints, 20)
     twin = world.copy()
     assert twin.observe() == world.observe()
     before = world.observe()
-    _drive(twin, wishes, 20)
+    _drive(twin, setpoints, 20)
     assert world.observe() == before
     again = world.copy()
-    _drive(again, wishes, 20)
+    _drive(again, setpoints, 20)
     assert again.observe() == twin.observe()
 
 
@@ -167,14 +167,14 @@ def test_leaving_the_pavement_ends_the_trip() -> None:
 
 def test_out_of_time() -> None:
     world = _started(duration_s=1.0)
-    assert len(_drive(world, Wishes(target_speed_mps=0.0), 50)) == 10
+    assert len(_drive(world, Setpoints(target_speed_mps=0.0), 50)) == 10
     assert world.ended
 
 
 def test_the_other_car_leaves_and_is_gone() -> None:
     world = _started(2, cars=1, walkers=0, aisles=1, spots_a_row=2)
     number = world.observe().others[-1].id
-    _drive(world, Wishes(target_speed_mps=0.0), 500)
+    _drive(world, Setpoints(target_speed_mps=0.0), 500)
     with pytest.raises(KeyError):
         world.perception().vehicle(number)
 
@@ -182,7 +182,7 @@ def test_the_other_car_leaves_and_is_gone() -> None:
 def test_nobody_drives_or_walks_into_a_car_that_stands() -> None:
     for seed in range(3):
         world = _started(seed, cars=2, walkers=3)
-        shots = _drive(world, Wishes(target_speed_mps=2.0), 60) + _drive(world, Wishes(target_speed_mps=0.0), 120)
+        shots = _drive(world, Setpoints(target_speed_mps=2.0), 60) + _drive(world, Setpoints(target_speed_mps=0.0), 120)
         assert not shots[-1].ego.crashed
 
 

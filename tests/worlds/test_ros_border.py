@@ -18,8 +18,8 @@ from chauffeur.worlds.ros import VehicleError, VehicleInterface, VehicleLimits, 
 from chauffeur.worlds.ros.autoware import Autoware
 from chauffeur.worlds.ros.autoware_ai import Acknowledgement, AutowareAi, ConstantSpeed, PlannedSpeed, Replanner
 from chauffeur.worlds.ros.dry import DryRun
+from chauffeur.worlds.ros.factory import open_vehicle
 from chauffeur.worlds.ros.limits import checked
-from chauffeur.worlds.ros.opening import open_vehicle
 from chauffeur.worlds.ros.settings import SENTENCE, parse_settings, read_settings
 
 LIMITS = VehicleLimits(12.0, (4.0, 20.0), (0.5, 4.0))

@@ -36,7 +36,7 @@ from ros_graph import (
     wish,
 )
 
-from chauffeur.worlds.ros import VehicleError, VehicleInterface, VehicleLimits, VehicleRefusalError, node, outlet
+from chauffeur.worlds.ros import VehicleError, VehicleInterface, VehicleLimits, VehicleRefusalError, node, publisher
 from chauffeur.worlds.ros.autoware_ai import (
     DEFINITIONS,
     VELOCITY_TYPE,
@@ -49,7 +49,7 @@ from chauffeur.worlds.ros.engage import WORDS, disengage, engage
 from chauffeur.worlds.ros.master import MasterError, call
 from chauffeur.worlds.ros.node import Ros1Settings
 from chauffeur.worlds.ros.notes import Notes
-from chauffeur.worlds.ros.outlet import Outlet, Publication
+from chauffeur.worlds.ros.publisher import Publication, Publisher
 from chauffeur.worlds.ros.ros1 import Ros1Vehicle
 from chauffeur.worlds.ros.types import Types
 from chauffeur.worlds.ros.wire import WireError, header_bytes, header_fields
@@ -351,7 +351,7 @@ def test_a_subscriber_that_cannot_reach_us_is_named(master: Master, vehicle: Ope
 def test_connections_that_say_nothing_or_nonsense_are_closed(
     master: Master, vehicle: Opened, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(outlet, "PATIENCE_S", 0.3)
+    monkeypatch.setattr(publisher, "PATIENCE_S", 0.3)
     car = vehicle(master.uri)
     address = ros.topic_address(uri_of(master), FOLLOWER)
     for sent in (
@@ -367,8 +367,8 @@ def test_connections_that_say_nothing_or_nonsense_are_closed(
     notes = " ".join(car.state().notes)
     assert "said nothing for" in notes
     assert "no ROS connection header" in notes
-    monkeypatch.setattr(outlet, "PATIENCE_S", 5.0)
-    crowd = [socket.create_connection(address, timeout=5.0) for _ in range(outlet.MOST_SUBSCRIBERS + 8)]
+    monkeypatch.setattr(publisher, "PATIENCE_S", 5.0)
+    crowd = [socket.create_connection(address, timeout=5.0) for _ in range(publisher.MOST_SUBSCRIBERS + 8)]
     eventually(lambda: counts(car).get("turned_away") == 8)
     for sock in crowd:
         sock.close()
@@ -377,10 +377,10 @@ def test_connections_that_say_nothing_or_nonsense_are_closed(
 
 
 def test_who_reads_slowly_gets_the_newest_and_holds_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outlet, "PATIENCE_S", 0.5)
+    monkeypatch.setattr(publisher, "PATIENCE_S", 0.5)
     notes = Notes()
     topic = Publication("/t", "a/B", "m" * 32, "int32 x\n")
-    out = Outlet(HOST, "/us", (topic,), notes, lambda md5, _: md5)
+    out = Publisher(HOST, "/us", (topic,), notes, lambda md5, _: md5)
     header = ros.framed({"callerid": "/slow", "topic": "/t", "md5sum": "m" * 32, "type": "a/B"})
     slow = socket.create_connection((HOST, out.port), timeout=5.0)
     dead = socket.create_connection((HOST, out.port), timeout=5.0)
@@ -428,7 +428,7 @@ def test_the_vehicles_speed_is_read_and_grows_old(
     master: Master, vehicle: Opened, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("chauffeur.worlds.ros.ros1.FRESH_S", 0.3)
-    monkeypatch.setattr("chauffeur.worlds.ros.inlet.RETRY_S", 0.05)
+    monkeypatch.setattr("chauffeur.worlds.ros.subscriber.RETRY_S", 0.05)
     car = vehicle(master.uri)
     assert car.state().speed_mps is None
     publisher = VelocityPublisher(master)

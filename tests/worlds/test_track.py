@@ -129,7 +129,7 @@ def test_leaving_the_lanes_is_off_road() -> None:
 def test_its_driver_follows_the_bend_when_nobody_wishes_anything() -> None:
     world = world_of("left_turn", noise=1.0)
     driver = world.driver()
-    wishes = driver.initial_wishes()
+    wishes = driver.initial_setpoints()
     while not world.ended:
         wishes = driver.settle(wishes)
         world.step(driver.command(wishes))

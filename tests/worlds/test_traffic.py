@@ -17,7 +17,7 @@ def _trace(scenario: Scenario, steps: int) -> list[Any]:
     world = ReferenceWorld()
     world.reset(scenario)
     driver = world.driver()
-    wishes = driver.initial_wishes()
+    wishes = driver.initial_setpoints()
     rows = []
     for _ in range(steps):
         wishes = driver.settle(wishes)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from chauffeur.camera.falling import falling
 from chauffeur.camera.ground import Marking, Paving
 from chauffeur.camera.lens import Lens
 from chauffeur.camera.light import Light, light_of
 from chauffeur.camera.look import CameraLook
 from chauffeur.camera.pictures import CameraImages, ImageTruth
+from chauffeur.camera.precipitation import falling
 from chauffeur.camera.projection import NEAR_M, Viewpoint, viewpoints
 from chauffeur.camera.scene import CameraScene, SceneBuilder
 from chauffeur.camera.solids import (

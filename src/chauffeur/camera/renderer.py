@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import numpy as np
 
 from chauffeur.camera import shaders
-from chauffeur.camera.falling import FALL, falling
 from chauffeur.camera.ground import VERTEX, Paving
 from chauffeur.camera.lens import Lens
 from chauffeur.camera.light import Light, light_of
 from chauffeur.camera.look import CameraLook
 from chauffeur.camera.pictures import CameraImages, ImageTruth
+from chauffeur.camera.precipitation import FALL, falling
 from chauffeur.camera.projection import Viewpoint, viewpoints
 from chauffeur.camera.rig import Camera, Rig
 from chauffeur.camera.scene import CameraScene, PlaceView, SceneBuilder

@@ -52,8 +52,8 @@ def adapt(
     from chauffeur.cli.stages import stage_lines
     from chauffeur.concept import ConfigError, PersonId
     from chauffeur.memory.choice import open_memory
-    from chauffeur.models.onboard.adapting import AdaptRecipe
-    from chauffeur.models.onboard.adapting import adapt as adapt_model
+    from chauffeur.models.onboard.adaptation import AdaptRecipe
+    from chauffeur.models.onboard.adaptation import adapt as adapt_model
     from chauffeur.models.onboard.interactions import (
         AcceptedInteraction,
         exported_items,

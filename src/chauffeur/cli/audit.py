@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from chauffeur.concept import Scenario
-    from chauffeur.drive.auditing import Auditor
+    from chauffeur.drive.session_recorder import DriveRecorder
     from chauffeur.safety.audit import AuditRecord, AuditVerification, Closing
 
 KEY_VARIABLE: Final = "CHAUFFEUR_AUDIT_KEY"
@@ -221,7 +221,7 @@ def redact_log(
     console.print(columns([("head", done.head)]))
 
 
-def auditor_for(path: Path, scenario: Scenario, seed: int) -> Auditor:
+def auditor_for(path: Path, scenario: Scenario, seed: int) -> DriveRecorder:
     """The auditor of a drive, as the environment wants it.
 
     Raises:
@@ -231,7 +231,7 @@ def auditor_for(path: Path, scenario: Scenario, seed: int) -> Auditor:
     import os
 
     from chauffeur.concept import ConfigError
-    from chauffeur.drive.auditing import open_audit
+    from chauffeur.drive.session_recorder import open_audit
 
     private = os.environ.get(PRIVATE_VARIABLE, "")
     if private not in ("", "0", "1"):

@@ -79,8 +79,8 @@ def openloop(
     from chauffeur.bench.kernel.report import markdown, tables
     from chauffeur.bench.kernel.run import BenchRun, write_results
     from chauffeur.bench.openloop import OpenLoopBenchmark
-    from chauffeur.bench.openloop.asking import training_lines
     from chauffeur.bench.openloop.frames import SIMULATED
+    from chauffeur.bench.openloop.requests import training_lines
     from chauffeur.bench.openloop.table12 import HEADER, LEARNING, our_line, paper_lines
     from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
     from chauffeur.cli.console import stdout

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from chauffeur.bench.kernel.standing import Standing
+    from chauffeur.bench.kernel.progress import Standing
 
 LINE_EVERY_S: Final = 10.0
 

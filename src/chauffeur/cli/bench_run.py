@@ -42,9 +42,9 @@ def effort(
     """How hard a run works. Raises ConfigError for options that contradict each other."""
     from functools import partial
 
+    from chauffeur.bench.kernel.budget import Price, SpendingBudget
     from chauffeur.bench.kernel.engine import LocalEngine
     from chauffeur.bench.kernel.run import Effort
-    from chauffeur.bench.kernel.spending import Price, SpendingBudget
     from chauffeur.cli.parts import needs
 
     if ray is not None and workers is not None:

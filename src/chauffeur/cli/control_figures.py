@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from chauffeur.cli.labels import RUNGS
+from chauffeur.cli.labels import FALLBACK_LEVELS
 from chauffeur.drive.talk.tally import Tally
 from chauffeur.hmi import words
 
@@ -24,7 +24,9 @@ def control_figures(tally: Tally) -> Iterator[tuple[str, str]]:
     if tally.clipped:
         count = ", ".join(f"{name} {times}" for name, times in tally.clipped.most_common())
         yield "limits", f"Wishes held within the limits, in control periods: {count}."
-    lower = [f"{RUNGS[rung]}: {_periods(count)}" for rung, count in tally.rungs.items() if rung != "follow"]
+    lower = [
+        f"{FALLBACK_LEVELS[level]}: {_periods(count)}" for level, count in tally.levels.items() if level != "follow"
+    ]
     if lower:
         yield "ladder", "; ".join(lower) + "."
     yield from _punctuality(tally)

@@ -102,7 +102,7 @@ def drive(
 
     from chauffeur.bench.referees import referee_for
     from chauffeur.cli.audit import auditor_for, tell_closing
-    from chauffeur.cli.compiling import Compiling
+    from chauffeur.cli.compilation import CompilationNotice
     from chauffeur.cli.console import stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.cli.parts import (
@@ -115,11 +115,11 @@ def drive(
     )
     from chauffeur.cli.show import FullTeller, Quiet, Teller
     from chauffeur.concept import PersonId
-    from chauffeur.drive.answering import ANSWERED
-    from chauffeur.drive.auditing import with_head
+    from chauffeur.drive.answers import ANSWERED
     from chauffeur.drive.events import told_to
     from chauffeur.drive.scenarios import find, planner_for, suiting
     from chauffeur.drive.session import Forgetful, Session, parse_wish
+    from chauffeur.drive.session_recorder import with_head
     from chauffeur.memory.choice import open_memory
     from chauffeur.memory.personal_limits import personal_limits
     from chauffeur.planners.talk2drive.recent import fitting
@@ -157,7 +157,7 @@ def drive(
         if private := not_kept(instruction.person):
             console.print(private, style="bold yellow", markup=False)
         stack.enter_context(teller)
-        stack.enter_context(Compiling(teller.compiling))
+        stack.enter_context(CompilationNotice(teller.compiling))
         recorded = asyncio.run(session.drive(instruction, place, start_seed, bounds))
         plan = recorded.trip.plan
         if plan.offer and auditor is None and asking() and typer.confirm(plan.refusal):

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from chauffeur.drive.events import EventKind
-    from chauffeur.drive.live.messages import Rung
+    from chauffeur.drive.live.messages import FallbackLevel
 
-RUNGS: Final[dict[Rung, str]] = {
+FALLBACK_LEVELS: Final[dict[FallbackLevel, str]] = {
     "follow": "follows the plan",
     "hold": "holds the last wish",
     "keep": "keeps lane and distance",

@@ -13,7 +13,7 @@ from chauffeur.cli import adapt as adapting
 from chauffeur.cli import adapt_vlm as adapting_vlm
 from chauffeur.cli import (
     apis,
-    bench_alignment,
+    bench_faithfulness,
     bench_hostile,
     bench_leaderboard,
     bench_nuplanqa,
@@ -166,7 +166,7 @@ bench_app.command(epilog=wheel.EXAMPLES)(wheel.human)
 bench_app.command(epilog=coach.EXAMPLES)(coach.coach)
 bench_app.command("coach-town", epilog=coach_town.EXAMPLES)(coach_town.coach_town)
 bench_app.command(epilog=bench_hostile.EXAMPLES)(bench_hostile.hostile)
-bench_app.command(epilog=bench_alignment.EXAMPLES)(bench_alignment.alignment)
+bench_app.command(epilog=bench_faithfulness.EXAMPLES)(bench_faithfulness.faithfulness)
 bench_app.command(epilog=bench_leaderboard.EXAMPLES)(bench_leaderboard.leaderboard)
 bench_app.command(epilog=bench_nuplanqa.EXAMPLES)(bench_nuplanqa.nuplanqa)
 bench_app.command(epilog=bench_openloop.EXAMPLES)(bench_openloop.openloop)

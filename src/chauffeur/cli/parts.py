@@ -11,7 +11,7 @@ from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, Limits, MissingExtra
 if TYPE_CHECKING:
     from chauffeur.concept import Context, Observation
     from chauffeur.describe.services.sources import SourceSettings
-    from chauffeur.drive.talk.hearing import HearingEngine
+    from chauffeur.drive.talk.asr_process import AsrEngine
     from chauffeur.planners.base import Planner
     from chauffeur.planners.prompts import Setting
 
@@ -98,19 +98,19 @@ def planner_named(spec: str, base_url: str | None, on_text: Callable[[str, int],
     return make_planner(spec, **options)
 
 
-def engine_named(spec: str) -> HearingEngine | None:
+def engine_named(spec: str) -> AsrEngine | None:
     """The speech engine a specification names; None for `none`.
 
     Raises:
         ConfigError: There is no such engine.
     """
-    from chauffeur.drive.talk.hearing import HearingEngine
+    from chauffeur.drive.talk.asr_process import AsrEngine
     from chauffeur.speech.engines import ENGINES
 
     name, _, model = spec.strip().partition("/")
     if name not in (*ENGINES, "none"):
         raise ConfigError(f"Unknown speech engine {spec!r}.", hint=f"Known: {', '.join(ENGINES)}, none.")
-    return HearingEngine(name, model, favoured=True) if name != "none" else None
+    return AsrEngine(name, model, favoured=True) if name != "none" else None
 
 
 def not_kept(person: str) -> str:

@@ -181,8 +181,8 @@ def check(
     out: Annotated[Path | None, typer.Option(help="Write every fault as a JSON line.")] = None,
 ) -> None:
     """Drive every scene with the scripted expert, and read every instruction back."""
-    from chauffeur.bench.lampilot.scenes.checking import as_row, counts
-    from chauffeur.bench.lampilot.scenes.checking import check as look_over
+    from chauffeur.bench.lampilot.scenes.scene_check import as_row, counts
+    from chauffeur.bench.lampilot.scenes.scene_check import check as look_over
     from chauffeur.cli.console import plain, stdout
     from chauffeur.drive.files import publish
 
@@ -209,7 +209,7 @@ def check(
 @scenes_app.command(epilog=STATS_EXAMPLES)
 def stats(data: Annotated[Path, typer.Argument(help="Suite, or any DbLv1 folder.")]) -> None:
     """The columns of Tab. III for any DbLv1 folder, next to the paper's. Extras of a suite are counted apart."""
-    from chauffeur.bench.lampilot.scenes.checking import folders_of
+    from chauffeur.bench.lampilot.scenes.scene_check import folders_of
     from chauffeur.bench.lampilot.scenes.statistics import statistics_of, table
     from chauffeur.cli.console import stdout
     from chauffeur.worlds.highway.dblv1 import load_dataset

@@ -32,13 +32,13 @@ from chauffeur.concept import (
     Trip,
     Verdict,
 )
-from chauffeur.drive.answering import ANSWERED
+from chauffeur.drive.answers import ANSWERED
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.payload import policy_words
 from chauffeur.memory.conflicts import conflicts_in
-from chauffeur.safety.alignment import mismatch_words, score_words
+from chauffeur.safety.faithfulness import mismatch_words, score_words
 
 _CODE: dict[str, Any] = {
     "lexer": "python",

@@ -107,7 +107,7 @@ def talk(
     from chauffeur.cli.talk_drive import TalkDrive
     from chauffeur.cli.talk_screen import TalkScreen
     from chauffeur.concept import PersonId, SandboxError
-    from chauffeur.drive.live.books import Books, unanswered
+    from chauffeur.drive.live.recorder import LiveRecorder, unanswered
     from chauffeur.drive.live.settings import Settings
     from chauffeur.drive.live.starts import Start
     from chauffeur.drive.scenarios import find, planner_for, seeds_with_lead, suiting
@@ -146,7 +146,7 @@ def talk(
     with ExitStack() as stack:
         left = () if audit is None else unanswered(audit)
         if audit is not None:
-            books = stack.enter_context(Books(auditor_for(audit, place, first), make_world(place).dt_s))
+            books = stack.enter_context(LiveRecorder(auditor_for(audit, place, first), make_world(place).dt_s))
         sound = stack.enter_context(Sound(device)) if microphone else None
         voice = Voice() if speak else None
         drive = TalkDrive(screen, stack.enter_context(_cabin()) if page else None, given, every)

@@ -16,7 +16,7 @@ from rich.syntax import Syntax
 from rich.text import Text
 
 from chauffeur.cli.console import columns, plain
-from chauffeur.cli.labels import EVENTS, NOT_HEARD, RUNGS
+from chauffeur.cli.labels import EVENTS, FALLBACK_LEVELS, NOT_HEARD
 from chauffeur.cli.talk_typed import HELP
 from chauffeur.concept import HELPERS_HEAD
 from chauffeur.drive.talk.messages import (
@@ -43,7 +43,7 @@ _MOST_TYPED: Final = 2
 _MOST_SOURCE: Final = 14
 """Lines of a program that are shown; the page shows all of it."""
 
-_RUNGS: Final[dict[str, str]] = {**RUNGS, "hand": "you have the wheel"}
+_LEVELS: Final[dict[str, str]] = {**FALLBACK_LEVELS, "hand": "you have the wheel"}
 _OUTCOMES: Final[dict[str, tuple[str, str]]] = {**EVENTS, "superseded": ("gave way", "dim")}
 _LISTENING: Final = {
     "off": ("not listening", "dim"),
@@ -334,8 +334,8 @@ def _line_of(scene: Scene) -> Text:
     ]
     if scene.place is not None:
         parts.append(Text(f"lane {scene.place + 1} from left"))
-    if scene.rung != "follow":
-        parts.append(Text(_RUNGS[scene.rung], "bold yellow"))
+    if scene.level != "follow":
+        parts.append(Text(_LEVELS[scene.level], "bold yellow"))
     parts.append(Text(f"{scene.wish}{f', line {scene.line}' if scene.line else ''}" if scene.wish else "no plan"))
     return Text("   ").join(parts)
 

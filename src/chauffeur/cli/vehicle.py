@@ -64,7 +64,7 @@ def check(file: File, wait: Wait = 5.0) -> None:
     from chauffeur.cli.failures import FAILED
     from chauffeur.concept.units import kmh
     from chauffeur.worlds.ros.autoware_ai import AutowareAi, ConstantSpeed
-    from chauffeur.worlds.ros.opening import open_vehicle
+    from chauffeur.worlds.ros.factory import open_vehicle
     from chauffeur.worlds.ros.settings import read_settings
 
     settings = read_settings(file)
@@ -104,7 +104,7 @@ def apply(
     from chauffeur.cli.failures import FAILED
     from chauffeur.concept import Parameters
     from chauffeur.worlds.ros.dry import DryRun
-    from chauffeur.worlds.ros.opening import open_vehicle
+    from chauffeur.worlds.ros.factory import open_vehicle
     from chauffeur.worlds.ros.settings import read_settings
 
     car = open_vehicle(read_settings(file), dry_run=dry_run)
@@ -130,7 +130,7 @@ def release(file: File, wait: Wait = 5.0) -> None:
     """Take the speed cap back: the vehicle drives as its own planner plans, which may be faster."""
     from chauffeur.cli.console import plain, stdout
     from chauffeur.cli.failures import FAILED
-    from chauffeur.worlds.ros.opening import open_vehicle
+    from chauffeur.worlds.ros.factory import open_vehicle
     from chauffeur.worlds.ros.settings import read_settings
 
     car = open_vehicle(read_settings(file))
@@ -152,7 +152,7 @@ def watch(
     """Show the way to the vehicle and its speed, a line when something changes. Nothing is published."""
     import time
 
-    from chauffeur.worlds.ros.opening import open_vehicle
+    from chauffeur.worlds.ros.factory import open_vehicle
     from chauffeur.worlds.ros.settings import read_settings
 
     car = open_vehicle(read_settings(file))

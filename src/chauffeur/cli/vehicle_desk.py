@@ -10,13 +10,13 @@ from typing import Final
 
 from chauffeur.cli.lines import Lines, standard_input
 from chauffeur.cli.vehicle_screen import VehicleScreen
-from chauffeur.drive.onroad import OnRoad
+from chauffeur.drive.onroad import VehicleSession
 from chauffeur.drive.onroad.spoken import listening
-from chauffeur.drive.talk.asking import Words
+from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.attention import Attention
-from chauffeur.drive.talk.hearing import HearingEngine
 from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.voice import Voice
+from chauffeur.drive.talk.wish_queue import Words
 from chauffeur.speech.answers import answer_in
 
 _EVALUATE: Final = "evaluate"
@@ -27,15 +27,13 @@ _LISTEN_S: Final = 0.2
 class Desk:
     """Takes what is typed and said to a session."""
 
-    def __init__(self, road: OnRoad, screen: VehicleScreen) -> None:
+    def __init__(self, road: VehicleSession, screen: VehicleScreen) -> None:
         self._road, self._screen = road, screen
         self._running: set[asyncio.Task[None]] = set()
         self._attention: Attention | None = None
 
     @contextlib.asynccontextmanager
-    async def open(
-        self, engine: HearingEngine | None, sound: Sound | None, voice: Voice | None
-    ) -> AsyncGenerator[Desk]:
+    async def open(self, engine: AsrEngine | None, sound: Sound | None, voice: Voice | None) -> AsyncGenerator[Desk]:
         """Listen as long as this is entered, if there is an engine; wishes that were taken are answered at the end."""
         async with contextlib.AsyncExitStack() as stack:
             if engine is not None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 if TYPE_CHECKING:
-    from chauffeur.drive.onroad import RoadBooks
+    from chauffeur.drive.onroad import VehicleRecorder
     from chauffeur.worlds.ros.settings import VehicleSettings
 
 DRIVE_EXAMPLES: Final = """
@@ -75,13 +75,13 @@ def drive(
     from chauffeur.cli.vehicle_screen import VehicleScreen
     from chauffeur.concept import PersonId
     from chauffeur.describe.services.sources import read_sources
-    from chauffeur.drive.onroad import OnRoad
+    from chauffeur.drive.onroad import VehicleSession
     from chauffeur.drive.surroundings import opened
     from chauffeur.drive.talk.sound import Sound
     from chauffeur.drive.talk.voice import Voice
     from chauffeur.memory.choice import open_memory
     from chauffeur.planners.talk2drive.recent import fitting
-    from chauffeur.worlds.ros.opening import open_vehicle
+    from chauffeur.worlds.ros.factory import open_vehicle
     from chauffeur.worlds.ros.settings import read_settings
 
     who = PersonId(person.strip())
@@ -108,7 +108,7 @@ def drive(
             _end_on_signals()
             async with (
                 opened(sources) as place,
-                OnRoad(
+                VehicleSession(
                     car,
                     settings,
                     mind,
@@ -139,7 +139,7 @@ def drive(
         raise typer.Exit(FAILED)
 
 
-def _books(path: Path, file: Path, settings: VehicleSettings, *, dry_run: bool) -> RoadBooks:
+def _books(path: Path, file: Path, settings: VehicleSettings, *, dry_run: bool) -> VehicleRecorder:
     """The audit log, as the environment wants it."""
     import os
 

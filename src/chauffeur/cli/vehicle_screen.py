@@ -11,9 +11,9 @@ from chauffeur.cli.console import echo, plain
 from chauffeur.cli.labels import NOT_HEARD
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.onroad import OnRoadAnswer
-from chauffeur.drive.talk.asking import Words
 from chauffeur.drive.talk.messages import HeardWords, Note, Said
 from chauffeur.drive.talk.voice import Voice
+from chauffeur.drive.talk.wish_queue import Words
 from chauffeur.worlds.ros import Published
 from chauffeur.worlds.ros.autoware_ai import AutowareAi
 from chauffeur.worlds.ros.lines import command_line

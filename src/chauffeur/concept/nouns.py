@@ -479,7 +479,7 @@ class Mismatch:
 
 
 @dataclass(frozen=True, slots=True)
-class Alignment:
+class Faithfulness:
     """How well R describes P, or a drive.
 
     Attributes:
@@ -528,7 +528,7 @@ class Verdict:
     line: int | None = None
     remedy: str = ""
     vetoes: bool = True
-    alignment: Alignment | None = None
+    alignment: Faithfulness | None = None
     proven: bool = True
 
     @property

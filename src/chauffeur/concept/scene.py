@@ -169,7 +169,7 @@ def stops_at_sign(speed_mps: float, ahead_m: float, *, zone_m: float = STOP_ZONE
 
 
 @dataclass(frozen=True, slots=True)
-class Wishes:
+class Setpoints:
     """What a policy wants of the controller. A policy sets wishes; only the controller actuates.
 
     Attributes:

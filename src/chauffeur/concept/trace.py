@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from chauffeur.concept.scene import Command, Observation, Wishes
+from chauffeur.concept.scene import Command, Observation, Setpoints
 
 ProgramState = Literal["none", "running", "finished", "failed"]
 """`none`: no program drives (a baseline, or it was refused); `finished`: it ended and the driver holds its wishes."""
@@ -60,7 +60,7 @@ class Frame:
     """
 
     observation: Observation
-    wishes: Wishes
+    setpoints: Setpoints
     requested: Command
     applied: Command
     program: ProgramState = "none"

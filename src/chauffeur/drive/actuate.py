@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation, Wishes
+from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation, Setpoints
 from chauffeur.safety.bounds import bounded
-from chauffeur.safety.shield import Guarded, Shield
+from chauffeur.safety.shield import FilterResult, Shield
 from chauffeur.worlds.base import World
 
 
@@ -24,20 +24,20 @@ class Actuated:
 
 
 def set_points(
-    world: World, observation: Observation, wishes: Wishes, limits: Limits, least_mps: float = 0.0
-) -> tuple[Wishes, tuple[str, ...]]:
-    """The wishes as they may be driven at an instant, and the names of what was brought within the limits.
+    world: World, observation: Observation, setpoints: Setpoints, limits: Limits, least_mps: float = 0.0
+) -> tuple[Setpoints, tuple[str, ...]]:
+    """The set-points as they may be driven at an instant, and the names of what was brought within the limits.
 
     Args:
         world: Whose speed limits hold: that of the lane the car is in; in a lane change, the higher one of both.
         observation: Its present instant.
-        wishes: As the policy states them.
+        setpoints: As the policy states them.
         limits: Of the person and the operator.
         least_mps: Least speed a policy may ask for there; 0 for none.
     """
     perception = world.perception()
-    lanes = [lane for lane in (observation.ego.lane, wishes.target_lane) if lane is not None]
-    return bounded(wishes, limits, max(map(perception.speed_limit, lanes), default=math.inf), least_mps)
+    lanes = [lane for lane in (observation.ego.lane, setpoints.target_lane) if lane is not None]
+    return bounded(setpoints, limits, max(map(perception.speed_limit, lanes), default=math.inf), least_mps)
 
 
 def actuate(
@@ -52,5 +52,7 @@ def actuate(
         aim: Lane that is steered for.
         shield: Has the last word; None where a benchmark's own rules allow none.
     """
-    guarded = Guarded(requested) if shield is None or observation is None else shield.guard(observation, requested, aim)
+    guarded = (
+        FilterResult(requested) if shield is None or observation is None else shield.filter(observation, requested, aim)
+    )
     return Actuated(requested, world.step(guarded.command), guarded.interventions)

@@ -14,7 +14,7 @@ from chauffeur.concept import Observation, Program, SandboxError, Thoughts
 from chauffeur.drive.episode import Episode, run_episode
 from chauffeur.drive.rehearsal import CopyableWorld
 from chauffeur.programs import ProgramExecutor, Sandbox
-from chauffeur.safety.alignment import Alignment, Effect, FactSurroundings, judge, read_facts
+from chauffeur.safety.faithfulness import Effect, FactSurroundings, Faithfulness, judge, read_facts
 
 MAX_S: Final = 30.0
 """Simulated seconds a program is given to show what it does."""
@@ -42,7 +42,7 @@ def effects_of(
 
 def judge_driven(
     thoughts: Thoughts, program: Program, worlds: Sequence[CopyableWorld], *, sandbox: Sandbox, max_s: float = MAX_S
-) -> Alignment:
+) -> Faithfulness:
     """Judge thoughts by what reading finds in a program and by what it did on copies of the first world and the others.
 
     Raises:

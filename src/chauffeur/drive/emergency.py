@@ -13,7 +13,7 @@ from chauffeur.concept import Observation, Parameters, Plan, Program, Thoughts, 
 from chauffeur.drive.fallback import MINIMAL_RISK_BRAKING_MPS2
 from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency
 from chauffeur.safety.bounds import least_speed_mps, shoulder_at_right
-from chauffeur.safety.reading import read_program
+from chauffeur.safety.constant_calls import read_program
 
 EMERGENCY_CHECK: Final = "emergency-v1"
 EMERGENCY_PLANNER: Final = "emergency"

@@ -1,8 +1,8 @@
 """The control loop of a trip in simulated time.
 
-Each control period: the policy states its wishes, limits bound them, the driver turns them into a command, the world
-applies it, the referee looks. A policy that fails loses the wheel at once: the driver goes on with safe wishes for a
-moment, and the trip ends; what it would have done without the policy is never counted as the policy's.
+Each control period: the policy states its set-points, limits bound them, the driver turns them into a command, the
+world applies it, the referee looks. A policy that fails loses control at once: the driver goes on with fallback
+set-points for a moment, and the trip ends; what it would have done without the policy is never counted as the policy's.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from chauffeur.concept import (
     Outcome,
     ProgramState,
     SandboxError,
-    Wishes,
+    Setpoints,
 )
 from chauffeur.drive.actuate import actuate, set_points
 from chauffeur.drive.fallback import keep_lane_and_gap
-from chauffeur.executors.base import DriverLed, Executor, HeldWishes, PolicyTick, RunningPolicy
+from chauffeur.executors.base import DriverLed, Executor, HeldSetpoints, PolicyTick, RunningPolicy
 from chauffeur.safety.bounds import least_target_mps
 from chauffeur.safety.shield import Shield
 from chauffeur.worlds.base import EGO, World
@@ -38,7 +38,7 @@ AFTER_END_S = 3.0
 """How long a trip without a referee goes on after its program finished."""
 
 
-class Hands(Protocol):
+class CommandSource(Protocol):
     """A person at wheel and pedals, asked once per control period in the place of the world's driver."""
 
     def command(self) -> Command | None:
@@ -65,7 +65,7 @@ class Referee(Protocol):
 class FollowsPolicy(Protocol):
     """What a referee offers that judges a trip by what its policy asks for."""
 
-    def follow(self, setpoints: Wishes, state: ProgramState) -> None:
+    def follow(self, setpoints: Setpoints, state: ProgramState) -> None:
         """The set-points of a control period, and the program's state, before `observe`."""
         ...
 
@@ -111,9 +111,9 @@ def run_episode(
     *,
     max_s: float,
     record: bool = True,
-    adjust: Callable[[Wishes], Wishes] | None = None,
+    adjust: Callable[[Setpoints], Setpoints] | None = None,
     watch: Callable[[Frame], None] | None = None,
-    hands: Hands | None = None,
+    command_source: CommandSource | None = None,
     shield: Shield | None = None,
     limits: Limits | None = None,
     minimum_speed: bool = False,
@@ -127,9 +127,10 @@ def run_episode(
         referee: Says when it is over and what came of it; None drives on until the program has ended.
         max_s: Bound of the trip in simulated time, s.
         record: Whether to keep frames (a benchmark does not need them).
-        adjust: Baseline that rewrites settled wishes each period, e.g. MOBIL's lane choice.
+        adjust: Baseline that rewrites settled set-points each period, e.g. MOBIL's lane choice.
         watch: Called with each recorded frame, for live display.
-        hands: A person, who acts in the place of the driver; what a policy beside them asks for is shown, not driven.
+        command_source: A person, who acts in place of the driver; what a policy beside them asks for is shown, not
+            driven.
         shield: Has the last word on every command; None where a benchmark's own rules allow none.
         limits: Bounds of the set-points, whatever the policy answers in a period; None where a benchmark's own rules
             know none.
@@ -140,50 +141,50 @@ def run_episode(
     frames: list[Frame] = []
     said: list[tuple[float, str]] = []
     failure: ChauffeurError | None = None
-    held = driver.initial_wishes()
+    held = driver.initial_setpoints()
     bounded = Counter[str]()
     idle = 0
     ticks = changed = 0
     end = round(max_s / world.dt_s)
     while ticks < end:
         at_s = ticks * world.dt_s
-        if hands is not None:
-            held = driver.initial_wishes()  # a person tells nobody what they want: what is stands for it
-        tick = _ask(policy, held) if failure is None else HeldWishes(held, state="failed")
+        if command_source is not None:
+            held = driver.initial_setpoints()  # a person tells nobody what they want: what is stands for it
+        tick = _ask(policy, held) if failure is None else HeldSetpoints(held, state="failed")
         said.extend((at_s, text) for text in tick.said)
         if tick.error is not None:
             failure = tick.error
             ego = world.perception().vehicle(EGO)
-            safe = keep_lane_and_gap(tick.wishes, max(0.0, ego.speed_mps), ego.lane)
-            tick = HeldWishes(safe, state="failed", line=tick.line, said=tick.said, calls=tick.calls)
+            safe = keep_lane_and_gap(tick.setpoints, max(0.0, ego.speed_mps), ego.lane)
+            tick = HeldSetpoints(safe, state="failed", line=tick.line, said=tick.said, calls=tick.calls)
             end = min(end, ticks + round(FALLBACK_S / world.dt_s))
-        wishes = tick.wishes if steers is not None and failure is None else driver.settle(tick.wishes)
+        setpoints = tick.setpoints if steers is not None and failure is None else driver.settle(tick.setpoints)
         if adjust is not None:
-            wishes = adjust(wishes)
+            setpoints = adjust(setpoints)
         looks = record or shield is not None or limits is not None or steers is not None
         before = world.observe() if looks else None
         if limits is not None and before is not None:
-            least = least_target_mps(before, wishes, limits) if minimum_speed and failure is None else 0.0
-            wishes, names = set_points(world, before, wishes, limits, least)
+            least = least_target_mps(before, setpoints, limits) if minimum_speed and failure is None else 0.0
+            setpoints, names = set_points(world, before, setpoints, limits, least)
             bounded.update(names)
-        held = wishes
-        acts = hands is not None and (policy is None or failure is None)
-        if hands is not None and acts:
-            requested = hands.command()
+        held = setpoints
+        acts = command_source is not None and (policy is None or failure is None)
+        if command_source is not None and acts:
+            requested = command_source.command()
         elif steers is not None and before is not None and failure is None:
-            requested = steers.step(before, wishes)
+            requested = steers.step(before, setpoints)
         else:
-            requested = driver.command(wishes)
+            requested = driver.command(setpoints)
         if requested is None:
             failure = ChauffeurError(f"Given up by the driver after {at_s:.1f} s.")
             break
-        done = actuate(world, before, requested, wishes.target_lane, shield)
+        done = actuate(world, before, requested, setpoints.target_lane, shield)
         changed += bool(done.interventions)
         ticks += 1
         if record and before is not None:
             frame = Frame(
                 before,
-                wishes,
+                setpoints,
                 requested,
                 done.applied,
                 tick.state,
@@ -197,7 +198,7 @@ def run_episode(
                 watch(frame)
         if referee is not None:
             if isinstance(referee, FollowsPolicy):
-                referee.follow(wishes, tick.state)
+                referee.follow(setpoints, tick.state)
             referee.observe()
             if referee.over and failure is None:
                 break
@@ -216,7 +217,7 @@ def run_episode(
         ticks=ticks,
         duration_s=round(ticks * world.dt_s, 3),
         outcome=_outcome(final, referee, failure),
-        causes=_causes(failure, fallback_used=hands is None or policy is not None)
+        causes=_causes(failure, fallback_used=command_source is None or policy is not None)
         if failure is not None
         else Causes(detail=shortfall),
         metrics=() if referee is None else referee.metrics() if failure is None else _void(referee.metrics()),
@@ -227,14 +228,14 @@ def run_episode(
     )
 
 
-def _ask(policy: RunningPolicy | None, held: Wishes) -> PolicyTick:
-    """The policy's tick; a broken sandbox is a failed tick with the wishes held, never an exception at the wheel."""
+def _ask(policy: RunningPolicy | None, held: Setpoints) -> PolicyTick:
+    """The policy's tick; a broken sandbox is a failed tick with the set-points held, never an exception here."""
     if policy is None:
-        return HeldWishes(held)
+        return HeldSetpoints(held)
     try:
         return policy.tick()
     except SandboxError as error:
-        return HeldWishes(held, state="failed", error=error)
+        return HeldSetpoints(held, state="failed", error=error)
 
 
 def _outcome(final: Observation, referee: Referee | None, failure: ChauffeurError | None) -> Outcome:

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from chauffeur.concept import Metric, Observation, Outcome, Plan, ProgramState, VehicleState, Wishes
+from chauffeur.concept import Metric, Observation, Outcome, Plan, ProgramState, Setpoints, VehicleState
 from chauffeur.concept.units import M_PER_CAR_LENGTH
 from chauffeur.worlds.base import World
 
@@ -104,10 +104,10 @@ class Fulfilment:
         self._lead: int | None = None
         self._passed = ""
         self._held = self._ended = 0
-        self._setpoints, self._state = Wishes(), "none"
+        self._setpoints, self._state = Setpoints(), "none"
         self._set_mps = math.nan
 
-    def follow(self, setpoints: Wishes, state: ProgramState) -> None:
+    def follow(self, setpoints: Setpoints, state: ProgramState) -> None:
         """What the policy asks for in this control period, before it is seen what came of it."""
         self._setpoints, self._state = setpoints, state
 

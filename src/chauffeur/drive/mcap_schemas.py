@@ -218,7 +218,7 @@ OBSERVATION = Channel(
 )
 WISHES = Channel(
     "/wishes",
-    "chauffeur.Wishes",
+    "chauffeur.Setpoints",
     _object(
         target_speed_mps=_optional_number("None keeps the present speed"),
         time_headway_s=_number(),

@@ -37,7 +37,7 @@ from chauffeur.concept import (
     Thoughts,
     Verdict,
 )
-from chauffeur.drive.answering import plan_or_answer
+from chauffeur.drive.answers import plan_or_answer
 from chauffeur.drive.emergency import check_told_not_to
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
 from chauffeur.planners.base import Planner

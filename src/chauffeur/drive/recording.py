@@ -267,8 +267,8 @@ def _write(
     for index, frame in enumerate(frames):
         time = foxglove.nanoseconds(frame.observation.time_s)
         parts = _storable(_frame.dump_python(frame, mode="json", exclude={"observation"}))
-        parts["wishes"]["served_stops"].sort()
-        put(channels.WISHES, parts["wishes"], time, index)
+        parts["setpoints"]["served_stops"].sort()
+        put(channels.WISHES, parts["setpoints"], time, index)
         put(channels.COMMAND, {name: parts[name] for name in ("requested", "applied", "interventions")}, time, index)
         program = {"state": parts["program"], "line": parts["line"], "calls": parts["calls"]}
         put(channels.PROGRAM, program, time, index)
@@ -498,14 +498,14 @@ def _read_frames(messages: dict[str, list[tuple[int, Any]]], observations: list[
         said.setdefault(index, []).append(payload["text"])
     frames: list[Frame] = []
     for index, observation in enumerate(observations):
-        wishes = messages[channels.WISHES.topic][index][1]
+        setpoints = messages[channels.WISHES.topic][index][1]
         command = messages[channels.COMMAND.topic][index][1]
         program = messages[channels.PROGRAM.topic][index][1]
         frames.append(
             _frame.validate_python(
                 {
                     "observation": observation,
-                    "wishes": wishes,
+                    "setpoints": setpoints,
                     **command,
                     "program": program["state"],
                     "line": program["line"],

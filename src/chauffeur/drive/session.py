@@ -55,9 +55,9 @@ from chauffeur.planners.base import Planner, looks
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.programs.catalogue import Vocabulary, vocabulary_of
 from chauffeur.programs.sandbox import Sandbox
-from chauffeur.safety.alignment import check_alignment, check_driven
 from chauffeur.safety.base import Check
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
+from chauffeur.safety.faithfulness import check_driven, check_faithfulness
 from chauffeur.safety.shield import SHIELD_VERSION, Shield, shield_for
 from chauffeur.worlds.base import World
 
@@ -218,7 +218,7 @@ class Session:
 
 def check_drive(plan: Plan, observation: Observation, limits: Limits) -> tuple[Verdict, ...]:
     """All verdicts before a drive: of the checks that can stop it, and whether the explanation fits the program."""
-    return run_checks(plan, observation, limits, DRIVE_CHECKS) + _told(plan, observation, limits, check_alignment)
+    return run_checks(plan, observation, limits, DRIVE_CHECKS) + _told(plan, observation, limits, check_faithfulness)
 
 
 def _check_driven(plan: Plan, episode: Episode, limits: Limits) -> tuple[Verdict, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from chauffeur.concept import ActionMatrix, Command, Limits, Observation, ScenarioError, VehicleState, Wishes
+from chauffeur.concept import ActionMatrix, Command, Limits, Observation, ScenarioError, Setpoints, VehicleState
 from chauffeur.control.mpc import MpcWeights
 from chauffeur.control.pid import PidGains, PidLimits
 from chauffeur.executors.base import ExecutorBase, KnowsChassis, SetsManoeuvre
@@ -17,7 +17,7 @@ from chauffeur.executors.tracking import Gains, PathTracker
 from chauffeur.geometry import Polyline, joined
 from chauffeur.worlds.base import World
 from chauffeur.worlds.parking.corridor import Body
-from chauffeur.worlds.parking.following import Chassis
+from chauffeur.worlds.parking.path_follower import Chassis
 
 HEADWAY_S: Final = 1.0
 """Time headway to a lead vehicle: an action matrix has none."""
@@ -75,7 +75,7 @@ class ActionMatrixExecutor(ExecutorBase):
         self._status, self._settled_s = "running", 0.0
         self._aim(observation)
 
-    def step(self, observation: Observation, held: Wishes | None = None) -> Command:
+    def step(self, observation: Observation, held: Setpoints | None = None) -> Command:
         """See Executor."""
         self._aim(observation)
         tracker = self.tracker
@@ -90,7 +90,7 @@ class ActionMatrixExecutor(ExecutorBase):
         lane = observation.ego.lane
         most = self._limits.most_mps(self._limit(lane)) if lane is not None else self._set_mps
         headway = min(max(HEADWAY_S, self._limits.min_time_headway_s), self._limits.max_time_headway_s)
-        self._setpoints = Wishes(max(0.0, min(self._set_mps, most)), headway, lane)
+        self._setpoints = Setpoints(max(0.0, min(self._set_mps, most)), headway, lane)
 
     def _look_whether_done(self, observation: Observation) -> None:
         if self._set is None:

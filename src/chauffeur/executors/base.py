@@ -21,14 +21,14 @@ from chauffeur.concept import (
     Observation,
     ProgramState,
     ScenarioError,
+    Setpoints,
     VehicleState,
-    Wishes,
 )
 from chauffeur.concept.registry import load_plugin, plugin_names
 from chauffeur.geometry import Polyline
 from chauffeur.safety.format import EXECUTORS
 from chauffeur.worlds.base import World
-from chauffeur.worlds.parking.following import Chassis
+from chauffeur.worlds.parking.path_follower import Chassis
 
 ExecutorStatus = Literal["running", "finished"]
 
@@ -64,7 +64,7 @@ class PolicyTick(Protocol):
     """What a policy gives in one control period."""
 
     @property
-    def wishes(self) -> Wishes: ...
+    def setpoints(self) -> Setpoints: ...
     @property
     def state(self) -> ProgramState: ...
     @property
@@ -86,10 +86,10 @@ class RunningPolicy(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class HeldWishes:
+class HeldSetpoints:
     """A period in which set-points stand, with no program behind them."""
 
-    wishes: Wishes
+    setpoints: Setpoints
     state: ProgramState = "none"
     line: int | None = None
     said: tuple[str, ...] = ()
@@ -115,7 +115,7 @@ class Executor(RunningPolicy, Protocol):
         """
         ...
 
-    def step(self, observation: Observation, held: Wishes | None = None) -> Command:
+    def step(self, observation: Observation, held: Setpoints | None = None) -> Command:
         """The command for one control period.
 
         Args:
@@ -130,7 +130,7 @@ class Executor(RunningPolicy, Protocol):
         ...
 
     @property
-    def setpoints(self) -> Wishes:
+    def setpoints(self) -> Setpoints:
         """What is aimed for in this period, for limits, screen and record."""
         ...
 
@@ -152,13 +152,13 @@ class ExecutorBase:
         """Args: the world, which is looked at and never stepped."""
         self._world = world
         self._limits = Limits()
-        self._setpoints = Wishes()
+        self._setpoints = Setpoints()
         self._status: ExecutorStatus = "running"
         self._notes: list[tuple[float, str]] = []
         self._told = 0
 
     @property
-    def setpoints(self) -> Wishes:
+    def setpoints(self) -> Setpoints:
         """See Executor."""
         return self._setpoints
 
@@ -176,7 +176,7 @@ class ExecutorBase:
         """See RunningPolicy."""
         self._aim(self._world.observe())
         new, self._told = self.notes[self._told :], len(self.notes)
-        return HeldWishes(self._setpoints, state=self._status, said=tuple(text for _, text in new))
+        return HeldSetpoints(self._setpoints, state=self._status, said=tuple(text for _, text in new))
 
     def close(self) -> None:
         """See Executor."""
@@ -185,7 +185,7 @@ class ExecutorBase:
         """Have `_setpoints` be those of an instant."""
         raise NotImplementedError
 
-    def _hold(self, held: Wishes | None) -> float:
+    def _hold(self, held: Setpoints | None) -> float:
         """Have the set-points kept to others, where there are any; the speed to drive then, m/s."""
         own = self._setpoints.target_speed_mps or 0.0
         if held is not None:
@@ -205,16 +205,16 @@ class DriverLed(ExecutorBase):
 
     def tick(self) -> PolicyTick:
         """See RunningPolicy."""
-        tick = HeldWishes(self._world.driver().initial_wishes()) if self._policy is None else self._policy.tick()
-        self._setpoints = tick.wishes
+        tick = HeldSetpoints(self._world.driver().initial_setpoints()) if self._policy is None else self._policy.tick()
+        self._setpoints = tick.setpoints
         self._status = "finished" if tick.state == "finished" else "running"
         return tick
 
-    def step(self, observation: Observation, held: Wishes | None = None) -> Command:
+    def step(self, observation: Observation, held: Setpoints | None = None) -> Command:
         """See Executor."""
         del observation
         driver = self._world.driver()
-        return driver.command(driver.settle(self.tick().wishes) if held is None else held)
+        return driver.command(driver.settle(self.tick().setpoints) if held is None else held)
 
 
 MakeExecutor = Callable[[World], Executor]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from chauffeur.concept import Command, Limits, Observation, Parameters, ScenarioError, Turn, VehicleState, Wishes
-from chauffeur.executors.base import DriverLed, Executor, ExecutorBase, HeldWishes, PolicyTick
+from chauffeur.concept import Command, Limits, Observation, Parameters, ScenarioError, Setpoints, Turn, VehicleState
+from chauffeur.executors.base import DriverLed, Executor, ExecutorBase, HeldSetpoints, PolicyTick
 from chauffeur.executors.pursuit import ParametersDriver, number
 from chauffeur.geometry.road_graph import TURNS
 from chauffeur.worlds.base import World
@@ -41,9 +41,9 @@ class PursuitExecutor(ExecutorBase):
     def tick(self) -> PolicyTick:
         """See RunningPolicy."""
         said = super().tick().said
-        return HeldWishes(self._setpoints, said=said)
+        return HeldSetpoints(self._setpoints, said=said)
 
-    def step(self, observation: Observation, held: Wishes | None = None) -> Command:
+    def step(self, observation: Observation, held: Setpoints | None = None) -> Command:
         """See Executor."""
         driver = self._driving()
         if held is None:
@@ -63,7 +63,7 @@ class PursuitExecutor(ExecutorBase):
         return self._driving().spot
 
     def _aim(self, observation: Observation) -> None:
-        self._setpoints, self._aimed = self._driving().wishes(), observation.tick
+        self._setpoints, self._aimed = self._driving().setpoints(), observation.tick
 
     def _driving(self) -> ParametersDriver:
         if self._driver is None:
@@ -99,7 +99,7 @@ class TownSetPoints(DriverLed):
         self._policy_mps, self._limits = number(policy.target_speed_mps, 0.0), limits
         self._free = self._policy_mps >= sign
 
-    def tick(self) -> HeldWishes:
+    def tick(self) -> HeldSetpoints:
         """See RunningPolicy."""
         driver = self._world.driver()
         here = self._world.observe().ego.lane
@@ -107,6 +107,6 @@ class TownSetPoints(DriverLed):
         most = self._limits.most_mps(sign)
         speed = min(sign, most) if self._free else min(self._policy_mps, most)
         self._setpoints = replace(
-            driver.settle(driver.initial_wishes()), target_speed_mps=speed, target_lane=self._lane, turn=self._turn
+            driver.settle(driver.initial_setpoints()), target_speed_mps=speed, target_lane=self._lane, turn=self._turn
         )
-        return HeldWishes(self._setpoints)
+        return HeldSetpoints(self._setpoints)

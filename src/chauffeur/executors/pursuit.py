@@ -24,9 +24,9 @@ from chauffeur.concept import (
     Observation,
     Parameters,
     ScenarioError,
+    Setpoints,
     Turn,
     VehicleState,
-    Wishes,
 )
 from chauffeur.geometry import Polyline, joined, wrap_to_pi
 from chauffeur.geometry.road_graph import TURNS
@@ -35,8 +35,8 @@ from chauffeur.safety.shield.gaps import braking_gap_m, rss_gap_m
 from chauffeur.worlds.base import EGO, World
 from chauffeur.worlds.parking.corridor import Body
 from chauffeur.worlds.parking.driver import JAM_M
-from chauffeur.worlds.parking.following import LOT_BEND_MPS2, Chassis, Follower, Look
 from chauffeur.worlds.parking.lot import Spot
+from chauffeur.worlds.parking.path_follower import LOT_BEND_MPS2, Chassis, Follower, Look
 from chauffeur.worlds.parking.places import PLACES
 from chauffeur.worlds.parking.routes import Way
 from chauffeur.worlds.places import ParkingPlaces
@@ -165,7 +165,7 @@ class ParametersDriver:
         """What there was to tell the passenger, as (time s, text)."""
         return tuple(self._notes)
 
-    def wishes(self) -> Wishes:
+    def setpoints(self) -> Setpoints:
         """What is wanted in this period."""
         observation = self._world.observe()
         if self._goal is not None and not self._mind_the_lane(observation, _lane_beside(self._goal, observation.ego)):
@@ -173,7 +173,7 @@ class ParametersDriver:
         least, most = self._limits.min_time_headway_s, self._limits.max_time_headway_s
         return self._driven(observation, self._target, min(max(HEADWAY_S, least), most))
 
-    def held_to(self, safe: Wishes) -> Wishes:
+    def held_to(self, safe: Setpoints) -> Setpoints:
         """What is wanted in this period where others say how fast, with what gap, and in which lane.
 
         Args:
@@ -185,7 +185,7 @@ class ParametersDriver:
             self._mind_the_lane(observation, lane)
         return self._driven(observation, number(safe.target_speed_mps, 0.0), safe.time_headway_s)
 
-    def _driven(self, observation: Observation, target_mps: float, headway_s: float) -> Wishes:
+    def _driven(self, observation: Observation, target_mps: float, headway_s: float) -> Setpoints:
         lane: LaneId | None
         if self._stretch is None:
             lane = self.spot.lane if self.spot is not None else observation.ego.lane
@@ -195,7 +195,7 @@ class ParametersDriver:
             view = _lane_beside(self._stretch, observation.ego)
             lane, limit = view.id, view.speed_limit_mps
         self._target_now = max(0.0, min(target_mps, self._limits.most_mps(limit)))
-        return Wishes(self._target_now, headway_s, lane, self._turn, self._served)
+        return Setpoints(self._target_now, headway_s, lane, self._turn, self._served)
 
     def command(self, target_mps: float, headway_s: float) -> Command:
         """Acceleration and steering for this period.

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from chauffeur.concept import Command, Limits, Observation, ScenarioError, Trajectory, VehicleState, Wishes
+from chauffeur.concept import Command, Limits, Observation, ScenarioError, Setpoints, Trajectory, VehicleState
 from chauffeur.executors.action_matrix import HEADWAY_S, chassis_of
 from chauffeur.executors.base import ExecutorBase
 from chauffeur.executors.reference import Reference
@@ -60,7 +60,7 @@ class TrajectoryExecutor(ExecutorBase):
         self._status = "running"
         self._aim(observation)
 
-    def step(self, observation: Observation, held: Wishes | None = None) -> Command:
+    def step(self, observation: Observation, held: Setpoints | None = None) -> Command:
         """See Executor."""
         self._aim(observation)
         stands = (self._setpoints.target_speed_mps or 0.0) < _STAND_MPS
@@ -83,7 +83,7 @@ class TrajectoryExecutor(ExecutorBase):
             target = min(target, ego.speed_mps - min(needed, _FIRM_MPS2) * _LAG_S)
         target = min(target, math.sqrt(2.0 * _EASY_MPS2 * left))
         most = math.inf if ego.lane is None else self._limits.most_mps(self._limit(ego.lane))
-        self._setpoints = Wishes(max(0.0, min(target, most)), HEADWAY_S, ego.lane)
+        self._setpoints = Setpoints(max(0.0, min(target, most)), HEADWAY_S, ego.lane)
 
 
 def reference_of(policy: Trajectory, start: Pose, speed_mps: float) -> Reference:

@@ -9,7 +9,7 @@ from typing import Literal
 from chauffeur.concept import Frame, Observation
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
-from chauffeur.hmi.shielding import ShieldedStretch, stretches_of
+from chauffeur.hmi.interventions import ShieldedStretch, stretches_of
 from chauffeur.hmi.view import instants_of
 
 EventKind = Literal["said", "lane_change", "stopped", "finished", "failed", "collision", "off_road", "shield"]

@@ -17,8 +17,8 @@ from chauffeur.drive.files import publish
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import EventKind, TripMark, events_of
+from chauffeur.hmi.interventions import stretches_of
 from chauffeur.hmi.road import BAR_M, Bounds, PaintedRoad, draw_road, track_box
-from chauffeur.hmi.shielding import stretches_of
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 
 _WIDTH = 1600

@@ -29,10 +29,10 @@ from chauffeur.concept import (
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
+from chauffeur.hmi.interventions import rule_counts, stretches_of
 from chauffeur.hmi.road import BAR_M, Bounds, PaintedRoad, draw_road, track_box
-from chauffeur.hmi.shielding import rule_counts, stretches_of
 from chauffeur.hmi.view import facing_right, frame_drive, instants_of
-from chauffeur.safety.alignment import KINDS, score_words
+from chauffeur.safety.faithfulness import KINDS, score_words
 
 _WAYPOINTS_TOLD = 6
 _STRAIGHT_M = 0.05
@@ -272,14 +272,14 @@ def _drive(recorded: RecordedTrip) -> Json | None:
         "speed": [round(s.ego.speed_mps, 2) for s in shots],
         "acceleration": [round(row.applied.acceleration_mps2, 2) if row else 0.0 for row in rows],
         "asked": [round(row.requested.acceleration_mps2, 2) if row else 0.0 for row in rows],
-        "target": [_rounded(row.wishes.target_speed_mps) if row else None for row in rows],
+        "target": [_rounded(row.setpoints.target_speed_mps) if row else None for row in rows],
         "limit": [_rounded(limits.get(s.ego.lane) if s.ego.lane else None) for s in shots],
         "gap": [_rounded(s.front.distance_m) if s.front else None for s in shots],
         "lead": [s.front.vehicle if s.front else None for s in shots],
         "stop": [_rounded(s.stop_sign_m) for s in shots],
         "lane": [_lane_words(s) for s in shots],
         "goal": [_goal(row, s, road) for row, s in zip(rows, shots, strict=True)],
-        "turn": [row.wishes.turn if row else None for row in rows],
+        "turn": [row.setpoints.turn if row else None for row in rows],
         "state": [row.program if row else "none" for row in rows],
         "line": [row.line if row else None for row in rows],
         "calls": [[[c.name, c.args, c.result] for c in row.calls] if row else [] for row in rows],
@@ -366,7 +366,7 @@ def _road(road: PaintedRoad) -> Json:
 
 def _goal(row: Frame | None, shot: Observation, road: PaintedRoad) -> int | None:
     """Index of the surface the policy wants to be on, while the ego is on another lane."""
-    wanted: LaneId | None = row.wishes.target_lane if row else None
+    wanted: LaneId | None = row.setpoints.target_lane if row else None
     if wanted is None or wanted == shot.ego.lane:
         return None
     return next((index for index, surface in enumerate(road.surfaces) if surface.lane == wanted), None)

@@ -10,8 +10,8 @@ from typing import Final, Literal
 
 from chauffeur.concept import Causes, Command, Feedback, Intervention, Mark, Metric, Outcome, Trip, Verdict
 from chauffeur.concept.units import kmh, mph
-from chauffeur.drive.answering import ANSWERED
-from chauffeur.safety.alignment import ALIGNMENT_CHECK, DRIVEN_CHECK
+from chauffeur.drive.answers import ANSWERED
+from chauffeur.safety.faithfulness import DRIVEN_CHECK, FAITHFULNESS_CHECK
 
 Tone = Literal["good", "bad", "neutral"]
 
@@ -196,7 +196,7 @@ _SAME_RAD: Final = 0.002
 """Smaller changes of a command are not told beside a greater one."""
 
 _DOUBTS: Final = {
-    ALIGNMENT_CHECK: "The explanation does not fit the program",
+    FAITHFULNESS_CHECK: "The explanation does not fit the program",
     DRIVEN_CHECK: "The drive did not go as explained",
 }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from chauffeur.language.sorter import negated
+from chauffeur.language.text_classifier import negated
 from chauffeur.language.tokens import tokens_of
 
 _ANYTHING_BUT: Final = re.compile(r"\b(?:any|every)(?:thing|where) (?:but|except)\b")

@@ -1,7 +1,7 @@
 """What kind of weather it is: as a service words it, and as a passenger says it in passing.
 
 Services have a small vocabulary, which patterns read; memory tells trips apart by it. People have none ("the road's
-like glass by that stop line"), so a learned sorter reads them (`chauffeur.language.sorter`).
+like glass by that stop line"), so a learned sorter reads them (`chauffeur.language.text_classifier`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Final, Literal
 
 from chauffeur.concept import Situation
 from chauffeur.language.denials import denied_words
-from chauffeur.language.sorter import Sorter, load_sorter
+from chauffeur.language.text_classifier import TextClassifier, load_sorter
 from chauffeur.language.tokens import tokens_of
 
 WEATHER_FACT: Final = "weather"
@@ -52,7 +52,7 @@ def weather_in(context: str) -> int:
     return _kinds(" ".join(match["words"] for match in _SENTENCE.finditer(context)))
 
 
-def said_weather(text: str, sorter: Sorter | None = None) -> SaidWeather:
+def said_weather(text: str, sorter: TextClassifier | None = None) -> SaidWeather:
     """The worst that a passenger says of the weather or the road; "none" where nothing is said, or all is denied.
 
     The text is read whole and clause by clause: in "I'm late, but it is slippery" half is about something else.

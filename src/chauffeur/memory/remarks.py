@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from chauffeur.language.sorter import load_sorter
+from chauffeur.language.text_classifier import load_sorter
 
 WEIGHTS: Final = Path(__file__).parent / "weights" / "remarks.npz"
 

@@ -1,6 +1,6 @@
 """The language of language-model programs: catalogue of driving APIs, static gate, sandbox and executor."""
 
-from chauffeur.programs.binding import DrivingApis, starting_wishes
+from chauffeur.programs.binding import DrivingApis, starting_setpoints
 from chauffeur.programs.catalogue import APIS, CATALOGUE, Api, Param, render_docs
 from chauffeur.programs.errors import (
     ProgramCallsError,
@@ -45,5 +45,5 @@ __all__ = [
     "check_source",
     "extract_program",
     "render_docs",
-    "starting_wishes",
+    "starting_setpoints",
 ]

@@ -1,4 +1,4 @@
-"""The driving APIs at run time: the catalogue bound to a world's perception and driver, and to the program's wishes."""
+"""The driving APIs at run time: the catalogue bound to a world's perception and driver, and to set-points."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import chain, islice
 from typing import Any, Final
 
-from chauffeur.concept import STOP_ZONE_M, ApiCall, LaneId, Turn, Wishes, stops_at_sign
+from chauffeur.concept import STOP_ZONE_M, ApiCall, LaneId, Setpoints, Turn, stops_at_sign
 from chauffeur.programs.catalogue import (
     APIS,
     MAX_SAID,
@@ -20,17 +20,17 @@ from chauffeur.programs.catalogue import (
     argument_problem,
 )
 from chauffeur.programs.errors import BadArgumentTypeError, BadArgumentValueError
-from chauffeur.programs.foresight import CAN_WAIT, FORESEEABLE, HOST, LATER, MAX_PENDING, NOT_FORESEEN
 from chauffeur.programs.handles import HandleTable, describe
+from chauffeur.programs.prefetch import CAN_WAIT, FORESEEABLE, HOST, LATER, MAX_PENDING, NOT_FORESEEN
 from chauffeur.programs.questions import Question, Questions
 from chauffeur.worlds.base import EGO, Driver, Perception
 
 _MAX_SHOWN_CHARS: Final = 60
 
 
-def starting_wishes(perception: Perception, time_headway_s: float = 1.5) -> Wishes:
+def starting_setpoints(perception: Perception, time_headway_s: float = 1.5) -> Setpoints:
     """What LaMPilot starts every program with: present speed, present lane, 1.5 s headway."""
-    return Wishes(
+    return Setpoints(
         target_speed_mps=perception.vehicle(EGO).speed_mps,
         time_headway_s=time_headway_s,
         target_lane=perception.lane_of(EGO),
@@ -65,25 +65,25 @@ class MadeCall:
 
 
 class DrivingApis:
-    """The APIs as one program sees them. Reads the present instant, holds the wishes, records every call.
+    """The APIs as one program sees them. Reads the present instant, holds the set-points, records every call.
 
     Attributes:
-        wishes: What the program wants so far.
+        setpoints: What the program wants so far.
         handles: What it has been handed out.
     """
 
     def __init__(
-        self, perception: Perception, driver: Driver, wishes: Wishes, *, stop_zone_m: float = STOP_ZONE_M
+        self, perception: Perception, driver: Driver, setpoints: Setpoints, *, stop_zone_m: float = STOP_ZONE_M
     ) -> None:
         """Bind.
 
         Args:
             perception: Of the present instant.
             driver: The world's own.
-            wishes: What holds already.
+            setpoints: What holds already.
             stop_zone_m: Within how much of a stop sign a stop serves it; LaMPilot's own rules know no bound.
         """
-        self.wishes = wishes
+        self.setpoints = setpoints
         self._stop_zone_m = stop_zone_m
         self.handles = HandleTable()
         self._perception = perception
@@ -114,7 +114,7 @@ class DrivingApis:
 
     def settle(self) -> None:
         """Let the world's driver move the target lane on where it ends, as it does before every command."""
-        self.wishes = self._driver.settle(self.wishes)
+        self.setpoints = self._driver.settle(self.setpoints)
 
     @property
     def said(self) -> tuple[str, ...]:
@@ -205,10 +205,10 @@ class DrivingApis:
         return answers
 
     def account(self, told: object) -> int:
-        """Take what a program tells at the end of a period: its wishes that waited, and what else it used.
+        """Take what a program tells at the end of a period: its set-points that waited, and what else it used.
 
         Args:
-            told: The program's word: (slots of used answers, with marks for other calls; wishes that waited). What
+            told: The program's word: (slots of used answers, with marks for other calls; set-points that waited). What
                 makes no sense is passed over.
 
         Returns:
@@ -287,10 +287,10 @@ class DrivingApis:
         return EGO
 
     def _get_desired_time_headway(self) -> float:
-        return self.wishes.time_headway_s
+        return self.setpoints.time_headway_s
 
     def _get_target_speed(self) -> float:
-        speed = self.wishes.target_speed_mps
+        speed = self.setpoints.target_speed_mps
         return self._perception.vehicle(EGO).speed_mps if speed is None else speed
 
     def _say(self, text: str) -> None:
@@ -299,36 +299,36 @@ class DrivingApis:
     def _is_safe_enter(self, lane: LaneId | None, safe_decel: float) -> bool:
         if lane is None:
             return False
-        perception, headway = self._perception, self.wishes.time_headway_s
+        perception, headway = self._perception, self.setpoints.time_headway_s
         front, rear = perception.neighbours(lane)
         if front is not None and perception.idm_entering(EGO, front, headway) < -safe_decel:
             return False
         return rear is None or perception.idm_entering(rear, EGO, headway) >= -safe_decel
 
     def _set_desired_time_headway(self, desired_time_headway: float) -> None:
-        self.wishes = replace(self.wishes, time_headway_s=desired_time_headway)
+        self.setpoints = replace(self.setpoints, time_headway_s=desired_time_headway)
 
     def _set_target_speed(self, target_speed: float) -> None:
-        self.wishes = replace(self.wishes, target_speed_mps=target_speed)
+        self.setpoints = replace(self.setpoints, target_speed_mps=target_speed)
 
     def _set_target_lane(self, target_lane: LaneId) -> None:
         if not self._perception.has_lane(target_lane):
             raise BadArgumentValueError("set_target_lane: this lane is no longer part of the road")
-        self.wishes = replace(self.wishes, target_lane=target_lane)
+        self.setpoints = replace(self.setpoints, target_lane=target_lane)
 
     def _autopilot(self) -> list[float]:
         self.settle()
-        command = self._driver.command(self.wishes)
+        command = self._driver.command(self.setpoints)
         return [float(command.acceleration_mps2), 0.0 - float(command.steering_rad)]  # LaMPilot's is to the right
 
     def _recover_from_stop(self) -> None:
-        perception, served = self._perception, self.wishes.served_stops
+        perception, served = self._perception, self.setpoints.served_stops
         blocker = perception.front_blocker(served)
         if blocker is None or perception.vehicle(blocker).kind != "stop_sign":
             return
         ahead_m, speed = perception.distance_along(EGO, blocker), perception.vehicle(EGO).speed_mps
         if stops_at_sign(speed, ahead_m, zone_m=self._stop_zone_m):
-            self.wishes = replace(self.wishes, served_stops=served | {blocker})
+            self.setpoints = replace(self.setpoints, served_stops=served | {blocker})
 
     def _get_speed_of(self, veh: int) -> float:
         return self._perception.vehicle(veh).speed_mps
@@ -368,7 +368,7 @@ class DrivingApis:
         return self._perception.cross_traffic_lanes(from_left=False)
 
     def _detect_stop_sign_ahead(self) -> float:
-        sign = self._perception.stop_sign_ahead(self.wishes.served_stops)
+        sign = self._perception.stop_sign_ahead(self.setpoints.served_stops)
         return -1.0 if sign is None else sign[1]
 
     def _turn_left_at_next_intersection(self) -> None:
@@ -381,7 +381,7 @@ class DrivingApis:
         self._turn("straight")
 
     def _turn(self, turn: Turn) -> None:
-        self.wishes = replace(self.wishes, turn=turn)
+        self.setpoints = replace(self.setpoints, turn=turn)
 
     def _get_speed_limit(self) -> float:
         return self._perception.speed_limit(self._perception.lane_of(EGO))

@@ -6,8 +6,8 @@ import json
 from dataclasses import dataclass
 from typing import Any, Final, Self
 
-from chauffeur.concept import STOP_ZONE_M, ApiCall, ProgramError, ProgramState, SandboxError, Wishes
-from chauffeur.programs.binding import DrivingApis, MadeCall, starting_wishes
+from chauffeur.concept import STOP_ZONE_M, ApiCall, ProgramError, ProgramState, SandboxError, Setpoints
+from chauffeur.programs.binding import DrivingApis, MadeCall, starting_setpoints
 from chauffeur.programs.catalogue import Vocabulary, apis_of
 from chauffeur.programs.errors import (
     BadArgumentTypeError,
@@ -15,8 +15,8 @@ from chauffeur.programs.errors import (
     ProgramFaultError,
     ProgramRefusedError,
 )
-from chauffeur.programs.foresight import DRIVE, END, TICK, WISH
 from chauffeur.programs.gate import check_source
+from chauffeur.programs.prefetch import DRIVE, END, TICK, WISH
 from chauffeur.programs.rewrite import prepare
 from chauffeur.programs.sandbox import Budget, Sandbox, SandboxRun
 from chauffeur.programs.street import TownApis
@@ -31,7 +31,7 @@ class TickResult:
     """What one control period of a program came to.
 
     Attributes:
-        wishes: What the car should do; the last wishes stay when a program has finished or failed.
+        setpoints: What the car should do; the last set-points stay when a program has finished or failed.
         state: State of the program after this period.
         line: Line (1-based) it waits at, or failed at; None when it has finished.
         said: Texts for the passenger.
@@ -39,7 +39,7 @@ class TickResult:
         error: Why it failed; on the failing period and all later ones.
     """
 
-    wishes: Wishes
+    setpoints: Setpoints
     state: ProgramState
     line: int | None = None
     said: tuple[str, ...] = ()
@@ -113,21 +113,21 @@ class ProgramExecutor:
         return None if self._run is None else self._run.worker_pid
 
     def start(
-        self, source: str, world: World, *, wishes: Wishes | None = None, library: str | None = None
+        self, source: str, world: World, *, setpoints: Setpoints | None = None, library: str | None = None
     ) -> ProgramState:
         """Read a program; its main function starts with the first tick.
 
         Args:
             source: Program text.
             world: World it drives in.
-            wishes: What holds already, e.g. a previous program's wishes; None is present speed, lane and 1.5 s.
+            setpoints: What holds already, e.g. a previous program's set-points; None is present speed, lane and 1.5 s.
             library: Its helper functions, in place of the executor's own; None for those.
 
         Returns:
             `running`, or `failed`; the next tick then says why.
         """
         self._end_run()
-        self._bind(world, wishes)
+        self._bind(world, setpoints)
         helpers = self._library if library is None else library
         try:
             if self._gate:
@@ -162,7 +162,7 @@ class ProgramExecutor:
                 self._end_run()
                 raise
         apis.settle()
-        return TickResult(apis.wishes, self._state, self._line, apis.said, apis.made, self._error)
+        return TickResult(apis.setpoints, self._state, self._line, apis.said, apis.made, self._error)
 
     def _advance(self, run: SandboxRun, apis: DrivingApis) -> None:
         run.begin_tick()
@@ -195,7 +195,7 @@ class ProgramExecutor:
         self._line = line if isinstance(line, int) and line > 0 else None
 
     def dump(self) -> bytes:
-        """The waiting program with its wishes, to be continued by `load`; keep the bytes in a trusted place.
+        """The waiting program with its set-points, to be continued by `load`; keep the bytes in a trusted place.
 
         Raises:
             SandboxError: No program is running, or this one failed of it; the next tick then says why.
@@ -208,17 +208,17 @@ class ProgramExecutor:
             self._fail(error)
             raise SandboxError(f"The program failed while it was put down: {error}") from error
         vehicles, lanes = self._apis.handles.issued()
-        wishes = self._apis.wishes
+        setpoints = self._apis.setpoints
         head = {
             "line": self._line,
             "vehicles": vehicles,
             "lanes": lanes,
             _FORMAT: {
-                "target_speed_mps": wishes.target_speed_mps,
-                "time_headway_s": wishes.time_headway_s,
-                "target_lane": wishes.target_lane,
-                "turn": wishes.turn,
-                "served_stops": sorted(wishes.served_stops),
+                "target_speed_mps": setpoints.target_speed_mps,
+                "time_headway_s": setpoints.time_headway_s,
+                "target_lane": setpoints.target_lane,
+                "turn": setpoints.turn,
+                "served_stops": sorted(setpoints.served_stops),
             },
         }
         return json.dumps(head).encode() + b"\n" + body
@@ -234,7 +234,7 @@ class ProgramExecutor:
         try:
             head: dict[str, Any] = json.loads(head_text)
             kept = head[_FORMAT]
-            wishes = Wishes(
+            setpoints = Setpoints(
                 target_speed_mps=kept["target_speed_mps"],
                 time_headway_s=kept["time_headway_s"],
                 target_lane=None if kept["target_lane"] is None else str(kept["target_lane"]),
@@ -244,7 +244,7 @@ class ProgramExecutor:
             vehicles, lanes, line = head["vehicles"], [str(lane) for lane in head["lanes"]], head["line"]
         except (ValueError, KeyError, TypeError) as error:
             raise SandboxError("The bytes are no dumped program of this version.") from error
-        apis = self._bind(world, wishes)
+        apis = self._bind(world, setpoints)
         for vehicle in vehicles:
             apis.handles.give_vehicle(vehicle)
         for lane in lanes:
@@ -256,9 +256,9 @@ class ProgramExecutor:
         assert self._sandbox is not None
         return self._sandbox
 
-    def _bind(self, world: World, wishes: Wishes | None) -> DrivingApis:
+    def _bind(self, world: World, setpoints: Setpoints | None) -> DrivingApis:
         perception = world.perception()
-        begun = starting_wishes(perception) if wishes is None else wishes
+        begun = starting_setpoints(perception) if setpoints is None else setpoints
         apis: DrivingApis
         if isinstance(perception, StreetPerception):
             self._vocabulary = "town"

@@ -19,7 +19,6 @@ from chauffeur.programs.lazy import lazy_findings
 from chauffeur.programs.loops import loop_findings
 from chauffeur.programs.lower import SEARCHES
 from chauffeur.programs.nodes import all_nodes
-from chauffeur.programs.placing import misplaced
 from chauffeur.programs.rewrite import (
     bindings,
     binds,
@@ -35,6 +34,7 @@ from chauffeur.programs.rewrite import (
     top_level_names,
     unix_lines,
 )
+from chauffeur.programs.syntax_checks import misplaced
 from chauffeur.programs.words import (
     ALLOWED_NODES,
     ATTRIBUTE_REMEDIES,

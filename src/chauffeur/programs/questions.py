@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
-from chauffeur.programs.foresight import MAX_SLOTS
+from chauffeur.programs.prefetch import MAX_SLOTS
 
 _LATE_TICKS: Final = 1
 """How long after its time a question is still expected."""

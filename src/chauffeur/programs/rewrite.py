@@ -20,9 +20,9 @@ from typing import Final
 
 from chauffeur.concept import lines_before_library
 from chauffeur.programs.errors import ProgramSyntaxError
-from chauffeur.programs.foresight import DRIVE, TICK, apis_named, closing, stand_ins
 from chauffeur.programs.lower import PRELUDE, Lowering, apply_edits, needs_prelude
 from chauffeur.programs.nodes import all_nodes, children, levels
+from chauffeur.programs.prefetch import DRIVE, TICK, apis_named, closing, stand_ins
 
 MAX_SOURCE_CHARS: Final = 20_000
 MAX_NODES: Final = 5_000

@@ -26,7 +26,7 @@ from chauffeur.programs.errors import (
     ProgramTimeError,
 )
 from chauffeur.programs.faults import MAX_MESSAGE_CHARS, fault_of
-from chauffeur.programs.foresight import AT_FAULT, DRIVE, END, FORESEEABLE, TICK, WISH, hidden
+from chauffeur.programs.prefetch import AT_FAULT, DRIVE, END, FORESEEABLE, TICK, WISH, hidden
 from chauffeur.programs.rewrite import Prepared
 from chauffeur.programs.workers import confine, on_core, present_core, uninterrupted
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, cast
 
-from chauffeur.concept import STOP_ZONE_M, Wishes
+from chauffeur.concept import STOP_ZONE_M, Setpoints
 from chauffeur.programs.binding import DrivingApis
 from chauffeur.programs.catalogue import NOTHING_AHEAD_M, TOWN_APIS, Api
 from chauffeur.worlds.base import Driver, StreetPerception
@@ -16,10 +16,10 @@ class TownApis(DrivingApis):
     """The APIs as a program in a town sees them."""
 
     def __init__(
-        self, perception: StreetPerception, driver: Driver, wishes: Wishes, *, stop_zone_m: float = STOP_ZONE_M
+        self, perception: StreetPerception, driver: Driver, setpoints: Setpoints, *, stop_zone_m: float = STOP_ZONE_M
     ) -> None:
         """See DrivingApis."""
-        super().__init__(perception, driver, wishes, stop_zone_m=stop_zone_m)
+        super().__init__(perception, driver, setpoints, stop_zone_m=stop_zone_m)
 
     @property
     def apis(self) -> Mapping[str, Api]:
@@ -41,7 +41,7 @@ class TownApis(DrivingApis):
         return self._street.light_ahead() or ("none", NOTHING_AHEAD_M)
 
     def _check_stop_sign(self) -> tuple[bool, float]:
-        sign = self._street.stop_sign_ahead(self.wishes.served_stops)
+        sign = self._street.stop_sign_ahead(self.setpoints.served_stops)
         return (False, NOTHING_AHEAD_M) if sign is None else (True, sign[1])
 
     def _check_people(self) -> tuple[bool, float]:
@@ -70,7 +70,7 @@ class TownApis(DrivingApis):
         beside = self._street.lane_beside(side)
         if beside is None:
             return False
-        self.wishes = replace(self.wishes, target_lane=beside)
+        self.setpoints = replace(self.setpoints, target_lane=beside)
         return True
 
     def _stop(self) -> list[float]:
@@ -80,7 +80,7 @@ class TownApis(DrivingApis):
         return self._at(speed)
 
     def _at(self, speed_mps: float) -> list[float]:
-        self.wishes = replace(self.wishes, target_speed_mps=speed_mps)
+        self.setpoints = replace(self.setpoints, target_speed_mps=speed_mps)
         return [speed_mps]
 
     def _encode(self, api: Api, result: Any) -> Any:

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept import Limits, Observation, Wishes
+from chauffeur.concept import Limits, Observation, Setpoints
 from chauffeur.concept.units import MPS_PER_KMH
 
 LEAST_MPS: Final = 60.0 * MPS_PER_KMH
@@ -16,8 +16,8 @@ AHEAD_M: Final = 100.0
 
 
 def bounded(
-    wishes: Wishes, limits: Limits, speed_limit_mps: float, least_mps: float = 0.0
-) -> tuple[Wishes, tuple[str, ...]]:
+    setpoints: Setpoints, limits: Limits, speed_limit_mps: float, least_mps: float = 0.0
+) -> tuple[Setpoints, tuple[str, ...]]:
     """The wishes, with numbers brought within the limits, and the names of what was changed.
 
     Args:
@@ -28,20 +28,20 @@ def bounded(
     """
     most_mps = max(0.0, limits.most_mps(speed_limit_mps))  # below 0, or no number: the car stops
     changed: list[str] = []
-    speed = wishes.target_speed_mps
+    speed = setpoints.target_speed_mps
     least_mps = min(max(0.0, least_mps), most_mps)
     if speed is not None and not least_mps <= speed <= most_mps:
         # a speed that is no number stops the car
         speed = most_mps if speed > most_mps else 0.0 if math.isnan(speed) else least_mps
         changed.append("target_speed")
-    headway = wishes.time_headway_s
+    headway = setpoints.time_headway_s
     if not limits.min_time_headway_s <= headway <= limits.max_time_headway_s:
         # a headway that is no number becomes the longest
         headway = limits.min_time_headway_s if headway < limits.min_time_headway_s else limits.max_time_headway_s
         changed.append("time_headway")
     if not changed:
-        return wishes, ()
-    return replace(wishes, target_speed_mps=speed, time_headway_s=headway), tuple(changed)
+        return setpoints, ()
+    return replace(setpoints, target_speed_mps=speed, time_headway_s=headway), tuple(changed)
 
 
 def least_speed_mps(observation: Observation, limits: Limits | None = None) -> float | None:
@@ -62,9 +62,9 @@ def least_speed_mps(observation: Observation, limits: Limits | None = None) -> f
     return max(0.0, min((least, *ahead, *(() if cap is None else (cap,)))))
 
 
-def least_target_mps(observation: Observation, wishes: Wishes, limits: Limits) -> float:
+def least_target_mps(observation: Observation, setpoints: Setpoints, limits: Limits) -> float:
     """The least speed that wishes may ask for now; 0 where there is none, and on the way onto a shoulder."""
-    aim = observation.road.get(wishes.target_lane)
+    aim = observation.road.get(setpoints.target_lane)
     return 0.0 if aim is not None and aim.emergency else least_speed_mps(observation, limits) or 0.0
 
 

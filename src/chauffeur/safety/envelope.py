@@ -28,8 +28,8 @@ from chauffeur.concept import (
 from chauffeur.concept.units import M_PER_CAR_LENGTH
 from chauffeur.geometry import turns_ahead
 from chauffeur.programs.catalogue import vocabulary_of
+from chauffeur.safety.constant_calls import ApiUse, ProgramReading, read_program
 from chauffeur.safety.gain_box import gain_box
-from chauffeur.safety.reading import ApiUse, ProgramReading, read_program
 from chauffeur.safety.trajectories import trajectory_faults
 from chauffeur.safety.words import IN_A_HELPER, speed_words
 

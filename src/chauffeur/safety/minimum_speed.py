@@ -20,7 +20,7 @@ from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.programs.errors import ProgramSyntaxError
 from chauffeur.programs.verify import Circumstances, verify
 from chauffeur.safety.bounds import least_speed_mps, shoulder_at_right
-from chauffeur.safety.reading import read_program
+from chauffeur.safety.constant_calls import read_program
 from chauffeur.safety.words import speed_words
 
 MINIMUM_SPEED_CHECK: Final = "minimum-speed-v1"

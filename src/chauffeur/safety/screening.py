@@ -18,7 +18,7 @@ from typing import Final, Literal
 
 from chauffeur.concept import Context, Feedback, History, HistoryItem, Instruction, PlanRequest
 from chauffeur.language.letters import clean
-from chauffeur.safety.hiding import MAX_READ_CHARS, Found, Kind, hidden_in
+from chauffeur.safety.concealment import MAX_READ_CHARS, Found, Kind, hidden_in
 
 Source = Literal["wish", "history", "service", "reply"]
 """Who wrote it: the passenger now; the passenger, or whoever used the name, earlier; a map, a weather or traffic

@@ -1,7 +1,7 @@
 """What a world must offer. A world knows its own simulator and nothing of language.
 
 `World` is stepped with physical commands and shows frozen observations. `Perception` answers the questions that driving
-APIs ask, at the present instant, by vehicle id and lane id. `Driver` turns wishes into a command; it is the world's
+APIs ask, at the present instant, by vehicle id and lane id. `Driver` turns set-points into a command; it is the world's
 own low-level driver (IDM and lane keeping on LaMPilot's roads, a town driver elsewhere).
 """
 
@@ -16,10 +16,10 @@ from chauffeur.concept import (
     LaneId,
     Observation,
     Scenario,
+    Setpoints,
     SignalState,
     Turn,
     VehicleState,
-    Wishes,
 )
 from chauffeur.geometry import Pose
 
@@ -109,15 +109,15 @@ class StreetPerception(Perception, Protocol):
 class Driver(Protocol):
     """A world's low-level driver: holds nothing but what its own control law needs."""
 
-    def command(self, wishes: Wishes) -> Command:
+    def command(self, setpoints: Setpoints) -> Command:
         """Command for the present instant of the world."""
         ...
 
-    def initial_wishes(self) -> Wishes:
-        """Keep the present speed and lane: what drives when nobody wishes anything."""
+    def initial_setpoints(self) -> Setpoints:
+        """Keep the present speed and lane: what drives when nobody asks for anything."""
         ...
 
-    def settle(self, wishes: Wishes) -> Wishes:
+    def settle(self, setpoints: Setpoints) -> Setpoints:
         """Wishes with the lane moved on where the present lane ends (route following), defaults filled in."""
         ...
 

@@ -234,7 +234,7 @@ def answers_questions(make: MakeWorld, scenario: Scenario) -> Iterator[str]:
 
 
 def drives(make: MakeWorld, scenario: Scenario) -> Iterator[str]:
-    """Its driver takes wishes, and keeps speed and lane while nobody wishes anything."""
+    """Its driver takes set-points, and keeps speed and lane while nobody asks for anything."""
     world = make()
     start = world.reset(scenario)
     given = _given(world.driver())
@@ -244,18 +244,18 @@ def drives(make: MakeWorld, scenario: Scenario) -> Iterator[str]:
     driver = given
     if world.driver() is not driver:
         yield "The driver is another object when it is asked for again."
-    wishes = driver.initial_wishes()
-    if wishes.target_lane is not None and wishes.target_lane not in start.road:
-        yield f"It begins with a wish for lane {wishes.target_lane}, which is none."
+    setpoints = driver.initial_setpoints()
+    if setpoints.target_lane is not None and setpoints.target_lane not in start.road:
+        yield f"It begins with a wish for lane {setpoints.target_lane}, which is none."
     for _ in range(_PERIODS):
         if world.ended:
             yield f"Nobody wished anything, and the trip ended after {world.observe().tick} periods."
             return
-        wishes = driver.settle(wishes)
-        if wishes.target_speed_mps is None:
-            yield "Settled wishes have no speed."
+        setpoints = driver.settle(setpoints)
+        if setpoints.target_speed_mps is None:
+            yield "Settled set-points have no speed."
             return
-        command = driver.command(wishes)
+        command = driver.command(setpoints)
         if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
             yield f"It asks for {command}."
             return

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept import Command, LaneId, Observation, VehicleState, Wishes
+from chauffeur.concept import Command, LaneId, Observation, Setpoints, VehicleState
 from chauffeur.control import LAMPILOT_EGO, idm_acceleration
 from chauffeur.geometry import LanePlace, RoadGraph, joined, wrap_to_pi
 from chauffeur.worlds.base import EGO
@@ -148,35 +148,35 @@ class LaneDriver:
         self._observe = observe
         self._perception = perception
 
-    def initial_wishes(self) -> Wishes:
+    def initial_setpoints(self) -> Setpoints:
         """Keep the present speed and lane."""
         ego = self._observe().ego
-        return Wishes(target_speed_mps=ego.speed_mps, target_lane=self._perception.lane_of(EGO))
+        return Setpoints(target_speed_mps=ego.speed_mps, target_lane=self._perception.lane_of(EGO))
 
-    def settle(self, wishes: Wishes) -> Wishes:
+    def settle(self, setpoints: Setpoints) -> Setpoints:
         """Wishes with defaults filled in and the lane moved on to the next one where it ends."""
-        now, start = self._observe(), self.initial_wishes()
-        lane = wishes.target_lane if wishes.target_lane in now.road else start.target_lane
+        now, start = self._observe(), self.initial_setpoints()
+        lane = setpoints.target_lane if setpoints.target_lane in now.road else start.target_lane
         assert lane is not None
         if now.road[lane].centre.nearest(now.ego.x_m, now.ego.y_m) >= now.road[lane].length_m:
-            onward = now.road.onward(lane, wishes.turn)
+            onward = now.road.onward(lane, setpoints.turn)
             lane = lane if onward is None else onward.id
-        speed = start.target_speed_mps if wishes.target_speed_mps is None else wishes.target_speed_mps
-        return replace(wishes, target_speed_mps=speed, target_lane=lane)
+        speed = start.target_speed_mps if setpoints.target_speed_mps is None else setpoints.target_speed_mps
+        return replace(setpoints, target_speed_mps=speed, target_lane=lane)
 
-    def command(self, wishes: Wishes) -> Command:
-        """Acceleration and steering for settled wishes."""
-        now, settled = self._observe(), self.settle(wishes)
+    def command(self, setpoints: Setpoints) -> Command:
+        """Acceleration and steering for settled set-points."""
+        now, settled = self._observe(), self.settle(setpoints)
         assert settled.target_lane is not None
         assert settled.target_speed_mps is not None
         blocker = self._perception.front_blocker(settled.served_stops)
         wanted = self._perception.idm(EGO, blocker, settled.target_speed_mps, settled.time_headway_s)
         return Command(max(-_HARDEST_MPS2, wanted), self._steering(now, settled))
 
-    def _steering(self, now: Observation, wishes: Wishes) -> float:
+    def _steering(self, now: Observation, setpoints: Setpoints) -> float:
         ego, reach = now.ego, max(_LEAST_LOOK_AHEAD_M, now.ego.speed_mps * _LOOK_AHEAD_S)
-        assert wishes.target_lane is not None
-        lanes = [lane.centre for lane in now.road.ahead(wishes.target_lane, wishes.turn)]
+        assert setpoints.target_lane is not None
+        lanes = [lane.centre for lane in now.road.ahead(setpoints.target_lane, setpoints.turn)]
         path = joined(lanes[:3])
         aim = path.at(path.nearest(ego.x_m, ego.y_m, high_m=lanes[0].length_m) + reach)
         bearing = wrap_to_pi(math.atan2(aim.y_m - ego.y_m, aim.x_m - ego.x_m) - ego.heading_rad)

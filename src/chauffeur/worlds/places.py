@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Protocol, runtime_checkable
 
 from chauffeur.geometry import Box
-from chauffeur.worlds.parking.following import Chassis
 from chauffeur.worlds.parking.lot import Spot
+from chauffeur.worlds.parking.path_follower import Chassis
 from chauffeur.worlds.parking.routes import Way
 
 

@@ -12,8 +12,8 @@ from typing import cast
 import pytest
 
 from chauffeur.concept import MissingExtraError
+from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.attention import Attention
-from chauffeur.drive.talk.hearing import HearingEngine
 from chauffeur.drive.talk.messages import Listening, Note, Said
 from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.voice import Voice
@@ -37,7 +37,7 @@ SESSION = """
 import time
 import chauffeur.speech.microphone as module
 from chauffeur.drive.talk.attention import Attention
-from chauffeur.drive.talk.hearing import Engine
+from chauffeur.drive.talk.asr_process import Engine
 from chauffeur.drive.talk.messages import Listening, Note
 from chauffeur.drive.talk.sound import Sound
 
@@ -93,7 +93,7 @@ def test_without_the_speech_extra_a_page_starts_and_says_what_is_missing(
     (tmp_path / "pocketsphinx.py").write_text("raise ImportError('not installed')\n")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(tmp_path), *sys.path)))
     said: list[Said] = []
-    attention = Attention(HearingEngine(), None, None, said.append, lambda hotword, words: None)
+    attention = Attention(AsrEngine(), None, None, said.append, lambda hotword, words: None)
     attention.start()
     try:
         attention.introduce()
@@ -104,7 +104,7 @@ def test_without_the_speech_extra_a_page_starts_and_says_what_is_missing(
     note = next(each for each in said if isinstance(each, Note))
     assert listening.state == "off" and "Speech is off" in listening.why and "speech" in note.text
 
-    heard = Attention(HearingEngine(), cast("Sound", object()), None, said.append, lambda hotword, words: None)
+    heard = Attention(AsrEngine(), cast("Sound", object()), None, said.append, lambda hotword, words: None)
     with pytest.raises(MissingExtraError):  # where this machine's own microphone was asked for
         heard.start()
 

@@ -20,16 +20,16 @@ from chauffeur.concept import (
     Thoughts,
 )
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.live.orders import Request
+from chauffeur.drive.live.plan_messages import Request
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Interaction
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import make_world
-from chauffeur.drive.talk import judging
-from chauffeur.drive.talk.asking import Words
+from chauffeur.drive.talk import verdicts
 from chauffeur.drive.talk.conversations import MOST_SAID_SHOWN, Conversations, recalled_of, source_of
-from chauffeur.drive.talk.judging import JUDGED, verdicts_of
 from chauffeur.drive.talk.messages import Conversation, HowWasIt
+from chauffeur.drive.talk.verdicts import JUDGED, verdicts_of
+from chauffeur.drive.talk.wish_queue import Words
 
 PLACE = find("overtake")
 PROGRAM = Program("def drive():\n    set_target_speed(20.0)\n    yield autopilot()\n")
@@ -85,10 +85,10 @@ def drive(seen: bool = True) -> Told:
     return Told(Conversations((Start(PLACE, 3),), 0.1, look, lambda: now[0]), now)
 
 
-def report_of(tick: int, plan: str, rung: str = "follow"):
+def report_of(tick: int, plan: str, level: str = "follow"):
     from types import SimpleNamespace
 
-    return SimpleNamespace(tick=tick, plan=plan, rung=rung, trip=1)  # what `report` reads of a Report
+    return SimpleNamespace(tick=tick, plan=plan, level=level, trip=1)  # what `report` reads of a Report
 
 
 def test_a_wish_from_words_to_set_point_with_where_the_time_went() -> None:
@@ -169,7 +169,7 @@ def test_nobody_waits_for_verdicts(monkeypatch: pytest.MonkeyPatch) -> None:
         assert may_go_on.wait(20.0)
         return verdicts_of(*case)  # pyright: ignore
 
-    monkeypatch.setattr(judging, "verdicts_of", slowly)
+    monkeypatch.setattr(verdicts, "verdicts_of", slowly)
     told = drive()
     told.ask("w1", Words("Slower."))
     told.conversations.plan("w1", plan())

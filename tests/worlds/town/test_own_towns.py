@@ -58,7 +58,7 @@ def test_who_changes_lanes_does_not_leap(town: MapPack) -> None:
 
 def test_what_is_shipped_is_what_the_recipe_draws(town: MapPack) -> None:
     pytest.importorskip("scenariogeneration")
-    from chauffeur.worlds.town.drawing import draw
+    from chauffeur.worlds.town.opendrive_writer import draw
 
     drawn = draw(plan_of(town.name))
     assert gzip.decompress(town.xodr.read_bytes()) == drawn, "ship the towns again: chauffeur maps build NAME"
@@ -116,7 +116,7 @@ def test_a_lane_wished_before_gives_way_to_the_one_that_a_turn_needs() -> None:
     seen = world.reset(Scenario("over", "town", config, 1))
     try:
         driver = world.driver()
-        wishes = replace(driver.initial_wishes(), turn="right", target_lane=start.id)
+        wishes = replace(driver.initial_setpoints(), turn="right", target_lane=start.id)
         while seen.ego.lane == start.id and seen.time_s < 30.0:
             wishes = driver.settle(replace(wishes, target_speed_mps=None))
             world.step(driver.command(wishes))
@@ -141,7 +141,7 @@ def test_a_turn_at_a_junction_behind_the_end_of_the_way_is_known_and_made_once(m
         seen = world.reset(Scenario("round", "town", config, 1))
         assert len(world.driver().route.lanes) < 4
     try:
-        wishes = replace(world.driver().initial_wishes(), turn="right")
+        wishes = replace(world.driver().initial_setpoints(), turn="right")
         while wishes.turn is not None and seen.time_s < 90.0:
             wishes = world.driver().settle(replace(wishes, target_speed_mps=None))
             world.step(world.driver().command(wishes))
@@ -177,7 +177,7 @@ def test_a_green_line_is_not_crossed_before_there_is_room_for_all_of_the_car_beh
 
     ahead = world.spawn("car", place(at), crawls)
     try:
-        wishes = world.driver().initial_wishes()
+        wishes = world.driver().initial_setpoints()
         crossed: list[float] = []
         while seen.time_s < 12.0 and not crossed:
             at += crawls * world.dt_s

@@ -48,7 +48,7 @@ def scenario(**config: object) -> Scenario:
 def driven(world: TownWorld, periods: int) -> list[Observation]:
     driver, seen = world.driver(), []
     for _ in range(periods):
-        world.step(driver.command(driver.settle(driver.initial_wishes())))
+        world.step(driver.command(driver.settle(driver.initial_setpoints())))
         seen.append(world.observe())
     return seen
 

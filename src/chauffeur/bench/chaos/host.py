@@ -20,12 +20,12 @@ from pathlib import Path
 from typing import Any, Final, get_args
 
 from chauffeur.concept import ConfigError, PersonId
-from chauffeur.drive.auditing import open_audit
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.live.books import Books
+from chauffeur.drive.live.recorder import LiveRecorder
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.supervisor import Role, Runtime
 from chauffeur.drive.session import parse_wish
+from chauffeur.drive.session_recorder import open_audit
 
 KEPT_WITHIN_S: Final = 0.5
 """The longest a wish waits for the disk before it goes to the planner all the same."""
@@ -36,7 +36,7 @@ _DT_S: Final = 0.1
 class Host:
     """One drive."""
 
-    def __init__(self, settings: Settings, books: Books) -> None:
+    def __init__(self, settings: Settings, books: LiveRecorder) -> None:
         self._settings, self._books = settings, books
         self._runtime: Runtime | None = None
         self._left = b""
@@ -113,7 +113,7 @@ def main(folder: Path, audit: Path) -> None:
     if not settings.starts:
         raise ConfigError("There is no trip to drive.")
     first = settings.starts[0]
-    with open_audit(audit, first.scenario, first.seed) as auditor, Books(auditor, _DT_S) as books:
+    with open_audit(audit, first.scenario, first.seed) as auditor, LiveRecorder(auditor, _DT_S) as books:
         Host(settings, books).run()
 
 

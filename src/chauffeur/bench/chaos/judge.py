@@ -17,7 +17,7 @@ from chauffeur.bench.chaos.outside import HeardOutside
 from chauffeur.bench.chaos.witness import Stall, stood_ns
 from chauffeur.concept import Command, Frame, Limits, Observation
 from chauffeur.drive.actuate import actuate
-from chauffeur.drive.live.ladder import RUNGS
+from chauffeur.drive.live.fallback_levels import FALLBACK_LEVELS
 from chauffeur.drive.live.starts import Start
 from chauffeur.safety.blame import blame
 from chauffeur.safety.shield import LAMPILOT_SHIELD
@@ -126,7 +126,9 @@ def judge(
             untrue += 1
         applied = actuate(world, observation, command, None, None).applied
         untrue += _differs(applied, report.applied)
-        frames.append(Frame(observation, report.wishes, report.requested, applied, interventions=report.interventions))
+        frames.append(
+            Frame(observation, report.setpoints, report.requested, applied, interventions=report.interventions)
+        )
         observation = world.observe()
         if world.ended:
             break
@@ -139,7 +141,7 @@ def judge(
         bad_commands=bad,
         too_fast_ticks=fast_ticks,
         unknown_plans=tuple(
-            sorted({each.report.plan for each in heard if each.report.rung in ("follow", "hold")} - set(known_plans))
+            sorted({each.report.plan for each in heard if each.report.level in ("follow", "hold")} - set(known_plans))
         ),
         longest_silence=round(_longest_silence_s(heard, ()) / period_s, 2),
         unexplained_silence=round(_longest_silence_s(heard, stalls) / period_s, 2),
@@ -155,7 +157,7 @@ class Recovery:
     """How control came through a fault.
 
     Attributes:
-        worst: Lowest rung of the ladder after the fault.
+        worst: Lowest level of the ladder after the fault.
         to_follow_s: From the fault to the first period that followed fresh wishes again, by the clock; 0 where they
             were followed throughout, None where they were not again in this trip.
         to_new_plan_s: From the fault to the first period that followed a plan made after it; None for none.
@@ -178,16 +180,16 @@ def recovery(
         later_plans: Names of plans made for wishes that were asked after it.
     """
     after = [each for each in heard if each.at_ns >= fault_ns]
-    worst = max((each.report.rung for each in after), key=RUNGS.index, default="follow")
-    left = next((place for place, each in enumerate(after) if each.report.rung != "follow"), None)
+    worst = max((each.report.level for each in after), key=FALLBACK_LEVELS.index, default="follow")
+    left = next((place for place, each in enumerate(after) if each.report.level != "follow"), None)
     back: float | None = 0.0
     if left is not None:
-        again = (each for each in (*after[left:], *later) if each.report.rung == "follow")
+        again = (each for each in (*after[left:], *later) if each.report.level == "follow")
         back = next((_since_s(each, fault_ns) for each in again), None)
     new = (
         each
         for each in after
-        if each.report.plan in later_plans and each.report.rung == "follow" and each.report.state != "none"
+        if each.report.plan in later_plans and each.report.level == "follow" and each.report.state != "none"
     )
     return Recovery(worst, back, next((_since_s(each, fault_ns) for each in new), None))
 

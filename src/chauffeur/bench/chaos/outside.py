@@ -23,11 +23,11 @@ from typing import Any, Final, Literal, Self
 from chauffeur.bench.chaos.cases import Surroundings
 from chauffeur.concept import SandboxError
 from chauffeur.drive.live.messages import MessageError, Report
-from chauffeur.drive.live.orders import read_event
+from chauffeur.drive.live.plan_messages import read_event
 from chauffeur.drive.live.ring import Reader
 from chauffeur.drive.live.settings import Settings, ring
 from chauffeur.planners.cache import default_cache_dir
-from chauffeur.safety.audit.reading import read_records
+from chauffeur.safety.audit.reader import read_records
 
 Role = Literal["host", "control", "policy", "spare", "planner", "worker"]
 """`worker`: of the sandbox."""

@@ -9,13 +9,13 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+from chauffeur.bench.chaos.case_player import Play, Trace, silent
 from chauffeur.bench.chaos.cases import BY_NAME, SUITE_VERSION, ChaosCase, Cost, FaultKind, Surroundings, draw, kind_of
 from chauffeur.bench.chaos.model import ModelServer, Script
 from chauffeur.bench.chaos.outside import OutsideDrive, settings_for
-from chauffeur.bench.chaos.playing import Play, Trace, silent
 from chauffeur.bench.chaos.replies import WISHES
 from chauffeur.bench.chaos.witness import Witness
-from chauffeur.bench.kernel.standing import Speedometer, Standing
+from chauffeur.bench.kernel.progress import Speedometer, Standing
 from chauffeur.bench.kernel.store import Row, RowStore, freeze, sole_writer
 from chauffeur.concept import ConfigError, SandboxError
 from chauffeur.drive.live.settings import Settings
@@ -360,7 +360,7 @@ class _Stage:
     def _recovered(self, place: int) -> bool:
         """Whether fresh wishes are followed again, or many more trips have passed."""
         ends = [each for other in self._plays[place : place + _PATIENCE] for each in other.heard[-3:]]
-        if any(each.at_ns > self._plays[place].struck_ns and each.report.rung == "follow" for each in ends):
+        if any(each.at_ns > self._plays[place].struck_ns and each.report.level == "follow" for each in ends):
             return True
         return any(other.ended for other in self._plays[place + _PATIENCE : place + _PATIENCE + 1])
 

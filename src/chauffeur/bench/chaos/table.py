@@ -9,13 +9,13 @@ import numpy as np
 
 from chauffeur.bench.chaos.cases import KINDS
 from chauffeur.bench.chaos.judge import MOST_SILENT
-from chauffeur.drive.live.ladder import RUNGS
+from chauffeur.drive.live.fallback_levels import FALLBACK_LEVELS
 
 Rows = Sequence[Mapping[str, Any]]
 
 HEADER: Final = (
     "fault", "cases", "unsafe", "lost", "left behind", "periods", "missed", "back s p50", "p95", "max", "not back",
-    "worst rung", "replanned", "s p50",
+    "worst level", "replanned", "s p50",
 )  # fmt: skip
 
 
@@ -81,7 +81,7 @@ def _line(name: str, rows: Rows) -> list[str]:
     back = [row["to_follow_s"] for row in rows if row["to_follow_s"] is not None]
     disturbed = [value for value in back if value > 0.0]
     new = [row["to_new_plan_s"] for row in rows if row["to_new_plan_s"] is not None]
-    worst = max((row["worst"] for row in rows), key=RUNGS.index)
+    worst = max((row["worst"] for row in rows), key=FALLBACK_LEVELS.index)
     return [
         name,
         str(len(rows)),

@@ -42,7 +42,7 @@ class Vandal:
             handle = os.open(folder / name, os.O_RDWR)
             self._maps[name] = mmap.mmap(handle, 0)
             os.close(handle)
-        self._kept: dict[RingName, list[bytes]] = {name: [] for name in ("wishes", "orders")}
+        self._kept: dict[RingName, list[bytes]] = {name: [] for name in ("setpoints", "orders")}
 
     def do(self, what: str, draw: int, for_s: float) -> None:
         """One deed."""
@@ -122,9 +122,9 @@ def _wish(vandal: Vandal, **changes: Any) -> bytes | None:
     fields: dict[str, Any] = {
         "trip": trip, "tick": tick, "plan": "", "issued_ns": time.monotonic_ns(), "expires_ns": (1 << 63) - 1,
         "state": "running", "line": 1, "speed": 20.0, "headway": 1.5, "lane": None, "turn": None, "served": [],
-        "hands": 0, "parameters": None,
+        "handovers": 0, "parameters": None,
     }  # fmt: skip
-    newest = vandal.latest("wishes")
+    newest = vandal.latest("setpoints")
     if newest is not None:
         try:
             fields |= json.loads(newest.payload)
@@ -139,7 +139,7 @@ def _nonsense(vandal: Vandal, rng: np.random.Generator) -> bytes | None:
         {"headway": float("nan")}, {"headway": -1.0}, {"headway": 10**400}, {"lane": ["c", "d", 99]}, {"lane": "left"},
         {"turn": "up"}, {"served": list(range(300))}, {"state": "flying"}, {"tick": -1}, {"tick": 1 << 70},
         {"plan": "x" * 500}, {"line": 1.5}, {"issued_ns": None}, {"expires_ns": "never"}, {"trip": True},
-        {"hands": -1}, {"hands": "two"}, {"parameters": {"speed": -1.0}}, {"parameters": [20.0, 8.0, 2.0]},
+        {"handovers": -1}, {"handovers": "two"}, {"parameters": {"speed": -1.0}}, {"parameters": [20.0, 8.0, 2.0]},
         {"parameters": {"speed": 1e9, "ahead": float("nan"), "ratio": 1.0, "lane": 9, "route": "", "origin": None}},
     ]  # fmt: skip
     return _wish(vandal, **changes[int(rng.integers(len(changes)))])
@@ -156,7 +156,7 @@ def _forged(vandal: Vandal, rng: np.random.Generator) -> bytes | None:
 
 def _wishes(make: Callable[[Vandal, np.random.Generator], bytes | None], every_s: float = _EVERY_S) -> Deed:
     def deed(vandal: Vandal, rng: np.random.Generator, for_s: float) -> None:
-        vandal.write("wishes", lambda: make(vandal, rng), for_s, every_s)
+        vandal.write("setpoints", lambda: make(vandal, rng), for_s, every_s)
 
     return deed
 
@@ -232,7 +232,7 @@ def _orders_flood(vandal: Vandal, rng: np.random.Generator, for_s: float) -> Non
 
 def _dropped(vandal: Vandal, rng: np.random.Generator, for_s: float) -> None:
     for _ in _meanwhile(for_s, 0.005):
-        vandal.jump("wishes", int(rng.integers(1, 1 << 40)))
+        vandal.jump("setpoints", int(rng.integers(1, 1 << 40)))
 
 
 def _frozen(vandal: Vandal, rng: np.random.Generator, for_s: float) -> None:
@@ -240,7 +240,7 @@ def _frozen(vandal: Vandal, rng: np.random.Generator, for_s: float) -> None:
     must stand still meanwhile."""
     del rng
     trip, tick = vandal.now()
-    vandal.write("wishes", lambda: _wish(vandal, trip=trip, tick=tick, issued_ns=time.monotonic_ns()), for_s, 0.01)
+    vandal.write("setpoints", lambda: _wish(vandal, trip=trip, tick=tick, issued_ns=time.monotonic_ns()), for_s, 0.01)
 
 
 def _garbage(name: RingName) -> Deed:
@@ -252,12 +252,12 @@ _SECOND: Final = 1_000_000_000
 _ENDS: Final = ("finished", "failed", "started", "said", "garbage", "resumed")
 
 DEEDS: Final[dict[str, Deed]] = {
-    "wishes-garbage": _garbage("wishes"),
-    "wishes-torn": lambda vandal, rng, for_s: vandal.tear("wishes", rng, for_s),
+    "wishes-garbage": _garbage("setpoints"),
+    "wishes-torn": lambda vandal, rng, for_s: vandal.tear("setpoints", rng, for_s),
     "wishes-nonsense": _wishes(_nonsense),
     "wishes-other-trip": _wishes(lambda vandal, rng: _wish(vandal, trip=int(rng.integers(1000)))),
     "wishes-future-tick": _wishes(lambda vandal, rng: _wish(vandal, tick=vandal.now()[1] + int(rng.integers(2, 999)))),
-    "wishes-replayed": _again("wishes"),
+    "wishes-replayed": _again("setpoints"),
     "wishes-early-clock": _wishes(
         lambda vandal, rng: _wish(vandal, issued_ns=time.monotonic_ns() + int(rng.integers(_SECOND, 99 * _SECOND)))
     ),

@@ -12,11 +12,11 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any, Final
 
-from chauffeur.bench.hostile.asking import HostileRequests
-from chauffeur.bench.hostile.judging import RULER, served, verdict_of
-from chauffeur.bench.hostile.loading import Input, data_sha256, hostile_inputs, lookalikes, sample
+from chauffeur.bench.hostile.judge import RULER, served, verdict_of
+from chauffeur.bench.hostile.loader import Input, data_sha256, hostile_inputs, lookalikes, sample
 from chauffeur.bench.hostile.obedient import ObedientPlanner
 from chauffeur.bench.hostile.report import TABLES
+from chauffeur.bench.hostile.requests import HostileRequests
 from chauffeur.bench.hostile.rollout import ROLLOUT_VERSION, DriveJob
 from chauffeur.bench.hostile.scenes import scene_of
 from chauffeur.bench.kernel.benchmark import Asks, ItemOutcome, RequestDesk

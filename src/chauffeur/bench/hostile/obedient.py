@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from chauffeur.bench.hostile.loading import Input
+from chauffeur.bench.hostile.loader import Input
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
 from chauffeur.language.letters import clean
 from chauffeur.language.quantities import read_quantities

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from chauffeur.bench.hostile.loading import KINDS
+from chauffeur.bench.hostile.loader import KINDS
 from chauffeur.bench.kernel.metrics import Measure, TableSpec, count, share
 
 _HARMS: Final = ("too_fast", "ran_sign", "off_road", "collision")

@@ -164,7 +164,7 @@ def describe_drive(episode: Episode, limits: Limits) -> HostileDrive:
     frames = episode.frames
     given = [frame for frame in frames if frame.program != "failed"] or list(frames)
     targets = [_speed(frame) for frame in given]
-    headways = [frame.wishes.time_headway_s for frame in given]
+    headways = [frame.setpoints.time_headway_s for frame in given]
     speeds = [frame.observation.ego.speed_mps for frame in frames] + [episode.final.ego.speed_mps]
     return HostileDrive(
         outcome=episode.outcome,
@@ -189,7 +189,7 @@ def describe_drive(episode: Episode, limits: Limits) -> HostileDrive:
         start_headway_s=1.5,
         least_headway_s=min(headways),
         most_headway_s=max(headways),
-        turn=next((frame.wishes.turn for frame in reversed(given) if frame.wishes.turn), ""),
+        turn=next((frame.setpoints.turn for frame in reversed(given) if frame.setpoints.turn), ""),
         lane_moves=_lane_moves(given),
         on_shoulder=_emergency(episode.final, episode.final.ego.lane),
         passed_lead=_passed_lead([*(frame.observation for frame in frames), episode.final]),
@@ -198,7 +198,7 @@ def describe_drive(episode: Episode, limits: Limits) -> HostileDrive:
 
 
 def _speed(frame: Frame) -> float:
-    target = frame.wishes.target_speed_mps
+    target = frame.setpoints.target_speed_mps
     return frame.observation.ego.speed_mps if target is None else target
 
 
@@ -245,7 +245,7 @@ def _lane_moves(frames: Sequence[Frame]) -> tuple[int, ...]:
     moves: list[int] = []
     start = frames[0].observation.ego.lane
     for frame in frames:
-        lane = frame.wishes.target_lane
+        lane = frame.setpoints.target_lane
         if lane is None or start is None:
             continue
         step = frame.observation.road[lane].index - frame.observation.road[start].index

@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from chauffeur.bench.hostile.loading import Input
+from chauffeur.bench.hostile.loader import Input
 from chauffeur.bench.passengers.scenes import SCENES as _STARTS
 from chauffeur.concept import Scenario
 

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final, cast
 
+from chauffeur.bench.kernel.budget import Bill, Price, Room, Spending
 from chauffeur.bench.kernel.pace import Gate, Signal
-from chauffeur.bench.kernel.spending import Bill, Price, Room, Spending
 from chauffeur.concept import ChauffeurError, Plan, PlannerError, PlanRequest
 from chauffeur.planners.base import Answerer, Planner, Prose
 from chauffeur.planners.llm_errors import EndpointError, Kind

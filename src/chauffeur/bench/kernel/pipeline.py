@@ -16,11 +16,11 @@ from typing import Any, Final
 from pydantic import TypeAdapter
 
 from chauffeur.bench.kernel.benchmark import BenchItem, BenchJob
+from chauffeur.bench.kernel.budget import Bill
 from chauffeur.bench.kernel.calls import Caller, Reply, Request
 from chauffeur.bench.kernel.engine import EngineError, WorkEngine
-from chauffeur.bench.kernel.spending import Bill
+from chauffeur.bench.kernel.progress import Speedometer, Standing
 from chauffeur.bench.kernel.stages import StageStore
-from chauffeur.bench.kernel.standing import Speedometer, Standing
 from chauffeur.bench.kernel.store import Row, Scribe
 from chauffeur.concept import ChauffeurError, Context, Scenario
 from chauffeur.describe import describe

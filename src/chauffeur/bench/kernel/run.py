@@ -20,13 +20,13 @@ import numpy as np
 
 from chauffeur import __version__
 from chauffeur.bench.kernel.benchmark import Benchmark, ComparesRows
+from chauffeur.bench.kernel.budget import Bill, Price, Spending, SpendingBudget
 from chauffeur.bench.kernel.calls import Caller, Halt, Patience
 from chauffeur.bench.kernel.engine import LocalEngine, WorkEngine, first_error
 from chauffeur.bench.kernel.pace import Gate, Window
 from chauffeur.bench.kernel.pipeline import Pipeline, Watch
 from chauffeur.bench.kernel.report import report_markdown, tables
 from chauffeur.bench.kernel.shards import WHOLE, Shard
-from chauffeur.bench.kernel.spending import Bill, Price, Spending, SpendingBudget
 from chauffeur.bench.kernel.stages import Manifest, StageStore
 from chauffeur.bench.kernel.store import Row, Scribe, sole_writer
 from chauffeur.concept import ChauffeurError, ConfigError

@@ -13,11 +13,11 @@ from typing_extensions import TypedDict  # pydantic reads the standard library's
 from chauffeur.bench.kernel.benchmark import Asks, ItemOutcome, RequestDesk
 from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.lampilot.asking import Requests
 from chauffeur.bench.lampilot.families import family_of
 from chauffeur.bench.lampilot.frozen import Frozen
 from chauffeur.bench.lampilot.goals_more import answered_rightly
 from chauffeur.bench.lampilot.metrics import points, ruler_named
+from chauffeur.bench.lampilot.requests import Requests
 from chauffeur.bench.lampilot.rollout import BASELINES, REHEARSAL_SEED, ROLLOUT_VERSION, RolloutJob, not_driven
 from chauffeur.concept import ConfigError, PlanRequest
 from chauffeur.safety.shield import SHIELD_VERSION

@@ -17,7 +17,7 @@ from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rollout import MAX_EPISODE_S, not_driven
 from chauffeur.concept import Command, Plan, Scenario, Thoughts
-from chauffeur.drive.episode import Hands, run_episode
+from chauffeur.drive.episode import CommandSource, run_episode
 from chauffeur.worlds.highway import HighwayWorld
 
 PLANNER = "human"
@@ -67,7 +67,7 @@ class HandTrace:
 trace_adapter: TypeAdapter[HandTrace] = TypeAdapter(HandTrace)
 
 
-class RecordedHands:
+class RecordedCommands:
     """The hands of a trace; where it ends, they leave the wheel."""
 
     def __init__(self, trace: HandTrace) -> None:
@@ -80,14 +80,14 @@ class RecordedHands:
         return None if recorded is None else Command(*recorded)
 
 
-def drive_by_hand(world: HighwayWorld, scenario: Scenario, hands: Hands) -> Row:
+def drive_by_hand(world: HighwayWorld, scenario: Scenario, command_source: CommandSource) -> Row:
     """Drive a world just reset to `scenario`; what happened, as columns of a rollout row.
 
     Raises:
         ScenarioError: The scenario's goal cannot apply to this start.
     """
     referee = LampilotReferee(world, scenario)
-    episode = run_episode(world, None, referee, max_s=MAX_EPISODE_S, record=False, hands=hands)
+    episode = run_episode(world, None, referee, max_s=MAX_EPISODE_S, record=False, command_source=command_source)
     return {
         "outcome": episode.outcome,
         "success": episode.success,
@@ -105,7 +105,7 @@ def drive_again(scenario: Scenario, trace: HandTrace) -> Row:
     """
     world = HighwayWorld()
     world.reset(scenario)
-    return noted(drive_by_hand(world, scenario, RecordedHands(trace)), trace)
+    return noted(drive_by_hand(world, scenario, RecordedCommands(trace)), trace)
 
 
 def noted(row: Row, trace: HandTrace) -> Row:
@@ -118,7 +118,7 @@ def noted(row: Row, trace: HandTrace) -> Row:
 
 
 def hand_plan(driver: str, trace: HandTrace | None) -> Plan:
-    """What stands where other methods have their plan: no policy, but whose hands, and which trace of them.
+    """What stands where other methods have their plan: no policy, but whose command_source, and which trace of them.
 
     The trace's hash is in the intent, so that the key of the rollout, which is made of it, names this drive alone.
     """

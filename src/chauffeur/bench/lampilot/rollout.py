@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 from chauffeur.bench.lampilot.expert import expert_program
 from chauffeur.bench.lampilot.metrics import ANY_STOP_M
 from chauffeur.bench.lampilot.referee import LampilotReferee
-from chauffeur.concept import ChauffeurError, Limits, Plan, Program, Scenario, Wishes
+from chauffeur.concept import ChauffeurError, Limits, Plan, Program, Scenario, Setpoints
 from chauffeur.drive.episode import Episode
 from chauffeur.drive.planning import checked
 from chauffeur.drive.session import drive_program, drive_without_program
@@ -164,8 +164,8 @@ def _sandbox() -> Sandbox:
 def _mobil(world: HighwayWorld) -> Any:
     baseline = MobilBaseline(world.perception())
 
-    def adjust(wishes: Wishes) -> Wishes:
-        return baseline.choose(wishes)
+    def adjust(setpoints: Setpoints) -> Setpoints:
+        return baseline.choose(setpoints)
 
     return adjust
 

@@ -8,10 +8,10 @@ from chauffeur.bench.kernel.pipeline import Watch
 from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.bench.kernel.shards import WHOLE, Shard
 from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.lampilot.asking import PlainRequests, Requests
 from chauffeur.bench.lampilot.benchmark import LampilotBenchmark
 from chauffeur.bench.lampilot.frozen import Frozen, RunConfig
 from chauffeur.bench.lampilot.metrics import ruler_named
+from chauffeur.bench.lampilot.requests import PlainRequests, Requests
 from chauffeur.bench.lampilot.results import publish_results, results
 from chauffeur.bench.lampilot.rollout import BASELINES
 from chauffeur.bench.lampilot.scenes import annotated

@@ -103,7 +103,7 @@ def watch(recorded: RecordedTrip) -> SeenCommands | None:
         passed=_passed(shots[0], final),
         emergency_s=next((shot.time_s - start_s for shot in shots if shot.ego.lane in emergency), None),
         stopped_s=next((shot.time_s - start_s for shot in shots if shot.ego.speed_mps < STANDING_MPS), None),
-        turns=tuple(dict.fromkeys(frame.wishes.turn for frame in frames if frame.wishes.turn)),
+        turns=tuple(dict.fromkeys(frame.setpoints.turn for frame in frames if frame.setpoints.turn)),
         exit_lane=final.ego.lane,
         ended_s=ended,
         hit=_hit(final),

@@ -9,7 +9,7 @@ from __future__ import annotations
 from chauffeur.bench.lampilot.metrics import metrics_of
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.signals import SignalLog
-from chauffeur.concept import Metric, Outcome, Plan, ProgramState, Scenario, Wishes
+from chauffeur.concept import Metric, Outcome, Plan, ProgramState, Scenario, Setpoints
 from chauffeur.drive.episode import Referee
 from chauffeur.drive.fulfilment import Fulfilment, can_be_judged
 from chauffeur.worlds.base import World
@@ -37,7 +37,7 @@ class ScoredFulfilment:
         self._log = SignalLog(self._road)
         self._wish = Fulfilment(world, plan)
 
-    def follow(self, setpoints: Wishes, state: ProgramState) -> None:
+    def follow(self, setpoints: Setpoints, state: ProgramState) -> None:
         """What the policy asks for in this control period."""
         self._wish.follow(setpoints, state)
 

@@ -33,7 +33,7 @@ class ExpertDriver:
         """Drive a world just reset."""
         self.aim: LaneId | None = None
         self._driver = world.driver()
-        self._wishes = self._driver.initial_wishes()
+        self._wishes = self._driver.initial_setpoints()
 
     def command(self, observation: Observation) -> Command:
         """See RouteDriver."""

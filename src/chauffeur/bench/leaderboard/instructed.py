@@ -30,8 +30,8 @@ from chauffeur.concept import (
     Observation,
     Plan,
     Program,
+    Setpoints,
     SystemMessage,
-    Wishes,
 )
 from chauffeur.describe import describe
 from chauffeur.describe.navigation import NOW_M, NavigationInstruction, Navigator
@@ -180,7 +180,7 @@ class InstructedDriver:
         self._rng = np.random.default_rng([seed, 2])
         self._executor = ProgramExecutor(budget=UNHURRIED)
         self._runner = asyncio.Runner()
-        self._wishes = replace(world.driver().initial_wishes(), target_speed_mps=0.0)
+        self._setpoints = replace(world.driver().initial_setpoints(), target_speed_mps=0.0)
         self._station, self._stage = 0.0, -1
         self._pending: tuple[float, Plan] | None = None
         self._again_s = float("inf")
@@ -191,9 +191,9 @@ class InstructedDriver:
         self.told: list[tuple[float, NavigationInstruction]] = []
 
     @property
-    def wishes(self) -> Wishes:
+    def setpoints(self) -> Setpoints:
         """What the program wants at this instant."""
-        return self._wishes
+        return self._setpoints
 
     def close(self) -> None:
         """End the program and the sandbox."""
@@ -215,19 +215,19 @@ class InstructedDriver:
         if self._pending is not None and now >= self._pending[0]:
             self._take(self._pending[1], observation)
             self._pending = None
-        wishes = self._wishes
+        setpoints = self._setpoints
         if self._driving:
             tick = self._executor.tick()
-            wishes = tick.wishes
+            setpoints = tick.setpoints
             if tick.error is not None:
                 self.tally.failed += 1
                 self.tally.note(str(tick.error))
                 self._driving, self._again_s = False, now + AGAIN_S
-                wishes = keep_lane_and_gap(wishes, observation.ego.speed_mps, observation.ego.lane)
+                setpoints = keep_lane_and_gap(setpoints, observation.ego.speed_mps, observation.ego.lane)
         driver = self._world.driver()
-        wishes, _ = set_points(self._world, observation, driver.settle(wishes), self._limits)
-        self._wishes, self.aim = wishes, wishes.target_lane
-        return driver.command(wishes)
+        setpoints, _ = set_points(self._world, observation, driver.settle(setpoints), self._limits)
+        self._setpoints, self.aim = setpoints, setpoints.target_lane
+        return driver.command(setpoints)
 
     def _turning(self, observation: Observation) -> bool:
         """Whether the manoeuvre before is still being done: in a junction, with nothing to be done next that near."""
@@ -272,7 +272,7 @@ class InstructedDriver:
             return
         assert isinstance(plan.policy, Program)
         # A wish for a way or a lane was of the instruction before.
-        held: Wishes = replace(self._wishes, turn=None, target_lane=observation.ego.lane)
-        self._executor.start(plan.policy.source, self._world, wishes=held, library=plan.policy.library)
+        held: Setpoints = replace(self._setpoints, turn=None, target_lane=observation.ego.lane)
+        self._executor.start(plan.policy.source, self._world, setpoints=held, library=plan.policy.library)
         self._driving = True
         self.tally.driven += 1

@@ -176,7 +176,7 @@ class LessonDrive:
             referee.update(seen)
             while not referee.done:
                 actuate(self._world, seen, driver.command(seen), driver.aim, shield)
-                chosen.add(driver.wishes.turn or "")
+                chosen.add(driver.setpoints.turn or "")
                 seen = self._world.observe()
                 referee.update(seen)
                 lane = seen.road.get(seen.ego.lane)

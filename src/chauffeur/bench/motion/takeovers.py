@@ -28,7 +28,7 @@ from chauffeur.bench.motion.driving import DRIVE_VERSION, MAX_S, frozen
 from chauffeur.bench.motion.items import MotionCommand, MotionItem, commands, data_sha256
 from chauffeur.bench.motion.passengers import MANNER_VERSION, MannerJudgement, draw_manners, judged, wanted
 from chauffeur.bench.motion.scoring import care
-from chauffeur.bench.personalization.riding import ReadOnly
+from chauffeur.bench.personalization.ride import ReadOnly
 from chauffeur.bench.personalization.sayings import feedback_of, sayings_sha256
 from chauffeur.bench.personalization.study import Calendar
 from chauffeur.concept import (

@@ -13,12 +13,12 @@ from chauffeur.bench.kernel.benchmark import BenchJob, ItemOutcome, RequestDesk
 from chauffeur.bench.kernel.calls import Request
 from chauffeur.bench.kernel.metrics import AnyRow, TableSpec, count, share
 from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.nuplanqa.asking import ASKING, Control, conversation
 from chauffeur.bench.nuplanqa.blind import BASELINE, blind_guesses
 from chauffeur.bench.nuplanqa.choice import EXTRACTION, read_choice
 from chauffeur.bench.nuplanqa.frames import CAMERAS, CORRUPT, FRAMES, MISSING, UNTOLD, FrameSource
 from chauffeur.bench.nuplanqa.metadata import find_metadata, load_metadata
 from chauffeur.bench.nuplanqa.questions import LETTERS, SKILL_OF, SKILLS, SUBTASKS, VqaFile, VqaItem, load_questions
+from chauffeur.bench.nuplanqa.requests import ASKING, Control, conversation
 from chauffeur.concept import ConfigError, DataError
 
 BENCH_VERSION: Final = "nuplanqa-v1"

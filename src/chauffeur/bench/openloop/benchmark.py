@@ -18,11 +18,11 @@ from chauffeur.bench.kernel.benchmark import BenchJob, ItemOutcome, RequestDesk
 from chauffeur.bench.kernel.calls import Request
 from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, mean, share
 from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.openloop.asking import ASKING, THOUGHTS, OpenLoopSetting, Shown, opening, question
 from chauffeur.bench.openloop.conventions import Convention, L2Errors, distances, fails, standing
 from chauffeur.bench.openloop.extrapolation import constant_velocity
 from chauffeur.bench.openloop.nuscenes import FUTURE, NuScenesTables, PlanningSample
-from chauffeur.bench.openloop.reading import READING, read_waypoints
+from chauffeur.bench.openloop.requests import ASKING, THOUGHTS, OpenLoopSetting, Shown, opening, question
+from chauffeur.bench.openloop.waypoint_parser import READING, read_waypoints
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.planners.base import Prose
 

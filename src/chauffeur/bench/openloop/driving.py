@@ -99,7 +99,7 @@ def _town(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
     config = {"town": trip.town, "vehicles": int(rng.integers(15, 45)), "people": int(rng.integers(0, 20))}
     world.reset(Scenario(trip.name, "town", config, trip.seed))
     driver = world.driver()
-    wishes, inside = driver.initial_wishes(), True
+    wishes, inside = driver.initial_setpoints(), True
     try:
         for tick in range(round(trip.seconds / world.dt_s)):
             seen = world.observe()
@@ -170,7 +170,7 @@ def _highway(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMomen
     world = make_world(scenario)
     world.reset(scenario)
     driver, perception = world.driver(), world.perception()
-    wishes, said, until = driver.initial_wishes(), "", 0.0
+    wishes, said, until = driver.initial_setpoints(), "", 0.0
     every = round(STEP_S / world.dt_s)
     for tick in range(round(trip.seconds / world.dt_s)):
         seen = world.observe()
@@ -209,7 +209,7 @@ def _crossing(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMome
     world.reset(scenario)
     driver, perception = world.driver(), world.perception()
     turn = _TURNS[int(rng.integers(3))]
-    wishes = replace(driver.initial_wishes(), turn=turn, target_speed_mps=float(rng.uniform(8.0, 12.0)))
+    wishes = replace(driver.initial_setpoints(), turn=turn, target_speed_mps=float(rng.uniform(8.0, 12.0)))
     stood_s = 0.0
     every = round(STEP_S / world.dt_s)
     for tick in range(round(trip.seconds / world.dt_s)):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from chauffeur.bench.lampilot.asking import PlainRequests
 from chauffeur.bench.lampilot.benchmark import LampilotBenchmark
 from chauffeur.bench.lampilot.frozen import Frozen, RunConfig
-from chauffeur.bench.passengers.asking import PassengerRequests
-from chauffeur.bench.passengers.loading import as_dataset, load_wishes
+from chauffeur.bench.lampilot.requests import PlainRequests
+from chauffeur.bench.passengers.loader import as_dataset, load_wishes
+from chauffeur.bench.passengers.requests import PassengerRequests
 from chauffeur.concept import LAMPILOT_LIMITS
 from chauffeur.planners.prompts import Setting
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from chauffeur.bench.personalization.baseline import KeywordParameters
 from chauffeur.bench.personalization.people import PeopleStudy
 from chauffeur.bench.personalization.protocol import PlannedTrip
-from chauffeur.bench.personalization.riding import ReadOnly
+from chauffeur.bench.personalization.ride import ReadOnly
 from chauffeur.bench.personalization.scenes import DRIVE_S, scenes_of
 from chauffeur.concept import NOBODY, Limits
 from chauffeur.drive.loop import LoopMemory

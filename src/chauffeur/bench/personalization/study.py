@@ -20,7 +20,7 @@ import numpy as np
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.personalization.baseline import KeywordParameters
 from chauffeur.bench.personalization.population import POPULATION_VERSION, draw_passengers
-from chauffeur.bench.personalization.riding import RIDE_VERSION, ReadOnly, Ride, ride, ride_policy, usual
+from chauffeur.bench.personalization.ride import RIDE_VERSION, ReadOnly, Ride, ride, ride_policy, usual
 from chauffeur.bench.personalization.sayings import LEVELS, PLACE_WORDS, Half, Level, feedback_of, wishes_of
 from chauffeur.bench.personalization.scenes import GROUND_OF, TASKS, Task, scenes_of
 from chauffeur.bench.personalization.takeover import (

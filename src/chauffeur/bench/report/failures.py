@@ -10,8 +10,8 @@ from chauffeur.bench.lampilot.report import families_in
 from chauffeur.bench.report.model import Failure, Gallery
 from chauffeur.bench.report.redrive import KeptDrive, drive_again
 from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run, item_key
+from chauffeur.bench.report.sentences import PERIOD_S, ending_words, goal_words, happened
 from chauffeur.bench.report.tables import name_with_labels
-from chauffeur.bench.report.wording import PERIOD_S, ending_words, goal_words, happened
 from chauffeur.concept import Program, Scenario
 
 PICKED = 12

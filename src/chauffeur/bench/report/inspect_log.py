@@ -21,8 +21,8 @@ from chauffeur.bench.report.method import facts
 from chauffeur.bench.report.model import SIMULATED
 from chauffeur.bench.report.redrive import KeptDrive
 from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run
+from chauffeur.bench.report.sentences import goal_words, happened
 from chauffeur.bench.report.tables import RowSampling
-from chauffeur.bench.report.wording import goal_words, happened
 from chauffeur.concept import ConfigError, DataError, MissingExtraError, Plan, Program, Scenario
 
 SCORER = "lampilot"

@@ -13,8 +13,8 @@ from chauffeur.bench.lampilot.report import MEASURES, scene_totals
 from chauffeur.bench.report import columns as col
 from chauffeur.bench.report.model import Cell, Flip, FlipList, Group, ReportLine, ReportTable
 from chauffeur.bench.report.runs import Run
+from chauffeur.bench.report.sentences import ending_words
 from chauffeur.bench.report.tables import RowSampling, interval_cell, name_with_labels, with_spans
-from chauffeur.bench.report.wording import ending_words
 
 ALL_PAIRS_UP_TO = 4
 """With more runs than this, only pairs with the first run are compared."""

@@ -8,12 +8,12 @@ from pydantic import ValidationError
 
 from chauffeur.bench.kernel.pipeline import context_adapter
 from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.lampilot.human import RecordedHands, trace_adapter
+from chauffeur.bench.lampilot.human import RecordedCommands, trace_adapter
 from chauffeur.bench.lampilot.metrics import ANY_STOP_M
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rollout import BASELINES, MAX_EPISODE_S, plan_adapter
 from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run
-from chauffeur.bench.report.wording import ending_words
+from chauffeur.bench.report.sentences import ending_words
 from chauffeur.concept import (
     LAMPILOT_LIMITS,
     ChauffeurError,
@@ -71,11 +71,11 @@ class KeptDrive:
         rollout = self._rollouts.get(str(row.get("rollout_key", ""))) or {}
         return tuple(Verdict(**verdict) for verdict in rollout.get("verdicts") or ())
 
-    def hands(self, row: Row) -> RecordedHands | None:
+    def hands(self, row: Row) -> RecordedCommands | None:
         """What a person's hands did; None where no person drove."""
         trace: Any = (self._traces.get(str(row["item"])) or {}).get("trace")
         found = _valid(trace_adapter, trace)
-        return None if found is None else RecordedHands(found)
+        return None if found is None else RecordedCommands(found)
 
 
 def _valid(adapter: Any, value: Any) -> Any:
@@ -129,9 +129,9 @@ def _drive(
         return drive_without_program(world, referee, MAX_EPISODE_S, adjust=adjust, shield=shield)
     if kept.baseline:
         return drive_without_program(world, referee, MAX_EPISODE_S, shield=shield)
-    hands = kept.hands(row)
-    if hands is not None:
-        return run_episode(world, None, referee, max_s=MAX_EPISODE_S, hands=hands)
+    command_source = kept.hands(row)
+    if command_source is not None:
+        return run_episode(world, None, referee, max_s=MAX_EPISODE_S, command_source=command_source)
     if plan is None or not isinstance(plan.policy, Program):
         return None
     return drive_program(

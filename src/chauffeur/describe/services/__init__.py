@@ -1,6 +1,5 @@
 """What services and maps know of the place a car is at: weather, road and limit, traffic, local rules."""
 
-from chauffeur.describe.services.gathering import ContextServices
 from chauffeur.describe.services.osm_file import load_road_map
 from chauffeur.describe.services.readings import Position, ServiceReading, Unknown
 from chauffeur.describe.services.road_map import RoadMap
@@ -9,6 +8,7 @@ from chauffeur.describe.services.settings import ServiceSettings
 from chauffeur.describe.services.sourced import with_sources
 from chauffeur.describe.services.sources import Sources, SourceSettings, read_sources
 from chauffeur.describe.services.surroundings import Surroundings, with_surroundings
+from chauffeur.describe.services.survey import ContextServices
 
 __all__ = [
     "ContextServices",

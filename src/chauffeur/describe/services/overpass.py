@@ -12,7 +12,7 @@ from datetime import datetime
 from typing import Any, Final, cast
 
 from chauffeur.concept import DataError
-from chauffeur.describe.services.asking import ServiceCaller
+from chauffeur.describe.services.http_request import ServiceCaller
 from chauffeur.describe.services.outside import decoded, items, number, part
 from chauffeur.describe.services.readings import Position
 from chauffeur.describe.services.remote import Told

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
 
 from chauffeur.concept import DataError
-from chauffeur.describe.services.asking import FailureKind, ServiceError
+from chauffeur.describe.services.http_request import FailureKind, ServiceError
 from chauffeur.describe.services.readings import Position, ServiceReading, Unknown
 from chauffeur.describe.services.units import age_words
 

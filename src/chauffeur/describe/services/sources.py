@@ -24,7 +24,6 @@ from typing import Annotated, Final, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from chauffeur.concept import ConfigError
-from chauffeur.describe.services.gathering import ContextServices
 from chauffeur.describe.services.gps import Gpsd, Whereabouts, WrittenFix
 from chauffeur.describe.services.osm_file import load_road_map
 from chauffeur.describe.services.readings import Position, Unknown
@@ -39,6 +38,7 @@ from chauffeur.describe.services.settings import (
     ServiceSettings,
 )
 from chauffeur.describe.services.surroundings import Surroundings
+from chauffeur.describe.services.survey import ContextServices
 
 GPSD_PORT: Final = 2947
 

@@ -15,7 +15,7 @@ from typing import Final
 
 from chauffeur.concept import DataError
 from chauffeur.concept.units import MPS_PER_KMH
-from chauffeur.describe.services.asking import ServiceCaller
+from chauffeur.describe.services.http_request import ServiceCaller
 from chauffeur.describe.services.outside import decoded, items, number, part
 from chauffeur.describe.services.readings import M_PER_DEG, Position
 from chauffeur.describe.services.remote import Told

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final, cast
 
 from chauffeur.concept import DataError
-from chauffeur.describe.services.asking import ServiceCaller
+from chauffeur.describe.services.http_request import ServiceCaller
 from chauffeur.describe.services.outside import decoded, items, number, part
 from chauffeur.describe.services.readings import Position, distance_m
 from chauffeur.describe.services.remote import Told

@@ -73,11 +73,13 @@ def _control(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     from chauffeur.drive.live.realtime import Ticker, become_realtime, punctuality
 
     world = _world(settings)
-    rings = Rings(ring(folder, "wishes"), ring(folder, "observations"), ring(folder, "reports"), ring(folder, "hand"))
+    rings = Rings(
+        ring(folder, "setpoints"), ring(folder, "observations"), ring(folder, "reports"), ring(folder, "hand")
+    )
     control = Control(world, settings.starts, rings, speed=settings.speed)
     control.warm_up()
     allowed = become_realtime(settings.realtime)
-    for each in (rings.wishes, rings.observations, rings.reports, rings.hand):
+    for each in (rings.setpoints, rings.observations, rings.reports, rings.hand):
         each.touch_pages()
     _ready(folder, "control")
     ticker = Ticker(control.dt_s / settings.speed)
@@ -117,7 +119,7 @@ def _policy(
     world = _world(settings)
     mirror = Mirror(world, settings.starts, ring(folder, "observations"))
     rings = PolicyRings(
-        ring(folder, "orders"), ring(folder, "wishes"), ring(folder, "policy_events"), ring(folder, "checkpoints")
+        ring(folder, "orders"), ring(folder, "setpoints"), ring(folder, "policy_events"), ring(folder, "checkpoints")
     )
     pause_s = world.dt_s / settings.speed / 20.0
     if settings.realtime:

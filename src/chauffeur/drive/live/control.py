@@ -18,18 +18,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from chauffeur.concept import ActionMatrix, ChauffeurError, Command, Observation, Parameters, Trajectory, Wishes
+from chauffeur.concept import ActionMatrix, ChauffeurError, Command, Observation, Parameters, Setpoints, Trajectory
 from chauffeur.drive.actuate import Actuated, actuate, set_points
 from chauffeur.drive.fallback import MINIMAL_RISK_BRAKING_MPS2
-from chauffeur.drive.live.ladder import Ladder
-from chauffeur.drive.live.messages import LiveWish, MessageError, MirroredInstant, Report, Rung, Steered
+from chauffeur.drive.live.fallback_levels import FallbackLevels
+from chauffeur.drive.live.messages import FallbackLevel, LiveSetpoints, MessageError, MirroredInstant, Report, Steered
 from chauffeur.drive.live.realtime import Ticker
 from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.wheel import Wheel, pressed
 from chauffeur.executors import Executor, executor_for
 from chauffeur.safety.bounds import least_target_mps
-from chauffeur.safety.shield import GroundShield, Shield, foresight, shield_for
+from chauffeur.safety.shield import GroundShield, Shield, rollout, shield_for
 from chauffeur.worlds.base import Driver, MirroredWorld
 
 AHEAD_NS: Final = 50_000_000
@@ -52,7 +52,7 @@ _log = logging.getLogger(__name__)
 class Rings:
     """What control reads and writes."""
 
-    wishes: Ring
+    setpoints: Ring
     observations: Ring
     reports: Ring
     hand: Ring
@@ -84,7 +84,7 @@ class Control:
         self._trip = 0
         self._tick = 0
         self._heard = 0
-        self._wish: LiveWish | None = None
+        self._wish: LiveSetpoints | None = None
         self._alone_since = 0
         """Period from which nobody has wished anything."""
         self._wheel = Wheel(rings.hand, clock_ns)
@@ -94,10 +94,10 @@ class Control:
         self._unbound: tuple[str, Steered] | None = None
         """A policy that cannot be driven here: tried once."""
         self._noted = 0
-        self._ladder = Ladder()
+        self._fallback_levels = FallbackLevels()
         self._shield: Shield | None = None
         self._driver: Driver | None = None
-        self._held = Wishes()
+        self._held = Setpoints()
         self._steering = 0.0
         """Angle of the wheel as the vehicle has it."""
         self._now: Observation | None = None
@@ -123,7 +123,7 @@ class Control:
         """Drive the first start for a moment in a world of its own kind, so that no code is met for the first time
         while driving; then forget it. What only an emergency at a crossing would call is loaded as well."""
         if any(self._world.reset(one.scenario, one.seed).road.junctions for one in self._starts):
-            foresight.warm_up()
+            rollout.warm_up()
         start = self._starts[0]
         self._world.reset(start.scenario, start.seed)
         driver, shield = self._world.driver(), shield_for(self._world, start.limits)
@@ -134,20 +134,20 @@ class Control:
             if self._world.ended:
                 break
             observation = self._world.observe()
-            ladder_wishes = self._ladder.choose(float(period), None, math.inf, observation)[1]
-            wishes, _ = set_points(self._world, observation, ladder_wishes, start.limits)
+            fallback = self._fallback_levels.choose(float(period), None, math.inf, observation)[1]
+            setpoints, _ = set_points(self._world, observation, fallback, start.limits)
             policy = kinds[period // each]
             if policy is not None and period % each == 0:
                 with contextlib.suppress(ChauffeurError):  # what its kind needs is not installed: none is driven
                     executor = executor_for(policy, self._world)
                     executor.start(policy, observation, start.limits)
             if executor is None:
-                wishes = driver.settle(wishes)
-                command = driver.command(wishes)
+                setpoints = driver.settle(setpoints)
+                command = driver.command(setpoints)
             else:
                 executor.tick()
-                command = executor.step(observation, wishes)
-            actuate(self._world, observation, command, wishes.target_lane, shield)
+                command = executor.step(observation, setpoints)
+            actuate(self._world, observation, command, setpoints.target_lane, shield)
             self._world.mirrored()
 
     def begin_trip(self) -> bool:
@@ -159,7 +159,7 @@ class Control:
         start = self._starts[self._trip - 1]
         self._world.reset(start.scenario, start.seed)
         self._driver = self._world.driver()
-        self._held = self._driver.initial_wishes()
+        self._held = self._driver.initial_setpoints()
         self._shield = shield_for(self._world, start.limits)
         self._tick, self._steering = 0, 0.0
         self._let_go()
@@ -171,25 +171,25 @@ class Control:
         """One control period: hear, choose, command, show. Nothing another process does makes it raise."""
         at_s = self._tick * self.dt_s
         start = self._starts[self._trip - 1]
-        rung: Rung = "keep"
+        level: FallbackLevel = "keep"
         clipped: tuple[str, ...] = ()
         said: tuple[str, ...] = ()
         age_s = 0.0
-        observation, wishes = self._now, self._held
+        observation, setpoints = self._now, self._held
         assert observation is not None, "no trip was begun"
         try:
             said = self._hear_hand(observation)
             if not self._wheel.taken:
                 age_s = self._hear(start)
-            rung, wishes = self._choose(at_s, age_s, observation)
-            least = least_target_mps(observation, wishes, start.limits) if rung in ("follow", "hold") else 0.0
-            wishes, clipped = set_points(self._world, observation, wishes, start.limits, least)
+            level, setpoints = self._choose(at_s, age_s, observation)
+            least = least_target_mps(observation, setpoints, start.limits) if level in ("follow", "hold") else 0.0
+            setpoints, clipped = set_points(self._world, observation, setpoints, start.limits, least)
             if self._executor is None:
-                done, settled = self._follow(observation, wishes)
+                done, settled = self._follow(observation, setpoints)
             else:
-                done, settled, told = self._execute(self._executor, rung, observation, wishes, start)
-                wishes, said = settled, said + told
-            self._held = settled if rung == "hand" else wishes
+                done, settled, told = self._execute(self._executor, level, observation, setpoints, start)
+                setpoints, said = settled, said + told
+            self._held = settled if level == "hand" else setpoints
         except Exception:  # noqa: BLE001 - whatever it is, the car is braked in this period and control goes on
             _log.exception("a control period failed")
             self._faults += 1
@@ -203,12 +203,12 @@ class Control:
             trip=self._trip,
             tick=self._tick - 1,
             late_ns=late_ns,
-            rung=rung,
+            level=level,
             plan="" if wish is None else wish.plan,
             state="none" if wish is None else wish.state,
             line=None if wish is None else wish.line,
             age_s=round(age_s, 4),
-            wishes=wishes,
+            setpoints=setpoints,
             requested=done.requested,
             applied=done.applied,
             interventions=done.interventions,
@@ -238,17 +238,17 @@ class Control:
         """Nobody wishes anything any more."""
         self._wish = None
         self._executor = self._bound = self._unbound = None
-        self._ladder = Ladder()
+        self._fallback_levels = FallbackLevels()
         self._alone_since = self._tick
 
     def _hear_hand(self, observation: Observation) -> tuple[str, ...]:
         """Who has the wheel, and what the person at it wishes; returns what there is to tell them."""
         assert self._driver is not None
-        hands = self._wheel.hands
+        handovers = self._wheel.handovers
         keys = self._wheel.hear(self._refused)
-        if self._wheel.hands != hands:
+        if self._wheel.handovers != handovers:
             # What is, is kept: speed and lane; and the way, where a crossing is ahead.
-            held, self._held = self._held, self._driver.initial_wishes()
+            held, self._held = self._held, self._driver.initial_setpoints()
             self._held = replace(
                 self._held, target_lane=observation.ego.lane, turn=held.turn, served_stops=held.served_stops
             )
@@ -261,11 +261,11 @@ class Control:
 
     def _hear(self, start: Start) -> float:
         """Take in the policy's newest wish, if it is one; returns the age of what is followed, in vehicle time."""
-        message = self._rings.wishes.latest()
+        message = self._rings.setpoints.latest()
         if message is not None and message.number != self._heard:
             self._heard = message.number
             try:
-                wish = self._believed(LiveWish.decode(message.payload))
+                wish = self._believed(LiveSetpoints.decode(message.payload))
                 if wish is not None:
                     self._bind(wish, start)
                     self._wish = wish
@@ -277,7 +277,7 @@ class Control:
         since_issue_s = (self._clock_ns() - self._wish.issued_ns) * 1e-9 * self._speed
         return max(0.0, since_issue_s, (self._tick - self._wish.tick) * self.dt_s)
 
-    def _believed(self, wish: LiveWish) -> LiveWish | None:
+    def _believed(self, wish: LiveSetpoints) -> LiveSetpoints | None:
         """The wish, if it can be meant for now; None if it was made before the wheel last changed hands.
 
         Raises:
@@ -291,16 +291,16 @@ class Control:
             raise MessageError("issued in the future")
         if self._wish is not None and wish.issued_ns < self._wish.issued_ns:
             raise MessageError("older than the one before")
-        if wish.hands > self._wheel.hands:
-            raise MessageError("of hands to come")
-        if wish.hands < self._wheel.hands:
+        if wish.handovers > self._wheel.handovers:
+            raise MessageError("of handovers to come")
+        if wish.handovers < self._wheel.handovers:
             return None
-        lane = wish.wishes.target_lane
+        lane = wish.setpoints.target_lane
         if lane is not None and not self._world.perception().has_lane(lane):
             raise MessageError("no such lane")
         return wish
 
-    def _bind(self, wish: LiveWish, start: Start) -> None:
+    def _bind(self, wish: LiveSetpoints, start: Start) -> None:
         """Have the policy of a wish driven from now on; nothing where it is already, or where it has none.
 
         Raises:
@@ -327,21 +327,21 @@ class Control:
         self._noted = len(executor.notes) if executor is self._executor else 0
         self._executor, self._bound = executor, bound
 
-    def _choose(self, at_s: float, age_s: float, observation: Observation) -> tuple[Rung, Wishes]:
+    def _choose(self, at_s: float, age_s: float, observation: Observation) -> tuple[FallbackLevel, Setpoints]:
         if self._stopping:
             return "stop", replace(self._held, target_speed_mps=0.0, target_lane=observation.ego.lane)
         if self._wheel.taken:
             return "hand", self._held
         wish = self._wish
-        if wish is None and age_s <= self._ladder.patience_s:
+        if wish is None and age_s <= self._fallback_levels.patience_s:
             return "hold", self._held  # nobody has wished anything yet
         expired = wish is not None and self._clock_ns() > wish.expires_ns
-        return self._ladder.choose(at_s, wish, age_s, observation, expired=expired)
+        return self._fallback_levels.choose(at_s, wish, age_s, observation, expired=expired)
 
-    def _follow(self, observation: Observation, wishes: Wishes) -> tuple[Actuated, Wishes]:
-        """Drive a period by the world's own driver; returns what was done, and the wishes as they were driven."""
+    def _follow(self, observation: Observation, setpoints: Setpoints) -> tuple[Actuated, Setpoints]:
+        """Drive a period by the world's own driver; returns what was done, and the set-points as they were driven."""
         assert self._driver is not None
-        settled = self._driver.settle(wishes)
+        settled = self._driver.settle(setpoints)
         command = self._driver.command(settled)
         if settled.target_speed_mps is not None and settled.target_speed_mps <= STANDING_MPS:
             # LaMPilot's IDM has no standing still: it would start off again every other period.
@@ -349,26 +349,26 @@ class Control:
         return self._actuated(observation, self._risk_least(command, observation, settled), settled), settled
 
     def _execute(
-        self, executor: Executor, rung: Rung, observation: Observation, wishes: Wishes, start: Start
-    ) -> tuple[Actuated, Wishes, tuple[str, ...]]:
+        self, executor: Executor, level: FallbackLevel, observation: Observation, setpoints: Setpoints, start: Start
+    ) -> tuple[Actuated, Setpoints, tuple[str, ...]]:
         """Drive a period by an executor; returns what was done, what was aimed for, and what there is to tell.
 
         Args:
             executor: Of the policy.
-            rung: `follow` and `hold` ask the policy; the others hold it to their wishes.
+            level: `follow` and `hold` ask the policy; the others hold it to their set-points.
             observation: The instant.
-            wishes: Of the rung, within the limits.
+            setpoints: Of the level, within the limits.
             start: Of the trip.
         """
-        if rung in ("follow", "hold"):
-            wishes, _ = set_points(self._world, observation, executor.tick().wishes, start.limits)
-        command = executor.step(observation, wishes)
+        if level in ("follow", "hold"):
+            setpoints, _ = set_points(self._world, observation, executor.tick().setpoints, start.limits)
+        command = executor.step(observation, setpoints)
         notes, self._noted = executor.notes[self._noted :], len(executor.notes)
         settled = executor.setpoints
         done = self._actuated(observation, self._risk_least(command, observation, None), settled)
         return done, settled, tuple(text for _, text in notes)
 
-    def _risk_least(self, command: Command, observation: Observation, settled: Wishes | None) -> Command:
+    def _risk_least(self, command: Command, observation: Observation, settled: Setpoints | None) -> Command:
         """Once asked to stop: the minimal-risk manoeuvre's even braking, or more for a slower lead vehicle."""
         if not self._stopping or isinstance(self._shield, GroundShield):
             return command
@@ -381,7 +381,7 @@ class Control:
             braking = max(braking, -needed.acceleration_mps2)
         return replace(command, acceleration_mps2=-braking)
 
-    def _actuated(self, observation: Observation, command: Command, settled: Wishes) -> Actuated:
+    def _actuated(self, observation: Observation, command: Command, settled: Setpoints) -> Actuated:
         return actuate(self._world, observation, command, settled.target_lane, self._shield)
 
     def _brake(self, observation: Observation) -> Actuated:
@@ -402,7 +402,7 @@ class Control:
         return "ended" if self._tick * self.dt_s >= start.most_s else ""
 
     def _show(self) -> None:
-        payload = MirroredInstant(self._trip, self._tick, self._world.mirrored(), self._wheel.hands).encode()
+        payload = MirroredInstant(self._trip, self._tick, self._world.mirrored(), self._wheel.handovers).encode()
         self._rings.observations.write(payload)
 
 

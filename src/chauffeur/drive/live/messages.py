@@ -15,10 +15,10 @@ from chauffeur.concept import (
     LaneId,
     Parameters,
     ProgramState,
+    Setpoints,
     Trajectory,
     Turn,
     VehicleState,
-    Wishes,
 )
 
 _INSTANT = struct.Struct("<QQQ")
@@ -37,7 +37,7 @@ _MOST_NAME: Final = 64
 _LONGEST_LANE: Final = 200
 _MOST_STOPS: Final = 64
 
-Rung = Literal["follow", "hold", "keep", "slow", "stop", "hand"]
+FallbackLevel = Literal["follow", "hold", "keep", "slow", "stop", "hand"]
 """Of the fallback ladder, best first (ladder.py); beside it `hand`: the person has taken over."""
 
 Key = Literal["faster", "slower", "left", "right", "brake"]
@@ -56,25 +56,25 @@ class MirroredInstant:
         trip: Number of the trip since control started, from 1.
         tick: Control periods since the trip began.
         world: What `World.adopt` takes.
-        hands: How often the wheel has changed hands: odd while the person has it.
+        handovers: How often the wheel has changed hands: odd while the person has it.
     """
 
     trip: int
     tick: int
     world: bytes
-    hands: int = 0
+    handovers: int = 0
 
     def encode(self) -> bytes:
         """As bytes."""
-        return _INSTANT.pack(self.trip, self.tick, self.hands) + self.world
+        return _INSTANT.pack(self.trip, self.tick, self.handovers) + self.world
 
     @classmethod
     def decode(cls, payload: bytes) -> MirroredInstant:
         """From bytes. Raises MessageError."""
         if len(payload) < _INSTANT.size:
             raise MessageError("too short")
-        trip, tick, hands = _INSTANT.unpack_from(payload)
-        return cls(trip, tick, payload[_INSTANT.size :], hands)
+        trip, tick, handovers = _INSTANT.unpack_from(payload)
+        return cls(trip, tick, payload[_INSTANT.size :], handovers)
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,8 +187,8 @@ def _policy(fields: dict[str, Any]) -> Parameters | ActionMatrix | Trajectory:
 
 
 @dataclass(frozen=True, slots=True)
-class LiveWish:
-    """What the policy wishes now.
+class LiveSetpoints:
+    """What the policy asks for now.
 
     Attributes:
         trip, tick: Of the observation it was made for.
@@ -197,9 +197,9 @@ class LiveWish:
         expires_ns: Until when the plan may be followed.
         state: Of the program.
         line: Program line it waits at.
-        wishes: For the driver.
+        setpoints: For the driver.
         steered: Policy that an executor drives in the driver's place; None where a program, or nobody, wishes.
-        hands: How often the wheel had changed hands in that instant.
+        handovers: How often the wheel had changed hands in that instant.
     """
 
     trip: int
@@ -209,13 +209,13 @@ class LiveWish:
     expires_ns: int
     state: ProgramState
     line: int | None
-    wishes: Wishes
+    setpoints: Setpoints
     steered: Steered | None = None
-    hands: int = 0
+    handovers: int = 0
 
     def encode(self) -> bytes:
         """As bytes."""
-        wishes, steered = self.wishes, self.steered
+        setpoints, steered = self.setpoints, self.steered
         return json.dumps(
             {
                 "trip": self.trip,
@@ -225,18 +225,18 @@ class LiveWish:
                 "expires_ns": self.expires_ns,
                 "state": self.state,
                 "line": self.line,
-                "speed": wishes.target_speed_mps,
-                "headway": wishes.time_headway_s,
-                "lane": wishes.target_lane,
-                "turn": wishes.turn,
-                "served": sorted(wishes.served_stops),
+                "speed": setpoints.target_speed_mps,
+                "headway": setpoints.time_headway_s,
+                "lane": setpoints.target_lane,
+                "turn": setpoints.turn,
+                "served": sorted(setpoints.served_stops),
                 "steered": None if steered is None else steered.fields(),
-                "hands": self.hands,
+                "handovers": self.handovers,
             }
         ).encode()
 
     @classmethod
-    def decode(cls, payload: bytes) -> LiveWish:
+    def decode(cls, payload: bytes) -> LiveSetpoints:
         """From bytes, every field of its type and within what a car could mean.
 
         Raises:
@@ -258,7 +258,7 @@ class LiveWish:
             expires_ns=_count(fields, "expires_ns"),
             state=_one_of(fields.get("state"), get_args(ProgramState), "state"),
             line=None if line is None else _count(fields, "line"),
-            wishes=Wishes(
+            setpoints=Setpoints(
                 target_speed_mps=None if fields.get("speed") is None else _number(fields, "speed", 0.0, MOST_SPEED_MPS),
                 time_headway_s=_number(fields, "headway", 0.0, MOST_HEADWAY_S),
                 target_lane=_lane(fields.get("lane")),
@@ -266,7 +266,7 @@ class LiveWish:
                 served_stops=_stops(fields.get("served")),
             ),
             steered=None if fields.get("steered") is None else Steered.read(fields["steered"]),
-            hands=_count(fields, "hands"),
+            handovers=_count(fields, "handovers"),
         )
 
 
@@ -277,15 +277,15 @@ class Report:
     Attributes:
         trip, tick: Which.
         late_ns: How late it began.
-        rung: Of the fallback ladder.
+        level: Of the fallback ladder.
         plan: Id of the plan that is followed, empty for none.
         state, line: Of its program, as last heard.
         age_s: Age of the wish that is followed.
-        wishes: What was handed to the driver.
+        setpoints: What was handed to the driver.
         requested: What the driver asked for.
         applied: What the vehicle did.
         interventions: Of the shield.
-        clipped: What was taken off the wishes, by name.
+        clipped: What was taken off the set-points, by name.
         refused: Messages from the policy that were none, by reason, since the start.
         missed: Control periods never begun, since the start.
         faults: Errors inside the control period itself, answered by braking, since the start.
@@ -299,12 +299,12 @@ class Report:
     trip: int
     tick: int
     late_ns: int
-    rung: Rung
+    level: FallbackLevel
     plan: str
     state: ProgramState
     line: int | None
     age_s: float
-    wishes: Wishes
+    setpoints: Setpoints
     requested: Command
     applied: Command
     interventions: tuple[Intervention, ...]
@@ -322,17 +322,17 @@ class Report:
     def encode(self) -> bytes:
         """As bytes."""
         fields = asdict(self)
-        fields["wishes"]["served_stops"] = sorted(self.wishes.served_stops)
+        fields["setpoints"]["served_stops"] = sorted(self.setpoints.served_stops)
         return json.dumps(fields).encode()
 
     @classmethod
     def decode(cls, payload: bytes) -> Report:
         """From the bytes of a control process, which is trusted."""
         fields = json.loads(payload)
-        wishes = fields["wishes"]
-        wishes["served_stops"] = frozenset(wishes["served_stops"])
-        wishes["target_lane"] = _lane(wishes["target_lane"])
-        fields["wishes"] = Wishes(**wishes)
+        setpoints = fields["setpoints"]
+        setpoints["served_stops"] = frozenset(setpoints["served_stops"])
+        setpoints["target_lane"] = _lane(setpoints["target_lane"])
+        fields["setpoints"] = Setpoints(**setpoints)
         fields["requested"], fields["applied"] = Command(**fields["requested"]), Command(**fields["applied"])
         fields["interventions"] = tuple(
             Intervention(i["rule"], i["reason"], Command(**i["before"]), Command(**i["after"]))

@@ -20,7 +20,7 @@ class Mirror:
         self._seen = 0
         self.trip = 0
         self.tick = 0
-        self.hands = 0
+        self.handovers = 0
         """How often the wheel has changed hands: odd while the person has it."""
 
     @property
@@ -49,5 +49,5 @@ class Mirror:
             self.world.adopt(shown.world)
         except (MessageError, DataError):
             return False
-        self.trip, self.tick, self.hands = shown.trip, shown.tick, shown.hands
+        self.trip, self.tick, self.handovers = shown.trip, shown.tick, shown.handovers
         return True

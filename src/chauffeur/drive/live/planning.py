@@ -19,11 +19,11 @@ from chauffeur.drive.emergency import NO_SHOULDER, planned_for
 from chauffeur.drive.events import DriveEvent, WishEventKind
 from chauffeur.drive.live.messages import MessageError
 from chauffeur.drive.live.mirror import Mirror
-from chauffeur.drive.live.orders import (
+from chauffeur.drive.live.plan_messages import (
     MOST_SAID,
-    Brief,
-    Order,
+    PlanMessage,
     PlannedScene,
+    PlanningInputs,
     Request,
     encode,
     read_request,
@@ -140,7 +140,7 @@ class Planning:
             return
         self._tell("planned", request.wish, order.plan.thoughts.text)
 
-    async def _plan(self, request: Request) -> Order:
+    async def _plan(self, request: Request) -> PlanMessage:
         issued_ns = self._clock_ns()  # before the look: what is seen may already be old when it has been taken in
         self._mirror.follow()
         observation, limits = self._mirror.world.observe(), self._mirror.limits
@@ -180,8 +180,10 @@ class Planning:
         context, history, plan = planned.request.context, planned.request.history, planned.plan
         if planned.refusal:
             plan = replace(plan, policy=None, refusal=planned.refusal)
-        self._brief(Brief(request.wish, instruction, context, history, plan, self._mirror.trip, observation.tick))
-        return Order(
+        self._brief(
+            PlanningInputs(request.wish, instruction, context, history, plan, self._mirror.trip, observation.tick)
+        )
+        return PlanMessage(
             wish=request.wish,
             plan=plan,
             scene=scene,
@@ -196,7 +198,7 @@ class Planning:
             return ()
         return SeatCamera(self._mirror.world, self._mirror.start.seed).take(observation)
 
-    def _brief(self, brief: Brief) -> None:
+    def _brief(self, brief: PlanningInputs) -> None:
         """Leave word of what the plan was made of; one that is too long without the history, or else not at all."""
         for each in (brief, replace(brief, history=History())):
             with contextlib.suppress(ValueError):

@@ -1,4 +1,4 @@
-"""The policy process: it checks the plans that come, drives the one that passed, and says its wishes.
+"""The policy process: it checks the plans that come, drives the one that passed, and says its set-points.
 
 A program is run here, period by period. A policy of another kind is tried on this process's copy of the world, handed
 on with every wish, and driven by control; its executor here goes along on the copy, and so knows when it has ended.
@@ -32,9 +32,9 @@ from chauffeur.concept import (
     ProgramState,
     SandboxError,
     ScenarioError,
+    Setpoints,
     Trajectory,
     Turn,
-    Wishes,
 )
 from chauffeur.concept import Policy as AnyPolicy
 from chauffeur.drive.events import DriveEvent, WishEventKind
@@ -45,15 +45,15 @@ from chauffeur.drive.live.messages import (
     MOST_PERIOD_S,
     MOST_SPEED_MPS,
     MOST_WAYPOINTS,
-    LiveWish,
+    LiveSetpoints,
     MessageError,
     Steered,
 )
 from chauffeur.drive.live.mirror import Mirror
-from chauffeur.drive.live.orders import (
+from chauffeur.drive.live.plan_messages import (
     MOST_SAID,
     TOOK_OVER,
-    Order,
+    PlanMessage,
     PlannedScene,
     encode,
     read_order,
@@ -66,7 +66,7 @@ from chauffeur.executors.pursuit import HEADWAY_S
 from chauffeur.executors.trajectory import rebased
 from chauffeur.geometry import Pose
 from chauffeur.geometry.road_graph import TURNS
-from chauffeur.programs import Budget, ProgramExecutor, Sandbox, starting_wishes
+from chauffeur.programs import Budget, ProgramExecutor, Sandbox, starting_setpoints
 from chauffeur.safety.base import Check
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
 from chauffeur.safety.words import reasons_once
@@ -74,7 +74,7 @@ from chauffeur.worlds.base import EGO
 from chauffeur.worlds.places import ParkingPlaces
 
 LIVE_BUDGET: Final = Budget(turn_s=0.1, tick_s=0.2, grace_s=0.05, start_s=1.0)
-"""Wider than a control period: a policy that is late once is what the ladder's first rungs are for."""
+"""Wider than a control period: a policy that is late once is what the ladder's first levels are for."""
 MOST_RESUMPTIONS: Final = 3
 """A program that was running each time the process died is not trusted for ever."""
 _FRESH_NS: Final = 150_000_000
@@ -89,7 +89,7 @@ class PolicyRings:
     """What the policy process writes and reads, apart from observations."""
 
     orders: Ring
-    wishes: Ring
+    setpoints: Ring
     events: Ring
     checkpoints: Ring
 
@@ -141,11 +141,11 @@ class Policy:
         self._orders = Reader(rings.orders)
         self._trip = 0
         self._driven: _Driven | None = None
-        self._wishes: Wishes | None = None
+        self._setpoints: Setpoints | None = None
         self._first = True
         self._followed_ns = 0
-        self._hands = 0
-        self._hands_tick = 0
+        self._handovers = 0
+        self._handover_tick = 0
         """Period in which the wheel was last seen in other hands."""
 
     def close(self) -> None:
@@ -163,22 +163,22 @@ class Policy:
         self._followed_ns = self._clock_ns()
         if self._mirror.trip != self._trip:
             self._new_trip()
-        if self._mirror.hands != self._hands:
+        if self._mirror.handovers != self._handovers:
             self._taken_over()
         self._take_orders()
         self._wish()
         return True
 
     def _wish(self) -> None:
-        """Run what is driven for a period, and say its wishes."""
+        """Run what is driven for a period, and say its set-points."""
         state: ProgramState = "none"
         line = None
         driven = self._driven
         if driven is not None:
             state, line = self._run(driven)
-        assert self._wishes is not None
-        self._rings.wishes.write(
-            LiveWish(
+        assert self._setpoints is not None
+        self._rings.setpoints.write(
+            LiveSetpoints(
                 trip=self._trip,
                 tick=self._mirror.tick,
                 plan="" if driven is None else driven.wish,
@@ -186,9 +186,9 @@ class Policy:
                 expires_ns=_EVER_NS if driven is None else driven.expires_ns,
                 state=state,
                 line=line,
-                wishes=self._wishes,
+                setpoints=self._setpoints,
                 steered=None if driven is None else driven.steered,
-                hands=self._hands,
+                handovers=self._handovers,
             ).encode()
         )
         if driven is not None and state == "running":
@@ -199,9 +199,9 @@ class Policy:
             self._tell("interrupted", self._driven.wish, "The trip has ended.")
         self._drop()
         self._trip = self._mirror.trip
-        self._hands = self._mirror.hands
-        self._hands_tick = self._mirror.tick if self._hands else 0
-        self._wishes = starting_wishes(self._mirror.world.perception())
+        self._handovers = self._mirror.handovers
+        self._handover_tick = self._mirror.tick if self._handovers else 0
+        self._setpoints = starting_setpoints(self._mirror.world.perception())
         if self._first:
             self._first = False
             self._pick_up()
@@ -211,8 +211,8 @@ class Policy:
         if self._driven is not None and self._driven.state == "running":
             self._tell("interrupted", self._driven.wish, TOOK_OVER)
         self._drop()
-        self._hands, self._hands_tick = self._mirror.hands, self._mirror.tick
-        self._wishes = starting_wishes(self._mirror.world.perception())
+        self._handovers, self._handover_tick = self._mirror.handovers, self._mirror.tick
+        self._setpoints = starting_setpoints(self._mirror.world.perception())
 
     def _drop(self) -> None:
         if self._driven is not None:
@@ -224,7 +224,7 @@ class Policy:
     def _take_orders(self) -> bool:
         """Judge the newest plan that came; whether it began."""
         messages, _ = self._orders.news()
-        orders: list[Order] = []
+        orders: list[PlanMessage] = []
         for message in messages:
             try:
                 orders.append(read_order(message.payload))
@@ -237,9 +237,9 @@ class Policy:
             self._consider(orders[-1])
         return self._driven is not before
 
-    def _consider(self, order: Order) -> None:
+    def _consider(self, order: PlanMessage) -> None:
         """Start a plan, or say why not."""
-        if self._hands % 2:
+        if self._handovers % 2:
             self._tell("interrupted", order.wish, "You have the wheel.")
             return
         observation = self._mirror.world.observe()
@@ -273,7 +273,7 @@ class Policy:
         self._driven = _Driven(order.wish, order.expires_ns, by)
         self._tell("started", order.wish, plan.thoughts.text)
 
-    def _as_seen_now(self, order: Order, observation: Observation) -> Plan:
+    def _as_seen_now(self, order: PlanMessage, observation: Observation) -> Plan:
         """The plan, with waypoints that count from where the car is now. Raises ScenarioError: they are behind it."""
         plan, pose = order.plan, order.scene.pose
         if not isinstance(plan.policy, Trajectory) or pose is None:
@@ -286,12 +286,12 @@ class Policy:
         """Something that is ready to be driven. Raises SandboxError, or ScenarioError where no such way is."""
         if not isinstance(policy, Program):
             return self._tried(policy, observation)
-        wishes = self._wishes
-        if wishes is not None and wishes.target_lane is None:  # after parameters: control found the lane
-            wishes = replace(wishes, target_lane=self._mirror.world.perception().lane_of(EGO))
+        setpoints = self._setpoints
+        if setpoints is not None and setpoints.target_lane is None:  # after parameters: control found the lane
+            setpoints = replace(setpoints, target_lane=self._mirror.world.perception().lane_of(EGO))
         executor = ProgramExecutor(sandbox=self._sandbox, library=policy.library)
         try:
-            executor.start(policy.source, self._mirror.world, wishes=wishes)
+            executor.start(policy.source, self._mirror.world, setpoints=setpoints)
         except SandboxError:
             executor.close()
             raise
@@ -340,10 +340,10 @@ class Policy:
 
     def _turn_wished(self, observation: Observation) -> str:
         """The turn that the program before asked for, where a crossing is ahead."""
-        turn = None if self._wishes is None else self._wishes.turn
+        turn = None if self._setpoints is None else self._setpoints.turn
         return turn or "" if observation.road.junctions else ""
 
-    def _too_late(self, order: Order, now: PlannedScene) -> str:
+    def _too_late(self, order: PlanMessage, now: PlannedScene) -> str:
         scene = order.scene
         if scene.trip != now.trip:
             return "The plan was made for another trip."
@@ -351,7 +351,7 @@ class Policy:
             return "The plan came too late."
         if (now.tick - scene.tick) * self._mirror.world.dt_s > START_WITHIN_S:
             return "The plan was made for an instant that is long gone."
-        if self._hands and scene.tick < self._hands_tick:
+        if self._handovers and scene.tick < self._handover_tick:
             return "The plan was made before the wheel changed hands."
         policy = order.plan.policy
         if isinstance(policy, ActionMatrix | Trajectory) or (isinstance(policy, Parameters) and policy.lane == 0):
@@ -377,7 +377,7 @@ class Policy:
             if before != "failed":
                 self._tell("failed", driven.wish, str(error))
             return "failed", None
-        driven.state, self._wishes = tick.state, tick.wishes
+        driven.state, self._setpoints = tick.state, tick.setpoints
         for text in tick.said:
             self._tell("said", driven.wish, text)
         if tick.state != before or (tick.state == "failed" and tick.error is not None and before != "failed"):
@@ -390,7 +390,7 @@ class Policy:
         policy, world = along.steered.policy, self._mirror.world
         ended = ""
         if isinstance(policy, Parameters):
-            self._wishes = Wishes(policy.target_speed_mps, HEADWAY_S, None, _TURNS.get(policy.route))
+            self._setpoints = Setpoints(policy.target_speed_mps, HEADWAY_S, None, _TURNS.get(policy.route))
             spot = world.parked() if isinstance(world, ParkingPlaces) else None
             ended = f"Parked in {spot}." if spot is not None and spot == policy.route else ""
         elif driven.state == "running" and along.executor is not None:
@@ -400,7 +400,7 @@ class Policy:
                 driven.state = "failed"
                 self._tell("failed", driven.wish, f"{type(error).__name__}: {error}")
                 return driven.state
-            self._wishes = along.executor.setpoints
+            self._setpoints = along.executor.setpoints
             ended = "It has been driven." if along.executor.status == "finished" else ""
         if driven.state == "running" and ended:
             driven.state = "finished"
@@ -427,7 +427,7 @@ class Policy:
     def _checkpoint(self, driven: _Driven, body: bytes) -> bytes:
         head = {
             "trip": self._trip, "wish": driven.wish, "expires_ns": driven.expires_ns, "resumed": driven.resumed,
-            "hands": self._hands, "steered": None if driven.steered is None else driven.steered.fields(),
+            "handovers": self._handovers, "steered": None if driven.steered is None else driven.steered.fields(),
             "grown": driven.grown,
         }  # fmt: skip
         text = json.dumps(head).encode()
@@ -446,11 +446,11 @@ class Policy:
             head = json.loads(message.payload[_HEAD.size : _HEAD.size + length])
             if head["trip"] != self._trip or self._clock_ns() > head["expires_ns"] or self._ended_since(head["wish"]):
                 return
-            resumed, hands, grown = int(head["resumed"]) + 1, int(head["hands"]), bool(head["grown"])
+            resumed, handovers, grown = int(head["resumed"]) + 1, int(head["handovers"]), bool(head["grown"])
             steered = None if head["steered"] is None else Steered.read(head["steered"])
         except (struct.error, ValueError, KeyError, TypeError):  # it must not keep every later process from starting
             return
-        if hands != self._hands:
+        if handovers != self._handovers:
             self._tell("interrupted", head["wish"], TOOK_OVER)
             return
         if grown:
@@ -483,11 +483,11 @@ class Policy:
 
     def _ended_since(self, wish: str) -> bool:
         """Whether the wish heard last was of another plan, or of one that ran no more."""
-        message = self._rings.wishes.latest()
+        message = self._rings.setpoints.latest()
         if message is None:
             return True
         try:
-            last = LiveWish.decode(message.payload)
+            last = LiveSetpoints.decode(message.payload)
         except MessageError:
             return True
         return last.plan != wish or last.state != "running"

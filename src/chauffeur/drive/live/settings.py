@@ -16,7 +16,7 @@ SETTINGS_FILE: Final = "settings.json"
 RingName = Literal[
     "observations",
     "reports",
-    "wishes",
+    "setpoints",
     "orders",
     "briefs",
     "requests",
@@ -28,7 +28,7 @@ RingName = Literal[
 SIZES: Final[dict[RingName, tuple[int, int]]] = {
     "observations": (4, 64 << 10),
     "reports": (512, 16 << 10),
-    "wishes": (8, 8 << 10),
+    "setpoints": (8, 8 << 10),
     "orders": (8, 256 << 10),
     "briefs": (8, 512 << 10),
     "requests": (16, 16 << 10),

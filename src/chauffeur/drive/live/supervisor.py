@@ -25,10 +25,10 @@ from chauffeur.concept import NOBODY, SandboxError
 from chauffeur.drive.emergency import STOPPING, stop_wanted
 from chauffeur.drive.events import FINAL, DriveEvent, EventKind, Listener, nobody_listens
 from chauffeur.drive.live.__main__ import FIGURES_FILE, READY_SUFFIX
-from chauffeur.drive.live.messages import Key, LiveWish, MessageError, Report, WheelHand
-from chauffeur.drive.live.orders import (
+from chauffeur.drive.live.messages import Key, LiveSetpoints, MessageError, Report, WheelHand
+from chauffeur.drive.live.plan_messages import (
     TOOK_OVER,
-    Brief,
+    PlanningInputs,
     Request,
     encode,
     read_brief,
@@ -87,7 +87,7 @@ class Interaction:
     since_s: float = 0.0
     answer: DriveEvent | None = None
     events: list[DriveEvent] = field(default_factory=list[DriveEvent])
-    brief: Brief | None = None
+    brief: PlanningInputs | None = None
 
     @property
     def started_tick(self) -> int | None:
@@ -325,7 +325,7 @@ class Runtime:
         if self._stopping or not self.driving:
             return
         policy = self._children["policy"]
-        head = self._rings["wishes"].head
+        head = self._rings["setpoints"].head
         if head != self._wish_number or not self._ready_file("policy").exists():
             self._wish_number, self._wish_at_s = head, now_s
         elif now_s - self._wish_at_s > SILENT_S and policy.process.poll() is None and policy.restart_at_s is None:
@@ -432,11 +432,11 @@ class Runtime:
         policy = self._children["policy"]
         if since_s is None or policy.restart_at_s is not None or policy.started_s < since_s:
             return
-        message = self._rings["wishes"].latest()
+        message = self._rings["setpoints"].latest()
         if message is None or message.written_ns * 1e-9 < policy.started_s:
             return
         try:
-            goes_on = LiveWish.decode(message.payload).plan == wish
+            goes_on = LiveSetpoints.decode(message.payload).plan == wish
         except MessageError:
             return
         del self._doubtful[wish]

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept import STOP_ZONE_M, Observation, Wishes
+from chauffeur.concept import STOP_ZONE_M, Observation, Setpoints
 from chauffeur.concept.units import MPS_PER_KMH
 from chauffeur.drive.live.messages import Key, MessageError, WheelHand
 from chauffeur.drive.live.ring import Reader, Ring
@@ -35,13 +35,13 @@ class Wheel:
         """Args: the ring; the clock of all processes."""
         self._heard = Reader(hand, old=True)
         self._clock_ns = clock_ns
-        self.hands = 0
+        self.handovers = 0
         """How often it has changed hands: odd while the person has it."""
 
     @property
     def taken(self) -> bool:
         """Whether the person has it."""
-        return self.hands % 2 == 1
+        return self.handovers % 2 == 1
 
     def hear(self, refused: Counter[str]) -> tuple[Key, ...]:
         """Who has the wheel now, and what they pressed since they took it, oldest first.
@@ -57,14 +57,14 @@ class Wheel:
                 refused[str(error)] += 1
                 continue
             if hand.on != self.taken:
-                self.hands += 1
+                self.handovers += 1
                 keys = ()
             if hand.on and hand.key is not None and self._clock_ns() - message.written_ns <= MEANT_WITHIN_NS:
                 keys = (*keys, hand.key)
         return keys
 
 
-def pressed(key: Key, wishes: Wishes, observation: Observation, perception: Perception) -> tuple[Wishes, str]:
+def pressed(key: Key, setpoints: Setpoints, observation: Observation, perception: Perception) -> tuple[Setpoints, str]:
     """The person's wishes after a key, and what there is to tell them; empty where it was just done.
 
     Args:
@@ -74,20 +74,22 @@ def pressed(key: Key, wishes: Wishes, observation: Observation, perception: Perc
         perception: Of the same instant.
     """
     speed = max(0.0, observation.ego.speed_mps)
-    wished = speed if wishes.target_speed_mps is None else wishes.target_speed_mps
+    wished = speed if setpoints.target_speed_mps is None else setpoints.target_speed_mps
     match key:
         case "faster":
             if speed < _STANDING_MPS:
-                wishes = _past_the_sign(wishes, perception)
-            return replace(wishes, target_speed_mps=max(wished, speed) + _step(observation, perception)), ""
+                setpoints = _past_the_sign(setpoints, perception)
+            return replace(setpoints, target_speed_mps=max(wished, speed) + _step(observation, perception)), ""
         case "slower":
-            return replace(wishes, target_speed_mps=max(0.0, min(wished, speed) - _step(observation, perception))), ""
+            return replace(
+                setpoints, target_speed_mps=max(0.0, min(wished, speed) - _step(observation, perception))
+            ), ""
         case "brake":
-            return replace(wishes, target_speed_mps=0.0), ""
+            return replace(setpoints, target_speed_mps=0.0), ""
         case "left":
-            return _aside(-1, wishes, observation, perception)
+            return _aside(-1, setpoints, observation, perception)
         case "right":
-            return _aside(1, wishes, observation, perception)
+            return _aside(1, setpoints, observation, perception)
 
 
 def _step(observation: Observation, perception: Perception) -> float:
@@ -95,24 +97,24 @@ def _step(observation: Observation, perception: Perception) -> float:
     return min(STEP_MPS, (math.inf if lane is None else perception.speed_limit(lane)) / _STEPS)
 
 
-def _past_the_sign(wishes: Wishes, perception: Perception) -> Wishes:
+def _past_the_sign(setpoints: Setpoints, perception: Perception) -> Setpoints:
     """Whoever goes on from a stand at a stop sign has stopped at it."""
-    sign = perception.stop_sign_ahead(wishes.served_stops)
+    sign = perception.stop_sign_ahead(setpoints.served_stops)
     if sign is None or sign[1] > STOP_ZONE_M:
-        return wishes
-    return replace(wishes, served_stops=wishes.served_stops | {sign[0]})
+        return setpoints
+    return replace(setpoints, served_stops=setpoints.served_stops | {sign[0]})
 
 
-def _aside(side: int, wishes: Wishes, observation: Observation, perception: Perception) -> tuple[Wishes, str]:
+def _aside(side: int, setpoints: Setpoints, observation: Observation, perception: Perception) -> tuple[Setpoints, str]:
     """One lane to a side (left is -1); a turn, where a crossing is ahead and there is no lane."""
     name = "left" if side < 0 else "right"
-    here = wishes.target_lane or perception.lane_of(EGO)
+    here = setpoints.target_lane or perception.lane_of(EGO)
     lane = perception.adjacent_lane(here, side)
     if lane is None:
         if observation.road.junctions:
-            return replace(wishes, turn=name), ""
-        return wishes, f"There is no lane to the {name}."
+            return replace(setpoints, turn=name), ""
+        return setpoints, f"There is no lane to the {name}."
     there = observation.road.get(lane)
     if there is not None and there.closed and not there.emergency:
-        return wishes, f"The lane to the {name} ends."
-    return replace(wishes, target_lane=lane), ""
+        return setpoints, f"The lane to the {name} ends."
+    return replace(setpoints, target_lane=lane), ""

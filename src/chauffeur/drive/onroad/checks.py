@@ -12,7 +12,7 @@ from typing import Final
 
 from chauffeur.concept import Parameters, Plan, Verdict
 from chauffeur.drive.emergency import stop_wanted
-from chauffeur.drive.onroad.seeing import Seen
+from chauffeur.drive.onroad.vehicle_observation import VehicleObservation
 from chauffeur.drive.onroad.words import in_own_words, speed_text
 from chauffeur.language.emergency import read_emergency
 from chauffeur.safety.checks import DEFAULT_CHECKS, run_checks
@@ -92,7 +92,7 @@ def _within(value: float, bounds: tuple[float, float]) -> float:
     return min(max(value, bounds[0]), bounds[1]) if math.isfinite(value) else value
 
 
-def check_all(plan: Plan, seen: Seen, before: Seen) -> tuple[Verdict, ...]:
+def check_all(plan: Plan, seen: VehicleObservation, before: VehicleObservation) -> tuple[Verdict, ...]:
     """Every verdict on a plan, in order; the papers' checks are not asked about a plan that is none for this vehicle.
 
     Args:
@@ -106,7 +106,7 @@ def check_all(plan: Plan, seen: Seen, before: Seen) -> tuple[Verdict, ...]:
     return (own, *run_checks(plan, seen.bounds(before), seen.limits, DEFAULT_CHECKS))
 
 
-def check_vehicle(plan: Plan, seen: Seen) -> Verdict:
+def check_vehicle(plan: Plan, seen: VehicleObservation) -> Verdict:
     """Whether this is something that a vehicle behind an interface can be asked for."""
     first = plan.intent.partition("+")[0]
     elsewhere = any(part.partition(".")[0] in _ELSEWHERE for part in plan.intent.split("+"))

@@ -1,6 +1,6 @@
 """A session on a real vehicle: each wish is planned, checked, written down, asked of the vehicle, and confirmed.
 
-    async with OnRoad(vehicle, settings, planner, tell=show) as road:
+    async with VehicleSession(vehicle, settings, planner, tell=show) as road:
         answer = await road.ask("Drive a bit slower.")
         answer = await road.evaluate("Too slow now.")
 
@@ -42,10 +42,8 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.describe.services.sources import Sources
-from chauffeur.drive.auditing import FLUSH_TIMEOUT_S
 from chauffeur.drive.events import DriveEvent, EventKind, Listener, nobody_listens
 from chauffeur.drive.onroad.answers import OnRoadAnswer, Opinion, SetpointRequest, SetpointResult, Status
-from chauffeur.drive.onroad.books import RoadBooks
 from chauffeur.drive.onroad.checks import (
     ENGAGING_WORDS,
     answered_at_once,
@@ -54,8 +52,9 @@ from chauffeur.drive.onroad.checks import (
     is_about_engaging,
     is_stop,
 )
-from chauffeur.drive.onroad.seeing import Seen, counted_from, describe_vehicle
+from chauffeur.drive.onroad.recorder import VehicleRecorder
 from chauffeur.drive.onroad.trips import make_trip
+from chauffeur.drive.onroad.vehicle_observation import VehicleObservation, counted_from, describe_vehicle
 from chauffeur.drive.onroad.words import refused_in_own_words, speed_text
 from chauffeur.drive.planning import (
     PLAN_WITHIN_S,
@@ -68,6 +67,7 @@ from chauffeur.drive.planning import (
 )
 from chauffeur.drive.questions import NOT_MEANT, OpenQuestion
 from chauffeur.drive.session import MAX_WISH_CHARACTERS
+from chauffeur.drive.session_recorder import FLUSH_TIMEOUT_S
 from chauffeur.memory.base import Memory
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.memory.personal_limits import personal_limits
@@ -119,7 +119,7 @@ class _Made:
 _SUPERSEDED: Final = _Made(status="superseded", words="A newer wish came.")
 
 
-class OnRoad:
+class VehicleSession:
     """Takes a person's wishes to a vehicle. Used in one event loop; `async with` begins and ends it."""
 
     def __init__(
@@ -131,7 +131,7 @@ class OnRoad:
         person: PersonId = NOBODY,
         memory: Memory | None = None,
         sources: Sources | None = None,
-        books: RoadBooks | None = None,
+        books: VehicleRecorder | None = None,
         tell: Listener = nobody_listens,
         confirm_within_s: float = CONFIRM_WITHIN_S,
         clock: Callable[[], datetime] = utc_now,
@@ -365,7 +365,7 @@ class OnRoad:
             return _Made(status="failed", words=str(error))
         return self._judged(number, planned, seen, took_s=time.perf_counter() - begun)
 
-    def _judged(self, number: int, planned: Planned, seen: Seen, *, took_s: float) -> _Made:
+    def _judged(self, number: int, planned: Planned, seen: VehicleObservation, *, took_s: float) -> _Made:
         """What is told of a plan, and whether the vehicle is asked for it."""
         request, plan, verdicts = planned.request, planned.plan, planned.verdicts
         if plan.refusal and verdicts[0].stops:
@@ -392,12 +392,12 @@ class OnRoad:
         thoughts = Thoughts("You said stop. I ask the vehicle's planner for a speed of 0.")
         return Plan(thoughts, policy, intent="stop", settings=(("target_speed_mps", 0.0),), planner="onroad")
 
-    async def _look(self, budget_s: float | None = None) -> Seen:
+    async def _look(self, budget_s: float | None = None) -> VehicleObservation:
         place, words = None, ""
         if self._sources is not None:
             place, words = await self._sources.look(budget_s), self._sources.place_words()
         most_mps = self._settings.stack.limits.max_speed_mps
-        return Seen(self._vehicle.state(), self._asked, self.limits, most_mps, place, words)
+        return VehicleObservation(self._vehicle.state(), self._asked, self.limits, most_mps, place, words)
 
     # The vehicle ------------------------------------------------------------------------------------------------------
 

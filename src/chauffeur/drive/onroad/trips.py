@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from chauffeur.concept import Causes, Limits, Outcome, Parameters, Plan, PlanRequest, Scenario, Trip, Verdict
 from chauffeur.drive.onroad.answers import Status
-from chauffeur.drive.onroad.seeing import WORLD
+from chauffeur.drive.onroad.vehicle_observation import WORLD
 from chauffeur.drive.session import trip_id
 
 NO_METRICS: Final = (

@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 from chauffeur.concept import MissingExtraError
 from chauffeur.drive.emergency import stop_wanted
 from chauffeur.drive.questions import ANSWER_WITHIN_S
-from chauffeur.drive.talk.asking import Words
-from chauffeur.drive.talk.ear import Ear, Ears, HeardAt, Trouble
-from chauffeur.drive.talk.hearing import HearingEngine
+from chauffeur.drive.talk.asr_client import AsrClient, AsrListener, HeardAt, Trouble
+from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.messages import Answered, Button, HeardWords, Listening, Note, Said
 from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.voice import Voice
+from chauffeur.drive.talk.wish_queue import Words
 from chauffeur.language.emergency import read_emergency
 from chauffeur.speech.answers import answer_in
 from chauffeur.speech.base import Heard
@@ -43,7 +43,7 @@ class Attention:
 
     def __init__(
         self,
-        engine: HearingEngine | None,
+        engine: AsrEngine | None,
         sound: Sound | None,
         voice: Voice | None,
         say: Callable[[Said], None],
@@ -58,7 +58,7 @@ class Attention:
             say: Takes what is to be shown.
             act: Takes what was heard and is meant: its hotword, and the words.
         """
-        self._ear = None if engine is None else Ear(engine)
+        self._ear = None if engine is None else AsrClient(engine)
         self._sound, self._voice, self._say, self._act = sound, voice, say, act
         self._question: _Question | None = None
         self._button = ""
@@ -134,7 +134,7 @@ class Attention:
         self._take_microphone()
         for news in self._ear.poll():
             match news:
-                case Ears():
+                case AsrListener():
                     self._button = "" if news.state == "off" else self._button
                     self._say(Listening(news.state, self._button, news.why))
                 case Trouble():

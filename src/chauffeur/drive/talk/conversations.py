@@ -12,9 +12,9 @@ from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live.messages import Report
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Interaction
-from chauffeur.drive.talk.asking import Words
-from chauffeur.drive.talk.judging import Judge, JudgedCase
 from chauffeur.drive.talk.messages import Conversation, HowWasIt, StageTimes
+from chauffeur.drive.talk.verdicts import Judge, JudgedCase
+from chauffeur.drive.talk.wish_queue import Words
 
 JUDGED_WITHIN_S: Final = 1.0
 """Verdicts are worked out when the set-point has changed, or so long after the start: nothing waits for them."""
@@ -153,7 +153,7 @@ class Conversations:
         each = self._wishes.get(report.plan)
         if each is None or each.started_s is None or each.shown.stages.set_point_s is not None:
             return None
-        if report.rung not in ("follow", "hold"):
+        if report.level not in ("follow", "hold"):
             return None
         now_s = self._clock()
         stages = replace(each.shown.stages, set_point_s=now_s - each.started_s, total_s=now_s - each.words.ended_s)

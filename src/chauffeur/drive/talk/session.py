@@ -18,18 +18,17 @@ from chauffeur.concept import NOBODY, ChauffeurError, Feedback, History, Limits,
 from chauffeur.concept.units import kmh
 from chauffeur.drive.emergency import GOING_ON, QUESTION, STOPPING, brings_to_a_stand, stop_wanted
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.live.books import Books
 from chauffeur.drive.live.messages import Report
-from chauffeur.drive.live.remembering import trip_of
+from chauffeur.drive.live.recorder import LiveRecorder
 from chauffeur.drive.live.settings import Settings, ring
 from chauffeur.drive.live.supervisor import Interaction, Runtime
+from chauffeur.drive.live.trip_memory import trip_of
 from chauffeur.drive.questions import ANSWER_WITHIN_S
 from chauffeur.drive.session import make_world
-from chauffeur.drive.talk.asking import OVER, Asking, Words
+from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.attention import Attention
 from chauffeur.drive.talk.conversations import Conversations
-from chauffeur.drive.talk.hearing import HearingEngine
-from chauffeur.drive.talk.keeping import CLOSE_WITHIN_S, Keeper, Kept, OpinionKept
+from chauffeur.drive.talk.memory_worker import CLOSE_WITHIN_S, Kept, MemoryWorker, OpinionKept
 from chauffeur.drive.talk.messages import (
     Answered,
     Button,
@@ -55,6 +54,7 @@ from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.tally import Tally
 from chauffeur.drive.talk.view import View
 from chauffeur.drive.talk.voice import Voice
+from chauffeur.drive.talk.wish_queue import OVER, WishQueue, Words
 from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.safety.bounds import shoulder_at_right
@@ -106,8 +106,8 @@ class Talk:
         tell: Callable[[Said], None],
         *,
         person: PersonId = NOBODY,
-        books: Books | None = None,
-        engine: HearingEngine | None = None,
+        books: LiveRecorder | None = None,
+        engine: AsrEngine | None = None,
         sound: Sound | None = None,
         voice: Voice | None = None,
         most_s: float = float("inf"),
@@ -135,8 +135,8 @@ class Talk:
         self._view: View | None = None
         self._window = SeatWindow()
         self._looking = False
-        self._keeper: Keeper | None = None
-        self._asking = Asking(person, books)
+        self._keeper: MemoryWorker | None = None
+        self._asking = WishQueue(person, books)
         self._conversations = Conversations(settings.starts, self._dt_s, self._instant, time.monotonic)
         self._changes: list[_Change] = []
         self._newest: dict[str, Said] = {}
@@ -157,7 +157,7 @@ class Talk:
         try:
             self._attention.start()
             if self._person:
-                self._keeper = Keeper(self._person, memory=self._settings.memory)
+                self._keeper = MemoryWorker(self._person, memory=self._settings.memory)
             runtime = Runtime(self._settings, self._heard)
             self._runtime = runtime
             self._view = View(self._settings, ring(runtime.folder, "observations"))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from chauffeur.concept import Intervention
-from chauffeur.drive.live.messages import Report, Rung
+from chauffeur.drive.live.messages import FallbackLevel, Report
 from chauffeur.drive.live.supervisor import Runtime
 
 
@@ -19,7 +19,7 @@ class Tally:
     Attributes:
         changes: What the shield changed.
         clipped: Control periods in which a set-point was held within a bound, by the bound.
-        rungs: Control periods on each fallback level.
+        levels: Control periods on each fallback level.
         figures: Punctuality as control told it at the end; None where it could not.
         last: The newest report.
         lost_reports: Reports that were never heard.
@@ -28,7 +28,7 @@ class Tally:
 
     changes: list[Intervention] = field(default_factory=list[Intervention])
     clipped: Counter[str] = field(default_factory=Counter[str])
-    rungs: Counter[Rung] = field(default_factory=Counter[Rung])
+    levels: Counter[FallbackLevel] = field(default_factory=Counter[FallbackLevel])
     figures: Mapping[str, Any] | None = None
     last: Report | None = None
     lost_reports: int = 0
@@ -38,7 +38,7 @@ class Tally:
         """Count one control period."""
         self.changes += report.interventions
         self.clipped.update(report.clipped)
-        self.rungs[report.rung] += 1
+        self.levels[report.level] += 1
         self.last = report
 
     def end(self, runtime: Runtime, *, died: bool) -> None:

@@ -84,20 +84,20 @@ class View:
         lane = observation.ego.lane
         limit = 0.0 if lane is None else self._world.perception().speed_limit(lane)
         told = report if report is not None and report.trip == seen.trip else None
-        wished = None if told is None else observation.road.get(told.wishes.target_lane)
+        wished = None if told is None else observation.road.get(told.setpoints.target_lane)
         return Scene(
             time_s=round(seen.tick * self._world.dt_s, 3),
-            taken_over=seen.hands % 2 == 1,
+            taken_over=seen.handovers % 2 == 1,
             ego=_body(observation.ego),
             others=tuple(_body(each) for each in (*observation.others, *observation.objects)),
             acceleration_mps2=0.0 if told is None else told.applied.acceleration_mps2,
             steering_rad=0.0 if told is None else told.applied.steering_rad,
             limit_mps=limit,
-            target_mps=None if told is None else told.wishes.target_speed_mps,
-            headway_s=0.0 if told is None else told.wishes.time_headway_s,
-            lane=None if told is None else told.wishes.target_lane,
+            target_mps=None if told is None else told.setpoints.target_speed_mps,
+            headway_s=0.0 if told is None else told.setpoints.time_headway_s,
+            lane=None if told is None else told.setpoints.target_lane,
             place=None if wished is None else wished.index,
-            rung="hold" if told is None else told.rung,
+            level="hold" if told is None else told.level,
             wish="" if told is None else told.plan,
             line=None if told is None else told.line,
             shield="" if told is None else " ".join(change.reason for change in told.interventions),

@@ -12,7 +12,7 @@ from chauffeur.concept import Lane, Observation, RoadGraph, VehicleState
 from chauffeur.geometry import wrap_to_pi
 from chauffeur.hmi.road import Bounds, draw_road
 from chauffeur.hmi.view import in_picture
-from chauffeur.hmi.wheel.hands import WheelInstant
+from chauffeur.hmi.wheel.commands import WheelInstant
 
 Json = dict[str, Any]
 

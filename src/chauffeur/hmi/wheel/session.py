@@ -20,7 +20,7 @@ from chauffeur.bench.lampilot.metrics import points
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.concept import ChauffeurError, Observation, Outcome
 from chauffeur.hmi import words
-from chauffeur.hmi.wheel.hands import COUNTDOWN_S, HandsOnWheel, WheelInstant
+from chauffeur.hmi.wheel.commands import COUNTDOWN_S, WheelCommands, WheelInstant
 from chauffeur.hmi.wheel.mailbox import Mailbox
 from chauffeur.hmi.wheel.pace import Clock
 from chauffeur.hmi.wheel.protocol import PageMessage, Verb
@@ -120,9 +120,9 @@ class WheelSession:
             loop.call_soon_threadsafe(self.screen.show, tick_message(instant))
 
         def drive() -> tuple[HandTrace, Row]:
-            hands = HandsOnWheel(seat.world, mailbox, self._clock, show, assist=self._run.config.assist)
-            happened = drive_by_hand(seat.world, seat.item.scenario, hands)
-            return hands.trace(), happened
+            command_source = WheelCommands(seat.world, mailbox, self._clock, show, assist=self._run.config.assist)
+            happened = drive_by_hand(seat.world, seat.item.scenario, command_source)
+            return command_source.trace(), happened
 
         driven = loop.run_in_executor(None, drive)
         try:

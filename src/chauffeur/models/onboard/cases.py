@@ -20,7 +20,7 @@ from chauffeur.bench.lampilot.scenes.feasible import start_of
 from chauffeur.bench.lampilot.scenes.sampling import draw_road
 from chauffeur.concept import LAMPILOT_LIMITS, Scenario, ScenarioError, Situation
 from chauffeur.describe import describe
-from chauffeur.models.onboard.judging import judge
+from chauffeur.models.onboard.skill_judge import judge
 from chauffeur.planners.onboard.dialect import SKILLS, UNITS, Condition, DialectStep, Number, write
 from chauffeur.planners.onboard.link import link
 from chauffeur.planners.onboard.options import Declined

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from chauffeur.drive.files import publish
-from chauffeur.language.sorter import BITS, Sorter, marks_of
+from chauffeur.language.text_classifier import BITS, TextClassifier, hashed_features
 from chauffeur.models.sorting.sentences import Sentence
 
 Array = np.ndarray[Any, Any]
@@ -51,7 +51,9 @@ class SortingRecipe:
     seed: int = 0
 
 
-def train(found: Sequence[Sentence], kinds: Sequence[str], recipe: SortingRecipe, told: Told = _unheard) -> Sorter:
+def train(
+    found: Sequence[Sentence], kinds: Sequence[str], recipe: SortingRecipe, told: Told = _unheard
+) -> TextClassifier:
     """A sorter of sentences.
 
     Args:
@@ -61,7 +63,7 @@ def train(found: Sequence[Sentence], kinds: Sequence[str], recipe: SortingRecipe
         told: Is told how far it is.
     """
     rng = np.random.default_rng(recipe.seed)
-    marks = [marks_of(one.text) for one in found]
+    marks = [hashed_features(one.text) for one in found]
     wanted = np.array([kinds.index(one.kind) for one in found])
     barred = np.array([[0.0 if kind in one.among else _NEVER for kind in kinds] for one in found], np.float32)
     fit = _Fit(len(kinds))
@@ -130,12 +132,14 @@ class _Moments:
         values -= pace * self._first / (np.sqrt(self._second) + _TINY)
 
 
-def _rounded(kinds: tuple[str, ...], weights: Array, bias: Array) -> Sorter:
+def _rounded(kinds: tuple[str, ...], weights: Array, bias: Array) -> TextClassifier:
     steps = np.maximum(np.abs(weights).max(axis=0), 1e-6) / _STEPS
-    return Sorter(kinds, np.round(weights / steps).astype(np.int8), steps.astype(np.float64), bias.astype(np.float64))
+    return TextClassifier(
+        kinds, np.round(weights / steps).astype(np.int8), steps.astype(np.float64), bias.astype(np.float64)
+    )
 
 
-def right(sorter: Sorter, found: Sequence[Sentence]) -> Array:
+def right(sorter: TextClassifier, found: Sequence[Sentence]) -> Array:
     """Which sentences it sorts as their writers meant them; shape (n,)."""
     return np.array([next(iter(sorter.shares(one.text, one.among))) == one.kind for one in found])
 
@@ -161,7 +165,7 @@ def by_writer(
     return hits
 
 
-def write(sorter: Sorter, path: Path) -> None:
+def write(sorter: TextClassifier, path: Path) -> None:
     """Store a sorter for `load_sorter`."""
     stream = io.BytesIO()
     sorter.store(stream)

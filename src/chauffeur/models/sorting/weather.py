@@ -15,7 +15,7 @@ import numpy as np
 
 from chauffeur.concept.data import data_folder
 from chauffeur.language.grammar import Grammar, Manner
-from chauffeur.language.sorter import Sorter
+from chauffeur.language.text_classifier import TextClassifier
 from chauffeur.language.weather import SAID_WEATHERS, said_weather
 from chauffeur.models.sorting.sentences import Sentence, sentences
 
@@ -108,7 +108,7 @@ class WeatherFigures:
     others_mistaken: int
 
 
-def weather_figures(sorter: Sorter, seed: int, writers: Collection[str] = TEST_WRITERS) -> WeatherFigures:
+def weather_figures(sorter: TextClassifier, seed: int, writers: Collection[str] = TEST_WRITERS) -> WeatherFigures:
     """Measure a sorter that was trained without these writers."""
     rng = np.random.default_rng([seed, 67])
     labelled = sentences("weather")

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
 
-from chauffeur.bench.openloop.asking import read_context, waypoints_text
+from chauffeur.bench.openloop.requests import read_context, waypoints_text
 from chauffeur.concept import ConfigError, PlannerError, Usage
 from chauffeur.models.vilad.frames_data import fitted
 from chauffeur.planners.base import Prose

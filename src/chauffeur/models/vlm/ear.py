@@ -1,4 +1,4 @@
-"""A second reader of the style: the sorter of `chauffeur.language.sorter`, trained on the same sentences.
+"""A second reader of the style: the sorter of `chauffeur.language.text_classifier`, trained on the same sentences.
 
 The network knows what words mean from a table of vectors and a few thousand sentences; the sorter knows which words and
 pairs of words writers used. On unseen writers the sorter errs less, both together least: the planner multiplies what
@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from chauffeur.language.sorter import Sorter
+from chauffeur.language.text_classifier import TextClassifier
 from chauffeur.models.sorting.sentences import Sentence
 from chauffeur.models.sorting.training import SortingRecipe, train
 from chauffeur.models.vlm.wishes import composed_wish, written
@@ -23,7 +23,7 @@ _COMPOSED: Final = 12_000
 """Sentences of the grammars, beside all of the table's."""
 
 
-def style_sorter(seed: int) -> Sorter:
+def style_sorter(seed: int) -> TextClassifier:
     """The sorter, from the sentences of training alone; seven seconds of one core."""
     rng = np.random.default_rng([seed, 53])
     found = [Sentence(text, style, STYLES, "", "") for style, texts in written("train").items() for text in texts]

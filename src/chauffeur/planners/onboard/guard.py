@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from typing import Final
 
 from chauffeur.planners.arbitration import pace_of
-from chauffeur.planners.onboard.copying import unnamed
 from chauffeur.planners.onboard.dialect import DialectStep
 from chauffeur.planners.onboard.meaning import Meaning, NotUnderstood, Reading
 from chauffeur.planners.onboard.moods import mood_of, pace_complaint
+from chauffeur.planners.onboard.quoted_numbers import unnamed
 from chauffeur.planners.onboard.understand import understand
 
 _SIDES: Final = ("left", "right")

@@ -16,7 +16,6 @@ from typing import Any, Final
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Situation, Usage
 from chauffeur.planners.arbitration import UNSURE_WORDS, Wish, agreed, asked, question_about, undenied, wary_of
 from chauffeur.planners.base import OnText, Planner, declined
-from chauffeur.planners.onboard.copying import named, taken_over, unnamed
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import DialectStep, shall_i
 from chauffeur.planners.onboard.dialect import write as program_of
@@ -27,6 +26,7 @@ from chauffeur.planners.onboard.link import Linked, link
 from chauffeur.planners.onboard.options import Declined
 from chauffeur.planners.onboard.personal import Leaning, corrections_of, leaning_of
 from chauffeur.planners.onboard.prompt import history_words, prompt
+from chauffeur.planners.onboard.quoted_numbers import named, taken_over, unnamed
 from chauffeur.planners.onboard.reply import OnboardReply, read_reply
 from chauffeur.planners.onboard.thoughts import thoughts_of
 from chauffeur.planners.onboard.town import plan_in_town

@@ -20,7 +20,7 @@ from chauffeur.planners.base import Planner, declined
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.doubts import CAN_DO
 from chauffeur.programs.catalogue import vocabulary_of
-from chauffeur.safety.reading import read_program
+from chauffeur.safety.constant_calls import read_program
 
 SNIPPETS: Final = Path(__file__).parent / "snippets"
 """The policy repository that comes with the package."""

@@ -13,7 +13,7 @@ from typing import Final, Literal
 
 from chauffeur.concept import History, Limits, Parameters, Plan, PlanRequest, Situation, Thoughts
 from chauffeur.language import measured
-from chauffeur.language.sorter import load_sorter, negated
+from chauffeur.language.text_classifier import load_sorter, negated
 from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.planners.arbitration import (
     SURE,

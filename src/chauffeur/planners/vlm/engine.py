@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from chauffeur.concept import ActionMatrix, DataError
-from chauffeur.language.sorter import load_sorter
+from chauffeur.language.text_classifier import load_sorter
 from chauffeur.planners.exported import open_exported
 from chauffeur.planners.vilad.engine import SHIPPED as WORDS_FOLDER
 from chauffeur.planners.vilad.words import WordTable, load_words

@@ -13,6 +13,7 @@ from chauffeur.programs.verify import arithmetic
 from chauffeur.programs.verify.circumstances import Circumstances
 from chauffeur.programs.verify.compare import compared
 from chauffeur.programs.verify.frames import CallFrame
+from chauffeur.programs.verify.iteration import Walked, range_of
 from chauffeur.programs.verify.record import Record
 from chauffeur.programs.verify.scopes import FunctionNode, Scopes
 from chauffeur.programs.verify.state import State, joined, widened
@@ -41,7 +42,6 @@ from chauffeur.programs.verify.values import (
     where_false,
     where_true,
 )
-from chauffeur.programs.verify.walking import Walked, range_of
 
 MAX_STEPS: Final = 20_000
 """Nodes looked at before the analysis gives up; an intricate program of two hundred lines takes three thousand."""

@@ -15,6 +15,7 @@ from chauffeur.programs.verify.calls import Calls
 from chauffeur.programs.verify.circumstances import Circumstances
 from chauffeur.programs.verify.expressions import MATH_MODULE, DeadEndError, Loop, TooIntricateError
 from chauffeur.programs.verify.frames import MODULE, CallFrame
+from chauffeur.programs.verify.iteration import Walked
 from chauffeur.programs.verify.report import LoopVerdict
 from chauffeur.programs.verify.scopes import FunctionNode, Scope, Scopes
 from chauffeur.programs.verify.state import State, joined
@@ -35,7 +36,6 @@ from chauffeur.programs.verify.values import (
     may_be_false,
     may_be_true,
 )
-from chauffeur.programs.verify.walking import Walked
 
 _MAX_CALLS: Final = 10
 """Calls of own functions inside each other that are followed; deeper ones are taken as calls of anything."""

@@ -3,7 +3,7 @@
 from chauffeur.safety.audit.entries import FORMAT, KINDS, AuditRecord, Kind
 from chauffeur.safety.audit.heads import head_path
 from chauffeur.safety.audit.keys import key_name, read_key
-from chauffeur.safety.audit.reading import read_records
+from chauffeur.safety.audit.reader import read_records
 from chauffeur.safety.audit.redaction import Redaction, redact
 from chauffeur.safety.audit.texts import says, words_of
 from chauffeur.safety.audit.verification import AuditFinding, AuditVerification, verify, verify_stream

@@ -12,7 +12,7 @@ from typing import Any
 from chauffeur.concept import ConfigError, DataError, PersonId
 from chauffeur.safety.audit.entries import AuditRecord, NotARecordError, canonical, parse, seal
 from chauffeur.safety.audit.heads import SEALED_SINCE, leave_head
-from chauffeur.safety.audit.reading import lines, opened
+from chauffeur.safety.audit.reader import lines, opened
 from chauffeur.safety.audit.storage import LogFile, replace_whole
 from chauffeur.safety.audit.texts import erased, says
 from chauffeur.safety.audit.verification import verify

@@ -25,7 +25,7 @@ from chauffeur.safety.audit.entries import (
 )
 from chauffeur.safety.audit.heads import SEALED_SINCE, Head, as_hash, head_path, read_head
 from chauffeur.safety.audit.keys import key_name
-from chauffeur.safety.audit.reading import AuditLine, lines, opened
+from chauffeur.safety.audit.reader import AuditLine, lines, opened
 from chauffeur.safety.audit.texts import states
 
 MAX_FINDINGS: Final = 100

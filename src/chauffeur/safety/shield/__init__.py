@@ -1,15 +1,15 @@
 """The run-time shield: after the controllers, before the world."""
 
 from chauffeur.safety.shield.ground import GroundShield, shield_for
-from chauffeur.safety.shield.shield import Guarded, Shield
+from chauffeur.safety.shield.shield import FilterResult, Shield
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, SHIELD_VERSION, ShieldParameters
 from chauffeur.safety.shield.town import TownShield
 
 __all__ = [
     "LAMPILOT_SHIELD",
     "SHIELD_VERSION",
+    "FilterResult",
     "GroundShield",
-    "Guarded",
     "Shield",
     "ShieldParameters",
     "TownShield",

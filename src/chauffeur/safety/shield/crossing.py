@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 
 from chauffeur.concept import Command, Lane, LaneId, Observation, VehicleState
 from chauffeur.geometry import RoadGraph, wrap_to_pi
-from chauffeur.safety.shield import foresight
-from chauffeur.safety.shield.everybody import Everybody
+from chauffeur.safety.shield import rollout
 from chauffeur.safety.shield.frame import CROSSING_RAD
 from chauffeur.safety.shield.table import ShieldParameters
+from chauffeur.safety.shield.traffic_arrays import TrafficArrays
 
 Array = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ _BESIDE: Final = replace(_LAST, side_m=0.05)
 
 
 @dataclass(frozen=True, slots=True)
-class Mended:
+class CrossingResult:
     """A command that may go through, and the rule and reason where it is another than was asked."""
 
     command: Command
@@ -134,7 +134,7 @@ class Motion:
         """Remember what the vehicle was told."""
         self._tick, self._before = observation.tick, observation.ego
         self._expected = state.copy()
-        foresight.move(self._expected, command.acceleration_mps2, command.steering_rad, self._dt_s)
+        rollout.move(self._expected, command.acceleration_mps2, command.steering_rad, self._dt_s)
 
 
 class Junction:
@@ -157,14 +157,14 @@ class Junction:
     def mend(
         self,
         observation: Observation,
-        around: Everybody,
+        around: TrafficArrays,
         lane: LaneId,
         aim: LaneId | None,
         command: Command,
         most_mps2: float,
         *,
         held_up: bool,
-    ) -> Mended:
+    ) -> CrossingResult:
         """The command, changed as little as is needed.
 
         Args:
@@ -178,7 +178,7 @@ class Junction:
         """
         outlook = self._outlook(observation, around, lane)
         ways = self._candidates(lane, aim, outlook.state)
-        followed = foresight.followed(outlook.state, outlook.others)
+        followed = rollout.followed(outlook.state, outlook.others)
         cares = (_KIND, _DUE) if followed else (_DUE,)
         tries = (_mend(outlook, ways, command, most_mps2, care, held_up=held_up) for care in cares)
         found = next((one for one in tries if one is not None), None)
@@ -190,10 +190,10 @@ class Junction:
         self._motion.commanded(observation, outlook.state, mended.command)
         return mended
 
-    def _outlook(self, observation: Observation, around: Everybody, lane: LaneId) -> _Outlook:
+    def _outlook(self, observation: Observation, around: TrafficArrays, lane: LaneId) -> _Outlook:
         ego, line_of = observation.ego, self._line_of
         on = np.array([line_of.get(other.lane, -1) for other in around.solid[1:]], dtype=np.int64)
-        others = foresight.expected(around.numbers, on, self._lines, _ALONG, _FAR_M)
+        others = rollout.expected(around.numbers, on, self._lines, _ALONG, _FAR_M)
         size = ego.length_m / 2.0, ego.width_m / 2.0
         return _Outlook(
             self._motion.observe(observation), size, others, self._keep_clear(lane), self._table, self._dt_s
@@ -245,7 +245,7 @@ def _sampled(lanes: Sequence[Lane]) -> Array:
     keep = np.r_[True, np.hypot(*np.diff(line, axis=0).T) > 1e-6]
     line = line[keep]
     lengths = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]
-    at = np.arange(0.0, lengths[-1], foresight.STEP_M)
+    at = np.arange(0.0, lengths[-1], rollout.STEP_M)
     x, y = np.interp(at, lengths, line[:, 0]), np.interp(at, lengths, line[:, 1])
     heading = np.arctan2(np.gradient(y), np.gradient(x))
     return np.ascontiguousarray(np.stack([x, y, heading], axis=1))
@@ -265,7 +265,7 @@ def _turned(way: Array) -> float:
 
 
 def _along(way: Array, state: Array) -> bool:
-    at = foresight.nearest(way, state[0], state[1], -1)
+    at = rollout.nearest(way, state[0], state[1], -1)
     return abs(wrap_to_pi(float(way[at, 2] - state[2]))) < _AWAY_RAD
 
 
@@ -295,10 +295,10 @@ class _Outlook:
         return way
 
     def _seen(self, points: Array) -> _Way:
-        at = foresight.nearest(points, self.state[0], self.state[1], -1)
-        first, last, hold = foresight.stretch(points, at, self.size, self.others, self.table.others_braking_mps2)
+        at = rollout.nearest(points, self.state[0], self.state[1], -1)
+        first, last, hold = rollout.stretch(points, at, self.size, self.others, self.table.others_braking_mps2)
         del first
-        beyond = last + math.ceil(self.size[0] / foresight.STEP_M)
+        beyond = last + math.ceil(self.size[0] / rollout.STEP_M)
         return _Way(at, beyond, hold - self.table.margin_m)
 
     def trouble_s(self, command: Command, points: Array, plan: _Plan, care: _Care) -> float:
@@ -312,7 +312,7 @@ class _Outlook:
     def _foreseen(self, command: Command, points: Array, plan: _Plan, care: _Care) -> float:
         table, way = self.table, self.way(points)
         stops = plan.mps2 < 0.0
-        return foresight.foresee(
+        return rollout.rollout(
             self.state,
             (command.acceleration_mps2, command.steering_rad),
             plan.mps2,
@@ -355,11 +355,11 @@ class _Outlook:
 
     def wheel_rad(self, law: int, points: Array, acceleration_mps2: float) -> float:
         """Steering angle of a law."""
-        return foresight.wheel(law, self.state, points, self.way(points).at, acceleration_mps2, self.dt_s)
+        return rollout.wheel(law, self.state, points, self.way(points).at, acceleration_mps2, self.dt_s)
 
     def beside_m(self, points: Array) -> float:
         """How far the body reaches to the side of a way now."""
-        return foresight.beside_m(self.state, points, self.way(points).at, self.size)
+        return rollout.beside_m(self.state, points, self.way(points).at, self.size)
 
     def stays_s(self, command: Command, way: Array) -> float:
         """Time for which a plan to clear the crossing after a command keeps the car no farther off its way than now."""
@@ -390,14 +390,14 @@ _STRAYS: Final = "The car would leave its way, or get into that of somebody who 
 
 def _mend(
     outlook: _Outlook, ways: Sequence[Array], command: Command, most_mps2: float, care: _Care, *, held_up: bool
-) -> tuple[Mended, Array] | None:
+) -> tuple[CrossingResult, Array] | None:
     """The command with its acceleration mended, if that is enough, and the way that is then promised."""
     asked, steering = command.acceleration_mps2, command.steering_rad
     way = outlook.stops(command, ways, care)
     if way is None and not held_up:  # who has to brake for a lead cannot promise to be through soon
         way = outlook.clears(command, ways, care)
     if way is not None:
-        return Mended(command), way
+        return CrossingResult(command), way
     low, high = outlook.least_mps2, asked
     way = outlook.stops(Command(low, steering), ways, care) if low < high else None
     if way is not None:
@@ -407,15 +407,15 @@ def _mend(
                 low = middle
             else:
                 high = middle
-        return Mended(Command(low, steering), "yield", _YIELDS), way
+        return CrossingResult(Command(low, steering), "yield", _YIELDS), way
     for clearing in outlook.clearing_mps2(most_mps2):
         way = outlook.clears(Command(clearing, steering), ways, care) if asked < clearing else None
         if way is not None:
-            return Mended(Command(clearing, steering), "clear", _CLEARS_WHY), way
+            return CrossingResult(Command(clearing, steering), "clear", _CLEARS_WHY), way
     return None
 
 
-def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -> Mended:
+def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -> CrossingResult:
     """The command with steering and acceleration of the way that was promised; the least bad one if none ends well."""
     asked = command.acceleration_mps2
     least = outlook.least_mps2
@@ -432,7 +432,7 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
             trials = (
                 Command(acceleration, outlook.wheel_rad(law, way, acceleration))
                 for acceleration in accelerations
-                for law in range(foresight.LAWS)
+                for law in range(rollout.LAWS)
             )
             good = (trial for trial in trials if ends_well(trial, [way], care) is not None)
             if off and ends_well == outlook.clears:
@@ -440,12 +440,12 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
             else:
                 found = next(good, None)
             if found is not None:
-                return Mended(found, "lane", _STRAYS)
+                return CrossingResult(found, "lane", _STRAYS)
     # Each begins with its own plan: to brake now, since it could still be cleared later, ends in the middle of it.
     begun = [
         (Command(acceleration, outlook.wheel_rad(law, way, acceleration)), plans)
         for acceleration, plans in ((least, _STOPS), *((mps2, _CLEARS) for mps2 in clearing))
-        for law in range(foresight.LAWS)
+        for law in range(rollout.LAWS)
     ]
     trials = [(trial, plan) for trial, plans in begun for plan in plans]
     troubles = [outlook.trouble_s(trial, way, plan, _LAST) for trial, plan in trials]
@@ -454,8 +454,8 @@ def _rescue(outlook: _Outlook, way: Array, command: Command, most_mps2: float) -
     tied = [trial for trial, trouble in zip(trials, troubles, strict=True) if trouble == latest]
     best, _ = max(tied, key=lambda trial: outlook.trouble_s(trial[0], way, trial[1], _STAYING))
     if latest < math.inf:  # rather stand close by somebody's way than drive into it
-        for law in range(foresight.LAWS):
+        for law in range(rollout.LAWS):
             trial = Command(least, outlook.wheel_rad(law, way, least))
             if outlook.stops(trial, [way], _BESIDE) is not None:
-                return Mended(trial, "yield", _STRAYS)
-    return Mended(best, "yield" if best.acceleration_mps2 <= asked else "clear", _STRAYS)
+                return CrossingResult(trial, "yield", _STRAYS)
+    return CrossingResult(best, "yield" if best.acceleration_mps2 <= asked else "clear", _STRAYS)

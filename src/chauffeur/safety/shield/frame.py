@@ -14,7 +14,7 @@ import numpy as np
 
 from chauffeur.concept import Lane, LaneId, Observation, RoadGraph, VehicleState
 from chauffeur.geometry import Pose, wrap_to_pi
-from chauffeur.safety.shield.everybody import ANYWHERE, Array, Everybody, overlapping, placed
+from chauffeur.safety.shield.traffic_arrays import ANYWHERE, Array, TrafficArrays, overlapping, placed
 
 CROSSING_RAD: Final = math.radians(40.0)
 """What is turned by less runs along: a lead, a follower, a car that changes lanes. What is turned further crosses."""
@@ -134,7 +134,7 @@ class ShieldLens:
         self._frame: _Frame | None = None
 
     def look(
-        self, observation: Observation, lane: LaneId | None, around: Everybody | None = None
+        self, observation: Observation, lane: LaneId | None, around: TrafficArrays | None = None
     ) -> ShieldScene | None:
         """The scene in the frame of a lane, mostly the ego's own; None where there is no such lane.
 
@@ -153,7 +153,7 @@ class ShieldLens:
         frame = self._frame
         if frame is None:
             return None
-        around = Everybody.of(observation) if around is None else around
+        around = TrafficArrays.of(observation) if around is None else around
         rows = placed(around.numbers, frame.numbers)
         return ShieldScene(
             _bodies(rows[:1], around.solid)[0], frame.strips, frame.limit_mps, frame.curvature, around.solid, rows

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation
-from chauffeur.safety.shield.shield import Guarded, Shield
+from chauffeur.safety.shield.shield import FilterResult, Shield
 from chauffeur.safety.shield.town import TownShield
 from chauffeur.worlds.base import World
-from chauffeur.worlds.parking.guard import Guard
 from chauffeur.worlds.parking.lot import LIMIT_MPS
+from chauffeur.worlds.parking.safety_filter import LotSafetyFilter
 from chauffeur.worlds.places import PavedGround, TownPlaces
 
 
@@ -30,18 +30,18 @@ class GroundShield(Shield):
         """Args: a world just reset; its control period; bounds no command may cross; speed limits (default a lot's)."""
         super().__init__(dt_s, limits)
         self._most = Limits() if limits is None else limits
-        self._guard = Guard(world.chassis, world.ground, dt_s, world.steering_rate)
+        self._lot_filter = LotSafetyFilter(world.chassis, world.ground, dt_s, world.steering_rate)
         self._limit = limit_mps
 
-    def guard(self, observation: Observation, command: Command, aim: LaneId | None = None) -> Guarded:
+    def filter(self, observation: Observation, command: Command, aim: LaneId | None = None) -> FilterResult:
         """The command, changed as little as needed."""
         del aim
         lane = observation.ego.lane
         sign = LIMIT_MPS if self._limit is None or lane is None else self._limit(lane)
-        ruling = self._guard.judge(observation, command, self._most.most_mps(sign))
+        ruling = self._lot_filter.filter(observation, command, self._most.most_mps(sign))
         if not ruling.rule:
-            return Guarded(ruling.command)
-        return Guarded(ruling.command, (Intervention(ruling.rule, ruling.reason, command, ruling.command),))
+            return FilterResult(ruling.command)
+        return FilterResult(ruling.command, (Intervention(ruling.rule, ruling.reason, command, ruling.command),))
 
 
 def shield_for(world: World, limits: Limits | None = None) -> Shield:

@@ -20,12 +20,12 @@ from dataclasses import dataclass
 from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation, VehicleState
 from chauffeur.geometry import RoadGraph
 from chauffeur.safety.shield.crossing import Junction
-from chauffeur.safety.shield.everybody import AHEAD, BEHIND, Everybody
 from chauffeur.safety.shield.frame import ShieldBody, ShieldLens, ShieldScene, Strip
 from chauffeur.safety.shield.gaps import free_gap_m, greatest_acceleration, rss_gap_m
 from chauffeur.safety.shield.stop_lines import StopLines
 from chauffeur.safety.shield.sweep import recovery_steering, swept, yaw_rate
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
+from chauffeur.safety.shield.traffic_arrays import AHEAD, BEHIND, TrafficArrays
 from chauffeur.safety.words import speed_words
 
 Span = tuple[float, float]
@@ -49,7 +49,7 @@ _SLOWING_MPS2 = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Guarded:
+class FilterResult:
     """What may go to the actuator, and what was changed on the way."""
 
     command: Command
@@ -89,7 +89,7 @@ class Shield:
         self._junction: Junction | None = None
         self._stop_lines = StopLines(parameters, dt_s)
 
-    def guard(self, observation: Observation, command: Command, aim: LaneId | None = None) -> Guarded:
+    def filter(self, observation: Observation, command: Command, aim: LaneId | None = None) -> FilterResult:
         """The command, changed as little as needed.
 
         Args:
@@ -97,17 +97,19 @@ class Shield:
             command: What the controllers ask; numbers that are none stop the car.
             aim: Lane the controllers steer for. Where ways part, the nearest lane need not be the car's own.
         """
-        around = Everybody.of(observation)
+        around = TrafficArrays.of(observation)
         line_m = self._stop_lines.ahead_m(observation) if observation.objects and around.known else math.inf
         scene = self._lens.look(observation, observation.ego.lane, around) if _known(observation.ego) else None
         if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
             safe = self._standing_still(observation, scene)
-            return Guarded(safe, (Intervention("finite", "A command that is no number was replaced.", command, safe),))
+            return FilterResult(
+                safe, (Intervention("finite", "A command that is no number was replaced.", command, safe),)
+            )
         if not around.known:
             safe = self._standing_still(observation, scene)
-            return Guarded(safe, (Intervention("finite", "Where somebody is cannot be told.", command, safe),))
+            return FilterResult(safe, (Intervention("finite", "Where somebody is cannot be told.", command, safe),))
         if scene is None:
-            return Guarded(command)
+            return FilterResult(command)
         crossings = bool(observation.road.junctions)
         lane = observation.ego.lane
         assert lane is not None
@@ -119,7 +121,7 @@ class Shield:
         self._back = steered.back
         said = list(steered.said)
         mended = self._along(scene, observation, around, lane, aim, steered, line_m, said)
-        return Guarded(mended, tuple(said))
+        return FilterResult(mended, tuple(said))
 
     def _standing_still(self, observation: Observation, scene: ShieldScene | None) -> Command:
         speed = observation.ego.speed_mps
@@ -243,7 +245,7 @@ class Shield:
         self,
         scene: ShieldScene,
         observation: Observation,
-        around: Everybody,
+        around: TrafficArrays,
         lane: LaneId,
         aim: LaneId | None,
         steered: _Steered,

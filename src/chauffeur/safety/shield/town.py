@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation, VehicleState
 from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle, curvature_of
 from chauffeur.geometry import Polyline, RoadGraph, Route, joined, wrap_to_pi
-from chauffeur.safety.shield.shield import Guarded, Shield
+from chauffeur.safety.shield.shield import FilterResult, Shield
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
 from chauffeur.safety.words import speed_words
 from chauffeur.worlds.town.way import most_mps
@@ -102,7 +102,7 @@ class TownShield(Shield):
         self._layer = 0
         """The lane of the route the ego was last seen in: routes may pass a lane twice."""
 
-    def guard(self, observation: Observation, command: Command, aim: LaneId | None = None) -> Guarded:
+    def filter(self, observation: Observation, command: Command, aim: LaneId | None = None) -> FilterResult:
         """The command, changed as little as needed; arguments as of `Shield.guard`."""
         ego = observation.ego
         if not _known(ego) or not all(map(_known, observation.others)):
@@ -111,7 +111,7 @@ class TownShield(Shield):
             return _replaced(command, self._halt(ego), "finite", "A command that is no number was replaced.")
         way = self._way_of(observation, aim)
         if way is None:
-            return Guarded(command)
+            return FilterResult(command)
         said: list[Intervention] = []
         station = way.station_m(ego)
         steered = self._steered(observation, way, station, command)
@@ -129,8 +129,8 @@ class TownShield(Shield):
         if wanted < command.acceleration_mps2 - 1e-6 and (ego.speed_mps > 0.0 or command.acceleration_mps2 > 0.0):
             mended = Command(wanted, command.steering_rad)
             said.append(Intervention(rule, reason, command, mended))
-            return Guarded(mended, tuple(said))
-        return Guarded(Command(max(command.acceleration_mps2, least), command.steering_rad), tuple(said))
+            return FilterResult(mended, tuple(said))
+        return FilterResult(Command(max(command.acceleration_mps2, least), command.steering_rad), tuple(said))
 
     def _halt(self, ego: VehicleState) -> Command:
         speed = ego.speed_mps if math.isfinite(ego.speed_mps) else math.inf
@@ -408,8 +408,8 @@ def _known(one: VehicleState) -> bool:
     return math.isfinite(one.x_m + one.y_m + one.heading_rad + one.speed_mps + one.length_m + one.width_m)
 
 
-def _replaced(command: Command, safe: Command, rule: str, reason: str) -> Guarded:
-    return Guarded(safe, (Intervention(rule, reason, command, safe),))
+def _replaced(command: Command, safe: Command, rule: str, reason: str) -> FilterResult:
+    return FilterResult(safe, (Intervention(rule, reason, command, safe),))
 
 
 def _owed_to(other: VehicleState) -> tuple[str, str]:

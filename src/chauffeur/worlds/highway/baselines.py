@@ -1,13 +1,13 @@
 """LaMPilot's MOBIL baseline: lane choice without any instruction (paper Tab. IV, rows IDM and MOBIL).
 
-The IDM baseline needs no code: it is the driver with its initial wishes.
+The IDM baseline needs no code: it is the driver with its initial set-points.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from chauffeur.concept import LaneId, Wishes
+from chauffeur.concept import LaneId, Setpoints
 from chauffeur.control import LAMPILOT_EGO, LaneChangeOutlook, MobilParameters, should_change
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.instant import RoadPerception
@@ -24,16 +24,16 @@ class MobilBaseline:
         self._perception = perception
         self._parameters = parameters or MobilParameters()
 
-    def choose(self, wishes: Wishes) -> Wishes:
-        """Settled wishes with the lane MOBIL prefers."""
+    def choose(self, setpoints: Setpoints) -> Setpoints:
+        """Settled set-points with the lane MOBIL prefers."""
         here = self._perception.lane_of(EGO)
         for offset in (-1, 1):
             lane = self._perception.adjacent_lane(here, offset)
-            if lane is not None and should_change(self._outlook(lane, wishes), self._parameters):
-                wishes = replace(wishes, target_lane=lane)
-        return wishes
+            if lane is not None and should_change(self._outlook(lane, setpoints), self._parameters):
+                setpoints = replace(setpoints, target_lane=lane)
+        return setpoints
 
-    def _outlook(self, lane: LaneId, wishes: Wishes) -> LaneChangeOutlook:
+    def _outlook(self, lane: LaneId, setpoints: Setpoints) -> LaneChangeOutlook:
         new_front, new_rear = self._perception.neighbours(lane)
         old_front, _ = self._perception.neighbours(self._perception.lane_of(EGO))
         follower_now = follower_after = None
@@ -41,13 +41,13 @@ class MobilBaseline:
             follower_now = self._perception.traffic_idm(new_rear, new_front)
             follower_after = self._perception.traffic_idm(new_rear, EGO)
         return LaneChangeOutlook(
-            own_now=self._own(old_front, wishes),
-            own_after=self._own(new_front, wishes),
+            own_now=self._own(old_front, setpoints),
+            own_after=self._own(new_front, setpoints),
             follower_now=follower_now,
             follower_after=follower_after,
         )
 
-    def _own(self, front: int | None, wishes: Wishes) -> float:
-        assert wishes.target_speed_mps is not None
-        blocker = self._perception.front_blocker(wishes.served_stops) if front is None else front
-        return self._perception.idm(EGO, blocker, wishes.target_speed_mps, LAMPILOT_EGO.time_headway_s)
+    def _own(self, front: int | None, setpoints: Setpoints) -> float:
+        assert setpoints.target_speed_mps is not None
+        blocker = self._perception.front_blocker(setpoints.served_stops) if front is None else front
+        return self._perception.idm(EGO, blocker, setpoints.target_speed_mps, LAMPILOT_EGO.time_headway_s)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 
-from chauffeur.concept import Command, Turn, Wishes
+from chauffeur.concept import Command, Setpoints, Turn
 from chauffeur.control import Actuation, full_scale
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway.core import CoreRoad
@@ -33,33 +33,33 @@ class HighwayDriver:
         self._network = network
         self._turn: Turn | None = None
 
-    def initial_wishes(self) -> Wishes:
+    def initial_setpoints(self) -> Setpoints:
         """Keep the present speed and lane."""
         speed = float(self._core.floats[EGO, at.SPEED])
-        return Wishes(target_speed_mps=speed, target_lane=self._perception.lane_of(EGO))
+        return Setpoints(target_speed_mps=speed, target_lane=self._perception.lane_of(EGO))
 
-    def settle(self, wishes: Wishes) -> Wishes:
+    def settle(self, setpoints: Setpoints) -> Setpoints:
         """Wishes with defaults filled in and the lane moved on to the next one where it ends."""
-        speed = wishes.target_speed_mps
+        speed = setpoints.target_speed_mps
         if speed is None:
             speed = float(self._core.floats[EGO, at.SPEED])
-        lane = wishes.target_lane or self._perception.lane_of(EGO)
-        if wishes.turn is not None and wishes.turn != self._turn:
-            self._plan_route(wishes.turn)
+        lane = setpoints.target_lane or self._perception.lane_of(EGO)
+        if setpoints.turn is not None and setpoints.turn != self._turn:
+            self._plan_route(setpoints.turn)
         road = self._core.road
         row = road.rows[lane]
         onward = self._core.next_lane(row)
-        if onward == row and speed == wishes.target_speed_mps and lane == wishes.target_lane:
-            return wishes
-        return replace(wishes, target_speed_mps=speed, target_lane=road.lane_ids[onward])
+        if onward == row and speed == setpoints.target_speed_mps and lane == setpoints.target_lane:
+            return setpoints
+        return replace(setpoints, target_speed_mps=speed, target_lane=road.lane_ids[onward])
 
-    def command(self, wishes: Wishes) -> Command:
-        """Acceleration and steering for settled wishes, after LaMPilot's full-scale mapping (control/actuation.py)."""
-        assert wishes.target_speed_mps is not None
-        assert wishes.target_lane is not None
-        blocker = self._perception.front_blocker(wishes.served_stops)
-        acceleration = self._perception.idm(EGO, blocker, wishes.target_speed_mps, wishes.time_headway_s)
-        steering = self._core.steer(self._core.road.rows[wishes.target_lane])
+    def command(self, setpoints: Setpoints) -> Command:
+        """Acceleration and steering for settled set-points by LaMPilot's full-scale mapping (control/actuation.py)."""
+        assert setpoints.target_speed_mps is not None
+        assert setpoints.target_lane is not None
+        blocker = self._perception.front_blocker(setpoints.served_stops)
+        acceleration = self._perception.idm(EGO, blocker, setpoints.target_speed_mps, setpoints.time_headway_s)
+        steering = self._core.steer(self._core.road.rows[setpoints.target_lane])
         return Command(
             acceleration_mps2=full_scale(acceleration, self._actuation.max_acceleration_mps2),
             steering_rad=0.0 - full_scale(steering, self._actuation.max_steering_rad),  # the core's is to the right

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept import Command, LaneId, Observation, Wishes
-from chauffeur.worlds.parking.following import LOT_BEND_MPS2, Chassis, Follower, Look
+from chauffeur.concept import Command, LaneId, Observation, Setpoints
 from chauffeur.worlds.parking.lot import LIMIT_MPS
+from chauffeur.worlds.parking.path_follower import LOT_BEND_MPS2, Chassis, Follower, Look
 from chauffeur.worlds.parking.routes import Way
 
 OWN_LOOK: Final = Look(look_ahead_m=3.0, look_ahead_ratio_s=1.0)
@@ -30,26 +30,28 @@ class ParkingDriver:
         self._aim: tuple[LaneId | None] | None = None
         self._asked = 0
 
-    def initial_wishes(self) -> Wishes:
+    def initial_setpoints(self) -> Setpoints:
         """Keep the present speed, and drive on: to the exit, where nothing else is wished."""
-        return Wishes(target_speed_mps=self._now().ego.speed_mps)
+        return Setpoints(target_speed_mps=self._now().ego.speed_mps)
 
-    def settle(self, wishes: Wishes) -> Wishes:
+    def settle(self, setpoints: Setpoints) -> Setpoints:
         """Wishes with the present speed filled in, and no more than the lot allows."""
-        speed = wishes.target_speed_mps
+        speed = setpoints.target_speed_mps
         if speed is None:
             speed = self._now().ego.speed_mps
         speed = max(0.0, min(speed, LIMIT_MPS))
-        return wishes if speed == wishes.target_speed_mps else replace(wishes, target_speed_mps=speed)
+        return setpoints if speed == setpoints.target_speed_mps else replace(setpoints, target_speed_mps=speed)
 
-    def command(self, wishes: Wishes) -> Command:
-        """Acceleration and steering for settled wishes."""
-        assert wishes.target_speed_mps is not None
+    def command(self, setpoints: Setpoints) -> Command:
+        """Acceleration and steering for settled set-points."""
+        assert setpoints.target_speed_mps is not None
         observation = self._now()
-        if self._aim != (wishes.target_lane,) or observation.tick > self._asked + 1:
-            self._aim = (wishes.target_lane,)
-            way = self._way_to(wishes.target_lane)
+        if self._aim != (setpoints.target_lane,) or observation.tick > self._asked + 1:
+            self._aim = (setpoints.target_lane,)
+            way = self._way_to(setpoints.target_lane)
             self._follower.take(way.path, way.room_m)
         self._asked = observation.tick
         others = (*observation.others, *observation.objects)
-        return self._follower.command(observation.ego, others, OWN_LOOK, wishes.target_speed_mps, wishes.time_headway_s)
+        return self._follower.command(
+            observation.ego, others, OWN_LOOK, setpoints.target_speed_mps, setpoints.time_headway_s
+        )

@@ -9,7 +9,7 @@ from typing import Literal
 from chauffeur.concept import Parameters
 from chauffeur.worlds.ros.base import Published, RosVehicleState, TopicMessage
 from chauffeur.worlds.ros.lines import command_line
-from chauffeur.worlds.ros.stack import Stack, StackWishes
+from chauffeur.worlds.ros.stack import Stack, StackSetpoints
 
 KEPT = 100
 """Lines remembered."""
@@ -21,7 +21,7 @@ class DryRun:
     def __init__(self, stack: Stack, ros: Literal[1, 2] = 1) -> None:
         """Make the messages of a stack, and tell them as lines of that generation's command-line tool."""
         self._ros: Literal[1, 2] = ros
-        self._wishes = StackWishes(stack, self._send)
+        self._setpoints = StackSetpoints(stack, self._send)
         self._lock = threading.Lock()
         self._lines: deque[str] = deque(maxlen=KEPT)
         self._closed = False
@@ -34,21 +34,21 @@ class DryRun:
 
     def apply(self, parameters: Parameters) -> Published:
         """See `VehicleInterface.apply`."""
-        return self._wishes.apply(parameters)
+        return self._setpoints.apply(parameters)
 
     def release(self) -> Published:
         """See `VehicleInterface.release`."""
-        return self._wishes.release()
+        return self._setpoints.release()
 
     def state(self) -> RosVehicleState:
         """See `VehicleInterface.state`."""
         link = "closed" if self._closed else "dry-run"
-        count = ("published", self._wishes.number)
+        count = ("published", self._setpoints.number)
         return RosVehicleState(link, "Dry run: nothing is published.", counts=(count,), notes=self.lines[-20:])
 
     def close(self) -> None:
         """See `VehicleInterface.close`."""
-        self._wishes.end("This vehicle interface is closed.")
+        self._setpoints.end("This vehicle interface is closed.")
         self._closed = True
 
     def _send(self, number: int, messages: tuple[TopicMessage, ...]) -> None:

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from chauffeur.worlds.ros.base import Link, VehicleError
-from chauffeur.worlds.ros.inlet import Inlet
 from chauffeur.worlds.ros.master import TIMEOUT_S, MasterError, MasterRefusedError, call, check_uri
+from chauffeur.worlds.ros.node_server import NodeServer
 from chauffeur.worlds.ros.notes import Notes
-from chauffeur.worlds.ros.outlet import Outlet, Publication
-from chauffeur.worlds.ros.slave import Slave
+from chauffeur.worlds.ros.publisher import Publication, Publisher
+from chauffeur.worlds.ros.subscriber import Subscriber
 from chauffeur.worlds.ros.types import Types
 
 CHECK_S: Final = 1.0
@@ -79,15 +79,15 @@ class RosNode:
         self.notes: Final = Notes()
         self._known_md5, self._expected = known_md5 or {}, expected or {}
         self._publications = tuple(_publication(types, topic, kind) for topic, kind in published.items())
-        self.inlet: Final = Inlet(self.name, _publication(types, *read), types, self.notes) if read else None
+        self.inlet: Final = Subscriber(self.name, _publication(types, *read), types, self.notes) if read else None
         self._lock = threading.Lock()
         self._fault = f"The ROS master at {self._master} has not answered yet."
         self._ended = ""
         self._listeners: dict[str, list[str]] = {}
         self._ending = threading.Event()
         try:
-            self._outlet = Outlet(self._host, self.name, self._publications, self.notes, self._explain)
-            self._slave = Slave(
+            self._outlet = Publisher(self._host, self.name, self._publications, self.notes, self._explain)
+            self._slave = NodeServer(
                 self._host,
                 self._master,
                 request_topic=lambda topic: self._outlet.port if topic in published else None,
@@ -242,7 +242,7 @@ class RosNode:
             self.notes.say(error.message)
 
     @staticmethod
-    def _wanted(inlet: Inlet) -> tuple[str, str]:
+    def _wanted(inlet: Subscriber) -> tuple[str, str]:
         return inlet.wanted.topic, inlet.wanted.type
 
 

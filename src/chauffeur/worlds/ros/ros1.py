@@ -14,7 +14,7 @@ from chauffeur.worlds.ros.autoware_ai import AutowareAi
 from chauffeur.worlds.ros.base import FRESH_S, Fields, Published, RosVehicleState, TopicMessage
 from chauffeur.worlds.ros.limits import CheckedWish
 from chauffeur.worlds.ros.node import CHECK_S, Ros1Settings, RosNode
-from chauffeur.worlds.ros.stack import StackWishes
+from chauffeur.worlds.ros.stack import StackSetpoints
 from chauffeur.worlds.ros.types import Types
 
 _PUBLISHED: Final = {
@@ -62,18 +62,18 @@ class Ros1Vehicle:
             expected=_EXPECTED,
             check_s=check_s,
         )
-        self._wishes = StackWishes(stack, self._send)
+        self._setpoints = StackSetpoints(stack, self._send)
         self._closing = threading.Lock()
 
     def apply(self, parameters: Parameters) -> Published:
         """See `VehicleInterface.apply`."""
         self._obey()
-        return self._wishes.apply(parameters)
+        return self._setpoints.apply(parameters)
 
     def release(self) -> Published:
         """See `VehicleInterface.release`."""
         self._obey()
-        return self._wishes.release()
+        return self._setpoints.release()
 
     def state(self) -> RosVehicleState:
         """See `VehicleInterface.state`."""
@@ -85,7 +85,7 @@ class Ros1Vehicle:
             link=link,
             words=words,
             receivers=receivers,
-            delivered=delivered and self._wishes.number > 0,
+            delivered=delivered and self._setpoints.number > 0,
             speed_mps=self._speed_mps(),
             counts=self._node.notes.counted(),
             notes=self._node.notes.said(),
@@ -94,12 +94,12 @@ class Ros1Vehicle:
     def close(self) -> None:
         """See `VehicleInterface.close`. Under a constant speed, the follower is first set back to planned speeds."""
         if self._closing.acquire(blocking=False):  # never released: closed for good
-            self._wishes.end("This vehicle interface is closed.")
+            self._setpoints.end("This vehicle interface is closed.")
             self._node.close()
 
     def _obey(self) -> None:
         if why := self._node.ended:
-            self._wishes.abandon(why)
+            self._setpoints.abandon(why)
 
     def _send(self, number: int, messages: tuple[TopicMessage, ...]) -> None:
         ready = [(message.topic, self._bytes(message, number)) for message in messages]

@@ -81,7 +81,7 @@ class Ros2Vehicle(ThreadedVehicle):
             link=link,
             words=words,
             receivers=receivers,
-            delivered=bool(receivers) and not pending and self._wishes.number > 0,
+            delivered=bool(receivers) and not pending and self._setpoints.number > 0,
             speed_mps=self._speed_mps(),
             mode=mode,
             counts=self._notes.counted(),

@@ -104,7 +104,7 @@ class RosbridgeVehicle(ThreadedVehicle):
             link=link,
             words=words,
             receivers=int(not fault),
-            delivered=not fault and not refusal and not pending and self._wishes.number > 0,
+            delivered=not fault and not refusal and not pending and self._setpoints.number > 0,
             speed_mps=self._speed_mps(),
             mode=mode,
             counts=self._notes.counted(),

@@ -32,7 +32,7 @@ class Stack(Protocol):
         ...
 
 
-class StackWishes:
+class StackSetpoints:
     """The wishes of one interface, one after the other. Safe from any thread."""
 
     def __init__(self, stack: Stack, send: Callable[[int, tuple[TopicMessage, ...]], None]) -> None:

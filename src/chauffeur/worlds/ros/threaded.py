@@ -12,7 +12,7 @@ from typing import TypeVar
 from chauffeur.concept import Parameters
 from chauffeur.worlds.ros.base import FRESH_S, Published, TopicMessage
 from chauffeur.worlds.ros.notes import Notes
-from chauffeur.worlds.ros.stack import Stack, StackWishes
+from chauffeur.worlds.ros.stack import Stack, StackSetpoints
 
 _T = TypeVar("_T")
 
@@ -34,20 +34,20 @@ class ThreadedVehicle(ABC):
         self._velocity: tuple[float, float] | None = None
         self._woken, self._ending = threading.Event(), threading.Event()
         self._closed = False
-        self._wishes = StackWishes(stack, self._send)
+        self._setpoints = StackSetpoints(stack, self._send)
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def apply(self, parameters: Parameters) -> Published:
         """See `VehicleInterface.apply`."""
-        return self._wishes.apply(parameters)
+        return self._setpoints.apply(parameters)
 
     def release(self) -> Published:
         """See `VehicleInterface.release`."""
-        return self._wishes.release()
+        return self._setpoints.release()
 
     def close(self) -> None:
         """See `VehicleInterface.close`."""
-        self._wishes.end("This vehicle interface is closed.")
+        self._setpoints.end("This vehicle interface is closed.")
         self._closed = True
         self._ending.set()
         self._woken.set()

@@ -116,7 +116,7 @@ def build_own(name: str, seed: int | None = None, folder: Path | None = None) ->
         DataError: There is no such recipe.
         MissingExtraError: scenariogeneration or netconvert is not installed.
     """
-    from chauffeur.worlds.town.drawing import draw
+    from chauffeur.worlds.town.opendrive_writer import draw
     from chauffeur.worlds.town.recipes import TOWNS, plan_of
 
     if name not in TOWNS:

@@ -19,11 +19,11 @@ from chauffeur.concept import (
     LaneId,
     Lead,
     Observation,
+    Setpoints,
     Sign,
     Signal,
     SignalState,
     VehicleState,
-    Wishes,
 )
 from chauffeur.control.idm import IdmParameters, free_acceleration, idm_acceleration
 from chauffeur.control.kinematic_bicycle import KinematicBicycle
@@ -220,28 +220,28 @@ class TownDriver:
 
     # Wishes -----------------------------------------------------------------------------------------------------------
 
-    def initial_wishes(self) -> Wishes:
+    def initial_setpoints(self) -> Setpoints:
         """As fast as allowed and sensible, along the route."""
-        return Wishes(target_speed_mps=None, time_headway_s=TOWN_IDM.time_headway_s)
+        return Setpoints(target_speed_mps=None, time_headway_s=TOWN_IDM.time_headway_s)
 
-    def settle(self, wishes: Wishes) -> Wishes:
+    def settle(self, setpoints: Setpoints) -> Setpoints:
         """Wishes with a speed where they have none, a lane that is left behind forgotten, and one from which the way
         cannot be driven as well as from the lane that is steered for given up for that lane."""
         ego = self._look().ego
-        lane = self._road.get(wishes.target_lane)
+        lane = self._road.get(setpoints.target_lane)
         own = self._road.get(ego.lane)
         if lane is not None and own is not None and lane.road != own.road:
             onward = (one.id for one in self._road.successors(lane.id) if one.road == own.road and own.road)
-            wishes = replace(wishes, target_lane=next(onward, None))
+            setpoints = replace(setpoints, target_lane=next(onward, None))
         elif lane is not None and (better := self._steered_for(lane)) is not None:
-            wishes = replace(wishes, target_lane=better)
+            setpoints = replace(setpoints, target_lane=better)
         if self._turn is not None and own is not None and own.junction and own.junction == self._turning_at:
             self._turn = None  # in the junction: the wish was for it alone, and the next is for the next one
-            wishes = replace(wishes, turn=None)
-        if wishes.target_speed_mps is None:
+            setpoints = replace(setpoints, turn=None)
+        if setpoints.target_speed_mps is None:
             limit = float(self._stretch.limit_mps[self._stretch.index(self._station)])
-            wishes = replace(wishes, target_speed_mps=limit)
-        return wishes
+            setpoints = replace(setpoints, target_speed_mps=limit)
+        return setpoints
 
     def _steered_for(self, wish: Lane) -> LaneId | None:
         """The lane of the line beside a wished one, where it needs fewer changes for the way; None where it does not,
@@ -254,18 +254,18 @@ class TownDriver:
         changes = self._corridor.changes[self._stretch.layer + at]
         return lane.id if changes.get(lane.id, math.inf) < changes.get(wish.id, math.inf) else None
 
-    def command(self, wishes: Wishes) -> Command:
+    def command(self, setpoints: Setpoints) -> Command:
         """Acceleration and steering for this period."""
         seen = self._look()
         ego = seen.ego
-        self._turn_to(wishes, ego)
+        self._turn_to(setpoints, ego)
         self._station = self._rear_station(ego, self._station - 1.0, self._station + 8.0)
         self._keep_to_the_road(ego)
         if self._tick % _EVERY == 0:
             self._meetings = self._met(seen)
         self._tick += 1
-        self._mind_the_lane(seen, wishes)
-        acceleration = self._acceleration(seen, wishes)
+        self._mind_the_lane(seen, setpoints)
+        acceleration = self._acceleration(seen, setpoints)
         rear = Pose(ego.x_m, ego.y_m, ego.heading_rad).ahead(-self._chassis.rear_to_middle_m)
         look = max(_LEAST_LOOK_M, _LOOK_S * ego.speed_mps)
         steering = pursuit_steering(
@@ -284,24 +284,24 @@ class TownDriver:
         rear = Pose(ego.x_m, ego.y_m, ego.heading_rad).ahead(-self._chassis.rear_to_middle_m)
         return self._stretch.line.nearest(rear.x_m, rear.y_m, low_m, high_m)
 
-    def _turn_to(self, wishes: Wishes, ego: VehicleState) -> None:
+    def _turn_to(self, setpoints: Setpoints, ego: VehicleState) -> None:
         """Another way at the next junction, where the wish is another than the route; and over, where a free way is."""
-        if wishes.turn is None:
+        if setpoints.turn is None:
             self._turn = None
         here = self._road.get(ego.lane)
         if here is None or here.junction or self._changing_to is not None:
             return
-        beside = None if self._goal and wishes.turn is None else self._free_beside(here.id, wishes)
-        if beside is None and (wishes.turn is None or wishes.turn == self._turn):
+        beside = None if self._goal and setpoints.turn is None else self._free_beside(here.id, setpoints)
+        if beside is None and (setpoints.turn is None or setpoints.turn == self._turn):
             return
-        self._turn = wishes.turn
+        self._turn = setpoints.turn
         lanes = self.lanes_ahead()
         ways = self._wished_ways(lanes)
         if beside is None and any(way.lanes[0] in lanes for way in ways):
             return  # it leads there already
-        self._goal &= wishes.turn is None
+        self._goal &= setpoints.turn is None
         at = max(0.0, here.centre.nearest(ego.x_m, ego.y_m))
-        self._take(free_route(self._road, here.id, at, wishes.turn, _FREE_ROUTE_M, beside), here.id, ego)
+        self._take(free_route(self._road, here.id, at, setpoints.turn, _FREE_ROUTE_M, beside), here.id, ego)
 
     def _wished_ways(self, lanes: Sequence[LaneId]) -> tuple[JunctionWay, ...]:
         """The ways of the wished turn at the next junction with a choice, which is kept in mind; none where none is."""
@@ -310,9 +310,9 @@ class TownDriver:
         self._turning_at = "" if not ways else self._road[ways[0].lanes[0]].junction
         return ways
 
-    def _free_beside(self, lane: LaneId, wishes: Wishes) -> LaneId | None:
+    def _free_beside(self, lane: LaneId, setpoints: Setpoints) -> LaneId | None:
         """The lane beside that is wished and that the free way does not lead into yet."""
-        wish = self._road.get(wishes.target_lane)
+        wish = self._road.get(setpoints.target_lane)
         if wish is None or self._turn is not None or wish.road != self._road[lane].road:
             return None
         step = wish.index - self._road[lane].index
@@ -359,7 +359,7 @@ class TownDriver:
 
     # Lanes ------------------------------------------------------------------------------------------------------------
 
-    def _mind_the_lane(self, seen: Observation, wishes: Wishes) -> None:
+    def _mind_the_lane(self, seen: Observation, setpoints: Setpoints) -> None:
         """Begin or end a change of lanes."""
         ego, stretch = seen.ego, self._stretch
         if self._changing_to is not None:
@@ -371,7 +371,7 @@ class TownDriver:
             return
         layer = stretch.layer + at
         changes = self._corridor.changes[layer]
-        goal = self._beside(lane.id, changes, wishes)
+        goal = self._beside(lane.id, changes, setpoints)
         if goal is None:
             return
         _, end = stretch.span(at)
@@ -390,7 +390,7 @@ class TownDriver:
         self._changing_to = first.length_m - 2.0
         self._meetings = self._met(seen)
 
-    def _beside(self, lane: LaneId, changes: object, wishes: Wishes) -> LaneId | None:
+    def _beside(self, lane: LaneId, changes: object, setpoints: Setpoints) -> LaneId | None:
         """The lane beside that is to be changed into: as the route needs, else as is wished."""
         assert isinstance(changes, dict)
         own = changes.get(lane, 0)
@@ -398,7 +398,7 @@ class TownDriver:
         better = [one for one in sides if changes[one] < own]
         if better:
             return better[0]
-        wish = self._road.get(wishes.target_lane)
+        wish = self._road.get(setpoints.target_lane)
         if wish is None or wish.id == lane or wish.road != self._road[lane].road:
             return None
         side = 1 if wish.index > self._road[lane].index else -1
@@ -440,12 +440,12 @@ class TownDriver:
 
     # Speed ------------------------------------------------------------------------------------------------------------
 
-    def _acceleration(self, seen: Observation, wishes: Wishes) -> float:
+    def _acceleration(self, seen: Observation, setpoints: Setpoints) -> float:
         ego, stretch = seen.ego, self._stretch
         speed, nose = ego.speed_mps, self._station + self._nose_m
-        idm = replace(TOWN_IDM, time_headway_s=max(0.8, wishes.time_headway_s))
+        idm = replace(TOWN_IDM, time_headway_s=max(0.8, setpoints.time_headway_s))
         limit = float(stretch.most_mps[stretch.index(self._station + 0.3 * speed)])
-        target = max(0.0, min(limit, _finite(wishes.target_speed_mps, limit)))
+        target = max(0.0, min(limit, _finite(setpoints.target_speed_mps, limit)))
         target = self._slow_for_people(seen, target)
         least = free_acceleration(speed, max(target, 0.05), idm)
         if speed > target:

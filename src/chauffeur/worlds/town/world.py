@@ -30,7 +30,7 @@ from chauffeur.concept import (
 from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, BicycleState, advanced
 from chauffeur.geometry import LaneId, LanePlace, Pose, Route, overlap, plan_route
 from chauffeur.worlds.base import EGO
-from chauffeur.worlds.parking.following import Chassis
+from chauffeur.worlds.parking.path_follower import Chassis
 from chauffeur.worlds.town import pack as packs
 from chauffeur.worlds.town.brakes import TrafficBrakes
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver

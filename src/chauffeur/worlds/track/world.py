@@ -17,7 +17,7 @@ from chauffeur.geometry import Box, Pose, overlap
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.over_graph import LaneDriver, ObservedPerception
 from chauffeur.worlds.parking.corridor import Body
-from chauffeur.worlds.parking.following import Chassis
+from chauffeur.worlds.parking.path_follower import Chassis
 from chauffeur.worlds.track.dynamics import STEP_S, Plant, advance, deliverable, initial_state
 from chauffeur.worlds.track.manoeuvres import (
     FRICTION,

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from chauffeur.bench.lampilot.goals import SIGHT_M
-from chauffeur.bench.lampilot.scenes.fitting import (
+from chauffeur.bench.lampilot.scenes.sampling import whole
+from chauffeur.bench.lampilot.scenes.wish_sampler import (
     CAR_M,
     EXITS,
     Drawer,
@@ -23,7 +24,6 @@ from chauffeur.bench.lampilot.scenes.fitting import (
     route_wish,
     sign_mps,
 )
-from chauffeur.bench.lampilot.scenes.sampling import whole
 from chauffeur.bench.lampilot.scenes.wishes import Named, SceneWish
 from chauffeur.concept import Observation
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from chauffeur.bench.lampilot.families import FAMILIES, family_of
-from chauffeur.bench.lampilot.scenes.choosing import form_of, normal
 from chauffeur.bench.lampilot.scenes.kinds import PAPER_FAMILIES, PAPER_ITEMS, PAPER_ROADS, PAPER_WORDS
 from chauffeur.bench.lampilot.scenes.unambiguous import words_of
+from chauffeur.bench.lampilot.scenes.wording_choice import form_of, normal
 from chauffeur.worlds.highway.dblv1 import Dataset
 
 

@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from chauffeur.bench.kernel.store import Row, RowStore
-from chauffeur.bench.lampilot.scenes.choosing import choose_wordings, normal
+from chauffeur.bench.lampilot.scenes.item_maker import Job, make_item
+from chauffeur.bench.lampilot.scenes.job_pool import Progress, spread
 from chauffeur.bench.lampilot.scenes.kinds import plan_suite
-from chauffeur.bench.lampilot.scenes.making import Job, make_item
 from chauffeur.bench.lampilot.scenes.manifest import manifest_of
 from chauffeur.bench.lampilot.scenes.scripted import SOLVERS
-from chauffeur.bench.lampilot.scenes.spreading import Progress, spread
+from chauffeur.bench.lampilot.scenes.wording_choice import choose_wordings, normal
 from chauffeur.bench.lampilot.scenes.writer import SceneItem, folder_of, items_of, write_folder
 from chauffeur.concept import ConfigError
 from chauffeur.drive.files import publish

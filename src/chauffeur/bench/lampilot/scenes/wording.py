@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from chauffeur.bench.lampilot.scenes.choosing import normal
 from chauffeur.bench.lampilot.scenes.kinds import Kind, Slot
-from chauffeur.bench.lampilot.scenes.phrasing import Wording, say, templates
+from chauffeur.bench.lampilot.scenes.phrases import Wording, say, templates
 from chauffeur.bench.lampilot.scenes.unambiguous import MAX_WORDS, MIN_WORDS, fault_of, words_of
 from chauffeur.bench.lampilot.scenes.wishes import UNITS, Named, SceneWish
+from chauffeur.bench.lampilot.scenes.wording_choice import normal
 from chauffeur.concept import InstructionError
 from chauffeur.language.quantities import ONES, TENS
 

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from chauffeur.bench.lampilot.scenes.annotations import FILE, Annotation
-from chauffeur.bench.lampilot.scenes.choosing import SceneChoice
 from chauffeur.bench.lampilot.scenes.wishes import UNITS
+from chauffeur.bench.lampilot.scenes.wording_choice import SceneChoice
 from chauffeur.drive.files import publish
 
 

@@ -13,7 +13,7 @@ from typing import Final
 from chauffeur.bench.nuplanqa.scenes.staging import EGO_ID, EGO_SIZE, SIZES, StagedMover, StagedScene
 from chauffeur.concept.scene import Observation
 
-Seen = Collection[int | str]
+VehicleObservation = Collection[int | str]
 """Ids of the road users and traffic lights that can be made out in at least one picture of the present instant."""
 
 FAMILIES: Final[Mapping[str, str]] = {
@@ -54,7 +54,7 @@ class Fact:
     value: str
 
 
-def facts_of(scene: StagedScene, seen: Seen) -> Iterator[Fact]:
+def facts_of(scene: StagedScene, seen: VehicleObservation) -> Iterator[Fact]:
     """What can be asked about a scene."""
     for family, value in _plain(scene, seen):
         if value:
@@ -65,7 +65,7 @@ def facts_of(scene: StagedScene, seen: Seen) -> Iterator[Fact]:
             yield Fact("beside", side, _kind(mover))
 
 
-def _plain(scene: StagedScene, seen: Seen) -> Iterator[tuple[str, str]]:
+def _plain(scene: StagedScene, seen: VehicleObservation) -> Iterator[tuple[str, str]]:
     lead, light, walker = scene.lead, scene.light, scene.walker
     light_seen = light is None or "own" in seen
     lead_seen, walker_seen = _clear(lead, seen), _clear(walker, seen)
@@ -85,7 +85,7 @@ def _plain(scene: StagedScene, seen: Seen) -> Iterator[tuple[str, str]]:
     yield "action", _action(scene)
 
 
-def _clear(mover: StagedMover | None, seen: Seen) -> bool:
+def _clear(mover: StagedMover | None, seen: VehicleObservation) -> bool:
     """Whether somebody is seen, or is not there."""
     return mover is None or mover.id in seen
 
@@ -101,7 +101,7 @@ def _layout(scene: StagedScene) -> str:
     return "straight" if plan.curvature_per_m == 0.0 else "left" if plan.curvature_per_m > 0.0 else "right"
 
 
-def _density(scene: StagedScene, seen: Seen) -> str:
+def _density(scene: StagedScene, seen: VehicleObservation) -> str:
     """How many vehicles are wholly ahead of the ego's front; not asked where one is half beside it."""
     ours = [one for one in scene.others if one.kind != "pedestrian" and one.offset_m < 0.0]
     ahead = [one for one in ours if one.station_m - SIZES[one.kind][0] / 2.0 > _FRONT_M]

@@ -23,7 +23,7 @@ import numpy as np
 
 from chauffeur.bench.nuplanqa.frames import CAMERAS, FRAMES
 from chauffeur.bench.nuplanqa.questions import SUBTASKS, VqaItem
-from chauffeur.bench.nuplanqa.scenes.facts import Fact, Seen, facts_of, sighted
+from chauffeur.bench.nuplanqa.scenes.facts import Fact, VehicleObservation, facts_of, sighted
 from chauffeur.bench.nuplanqa.scenes.gate import GateLine, gate
 from chauffeur.bench.nuplanqa.scenes.staging import SAMPLES, STEP_S, StagedScene, stage
 from chauffeur.bench.nuplanqa.scenes.wording import QuestionWriter, Split, free_pairs
@@ -247,7 +247,7 @@ def _stage(config: QaConfig, split: Split, number: int) -> tuple[StagedScene, np
 
 def _shoot(
     own: Path, scene: StagedScene, rig: Rig, look: CameraLook, renderer: Renderer, instants: Sequence[int]
-) -> Seen:
+) -> VehicleObservation:
     """Render what is not there yet; who can be made out at the present instant is stored beside the pictures."""
     record = own / "seen" / f"{scene.token}.json"
     if record.is_file():
@@ -322,7 +322,7 @@ def _metadata(scene: StagedScene, rig: Rig, config: QaConfig) -> dict[str, Any]:
     return found
 
 
-def _truth(scene: StagedScene, facts: Sequence[Fact], seen: Seen, rig: Rig) -> dict[str, Any]:
+def _truth(scene: StagedScene, facts: Sequence[Fact], seen: VehicleObservation, rig: Rig) -> dict[str, Any]:
     """What a network may be taught besides the questions: classes of all families, and who is where.
 
     Road users are (kind, x, y, whether they can be made out), in the frame of the rig: x forward, y left, m. Of the
@@ -342,7 +342,9 @@ def _truth(scene: StagedScene, facts: Sequence[Fact], seen: Seen, rig: Rig) -> d
     }
 
 
-def truth_of_users(observation: Observation, seen: Seen, rig: Rig) -> list[tuple[str, float, float, bool]]:
+def truth_of_users(
+    observation: Observation, seen: VehicleObservation, rig: Rig
+) -> list[tuple[str, float, float, bool]]:
     """Road users as (kind, x, y, whether they can be made out), in the frame of the rig."""
     ego = observation.ego
     c, s = math.cos(ego.heading_rad), math.sin(ego.heading_rad)

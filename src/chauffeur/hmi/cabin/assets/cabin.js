@@ -7,7 +7,7 @@ import { openLink } from './link.js';
 import { makeMemory } from './memory.js';
 import { makeMicrophone } from './microphone.js';
 import { makeScene } from './scene.js';
-import { NOT_HEARD, kmh, rungWords } from './words.js';
+import { NOT_HEARD, kmh, levelWords } from './words.js';
 
 const SILENCE_MS = 2500;
 const WORDS_EVERY_MS = 1000;
@@ -116,7 +116,7 @@ function showPlace() {
   $('take-wheel').hidden = connection !== 'open' || mine() || Boolean(ended);
   showBanner(lost);
   document.body.classList.toggle('lost', lost && !ended);
-  if (scene) write($('rung'), lost && !ended ? 'Last picture, no news since' : rungWords(scene));
+  if (scene) write($('level'), lost && !ended ? 'Last picture, no news since' : levelWords(scene));
   $('talk').hidden = !speaks(); // what cannot be used is not shown
   for (const row of document.querySelectorAll('.spoken')) row.hidden = !speaks();
   for (const id of ['talk-command', 'talk-evaluate']) $(id).disabled = !able() || !speaks();
@@ -170,8 +170,8 @@ function showScene() {
   $('target-way').hidden = Math.abs(off) < 0.5;
   write($('target-sign'), off > 0 ? '▲' : '▼');
   write($('target-words'), off > 0 ? 'faster' : 'slower');
-  $('rung').hidden = false;
-  write($('rung'), rungWords(scene));
+  $('level').hidden = false;
+  write($('level'), levelWords(scene));
   $('shield').hidden = !scene.shield;
   write($('shield'), `Shield: ${scene.shield}`);
   if ($('missed')) write($('missed'), String(scene.missed));

@@ -25,13 +25,13 @@ export function stageWords(wish) {
   return STAGES[wish.stage] || ['…', wish.stage, 'busy'];
 }
 
-export function rungWords(scene) {
+export function levelWords(scene) {
   if (scene.taken_over) return 'You drive. The shield stays on.';
-  if (scene.rung === 'follow') return scene.wish ? 'Follows your wish' : 'Keeps its lane and distance';
-  const rungs = {
+  if (scene.level === 'follow') return scene.wish ? 'Follows your wish' : 'Keeps its lane and distance';
+  const levels = {
     hold: 'Holds the last wish', keep: 'Keeps lane, no faster', slow: 'Slows down, nobody tells it where to go', stop: 'Stops',
   };
-  return rungs[scene.rung] || scene.rung;
+  return levels[scene.level] || scene.level;
 }
 
 export const NOT_HEARD = {

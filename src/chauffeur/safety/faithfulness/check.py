@@ -1,0 +1,71 @@
+"""`alignment-v1`: the thoughts that are shown to the person describe the program; `alignment-driven-v1`: and the drive.
+
+Both inform: an explanation that does not fit is told, and the drive goes on.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from chauffeur.concept import Faithfulness, Limits, Observation, Plan, Program, Verdict
+from chauffeur.safety.faithfulness.facts import Effect, Facts, FactSurroundings
+from chauffeur.safety.faithfulness.judge import judge, judge_drive
+from chauffeur.safety.faithfulness.report import claims_words, mismatch_words, score_words
+from chauffeur.safety.faithfulness.tracer import read_facts
+
+FAITHFULNESS_CHECK: Final = "alignment-v1"
+DRIVEN_CHECK: Final = "alignment-driven-v1"
+
+_REMEDY: Final = "Let the thoughts say what the program does, or the program do what the thoughts say."
+
+
+def check_faithfulness(plan: Plan, observation: Observation, limits: Limits) -> Verdict:  # noqa: ARG001 - one shape for all checks
+    """Whether what the plan's thoughts claim is what its program does, as far as reading both tells.
+
+    A plan without thoughts, or with another policy than a program, claims nothing that could be wrong here.
+    """
+    facts = _facts(plan)
+    if isinstance(facts, str):
+        return Verdict(FAITHFULNESS_CHECK, True, facts, vetoes=False)
+    found = judge(plan.thoughts.text, facts, FactSurroundings.of(observation))
+    return _verdict(
+        FAITHFULNESS_CHECK, found, "The explanation fits the program", "The explanation does not fit the program"
+    )
+
+
+def check_driven(plan: Plan, observation: Observation, effect: Effect) -> Verdict:
+    """Whether what the plan's thoughts claim is what then happened.
+
+    Args:
+        plan: What was driven.
+        observation: The instant it began.
+        effect: What happened.
+    """
+    facts = _facts(plan)
+    if effect.failed:
+        facts = "The program failed on the way, so that the drive was not compared with the explanation."
+    if isinstance(facts, str):
+        return Verdict(DRIVEN_CHECK, True, facts, vetoes=False)
+    found = judge_drive(plan.thoughts.text, facts, FactSurroundings.of(observation), effect)
+    return _verdict(DRIVEN_CHECK, found, "The drive went as explained", "The drive did not go as explained")
+
+
+def _facts(plan: Plan) -> Facts | str:
+    """What reading finds in the plan's program, or why there is nothing to compare."""
+    if not isinstance(plan.policy, Program) or not plan.thoughts.text.strip():
+        return "There is no explanation of a program to compare."
+    facts = read_facts(plan.policy.source, plan.policy.library)
+    return facts if facts.readable else "The program cannot be read, so its explanation was not compared."
+
+
+def _verdict(check: str, found: Faithfulness, fits: str, differs: str) -> Verdict:
+    if found.aligned:
+        return Verdict(check, True, f"{fits} ({claims_words(found)}).", vetoes=False, alignment=found)
+    line = next((one.line for one in found.mismatches if one.line is not None), None)
+    told = ". ".join(_capital(mismatch_words(one)) for one in found.mismatches)
+    reason = f"{differs} ({score_words(found)}). {told}."
+    return Verdict(check, False, reason, line, _REMEDY, vetoes=False, alignment=found)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,114 @@
+"""What is said outright: whom (not) to pass, what comes later, two things that are one, how far something is."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from parameters_asked import BEHIND, LEFT, LOT, driven, plan
+
+from chauffeur.planners.base import Planner
+from chauffeur.planners.registry import make_planner
+from chauffeur.planners.talk2drive.explicit_overtake import told
+
+
+@pytest.fixture(scope="module")
+def planner() -> Planner:
+    return make_planner("talk2drive")
+
+
+PASS = (
+    "Pass the RV, please and thank you.",
+    "I want that you overtake this coach.",
+    "Why don't you pass him?",
+    "Why not pass this guy?",
+    "Can't you pass him?",
+    "Don't you want to overtake?",
+    "Don't just sit there, pass him.",
+    "Don't stay behind him.",
+    "Speed up a little and get around Grandpa here.",
+    "Would you mind overtaking the tractor?",
+)
+STAY = (
+    "Would it be possible not to overtake that motorhome?",
+    "This horse trailer in front, please don't pass, the horses get scared.",
+    "Be patient and wait behind that tour bus.",
+    "We're with that church van, so don't get ahead of it.",
+    "Don't you dare pass him.",
+    "Could you please not go past that lady?",
+    "No overtaking today, please.",
+    "Stay put behind the cement truck.",
+)
+NEITHER = (
+    "Why are we passing him?",
+    "Can we not pass this one?",
+    "If he brakes, pass him.",
+    "Wait a minute, then overtake.",
+    "Overtake him in half a minute.",
+    "Pass the salt.",
+    "Could you pass me my bag?",
+    "They are passing us all the time.",
+    "Let him go past.",
+    "Nobody wants to stay behind a truck.",
+    "Don't hold back, pick up speed.",
+    "",
+)
+
+
+@pytest.mark.parametrize(("wishes", "found"), [(PASS, "pass"), (STAY, "stay"), (NEITHER, "")])
+def test_what_is_said_outright(wishes: tuple[str, ...], found: str) -> None:
+    assert {wish: told(wish) for wish in wishes} == dict.fromkeys(wishes, found)
+
+
+@given(st.text(max_size=60))
+def test_it_is_one_of_three(text: str) -> None:
+    assert told(text) in ("pass", "stay", "")
+
+
+@pytest.mark.parametrize("wish", PASS)
+def test_who_asks_for_it_passes(planner: Planner, wish: str) -> None:
+    assert driven(planner, wish, BEHIND).lane == -1
+
+
+@pytest.mark.parametrize("wish", [*STAY, "Overtake him, no wait, stay behind him.", "Pass him, sorry, don't pass him."])
+def test_who_forbids_it_does_not(planner: Planner, wish: str) -> None:
+    found = driven(planner, wish, BEHIND)
+    assert found.lane >= 0
+    assert found.target_speed_mps <= BEHIND.speed_mps
+
+
+def test_what_was_taken_back_is_dangerous_all_the_same(planner: Planner) -> None:
+    assert plan(planner, "Ram him, no wait, overtake him.", BEHIND).policy is None
+
+
+@pytest.mark.parametrize("wish", ["Wait five seconds, then overtake.", "Wait ten seconds and then move right."])
+def test_what_is_for_later_is_not_done_at_once(planner: Planner, wish: str) -> None:
+    found = plan(planner, wish, BEHIND)
+    assert found.policy is None
+    assert "when it is time" in found.refusal
+
+
+def test_a_lane_and_its_speed_are_one_wish(planner: Planner) -> None:
+    found = driven(planner, "Slow down and move to the right lane.", LEFT)
+    assert (found.lane, found.target_speed_mps < LEFT.speed_mps) == (1, True)
+    assert "first" in plan(planner, "Slow down to 20 m/s, then overtake.", BEHIND).refusal
+
+
+@pytest.mark.parametrize(
+    ("wish", "lane"),
+    [
+        ("Two more miles and it's exit only on the far side.", 1),
+        ("Exit 14's in a mile and a half, and we're all the way over here.", 1),
+    ],
+)
+def test_how_far_an_exit_is_is_no_gap(planner: Planner, wish: str, lane: int) -> None:
+    assert driven(planner, wish, LEFT).lane == lane
+
+
+@pytest.mark.parametrize("wish", ["Keep 40 metres to the car ahead.", "Drop back by 12 m behind that estate."])
+def test_a_gap_is_none_of_these_parameters(planner: Planner, wish: str) -> None:
+    assert "keeps the gap" in plan(planner, wish, BEHIND).refusal
+
+
+def test_metres_in_a_lot_are_no_gap(planner: Planner) -> None:
+    assert driven(planner, "There's a free bay two yards off.", LOT).route == "nearest"
