@@ -164,7 +164,7 @@ def drive(job: Job) -> dict[str, Any]:
     policy = None if hands is not None else Wishing(job.kind, world, rng)
     shield = Shield(world.dt_s, Limits()) if job.shielded else None
     most = MAX_S.get(job.traffic, HIGHWAY_S)
-    episode = run_episode(world, policy, None, max_s=most, hands=hands, shield=shield)
+    episode = run_episode(world, policy, None, max_s=most, command_source=hands, shield=shield)
     found = blame(episode.frames, episode.final, world.dt_s)
     speeds = [frame.observation.ego.speed_mps for frame in episode.frames]
     return row | {

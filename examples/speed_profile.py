@@ -50,3 +50,7 @@ class SpeedProfileExecutor(DriverLed):
         self._status = "finished" if over else "running"
         self._setpoints = Setpoints(profile.speeds_mps[-1 if over else index], HEADWAY_S, now.ego.lane)
         return HeldSetpoints(self._setpoints, state=self._status)
+
+
+EXAMPLE = SpeedProfile((20.0, 22.0), 3.0)
+"""`chauffeur check executor speed_profile:SpeedProfileExecutor --policy speed_profile:EXAMPLE` drives it."""

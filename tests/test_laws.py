@@ -74,8 +74,9 @@ def test_one_door_to_the_actuator() -> None:
     assert len(_calls(SOURCE / "drive" / "actuate.py", "step")) == 1
     hands = {str(p.relative_to(SOURCE)) for p, source in _sources().items() if "drive.actuate import" in source.text}
     # Trips in simulated time, in real time, a judge who replays what was commanded, routes with scenarios (driven,
-    # taught, and bounded as planned), and the traffic that frames are taken of.
+    # taught, and bounded as planned), the traffic that frames are taken of, and the kit that tries an executor.
     assert hands == {
+        "drive/conformance.py",
         "drive/episode.py",
         "drive/live/control.py",
         "bench/chaos/judge.py",

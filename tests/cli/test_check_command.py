@@ -60,3 +60,79 @@ def test_what_cannot_be_checked_is_refused_in_words(words: tuple[str, ...], says
     code, said = checked(*words)
     assert code == 2
     assert says in " ".join(said.split())
+
+
+RUDE = """
+from dataclasses import replace
+from chauffeur.concept import Plan, Program, Thoughts
+
+
+class Rude:
+    id, model = "rude", ""
+
+    async def plan(self, request):
+        if "?" in request.instruction.text:
+            raise KeyError("?")
+        return Plan(Thoughts(""), Program("not a program"), planner="somebody", model="else")
+"""
+DEAF = """
+from speed_profile import EXAMPLE, SpeedProfileExecutor
+from chauffeur.concept import Command
+
+
+class Deaf(SpeedProfileExecutor):
+    def step(self, observation, held=None):
+        return Command(2.0, 0.0)
+"""
+
+
+def kit(*words: str) -> tuple[int, str]:
+    result = CliRunner().invoke(app, ["check", *words])
+    return result.exit_code, " ".join(result.output.split())
+
+
+@pytest.fixture
+def somebodys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "rude_planner.py").write_text(RUDE, encoding="utf-8")
+    (tmp_path / "deaf_executor.py").write_text(DEAF, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("planner", "keyword"),
+        ("planner", "lookout:Lookout"),
+        ("executor", "speed_profile:SpeedProfileExecutor", "--policy", "speed_profile:EXAMPLE"),
+        ("benchmark", "right_of_way:RightOfWay"),
+    ],
+)
+def test_what_is_ours_keeps_its_contract(somebodys: None, words: tuple[str, ...]) -> None:
+    code, said = kit(*words)
+    assert code == 0, said
+    assert "fails" not in said
+
+
+def test_a_planner_that_breaks_the_contract_is_told_how(somebodys: None) -> None:
+    code, said = kit("planner", "rude_planner:Rude")
+    assert code == 1
+    for fault in (
+        "Its `model` is ''",
+        "the plan is signed 'somebody', 'else'",
+        "the policy is none",
+        "raised KeyError",
+    ):
+        assert fault in said
+
+
+def test_an_executor_that_does_not_hear_limits_is_told_so(somebodys: None) -> None:
+    code, said = kit("executor", "deaf_executor:Deaf", "--policy", "deaf_executor:EXAMPLE")
+    assert code == 1
+    assert "fails is held back" in said
+    assert "3 of 4 checks" in said
+
+
+def test_what_is_not_there_to_be_checked_is_said(somebodys: None) -> None:
+    assert "has no 'Nobody'" in kit("planner", "rude_planner:Nobody")[1]
+    assert "cannot be loaded" in kit("executor", "nowhere:X", "--policy", "nowhere:Y")[1]

@@ -24,7 +24,7 @@ class Bench:
 
     def __init__(self, folder: Path, starts: tuple[Start, ...], speed: float = 1.0) -> None:
         self.now_ns = 1_000_000_000
-        names: tuple[RingName, ...] = ("wishes", "observations", "reports", "hand")
+        names: tuple[RingName, ...] = ("setpoints", "observations", "reports", "hand")
         made = (Ring(folder / n, *SIZES[n], create=True) for n in names)
         self.setpoints, self.observations, self.reports, self.hand = made
         self.starts = starts

@@ -28,7 +28,7 @@ class Rig:
         names: tuple[RingName, ...] = ("orders", "policy_events", "checkpoints")
         orders, events, checkpoints = (Ring(folder / name, *SIZES[name], create=True) for name in names)
         self.orders, self.events = orders, events
-        self.rings = PolicyRings(orders, self.bench.wishes, events, checkpoints)
+        self.rings = PolicyRings(orders, self.bench.setpoints, events, checkpoints)
         self.starts, self.sandbox = starts, sandbox
         self.policy = self.new_policy()
         self.bench.control.begin_trip()
@@ -44,7 +44,7 @@ class Rig:
         for _ in range(count):
             self.policy.tick()
             self.reports.append(self.bench.tick())
-        message = self.bench.wishes.latest()
+        message = self.bench.setpoints.latest()
         assert message is not None
         return LiveSetpoints.decode(message.payload)
 

@@ -75,7 +75,7 @@ def test_an_observation_that_is_none_leaves_the_copy_as_it_was(bench: Bench) -> 
         ({"trip": 2}, "another trip"),
         ({"tick": 50}, "an instant to come"),
         ({"issued_ns": 1_000_000_000 + 2 * DT_NS + 2 * AHEAD_NS}, "issued in the future"),
-        ({"wishes": Setpoints(20.0, 1.5, "no-such:0")}, "no such lane"),
+        ({"setpoints": Setpoints(20.0, 1.5, "no-such:0")}, "no such lane"),
     ],
 )
 def test_a_wish_that_cannot_be_meant_for_now_is_refused_and_counted(

@@ -83,9 +83,9 @@ def test_keys_move_the_car_and_brake_stops_it(rig: Rig) -> None:
     before = rig.reports[-1]
     rig.bench.take_over(True)
     rig.period()
-    began = rig.reports[-1].wishes.target_speed_mps
+    began = rig.reports[-1].setpoints.target_speed_mps
     assert began is not None
-    assert press(rig, "slower", "slower").wishes.target_speed_mps == pytest.approx(began - 2 * STEP_MPS, abs=0.3)
+    assert press(rig, "slower", "slower").setpoints.target_speed_mps == pytest.approx(began - 2 * STEP_MPS, abs=0.3)
     report = press(rig, "slower", periods=80)
     assert report.speed_mps == pytest.approx(report.setpoints.target_speed_mps, abs=0.5)
     slow = report.speed_mps
@@ -117,10 +117,10 @@ def test_limits_stay_and_keys_do_not_pile_up_beyond_them(tmp_path: Path, sandbox
     for _ in range(30):
         rig.bench.take_over(True, "faster")
         rig.period(3)
-    assert rig.reports[-1].wishes.target_speed_mps == 26.0
+    assert rig.reports[-1].setpoints.target_speed_mps == 26.0
     rig.period(60)
     assert max(report.speed_mps for report in rig.reports) <= max(26.1, rig.reports[0].speed_mps)
-    assert press(rig, "slower").wishes.target_speed_mps == pytest.approx(26.0 - STEP_MPS, abs=0.3)
+    assert press(rig, "slower").setpoints.target_speed_mps == pytest.approx(26.0 - STEP_MPS, abs=0.3)
     rig.policy.close()
 
 
@@ -151,7 +151,7 @@ def test_at_a_crossing_the_keys_choose_the_turn_and_lead_on_from_the_stop_sign(
     rig = rig_on(tmp_path, sandbox, "quiet-intersection")
     rig.bench.take_over(True)
     rig.period()
-    assert press(rig, "left").wishes.turn == "left"
+    assert press(rig, "left").setpoints.turn == "left"
     for _ in range(200):
         report = press(rig, periods=1)
         if report.speed_mps < 0.1:
@@ -195,7 +195,7 @@ def test_given_back_the_car_holds_until_a_new_wish_is_driven(rig: Rig) -> None:
     rig.bench.take_over(False)
     back = rig.bench.tick()
     assert (back.level, back.taken_over, back.plan) == ("hold", False, "")
-    assert back.wishes.target_speed_mps == pytest.approx(speed)
+    assert back.setpoints.target_speed_mps == pytest.approx(speed)
     rig.period(100)
     report = rig.reports[-1]
     assert (report.level, report.plan, report.refused) == ("follow", "", {})
@@ -215,7 +215,7 @@ def test_what_the_policy_still_wishes_from_before_is_not_believed(rig: Rig) -> N
     for handovers, counted in ((0, {}), (1, {}), (3, {"of handovers to come": 1})):
         seen = rig.bench.observed()
         made = replace(old, tick=seen.tick, issued_ns=rig.bench.now_ns, handovers=handovers)
-        rig.bench.wishes.write(made.encode())
+        rig.bench.setpoints.write(made.encode())
         report = rig.bench.tick()
         assert (report.level, report.plan, report.refused) == ("hold", "", counted)
 
@@ -336,10 +336,10 @@ def test_every_key_of_a_period_counts_and_in_its_order(rig: Rig) -> None:
     for key in ("slower", "slower", "slower", "brake", "faster"):
         rig.bench.take_over(True, key)
         rig.bench.now_ns += 1
-    assert rig.bench.tick().wishes.target_speed_mps == pytest.approx(speed + STEP_MPS)
+    assert rig.bench.tick().setpoints.target_speed_mps == pytest.approx(speed + STEP_MPS)
     rig.bench.take_over(True, "faster")
     rig.bench.take_over(True, "brake")
-    assert rig.bench.tick().wishes.target_speed_mps == 0.0
+    assert rig.bench.tick().setpoints.target_speed_mps == 0.0
 
 
 # Nobody else ----------------------------------------------------------------------------------------------------------

@@ -84,7 +84,7 @@ def test_a_plan_is_checked_started_run_and_told_of(rig: Rig) -> None:
     assert rig.kinds() == [("started", "w1")]
     assert rig.period(45).state == "finished"
     assert rig.kinds() == [("said", "w1"), ("finished", "w1")]
-    assert rig.period().wishes.target_speed_mps == 20.0  # what was wished holds on
+    assert rig.period().setpoints.target_speed_mps == 20.0  # what was wished holds on
 
 
 def test_a_plan_that_crosses_the_limits_is_refused_and_what_is_driven_goes_on(rig: Rig) -> None:
@@ -101,7 +101,7 @@ def test_a_plan_that_crosses_the_limits_is_refused_and_what_is_driven_goes_on(ri
 def test_a_new_plan_takes_over_at_the_beginning_of_a_period_with_the_wishes_of_the_old(rig: Rig) -> None:
     rig.period()
     rig.order("def drive():\n    set_desired_time_headway(2.0)\n    while True:\n        yield autopilot()\n")
-    assert rig.period().wishes.time_headway_s == 2.0
+    assert rig.period().setpoints.time_headway_s == 2.0
     rig.order(FASTER, "w2")
     wish = rig.period()
     assert (wish.plan, wish.setpoints.target_speed_mps, wish.setpoints.time_headway_s) == ("w2", 31.0, 2.0)
@@ -114,7 +114,7 @@ def test_a_plan_begins_without_waiting_for_the_next_instant(rig: Rig) -> None:
     assert not rig.policy.tick()  # nothing new was shown
     rig.order(HOLD_20)
     assert rig.policy.tick()
-    message = rig.bench.wishes.latest()
+    message = rig.bench.setpoints.latest()
     assert message is not None
     assert LiveSetpoints.decode(message.payload).plan == "w1"
     assert not rig.policy.tick()
@@ -182,8 +182,8 @@ def test_a_program_goes_on_where_it_stood_when_its_process_dies(rig: Rig) -> Non
     after = rig.period()
     assert rig.kinds() == [("started", "w1"), ("resumed", "w1")]
     assert (after.plan, after.state) == ("w1", "running")
-    assert before.wishes.target_speed_mps is not None
-    assert after.wishes.target_speed_mps == pytest.approx(before.wishes.target_speed_mps - 0.1)
+    assert before.setpoints.target_speed_mps is not None
+    assert after.setpoints.target_speed_mps == pytest.approx(before.setpoints.target_speed_mps - 0.1)
 
 
 def test_a_program_that_was_running_whenever_its_process_died_is_given_up(rig: Rig) -> None:

@@ -65,7 +65,7 @@ def test_a_wish_is_driven_while_every_other_process_is_killed(tmp_path: Path) ->
         folder = runtime.folder
         wish = runtime.ask("Slow down to 20 m/s and keep going.")
         until(runtime, lambda: following(heard, wish))
-        speed = heard.reports[-1].wishes.target_speed_mps
+        speed = heard.reports[-1].setpoints.target_speed_mps
 
         before = runtime.pid("policy")
         os.kill(before, signal.SIGKILL)
@@ -81,7 +81,7 @@ def test_a_wish_is_driven_while_every_other_process_is_killed(tmp_path: Path) ->
         second = runtime.ask("Go back up to 25 m/s.")
         until(runtime, lambda: following(heard, second))
         assert runtime.pid("planner") != planner
-        assert heard.reports[-1].wishes.target_speed_mps != speed
+        assert heard.reports[-1].setpoints.target_speed_mps != speed
         runtime.stop()
         pids = [runtime.pid("control"), runtime.pid("policy"), runtime.pid("planner")]
         figures = runtime.figures()
@@ -146,7 +146,7 @@ def test_a_person_takes_the_wheel_and_gives_it_back(parameters: str) -> None:
         assert early is not None
         assert (early.kind, early.text) == ("interrupted", TOOK_OVER), "what has no plan yet ends as well"
         until(runtime, lambda: bool(heard.reports) and heard.reports[-1].taken_over)
-        assert heard.reports[-1].wishes.target_speed_mps != 0.0
+        assert heard.reports[-1].setpoints.target_speed_mps != 0.0
         runtime.take_over(False)
         until(runtime, lambda: heard.reports[-1].level == "follow")
         assert heard.reports[-1].plan == ""
@@ -161,7 +161,7 @@ def test_a_person_takes_the_wheel_and_gives_it_back(parameters: str) -> None:
         assert interaction.taken_over
         assert interaction.answer in heard.events
         runtime.hand("brake")
-        until(runtime, lambda: heard.reports[-1].wishes.target_speed_mps == 0.0)
+        until(runtime, lambda: heard.reports[-1].setpoints.target_speed_mps == 0.0)
         asked = runtime.ask(SLOWER)
         until(runtime, lambda: runtime.interactions[asked].answer is not None)
         answer = runtime.interactions[asked].answer

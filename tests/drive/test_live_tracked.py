@@ -162,7 +162,7 @@ def test_the_longest_trajectory_fits_where_wishes_are_written(begin: Callable[[S
     wish = rig.period()
     assert isinstance(wish, LiveSetpoints)
     pose = (12345.678, -9876.543, -3.14159, 22.345)
-    rig.bench.wishes.write(replace(wish, steered=Steered(Trajectory(points, 0.1), "a" * 200, pose)).encode())
+    rig.bench.setpoints.write(replace(wish, steered=Steered(Trajectory(points, 0.1), "a" * 200, pose)).encode())
 
 
 def test_a_trajectory_is_driven_by_the_processes_themselves_although_the_policy_dies(tmp_path: Path) -> None:

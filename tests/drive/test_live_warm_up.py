@@ -20,7 +20,7 @@ from chauffeur.safety.shield import rollout
 from chauffeur.worlds.highway import HighwayWorld
 
 def loaded():
-    return {name: len(one.signatures) for name, one in vars(foresight).items() if hasattr(one, "signatures")}
+    return {name: len(one.signatures) for name, one in vars(rollout).items() if hasattr(one, "signatures")}
 
 road = {"type": "dt-intersection-v0", "num_vehicles_left": 3, "num_vehicles_right": 3}
 crossing = Scenario("crossing", "highway", road, 4000)
@@ -30,12 +30,12 @@ before, rules = loaded(), set()
 world = HighwayWorld()
 world.reset(crossing, 4000)
 driver, shield = world.driver(), shield_for(world, Limits())
-wishes = driver.initial_setpoints()
+setpoints = driver.initial_setpoints()
 for _ in range(120):
     if world.ended:
         break
     observation = world.observe()
-    settled = driver.settle(wishes)
+    settled = driver.settle(setpoints)
     steered = driver.command(settled)
     command = Command(5.0, steered.steering_rad + 0.1)  # full throttle, and off its way
     done = actuate(world, observation, command, settled.target_lane, shield)

@@ -29,7 +29,7 @@ def rings(tmp_path):
     made = {name: ring(tmp_path, name, create=True) for name in SIZES}
     made["observations"].write(MirroredInstant(3, 40, b"x").encode())
     wish = LiveSetpoints(3, 40, "w1", time.monotonic_ns(), FOREVER_NS, "running", 1, Setpoints(20.0))
-    made["wishes"].write(wish.encode())
+    made["setpoints"].write(wish.encode())
     yield made
     for each in made.values():
         each.close()
@@ -44,7 +44,7 @@ def test_whatever_the_vandal_does_a_reader_gets_a_message_or_none(tmp_path, ring
     assert any(bytes(each._map) != before[name] for name, each in rings.items() if name != "orders") or "orders" in what
     for name, each in rings.items():
         message = each.latest()
-        if name == "wishes" and message is not None:
+        if name == "setpoints" and message is not None:
             try:
                 wish = LiveSetpoints.decode(message.payload)
             except MessageError:

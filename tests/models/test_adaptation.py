@@ -92,7 +92,7 @@ class Trained:
 
     @property
     def recipe(self) -> AdaptRecipe:
-        """How much so small a network forgets depends on the rounding of the machine; that one is ruined shows all the same."""
+        """How much so small a network forgets depends on the machine's rounding; a ruined one shows all the same."""
         data = self.folder / "data"
         return AdaptRecipe(data / "seen.jsonl", data / "train.jsonl", tolerance=50.0, judged=40, rate=5e-3, threads=1)
 

@@ -49,7 +49,7 @@ def _drive(tick: Callable[[], Trace], world: World, ticks: int) -> list[Trace]:
         traces.append(trace)
         if trace.state != "running":
             break
-        world.step(driver.command(driver.settle(trace.wishes)))
+        world.step(driver.command(driver.settle(trace.setpoints)))
     return traces
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 from pathlib import Path
@@ -12,7 +13,7 @@ from typer.core import TyperGroup
 
 from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
 from chauffeur.concept import ConfigError
-from chauffeur.concept.registry import plugin_names
+from chauffeur.concept.registry import load_plugin, plugin_names
 
 GROUP = "chauffeur.benchmarks"
 
@@ -31,8 +32,17 @@ class BenchGroup(TyperGroup):
         if command is not None or cmd_name not in plugin_names(GROUP):
             return command
         app = typer.Typer(rich_markup_mode="markdown")
-        app.command(cmd_name, help=f"The benchmark {cmd_name!r}, from an installed package.")(plugin)
+        app.command(cmd_name, help=_about(cmd_name))(plugin)
         return typer.main.get_command(app)
+
+
+def _about(name: str) -> str:
+    """What a benchmark is, in the words of its own docstring."""
+    try:
+        words = (inspect.getdoc(load_plugin(GROUP, name)) or "").partition("\n\n")[0].replace("\n", " ")
+    except ConfigError as error:
+        return f"Cannot be loaded: {error}"
+    return words or f"The benchmark {name!r}, from an installed package."
 
 
 def plugin(
@@ -61,7 +71,7 @@ def plugin(
 
     console = stdout()
     name = str(ctx.info_name)
-    bench = make_benchmark(name, **_options(option or []))
+    bench = make_benchmark(name, **options_of(option or []))
     make = {"plans": make_planner, "words": make_answerer}.get(bench.asks)
     who = None if make is None else make(planner, **planner_options(planner, base_url))
     part = WHOLE if shard is None else Shard.parse(shard, os.environ)
@@ -73,7 +83,7 @@ def plugin(
     finish(console, run)
 
 
-def _options(given: list[str]) -> dict[str, Any]:
+def options_of(given: list[str]) -> dict[str, Any]:
     """Options of the benchmark: numbers and truth values as JSON writes them, all else as text."""
     found: dict[str, Any] = {}
     for text in given:

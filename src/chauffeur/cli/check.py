@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Annotated, Any
+from collections.abc import Callable, Sequence
+from types import ModuleType
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from chauffeur.worlds.conformance import ConformanceFinding
 
 EXAMPLES = """
 Examples:
@@ -15,6 +19,12 @@ Examples:
     chauffeur check world highway --scenario intersection
 
     chauffeur check world parking --config '{"aisles": 2}'
+
+    chauffeur check planner my_package.my_planner:MyPlanner
+
+    chauffeur check executor speed_profile:SpeedProfileExecutor --policy speed_profile:EXAMPLE
+
+    chauffeur check benchmark right_of_way:RightOfWay
 """
 
 check_app = typer.Typer(
@@ -41,13 +51,69 @@ def world(
 
     Exit code 1 where a check finds something.
     """
+    from chauffeur.worlds.conformance import check_world
+
+    _tell(check_world(_world_class(name), _scenario(name, scenario, config, seed)))
+
+
+@check_app.command(epilog=EXAMPLES)
+def planner(
+    name: Annotated[str, typer.Argument(metavar="PLANNER", help="A registered planner, or MODULE:CLASS.")],
+    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+) -> None:
+    """Ask a planner usual and strange things: who it is, plans that can be driven, no surprises.
+
+    It is asked some twenty times. Exit code 1 where a check finds something.
+    """
+    from chauffeur.cli.bench_run import planner_options
+    from chauffeur.drive.conformance import check_planner
+    from chauffeur.planners.registry import make_planner
+
+    asked = _named(name)() if ":" in name else make_planner(name, **planner_options(name, base_url))
+    _tell(check_planner(asked))
+
+
+@check_app.command(epilog=EXAMPLES)
+def executor(
+    name: Annotated[str, typer.Argument(metavar="MODULE:CLASS", help="The executor's class.")],
+    policy: Annotated[str, typer.Option(metavar="MODULE:NAME", help="A policy of its kind to try it with.")],
+    scenario: Annotated[str, typer.Option(help="A built-in scenario to drive it on.")] = "cruise",
+) -> None:
+    """Drive a policy with its executor: vouched for, finite commands, the same trip twice, held back by set-points.
+
+    Exit code 1 where a check finds something.
+    """
+    from chauffeur.drive.conformance import check_executor
+
+    _tell(check_executor(_named(name), _named(policy), _scenario("", scenario, "{}", 0)))
+
+
+@check_app.command(epilog=EXAMPLES)
+def benchmark(
+    name: Annotated[str, typer.Argument(metavar="BENCHMARK", help="A registered benchmark, or MODULE:CLASS.")],
+    option: Annotated[
+        list[str] | None, typer.Option("--option", "-o", help="An option of the benchmark, NAME=VALUE; may come again.")
+    ] = None,
+) -> None:
+    """Hold a benchmark against the kernel's protocol; its first item is run.
+
+    Exit code 1 where a check finds something.
+    """
+    from chauffeur.bench.kernel.benchmark import make_benchmark
+    from chauffeur.bench.kernel.conformance import check_benchmark
+    from chauffeur.cli.bench_plugin import options_of
+
+    given = options_of(option or [])
+    _tell(check_benchmark(_named(name)(**given) if ":" in name else make_benchmark(name, **given)))
+
+
+def _tell(findings: Sequence[ConformanceFinding]) -> None:
+    """Print what a kit found; exit code 1 where that is anything."""
     from rich.text import Text
 
     from chauffeur.cli.console import stdout
     from chauffeur.cli.failures import FAILED
-    from chauffeur.worlds.conformance import check_world
 
-    findings = check_world(_world_class(name), _scenario(name, scenario, config, seed))
     console = stdout()
     for finding in findings:
         console.print(Text("fails  " if finding.faults else "keeps  ", "red" if finding.faults else "green"), end="")
@@ -60,24 +126,42 @@ def world(
         raise typer.Exit(FAILED)
 
 
-def _world_class(name: str) -> Callable[[], Any]:
-    """The class at `module:Class`, the only world of a module, or a registered one. Raises ConfigError."""
+def _module(name: str) -> ModuleType:
+    """A module by its name, found as `python -m` finds it. Raises ConfigError."""
     import importlib
     import os
     import sys
 
+    from chauffeur.concept import ConfigError
+
+    if os.getcwd() not in sys.path:  # noqa: PTH109 - where the person stands, as `python -m` has it
+        sys.path.insert(0, os.getcwd())  # noqa: PTH109
+    try:
+        return importlib.import_module(name)
+    except (ImportError, ValueError, TypeError) as error:
+        raise ConfigError(f"The module {name!r} cannot be loaded: {error}.", hint="Check its name.") from error
+
+
+def _named(name: str) -> Any:
+    """What `module:NAME` names. Raises ConfigError."""
+    from chauffeur.concept import ConfigError
+
+    module_name, _, own = name.partition(":")
+    module = _module(module_name)
+    if not own or not hasattr(module, own):
+        raise ConfigError(f"{module_name} has no {own!r}.", hint="Say MODULE:NAME.")
+    return getattr(module, own)
+
+
+def _world_class(name: str) -> Callable[[], Any]:
+    """The class at `module:Class`, the only world of a module, or a registered one. Raises ConfigError."""
     from chauffeur.concept import ConfigError
     from chauffeur.concept.registry import load_plugin, plugin_names
 
     module_name, _, class_name = name.partition(":")
     if not class_name and module_name in plugin_names("chauffeur.worlds"):
         return load_plugin("chauffeur.worlds", module_name)
-    if os.getcwd() not in sys.path:  # noqa: PTH109 - where the person stands, as `python -m` has it
-        sys.path.insert(0, os.getcwd())  # noqa: PTH109
-    try:
-        module = importlib.import_module(module_name)
-    except (ImportError, ValueError, TypeError) as error:
-        raise ConfigError(f"The module {module_name!r} cannot be loaded: {error}.", hint="Check its name.") from error
+    module = _module(module_name)
     if class_name:
         found = getattr(module, class_name, None)
         if not isinstance(found, type):

@@ -1,4 +1,4 @@
-"""What is wished when the policy can no longer be asked: the same for a program that died and for one not heard of."""
+"""Fallback set-points after a policy failure: the same for a program that died and for one not heard of."""
 
 from __future__ import annotations
 

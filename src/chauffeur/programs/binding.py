@@ -188,7 +188,7 @@ class DrivingApis:
         return result
 
     def foreseen(self) -> list[Any]:
-        """Answers to what is likely to be asked in this period, as of now, by slot (foresight.py)."""
+        """Answers to what is likely to be asked in this period, as of now, by slot (prefetch.py)."""
         answers: list[Any] = []
         self._foreseen = {}
         for slot, question in self._questions.expected(self._tick):

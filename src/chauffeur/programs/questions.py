@@ -1,4 +1,4 @@
-"""The host's side of foresight: which questions a program has asked, and which it is likely to ask in this period."""
+"""The host's side of prefetching: which questions a program has asked, and which it is likely to ask in this period."""
 
 from __future__ import annotations
 

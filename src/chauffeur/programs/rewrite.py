@@ -54,7 +54,7 @@ class Prepared:
     """A program ready for the sandbox.
 
     Attributes:
-        helpers: What is read before it: stand-ins for the driving APIs (foresight.py), Python bodies of built-ins,
+        helpers: What is read before it: stand-ins for the driving APIs (prefetch.py), Python bodies of built-ins,
             rewritten library functions.
         program: Rewritten program, ending in the call of its main function.
         main: Name of the main function.

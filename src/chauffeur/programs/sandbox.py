@@ -68,7 +68,7 @@ class HostCall:
     Attributes:
         name: Which host function it calls.
         arguments, keywords: Untrusted values of any type and size.
-        slot: Under which number the sandbox remembers the question (foresight.py), as it says.
+        slot: Under which number the sandbox remembers the question (prefetch.py), as it says.
     """
 
     name: str

@@ -20,6 +20,7 @@ from chauffeur.bench.kernel.report import tables
 from chauffeur.bench.kernel.store import Row
 from chauffeur.concept import ChauffeurError, Context, Plan, PlanRequest, Scenario, Thoughts, Usage
 from chauffeur.planners.base import Prose
+from chauffeur.worlds.conformance import ConformanceFinding
 
 _VERSIONED: Final = re.compile(r"[\w./-]{1,80}-v\d{1,4}")
 _REFUSED: Final = Plan(Thoughts("No."), None, refusal="No.", planner="conformance", model="conformance")
@@ -38,13 +39,22 @@ class _Desk:
         del request
 
 
-def faults(benchmark: Benchmark[Any]) -> list[str]:
-    """What is wrong with a benchmark, in sentences; empty when it conforms.
+def check_benchmark(benchmark: Benchmark[Any]) -> tuple[ConformanceFinding, ...]:
+    """What every check finds in a benchmark.
 
     Its first item is asked about, answered with a refusal or with no words, and done: a drive of that item may be
     simulated.
     """
-    return [*_of_itself(benchmark), *_of_items(benchmark), *_of_first(benchmark)]
+    return (
+        ConformanceFinding("what it is", tuple(_of_itself(benchmark))),
+        ConformanceFinding("items", tuple(_of_items(benchmark))),
+        ConformanceFinding("the first item", tuple(_of_first(benchmark))),
+    )
+
+
+def faults(benchmark: Benchmark[Any]) -> list[str]:
+    """What is wrong with a benchmark, in sentences; empty when it conforms."""
+    return [fault for finding in check_benchmark(benchmark) for fault in finding.faults]
 
 
 def _of_itself(benchmark: Benchmark[Any]) -> Iterator[str]:

@@ -186,7 +186,7 @@ class Scribe:
         self._thread.start()
 
     def write(self, store: RowStore, row: Row) -> None:
-        """Have a row written; the store shows it at once.
+        """Append a row; the store shows it at once.
 
         Raises:
             TypeError, ValueError: The row holds something that is no JSON.

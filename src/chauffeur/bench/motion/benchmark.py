@@ -220,5 +220,8 @@ def _matrix(policy: Mapping[str, Any] | None) -> ActionMatrix | None:
 
 
 def motion(plant: Plant = "std", seed: int = 1, weather: Told = "told", camera: Shown = "off") -> MotionBenchmark:
-    """The benchmark, as its entry point gives it; arguments as of MotionBenchmark."""
+    """Gains for three manoeuvres in five kinds of weather (paper Tab. XI): comfort, safety, alignment, latency.
+
+    Arguments as of MotionBenchmark.
+    """
     return MotionBenchmark(plant, seed, weather, camera)

@@ -396,5 +396,8 @@ def _no_system(limits: Limits) -> SystemMessage:
 def motion_passengers(
     planner: str = "vlm", passengers: int = 20, seed: int = 1, trips: int = 5, plant: Plant = "std"
 ) -> TakeoverBenchmark:
-    """The benchmark, as its entry point gives it; arguments as of TakeoverBenchmark."""
+    """Takeovers of simulated passengers by directness and memory, with gains (paper Fig. 14-15).
+
+    Arguments as of TakeoverBenchmark.
+    """
     return TakeoverBenchmark(planner, passengers, seed, trips, plant)

@@ -45,7 +45,7 @@ Key = Literal["faster", "slower", "left", "right", "brake"]
 
 
 class MessageError(ValueError):
-    """A message that is none. The text is short and fixed, so that it can be counted."""
+    """Malformed message. The text is short and fixed, so that it can be counted."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -96,7 +96,7 @@ class Planning:
             try:
                 requests.append(read_request(message.payload))
             except MessageError as error:
-                self._tell("garbage", "", f"A wish that is none: {error}.")
+                self._tell("garbage", "", f"Malformed wish: {error}.")
         if not requests:
             return
         await self._give_up("A newer wish came.")

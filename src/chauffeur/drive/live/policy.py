@@ -229,7 +229,7 @@ class Policy:
             try:
                 orders.append(read_order(message.payload))
             except MessageError as error:
-                self._tell("garbage", "", f"A plan that is none: {error}.")
+                self._tell("garbage", "", f"Malformed plan: {error}.")
         for passed_over in orders[:-1]:
             self._tell("superseded", passed_over.wish, "Another plan came right after it.")
         before = self._driven

@@ -50,7 +50,7 @@ class DrivePace:
         self.worst_late_s = 0.0
 
     def await_period(self, *, driven: bool) -> None:
-        """Come back when the next period begins; `driven` tells whether being late for it matters."""
+        """Sleep until the next tick; lateness is counted only where `driven`."""
         self._clock.wait_until(self._due_s)
         delay_s = self._clock.now_s() - self._due_s
         if driven and delay_s > LATE_S:

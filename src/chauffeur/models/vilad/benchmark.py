@@ -400,5 +400,8 @@ class InstructionBenchmark:
 
 
 def instructions(task: str = "both", split: str = "all", count: int = 300, seed: int = 2024) -> InstructionBenchmark:
-    """The benchmark, as its entry point gives it; arguments as of InstructionBenchmark."""
+    """Commands driven closed loop: interactive parking and short drives (paper Tab. XIII).
+
+    Arguments as of InstructionBenchmark.
+    """
     return InstructionBenchmark(task, split, count, seed)

@@ -200,7 +200,7 @@ class Junction:
         )
 
     def _keep_clear(self, lane: LaneId) -> Array:
-        """The straight lanes nobody may stand in who is in a lane, as `foresight` wants them.
+        """The straight lanes nobody may stand in who is in a lane, as `rollout` wants them.
 
         Who is to come along its own lane, the one before it, or one that forks off where it does, comes from behind.
         """
