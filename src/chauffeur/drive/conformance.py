@@ -10,7 +10,7 @@ import asyncio
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from chauffeur.concept import ChauffeurError, Instruction, Limits, Plan, PlannerError, PlanRequest, Scenario, Setpoints
 from chauffeur.drive.actuate import actuate
@@ -86,7 +86,7 @@ async def _each(
 async def _asked(planner: Planner, request: PlanRequest) -> Plan | str:
     """A plan, or what is wrong, in words; empty where the planner said in the agreed way that it has none."""
     try:
-        plan: object = await asyncio.wait_for(planner.plan(request), PLAN_WITHIN_S)
+        plan = cast("object", await asyncio.wait_for(planner.plan(request), PLAN_WITHIN_S))
     except TimeoutError:
         return f"no answer within {PLAN_WITHIN_S:.0f} s."
     except PlannerError as error:
