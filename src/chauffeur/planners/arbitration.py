@@ -59,7 +59,7 @@ _DENIALS: Final[tuple[tuple[str, frozenset[str], tuple[str, str]], ...]] = (
     ("lane.right", frozenset({"right"}), _KEEP_LANE),
     ("overtake", _PASSING, _KEEP_BEHIND),
     ("pull_over", frozenset({"pull"}) | _STOPPING, _KEEP_SPEED),
-    ("stop", _STOPPING, _KEEP_SPEED),
+    ("stop", frozenset({"pull"}) | _STOPPING, _KEEP_SPEED),
     ("speed.decrease", _SLOWING, _KEEP_SPEED),
     ("speed.increase", _HASTENING, _KEEP_SPEED),
 )
@@ -230,9 +230,18 @@ def denied_intent(text: str, intent: str) -> tuple[str, str] | None:
     return None
 
 
-def undenied(planner: Planner, plan: Plan, request: PlanRequest, begun: float) -> Plan:
-    """The plan, or, where it does what the words deny ("don't slow down"), the question what to do instead."""
-    if plan.policy is None or (instead := denied_intent(request.instruction.text, plan.intent)) is None:
+def undenied(planner: Planner, plan: Plan, request: PlanRequest, begun: float, *, meant: str = "") -> Plan:
+    """The plan, or, where it does what the words deny ("don't slow down"), the question what to do instead.
+
+    Args:
+        planner: Whose plan it is.
+        plan: As it was made.
+        request: The words.
+        begun: When planning began, by `time.perf_counter`.
+        meant: Of a plan that asks: intent of what a yes would drive.
+    """
+    intent = plan.intent if plan.policy is not None else meant
+    if not intent or (instead := denied_intent(request.instruction.text, intent)) is None:
         return plan
     offer, words = instead
     question = f"{_DENIED} Shall I {words}?" if words else f"{_DENIED} What shall I do instead?"

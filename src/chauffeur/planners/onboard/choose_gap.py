@@ -77,7 +77,8 @@ def _step(meaning: Meaning, now: float, options: Options) -> Chosen | Declined:
     extra = options.leaning.headway_s * options.speed
     if meaning.change > 0:
         factor, least = _WIDER.get(meaning.degree, _PLAIN_WIDER)
-        gap = min(max(now * factor, now + least) + max(0.0, extra), _FARTHEST_M)
+        gap = max(now * factor, now + least) + max(0.0, extra)
+        gap = min(max(gap, options.least_gap_m), _FARTHEST_M)
         if gap < now + 1.0:
             return Declined(
                 f"The vehicle ahead is {number(now)} m away already; further back I would lose sight of it."

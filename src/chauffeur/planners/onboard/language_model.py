@@ -94,7 +94,9 @@ def answer(
     question = doubt(wish, history, reply.steps)
     if not question and written.sure < UNSURE:
         question = f"{UNSURE_WORDS} {shall_i(reply.steps)}"
-    return (OnboardReply(question=question), written) if question and question != confirmed else (reply, written)
+    if not question or question == confirmed:
+        return reply, written
+    return OnboardReply(question=question, meant="+".join(step.meaning.family for step in reply.steps)), written
 
 
 def _with_said_numbers(reply: OnboardReply, wish: str, history: Sequence[str]) -> OnboardReply:
@@ -226,7 +228,8 @@ class LanguageModelPlanner:
         linked, used, wish = settled.linked, settled.used, settled.wish
         if asks := settled.question(request):
             plan = asked(self, asks, begun, offer=wish, raw=settled.written.text)
-            return replace(plan, usage=usage_of(settled.written))
+            plan = replace(plan, usage=usage_of(settled.written))
+            return undenied(self, plan, request, begun, meant=linked.choice.intent)
         plan = Plan(
             thoughts=thoughts_of(linked.reading, linked.choice, settled.situation, used),
             policy=Program(settled.source, library=linked.library),
@@ -277,7 +280,9 @@ class LanguageModelPlanner:
             words = reply.question or reply.refusal
             intent = "ask" if reply.question else "refuse"
             plan = declined(self, words, begun, intent=intent, usage=usage_of(written), raw=written.text)
-            return replace(plan, offer=wish) if reply.question.startswith((UNSURE_WORDS, NOT_THE_NUMBER)) else plan
+            if reply.question.startswith((UNSURE_WORDS, NOT_THE_NUMBER)):
+                return undenied(self, replace(plan, offer=wish), request, begun, meant=reply.meant)
+            return plan
         leaning = partial(leaning_of, request.history, corrections=corrections_of(request.rounds))
         wary = wary_of(wish, "+".join(step.meaning.family for step in reply.steps))
         linked = link(reply.steps, situation, request.limits, leaning, wary=wary)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from chauffeur.concept import Limits, Situation
-from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH, kmh, mph
+from chauffeur.concept.units import M_PER_CAR_LENGTH, MPS_PER_KMH, MPS_PER_MPH, kmh, mph
 from chauffeur.planners.onboard.exemplars import Filled
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.meaning import Amount, Change
@@ -114,6 +115,13 @@ class Options:
     def last_lane(self) -> int:
         """Index of the rightmost lane that is no emergency lane."""
         return self.situation.lane_count - (2 if self.situation.emergency_lane else 1)
+
+    @property
+    def least_gap_m(self) -> float:
+        """Smallest gap that the checks allow behind the vehicle ahead, m, centre to centre, rounded up."""
+        front = self.situation.front
+        following_mps = self.speed if front is None else front.speed_mps
+        return math.ceil(M_PER_CAR_LENGTH + self.limits.min_time_headway_s * max(following_mps, 0.0))
 
     def headway(self, wanted_s: float) -> float:
         """A headway of the planner's own choice, s, inside the limits."""

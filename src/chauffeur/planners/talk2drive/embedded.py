@@ -157,7 +157,10 @@ class EmbeddedParameters:
         if isinstance(settled, Plan) or plan.policy is None:
             return plan
         asks = settled.question(request)
-        return asked(self, asks, begun, offer=settled.wish, raw=plan.raw) if asks else plan
+        if not asks:
+            return plan
+        question = asked(self, asks, begun, offer=settled.wish, raw=plan.raw)
+        return undenied(self, question, request, begun, meant=settled.linked.choice.intent)
 
     def _or_asked(self, plan: Plan, hint: Hint, request: PlanRequest, begun: float) -> Plan:
         """What a hint was taken for, or, where that is not sure, the question whether it is meant."""
