@@ -28,7 +28,7 @@ def control_figures(tally: Tally) -> Iterator[tuple[str, str]]:
         f"{FALLBACK_LEVELS[level]}: {_periods(count)}" for level, count in tally.levels.items() if level != "follow"
     ]
     if lower:
-        yield "ladder", "; ".join(lower) + "."
+        yield "fallbacks", "; ".join(lower) + "."
     yield from _punctuality(tally)
     last = tally.last
     if last is not None and last.refused:

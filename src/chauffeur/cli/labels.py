@@ -16,7 +16,7 @@ FALLBACK_LEVELS: Final[dict[FallbackLevel, str]] = {
     "stop": "stops",
     "hand": "you drive",
 }
-"""The ladder of fallbacks in words."""
+"""The fallback levels in words."""
 
 EVENTS: Final[dict[EventKind, tuple[str, str]]] = {
     "planned": ("thinks", "cyan"),

@@ -177,7 +177,7 @@ class ParametersDriver:
         """What is wanted in this period where others say how fast, with what gap, and in which lane.
 
         Args:
-            safe: Theirs, within the limits: of the ladder of fallbacks, for one.
+            safe: Theirs, within the limits: of the fallback levels, for one.
         """
         observation = self._world.observe()
         lane = self._road.get(safe.target_lane)

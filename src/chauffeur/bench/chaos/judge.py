@@ -157,7 +157,7 @@ class Recovery:
     """How control came through a fault.
 
     Attributes:
-        worst: Lowest level of the ladder after the fault.
+        worst: Lowest fallback level after the fault.
         to_follow_s: From the fault to the first period that followed fresh wishes again, by the clock; 0 where they
             were followed throughout, None where they were not again in this trip.
         to_new_plan_s: From the fault to the first period that followed a plan made after it; None for none.

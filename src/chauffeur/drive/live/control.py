@@ -1,6 +1,6 @@
 """The control process: one period after the other, it alone commands the vehicle.
 
-It knows the world, the driver, the shield and the ladder of fallbacks. It reads the policy's newest wish without ever
+It knows the world, the driver, the shield and the fallback levels. It reads the policy's newest wish without ever
 waiting for it, believes nothing of it that it cannot check, and goes on whatever has become of every other process.
 Set-points of a program go through the world's own driver; every other kind of policy is driven by its executor.
 While the person has the wheel, the policy is not listened to.

@@ -38,7 +38,7 @@ _LONGEST_LANE: Final = 200
 _MOST_STOPS: Final = 64
 
 FallbackLevel = Literal["follow", "hold", "keep", "slow", "stop", "hand"]
-"""Of the fallback ladder, best first (ladder.py); beside it `hand`: the person has taken over."""
+"""Fallback level, best first (fallback_levels.py); beside it `hand`: the person has taken over."""
 
 Key = Literal["faster", "slower", "left", "right", "brake"]
 """Of the person at the wheel."""
@@ -277,7 +277,7 @@ class Report:
     Attributes:
         trip, tick: Which.
         late_ns: How late it began.
-        level: Of the fallback ladder.
+        level: Fallback level.
         plan: Id of the plan that is followed, empty for none.
         state, line: Of its program, as last heard.
         age_s: Age of the wish that is followed.

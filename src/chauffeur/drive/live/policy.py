@@ -74,7 +74,7 @@ from chauffeur.worlds.base import EGO
 from chauffeur.worlds.places import ParkingPlaces
 
 LIVE_BUDGET: Final = Budget(turn_s=0.1, tick_s=0.2, grace_s=0.05, start_s=1.0)
-"""Wider than a control period: a policy that is late once is what the ladder's first levels are for."""
+"""Wider than a control period: a policy that is late once is what the first fallback levels are for."""
 MOST_RESUMPTIONS: Final = 3
 """A program that was running each time the process died is not trusted for ever."""
 _FRESH_NS: Final = 150_000_000

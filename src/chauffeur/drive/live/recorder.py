@@ -34,7 +34,7 @@ JUDGED: Final = "live"
 """Name of the judgement over all checks, made when a plan is about to start: the policy tells no more of it."""
 
 _DRIVEN: Final[frozenset[FallbackLevel]] = frozenset({"follow", "hold"})
-"""Between these the ladder goes up and down without anything being let go of."""
+"""Between these the level goes up and down without anything being let go of."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,7 +94,7 @@ class Scene:
         limit_mps: Speed limit here.
         target_mps, headway_s, lane: What is wished now; None where nothing is.
         place: Of the wished lane on its road, counted from the left; 0 leftmost.
-        level: Of the fallback ladder (`follow`, `hold`, `keep`, `slow`, `stop`).
+        level: Fallback level (`follow`, `hold`, `keep`, `slow`, `stop`).
         wish: Id of the wish that is driven, empty for none.
         line: Program line it waits at.
         shield: Why the shield changed the command; empty where it did not.
