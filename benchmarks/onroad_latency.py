@@ -24,7 +24,7 @@ import ros_debian as debian
 import ros_graph as ros
 
 from chauffeur.concept import PersonId
-from chauffeur.drive.onroad import OnRoadAnswer, VehicleSession, open_books
+from chauffeur.drive.onroad import OnRoadAnswer, VehicleSession, open_recorder
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.ros.factory import open_vehicle
@@ -53,7 +53,7 @@ async def measure(folder: Path, wishes: int, *, audited: bool) -> list[tuple[OnR
         debian.roscore(packages, port),
         debian.rospy_node(debian.LISTENER, packages, port, "pure_pursuit", "follower"),
         debian.rospy_node(debian.LISTENER, packages, port, "waypoint_replanner", "replanner") as node,
-        open_books(folder / "audit.jsonl", file, "ros1", dry_run=False) as books,
+        open_recorder(folder / "audit.jsonl", file, "ros1", dry_run=False) as books,
     ):
         car = open_vehicle(settings)
         try:

@@ -25,7 +25,9 @@ STEPS_ITS_OWN = {
 """Among worlds: what tests them, the highway's disturbed twin, its gymnasium face, a town with its scenarios on stage,
 and the town that steps SUMO and the people in it."""
 
-STEPS_AN_EXECUTOR = {"drive/episode.py", "drive/live/control.py", "drive/live/policy.py"}
+STEPS_AN_EXECUTOR = {
+    "drive/conformance.py", "drive/episode.py", "drive/live/control.py", "drive/live/policy.py",
+}  # fmt: skip
 """Ask an executor for its command, and hand it to the one door; the policy process, which goes along on a copy of the
 world that nobody steps, hands it to nobody."""
 

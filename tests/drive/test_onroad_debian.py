@@ -18,7 +18,7 @@ from ros_debian import LISTENER, rospy_node
 
 from chauffeur.concept import PersonId
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import OnRoadAnswer, VehicleSession, open_books
+from chauffeur.drive.onroad import OnRoadAnswer, VehicleSession, open_recorder
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.audit import read_records, verify
@@ -48,7 +48,7 @@ def test_a_session_over_a_roscore_that_dies(tmp_path: Path) -> None:
 
     async def whole() -> None:
         car = open_vehicle(settings)
-        with open_books(tmp_path / "audit.jsonl", file, settings.interface, dry_run=False) as books:
+        with open_recorder(tmp_path / "audit.jsonl", file, settings.interface, dry_run=False) as books:
             async with VehicleSession(
                 car, settings, planner, person=ana, memory=memory, books=books, tell=told.append
             ) as road:

@@ -21,7 +21,7 @@ from ros_graph import FOLLOWER, REPLANNER, Master, Subscriber, VelocityPublisher
 
 from chauffeur.concept import Parameters
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import OnRoadAnswer, VehicleSession, open_books
+from chauffeur.drive.onroad import OnRoadAnswer, VehicleSession, open_recorder
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.audit import read_records, verify
@@ -159,7 +159,7 @@ def test_a_roscore_that_dies_and_comes_back(tmp_path: Path, embedded: Planner) -
             answers.append(await road.ask("Drive at 25 km/h."))
             await until(lambda: len(fresh[1].got) == 2)
 
-    with open_books(log, file, "ros1", dry_run=False) as books:
+    with open_recorder(log, file, "ros1", dry_run=False) as books:
         drive(graph.uri, embedded, steps, books=books)
     assert [one.status for one in answers] == ["delivered", "unreachable", "delivered"]
     assert verify(log).ok

@@ -31,7 +31,7 @@ from chauffeur.concept import (
 )
 from chauffeur.drive import questions
 from chauffeur.drive.events import DriveEvent
-from chauffeur.drive.onroad import OnRoadAnswer, VehicleRecorder, VehicleSession, open_books
+from chauffeur.drive.onroad import OnRoadAnswer, VehicleRecorder, VehicleSession, open_recorder
 from chauffeur.drive.onroad import session as onroad
 from chauffeur.drive.onroad.checks import fitted, is_about_engaging, is_stop
 from chauffeur.memory.vault import VaultMemory
@@ -475,7 +475,7 @@ def test_the_log_holds_it_before_it_is_asked(tmp_path: Path, embedded: Planner) 
             return apply(parameters)
 
     async def whole() -> None:
-        with open_books(path, file, "ros1", dry_run=True) as books:
+        with open_recorder(path, file, "ros1", dry_run=True) as books:
             async with VehicleSession(Watched(), settings, embedded, person=ANA, books=books) as road:
                 await road.ask("Drive at 20 km/h.")
                 await road.evaluate("nice")
@@ -510,7 +510,7 @@ class Full(VehicleRecorder):
 def test_what_cannot_be_written_down_is_not_asked_unless_it_slows(tmp_path: Path) -> None:
     file = tmp_path / "vehicle.toml"
     file.write_text(FILE)
-    log = open_books(tmp_path / "audit.jsonl", file, "ros1", dry_run=True)
+    log = open_recorder(tmp_path / "audit.jsonl", file, "ros1", dry_run=True)
     with Full(log._log) as books:
         answers = ask(gives(5.0), "x", "stop", books=books)
     assert [one.status for one in answers] == ["failed", "dry-run"]

@@ -145,13 +145,13 @@ def _books(path: Path, file: Path, settings: VehicleSettings, *, dry_run: bool) 
 
     from chauffeur.cli.audit import KEY_VARIABLE, PRIVATE_VARIABLE
     from chauffeur.concept import ConfigError
-    from chauffeur.drive.onroad import open_books
+    from chauffeur.drive.onroad import open_recorder
 
     private = os.environ.get(PRIVATE_VARIABLE, "")
     if private not in ("", "0", "1"):
         raise ConfigError(f"{PRIVATE_VARIABLE} is {private!r}.", hint="Set it to 1, or to 0.")
     key = os.environ.get(KEY_VARIABLE)
-    return open_books(
+    return open_recorder(
         path,
         file,
         settings.interface,

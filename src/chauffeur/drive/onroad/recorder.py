@@ -30,7 +30,7 @@ def driven_what(interface: str, *, dry_run: bool) -> str:
     return f"a real vehicle over {interface}; nothing of it is simulated here"
 
 
-def open_books(
+def open_recorder(
     path: Path,
     vehicle_file: Path,
     interface: str,
