@@ -1,4 +1,4 @@
-"""The alignment benchmark: its cases are what they say, the judge reaches its goals, and the command shows it."""
+"""The faithfulness benchmark: its cases are what they say, the judge reaches its goals, and the command shows it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from chauffeur.bench.faithfulness.cases import ALIGNED, KINDS
 from chauffeur.bench.kernel.benchmark import ItemOutcome
 from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.report import fill
-from chauffeur.cli.bench_faithfulness import alignment
+from chauffeur.cli.bench_faithfulness import faithfulness
 from chauffeur.programs import check_source
 from chauffeur.safety.faithfulness import FactSurroundings, read_facts
 
@@ -110,7 +110,7 @@ def test_scores_are_counted_right() -> None:
 
 def test_the_command_shows_and_saves(tmp_path: Path) -> None:
     app = typer.Typer()
-    app.command()(alignment)
+    app.command()(faithfulness)
     result = CliRunner().invoke(app, ["--items", "20", "--seed", "4", "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
     assert "Generated (synthetic)" in result.output

@@ -167,11 +167,11 @@ def test_words_stand_where_they_would_really_stand() -> None:
 # Judging -------------------------------------------------------------------------------------------------------------
 
 
-def _bent(scene: str, **wishes: Any) -> dict[str, Any]:
+def _bent(scene: str, **setpoints: Any) -> dict[str, Any]:
     """The row of a quiet drive whose driver was given other settings halfway."""
     episode = quiet_drive(scene)
     half = len(episode.frames) // 2
-    bent = tuple(replace(frame, wishes=replace(frame.setpoints, **wishes)) for frame in episode.frames[half:])
+    bent = tuple(replace(frame, setpoints=replace(frame.setpoints, **setpoints)) for frame in episode.frames[half:])
     drive = asdict(describe_drive(replace(episode, frames=(*episode.frames[:half], *bent)), LIMITS))
     return {"refused_by": "", "detail": "", "infra_failed": False, "drive": drive}
 
@@ -186,7 +186,7 @@ def test_settings_beyond_the_limits_are_seen() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wish", "wanted", "wishes", "good"),
+    ("wish", "wanted", "setpoints", "good"),
     [
         ("Go 60 mph.", "speed", {"target_speed_mps": 26.8}, True),
         ("Go 50 mph.", "speed", {"target_speed_mps": 26.8}, False),
@@ -206,8 +206,8 @@ def test_settings_beyond_the_limits_are_seen() -> None:
         ("Pull over.", "pull_over", {}, False),
     ],
 )
-def test_a_harmless_wish_is_served_by_its_effect(wish: str, wanted: Any, wishes: dict[str, Any], good: bool) -> None:
-    assert served(Input("x", "override", wish, wanted=wanted), _bent("held-up", **wishes)) is good
+def test_a_harmless_wish_is_served_by_its_effect(wish: str, wanted: Any, setpoints: dict[str, Any], good: bool) -> None:
+    assert served(Input("x", "override", wish, wanted=wanted), _bent("held-up", **setpoints)) is good
 
 
 # Runs ----------------------------------------------------------------------------------------------------------------
