@@ -124,6 +124,20 @@ def test_a_red_light_is_stopped_at_and_a_forced_green_one_driven(world: TownWorl
         world.force_signal("nowhere", "red")
 
 
+def test_a_car_astride_a_stop_line_waits_with_its_tail_before_it(world: TownWorld, town: MapPack) -> None:
+    head = town.signals[0].heads[0]
+    lane = town.road[head.lanes[0]]
+    (ax, ay), (bx, by) = head.stop_line_m
+    line_m = lane.centre.nearest((ax + bx) / 2.0, (ay + by) / 2.0)
+    world.reset(scenario(start=(lane.id, line_m), vehicles=0))
+    world.force_signal(head.id, "red")
+    ego = driven(world, 100)[-1].ego
+    assert ego.speed_mps < 0.1
+    assert lane.centre.nearest(ego.x_m, ego.y_m) - 0.4 * ego.length_m < line_m
+    world.force_signal(head.id, "green")
+    assert driven(world, 100)[-1].ego.lane != lane.id
+
+
 def test_it_drives_to_a_place_by_its_name(world: TownWorld) -> None:
     world.reset(scenario(vehicles=10))
     world.head_for("the station")

@@ -30,7 +30,7 @@ from chauffeur.control.kinematic_bicycle import KinematicBicycle
 from chauffeur.control.pure_pursuit import pursuit_steering
 from chauffeur.geometry import JunctionWay, Lane, Pose, RoadGraph, Route, Turn, choice_ahead, wrap_to_pi
 from chauffeur.worlds.town.foresight import Foresight, Meeting
-from chauffeur.worlds.town.way import RouteCorridor, Stretch, blended, free_route
+from chauffeur.worlds.town.way import RouteCorridor, Stretch, astride_m, blended, free_route
 
 TOWN_CAPABILITIES: Final = Capabilities(
     roads=("town",),
@@ -51,6 +51,8 @@ _LEAST_LOOK_M: Final = 3.2
 _SIDE_M: Final = 0.35
 _MOST_BRAKING_MPS2: Final = 8.0
 _YELLOW_MPS2: Final = 3.0
+_GONE_S: Final = 2.5
+"""A car that stands astride a line needs so long to have all of itself behind it."""
 _LINE_M: Final = 0.7
 """The front bumper stops so far before a stop line."""
 _OVER_M: Final = 1.0
@@ -515,6 +517,8 @@ class TownDriver:
                     stops.append(_Stop(line - _LINE_M, f"light {lights[lane.id].state}"))
                 elif self._no_room_behind(line, nose, speed):
                     stops.append(_Stop(line - _LINE_M, "no room behind the stop line"))
+                elif self._waits_astride(lights[lane.id], line, nose, speed):
+                    stops.append(_Stop(line + astride_m(self._chassis.length_m), "its tail before the stop line"))
             if lane.id in signs and signs[lane.id][1].id not in self._served:
                 number, sign = signs[lane.id]
                 line = self._line_m(sign, start, end)
@@ -562,11 +566,24 @@ class TownDriver:
         ahead = line - _LINE_M - nose
         if ahead < -_LINE_M or speed * speed > 2.0 * _YELLOW_MPS2 * (max(0.0, ahead) + 0.3):
             return False
+        return self._crowded(line)
+
+    def _crowded(self, line: float) -> bool:
+        """Whether who is ahead leaves no room for all of the car behind a line, should they stop."""
         needed = line + self._chassis.length_m + _ROOM_BEHIND_M
         return any(
             one.now and one.along and line - 0.5 < one.first_m < needed - max(0.0, one.along_mps) ** 2 / _TO_A_STAND
             for one in self._meetings
         )
+
+    def _waits_astride(self, light: Signal, line: float, nose: float, speed: float) -> bool:
+        """Whether a car whose front is over a line waits there with its tail before it: it came to a stand in a queue,
+        and its light has turned red since, or there is no room behind the line yet."""
+        room = line + astride_m(self._chassis.length_m) - nose
+        if nose < line or light.state == "off" or speed * speed > 2.0 * _YELLOW_MPS2 * max(0.0, room):
+            return False
+        turns = light.state == "yellow" and light.remaining_s is not None and light.remaining_s < _GONE_S
+        return light.state == "red" or turns or self._crowded(line)
 
     def _serves(self, sign: Sign, line: float, nose: float, speed: float) -> bool:
         """Whether a stop sign is served, or has been passed."""
