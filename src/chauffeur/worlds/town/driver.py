@@ -130,7 +130,7 @@ class TownDriver:
         else:
             start = place.lane
         self._stretch = self._corridor.stretch(first, start)
-        self._station = self._rear_station(ego, -math.inf, math.inf)
+        self._station = self._first_station(ego)
         self._changing_to: float | None = None
         self._wanted: LaneId | None = None
         self._served: frozenset[str] = frozenset()
@@ -286,6 +286,10 @@ class TownDriver:
         rear = Pose(ego.x_m, ego.y_m, ego.heading_rad).ahead(-self._chassis.rear_to_middle_m)
         return self._stretch.line.nearest(rear.x_m, rear.y_m, low_m, high_m)
 
+    def _first_station(self, ego: VehicleState) -> float:
+        """On a new line, which begins in the ego's lane: its way may come by the same place again later."""
+        return self._rear_station(ego, -math.inf, _first_m(self._stretch) + _HERE_M)
+
     def _turn_to(self, wishes: Wishes, ego: VehicleState) -> None:
         """Another way at the next junction, where the wish is another than the route; and over, where a free way is."""
         if wishes.turn is None:
@@ -326,7 +330,7 @@ class TownDriver:
     def _take(self, route: Route, lane: LaneId, ego: VehicleState) -> None:
         self._corridor = RouteCorridor(self._road, route)
         self._stretch = self._corridor.stretch(self._corridor.layer_of(lane, 0) or 0, lane)
-        self._station = self._rear_station(ego, -math.inf, math.inf)
+        self._station = self._first_station(ego)
         self._changing_to = None
         self._wished_ways(self.lanes_ahead())  # the junction may lie behind the end of the way before
 
@@ -346,7 +350,7 @@ class TownDriver:
         layer = self._corridor.layer_of(place.lane, self._stretch.layer + at)
         if layer is not None:
             self._stretch = self._corridor.stretch(layer, place.lane)
-            self._station = self._rear_station(ego, -math.inf, math.inf)
+            self._station = self._first_station(ego)
 
     def _onwards(self) -> bool:
         """The free way drawn out, where the one there was is nearly driven; False where it ends, or leads to a goal."""
