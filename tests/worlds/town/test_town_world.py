@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from chauffeur.concept import Command, Observation, Scenario, ScenarioError
+from chauffeur.concept import Command, Observation, Scenario, ScenarioError, Wishes
 from chauffeur.geometry import Lane, LanePlace, Pose, plan_route
 from chauffeur.worlds.base import Driver, Perception, Stage, World
 
 pytest.importorskip("libsumo")
 pytest.importorskip("sumo")
 
-from chauffeur.worlds.town import TownWorld
+from chauffeur.worlds.town import TownWorld, WayReferee
 from chauffeur.worlds.town.build import build, sources_of
 from chauffeur.worlds.town.pack import MapPack, Place
 
@@ -148,6 +148,32 @@ def test_it_drives_to_a_place_by_its_name(world: TownWorld) -> None:
     assert world.arrived
     with pytest.raises(ScenarioError, match="Central Station"):
         world.head_for("the moon")
+
+
+def test_a_trip_is_done_when_the_way_is_taken_and_a_stop_only_when_it_was_asked_for(world: TownWorld) -> None:
+    world.reset(scenario(vehicles=0))
+    ways, stop = WayReferee(world, ("left",), stops=False), WayReferee(world, (), stops=True)
+    stop.follow(Wishes(5.0, 1.4), "running")
+    for _ in range(80):
+        world.step(Command(-3.0, 0.0))
+        ways.observe()
+        stop.observe()
+    assert not stop.success, "it stands, but nobody asked for it"
+    stop.follow(Wishes(0.0, 1.4), "running")
+    for _ in range(80):
+        world.step(Command(-3.0, 0.0))
+        stop.observe()
+    assert stop.over
+    assert stop.outcome() == "success"
+    driver = world.driver()
+    for _ in range(4000):
+        wishes = replace(driver.initial_wishes(), turn="left")
+        world.step(driver.command(driver.settle(wishes)))
+        ways.observe()
+        if ways.over:
+            break
+    assert ways.success
+    assert not ways.shortfall
 
 
 def test_traffic_yields_to_the_ego_whose_way_it_knows(world: TownWorld, town: MapPack) -> None:

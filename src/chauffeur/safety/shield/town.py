@@ -40,7 +40,7 @@ _OVER_M: Final = 1.0
 """Who is farther over a line than this, and cannot wait with its tail before it, clears the junction."""
 _SERVED_MPS: Final = 0.1
 _AT_SIGN_M: Final = 4.0
-_CLEAR_M: Final = 1.5
+_CLEAR_M: Final = 3.5
 _HALVINGS: Final = 5
 _SLOWING_MPS2: Final = 1.5
 _ASIDE_M: Final = 0.9

@@ -56,8 +56,11 @@ _GONE_S: Final = 2.5
 _LINE_M: Final = 0.7
 """The front bumper stops so far before a stop line."""
 _OVER_M: Final = 1.0
-_ROOM_BEHIND_M: Final = 2.5
-"""Between a stop line and who stands ahead, beside the car's own length: it stops so far behind, and is clear."""
+_ROOM_BEHIND_M: Final = 5.0
+"""Between a stop line and who stands ahead, beside its own length: a car stops up to 4 m behind, and is clear by 1 m."""
+_CLEAR_M: Final = 1.2
+_CLOSE_M: Final = 1.0
+"""Who stands with its tail over a stop line draws up so close to who is ahead."""
 _TO_A_STAND: Final = 5.0
 """Who is ahead may stand as soon as comfortable braking, 2.5 m/s2, allows: twice that, m/s2."""
 _STANDING_MPS: Final = 0.08
@@ -138,6 +141,7 @@ class TownDriver:
         self._meetings: list[Meeting] = []
         self._tick = 0
         self._sign: tuple[int, float] | None = None
+        self._tail_over = False
         self._lines: dict[tuple[str, float], tuple[Stretch, float]] = {}
         self.why = ""
 
@@ -460,13 +464,14 @@ class TownDriver:
             least = -1.0  # who is to stand does not creep
         self.why = ""
         stops = self._stops(seen, nose)
+        follows = replace(idm, jam_distance_m=_CLOSE_M) if self._tail_over else idm
         for meeting in self._meetings:
             if meeting.now and (meeting.along or meeting.along_mps > -0.5 or meeting.other.speed_mps < 0.5):
                 gap = meeting.first_m - nose
                 if meeting.last_m < nose or gap < -self._chassis.length_m:
                     continue  # beside or behind: to stand there would not help
                 lead = max(0.0, meeting.along_mps) if meeting.along else 0.0
-                asked = idm_acceleration(speed, max(target, 0.05), idm, max(gap, 0.05), speed - lead)
+                asked = idm_acceleration(speed, max(target, 0.05), follows, max(gap, 0.05), speed - lead)
                 if asked < least:
                     least, self.why = asked, f"behind {meeting.other.kind} {meeting.other.id}"
             else:
@@ -502,8 +507,8 @@ class TownDriver:
 
     def _stops(self, seen: Observation, nose: float) -> list[_Stop]:
         """Where it has to stop for the end of the line, lights, signs, and a junction that is blocked."""
-        stretch, speed = self._stretch, seen.ego.speed_mps
-        self._sign = None
+        stretch, speed, length = self._stretch, seen.ego.speed_mps, self._chassis.length_m
+        self._sign, self._tail_over = None, False
         stops = [_Stop(stretch.end_m - _ROOM_M, "room to change lanes")]
         if stretch.goal:
             stops = [_Stop(stretch.end_m + self._chassis.length_m / 2.0, "the goal")]
@@ -517,12 +522,13 @@ class TownDriver:
             lane = stretch.lanes[i]
             if lane.id in lights:
                 line = self._line_m(lights[lane.id], start, end)
+                self._tail_over |= line + astride_m(length) < nose < line + length + _CLEAR_M
                 if self._light_stops(lights[lane.id], line, nose, speed):
                     stops.append(_Stop(line - _LINE_M, f"light {lights[lane.id].state}"))
                 elif self._no_room_behind(line, nose, speed):
                     stops.append(_Stop(line - _LINE_M, "no room behind the stop line"))
                 elif self._waits_astride(lights[lane.id], line, nose, speed):
-                    stops.append(_Stop(line + astride_m(self._chassis.length_m), "its tail before the stop line"))
+                    stops.append(_Stop(line + astride_m(length), "its tail before the stop line"))
             if lane.id in signs and signs[lane.id][1].id not in self._served:
                 number, sign = signs[lane.id]
                 line = self._line_m(sign, start, end)

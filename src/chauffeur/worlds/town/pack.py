@@ -160,10 +160,11 @@ _ARTICLES: Final = re.compile(r"^(?:the|a|an|my|our)\s+")
 def places_called(places: Sequence[Place], name: str) -> tuple[Place, ...]:
     """The places that words may mean: by their whole name or kind, else by a part of it."""
     wanted = _ARTICLES.sub("", name.strip().casefold())
-    exact = tuple(one for one in places if wanted in (one.name.casefold(), one.kind.casefold()))
+    kinds = {one.kind: one.kind.casefold().replace("_", " ") for one in places}
+    exact = tuple(one for one in places if wanted in (one.name.casefold(), one.kind.casefold(), kinds[one.kind]))
     if exact or not wanted:
         return exact
-    return tuple(one for one in places if wanted in one.name.casefold() or one.kind.casefold() in wanted)
+    return tuple(one for one in places if wanted in one.name.casefold() or kinds[one.kind] in wanted)
 
 
 @dataclass(frozen=True, slots=True)
