@@ -57,7 +57,7 @@ _LINE_M: Final = 0.7
 """The front bumper stops so far before a stop line."""
 _OVER_M: Final = 1.0
 _ROOM_BEHIND_M: Final = 5.0
-"""Between a stop line and who stands ahead, beside its own length: a car stops up to 4 m behind, and is clear by 1 m."""
+"""Between a stop line and who stands ahead, beside its own length: a car stops up to 4 m behind, and is clear by 1."""
 _CLEAR_M: Final = 1.2
 _CLOSE_M: Final = 1.0
 """Who stands with its tail over a stop line draws up so close to who is ahead."""
