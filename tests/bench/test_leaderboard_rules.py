@@ -148,6 +148,14 @@ def stop_drive(least: float):
     return instants
 
 
+@pytest.mark.parametrize(("least", "kinds"), [(0.05, []), (6.0, ["stop_infraction"])])
+def test_two_signs_at_one_line_ask_for_one_stop(least: float, kinds: list[str]) -> None:
+    twin = replace(stop_sign(), id="s2", x_m=398.6, stop_line_m=((398.6, 1.75), (398.6, -1.75)))
+    instants = [replace(one, signs=(twin, stop_sign())) for one in stop_drive(least)]
+    _, found = judged(track(430, 340), instants)
+    assert [one.kind for one in found] == kinds
+
+
 @pytest.mark.parametrize(("least", "kinds"), [(0.05, []), (0.5, ["stop_infraction"]), (6.0, ["stop_infraction"])])
 def test_a_stop_sign_wants_a_full_stop(least: float, kinds: list[str]) -> None:
     _, found = judged(track(430, 340), stop_drive(least))

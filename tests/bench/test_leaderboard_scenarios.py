@@ -200,6 +200,13 @@ def test_negotiation_is_left_to_the_traffic() -> None:
     assert not stage.spawned
 
 
+def test_what_a_trigger_puts_on_the_road_is_measured_from_the_trigger_itself() -> None:
+    """The first point near it may lie 2 m before it: a car would have as much less to brake in."""
+    trigger = Trigger(3, Pose(101.9, 0.5, 0.0))
+    placed = Placed(trigger, 100, None)
+    assert placed.station_m(WAY) == pytest.approx(101.9)
+
+
 def test_a_trigger_fires_within_a_metre_and_a_half() -> None:
     placed = Placed(Trigger(3, Pose(100.0, 0.0, 0.0)), 100, None)
     assert reached(placed, seen(0.0, car(0, 98.6)))

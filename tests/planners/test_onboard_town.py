@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from chauffeur.bench.leaderboard.lessons import navigator_of
-from chauffeur.concept import Context, Instruction, Plan, PlanRequest, Program, Situation, SystemMessage
+from chauffeur.concept import Context, Instruction, Parameters, Plan, PlanRequest, Program, Situation, SystemMessage
 from chauffeur.describe.navigation import NavigationInstruction
 from chauffeur.geometry import LanePlace, Turn, plan_route
 from chauffeur.planners.onboard import RetrievalPlanner
@@ -150,3 +150,33 @@ def test_misleading_instructions_are_refused_and_no_others(
         assert (plan.policy is not None) is said.safe_to_execute, (said, ways, plan.refusal)
         driven[said.safe_to_execute] += 1
     assert min(driven.values()) > 30
+
+
+@pytest.mark.parametrize(
+    ("text", "intent", "says"),
+    [
+        ("Please don't go left here, carry on straight ahead.", "straight on", ()),
+        ("Take a left, no, a right.", "way right", ()),
+        ("Don't pull over now.", "on", ()),
+        ("At the third street go right.", "way right", ("range(2)", 'pass_a_way("right")')),
+        ("After three more junctions turn left.", "way left", ("range(3)", 'pass_a_way("left")')),
+        ("Keep going for 150 meters, then stop.", "on+stop", ("drive_on(150)", "yield stop()")),
+        ("Please stop at the next corner.", "stop", ("get_distance_to_junction() <", "yield stop()")),
+    ],
+)
+def test_denials_corrections_counts_and_distances_are_heeded(text: str, intent: str, says: tuple[str, ...]) -> None:
+    plan = planned(text)
+    assert plan.intent == intent
+    source = source_of(plan)
+    assert all(one in source for one in says)
+    assert "turn_left" not in source or intent == "way left"
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [("Bring us to the museum.", "museum"), ("Drop me off in front of the post office.", "post office")],
+)
+def test_a_place_is_driven_to(text: str, place: str) -> None:
+    policy = planned(text).policy
+    assert isinstance(policy, Parameters)
+    assert policy.route == place

@@ -54,6 +54,18 @@ def test_lights(state: SignalState, over: bool) -> None:
     assert (seen[-1].ego.speed_mps < 0.1) is not over
 
 
+@pytest.mark.parametrize(("front_over_m", "goes_on"), [(0.5, False), (2.5, False), (5.5, True)])
+def test_who_stands_astride_a_line_waits_for_green_with_its_tail_before_it(front_over_m: float, goes_on: bool) -> None:
+    shield = TownShield(DT)
+    rear = 80.0 + front_over_m - LINCOLN_MKZ.rear_to_middle_m - LINCOLN_MKZ.length_m / 2.0
+    state, red = BicycleState(Pose(rear, 0.0, 0.0), 0.0), (Signal("s", "red", ("a",), LINE),)
+    for tick in range(100):
+        command = shield.guard(instant(state, tick, signals=red), Command(1.5, 0.0)).command
+        state = advanced(state, command.acceleration_mps2, command.steering_rad, DT, LINCOLN_MKZ)
+    tail = state.middle(LINCOLN_MKZ).x_m - 0.8 * LINCOLN_MKZ.length_m / 2.0
+    assert (tail > 80.0) is goes_on
+
+
 def test_a_stop_sign_is_stopped_at_and_then_driven_on() -> None:
     seen = floored(500, signs=(Sign("s", "stop", ("a",), 80.0, -3.0, LINE),))
     stopped = [one for one in seen if one.ego.speed_mps < 0.1]

@@ -5,11 +5,17 @@ from __future__ import annotations
 from typing import Final
 
 from chauffeur.bench.lampilot.understood import referee_for as lampilot_referee
-from chauffeur.concept import Parameters, Plan, Scenario, Trajectory
+from chauffeur.concept import Parameters, Plan, Program, Scenario, Trajectory
 from chauffeur.drive.episode import Referee
-from chauffeur.geometry import Pose
+from chauffeur.geometry import Pose, Turn
+from chauffeur.safety.constant_calls import read_program
 from chauffeur.worlds.base import World
 
+TURN_CALLS: Final[dict[str, Turn]] = {
+    "turn_left_at_next_intersection": "left",
+    "turn_right_at_next_intersection": "right",
+    "go_straight_at_next_intersection": "straight",
+}
 RED_S: Final = 90.0
 """Who drives a trajectory in a town may stand so long on the way: a light's cycle, and people."""
 
@@ -25,16 +31,24 @@ def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
     if isinstance(plan.policy, Trajectory) and world.capabilities.turns and world.capabilities.places:
         return _end_referee(world, plan.policy, waits_s=RED_S)
     if world.capabilities.places:
-        return _town_referee(world) or _parking_referee(world, plan)
+        return _town_referee(world, plan) or _parking_referee(world, plan)
     if isinstance(plan.policy, Trajectory):
         return _street_referee(world, plan.policy)
     return lampilot_referee(world, scenario, plan)
 
 
-def _town_referee(world: World) -> Referee | None:
-    from chauffeur.worlds.town import TownReferee, TownWorld
+def _town_referee(world: World, plan: Plan) -> Referee | None:
+    from chauffeur.worlds.town import TownReferee, TownWorld, WayReferee
 
-    return TownReferee(world) if isinstance(world, TownWorld) else None
+    if not isinstance(world, TownWorld):
+        return None
+    if isinstance(plan.policy, Program):
+        calls = [use.name for use in read_program(plan.policy.source).uses]
+        turns: list[Turn] = [TURN_CALLS[name] for name in calls if name in TURN_CALLS]
+        if turns or "stop" in calls:
+            return WayReferee(world, turns, stops="stop" in calls)
+        return None  # nothing that could be over
+    return TownReferee(world)
 
 
 def _street_referee(world: World, trajectory: Trajectory) -> Referee | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from chauffeur.concept import Context, Observation, Signal, VehicleState
 from chauffeur.describe.road import (
@@ -32,10 +33,11 @@ def describe_town(observation: Observation) -> Context:
     Raises:
         ScenarioError: The ego is on no lane of the town.
     """
-    lane, lanes = ego_lane(observation), own_direction(observation)
+    lane = ego_lane(observation)
+    lanes = [one for one in own_direction(observation) if not one.emergency]  # a town's are the strip along the kerb
     route = () if observation.route is None else observation.route.lanes
     turns = turns_ahead(observation.road, lane.id, route)
-    situation = situation_of(observation, turns)
+    situation = replace(situation_of(observation, turns), lane_count=len(lanes), emergency_lane=False)
     where = "crossing a junction" if lane.junction else f"in the {ordinal(situation.lane_index + 1)} lane from the left"
     of_street = f" of {lane.street}" if lane.street else ""
     of = "" if lane.junction else f" of {len(lanes)}"

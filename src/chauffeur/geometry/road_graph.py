@@ -18,6 +18,9 @@ from chauffeur.geometry.angles import wrap_to_pi
 from chauffeur.geometry.polyline import Polyline
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from chauffeur.geometry.polyline import FloatArray
 
 LaneId = str
@@ -354,6 +357,16 @@ class RoadGraph:
         """Legs of the squares that somebody asked for, by the kinds asked for."""
         return {}
 
+    @cached_property
+    def _everywhere(self) -> dict[tuple[LaneKind, ...], _Legs | None]:
+        """All legs, by the kinds asked for."""
+        return {}
+
+    @cached_property
+    def _of_kinds(self) -> dict[tuple[LaneKind, ...], NDArray[np.bool_]]:
+        """Which lanes are of the kinds that somebody asked for."""
+        return {}
+
     def locate(
         self, x_m: float, y_m: float, heading_rad: float | None = None, kinds: tuple[LaneKind, ...] = ()
     ) -> LanePlace | None:
@@ -376,7 +389,9 @@ class RoadGraph:
             place, away = self._closest(near, x_m, y_m, heading_rad)
             if away <= _REACH_M:
                 return place
-        everywhere = self._chosen(None, kinds)
+        if kinds not in self._everywhere:
+            self._everywhere[kinds] = self._chosen(None, kinds)
+        everywhere = self._everywhere[kinds]
         return None if everywhere is None else self._closest(everywhere, x_m, y_m, heading_rad)[0]
 
     def places(
@@ -414,7 +429,9 @@ class RoadGraph:
         legs = self._legs
         chosen = np.arange(len(legs.lane)) if rows is None else np.array(rows, dtype=np.int64)
         if kinds:
-            wanted = np.array([lane.kind in kinds for lane in self.lanes])
+            wanted = self._of_kinds.get(kinds)
+            if wanted is None:
+                wanted = self._of_kinds[kinds] = np.array([lane.kind in kinds for lane in self.lanes])
             chosen = chosen[wanted[legs.lane[chosen].astype(int)]]
         return _Legs(*(one[chosen] for one in legs)) if len(chosen) else None
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from chauffeur.concept import Command, Observation, Scenario, ScenarioError
+from chauffeur.concept import Command, Observation, Scenario, ScenarioError, Setpoints
 from chauffeur.geometry import Lane, LanePlace, Pose, plan_route
 from chauffeur.worlds.base import Driver, Perception, Stage, World
 
 pytest.importorskip("libsumo")
 pytest.importorskip("sumo")
 
-from chauffeur.worlds.town import TownWorld
+from chauffeur.worlds.town import TownWorld, WayReferee
 from chauffeur.worlds.town.build import build, sources_of
 from chauffeur.worlds.town.pack import MapPack, Place
 
@@ -124,6 +124,20 @@ def test_a_red_light_is_stopped_at_and_a_forced_green_one_driven(world: TownWorl
         world.force_signal("nowhere", "red")
 
 
+def test_a_car_astride_a_stop_line_waits_with_its_tail_before_it(world: TownWorld, town: MapPack) -> None:
+    head = town.signals[0].heads[0]
+    lane = town.road[head.lanes[0]]
+    (ax, ay), (bx, by) = head.stop_line_m
+    line_m = lane.centre.nearest((ax + bx) / 2.0, (ay + by) / 2.0)
+    world.reset(scenario(start=(lane.id, line_m), vehicles=0))
+    world.force_signal(head.id, "red")
+    ego = driven(world, 100)[-1].ego
+    assert ego.speed_mps < 0.1
+    assert lane.centre.nearest(ego.x_m, ego.y_m) - 0.4 * ego.length_m < line_m
+    world.force_signal(head.id, "green")
+    assert driven(world, 100)[-1].ego.lane != lane.id
+
+
 def test_it_drives_to_a_place_by_its_name(world: TownWorld) -> None:
     world.reset(scenario(vehicles=10))
     world.head_for("the station")
@@ -134,6 +148,32 @@ def test_it_drives_to_a_place_by_its_name(world: TownWorld) -> None:
     assert world.arrived
     with pytest.raises(ScenarioError, match="Central Station"):
         world.head_for("the moon")
+
+
+def test_a_trip_is_done_when_the_way_is_taken_and_a_stop_only_when_it_was_asked_for(world: TownWorld) -> None:
+    world.reset(scenario(vehicles=0))
+    ways, stop = WayReferee(world, ("left",), stops=False), WayReferee(world, (), stops=True)
+    stop.follow(Setpoints(5.0, 1.4), "running")
+    for _ in range(80):
+        world.step(Command(-3.0, 0.0))
+        ways.observe()
+        stop.observe()
+    assert not stop.success, "it stands, but nobody asked for it"
+    stop.follow(Setpoints(0.0, 1.4), "running")
+    for _ in range(80):
+        world.step(Command(-3.0, 0.0))
+        stop.observe()
+    assert stop.over
+    assert stop.outcome() == "success"
+    driver = world.driver()
+    for _ in range(4000):
+        setpoints = replace(driver.initial_setpoints(), turn="left")
+        world.step(driver.command(driver.settle(setpoints)))
+        ways.observe()
+        if ways.over:
+            break
+    assert ways.success
+    assert not ways.shortfall
 
 
 def test_traffic_yields_to_the_ego_whose_way_it_knows(world: TownWorld, town: MapPack) -> None:

@@ -87,7 +87,7 @@ class ControlLoss(_Running):
         super().__init__(stage)
         self._rng = rng
         stations = track.stations_m
-        start = stations[placed.index] + self.AFTER_M
+        start = placed.station_m(track) + self.AFTER_M
         junction = next(
             (s for s, option in zip(stations, track.options, strict=True) if s >= start and option in _TURNING),
             math.inf,
@@ -379,7 +379,7 @@ def _control_loss(
 
 def _jaywalker(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator) -> Behaviour:
     """12 m ahead on the right, behind a machine, at 3 m/s and 0.4 m/s more for each lane to its right."""
-    at = _Line(track).at(track.stations_m[placed.index] + 12.0)
+    at = _Line(track).at(placed.station_m(track) + 12.0)
     lane = _lane_at(road, at, "Scenario3")
     right, left = _edges(road, lane, at)
     lanes = max(0, round((right - lane.width_m / 2.0) / lane.width_m))
@@ -410,19 +410,19 @@ def _after_turn(
 def _lead(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator) -> Behaviour:
     """A car 25 m ahead at 10 m/s brakes."""
     del road
-    return Leading(stage, track, track.stations_m[placed.index], {25.0: 10.0}, float(rng.uniform(30.0, 60.0)))
+    return Leading(stage, track, placed.station_m(track), {25.0: 10.0}, float(rng.uniform(30.0, 60.0)))
 
 
 def _leads(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator) -> Behaviour:
     """Two cars from 35 m ahead, at 55 km/h and 45 km/h; the second brakes."""
     del road
     speeds = {35.0: 45.0 / 3.6, 60.0: 55.0 / 3.6}
-    return Leading(stage, track, track.stations_m[placed.index], speeds, float(rng.uniform(40.0, 80.0)))
+    return Leading(stage, track, placed.station_m(track), speeds, float(rng.uniform(40.0, 80.0)))
 
 
 def _obstacle(placed: Placed, track: RouteTrack, road: RoadGraph, stage: Stage, rng: np.random.Generator) -> Behaviour:
     del rng
-    station = track.stations_m[placed.index] + Obstacle.AHEAD_M
+    station = placed.station_m(track) + Obstacle.AHEAD_M
     if station > track.length_m - 10.0:
         raise ScenarioError("Scenario6 needs 60 m of way ahead.", hint="Check the trigger's place.")
     return Obstacle(stage, _Line(track).at(station), _oncoming(road, _Line(track).at(station + Obstacle.SOURCE_M)))

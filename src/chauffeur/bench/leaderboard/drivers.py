@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final, Protocol
 
 from chauffeur.bench.leaderboard.track import RouteTrack
@@ -27,7 +28,13 @@ class RouteDriver(Protocol):
 
 
 class ExpertDriver:
-    """The world's own driver, which is told the route."""
+    """The world's own driver, which is told the route.
+
+    Beside a pavement it keeps to 40 km/h whatever the sign says: somebody may step off it, and CARLA's towns have
+    pavements along roads signed 80 km/h and more.
+    """
+
+    BESIDE_PAVEMENT_MPS: Final = 40.0 / 3.6
 
     def __init__(self, world: World) -> None:
         """Drive a world just reset."""
@@ -37,8 +44,11 @@ class ExpertDriver:
 
     def command(self, observation: Observation) -> Command:
         """See RouteDriver."""
-        del observation
-        return self._driver.command(self._driver.settle(self._wishes))
+        lane = observation.road.get(observation.ego.lane)
+        beside = () if lane is None else observation.road.abreast(lane.id)
+        most = self.BESIDE_PAVEMENT_MPS if any(one.kind == "sidewalk" for one in beside) else None
+        wishes = self._driver.settle(replace(self._wishes, target_speed_mps=most))
+        return self._driver.command(wishes)
 
 
 class RecklessDriver:

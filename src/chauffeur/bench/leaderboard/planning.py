@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from chauffeur.bench.leaderboard.track import RouteTrack
 from chauffeur.concept import ScenarioError
@@ -14,6 +15,10 @@ from chauffeur.geometry.route import plan_through
 if TYPE_CHECKING:
     from chauffeur.bench.leaderboard.routes import LeaderboardRoute
     from chauffeur.worlds.town.pack import MapPack
+
+
+ON_ROAD_M: Final = 20.0
+"""A key point farther than this from the closest lane belongs to another map."""
 
 
 @dataclass(frozen=True)
@@ -53,12 +58,17 @@ def plan_keypoints(road: RoadGraph, keypoints: Sequence[Pose]) -> PlannedRoute:
 def _planned(road: RoadGraph, keypoints: Sequence[Pose], places: Sequence[tuple[LanePlace, ...]]) -> PlannedRoute:
     hint = "Does the map belong to the route file?"
     for number, (found, pose) in enumerate(zip(places, keypoints, strict=True)):
-        if not found:
+        if not found or _away_m(road, found[0], pose) > ON_ROAD_M:
             raise ScenarioError(f"Key point {number} at ({pose.x_m:.1f}, {pose.y_m:.1f}) is on no lane.", hint=hint)
     route = plan_through(road, places)
     if route is None:
         raise ScenarioError("No way leads past the key points of the route.", hint=hint)
     return PlannedRoute(route, track_of(road, route))
+
+
+def _away_m(road: RoadGraph, place: LanePlace, pose: Pose) -> float:
+    at = road[place.lane].centre.at(min(max(place.station_m, 0.0), road[place.lane].length_m))
+    return math.hypot(at.x_m - pose.x_m, at.y_m - pose.y_m)
 
 
 def track_of(road: RoadGraph, route: Route) -> RouteTrack:

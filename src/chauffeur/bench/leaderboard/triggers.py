@@ -71,6 +71,12 @@ class Placed:
     index: int
     turn: RoadOption | None
 
+    def station_m(self, track: RouteTrack) -> float:
+        """Where along the way its trigger lies: what it puts on the road is that far from there, not from `index`,
+        the first point near it."""
+        at = self.trigger.pose
+        return track.stations_m[self.index] + track.poses[self.index].sees(at.x_m, at.y_m)[0]
+
 
 def read_triggers(path: Path) -> TriggerSet:
     """The trigger points of a JSON file, or of a folder of them.

@@ -8,19 +8,25 @@ from __future__ import annotations
 
 import re
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Final
 
-from chauffeur.concept import Plan, PlanRequest, Program, Situation, Thoughts
+from chauffeur.concept import Parameters, Plan, PlanRequest, Program, Situation, Thoughts
+from chauffeur.language import measured, read_quantities, tokens_of
+from chauffeur.language.corrections import last_said
+from chauffeur.language.denials import denied_words
 from chauffeur.memory.policies import PolicyRepository, Recalled
 from chauffeur.planners.arbitration import undenied
 from chauffeur.planners.base import Planner, declined
 from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.doubts import CAN_DO
+from chauffeur.planners.onboard.understand import meanings_said
+from chauffeur.planners.talk2drive.style import LOOK_AHEAD, destination_of
 from chauffeur.programs.catalogue import vocabulary_of
 from chauffeur.safety.constant_calls import read_program
+from chauffeur.worlds.town.recipes import PLACE_KINDS
 
 SNIPPETS: Final = Path(__file__).parent / "snippets"
 """The policy repository that comes with the package."""
@@ -29,6 +35,13 @@ NEAR: Final = 0.12
 NEIGHBOURS: Final = 50
 """So many are looked through for one that goes the way the words say."""
 _SIDES: Final = ("left", "right")
+_STANDS: Final = ("stop", "pull_over")
+_JUNCTION: Final = frozenset(
+    ("junction", "intersection", "crossing", "crossroads", "corner", "light", "lights", "signal")
+)
+_ORDINALS: Final = {"second": 2, "2nd": 2, "third": 3, "3rd": 3, "fourth": 4, "4th": 4, "fifth": 5, "5th": 5}
+_MOST_JUNCTIONS: Final = 9
+_STOPS_BEFORE_M: Final = 12.0
 
 _TURNS: Final = {
     "turn_left_at_next_intersection": "left",
@@ -73,12 +86,18 @@ class TownStep:
         place: Landmark after which it is to be done; empty for none.
         out: Whether somebody wants to get out there.
         recalled: The learned program that is nearest; None for a stop, and for keeping to the road.
+        after_m: Way to be driven first; None where none is said.
+        nth: At which of the junctions that have such a way, 1 for the next.
+        before_junction: Whether to stop before the next junction.
     """
 
     words: str
     place: str = ""
     out: bool = False
     recalled: Recalled | None = None
+    after_m: float | None = None
+    nth: int = 1
+    before_junction: bool = False
 
     @property
     def calls(self) -> frozenset[str]:
@@ -104,38 +123,103 @@ def snippets(folder: Path = SNIPPETS) -> PolicyRepository:
 
 
 def steps_of(text: str, repository: PolicyRepository) -> tuple[TownStep, ...] | None:
-    """The steps of an instruction; None where one of them is like nothing that was learned."""
+    """The steps of an instruction, as last corrected; None where one of them is like nothing that was learned."""
+    text = last_said(text)
     if _ON.search(text):
         return (TownStep(text),)
     steps: list[TownStep] = []
     for part in (one.strip(" ,.;") for one in _SPLIT.split(text)):
         if not part:
             continue
-        if _OUT.search(part):
-            steps.append(TownStep(part, out=True))
-            continue
-        found = _PLACE.search(part)
-        place = "" if found is None else found["place"].strip()
-        words = part if found is None else f"{part[: found.start()]} {part[found.end() :]}".strip(" ,.;")
-        near = repository.recall(f"{words[:1].upper()}{words[1:]}.", "town", NEIGHBOURS)
-        fit = [one for one in near if one.similarity >= NEAR and _agrees(words, one)]
-        if not fit:
+        step = _step_of(part, repository)
+        if step is None:
             return None
-        # A lane may lead elsewhere than the words say: of those that agree, the first that chooses the way itself.
-        choose = (one for one in fit if (step := TownStep(words, recalled=one)).way == step.turn)
-        steps.append(TownStep(part, place, recalled=next(choose, fit[0])))
+        steps.append(step)
     return tuple(steps) or None
 
 
-def _agrees(words: str, recalled: Recalled) -> bool:
+def _step_of(part: str, repository: PolicyRepository) -> TownStep | None:
+    denied = denied_words(part)
+    meant = meanings_said(part)
+    family = meant[0].manoeuvre if meant else ""
+    far = next((amount for dimension, amount in measured(part) if dimension == "distance"), None)
+    told = _OUT.search(part)
+    if family == "resume" and denied:  # "don't stop here"
+        return TownStep(part)
+    if family in _STANDS or (told is not None and not denied & set(tokens_of(told.group()))):
+        return TownStep(
+            part, landmark_in(part), out=True, after_m=far, before_junction=bool(_JUNCTION & set(tokens_of(part)))
+        )
+    nth = nth_of(part)
+    found = None if nth > 1 else _PLACE.search(part)
+    place = "" if found is None else found["place"].strip()
+    words = part if found is None else f"{part[: found.start()]} {part[found.end() :]}".strip(" ,.;")
+    said = " ".join(one for one in words.split() if not denied & set(tokens_of(one)))
+    near = repository.recall(f"{said[:1].upper()}{said[1:]}.", "town", NEIGHBOURS)
+    fit = [one for one in near if one.similarity >= NEAR and _agrees(words, one, denied)]
+    if not fit:
+        return None
+    # A lane may lead elsewhere than the words say: of those that agree, the first that chooses the way itself.
+    choose = (one for one in fit if (step := TownStep(words, recalled=one)).way == step.turn)
+    step = TownStep(part, place, recalled=next(choose, fit[0]))
+    if family in ("", "resume") and not step.turn and far is not None and not {"in", "after"} & set(tokens_of(part)):
+        return TownStep(part, place, after_m=far)  # "drive 200 meters"
+    return replace(step, nth=nth) if step.turn in _SIDES else step
+
+
+def landmark_in(words: str) -> str:
+    """The kind of place of our own towns that words name; empty for none."""
+    said = " ".join(tokens_of(words))
+    kinds = (kind.replace("_", " ") for kind in PLACE_KINDS)
+    return next((kind for kind in sorted(kinds, key=len, reverse=True) if f" {kind} " in f" {said} "), "")
+
+
+def nth_of(words: str) -> int:
+    """Which of several: 3 for "the third street", and for "after two more junctions"; 1 where nothing is said."""
+    tokens = tokens_of(words)
+    ordinal = next((_ORDINALS[one] for one in tokens if one in _ORDINALS), 1)
+    counted = [round(one.value) for one in read_quantities(words) if one.dimension == "bare"]
+    after = "after" in tokens and bool(counted) and 1 <= counted[0] <= _MOST_JUNCTIONS
+    return counted[0] + 1 if after else ordinal
+
+
+def _agrees(words: str, recalled: Recalled, denied: frozenset[str] = frozenset()) -> bool:
     """Whether a learned program goes to the side, and changes lanes, as the words say: likeness alone may not."""
     said = set(re.findall(r"\w+", words.casefold()))
-    sides = {side for side in _SIDES if side in said}
+    sides = {side for side in _SIDES if side in said and side not in denied}
     step = TownStep(words, recalled=recalled)
     lanes = {name.removeprefix("change_lane_") for name in _LANES if name in step.calls}
     if "lane" in said:
         return lanes == sides and not step.turn
     return not lanes and {step.turn} & set(_SIDES) == sides
+
+
+def town_destination(wish: str) -> str:
+    """The place that a wish in a town asks to be taken to; empty where it asks for none, or says a way or a lane."""
+    if any(one.manoeuvre in ("turn", "lane") for one in meanings_said(wish)):
+        return ""
+    return destination_of(wish)
+
+
+def driven_to(planner: Planner, place: str, request: PlanRequest, begun: float) -> Plan:
+    """The plan to go to a place of the town. The world refuses what it has not."""
+    situation = request.context.situation
+    limit, usual = situation.speed_limit_mps, LOOK_AHEAD["usual"]
+    policy = Parameters(
+        target_speed_mps=round(min(limit, request.limits.most_mps(limit)), 2),
+        look_ahead_m=usual.distance_m,
+        look_ahead_ratio=usual.ratio_s,
+        lane=0,
+        route=place,
+    )
+    return Plan(
+        thoughts=Thoughts(f"You want to go to {place}. I take the way there, as fast as the signs allow."),
+        policy=policy,
+        intent="go_to",
+        planner=planner.id,
+        model=planner.model,
+        latency_s=time.perf_counter() - begun,
+    )
 
 
 def plan_in_town(planner: Planner, request: PlanRequest, repository: PolicyRepository | None = None) -> Plan | None:
@@ -151,9 +235,13 @@ def plan_in_town(planner: Planner, request: PlanRequest, repository: PolicyRepos
         return None
     if reason := danger(_SIGN.sub("", request.instruction.text)):
         return declined(planner, f"{reason} {CAN_DO}", begun)
+    if there := town_destination(last_said(request.instruction.text)):
+        return driven_to(planner, there, request, begun)
     steps = steps_of(request.instruction.text, repository or snippets())
     if steps is None:
         return None
+    if len(steps) == 1 and steps[0].out and steps[0].place:  # "drop me off in front of the station"
+        return driven_to(planner, steps[0].place, request, begun)
     if words := _impossible(steps[0], request.context.situation):
         return declined(planner, words, begun, intent="not there")
     near = [step.recalled for step in steps if step.recalled is not None]
@@ -171,7 +259,7 @@ def plan_in_town(planner: Planner, request: PlanRequest, repository: PolicyRepos
 
 def _impossible(step: TownStep, situation: Situation) -> str:
     """Why a step cannot be done where the car is; empty where it can."""
-    if step.place:
+    if step.place or step.nth > 1:
         return ""  # the junction that is meant may be another one
     if step.way and situation.turns and step.way not in situation.turns:
         ways = " or ".join(_WORDS[turn] for turn in situation.turns)
@@ -199,19 +287,22 @@ def _told(steps: tuple[TownStep, ...]) -> str:
     for step in steps:
         where = f" after {step.place}" if step.place else ""
         if step.out:
-            parts.append("I stop, so that you can get out")
+            there = " before the next junction" if step.before_junction else f" at {step.place}" if step.place else ""
+            far = "" if step.after_m is None else f" in {step.after_m:.0f} m"
+            parts.append(f"I stop{there}{far}, so that you can get out")
         elif step.recalled is None:
-            parts.append("I keep to the road")
+            parts.append("I keep to the road" + ("" if step.after_m is None else f" for {step.after_m:.0f} m"))
         else:
+            where += f", at the junction number {step.nth} that leads there," if step.nth > 1 else ""
             parts.append(f'{step.words}: I drive{where} as I learned for "{step.recalled.entry.command}"')
     return "; then ".join(parts) + "."
 
 
 def _program(steps: tuple[TownStep, ...]) -> str:
     """A learned program as it is, or several steps as one program."""
-    if len(steps) == 1 and steps[0].recalled is not None and not steps[0].place:
+    if len(steps) == 1 and steps[0].recalled is not None and not steps[0].place and steps[0].nth == 1:
         return steps[0].recalled.entry.source
-    navigation = all(not step.out for step in steps) and not any(step.place for step in steps)
+    navigation = all(not step.out and not step.place and step.nth == 1 for step in steps)
     if navigation and steps[0].recalled is not None:
         return steps[0].recalled.entry.source  # navigation says the rest again when this is done
     body: list[str] = []
@@ -228,6 +319,15 @@ def _program(steps: tuple[TownStep, ...]) -> str:
                 "            break",
                 "        yield proceed(check_speed_limit())",
             ]
+        if step.after_m is not None:
+            body += [f"    yield from drive_on({step.after_m:.0f})"]
+        if step.before_junction:
+            body += [
+                "    for _ in range(12000):",
+                f"        if get_distance_to_junction() < {_STOPS_BEFORE_M}:",
+                "            break",
+                "        yield proceed(check_speed_limit())",
+            ]
         if step.out:
             body += [
                 '    say("I stop here. Please look round before you get out.")',
@@ -236,8 +336,19 @@ def _program(steps: tuple[TownStep, ...]) -> str:
             ]
             break
         if step.recalled is None:
-            body += ["    while True:", "        yield proceed(check_speed_limit())"]
-            break
+            if step.after_m is None:
+                body += ["    while True:", "        yield proceed(check_speed_limit())"]
+                break
+            continue
+        if step.nth > 1:
+            body += [
+                f"    for _ in range({step.nth - 1}):",
+                f'        yield from pass_a_way("{step.turn}")',
+                "    for _ in range(12000):",
+                f'        if can_go("{step.turn}"):',
+                "            break",
+                "        yield proceed(check_speed_limit())",
+            ]
         if step.turn:
             verb = "go_straight" if step.turn == "straight" else f"turn_{step.turn}"
             body += [
@@ -252,7 +363,12 @@ def _program(steps: tuple[TownStep, ...]) -> str:
             lane = next((name for name in _LANES if name in step.calls), "")
             body += [f"    {lane}()"] if lane else []
             body += ["    for _ in range(100):", "        yield proceed(check_speed_limit())"]
-    return "\n".join([_CROSSING if any(step.turn for step in steps) else "", "def as_told():", *body, ""]).lstrip("\n")
+    helpers = [
+        *([_CROSSING] if any(step.turn for step in steps) else []),
+        *([_PASSING] if any(step.nth > 1 for step in steps) else []),
+        *([_FAR] if any(step.after_m is not None for step in steps) else []),
+    ]
+    return "\n".join(["".join(helpers), "def as_told():", *body, ""]).lstrip("\n")
 
 
 _CROSSING: Final = """def cross_the_junction():
@@ -267,6 +383,27 @@ _CROSSING: Final = """def cross_the_junction():
     for _ in range(12000):
         gone = gone + 0.05 * get_speed_of(get_ego_vehicle())
         if gone > 40.0:
+            break
+        yield proceed(check_speed_limit())
+
+
+"""
+_PASSING: Final = """def pass_a_way(side):
+    counted = can_go(side)
+    yield from cross_the_junction()
+    for _ in range(8):
+        if counted:
+            break
+        counted = can_go(side)
+        yield from cross_the_junction()
+
+
+"""
+_FAR: Final = """def drive_on(far):
+    gone = 0.0
+    for _ in range(12000):
+        gone = gone + 0.05 * get_speed_of(get_ego_vehicle())
+        if gone > far:
             break
         yield proceed(check_speed_limit())
 

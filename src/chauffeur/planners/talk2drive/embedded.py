@@ -36,6 +36,7 @@ from chauffeur.planners.onboard.moods import EASE, HURRY
 from chauffeur.planners.onboard.options import Chosen, Declined, speed_words
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.thoughts import thoughts_of
+from chauffeur.planners.onboard.town import town_destination
 from chauffeur.planners.onboard.understand import meanings_said
 from chauffeur.planners.talk2drive.habits import SIGN_SETTING, kind_of, pace_of, speed_for
 from chauffeur.planners.talk2drive.hints import HINT_KINDS, WEIGHTS, Hint, goes_with, hint_of
@@ -46,7 +47,6 @@ from chauffeur.planners.talk2drive.style import (
     LOOK_AHEAD_PARKING,
     PARKING_MPS,
     LookAhead,
-    destination_of,
     manner_of,
     named_spot,
     place_of,
@@ -137,7 +137,7 @@ class EmbeddedParameters:
         if ready.declined is not None:
             return ready.declined
         wish = ready.instruction.text
-        if situation.world == "town" and (place := destination_of(wish)):
+        if situation.world == "town" and (place := town_destination(wish)):
             return self._take_to(place, request, begun)
         request = replace(request, instruction=ready.instruction)
         settled = self._model.settle(_compared(request), begun)

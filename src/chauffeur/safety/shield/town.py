@@ -24,7 +24,7 @@ from chauffeur.geometry import Polyline, RoadGraph, Route, joined, wrap_to_pi
 from chauffeur.safety.shield.shield import FilterResult, Shield
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, ShieldParameters
 from chauffeur.safety.words import speed_words
-from chauffeur.worlds.town.way import most_mps
+from chauffeur.worlds.town.way import astride_m, most_mps
 
 Array = NDArray[np.float64]
 _Line = tuple[tuple[float, float], tuple[float, float]]
@@ -37,10 +37,10 @@ _SIDE_M: Final = 0.15
 _PERSON_SIDE_M: Final = 0.5
 _GAP_M: Final = 0.6
 _OVER_M: Final = 1.0
-"""Who is farther over a line than this has passed it, and clears the junction."""
+"""Who is farther over a line than this, and cannot wait with its tail before it, clears the junction."""
 _SERVED_MPS: Final = 0.1
 _AT_SIGN_M: Final = 4.0
-_CLEAR_M: Final = 1.5
+_CLEAR_M: Final = 3.5
 _HALVINGS: Final = 5
 _SLOWING_MPS2: Final = 1.5
 _ASIDE_M: Final = 0.9
@@ -235,9 +235,12 @@ class TownShield(Shield):
             if at is None or signal.state == "off":
                 continue
             ahead = self._line_m(way, at, signal.stop_line_m) - nose
-            if ahead < -_OVER_M:
-                continue
-            cap = self._stopping(speed, ahead)
+            room = ahead
+            if ahead < -_OVER_M:  # its front is over it: it may wait so, as long as its tail is not
+                room += astride_m(ego.length_m)
+                if signal.state == "yellow" or speed * speed > 2.0 * self._bounds.gentle_mps2 * max(0.0, room):
+                    continue
+            cap = self._stopping(speed, room)
             if cap >= strictest[0] or (signal.state == "yellow" and cap < -self._bounds.gentle_mps2):
                 continue
             why = f"The light shows {signal.state}."

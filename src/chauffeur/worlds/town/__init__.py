@@ -2,7 +2,7 @@
 
 from chauffeur.worlds.town.driver import TownDriver
 from chauffeur.worlds.town.perception import TownPerception
-from chauffeur.worlds.town.referee import TownReferee
+from chauffeur.worlds.town.referee import TownReferee, WayReferee
 from chauffeur.worlds.town.world import TownWorld
 
-__all__ = ["TownDriver", "TownPerception", "TownReferee", "TownWorld"]
+__all__ = ["TownDriver", "TownPerception", "TownReferee", "TownWorld", "WayReferee"]

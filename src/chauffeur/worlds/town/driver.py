@@ -30,7 +30,7 @@ from chauffeur.control.kinematic_bicycle import KinematicBicycle
 from chauffeur.control.pure_pursuit import pursuit_steering
 from chauffeur.geometry import JunctionWay, Lane, Pose, RoadGraph, Route, Turn, choice_ahead, wrap_to_pi
 from chauffeur.worlds.town.foresight import Foresight, Meeting
-from chauffeur.worlds.town.way import RouteCorridor, Stretch, blended, free_route
+from chauffeur.worlds.town.way import RouteCorridor, Stretch, astride_m, blended, free_route
 
 TOWN_CAPABILITIES: Final = Capabilities(
     roads=("town",),
@@ -51,11 +51,16 @@ _LEAST_LOOK_M: Final = 3.2
 _SIDE_M: Final = 0.35
 _MOST_BRAKING_MPS2: Final = 8.0
 _YELLOW_MPS2: Final = 3.0
+_GONE_S: Final = 2.5
+"""A car that stands astride a line needs so long to have all of itself behind it."""
 _LINE_M: Final = 0.7
 """The front bumper stops so far before a stop line."""
 _OVER_M: Final = 1.0
-_ROOM_BEHIND_M: Final = 2.5
-"""Between a stop line and who stands ahead, beside the car's own length: it stops so far behind, and is clear."""
+_ROOM_BEHIND_M: Final = 5.0
+"""Between a stop line and who stands ahead, beside its own length: a car stops up to 4 m behind, and is clear by 1."""
+_CLEAR_M: Final = 1.2
+_CLOSE_M: Final = 1.0
+"""Who stands with its tail over a stop line draws up so close to who is ahead."""
 _TO_A_STAND: Final = 5.0
 """Who is ahead may stand as soon as comfortable braking, 2.5 m/s2, allows: twice that, m/s2."""
 _STANDING_MPS: Final = 0.08
@@ -128,7 +133,7 @@ class TownDriver:
         else:
             start = place.lane
         self._stretch = self._corridor.stretch(first, start)
-        self._station = self._rear_station(ego, -math.inf, math.inf)
+        self._station = self._first_station(ego)
         self._changing_to: float | None = None
         self._wanted: LaneId | None = None
         self._served: frozenset[str] = frozenset()
@@ -136,6 +141,7 @@ class TownDriver:
         self._meetings: list[Meeting] = []
         self._tick = 0
         self._sign: tuple[int, float] | None = None
+        self._tail_over = False
         self._lines: dict[tuple[str, float], tuple[Stretch, float]] = {}
         self.why = ""
 
@@ -284,6 +290,10 @@ class TownDriver:
         rear = Pose(ego.x_m, ego.y_m, ego.heading_rad).ahead(-self._chassis.rear_to_middle_m)
         return self._stretch.line.nearest(rear.x_m, rear.y_m, low_m, high_m)
 
+    def _first_station(self, ego: VehicleState) -> float:
+        """On a new line, which begins in the ego's lane: its way may come by the same place again later."""
+        return self._rear_station(ego, -math.inf, _first_m(self._stretch) + _HERE_M)
+
     def _turn_to(self, setpoints: Setpoints, ego: VehicleState) -> None:
         """Another way at the next junction, where the wish is another than the route; and over, where a free way is."""
         if setpoints.turn is None:
@@ -324,7 +334,7 @@ class TownDriver:
     def _take(self, route: Route, lane: LaneId, ego: VehicleState) -> None:
         self._corridor = RouteCorridor(self._road, route)
         self._stretch = self._corridor.stretch(self._corridor.layer_of(lane, 0) or 0, lane)
-        self._station = self._rear_station(ego, -math.inf, math.inf)
+        self._station = self._first_station(ego)
         self._changing_to = None
         self._wished_ways(self.lanes_ahead())  # the junction may lie behind the end of the way before
 
@@ -344,7 +354,7 @@ class TownDriver:
         layer = self._corridor.layer_of(place.lane, self._stretch.layer + at)
         if layer is not None:
             self._stretch = self._corridor.stretch(layer, place.lane)
-            self._station = self._rear_station(ego, -math.inf, math.inf)
+            self._station = self._first_station(ego)
 
     def _onwards(self) -> bool:
         """The free way drawn out, where the one there was is nearly driven; False where it ends, or leads to a goal."""
@@ -454,13 +464,14 @@ class TownDriver:
             least = -1.0  # who is to stand does not creep
         self.why = ""
         stops = self._stops(seen, nose)
+        follows = replace(idm, jam_distance_m=_CLOSE_M) if self._tail_over else idm
         for meeting in self._meetings:
             if meeting.now and (meeting.along or meeting.along_mps > -0.5 or meeting.other.speed_mps < 0.5):
                 gap = meeting.first_m - nose
                 if meeting.last_m < nose or gap < -self._chassis.length_m:
                     continue  # beside or behind: to stand there would not help
                 lead = max(0.0, meeting.along_mps) if meeting.along else 0.0
-                asked = idm_acceleration(speed, max(target, 0.05), idm, max(gap, 0.05), speed - lead)
+                asked = idm_acceleration(speed, max(target, 0.05), follows, max(gap, 0.05), speed - lead)
                 if asked < least:
                     least, self.why = asked, f"behind {meeting.other.kind} {meeting.other.id}"
             else:
@@ -496,8 +507,8 @@ class TownDriver:
 
     def _stops(self, seen: Observation, nose: float) -> list[_Stop]:
         """Where it has to stop for the end of the line, lights, signs, and a junction that is blocked."""
-        stretch, speed = self._stretch, seen.ego.speed_mps
-        self._sign = None
+        stretch, speed, length = self._stretch, seen.ego.speed_mps, self._chassis.length_m
+        self._sign, self._tail_over = None, False
         stops = [_Stop(stretch.end_m - _ROOM_M, "room to change lanes")]
         if stretch.goal:
             stops = [_Stop(stretch.end_m + self._chassis.length_m / 2.0, "the goal")]
@@ -511,10 +522,13 @@ class TownDriver:
             lane = stretch.lanes[i]
             if lane.id in lights:
                 line = self._line_m(lights[lane.id], start, end)
+                self._tail_over |= line + astride_m(length) < nose < line + length + _CLEAR_M
                 if self._light_stops(lights[lane.id], line, nose, speed):
                     stops.append(_Stop(line - _LINE_M, f"light {lights[lane.id].state}"))
                 elif self._no_room_behind(line, nose, speed):
                     stops.append(_Stop(line - _LINE_M, "no room behind the stop line"))
+                elif self._waits_astride(lights[lane.id], line, nose, speed):
+                    stops.append(_Stop(line + astride_m(length), "its tail before the stop line"))
             if lane.id in signs and signs[lane.id][1].id not in self._served:
                 number, sign = signs[lane.id]
                 line = self._line_m(sign, start, end)
@@ -562,11 +576,24 @@ class TownDriver:
         ahead = line - _LINE_M - nose
         if ahead < -_LINE_M or speed * speed > 2.0 * _YELLOW_MPS2 * (max(0.0, ahead) + 0.3):
             return False
+        return self._crowded(line)
+
+    def _crowded(self, line: float) -> bool:
+        """Whether who is ahead leaves no room for all of the car behind a line, should they stop."""
         needed = line + self._chassis.length_m + _ROOM_BEHIND_M
         return any(
             one.now and one.along and line - 0.5 < one.first_m < needed - max(0.0, one.along_mps) ** 2 / _TO_A_STAND
             for one in self._meetings
         )
+
+    def _waits_astride(self, light: Signal, line: float, nose: float, speed: float) -> bool:
+        """Whether a car whose front is over a line waits there with its tail before it: it came to a stand in a queue,
+        and its light has turned red since, or there is no room behind the line yet."""
+        room = line + astride_m(self._chassis.length_m) - nose
+        if nose < line or light.state == "off" or speed * speed > 2.0 * _YELLOW_MPS2 * max(0.0, room):
+            return False
+        turns = light.state == "yellow" and light.remaining_s is not None and light.remaining_s < _GONE_S
+        return light.state == "red" or turns or self._crowded(line)
 
     def _serves(self, sign: Sign, line: float, nose: float, speed: float) -> bool:
         """Whether a stop sign is served, or has been passed."""

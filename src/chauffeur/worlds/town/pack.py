@@ -56,7 +56,7 @@ class SignalPhase:
     states: tuple[SignalState, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SignalGroup:
     """The lights of one junction, which change together.
 
@@ -91,17 +91,26 @@ class SignalGroup:
     def signals(self, time_s: float) -> tuple[Signal, ...]:
         """What its heads show at a time, and how long they still do."""
         now, left = self.phase_at(time_s)
+        states, after = self.phases[now].states, self._after[now]
         return tuple(
-            Signal(head.id, self.phases[now].states[i], head.lanes, head.stop_line_m, self._remaining_s(i, now, left))
-            for i, head in enumerate(self.heads)
+            Signal(head.id, state, head.lanes, head.stop_line_m, None if more is None else left + more)
+            for head, state, more in zip(self.heads, states, after, strict=True)
         )
 
-    def _remaining_s(self, head: int, now: int, left: float) -> float | None:
+    @cached_property
+    def _after(self) -> tuple[tuple[float | None, ...], ...]:
+        """Of each phase, how long after it each head still shows the same, s; None for ever."""
+        return tuple(
+            tuple(self._lasts_s(head, now) for head in range(len(self.heads))) for now in range(len(self.phases))
+        )
+
+    def _lasts_s(self, head: int, now: int) -> float | None:
+        lasts = 0.0
         for step in range(1, len(self.phases)):
             phase = self.phases[(now + step) % len(self.phases)]
             if phase.states[head] != self.phases[now].states[head]:
-                return left
-            left += phase.seconds
+                return lasts
+            lasts += phase.seconds
         return None
 
 
@@ -151,10 +160,11 @@ _ARTICLES: Final = re.compile(r"^(?:the|a|an|my|our)\s+")
 def places_called(places: Sequence[Place], name: str) -> tuple[Place, ...]:
     """The places that words may mean: by their whole name or kind, else by a part of it."""
     wanted = _ARTICLES.sub("", name.strip().casefold())
-    exact = tuple(one for one in places if wanted in (one.name.casefold(), one.kind.casefold()))
+    kinds = {one.kind: one.kind.casefold().replace("_", " ") for one in places}
+    exact = tuple(one for one in places if wanted in (one.name.casefold(), one.kind.casefold(), kinds[one.kind]))
     if exact or not wanted:
         return exact
-    return tuple(one for one in places if wanted in one.name.casefold() or one.kind.casefold() in wanted)
+    return tuple(one for one in places if wanted in one.name.casefold() or kinds[one.kind] in wanted)
 
 
 @dataclass(frozen=True, slots=True)

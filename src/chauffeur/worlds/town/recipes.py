@@ -253,6 +253,8 @@ _LANDMARKS: Final = (
     ("Old Library", "library"), ("Corner Pharmacy", "pharmacy"), ("Green Market", "supermarket"),
     ("Lion Hotel", "hotel"), ("City Museum", "museum"), ("Post Office", "post_office"),
 )  # fmt: skip
+PLACE_KINDS: Final = (*(kind for _, kind in _LANDMARKS), "bus_stop")
+"""What places our own towns have."""
 _STREETS: Final = [
     "Bridge Street", "Castle Street", "Chapel Lane", "Church Street", "Cooper Street", "Elm Street", "Ferry Lane",
     "Garden Street", "George Street", "Grove Road", "Hazel Lane", "Hope Street", "Ivy Lane", "Kiln Lane",

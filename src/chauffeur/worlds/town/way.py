@@ -30,6 +30,9 @@ SLOWING_MPS2: Final = 1.3
 """Braking towards bends and lower limits."""
 _BEND_SPAN_M: Final = 4.0
 _CREEP_MPS: Final = 2.0
+_TAIL: Final = 0.9
+"""Of a car's length, from its front bumper: where its tail begins (Leaderboard 1.0)."""
+_CLEAR_OF_M: Final = 0.6
 _MOST_SWING_M: Final = 1.5
 
 
@@ -220,6 +223,14 @@ class Stretch:
         """Where one of its lanes begins and ends."""
         end = self.starts_m[at + 1] if at + 1 < len(self.lanes) else self.line.length_m
         return self.starts_m[at], end
+
+
+def astride_m(length_m: float) -> float:
+    """How far beyond a stop line the front bumper of a car may wait: its tail is not over the line yet.
+
+    Who has its tail over the line while the light is red has run it, whether it drives or stands.
+    """
+    return _TAIL * length_m - _CLEAR_OF_M
 
 
 def _led_in(

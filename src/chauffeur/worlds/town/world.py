@@ -59,6 +59,7 @@ _SIZES: Final[Mapping[AgentKind, tuple[float, float]]] = {
 _ON_ROAD_M: Final = 0.4
 _OFF_ROAD_M: Final = 1.0
 _NEAR_LANE_M: Final = 3.0
+_AMID_M: Final = 0.5
 
 
 class TownConfig(BaseModel):
@@ -569,8 +570,17 @@ class TownWorld:
         known = self._lane_places.get(mover.name)
         place = mover.lane, mover.x_m, mover.y_m
         if known is None or known[0] != place:
-            known = self._lane_places[mover.name] = place, self._closest(lanes, mover.x_m, mover.y_m)
+            lane = None if known is None or known[0][0] != mover.lane else known[1]
+            if lane is None or not self._amid(lane, mover.x_m, mover.y_m):
+                lane = self._closest(lanes, mover.x_m, mover.y_m)
+            known = self._lane_places[mover.name] = place, lane
         return known[1]
+
+    def _amid(self, name: LaneId, x_m: float, y_m: float) -> bool:
+        """Whether a place is well inside a lane: of those that follow one another no other is closer."""
+        lane = self.town.road[name]
+        station, offset = lane.centre.project(x_m, y_m)
+        return _AMID_M < station < lane.length_m - _AMID_M and abs(offset) < lane.width_m / 2.0
 
     def _closest(self, lanes: tuple[LaneId, ...], x_m: float, y_m: float) -> LaneId | None:
         if len(lanes) <= 1:
