@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from chauffeur.bench.motion.scoring import care
 from chauffeur.concept import (
     ActionMatrix,
     CameraImage,
@@ -31,8 +30,9 @@ from chauffeur.planners.vlm import VlmPlanner
 from chauffeur.planners.vlm.engine import VlmEngine, VlmReading, shipped
 from chauffeur.planners.vlm.pictures import HEIGHT, WIDTH, fault_of, small
 from chauffeur.planners.vlm.planner import RECALL_SETTING, recalled, task_of
+from chauffeur.planners.vlm.taste import TASTE_SETTING, JudgedDrive, taste_of
 from chauffeur.planners.vlm.template import GAINS, LEVELS, STYLES, TEMPLATE, GainCodebook
-from chauffeur.safety.gain_box import gain_box
+from chauffeur.safety.gain_box import care, gain_box, moved
 
 CODEBOOK = GainCodebook.of(gain_box())
 SITUATION = Situation("track", 8.3, 13.9, 1, 0, False, None, None)
@@ -46,8 +46,8 @@ def picture(time_s: float = 0.0, seed: int = 0) -> CameraImage:
 def sunshine() -> CameraImage:
     """Sky, meadow and a road, by hand."""
     pixels = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
-    pixels[:30], pixels[30:] = (150, 190, 235), (110, 150, 80)
-    pixels[34:, 30:82] = (120, 120, 122)
+    pixels[: HEIGHT // 2], pixels[HEIGHT // 2 :] = (150, 190, 235), (110, 150, 80)
+    pixels[HEIGHT // 2 + 4 :, WIDTH // 4 : 3 * WIDTH // 4] = (120, 120, 122)
     return CameraImage("front", 0.0, pixels)
 
 
@@ -92,8 +92,8 @@ def test_a_sound_camera_leaves_everything_to_the_model() -> None:
     ("images", "said"),
     [
         ((), "off"),
-        ((CameraImage("front", 0.0, np.zeros((64, 112, 3), np.uint8)),), "black"),
-        ((CameraImage("front", 0.0, np.full((64, 112, 3), 127, np.uint8)),), "blank"),
+        ((CameraImage("front", 0.0, np.zeros((HEIGHT, WIDTH, 3), np.uint8)),), "black"),
+        ((CameraImage("front", 0.0, np.full((HEIGHT, WIDTH, 3), 127, np.uint8)),), "blank"),
         ((picture(0.0), picture(1.0)), "frozen"),
     ],
 )
@@ -215,6 +215,38 @@ def test_what_was_said_of_such_a_wish_moves_the_gains(items: tuple[HistoryItem, 
     assert engine.given[0]["recall"] == expected
     assert dict(plan.settings)[RECALL_SETTING] == {"gentler": -1.0, "none": 0.0, "brisker": 1.0}[expected]
     assert recalled(History(items)) in (0, 1, 2)
+
+
+@pytest.mark.parametrize(
+    ("seen", "items", "sign"),
+    [
+        ("sunny", (item(HARSH, similarity=0.2),), 1),  # another wish, the same person
+        ("snow", (item(HARSH, similarity=0.2),), 1),
+        ("sunny", (item(TIMID, similarity=-1.0), item(TIMID, similarity=-1.0)), -1),
+        ("snow", (item(TIMID, similarity=-1.0), item(TIMID, similarity=-1.0)), 0),  # never bolder in bad weather
+        ("sunny", (item(HARSH, similarity=0.2), item(TIMID, similarity=0.2)), 0),
+        ("sunny", (item(LIKED, similarity=0.2),), 0),
+    ],
+)
+def test_what_was_said_of_other_wishes_counts_for_less(seen: str, items: tuple[HistoryItem, ...], sign: int) -> None:
+    plain, tasted = (ask(VlmPlanner(Sees(seen)), picture(), history=History(history)) for history in ((), items))
+    assert isinstance(plain.policy, ActionMatrix) and isinstance(tasted.policy, ActionMatrix)
+    more = care(tasted.policy) - care(plain.policy)
+    assert not gain_box().outside(tasted.policy)
+    assert (more > 0.02, more < -0.02) == (sign > 0, sign < 0)
+    assert abs(more - dict(tasted.settings)[TASTE_SETTING]) < 0.1
+    assert bool(sign) == ("your words alone" in tasted.thoughts.text)
+
+
+def test_the_more_often_it_is_said_the_farther_gains_move_and_less_for_other_wishes() -> None:
+    once, often = (taste_of([JudgedDrive(-1, 0.6, 0.0, 1.0)] * count) for count in (1, 4))
+    other = taste_of([JudgedDrive(-1, 0.6, 0.0, 0.3)])
+    assert 0.0 < other < once < often < 0.4
+    assert taste_of([JudgedDrive(1, 0.6, 0.0, 1.0)]) == pytest.approx(-once)
+    assert taste_of([]) == 0.0
+    gains = ActionMatrix((0.45, 0.03, 0.04), (11.0, 27.0, 100.0))
+    assert care(moved(gains, 0.1)) == pytest.approx(care(gains) + 0.1, abs=0.02)
+    assert moved(gains, 0.0) == gains
 
 
 def test_the_manoeuvre_is_read_off_speed_and_lanes() -> None:

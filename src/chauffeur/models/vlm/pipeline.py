@@ -27,13 +27,14 @@ from chauffeur.models.vlm.scenes import PictureSet, Split, load_pictures, make_p
 from chauffeur.models.vlm.wishes import held_wishes
 from chauffeur.planners.vilad.words import load_words
 from chauffeur.planners.vlm.engine import TRUST, WORDS_FOLDER, VlmEngine
+from chauffeur.planners.vlm.pictures import HEIGHT, WIDTH
 from chauffeur.planners.vlm.template import SEEN_WEATHERS, TEMPLATE, GainCodebook
 from chauffeur.safety.gain_box import gain_box
 
 Told = Callable[[str, int, int], None]
 """Is told (stage, done, of how many)."""
 
-VERSION: Final = "vlm-compact-v1"
+VERSION: Final = "vlm-compact-v2"
 TESTS: Final[Mapping[Split, int]] = {"test": 500, "held_out_a": 250, "held_out_b": 250}
 """Pictures of each test."""
 TEST_SEED: Final = 1
@@ -64,7 +65,11 @@ def make_vlm(folder: Path, recipe: VlmRecipe, told: Told, tests: Mapping[Split, 
         recipe,
         load_pictures(pictures, "train", recipe.scenes),
         load_words(WORDS_FOLDER / "words.npz"),
-        lambda step, loss, seconds: told(f"training, loss {loss:.3f}, {seconds:.2f} s", step + 1, recipe.steps),
+        lambda stage, step, loss, seconds: told(
+            f"{stage}, loss {loss:.3f}, {seconds:.2f} s",
+            step + 1,
+            recipe.seeing_steps if stage == "eye" else recipe.steps,
+        ),
     )
     about: dict[str, Any] = {
         "version": VERSION,
@@ -103,7 +108,7 @@ def make_vlm(folder: Path, recipe: VlmRecipe, told: Told, tests: Mapping[Split, 
 def _shuffled(pictures: PictureSet) -> PictureSet:
     """The same facts beside pictures of other scenes: what is left when what is shown says nothing."""
     order = np.random.default_rng([TEST_SEED, 23]).permutation(len(pictures))
-    return PictureSet(pictures.pixels[order], pictures.facts)
+    return PictureSet(pictures.pixels[order], pictures.cells[order], pictures.facts)
 
 
 def model_card(about: Mapping[str, Any], sizes: Mapping[str, int]) -> str:
@@ -130,12 +135,13 @@ word table of the ViLaD planner (2.3 MB, input embeddings of all-MiniLM-L6-v2, A
 {NETWORK_SHARE} (tuned on two writers of their own).
 
 - **Input**: {TEMPLATE.length} tokens of a fixed pattern, the words (pieces with pretrained vectors), the picture at
-  112x64. **Output**: style; weather, its grade, lead vehicle, road; Kp, Ki, Kd, Wl, Wh, Ws as tokens of a codebook
-  within the certified box. Token by token, each from those before it; the style from the words alone.
-- **Training**: {recipe["steps"]:,} steps of {recipe["pictures"]} pictures with three wishes each, of
-  {recipe["scenes"]:,} rendered scenes ({3 * recipe["scenes"]:,} pairs a turn; wishes are drawn anew each turn), seed
-  {recipe["seed"]}. Again: `chauffeur model train vlm --out DIR --scenes {recipe["scenes"]} --steps {recipe["steps"]}
-  --seed {recipe["seed"]}`
+  {WIDTH}x{HEIGHT}. **Output**: style; weather, its grade, lead vehicle, road; Kp, Ki, Kd, Wl, Wh, Ws as tokens of a
+  codebook within the certified box. Token by token, each from those before it; the style from the words alone.
+- **Training**: first the eye, {recipe["seeing_steps"]:,} steps of {recipe["seen_pictures"]} pictures (what is seen, and
+  where vehicles are); then, with the eye frozen, {recipe["steps"]:,} steps of {recipe["pictures"]} pictures with three
+  wishes each. {recipe["scenes"]:,} rendered scenes ({3 * recipe["scenes"]:,} pairs a turn; wishes are drawn anew each
+  turn), seed {recipe["seed"]}. Again: `chauffeur model train vlm --out DIR --scenes {recipe["scenes"]}
+  --steps {recipe["steps"]} --seed {recipe["seed"]}`
 - **Data**: rendered, never photographed; sentences of `data/sorters`, `data/onboard` and `data/vlm`, whose card says
   how writers are held apart; gains of the table `data/vlm/gains.json`, which is the authors' own.
 - **Figures**, percent (alignments: points), on places, traffic, writers and templates that training did not have;

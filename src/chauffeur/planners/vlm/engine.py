@@ -98,7 +98,7 @@ class VlmEngine:
         """
         words = self.words.vectors(self.words.tokens(text))[None]
         shown = small(BLIND if pixels is None else pixels).astype(np.float32) / 255.0
-        feed = {"words": words, "pixels": np.ascontiguousarray(shown.transpose(2, 0, 1)[None])}
+        feed = {"words": words, "pixels": shown[None]}
         row, shares, passes = TEMPLATE.canvas, dict[str, float](), 0
         slots = {slot.name: slot for slot in TEMPLATE.slots}
         for name, word in given.items():
