@@ -4,7 +4,7 @@
 folder/pictures/    rendered, with what is true of each
 folder/training/    the network's state and log
 folder/full/        the model in float32, for comparison
-folder/model/       what ships: `model.onnx`, `model.json`, `styles.npz`, `MODEL_CARD.md`
+folder/model/       what ships: `model.onnx`, `model.json`, `styles.npz`, `head.npz`, `MODEL_CARD.md`
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 
 from chauffeur.drive.files import publish
 from chauffeur.models.sorting.training import write
-from chauffeur.models.vlm.ear import NETWORK_SHARE, style_sorter
+from chauffeur.models.vlm.ear import HEAD_SHARE, NETWORK_SHARE, style_head, style_sorter, style_worth
 from chauffeur.models.vlm.evaluation import VlmFigures, vlm_figures
 from chauffeur.models.vlm.gains import gain_table
 from chauffeur.models.vlm.recipe import VlmRecipe, train
@@ -28,6 +28,7 @@ from chauffeur.models.vlm.wishes import held_wishes
 from chauffeur.planners.vilad.words import load_words
 from chauffeur.planners.vlm.engine import TRUST, WORDS_FOLDER, VlmEngine
 from chauffeur.planners.vlm.pictures import HEIGHT, WIDTH
+from chauffeur.planners.vlm.sentences import shipped_encoder
 from chauffeur.planners.vlm.template import SEEN_WEATHERS, TEMPLATE, GainCodebook
 from chauffeur.safety.gain_box import gain_box
 
@@ -79,12 +80,13 @@ def make_vlm(folder: Path, recipe: VlmRecipe, told: Told, tests: Mapping[Split, 
         "recipe": asdict(recipe),
         "parameters": parameter_count(model),
     }
-    about["network_share"] = NETWORK_SHARE
+    about |= {"network_share": NETWORK_SHARE, "head_share": HEAD_SHARE, "style_worth": style_worth()}
     full = export(model, folder / "full", about, int8=False)
     target = export(model, folder / "model", about)
-    ear = style_sorter(recipe.seed)
+    ear, head = style_sorter(recipe.seed), style_head(recipe.seed, shipped_encoder())
     for path in (full, target):
         write(ear, path / "styles.npz")
+        head.store(path / "head.npz")
     engines = {"int8": VlmEngine(target), "float32": VlmEngine(full)}
     sets: dict[Split, PictureSet] = {
         split: load_pictures(pictures, split, count) for split, count in tests.items() if count
@@ -130,9 +132,11 @@ def model_card(about: Mapping[str, Any], sizes: Mapping[str, int]) -> str:
 The on-board vision-language model of personalised motion control (paper Sec. VI), compact: a picture of the front
 camera and a wish in, the style that was heard, what is seen, and six gains out. {about["parameters"] / 1e6:.2f} million
 weights, {sizes["int8"] / 1e6:.1f} MB in int8 ({sizes["float32"] / 1e6:.1f} MB in float32) for ONNX Runtime, and the
-word table of the ViLaD planner (2.3 MB, input embeddings of all-MiniLM-L6-v2, Apache-2.0). A linear sorter of wishes
-(0.15 MB) reads the style as well, and better; what the two find is multiplied, the network's with an exponent of
-{NETWORK_SHARE} (tuned on two writers of their own).
+word table of the ViLaD planner (2.3 MB, input embeddings of all-MiniLM-L6-v2, Apache-2.0). The style is read by two
+more: a linear sorter of wishes (0.15 MB), and a head (1.4 MB) on the frozen sentence encoder all-MiniLM-L6-v2
+(`encoder.onnx`, 22 MB in int8, Apache-2.0). What the three find is multiplied, the network's with an exponent of
+{NETWORK_SHARE}, the head's with {HEAD_SHARE} (tuned on two writers of their own), and the style is taken whose gains
+are expected to fit best: in doubt between haste and care, moderate.
 
 - **Input**: {TEMPLATE.length} tokens of a fixed pattern, the words (pieces with pretrained vectors), the picture at
   {WIDTH}x{HEIGHT}. **Output**: style; weather, its grade, lead vehicle, road; Kp, Ki, Kd, Wl, Wh, Ws as tokens of a
