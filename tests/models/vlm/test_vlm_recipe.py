@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ pytest.importorskip("osqp")
 from chauffeur.bench.motion.items import commands, style_ranges  # noqa: E402
 from chauffeur.bench.motion.scoring import command_alignment  # noqa: E402
 from chauffeur.concept import ConfigError, DataError  # noqa: E402
+from chauffeur.models.vlm.ear import fitted_head, style_worth  # noqa: E402
 from chauffeur.models.vlm.export import VlmGraph, export  # noqa: E402
 from chauffeur.models.vlm.gains import GainCase, taught_gains  # noqa: E402
 from chauffeur.models.vlm.network import SIZES, CompactVlm  # noqa: E402
@@ -27,6 +29,7 @@ from chauffeur.planners.vilad.words import WIDTH as WORD_WIDTH  # noqa: E402
 from chauffeur.planners.vilad.words import load_words  # noqa: E402
 from chauffeur.planners.vlm.engine import WORDS_FOLDER, VlmEngine  # noqa: E402
 from chauffeur.planners.vlm.pictures import CELLS, HEIGHT, WIDTH  # noqa: E402
+from chauffeur.planners.vlm.sentences import FEATURES, load_head, shipped_encoder  # noqa: E402
 from chauffeur.planners.vlm.template import SEEN_WEATHERS, STYLES, TEMPLATE, GainCodebook  # noqa: E402
 from chauffeur.safety.gain_box import care, gain_box  # noqa: E402
 
@@ -164,3 +167,34 @@ def test_pictures_are_rendered_once_and_read_back(tmp_path: Path) -> None:
     assert all((lead <= vehicles).all() for vehicles, lead in held.cells)
     with pytest.raises(DataError, match="not 4"):
         load_pictures(tmp_path, "val", 4)
+
+
+def test_in_doubt_between_haste_and_care_moderate_gains_fit_best() -> None:
+    worth = np.array(style_worth())
+    assert (np.diag(worth) > 0.99).all() and worth.shape == (3, 3)
+    assert int((worth @ np.array([0.5, 0.0, 0.5])).argmax()) == STYLES.index("moderate")
+    assert int((worth @ np.array([0.0, 0.1, 0.9])).argmax()) == STYLES.index("aggressive")
+
+
+def test_a_head_learns_what_separates_styles_and_is_read_back(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    wanted = rng.integers(0, 3, 300)
+    features = rng.standard_normal((300, FEATURES), np.float32)
+    features[:, :3] += 4.0 * np.eye(3, dtype=np.float32)[wanted]
+    fitted_head(features, wanted, 0).store(tmp_path / "head.npz")
+    head = load_head(tmp_path / "head.npz")
+    assert np.mean([head.scores(row).argmax() == want for row, want in zip(features, wanted, strict=True)]) > 0.9
+    (tmp_path / "head.npz").write_bytes(b"damaged")
+    with pytest.raises(DataError):
+        load_head(tmp_path / "head.npz")
+
+
+def test_the_encoder_that_ships_tells_sentences_apart() -> None:
+    encoder = shipped_encoder()
+    late, later, calm = (encoder.features(text) for text in ("I am late.", "I'm running late!", "What a calm evening."))
+    assert late.shape == (FEATURES,)
+
+    def like(one: Any, two: Any) -> float:
+        return float(one @ two / np.linalg.norm(one) / np.linalg.norm(two))
+
+    assert like(late, later) > like(late, calm)
