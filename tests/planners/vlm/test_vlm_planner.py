@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
+from chauffeur.bench.motion.items import MotionItem, commands
 from chauffeur.concept import (
     ActionMatrix,
     CameraImage,
@@ -33,6 +35,7 @@ from chauffeur.planners.vlm.planner import RECALL_SETTING, recalled, task_of
 from chauffeur.planners.vlm.taste import TASTE_SETTING, JudgedDrive, taste_of
 from chauffeur.planners.vlm.template import GAINS, LEVELS, STYLES, TEMPLATE, GainCodebook
 from chauffeur.safety.gain_box import care, gain_box, moved
+from chauffeur.worlds.track.manoeuvres import ManoeuvreName
 
 CODEBOOK = GainCodebook.of(gain_box())
 SITUATION = Situation("track", 8.3, 13.9, 1, 0, False, None, None)
@@ -43,12 +46,12 @@ def picture(time_s: float = 0.0, seed: int = 0) -> CameraImage:
     return CameraImage("front", time_s, pixels)
 
 
-def sunshine() -> CameraImage:
-    """Sky, meadow and a road, by hand."""
-    pixels = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
-    pixels[: HEIGHT // 2], pixels[HEIGHT // 2 :] = (150, 190, 235), (110, 150, 80)
-    pixels[HEIGHT // 2 + 4 :, WIDTH // 4 : 3 * WIDTH // 4] = (120, 120, 122)
-    return CameraImage("front", 0.0, pixels)
+@cache
+def sunshine(manoeuvre: ManoeuvreName) -> CameraImage:
+    """What the front camera shows before a manoeuvre in fine weather."""
+    pytest.importorskip("osqp")
+    command = next(one for one in commands() if one.manoeuvre == manoeuvre)
+    return MotionItem(command, "sunny", "std", 1).shown("on")[0]
 
 
 class Sees(VlmEngine):
@@ -159,14 +162,16 @@ def test_of_the_camera_and_what_the_passenger_says_the_worse_counts(seen: str, w
 
 
 @pytest.mark.parametrize("style", STYLES)
-@pytest.mark.parametrize("speed_mps, lanes", [(0.0, 1), (13.9, 2), (8.3, 1)])
+@pytest.mark.parametrize(
+    "manoeuvre, speed_mps, lanes", [("acceleration", 0.0, 1), ("lane_change", 13.9, 2), ("left_turn", 8.3, 1)]
+)
 def test_the_model_that_ships_is_more_careful_where_it_goes_by_what_was_said(
-    style: str, speed_mps: float, lanes: int
+    style: str, manoeuvre: ManoeuvreName, speed_mps: float, lanes: int
 ) -> None:
     wishes = {"aggressive": "I'm late, hurry", "moderate": "Drive as usual", "conservative": "Very gently, please"}
     here = replace(SITUATION, speed_mps=speed_mps, lane_count=lanes)
     bare, said, served = (
-        ask(VlmPlanner(shipped()), sunshine(), wish=wish, situation=replace(here, scene=scene))
+        ask(VlmPlanner(shipped()), sunshine(manoeuvre), wish=wish, situation=replace(here, scene=scene))
         for wish, scene in (
             (f"{wishes[style]}.", ()),
             (f"{wishes[style]}, but it is slippery.", ()),

@@ -22,7 +22,7 @@ from chauffeur.language.sorter import Sorter
 from chauffeur.models.sorting.sentences import Sentence
 from chauffeur.models.sorting.training import SortingRecipe, train
 from chauffeur.models.vlm.gains import GainCase, taught_gains
-from chauffeur.models.vlm.wishes import composed_wish, written
+from chauffeur.models.vlm.wishes import composed_wish, with_weather, written
 from chauffeur.planners.vlm.sentences import FEATURES, SentenceEncoder, StyleHead
 from chauffeur.planners.vlm.template import SEEN_WEATHERS, STYLES, GainCodebook
 from chauffeur.safety.gain_box import gain_box
@@ -35,6 +35,8 @@ HEAD_SHARE: Final = 1.5
 _COMPOSED: Final = 12_000
 _COMPOSED_FOR_HEAD: Final = 3_000
 """Sentences of the grammars, beside all of the table's."""
+_WEATHER_SAID: Final = 0.2
+"""Sentences that come a second time with a remark on the weather behind them."""
 _MEMBERS, _HIDDEN, _STEPS, _BATCH, _RATE = 4, 128, 500, 512, 2e-3
 _DROPPED: Final = (0.3, 0.3)
 _SMOOTHED: Final = 0.05
@@ -59,7 +61,9 @@ def _sentences(seed: int, composed: int) -> list[tuple[str, str]]:
     for place in range(composed):
         style = STYLES[place % len(STYLES)]
         found.append((composed_wish(style, rng), style))
-    return found
+    # Somebody late on a slippery road is late all the same: what is said of the weather is heard elsewhere.
+    some = rng.permutation(len(found))[: int(_WEATHER_SAID * len(found))]
+    return found + [(with_weather(found[int(place)][0], rng), found[int(place)][1]) for place in some]
 
 
 def fitted_head(features: Array, wanted: Array, seed: int) -> StyleHead:

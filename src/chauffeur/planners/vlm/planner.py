@@ -29,6 +29,8 @@ from chauffeur.safety.gain_box import moved
 INTENT: Final = "motion.gains"
 RECALL_SETTING: Final = "recall"
 """Among a plan's settings: -1 where it was made gentler than the words alone, 1 brisker, 0 neither."""
+SURE: Final = 0.8
+"""What the model sees is said from this share on; below, of a road that bends far ahead, it says either."""
 SIMILAR: Final = 0.6
 """A remembered wish this much like the present one speaks for it."""
 _LEAST_SHIFT: Final = 0.02
@@ -98,7 +100,8 @@ class VlmPlanner:
         else:
             pixels = request.images[-1].pixels()
             read = self._engine.read(text, pixels, given)
-            scene = scene_words(read.values, self._engine.trusted)
+            sure = {name for name in self._engine.trusted if read.shares.get(name, 1.0) >= SURE}
+            scene = scene_words(read.values, sure)
             thoughts = f"{scene} {thought_words(read.values)}"
             seen = read.values["weather"]
             worst, doubts, where = seen, list[str](), ""
