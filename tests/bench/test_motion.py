@@ -15,14 +15,13 @@ from chauffeur.bench.motion.items import SKY, STYLES, commands, style_ranges
 from chauffeur.bench.motion.scoring import (
     WEIGHTS,
     MotionStatistics,
-    care,
     command_alignment,
     driving_score,
     parameter_score,
 )
 from chauffeur.concept import ActionMatrix, ConfigError, Context, Plan, Situation, Thoughts
 from chauffeur.concept.registry import plugin_names
-from chauffeur.safety.gain_box import gain_box
+from chauffeur.safety.gain_box import care, gain_box
 from chauffeur.worlds.track import MANOEUVRES, WEATHERS
 
 pytest.importorskip("osqp")

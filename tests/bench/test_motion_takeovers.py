@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome
 from chauffeur.bench.motion.passengers import draw_manners, judged, meant, wanted
-from chauffeur.bench.motion.scoring import care
 from chauffeur.bench.motion.takeovers import TakeoverBenchmark
 from chauffeur.concept import ActionMatrix, ConfigError
 from chauffeur.planners.prompts.motion import MODERATE
+from chauffeur.safety.gain_box import care
 
 BOLD = ActionMatrix((1.0, 0.06, 0.0), (20.0, 60.0, 80.0))
 CAREFUL = ActionMatrix((0.15, 0.0, 0.3), (1.0, 10.0, 800.0))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import pytest
 
 from chauffeur.concept import ConfigError
@@ -20,7 +23,12 @@ SIGLIP = (
 
 
 @pytest.mark.parametrize(
-    "config", [VisionConfig(size=(32, 48), channels=(8, 16, 32)), VisionConfig("siglip", (32, 32), shape=SIGLIP)]
+    "config",
+    [
+        VisionConfig(size=(32, 48), channels=(8, 16, 32)),
+        VisionConfig("efficientnet-lite0", (32, 48)),
+        VisionConfig("siglip", (32, 32), shape=SIGLIP),
+    ],
 )
 def test_pictures_become_tokens(config: VisionConfig) -> None:
     if config.kind == "siglip":
@@ -53,3 +61,13 @@ def test_what_cannot_be_is_refused(config: VisionConfig) -> None:
         pytest.importorskip("transformers")
     with pytest.raises(ConfigError):
         vision(config)
+
+
+def test_open_weights_stay_as_they_are_and_other_files_are_refused(tmp_path: Path) -> None:
+    encoder: Any = vision(VisionConfig("efficientnet-lite0", (32, 48)))
+    assert not encoder.train().training and not any(weight.requires_grad for weight in encoder.parameters())
+    other = tmp_path / "other.pth"
+    other.write_bytes(b"something else")
+    for weights in (other, tmp_path / "none.pth"):
+        with pytest.raises(ConfigError):
+            vision(VisionConfig("efficientnet-lite0", (32, 48), weights=str(weights)))

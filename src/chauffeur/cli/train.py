@@ -339,7 +339,7 @@ pip install 'chauffeur[models,camera]'.
 def vlm(
     out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
     seed: Annotated[int, typer.Option(min=0, help="Seed of weights and batches.")] = 0,
-    scenes: Annotated[int, typer.Option(min=20, help="Pictures to render; each gets three wishes a turn.")] = 4_000,
+    scenes: Annotated[int, typer.Option(min=20, help="Pictures to render; each gets three wishes a turn.")] = 6_000,
     steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 20 pictures with three wishes.")] = 1_600,
     size: Annotated[str, typer.Option(help="Network: `compact` ships; `tiny`, `large`.")] = "compact",
 ) -> None:

@@ -17,12 +17,16 @@ def open_exported(folder: Path, threads: int) -> tuple[dict[str, Any], Any]:
     Raises:
         Exception: A file is missing or damaged; the runtime raises types of its own. Callers say which model it is.
     """
+    about: dict[str, Any] = json.loads((folder / "model.json").read_text(encoding="utf-8"))
+    return about, open_graph(folder / "model.onnx", threads)
+
+
+def open_graph(path: Path, threads: int) -> Any:
+    """A session over a graph. Raises as `open_exported`."""
     import onnxruntime
 
-    about: dict[str, Any] = json.loads((folder / "model.json").read_text(encoding="utf-8"))
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     options.log_severity_level = 3
-    session = onnxruntime.InferenceSession(str(folder / "model.onnx"), options, providers=["CPUExecutionProvider"])
-    return about, session
+    return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])

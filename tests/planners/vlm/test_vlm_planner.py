@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
-from chauffeur.bench.motion.scoring import care
+from chauffeur.bench.motion.items import MotionItem, commands
 from chauffeur.concept import (
     ActionMatrix,
     CameraImage,
@@ -31,8 +32,10 @@ from chauffeur.planners.vlm import VlmPlanner
 from chauffeur.planners.vlm.engine import VlmEngine, VlmReading, shipped
 from chauffeur.planners.vlm.pictures import HEIGHT, WIDTH, fault_of, small
 from chauffeur.planners.vlm.planner import RECALL_SETTING, recalled, task_of
+from chauffeur.planners.vlm.taste import TASTE_SETTING, JudgedDrive, taste_of
 from chauffeur.planners.vlm.template import GAINS, LEVELS, STYLES, TEMPLATE, GainCodebook
-from chauffeur.safety.gain_box import gain_box
+from chauffeur.safety.gain_box import care, gain_box, moved
+from chauffeur.worlds.track.manoeuvres import ManoeuvreName
 
 CODEBOOK = GainCodebook.of(gain_box())
 SITUATION = Situation("track", 8.3, 13.9, 1, 0, False, None, None)
@@ -43,12 +46,12 @@ def picture(time_s: float = 0.0, seed: int = 0) -> CameraImage:
     return CameraImage("front", time_s, pixels)
 
 
-def sunshine() -> CameraImage:
-    """Sky, meadow and a road, by hand."""
-    pixels = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
-    pixels[:30], pixels[30:] = (150, 190, 235), (110, 150, 80)
-    pixels[34:, 30:82] = (120, 120, 122)
-    return CameraImage("front", 0.0, pixels)
+@cache
+def sunshine(manoeuvre: ManoeuvreName) -> CameraImage:
+    """What the front camera shows before a manoeuvre in fine weather."""
+    pytest.importorskip("osqp")
+    command = next(one for one in commands() if one.manoeuvre == manoeuvre)
+    return MotionItem(command, "sunny", "std", 1).shown("on")[0]
 
 
 class Sees(VlmEngine):
@@ -92,8 +95,8 @@ def test_a_sound_camera_leaves_everything_to_the_model() -> None:
     ("images", "said"),
     [
         ((), "off"),
-        ((CameraImage("front", 0.0, np.zeros((64, 112, 3), np.uint8)),), "black"),
-        ((CameraImage("front", 0.0, np.full((64, 112, 3), 127, np.uint8)),), "blank"),
+        ((CameraImage("front", 0.0, np.zeros((HEIGHT, WIDTH, 3), np.uint8)),), "black"),
+        ((CameraImage("front", 0.0, np.full((HEIGHT, WIDTH, 3), 127, np.uint8)),), "blank"),
         ((picture(0.0), picture(1.0)), "frozen"),
     ],
 )
@@ -159,14 +162,16 @@ def test_of_the_camera_and_what_the_passenger_says_the_worse_counts(seen: str, w
 
 
 @pytest.mark.parametrize("style", STYLES)
-@pytest.mark.parametrize("speed_mps, lanes", [(0.0, 1), (13.9, 2), (8.3, 1)])
+@pytest.mark.parametrize(
+    "manoeuvre, speed_mps, lanes", [("acceleration", 0.0, 1), ("lane_change", 13.9, 2), ("left_turn", 8.3, 1)]
+)
 def test_the_model_that_ships_is_more_careful_where_it_goes_by_what_was_said(
-    style: str, speed_mps: float, lanes: int
+    style: str, manoeuvre: ManoeuvreName, speed_mps: float, lanes: int
 ) -> None:
     wishes = {"aggressive": "I'm late, hurry", "moderate": "Drive as usual", "conservative": "Very gently, please"}
     here = replace(SITUATION, speed_mps=speed_mps, lane_count=lanes)
     bare, said, served = (
-        ask(VlmPlanner(shipped()), sunshine(), wish=wish, situation=replace(here, scene=scene))
+        ask(VlmPlanner(shipped()), sunshine(manoeuvre), wish=wish, situation=replace(here, scene=scene))
         for wish, scene in (
             (f"{wishes[style]}.", ()),
             (f"{wishes[style]}, but it is slippery.", ()),
@@ -215,6 +220,38 @@ def test_what_was_said_of_such_a_wish_moves_the_gains(items: tuple[HistoryItem, 
     assert engine.given[0]["recall"] == expected
     assert dict(plan.settings)[RECALL_SETTING] == {"gentler": -1.0, "none": 0.0, "brisker": 1.0}[expected]
     assert recalled(History(items)) in (0, 1, 2)
+
+
+@pytest.mark.parametrize(
+    ("seen", "items", "sign"),
+    [
+        ("sunny", (item(HARSH, similarity=0.2),), 1),  # another wish, the same person
+        ("snow", (item(HARSH, similarity=0.2),), 1),
+        ("sunny", (item(TIMID, similarity=-1.0), item(TIMID, similarity=-1.0)), -1),
+        ("snow", (item(TIMID, similarity=-1.0), item(TIMID, similarity=-1.0)), 0),  # never bolder in bad weather
+        ("sunny", (item(HARSH, similarity=0.2), item(TIMID, similarity=0.2)), 0),
+        ("sunny", (item(LIKED, similarity=0.2),), 0),
+    ],
+)
+def test_what_was_said_of_other_wishes_counts_for_less(seen: str, items: tuple[HistoryItem, ...], sign: int) -> None:
+    plain, tasted = (ask(VlmPlanner(Sees(seen)), picture(), history=History(history)) for history in ((), items))
+    assert isinstance(plain.policy, ActionMatrix) and isinstance(tasted.policy, ActionMatrix)
+    more = care(tasted.policy) - care(plain.policy)
+    assert not gain_box().outside(tasted.policy)
+    assert (more > 0.02, more < -0.02) == (sign > 0, sign < 0)
+    assert abs(more - dict(tasted.settings)[TASTE_SETTING]) < 0.1
+    assert bool(sign) == ("your words alone" in tasted.thoughts.text)
+
+
+def test_the_more_often_it_is_said_the_farther_gains_move_and_less_for_other_wishes() -> None:
+    once, often = (taste_of([JudgedDrive(-1, 0.6, 0.0, 1.0)] * count) for count in (1, 4))
+    other = taste_of([JudgedDrive(-1, 0.6, 0.0, 0.3)])
+    assert 0.0 < other < once < often < 0.4
+    assert taste_of([JudgedDrive(1, 0.6, 0.0, 1.0)]) == pytest.approx(-once)
+    assert taste_of([]) == 0.0
+    gains = ActionMatrix((0.45, 0.03, 0.04), (11.0, 27.0, 100.0))
+    assert care(moved(gains, 0.1)) == pytest.approx(care(gains) + 0.1, abs=0.02)
+    assert moved(gains, 0.0) == gains
 
 
 def test_the_manoeuvre_is_read_off_speed_and_lanes() -> None:

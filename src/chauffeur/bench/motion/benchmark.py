@@ -11,10 +11,10 @@ from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, mean, sha
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.motion.driving import MotionJob, job_key, statistics_from
 from chauffeur.bench.motion.items import MotionItem, Shown, Told, data_sha256, motion_items, style_ranges
-from chauffeur.bench.motion.scoring import SCORE_VERSION, WEIGHTS, care, command_alignment, driving_score
+from chauffeur.bench.motion.scoring import SCORE_VERSION, WEIGHTS, command_alignment, driving_score
 from chauffeur.concept import ActionMatrix, ConfigError, Instruction, PlanRequest, SystemMessage
 from chauffeur.drive.planning import screened_request
-from chauffeur.safety.gain_box import gain_box
+from chauffeur.safety.gain_box import care, gain_box
 from chauffeur.worlds.track import FRICTION, MANOEUVRES
 from chauffeur.worlds.track.dynamics import PLANTS, Plant
 

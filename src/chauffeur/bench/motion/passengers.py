@@ -21,10 +21,10 @@ from typing import Final
 import numpy as np
 
 from chauffeur.bench.motion.items import Style, style_ranges
-from chauffeur.bench.motion.scoring import care
 from chauffeur.bench.personalization.population import Passenger, draw_passengers
 from chauffeur.bench.personalization.sayings import Force, Topic
 from chauffeur.concept import ActionMatrix
+from chauffeur.safety.gain_box import care
 from chauffeur.worlds.track import Weather
 from chauffeur.worlds.track.manoeuvres import ManoeuvreName
 

@@ -17,20 +17,15 @@ from typing import Final
 from chauffeur.bench.personalization.scoring import ScoreWeights
 from chauffeur.concept import ActionMatrix, Frame, Observation, ScenarioError, VehicleState
 from chauffeur.geometry import Box, overlap
-from chauffeur.safety.gain_box import GAIN_NAMES, gain_box
+from chauffeur.safety.gain_box import gain_box, values_of
 
 SCORE_VERSION: Final = "motion-score-v1"
 LATENCY_S: Final = 1.98
 """Latency held against: the slowest of the paper's on-board model (Tab. XI)."""
 
-CAREFUL_WHEN_LOW: Final[Mapping[str, bool]] = {
-    "kp": True, "ki": True, "kd": False, "wl": True, "wh": True, "ws": False,
-}  # fmt: skip
-"""Whether a gain is the more conservative the lower it is."""
 _CLOSING_MPS: Final = 0.1
 _LOOK_S: Final = 10.0
 _EVERY_S: Final = 0.02
-_LOGARITHMIC: Final = frozenset({"kp", "wl", "wh", "ws"})
 
 WEIGHTS: Final[Mapping[str, Mapping[str, float]]] = {
     "acceleration": {
@@ -138,11 +133,6 @@ def parameter_score(value: float, least: float, lower: float, upper: float, most
     return 0.0
 
 
-def values_of(policy: ActionMatrix) -> dict[str, float]:
-    """Gains by name, `kp` ... `ws`."""
-    return dict(zip((name.lower() for name in GAIN_NAMES), (*policy.pid, *policy.mpc), strict=True))
-
-
 def command_alignment(policy: ActionMatrix, ranges: Mapping[str, tuple[float, float]]) -> float:
     """Eq. 27 averaged over the six parameters, against the ranges of the style that was meant; points."""
     box = gain_box()
@@ -153,19 +143,6 @@ def command_alignment(policy: ActionMatrix, ranges: Mapping[str, tuple[float, fl
         lower, upper = (min(max(end, low), high) for end in ranges[name])
         scores.append(parameter_score(value, low, lower, upper, high))
     return fmean(scores)
-
-
-def care(policy: ActionMatrix) -> float:
-    """How conservative gains are: 0 the most aggressive corner of the certified box, 1 the most conservative one."""
-    box = gain_box()
-    shares: list[float] = []
-    for name, value in values_of(policy).items():
-        low, high = box.low[name.capitalize()], box.high[name.capitalize()]
-        if name in _LOGARITHMIC:
-            low, high, value = math.log(low), math.log(high), math.log(max(value, 1e-9))  # noqa: PLW2901
-        share = min(max((value - low) / (high - low), 0.0), 1.0)
-        shares.append(1.0 - share if CAREFUL_WHEN_LOW[name] else share)
-    return fmean(shares)
 
 
 def driving_score(

@@ -27,7 +27,6 @@ from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.motion.driving import DRIVE_VERSION, MAX_S, frozen
 from chauffeur.bench.motion.items import MotionCommand, MotionItem, commands, data_sha256
 from chauffeur.bench.motion.passengers import MANNER_VERSION, MannerJudgement, draw_manners, judged, wanted
-from chauffeur.bench.motion.scoring import care
 from chauffeur.bench.personalization.ride import ReadOnly
 from chauffeur.bench.personalization.sayings import feedback_of, sayings_sha256
 from chauffeur.bench.personalization.study import Calendar
@@ -57,7 +56,8 @@ from chauffeur.memory.privacy import Privacy
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
-from chauffeur.safety.gain_box import gain_box
+from chauffeur.planners.talk2drive.recent import fitting
+from chauffeur.safety.gain_box import care, gain_box
 from chauffeur.worlds.track import WEATHERS, TrackWorld
 from chauffeur.worlds.track.dynamics import PLANTS, Plant
 from chauffeur.worlds.track.manoeuvres import MANOEUVRES, ManoeuvreName
@@ -266,7 +266,8 @@ class _Sitting:
         planner = _planner(job.planner)
         with tempfile.TemporaryDirectory(prefix="chauffeur-riders-") as home:
             clock = Calendar(datetime(2026, 1, 5, 8, 0, tzinfo=UTC))
-            memory = VaultMemory(Path(home), passphrase="", privacy=Privacy(None), clock=clock)
+            vault = VaultMemory(Path(home), passphrase="", privacy=Privacy(None), clock=clock)
+            memory = fitting(vault, job.planner)
             for _ in range(job.trips):
                 item, want = self._day(self._commands[int(self._rng.integers(len(self._commands)))])
                 trip, found = await self._ride(planner, memory, person, item, want)
@@ -277,8 +278,8 @@ class _Sitting:
                 trips.append(self._trip_row("with", "learning", 0, item, want, trip, found, said))
             learnt = ReadOnly(memory)
             for level in LEVELS:
-                fitting = [one for one in self._commands if one.directness == level]
-                item, want = self._day(fitting[int(self._rng.integers(len(fitting)))])
+                direct = [one for one in self._commands if one.directness == level]
+                item, want = self._day(direct[int(self._rng.integers(len(direct)))])
                 for place, index in enumerate(self._rng.permutation(len(ARMS)), start=1):
                     arm = ARMS[int(index)]
                     asked, recalls, who = {

@@ -14,14 +14,16 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import Any, Final, Literal, Protocol, cast
 
 import torch
 from torch import nn
 
 from chauffeur.concept import ConfigError, MissingExtraError
+from chauffeur.models.net import efficientnet
 
-VisionKind = Literal["small", "siglip"]
+VisionKind = Literal["small", "efficientnet-lite0", "siglip"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +31,14 @@ class VisionConfig:
     """A vision encoder.
 
     Attributes:
-        kind: `small`: strided convolutions, trained from nothing. `siglip`: transformers' SigLIP or SigLIP 2 tower.
-        size: Height and width of the pictures, px; of `small` multiples of all its strides together.
+        kind: `small`: strided convolutions, trained from nothing. `efficientnet-lite0`: its first stages, frozen.
+            `siglip`: transformers' SigLIP or SigLIP 2 tower.
+        size: Height and width of the pictures, px; of `small` multiples of all its strides together, of
+            `efficientnet-lite0` of 16.
         channels: Of `small`: width of its stages, each halving the picture; the last one is the tokens' width.
         stem: Of `small`: stride of its first stage; 4 costs half of what 2 does.
-        weights: Of `siglip`: folder or hub name of a checkpoint; empty for an untrained one (see `shape`).
+        weights: Of `siglip`: folder or hub name of a checkpoint; empty for an untrained one (see `shape`). Of
+            `efficientnet-lite0`: the file of its weights; empty for an untrained one.
         shape: Of an untrained `siglip`: arguments of its configuration.
         layer: Of `siglip`: whose hidden states are the tokens; LLaDA-V takes the one before the last.
     """
@@ -126,6 +131,38 @@ class _Residual(nn.Module):
         return x + self.second(nn.functional.gelu(self.norm(self.first(x))))
 
 
+class EfficientNetVision(nn.Module):
+    """EfficientNet-Lite0's features at a stride of 16, with open ImageNet weights that stay as they are."""
+
+    def __init__(self, config: VisionConfig) -> None:
+        """Args: the file of its weights, and the pictures' size.
+
+        Raises:
+            ConfigError: The weights cannot be read or are others, or the size does not divide.
+        """
+        super().__init__()
+        height, width = config.size
+        if height % efficientnet.STRIDE or width % efficientnet.STRIDE:
+            raise ConfigError(
+                f"Pictures of {width}x{height} px do not divide by {efficientnet.STRIDE}.", hint="Choose another size."
+            )
+        lite = efficientnet.EfficientNetLite0
+        self.features = (lite.of(Path(config.weights)) if config.weights else lite()).eval().requires_grad_(False)
+        self.width = efficientnet.WIDTH
+        rows, columns = height // efficientnet.STRIDE, width // efficientnet.STRIDE
+        self.tokens = rows * columns
+        self.where: Any = nn.Buffer(positions(rows, columns, self.width), persistent=False)
+
+    def train(self, mode: bool = True) -> EfficientNetVision:
+        """Its batch norms keep their statistics: the encoder is never in training mode."""
+        del mode
+        return super().train(mode=False)
+
+    def forward(self, pictures: torch.Tensor) -> torch.Tensor:
+        """See VisionEncoder."""
+        return self.features(scaled(pictures)).flatten(2).transpose(1, 2) + self.where
+
+
 class SiglipVision(nn.Module):
     """transformers' SigLIP tower (the fixed-resolution checkpoints of SigLIP 2 have its layout as well)."""
 
@@ -164,7 +201,11 @@ class SiglipVision(nn.Module):
         return self.tower(pixel_values=pixels, output_hidden_states=True).hidden_states[self._layer]
 
 
-_KINDS: Final[Mapping[str, Callable[[VisionConfig], nn.Module]]] = {"small": SmallVision, "siglip": SiglipVision}
+_KINDS: Final[Mapping[str, Callable[[VisionConfig], nn.Module]]] = {
+    "small": SmallVision,
+    "efficientnet-lite0": EfficientNetVision,
+    "siglip": SiglipVision,
+}
 
 
 def vision(config: VisionConfig) -> VisionEncoder:

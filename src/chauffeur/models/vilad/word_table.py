@@ -17,14 +17,12 @@ SHA256: Final = "53aa51172d142c89d9012cce15ae4d6cc0ca6895895114379cacb4fab128d9d
 _KEPT: Final = re.compile(r"(##)?[a-z]+|(##)?[0-9]|[.,!?;:'\"-]|\[UNK\]")
 
 
-def word_table(folder: Path) -> WordTable:
-    """The table of a checkpoint of all-MiniLM-L6-v2: `model.safetensors` and `vocab.txt`.
+def checkpoint(folder: Path) -> tuple[list[str], Path]:
+    """Vocabulary, and the file of the weights, of a checkpoint of all-MiniLM-L6-v2.
 
     Raises:
         DataError: A file is missing, or it is another model.
     """
-    from safetensors.numpy import load_file
-
     file = folder / "model.safetensors"
     try:
         digest = hashlib.sha256(file.read_bytes()).hexdigest()
@@ -33,9 +31,26 @@ def word_table(folder: Path) -> WordTable:
         raise DataError(f"{folder} holds no checkpoint: {error}.") from error
     if digest != SHA256:
         raise DataError(f"{file} is not all-MiniLM-L6-v2 (sha256 {digest[:12]}...).")
+    return names, file
+
+
+def kept_pieces(names: list[str]) -> list[int]:
+    """Places of the pieces that the table keeps, in its order."""
+    return [place for place, piece in enumerate(names) if _KEPT.fullmatch(piece)]
+
+
+def word_table(folder: Path) -> WordTable:
+    """The table of a checkpoint of all-MiniLM-L6-v2: `model.safetensors` and `vocab.txt`.
+
+    Raises:
+        DataError: A file is missing, or it is another model.
+    """
+    from safetensors.numpy import load_file
+
+    names, file = checkpoint(folder)
     tensors: dict[str, Any] = load_file(str(file))
     name = next(name for name in tensors if name.endswith("word_embeddings.weight"))
-    kept = [place for place, piece in enumerate(names) if _KEPT.fullmatch(piece)]
+    kept = kept_pieces(names)
     vectors = tensors[name][kept].astype(np.float64)
     centred = vectors - vectors.mean(axis=0)
     _, axes = np.linalg.eigh(centred.T @ centred)

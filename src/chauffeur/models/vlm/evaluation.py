@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from statistics import fmean, median
 
 from chauffeur.bench.motion.items import style_ranges
-from chauffeur.bench.motion.scoring import care, command_alignment
+from chauffeur.bench.motion.scoring import command_alignment
 from chauffeur.models.vlm.scenes import PictureSet
 from chauffeur.planners.vlm.engine import VlmEngine
 from chauffeur.planners.vlm.template import SEEN_WEATHERS
+from chauffeur.safety.gain_box import care
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ class VlmGraph(nn.Module):
         self.model = model
 
     def forward(self, words: torch.Tensor, pixels: torch.Tensor, rows: torch.Tensor) -> torch.Tensor:
-        """Logits (1, L, size) of words (1, T, width), a picture (1, 3, H, W) in 0..1 and tokens (1, L)."""
+        """Logits (1, L, size) of words (1, T, width), a picture (1, H, W, 3) in 0..1 and tokens (1, L)."""
         model, body, config = self.model, self.model.body, self.model.config.body
         count = words.shape[1]
         hidden = model.sequence(words, model.seen(pixels), rows)
@@ -61,7 +61,7 @@ def export(model: CompactVlm, folder: Path, about: Mapping[str, Any], *, int8: b
     graph = VlmGraph(deepcopy(model).to("cpu").float().eval()).eval()
     example = (
         torch.zeros((1, 7, WORD_WIDTH)),
-        torch.zeros((1, 3, HEIGHT, WIDTH)),
+        torch.zeros((1, HEIGHT, WIDTH, 3)),
         torch.zeros((1, TEMPLATE.length), dtype=torch.int64),
     )
     words = torch.export.Dim("words", min=1, max=MOST_PIECES)

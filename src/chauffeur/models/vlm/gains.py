@@ -10,13 +10,12 @@ import json
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Final
+from typing import Any
 
 from chauffeur.concept import DataError
 from chauffeur.concept.data import read_data
 from chauffeur.planners.vlm.template import GAINS, STYLES
-
-_LOGARITHMIC: Final = frozenset({"kp", "wl", "wh", "ws"})
+from chauffeur.safety.gain_box import LOGARITHMIC
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +67,7 @@ def taught_gains(case: GainCase) -> tuple[float, ...]:
     bold, careful = table["bold"][STYLES[style]], table["careful"][STYLES[style]]
     found: list[float] = []
     for name, a, b in zip(GAINS, bold, careful, strict=True):
-        if name in _LOGARITHMIC:
+        if name in LOGARITHMIC:
             found.append(math.exp(math.log(a) + share * math.log(b / a)))
         else:
             found.append(a + share * (b - a))

@@ -1,17 +1,16 @@
 # pyright: reportMissingImports=false, reportUntypedBaseClass=false, reportUnknownParameterType=false
-"""The compact VLM: words, then the style, then the picture's patches, then what is seen and the gains; causal.
+"""The compact VLM: words, then the style, then what the picture holds, then what is seen and the gains; causal.
 
-    [words] wish task recall style [patches] see weather grade lead road gains kp ki kd wl wh ws
+    [words] wish task recall style [sights] see weather grade lead road gains kp ki kd wl wh ws
 
 Each token is predicted from those before it. The style stands before the picture, so that how somebody wants to be
-driven is read from their words alone; scene and gains stand after it. The transformer is the stack's Llama, words and
-patches come in through its connectors (paper Fig. 11).
+driven is read from their words alone; scene and gains stand after it. The transformer is the stack's Llama, words come
+in through its connector (paper Fig. 11), the picture through an encoder of the stack and a `Glance`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import torch
@@ -19,12 +18,18 @@ from torch import nn
 
 from chauffeur.models.net.connector import Connector
 from chauffeur.models.net.transformer import TransformerConfig, transformer
+from chauffeur.models.net.vision import VisionConfig, vision
 from chauffeur.planners.vilad.words import MOST_PIECES
 from chauffeur.planners.vilad.words import WIDTH as WORD_WIDTH
-from chauffeur.planners.vlm.pictures import HEIGHT, WIDTH
-from chauffeur.planners.vlm.template import HEARD, TEMPLATE
+from chauffeur.planners.vlm.pictures import CELLS, HEIGHT, WIDTH
+from chauffeur.planners.vlm.template import HEARD, SIGHTS, TEMPLATE
 
-PATCHES: Final = (HEIGHT // 16) * (WIDTH // 16)
+FREE: Final = 2
+"""Sights that are taught nothing but the answers."""
+SEEN: Final = len(SIGHTS) + FREE
+"""Tokens of a picture."""
+_FORGOTTEN: Final = 0.1
+"""Share of the glance's inputs that are dropped in training."""
 _FORBIDDEN: Final = -1e4
 
 
@@ -34,41 +39,51 @@ class VlmConfig:
 
     Attributes:
         body: The transformer; causal.
-        channels: Of the encoder's four stages.
+        eye: The vision encoder; a token for each of `CELLS`.
+        glance: Numbers kept of each cell, and of all cells together.
     """
 
     body: TransformerConfig
-    channels: tuple[int, ...] = (16, 32, 64, 96)
+    eye: VisionConfig = field(default_factory=lambda: VisionConfig(size=(HEIGHT, WIDTH), channels=(24, 48, 96), stem=4))
+    glance: tuple[int, int] = (16, 192)
 
 
 SIZES: Final = {
-    "tiny": VlmConfig(TransformerConfig(16, 1, 2, 2, 32, positions=160), (4, 8, 8, 8)),
+    "tiny": VlmConfig(
+        TransformerConfig(16, 1, 2, 2, 32, positions=160),
+        VisionConfig(size=(HEIGHT, WIDTH), channels=(4, 8, 8), stem=4),
+        (4, 16),
+    ),
     "compact": VlmConfig(TransformerConfig(96, 3, 4, 4, 192, positions=160)),
-    "large": VlmConfig(TransformerConfig(256, 6, 8, 8, 512, positions=160), (32, 64, 128, 256)),
+    "large": VlmConfig(
+        TransformerConfig(256, 6, 8, 8, 512, positions=160),
+        VisionConfig(size=(HEIGHT, WIDTH), channels=(48, 96, 192), stem=4),
+        (24, 384),
+    ),
 }
 
 
-class SeatEncoder(nn.Module):
-    """Four strided convolutions: (B, 3, HEIGHT, WIDTH) in 0..1 to patches (B, PATCHES, channels[-1])."""
+class Glance(nn.Module):
+    """All cells of a picture at once, as a few tokens: a weight of its own for every place.
 
-    def __init__(self, channels: tuple[int, ...]) -> None:
-        """Args: channels of the stages."""
+    The camera is fixed to the car, so the lane ahead shows in the same place of every picture. Attention has to find
+    that out from nothing, and did not from 4,000 pictures; one matrix over all places does (as in BEV-LLM's gist).
+    """
+
+    def __init__(self, width: int, kept: int, inner: int, hidden: int) -> None:
+        """Args: numbers of a cell's features, of what is kept of them, of all cells together, of a token."""
         super().__init__()
-        self.stages = nn.ModuleList(
-            nn.Sequential(
-                nn.Conv2d(before, after, 5 if place == 0 else 3, 2, 2 if place == 0 else 1),
-                nn.GroupNorm(4, after),
-                nn.GELU(),
-            )
-            for place, (before, after) in enumerate(pairwise((3, *channels)))
+        self.cell = nn.Linear(width, kept)
+        self.all = nn.Linear(CELLS[0] * CELLS[1] * kept, inner)
+        self.out = nn.Sequential(
+            nn.LayerNorm(inner), nn.GELU(), nn.Dropout(_FORGOTTEN), nn.Linear(inner, SEEN * hidden)
         )
 
-    def forward(self, pixels: torch.Tensor) -> torch.Tensor:
-        """See the class."""
-        x = pixels - 0.45
-        for stage in self.stages:
-            x = stage(x)
-        return x.flatten(2).transpose(1, 2)
+    def forward(self, features: torch.Tensor) -> torch.Tensor:
+        """(B, cells, width) to (B, SEEN, hidden)."""
+        kept = nn.functional.gelu(self.cell(features)).flatten(1)
+        whole = self.all(nn.functional.dropout(kept, _FORGOTTEN, self.training))
+        return self.out(whole).unflatten(1, (SEEN, -1))
 
 
 class CompactVlm(nn.Module):
@@ -79,9 +94,10 @@ class CompactVlm(nn.Module):
         super().__init__()
         self.config = config
         hidden = config.body.hidden
-        self.eye = SeatEncoder(config.channels)
-        self.patches = Connector(config.channels[-1], hidden)
-        self.places = nn.Parameter(torch.randn(PATCHES, hidden) * 0.1)
+        self.eye: Any = vision(config.eye)
+        self.glance = Glance(self.eye.width, *config.glance, hidden)
+        self.covered = nn.Linear(self.eye.width, 2)
+        self.taught = nn.ModuleList(nn.Linear(hidden, len(words)) for words in SIGHTS.values())
         self.words = Connector(WORD_WIDTH, hidden)
         self.tokens = nn.Embedding(TEMPLATE.size, hidden)
         self.body: Any = transformer(config.body)
@@ -91,22 +107,30 @@ class CompactVlm(nn.Module):
         nn.init.normal_(self.tokens.weight, std=0.5)
 
     def seen(self, pixels: torch.Tensor) -> torch.Tensor:
-        """Vectors of a picture's patches, (B, PATCHES, hidden)."""
-        return self.patches(self.eye(pixels)) + self.places
+        """Vectors of pictures (B, HEIGHT, WIDTH, 3), uint8 or 0..1: (B, SEEN, hidden)."""
+        return self.glance(self.eye(pixels))
+
+    def perceived(self, pixels: torch.Tensor) -> tuple[list[torch.Tensor], torch.Tensor]:
+        """What the eye is taught before any words: logits of each of `SIGHTS`, (B, words) each, and of how much of each
+        cell vehicles, and the lead vehicle, cover, (B, 2, *CELLS)."""
+        features = self.eye(pixels)
+        tokens = self.glance(features)
+        covered = self.covered(features).transpose(1, 2).unflatten(2, CELLS)
+        return [head(tokens[:, place]) for place, head in enumerate(self.taught)], covered
 
     def sequence(self, words: torch.Tensor, seen: torch.Tensor, rows: torch.Tensor) -> torch.Tensor:
-        """All vectors in their order, (B, T + L + PATCHES, hidden)."""
+        """All vectors in their order, (B, T + L + SEEN, hidden)."""
         tokens = self.tokens(rows)
         return torch.cat((self.words(words), tokens[:, :HEARD], seen, tokens[:, HEARD:]), dim=1)
 
     def positions(self, words: int) -> torch.Tensor:
-        """Places (N,) of words, tokens heard, patches, and tokens written; all but the words have fixed ones."""
-        rest = torch.arange(TEMPLATE.length + PATCHES) + MOST_PIECES
+        """Places (N,) of words, tokens heard, sights, and tokens written; all but the words have fixed ones."""
+        rest = torch.arange(TEMPLATE.length + SEEN) + MOST_PIECES
         return torch.cat((torch.arange(words), rest))
 
     def scored(self, hidden: torch.Tensor, words: int) -> torch.Tensor:
         """Logits (B, L, size) of each template token, from the vector before it; the first two rows mean nothing."""
-        after = words + HEARD + PATCHES
+        after = words + HEARD + SEEN
         own = torch.cat((hidden[:, words : words + HEARD], hidden[:, after:]), dim=1)
         return self.head(torch.cat((own[:, :1], own[:, :-1]), dim=1)) + self.barred
 
@@ -116,7 +140,7 @@ class CompactVlm(nn.Module):
         Args:
             words: Vectors of the words (B, T, WORD_WIDTH).
             known: Which of them are words, not padding; bool (B, T).
-            seen: Of `seen`, (B, PATCHES, hidden).
+            seen: Of `seen`, (B, SEEN, hidden).
             rows: The template's tokens, int64 (B, L).
         """
         count = words.shape[1]

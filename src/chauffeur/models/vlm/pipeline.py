@@ -4,7 +4,7 @@
 folder/pictures/    rendered, with what is true of each
 folder/training/    the network's state and log
 folder/full/        the model in float32, for comparison
-folder/model/       what ships: `model.onnx`, `model.json`, `styles.npz`, `MODEL_CARD.md`
+folder/model/       what ships: `model.onnx`, `model.json`, `styles.npz`, `head.npz`, `MODEL_CARD.md`
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 
 from chauffeur.drive.files import publish
 from chauffeur.models.sorting.training import write
-from chauffeur.models.vlm.ear import NETWORK_SHARE, style_sorter
+from chauffeur.models.vlm.ear import HEAD_SHARE, NETWORK_SHARE, style_head, style_sorter, style_worth
 from chauffeur.models.vlm.evaluation import VlmFigures, vlm_figures
 from chauffeur.models.vlm.gains import gain_table
 from chauffeur.models.vlm.recipe import VlmRecipe, train
@@ -27,13 +27,15 @@ from chauffeur.models.vlm.scenes import PictureSet, Split, load_pictures, make_p
 from chauffeur.models.vlm.wishes import held_wishes
 from chauffeur.planners.vilad.words import load_words
 from chauffeur.planners.vlm.engine import TRUST, WORDS_FOLDER, VlmEngine
+from chauffeur.planners.vlm.pictures import HEIGHT, WIDTH
+from chauffeur.planners.vlm.sentences import shipped_encoder
 from chauffeur.planners.vlm.template import SEEN_WEATHERS, TEMPLATE, GainCodebook
 from chauffeur.safety.gain_box import gain_box
 
 Told = Callable[[str, int, int], None]
 """Is told (stage, done, of how many)."""
 
-VERSION: Final = "vlm-compact-v1"
+VERSION: Final = "vlm-compact-v2"
 TESTS: Final[Mapping[Split, int]] = {"test": 500, "held_out_a": 250, "held_out_b": 250}
 """Pictures of each test."""
 TEST_SEED: Final = 1
@@ -64,7 +66,11 @@ def make_vlm(folder: Path, recipe: VlmRecipe, told: Told, tests: Mapping[Split, 
         recipe,
         load_pictures(pictures, "train", recipe.scenes),
         load_words(WORDS_FOLDER / "words.npz"),
-        lambda step, loss, seconds: told(f"training, loss {loss:.3f}, {seconds:.2f} s", step + 1, recipe.steps),
+        lambda stage, step, loss, seconds: told(
+            f"{stage}, loss {loss:.3f}, {seconds:.2f} s",
+            step + 1,
+            recipe.seeing_steps if stage == "eye" else recipe.steps,
+        ),
     )
     about: dict[str, Any] = {
         "version": VERSION,
@@ -74,12 +80,13 @@ def make_vlm(folder: Path, recipe: VlmRecipe, told: Told, tests: Mapping[Split, 
         "recipe": asdict(recipe),
         "parameters": parameter_count(model),
     }
-    about["network_share"] = NETWORK_SHARE
+    about |= {"network_share": NETWORK_SHARE, "head_share": HEAD_SHARE, "style_worth": style_worth()}
     full = export(model, folder / "full", about, int8=False)
     target = export(model, folder / "model", about)
-    ear = style_sorter(recipe.seed)
+    ear, head = style_sorter(recipe.seed), style_head(recipe.seed, shipped_encoder())
     for path in (full, target):
         write(ear, path / "styles.npz")
+        head.store(path / "head.npz")
     engines = {"int8": VlmEngine(target), "float32": VlmEngine(full)}
     sets: dict[Split, PictureSet] = {
         split: load_pictures(pictures, split, count) for split, count in tests.items() if count
@@ -103,7 +110,7 @@ def make_vlm(folder: Path, recipe: VlmRecipe, told: Told, tests: Mapping[Split, 
 def _shuffled(pictures: PictureSet) -> PictureSet:
     """The same facts beside pictures of other scenes: what is left when what is shown says nothing."""
     order = np.random.default_rng([TEST_SEED, 23]).permutation(len(pictures))
-    return PictureSet(pictures.pixels[order], pictures.facts)
+    return PictureSet(pictures.pixels[order], pictures.cells[order], pictures.facts)
 
 
 def model_card(about: Mapping[str, Any], sizes: Mapping[str, int]) -> str:
@@ -125,17 +132,20 @@ def model_card(about: Mapping[str, Any], sizes: Mapping[str, int]) -> str:
 The on-board vision-language model of personalised motion control (paper Sec. VI), compact: a picture of the front
 camera and a wish in, the style that was heard, what is seen, and six gains out. {about["parameters"] / 1e6:.2f} million
 weights, {sizes["int8"] / 1e6:.1f} MB in int8 ({sizes["float32"] / 1e6:.1f} MB in float32) for ONNX Runtime, and the
-word table of the ViLaD planner (2.3 MB, input embeddings of all-MiniLM-L6-v2, Apache-2.0). A linear sorter of wishes
-(0.15 MB) reads the style as well, and better; what the two find is multiplied, the network's with an exponent of
-{NETWORK_SHARE} (tuned on two writers of their own).
+word table of the ViLaD planner (2.3 MB, input embeddings of all-MiniLM-L6-v2, Apache-2.0). The style is read by two
+more: a linear sorter of wishes (0.15 MB), and a head (1.4 MB) on the frozen sentence encoder all-MiniLM-L6-v2
+(`encoder.onnx`, 22 MB in int8, Apache-2.0). What the three find is multiplied, the network's with an exponent of
+{NETWORK_SHARE}, the head's with {HEAD_SHARE} (tuned on two writers of their own), and the style is taken whose gains
+are expected to fit best: in doubt between haste and care, moderate.
 
 - **Input**: {TEMPLATE.length} tokens of a fixed pattern, the words (pieces with pretrained vectors), the picture at
-  112x64. **Output**: style; weather, its grade, lead vehicle, road; Kp, Ki, Kd, Wl, Wh, Ws as tokens of a codebook
-  within the certified box. Token by token, each from those before it; the style from the words alone.
-- **Training**: {recipe["steps"]:,} steps of {recipe["pictures"]} pictures with three wishes each, of
-  {recipe["scenes"]:,} rendered scenes ({3 * recipe["scenes"]:,} pairs a turn; wishes are drawn anew each turn), seed
-  {recipe["seed"]}. Again: `chauffeur model train vlm --out DIR --scenes {recipe["scenes"]} --steps {recipe["steps"]}
-  --seed {recipe["seed"]}`
+  {WIDTH}x{HEIGHT}. **Output**: style; weather, its grade, lead vehicle, road; Kp, Ki, Kd, Wl, Wh, Ws as tokens of a
+  codebook within the certified box. Token by token, each from those before it; the style from the words alone.
+- **Training**: first the eye, {recipe["seeing_steps"]:,} steps of {recipe["seen_pictures"]} pictures (what is seen, and
+  where vehicles are); then, with the eye frozen, {recipe["steps"]:,} steps of {recipe["pictures"]} pictures with three
+  wishes each. {recipe["scenes"]:,} rendered scenes ({3 * recipe["scenes"]:,} pairs a turn; wishes are drawn anew each
+  turn), seed {recipe["seed"]}. Again: `chauffeur model train vlm --out DIR --scenes {recipe["scenes"]}
+  --steps {recipe["steps"]} --seed {recipe["seed"]}`
 - **Data**: rendered, never photographed; sentences of `data/sorters`, `data/onboard` and `data/vlm`, whose card says
   how writers are held apart; gains of the table `data/vlm/gains.json`, which is the authors' own.
 - **Figures**, percent (alignments: points), on places, traffic, writers and templates that training did not have;

@@ -1,10 +1,15 @@
 # pyright: reportMissingImports=false, reportUnknownParameterType=false
-"""The compact VLM's recipe: each picture of a batch comes with three wishes, one a style, and answers to them."""
+"""The compact VLM's recipe: an eye that learns to see (`seeing`), then words and gains with the eye frozen.
+
+In the second stage each picture of a batch comes with three wishes, one a style, and answers to them; what the eye
+makes of the pictures is computed once, so that a step costs no picture.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,6 +22,7 @@ from chauffeur.models.vilad.recipe import packed_words
 from chauffeur.models.vlm.gains import GainCase, gain_table, taught_gains
 from chauffeur.models.vlm.network import SIZES, CompactVlm
 from chauffeur.models.vlm.scenes import PictureSet, SceneFacts
+from chauffeur.models.vlm.seeing import dealt, seeing_figures, sights, train_eye
 from chauffeur.models.vlm.wishes import training_wish
 from chauffeur.planners.vilad.words import WordTable
 from chauffeur.planners.vlm.template import GIVEN, RECALLS, STYLES, TEMPLATE, GainCodebook
@@ -32,7 +38,9 @@ class VlmRecipe:
     Attributes:
         size: One of `network.SIZES`.
         scenes: Pictures of training; each with three wishes a turn.
-        steps: Optimiser steps.
+        seeing_steps, seen_pictures, seeing_rate: Optimiser steps of the eye, pictures of its batches, and its highest
+            learning rate.
+        steps: Optimiser steps of words and gains.
         pictures: Pictures of a batch; each with three wishes.
         rate: Highest learning rate; reached after `warmup` steps, then brought down along a cosine.
         warmup: See there.
@@ -42,7 +50,10 @@ class VlmRecipe:
     """
 
     size: str = "compact"
-    scenes: int = 4_000
+    scenes: int = 6_000
+    seeing_steps: int = 2_000
+    seen_pictures: int = 16
+    seeing_rate: float = 2e-3
     steps: int = 1_600
     pictures: int = 20
     rate: float = 2e-3
@@ -56,19 +67,24 @@ class VlmRecipe:
         """Learning rate of a step."""
         return cosine_rate(step, self.steps, self.rate, self.warmup, 0.03)
 
+    def seeing(self) -> dict[str, Any]:
+        """What decides the eye's training."""
+        names = ("size", "scenes", "seeing_steps", "seen_pictures", "seeing_rate", "seed")
+        return {name: getattr(self, name) for name in names}
+
 
 @dataclass(frozen=True, slots=True)
 class VlmBatch:
     """Pictures with their wishes as the network takes them.
 
     Attributes:
-        pixels: (B, 3, H, W) float32 in 0..1.
+        seen: What the eye makes of the pictures, (B, SEEN, hidden).
         words: (3 B, T, width) float32; padded with zeros.
         known: Which are words, bool (3 B, T).
         rows: What to answer, int64 (3 B, L).
     """
 
-    pixels: torch.Tensor
+    seen: torch.Tensor
     words: torch.Tensor
     known: torch.Tensor
     rows: torch.Tensor
@@ -90,61 +106,37 @@ def answer_row(facts: SceneFacts, style: str, recall: str, codebook: GainCodeboo
     return TEMPLATE.encode(values)
 
 
-def varied(pixels: Array, rng: np.random.Generator) -> Array:
-    """Pictures (B, H, W, 3) uint8 as another camera might have taken them, float32 (B, H, W, 3) in 0..1.
+def batches(
+    recipe: VlmRecipe, seen: torch.Tensor, facts: Sequence[Sequence[SceneFacts]], words: WordTable
+) -> Callable[[int], Iterator[VlmBatch]]:
+    """Endless batches from a step on; each step's come from its own number. All pictures are seen before one again.
 
-    Exposure, contrast, colour balance, saturation, noise, a small shift and zoom; milder than the held-out looks.
+    Args:
+        recipe: What decides the training.
+        seen: What the eye makes of each variant of each picture, (variants, N, SEEN, hidden).
+        facts: What is true of each.
+        words: Vectors of words.
     """
-    count, height, width, _ = pixels.shape
-    shown = pixels.astype(np.float32) / 255.0
-    moved = np.empty_like(shown)
-    for place in range(count):
-        zoom = float(rng.uniform(0.90, 1.04))
-        rows = (np.arange(height) - height / 2) * zoom + height / 2 + rng.uniform(-3.0, 3.0)
-        columns = (np.arange(width) - width / 2) * zoom + width / 2 + rng.uniform(-4.0, 4.0)
-        r, c = np.clip(rows.round().astype(int), 0, height - 1), np.clip(columns.round().astype(int), 0, width - 1)
-        moved[place] = shown[place][r][:, c]
-
-    def draw(low: float, high: float, channels: int = 1) -> Array:
-        return rng.uniform(low, high, (count, 1, 1, channels)).astype(np.float32)
-
-    grey = moved.mean(axis=3, keepdims=True)
-    moved = grey + (moved - grey) * draw(0.6, 1.3)
-    moved = (moved - 0.45) * draw(0.88, 1.12) + 0.45
-    moved = moved * draw(0.84, 1.18) * draw(0.94, 1.06, 3)
-    moved += rng.standard_normal(moved.shape, np.float32) * draw(0.0, 0.02)
-    return np.clip(moved, 0.0, 1.0)
-
-
-_MIRRORED: Final = {"bend_left": "bend_right", "bend_right": "bend_left", "straight": "straight"}
-
-
-def batches(recipe: VlmRecipe, pictures: PictureSet, words: WordTable) -> Callable[[int], Iterator[VlmBatch]]:
-    """Endless batches from a step on; each step's come from its own number. All pictures are seen before one again."""
     codebook = GainCodebook.of(gain_box())
-    many = len(pictures)
+    variants, many = seen.shape[:2]
 
     def batch(step: int) -> VlmBatch:
         rng = np.random.default_rng([recipe.seed, 17, step])
-        places = [_dealt(recipe.seed, (step * recipe.pictures + i), many) for i in range(recipe.pictures)]
-        shown = varied(pictures.pixels[places], rng)
+        places = [dealt(recipe.seed, (step * recipe.pictures + i), many) for i in range(recipe.pictures)]
+        which = rng.integers(0, variants, len(places))
         rows: list[Array] = []
         said: list[str] = []
-        for row, place in enumerate(places):
-            facts = pictures.facts[place]
-            if rng.random() < 0.5:
-                shown[row] = shown[row][:, ::-1]
-                facts = SceneFacts(**{**asdict(facts), "road": _MIRRORED[facts.road]})
+        for variant, place in zip(which, places, strict=True):
             for style in STYLES:
                 recall = RECALLS[int(rng.integers(1, 3))] if rng.random() < recipe.remembered else RECALLS[0]
-                rows.append(answer_row(facts, style, recall, codebook))
+                rows.append(answer_row(facts[variant][place], style, recall, codebook))
                 said.append(training_wish(style, rng))
         ids, known = packed_words(said, words)
         vectors = words.vectors(ids)
         vectors += recipe.jitter * rng.standard_normal(vectors.shape, np.float32)
         vectors *= (known & (rng.random(ids.shape) >= recipe.dropped))[..., None]
         return VlmBatch(
-            torch.from_numpy(shown).permute(0, 3, 1, 2).contiguous(),
+            seen[torch.from_numpy(which), torch.tensor(places)],
             torch.from_numpy(vectors),
             torch.from_numpy(known),
             torch.from_numpy(np.stack(rows)),
@@ -159,23 +151,6 @@ def batches(recipe: VlmRecipe, pictures: PictureSet, words: WordTable) -> Callab
     return from_step
 
 
-def _dealt(seed: int, number: int, many: int) -> int:
-    """Picture of a place in the endless row of epochs, each in an order of its own."""
-    epoch, place = divmod(number, many)
-    return int(_order(seed, epoch, many)[place])
-
-
-_orders: dict[tuple[int, int, int], Array] = {}
-
-
-def _order(seed: int, epoch: int, many: int) -> Array:
-    key = (seed, epoch, many)
-    if key not in _orders:
-        _orders.clear()
-        _orders[key] = np.random.default_rng([seed, 19, epoch]).permutation(many)
-    return _orders[key]
-
-
 _WEIGHTS: Final = torch.tensor(
     [0.0 if isinstance(piece, str) or piece.name in GIVEN else 2.0 if piece.name == "style" else 1.0
      for piece in TEMPLATE.pieces]
@@ -185,7 +160,7 @@ _WEIGHTS: Final = torch.tensor(
 
 def loss_of(model: CompactVlm, batch: VlmBatch) -> torch.Tensor:
     """Mean cross-entropy of the decided tokens."""
-    seen = model.seen(batch.pixels).repeat_interleave(len(STYLES), dim=0)
+    seen = batch.seen.repeat_interleave(len(STYLES), dim=0)
     logits = model(batch.words, batch.known, seen, batch.rows)
     found = torch.nn.functional.cross_entropy(logits.flatten(0, 1), batch.rows.flatten(), reduction="none")
     return (found.view(batch.rows.shape) * _WEIGHTS).sum() / (_WEIGHTS.sum() * len(batch.rows))
@@ -196,28 +171,47 @@ def train(
     recipe: VlmRecipe,
     pictures: PictureSet,
     words: WordTable,
-    watch: Callable[[int, float, float], None] | None = None,
-    evaluate: Callable[[CompactVlm], dict[str, float]] | None = None,
-    every: int = 200,
+    watch: Callable[[str, int, float, float], None] | None = None,
+    val: PictureSet | None = None,
 ) -> CompactVlm:
-    """Train, or go on where a run in this folder stopped.
+    """Train both stages, or go on where a run in this folder stopped.
+
+    Args:
+        folder: Of the run; `eye` and `words` in it.
+        recipe: What decides the training.
+        pictures: To learn from.
+        words: Vectors of words.
+        watch: Is told (stage, step, loss, seconds).
+        val: Pictures that the log tells of now and then how well they are seen.
 
     Raises:
         ConfigError: The folder holds a run of another recipe.
     """
     torch.manual_seed(recipe.seed)
     model = CompactVlm(SIZES[recipe.size])
+
+    def told(stage: str) -> Callable[[int, float, float], None] | None:
+        return None if watch is None else partial(watch, stage)
+
+    train_eye(
+        model,
+        folder / "eye",
+        recipe,
+        pictures,
+        told("eye"),
+        None if val is None else lambda: seeing_figures(model, val),
+    )
+    seen, facts = sights(model, pictures, recipe.seed)
     fit(
         model,
-        batches(recipe, pictures, words),
+        batches(recipe, seen, facts, words),
         lambda batch: loss_of(model, batch),
         recipe.rate_at,
-        folder,
+        folder / "words",
         {**asdict(recipe), "gains": gain_table()["version"]},
         recipe.steps,
         Optimisation(decay=0.05, betas=(0.9, 0.98), precision="float32"),
-        evaluate=None if evaluate is None else lambda: evaluate(model),
-        watch=watch,
-        every=every,
+        watch=told("words and gains"),
+        every=200,
     )
     return model.eval()

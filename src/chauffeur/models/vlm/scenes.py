@@ -15,11 +15,21 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
-from chauffeur.camera import LOOKS, WEATHERS, Conditions, Renderer, front_rig, make_renderer
+from chauffeur.camera import (
+    LOOKS,
+    WEATHERS,
+    CameraImages,
+    CameraLook,
+    Conditions,
+    Renderer,
+    SemanticClass,
+    front_rig,
+    make_renderer,
+)
 from chauffeur.concept import DataError, Lead, Observation, Scenario, VehicleState
 from chauffeur.drive.session import make_world
 from chauffeur.geometry import wrap_to_pi
-from chauffeur.planners.vlm.pictures import HEIGHT, WIDTH, small
+from chauffeur.planners.vlm.pictures import CELLS, HEIGHT, WIDTH, small
 from chauffeur.worlds.base import World
 from chauffeur.worlds.highway.scenarios import BUILT_IN as ROADS
 from chauffeur.worlds.track.manoeuvres import MANOEUVRES, ManoeuvreName, manoeuvre
@@ -36,6 +46,9 @@ _LOOK_M: Final = 38.0
 _SIZES: Final = {"car": (4.6, 1.8), "truck": (8.5, 2.5), "bus": (11.5, 2.5)}
 SHARD: Final = 500
 """Pictures in a file."""
+_LENSES: Final = (-0.05, -0.03, -0.015, 0.0, 0.015, 0.03)
+"""Radial distortion of training's lenses: less either way than that of the held-out looks."""
+_VEHICLES: Final = (SemanticClass.CAR, SemanticClass.TRUCK, SemanticClass.BUS)
 
 Pictures = np.ndarray[Any, np.dtype[np.uint8]]
 
@@ -165,10 +178,30 @@ def _on_highway(rng: np.random.Generator, which: int) -> tuple[Observation, str,
     return observation, task, "straight", f"highway/{scenario.id}"
 
 
-def view_of(scene: SeatScene, renderer: Renderer, look: str = "default") -> Pictures:
-    """The picture of a scene as the model takes it, (HEIGHT, WIDTH, 3) uint8."""
-    taken = renderer.render(scene.observation, front_rig(), scene.conditions, scene.seed, look=LOOKS[look])
-    return small(taken.images[0].pixels())
+def look_of_training(number: int) -> CameraLook:
+    """The look of a picture of training: `default` behind one of several lenses. Colours are varied as it is fed."""
+    return CameraLook("training", distortion=_LENSES[int(np.random.default_rng([43, number]).integers(len(_LENSES)))])
+
+
+def view_of(scene: SeatScene, renderer: Renderer, look: CameraLook = LOOKS["default"]) -> tuple[Pictures, Pictures]:
+    """The picture of a scene as the model takes it, (HEIGHT, WIDTH, 3) uint8, and its `cells_of`."""
+    taken = renderer.render(scene.observation, front_rig(), scene.conditions, scene.seed, look=look, truth=True)
+    front = scene.observation.front
+    return small(taken.images[0].pixels()), cells_of(taken, None if front is None else front.vehicle)
+
+
+def cells_of(taken: CameraImages, lead: int | None) -> Pictures:
+    """How much of each cell of a picture vehicles cover, and how much the lead vehicle does: (2, *CELLS) uint8."""
+    truth = taken.truth[0]
+    shown = np.zeros((2, *truth.classes.shape), np.float32)
+    shown[0] = np.isin(truth.classes, _VEHICLES)
+    for one in truth.sightings:
+        if lead is not None and one.instance.id == lead and one.instance.kind in _SIZES:
+            shown[1] = truth.instances == one.instance.number
+    rows, columns = CELLS
+    height, width = truth.classes.shape
+    shares = shown.reshape(2, rows, height // rows, columns, width // columns).mean(axis=(2, 4))
+    return np.ceil(shares * 255.0).astype(np.uint8)
 
 
 def make_pictures(folder: Path, split: Split, count: int, told: Callable[[str, int, int], None]) -> None:
@@ -182,20 +215,21 @@ def make_pictures(folder: Path, split: Split, count: int, told: Callable[[str, i
     """
     folder.mkdir(parents=True, exist_ok=True)
     renderer: Renderer | None = None
-    look = split if split in LOOKS else "default"
     for start in range(0, count, SHARD):
         path = folder / f"{split}-{start // SHARD:03d}.npz"
         size = min(SHARD, count - start)
         if not path.exists():
             renderer = renderer or make_renderer()
             pixels = np.zeros((size, HEIGHT, WIDTH, 3), np.uint8)
+            cells = np.zeros((size, 2, *CELLS), np.uint8)
             rows: list[str] = []
             for place in range(size):
                 scene = seat_scene(split, start + place)
-                pixels[place] = view_of(scene, renderer, look)
+                look = look_of_training(start + place) if split == "train" else LOOKS.get(split, LOOKS["default"])
+                pixels[place], cells[place] = view_of(scene, renderer, look)
                 rows.append(_line(scene.facts))
             part = path.with_suffix(".part.npz")
-            np.savez(part, pixels=pixels, facts=np.array(rows))
+            np.savez(part, pixels=pixels, cells=cells, facts=np.array(rows))
             part.replace(path)
         told(f"pictures, {split}", start + size, count)
 
@@ -206,9 +240,16 @@ def _line(facts: SceneFacts) -> str:
 
 @dataclass(frozen=True, eq=False)
 class PictureSet:
-    """Pictures of a split in memory: pixels (N, HEIGHT, WIDTH, 3) uint8, and what is true of each."""
+    """Pictures of a split in memory.
+
+    Attributes:
+        pixels: (N, HEIGHT, WIDTH, 3) uint8.
+        cells: See `cells_of`, (N, 2, *CELLS).
+        facts: What is true of each.
+    """
 
     pixels: Pictures
+    cells: Pictures
     facts: tuple[SceneFacts, ...]
 
     def __len__(self) -> int:
@@ -219,11 +260,13 @@ class PictureSet:
 def load_pictures(folder: Path, split: Split, count: int) -> PictureSet:
     """The first pictures of what `make_pictures` has made. Raises DataError: there are fewer, or a file is damaged."""
     pixels: list[Pictures] = []
+    cells: list[Pictures] = []
     facts: list[SceneFacts] = []
     for path in _files(folder, split):
         try:
             with np.load(path, allow_pickle=False) as held:
                 pixels.append(held["pixels"])
+                cells.append(held["cells"])
                 facts += [SceneFacts(*str(line).split("\t")) for line in held["facts"]]
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise DataError(f"The pictures {path} cannot be read: {error}.", hint="Delete the file.") from error
@@ -232,7 +275,7 @@ def load_pictures(folder: Path, split: Split, count: int) -> PictureSet:
             f"{folder} holds {len(facts)} pictures of {split}, not {count}.",
             hint="Make them: chauffeur model train vlm",
         )
-    return PictureSet(np.concatenate(pixels)[:count], tuple(facts[:count]))
+    return PictureSet(np.concatenate(pixels)[:count], np.concatenate(cells)[:count], tuple(facts[:count]))
 
 
 def _files(folder: Path, split: Split) -> Iterator[Path]:

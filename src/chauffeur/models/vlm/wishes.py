@@ -95,8 +95,13 @@ def training_wish(style: str, rng: np.random.Generator) -> str:
             break
         text = _of_source(source, style, rng)
     if rng.random() < _WEATHER_SAID:
-        text = f"{text.rstrip('.!?')} {_manner('slippery', rng)}"
+        text = with_weather(text, rng)
     return text
+
+
+def with_weather(text: str, rng: np.random.Generator) -> str:
+    """A wish with a remark on weather or road behind it, which says nothing of its style."""
+    return f"{text.rstrip('.!?')} {_manner('slippery', rng)}"
 
 
 def composed_wish(style: str, rng: np.random.Generator) -> str:

@@ -58,5 +58,5 @@ class RecentToo:
 
 
 def fitting(memory: Memory, planner: str) -> Memory:
-    """The memory as a planner wants it, by its specification (`talk2drive`, `talk2drive/openai/...`, others)."""
-    return RecentToo(memory) if planner.partition("/")[0] == "talk2drive" else memory
+    """The memory as a planner wants it, by its specification (`talk2drive`, `talk2drive/openai/...`, `vlm`, others)."""
+    return RecentToo(memory) if planner.partition("/")[0] in ("talk2drive", "vlm") else memory

@@ -16,6 +16,7 @@ from chauffeur.planners.exported import open_exported
 from chauffeur.planners.vilad.engine import SHIPPED as WORDS_FOLDER
 from chauffeur.planners.vilad.words import WordTable, load_words
 from chauffeur.planners.vlm.pictures import HEIGHT, WIDTH, small
+from chauffeur.planners.vlm.sentences import load_head, shipped_encoder
 from chauffeur.planners.vlm.template import DECIDED, STYLES, TEMPLATE, GainCodebook
 
 Array = np.ndarray[Any, Any]
@@ -51,7 +52,8 @@ class VlmEngine:
     """One network, loaded. Not to be used by two threads at once."""
 
     def __init__(self, folder: Path = SHIPPED, *, threads: int = 1) -> None:
-        """Load a model folder: `model.onnx`, `model.json`, and `styles.npz`, a second reader of the style.
+        """Load a model folder: `model.onnx`, `model.json`, and two more readers of the style, `styles.npz` and
+        `head.npz`.
 
         Args:
             folder: Where it is.
@@ -72,7 +74,11 @@ class VlmEngine:
         self.words: WordTable = load_words(WORDS_FOLDER / "words.npz")
         ear = folder / "styles.npz"
         self._ear = load_sorter(ear) if ear.exists() else None
+        head = folder / "head.npz"
+        self._head = load_head(head) if head.exists() else None
         self._network_share = float(self.about.get("network_share", 1.0))
+        self._head_share = float(self.about.get("head_share", 1.0))
+        self._worth = np.array(self.about.get("style_worth", np.eye(len(STYLES))), np.float64)
 
     @property
     def trusted(self) -> frozenset[str]:
@@ -98,7 +104,7 @@ class VlmEngine:
         """
         words = self.words.vectors(self.words.tokens(text))[None]
         shown = small(BLIND if pixels is None else pixels).astype(np.float32) / 255.0
-        feed = {"words": words, "pixels": np.ascontiguousarray(shown.transpose(2, 0, 1)[None])}
+        feed = {"words": words, "pixels": shown[None]}
         row, shares, passes = TEMPLATE.canvas, dict[str, float](), 0
         slots = {slot.name: slot for slot in TEMPLATE.slots}
         for name, word in given.items():
@@ -122,7 +128,7 @@ class VlmEngine:
         return VlmReading(values, self._codebook.matrix(values), shares, TEMPLATE.text(row), passes)
 
     def _style(self, text: str, tokens: Array) -> tuple[int, float]:
-        """(token of the likeliest style, how likely it is).
+        """(token of the style that is expected to fit best, how likely it is).
 
         Args:
             text: The wish.
@@ -133,8 +139,11 @@ class VlmEngine:
         if self._ear is not None:
             heard = self._ear.shares(text, STYLES)
             shares = shares**self._network_share * np.array([heard[style] for style in STYLES])
+        if self._head is not None:
+            scores = self._head.scores(shipped_encoder().features(text))
+            shares = shares * np.exp(self._head_share * (scores - scores.max()))
         shares = shares / max(float(shares.sum()), 1e-12)
-        best = int(shares.argmax())
+        best = int((self._worth @ shares).argmax())
         return ids[best], float(shares[best])
 
 

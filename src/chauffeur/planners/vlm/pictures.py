@@ -11,8 +11,10 @@ from chauffeur.concept import CameraImage
 
 Array = np.ndarray[Any, Any]
 
-WIDTH, HEIGHT = 112, 64
-"""Size the network looks at, px."""
+WIDTH, HEIGHT = 224, 128
+"""Size the network looks at, px: a car 40 m ahead is nine of them wide."""
+CELLS: Final = (HEIGHT // 16, WIDTH // 16)
+"""Rows and columns of the grid that the network sees in."""
 _BLACK_LEVEL: Final = 6.0
 _FLAT_LEVEL: Final = 2.0
 _FROZEN_AFTER_S: Final = 0.05

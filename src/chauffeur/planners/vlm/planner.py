@@ -13,14 +13,28 @@ from chauffeur.planners.motion import settings_of
 from chauffeur.planners.prompts.motion import matrix_words
 from chauffeur.planners.vlm.engine import VlmEngine, shipped
 from chauffeur.planners.vlm.pictures import fault_of
-from chauffeur.planners.vlm.template import RECALLS
-from chauffeur.planners.vlm.words import AS_SEEN, SAID, more_careful, scene_words, thought_words
+from chauffeur.planners.vlm.taste import (
+    STEP,
+    STYLE_SETTING,
+    TASTE_SETTING,
+    WEATHER_SETTING,
+    judged_drives,
+    sign_of,
+    taste_of,
+)
+from chauffeur.planners.vlm.template import RECALLS, SEEN_WEATHERS, STYLES
+from chauffeur.planners.vlm.words import AS_SEEN, SAID, more_careful, scene_words, taste_words, thought_words
+from chauffeur.safety.gain_box import moved
 
 INTENT: Final = "motion.gains"
 RECALL_SETTING: Final = "recall"
 """Among a plan's settings: -1 where it was made gentler than the words alone, 1 brisker, 0 neither."""
+SURE: Final = 0.8
+"""What the model sees is said from this share on; below, of a road that bends far ahead, it says either."""
 SIMILAR: Final = 0.6
 """A remembered wish this much like the present one speaks for it."""
+_LEAST_SHIFT: Final = 0.02
+"""Smaller shifts of the gains by a person's taste are left out: nobody would feel them."""
 _STANDS_MPS: Final = 1.0
 _DAMP: Final = ("sunny", "night")
 """What the weather services' "dry" may look like."""
@@ -86,7 +100,8 @@ class VlmPlanner:
         else:
             pixels = request.images[-1].pixels()
             read = self._engine.read(text, pixels, given)
-            scene = scene_words(read.values, self._engine.trusted)
+            sure = {name for name in self._engine.trusted if read.shares.get(name, 1.0) >= SURE}
+            scene = scene_words(read.values, sure)
             thoughts = f"{scene} {thought_words(read.values)}"
             seen = read.values["weather"]
             worst, doubts, where = seen, list[str](), ""
@@ -105,16 +120,31 @@ class VlmPlanner:
                 scene = " ".join([scene, *doubts])
                 of = "the worst of all" if len(doubts) > 1 else "the worse of the two"
                 thoughts = f"{scene} I go by {of}. {thought_words(read.values, where)}"
+        style, weather = STYLES.index(read.values["style"]), SEEN_WEATHERS.index(read.values["weather"])
+        policy, shift = read.policy, -STEP * (0, -1, 1)[recall]
+        if not fault and not recall:
+            items = (item for item in request.history.items if item.intent == INTENT)
+            shift = taste_of(judged_drives(items, style, weather, SIMILAR))
+            shift = max(shift, 0.0) if weather else shift  # never bolder in bad weather
+            shift = 0.0 if abs(shift) < _LEAST_SHIFT else round(shift, 3)
+            policy = moved(policy, shift) if shift else policy
+            thoughts = f"{thoughts}{taste_words(shift)}"
         return Plan(
             thoughts=Thoughts(thoughts),
-            policy=read.policy,
+            policy=policy,
             intent=INTENT,
-            settings=(*settings_of(read.policy), (RECALL_SETTING, float((0, -1, 1)[recall]))),
+            settings=(
+                *settings_of(policy),
+                (RECALL_SETTING, float((0, -1, 1)[recall])),
+                (TASTE_SETTING, shift),
+                (STYLE_SETTING, float(style)),
+                (WEATHER_SETTING, float(weather)),
+            ),
             planner=self.id,
             model=self.model,
             usage=Usage(completion_tokens=read.passes, requests=1),
             latency_s=time.perf_counter() - begun,
-            raw=f"{read.text}\nP = {matrix_words(read.policy)}",
+            raw=f"{read.text}\nP = {matrix_words(policy)}",
             scene=scene,
         )
 
@@ -136,11 +166,8 @@ def recalled(history: History) -> int:
         return 0
     item = max(similar, key=lambda one: one.when)
     before = int(dict(item.settings).get(RECALL_SETTING, 0.0))
-    said = item.feedback[-1]
-    signs = [sign for sign in (said.comfort, said.speed, said.gap) if sign]
-    step = 0 if not signs else 1 if sum(signs) > 0 else -1
-    moved = max(-1, min(1, before + step))
-    return RECALLS.index({-1: "gentler", 0: "none", 1: "brisker"}[moved])
+    asked = max(-1, min(1, before + sign_of(item.feedback[-1])))
+    return RECALLS.index({-1: "gentler", 0: "none", 1: "brisker"}[asked])
 
 
 def _contradicted(seen: str, situation: Situation) -> str:

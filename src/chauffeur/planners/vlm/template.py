@@ -16,7 +16,7 @@ from typing import Any, Final, Literal
 
 from chauffeur.concept import ActionMatrix
 from chauffeur.planners.vilad.template import ActionSlot, ActionTemplate
-from chauffeur.safety.gain_box import GAIN_NAMES, GainBox
+from chauffeur.safety.gain_box import GAIN_NAMES, LOGARITHMIC, GainBox
 
 Style = Literal["conservative", "moderate", "aggressive"]
 STYLES: Final[tuple[Style, ...]] = "conservative", "moderate", "aggressive"
@@ -28,10 +28,13 @@ SEEN_WEATHERS: Final = ("sunny", "night", "rain", "fog", "snow")
 GRADES: Final = ("clear", "light", "heavy")
 LEADS: Final = ("no_lead", "far_lead", "lead", "near_lead")
 ROADS: Final = ("straight", "bend_left", "bend_right")
+SIGHTS: Final[Mapping[str, tuple[str, ...]]] = {
+    "weather": SEEN_WEATHERS, "grade": GRADES, "lead": LEADS, "road": ROADS,
+}  # fmt: skip
+"""What is seen, by slot."""
 GAINS: Final = tuple(name.lower() for name in GAIN_NAMES)
 LEVELS: Final = 24
 """Values of a gain in the codebook."""
-_LOGARITHMIC: Final = frozenset({"kp", "wl", "wh", "ws"})
 
 
 def _gain_slot(name: str) -> ActionSlot:
@@ -45,10 +48,7 @@ TEMPLATE: Final = ActionTemplate(
         ActionSlot("recall", RECALLS),
         ActionSlot("style", STYLES),
         "see",
-        ActionSlot("weather", SEEN_WEATHERS),
-        ActionSlot("grade", GRADES),
-        ActionSlot("lead", LEADS),
-        ActionSlot("road", ROADS),
+        *(ActionSlot(name, words) for name, words in SIGHTS.items()),
         "gains",
         *(_gain_slot(name) for name in GAINS),
     )
@@ -76,7 +76,7 @@ class GainCodebook:
         for name, shown in zip(GAINS, GAIN_NAMES, strict=True):
             low, high = box.low[shown], box.high[shown]
             shares = [level / (LEVELS - 1) for level in range(LEVELS)]
-            if name in _LOGARITHMIC:
+            if name in LOGARITHMIC:
                 found[name] = tuple(math.exp(math.log(low) + s * math.log(high / low)) for s in shares)
             else:
                 found[name] = tuple(low + s * (high - low) for s in shares)
@@ -87,8 +87,8 @@ class GainCodebook:
         found: dict[str, str] = {}
         for name, value in zip(GAINS, gains, strict=True):
             values = self.values[name]
-            scaled = math.log(max(value, 1e-9)) if name in _LOGARITHMIC else value
-            own = [math.log(one) for one in values] if name in _LOGARITHMIC else list(values)
+            scaled = math.log(max(value, 1e-9)) if name in LOGARITHMIC else value
+            own = [math.log(one) for one in values] if name in LOGARITHMIC else list(values)
             found[name] = f"{name}={min(range(LEVELS), key=lambda level: abs(own[level] - scaled))}"
         return found
 

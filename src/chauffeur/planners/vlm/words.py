@@ -100,6 +100,14 @@ def thought_words(values: Mapping[str, str], where: str = "") -> str:
     return f"{heard}, {why}: {_GAINS[values['style']]}{kept}.{_RECALL[values['recall']]}"
 
 
+def taste_words(shift: float) -> str:
+    """What a person's earlier feedback moved, to follow R; empty where it moved nothing."""
+    if not shift:
+        return ""
+    much, how = ("too much", "gentler") if shift > 0.0 else ("too little", "brisker")
+    return f" You often found my drives {much}, so I am {how} than your words alone ask for."
+
+
 def more_careful(one: str, two: str) -> str:
     """Of two kinds of weather, the one that asks for more care."""
     return max(one, two, key=SEEN_WEATHERS.index)
