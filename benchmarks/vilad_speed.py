@@ -127,6 +127,7 @@ def measured(size: str, template: ActionTemplate, prompt: int, passes: int, repe
 
 def trained(data: Path, folder: Path, repeats: int, limit: int) -> list[dict[str, Any]]:
     """Time and quality of trained networks on the frames of a test split: one row a way to decode."""
+    from chauffeur.models.vilad.frames_baselines import expected_paths
     from chauffeur.models.vilad.frames_data import load_frames
     from chauffeur.models.vilad.frames_pipeline import line_of
     from chauffeur.models.vilad.frames_recipe import plan_paths, prompts
@@ -137,13 +138,14 @@ def trained(data: Path, folder: Path, repeats: int, limit: int) -> list[dict[str
     frames = load_frames(data, "test", model.size)
     book, template = model.book, model.book.template
     tokens, words = tokens_of(model.vision, frames.pictures), prompts(frames.ego, frames.commands)
+    expected = expected_paths(model.status, frames)
     allowed = template.allowed(tokens.shape[1])
     chosen = np.linspace(0, len(frames.samples) - 1, min(limit, len(frames.samples))).astype(int)
     rules = {f"ViLaD, tau {tau}": Unmasking(steps=6, tau=tau) for tau in (0.3, 0.5, 0.7, 0.9)}
     rules |= {"ViLaD, one pass": Unmasking(steps=1, tau=2.0), "ViLaD, a pass a decision": Unmasking(steps=6, tau=2.0)}
 
     def quality(network: Vilad, how: Unmasking) -> tuple[float, float, float]:
-        found = plan_paths(network, book, frames.histories[chosen], words[chosen], tokens[chosen], how)
+        found = plan_paths(network, book, expected[chosen], words[chosen], tokens[chosen], how)
         line = line_of("", np.stack([one.waypoints for one in found]), frames.futures[chosen], 0.0)
         passes = np.array([one.decided.passes for one in found])
         return line.l2["stp3"][3], line.failures, float(passes.mean())

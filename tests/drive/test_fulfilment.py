@@ -165,11 +165,18 @@ def test_every_advertised_wish_is_done(scenario: Scenario) -> None:
         ("Leave a bit more space to the car ahead.", "following"),
         ("Could you park on the shoulder?", "emergency-lane"),
         ("Park in B7.", "parking"),
+        ("Park close to the lift.", "parking-lift"),
+        ("Find a parking spot under a roof.", "parking-lift"),
         ("Drive at 100 km/h.", "cruise"),
     ],
 )
 def test_a_wish_finds_a_road_that_can_carry_it(wish: str, name: str) -> None:
     assert suiting(wish).id == name
+
+
+def test_a_lot_with_places_to_park_near_is_driven_by_who_knows_them() -> None:
+    assert [planner_for("", find(name)) for name in ("parking-lift", "parking")] == ["vilad", "talk2drive"]
+    assert planner_for("keyword", find("parking-lift")) == "keyword"
 
 
 def test_a_wish_about_the_road_finds_a_car_that_looks_at_it(monkeypatch: pytest.MonkeyPatch) -> None:

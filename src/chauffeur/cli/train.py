@@ -218,8 +218,8 @@ def vilad_frames(
     data: Annotated[Path, typer.Option(help="Set that `chauffeur bench scenes frames` has made.")],
     out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
     seed: Annotated[int, typer.Option(min=0, help="Seed of weights and batches.")] = 0,
-    encoder_steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of the encoder.")] = 1_600,
-    steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of the decoders, each.")] = 1_500,
+    encoder_steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of the encoder.")] = 1_000,
+    steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of the decoders, each.")] = 500,
 ) -> None:
     """ViLaD on frames: a front picture, own motion and a command to waypoints, by masked diffusion (paper Sec. VII)."""
     from dataclasses import replace

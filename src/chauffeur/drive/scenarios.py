@@ -14,6 +14,8 @@ from chauffeur.language.weather import said_weather
 from chauffeur.planners.onboard.meaning import Manoeuvre, Reading
 from chauffeur.planners.onboard.understand import understand
 from chauffeur.planners.talk2drive.style import destination_of, place_of
+from chauffeur.planners.vilad.parking import NOTHING
+from chauffeur.planners.vilad.planner import parking_wish
 from chauffeur.worlds.base import World
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 from chauffeur.worlds.highway.scenarios import BUILT_IN as ROADS
@@ -30,6 +32,7 @@ _CROSSING = re.compile(r"\b(intersection|crossroads?|crossing|junction|stop sign
 _SHOULDER = re.compile(r"\b(shoulder|emergency lane|hard shoulder)\b", re.IGNORECASE)
 _LOT = re.compile(r"\b(park|parking|spots?|bays?|stalls?)\b", re.IGNORECASE)
 _PLACES = {"stadium": "parking-stadium", "exit": "parking-exit"}
+_AMENITIES = "parking-lift"
 _ROADS: dict[Manoeuvre, str] = {
     "turn": "intersection",
     "pull_over": "emergency-lane",
@@ -93,7 +96,7 @@ def suiting(wish: str) -> Scenario:
     """
     by_id = {scenario.id: scenario for scenario in BUILT_IN}
     if _LOT.search(wish) and not _SHOULDER.search(wish):
-        return by_id[_PLACES.get(place_of(wish), "parking")]
+        return by_id[_AMENITIES if _asks_for_amenities(wish) else _PLACES.get(place_of(wish), "parking")]
     reading = understand(wish)
     first = reading.steps[0] if isinstance(reading, Reading) else None
     if first is not None and first.manoeuvre in _ROADS and not (first.manoeuvre == "stop" and _CROSSING.search(wish)):
@@ -109,6 +112,12 @@ def suiting(wish: str) -> Scenario:
     if first is not None and first.manoeuvre == "speed" and first.change <= 0 and first.variant != "match":
         return by_id["cruise"]  # a speed of one's own needs room ahead
     return by_id["overtake"]
+
+
+def _asks_for_amenities(wish: str) -> bool:
+    """Whether a parking wish is about what the lot with lift, chargers and roofs shows, as ViLaD reads it."""
+    asked = parking_wish(wish)
+    return any(asked[name] != NOTHING[name] for name in ("lift", "stairs", "machine", "bay", "covered", "apart", "end"))
 
 
 def _seeing() -> bool:
@@ -149,8 +158,11 @@ def _keeps_lead(world: World, shot: Observation) -> bool:
 
 
 def planner_for(spec: str, scenario: Scenario) -> str:
-    """The planner that was named, else one that can drive there: what the world says it can be driven by."""
+    """The planner that was named, else one that can drive there: what the world says it can be driven by; and where a
+    lot has places to park near, the one that knows them."""
     apt = make_world(scenario).capabilities.policies
     if spec:
         return spec
+    if scenario.config.get("places"):
+        return "vilad"
     return {"action_matrix": "vlm", "program": "onboard"}.get(apt[0], "talk2drive")

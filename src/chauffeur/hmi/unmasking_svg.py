@@ -12,6 +12,8 @@ from chauffeur.planners.vilad.unmasking import UnmaskingStep
 _CELL, _HIGH, _LEFT, _TOP = 74, 44, 74, 84
 _SECONDS: Final = 0.8
 """A step of the animation."""
+_FADES: Final = 0.3
+"""Seconds in which a row appears."""
 
 
 def unmasking_svg(
@@ -43,12 +45,12 @@ def unmasking_svg(
     for number, row in enumerate(rows):
         y = _TOP + _HIGH * number
         step = steps[number - 1] if number else None
-        hidden = ' opacity="0"' if animated and number else ""
-        out.append(f"<g{hidden}>")
-        if hidden:
+        out.append("<g>")
+        if animated and number:  # hidden by the animation alone: where none runs, in print or in a PNG, all is there
             begin = number * _SECONDS
             out.append(
-                f'<animate attributeName="opacity" from="0" to="1" begin="{begin:.1f}s" dur="0.3s" fill="freeze"/>'
+                f'<animate attributeName="opacity" values="0;0;1" keyTimes="0;{begin / (begin + _FADES):.3f};1" '
+                f'dur="{begin + _FADES:.1f}s" fill="freeze"/>'
             )
         label = f"pass {number}" if number else "start"
         out.append(f'<text x="20" y="{y + 26}" fill="#5b6873">{label}</text>')

@@ -25,12 +25,13 @@ from chauffeur.bench.openloop.writer import DrivenSample, DrivenScene, picture_f
 from chauffeur.concept import ConfigError, DataError  # noqa: E402
 from chauffeur.models.net.vision import VisionConfig  # noqa: E402
 from chauffeur.models.vilad.frames_answerer import FramesAnswerer  # noqa: E402
+from chauffeur.models.vilad.frames_baselines import FOLDS, expected_paths, strangers_paths, train_status_mlp  # noqa: E402
 from chauffeur.models.vilad.frames_data import ego_features, load_frames  # noqa: E402
 from chauffeur.models.vilad.frames_pipeline import FramesPlan, make_frames_model  # noqa: E402
 from chauffeur.models.vilad.frames_recipe import ONE_PASS, FramesRecipe, plan_path, plan_paths, prompts, soft_targets  # noqa: E402
 from chauffeur.models.vilad.frames_store import load_frames_model  # noqa: E402
 from chauffeur.models.vilad.frames_vision import VisionRecipe, tokens_of  # noqa: E402
-from chauffeur.models.vilad.waypoints import WaypointCodebook, codebook, geometric_median  # noqa: E402
+from chauffeur.models.vilad.waypoints import codebook, displacements, geometric_median  # noqa: E402
 from chauffeur.planners.vilad.template import MASK  # noqa: E402
 from chauffeur.planners.vilad.unmasking import Unmasking  # noqa: E402
 
@@ -94,12 +95,13 @@ def test_a_codebook_holds_what_happens() -> None:
     histories[:, :, 0] = np.array([-8.0, -6.0, -4.0, -2.0, 0.0])
     futures = np.stack([np.stack((2.0 * np.arange(1, 7) * (i % 3), np.zeros(6)), axis=1) for i in range(60)])
     futures += rng.normal(0.0, 0.01, futures.shape)
-    book = codebook(histories, futures, 3)
-    codes = book.nearest(histories, futures)
+    off = displacements(histories, futures)
+    book = codebook(off, 3)
+    codes = book.nearest(off)
     assert [len(set(codes[i::3, 5].tolist())) for i in range(3)] == [1, 1, 1]
     sure = np.eye(3)[codes[1]]
-    assert np.allclose(book.waypoints(histories[1], sure), futures[1], atol=0.1)
-    soft = soft_targets(book, histories, futures, 0.15)
+    assert np.allclose(book.waypoints(futures[1] - off[1], sure), futures[1], atol=0.1)
+    soft = soft_targets(book, off, 0.15)
     assert np.allclose(soft.sum(axis=-1), 1.0) and (soft.argmax(axis=-1) == codes).all()
     template = book.template
     assert template.length == 12 and int(template.maskable.sum()) == 6 and (template.canvas == MASK).sum() == 6
@@ -143,11 +145,12 @@ def test_a_batch_decides_as_one_by_one(trained: tuple[Path, Path, list[Any]]) ->
     data, folder, _ = trained
     model, frames = load_frames_model(folder), load_frames(data, "test", SIZE)
     words, tokens = prompts(frames.ego, frames.commands), tokens_of(model.vision, frames.pictures)
+    expected = expected_paths(model.status, frames)
     for decoder in (model.vilad, model.twin):
         for how in (Unmasking(steps=6, tau=0.9), ONE_PASS):
-            many = plan_paths(decoder, model.book, frames.histories, words, tokens, how, batch=5)
+            many = plan_paths(decoder, model.book, expected, words, tokens, how, batch=5)
             for i in range(0, len(many), 7):
-                one = plan_path(decoder, model.book, frames.histories[i], words[i : i + 1], tokens[i : i + 1], how)
+                one = plan_path(decoder, model.book, expected[i], words[i : i + 1], tokens[i : i + 1], how)
                 assert (one.decided.row == many[i].decided.row).all()
                 assert one.decided.passes == many[i].decided.passes
                 assert np.allclose(one.waypoints, many[i].waypoints, atol=1e-3)
@@ -174,8 +177,18 @@ def test_a_run_goes_on_and_keeps_to_its_recipe(trained: tuple[Path, Path, list[A
         make_frames_model(data, folder.parent, other, lambda stage, done, of: None)
 
 
-def test_codes_are_displacements_from_constant_velocity() -> None:
+def test_displacements_are_from_constant_velocity() -> None:
     histories = np.zeros((1, 5, 3))
     histories[0, :, 0] = [-12.0, -9.0, -6.0, -3.0, 0.0]
     futures = np.stack((3.0 * np.arange(1, 7), np.zeros(6)), axis=1)[None]
-    assert np.allclose(WaypointCodebook.displacements(histories, futures), 0.0)
+    assert np.allclose(displacements(histories, futures), 0.0)
+
+
+def test_whoever_expects_a_frame_was_trained_without_its_scene(trained: tuple[Path, Path, list[Any]]) -> None:
+    frames = load_frames(trained[0], "train", SIZE)
+    turn = np.arange(len(frames.samples)) % FOLDS  # a frame a scene
+    found = strangers_paths(frames, steps=20)
+    for fold in (0, FOLDS - 1):
+        own = turn == fold
+        alone = train_status_mlp(frames.part(~own), frames.part(own), 20)
+        assert np.allclose(found[own], expected_paths(alone, frames.part(own)), atol=1e-5)

@@ -201,3 +201,18 @@ def test_what_ships_gives_the_networks_own_logits(tmp_path: Path) -> None:
     states = engine.steps(TEMPLATE, one.text, features, Unmasking(steps=4, tau=0.9))
     assert len(states) == decided.passes
     assert np.array_equal(states[-1], decided.row)
+
+
+def test_training_goes_on_from_what_ships(tmp_path: Path) -> None:
+    pytest.importorskip("onnxscript")
+    from chauffeur.models.vilad.export import export
+
+    torch.manual_seed(6)
+    model = network(PARKING, SMALL).eval()
+    export(model, tmp_path / "ships", {"version": "test", "length": TEMPLATE.length})
+    again = train(tmp_path / "run", PARKING, replace(SMALL, steps=1, rate=0.0), WORDS, base=tmp_path / "ships")
+    found = dict(again.named_parameters())
+    for name, value in model.named_parameters():
+        if name != "body.embed_tokens.weight":  # of no use to a network that is given vectors
+            step = 1e-6 + float(value.detach().abs().max()) / 100.0
+            assert torch.allclose(found[name], value, atol=step), name

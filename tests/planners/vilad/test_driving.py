@@ -184,6 +184,8 @@ def test_the_model_that_ships_drives_and_refuses() -> None:
     assert policy is None
     assert "there is no way right here" in said
     assert planned("Turn left.", None)[0] is None
+    assert planned("Reverse fifty metres.")[0] is None
+    assert "turn left" in planned("Go right. Sorry, I meant left.")[1]
 
 
 def test_what_is_understood_is_told() -> None:

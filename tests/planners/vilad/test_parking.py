@@ -38,7 +38,7 @@ from chauffeur.planners.vilad.parking import (
     in_words,
     verified,
 )
-from chauffeur.planners.vilad.planner import HOW
+from chauffeur.planners.vilad.planner import HOW, parking_wish
 from chauffeur.planners.vilad.unmasking import Decided
 from chauffeur.planners.vilad.words import load_words
 from chauffeur.worlds.parking import ParkingWorld
@@ -176,6 +176,14 @@ def test_what_cannot_be_is_said() -> None:
     assert planned("Park.", replace(here, lot=full)).refusal == "There is no free spot."
     with pytest.raises(InstructionError):
         planned("  ", here)
+
+
+def test_what_is_dangerous_is_declined_and_what_is_taken_back_is_not_meant() -> None:
+    here = context()
+    assert planned("Drive into the pillar.", here).refusal
+    assert planned("Park as close as you can get to the lift.", here).policy is not None
+    assert "near the lift" in planned("By the stairs. No wait, by the lift.", here).thoughts.text
+    assert parking_wish("Park by the stairs, no wait, by the lift.") == {**NOTHING, "lift": "near"}
 
 
 def test_a_damaged_model_is_refused(tmp_path: Path) -> None:

@@ -13,13 +13,16 @@ from typing import Any, Final
 import numpy as np
 import torch
 
+from chauffeur.bench.openloop.extrapolation import constant_velocity
+from chauffeur.bench.openloop.nuscenes import FUTURE
 from chauffeur.models.vilad.frames_data import FrameSet
 from chauffeur.models.vilad.frames_vision import StatusHead, batches, l2, status
-from chauffeur.models.vilad.waypoints import WaypointCodebook
+from chauffeur.models.vilad.waypoints import displacements
 
 Array = np.ndarray[Any, Any]
 
 STEPS: Final = 4000
+FOLDS: Final = 4
 _BATCH: Final = 128
 _EVERY: Final = 200
 
@@ -30,8 +33,8 @@ def train_status_mlp(train: FrameSet, val: FrameSet, steps: int = STEPS, seed: i
     model = StatusHead()
     optimiser = torch.optim.AdamW(model.parameters(), lr=1e-3, weight_decay=0.05)
     said = torch.from_numpy(status(train))
-    truth = torch.from_numpy(WaypointCodebook.displacements(train.histories, train.futures)).float()
-    val_truth = torch.from_numpy(WaypointCodebook.displacements(val.histories, val.futures)).float()
+    truth = torch.from_numpy(displacements(train.histories, train.futures)).float()
+    val_truth = torch.from_numpy(displacements(val.histories, val.futures)).float()
     val_said = torch.from_numpy(status(val))
     best, kept = float("inf"), deepcopy(model)
     feed = batches(len(said), min(_BATCH, len(said)), seed)(0)
@@ -54,3 +57,23 @@ def train_status_mlp(train: FrameSet, val: FrameSet, steps: int = STEPS, seed: i
 def told(model: StatusHead, frames: FrameSet) -> Array:
     """Displacements (n, FUTURE, 2) of a set."""
     return model(torch.from_numpy(status(frames))).numpy()
+
+
+def expected_paths(model: StatusHead, frames: FrameSet) -> Array:
+    """Where own motion and command alone lead, (n, FUTURE, 2), m, ego frame: what a picture is to correct."""
+    return np.stack([constant_velocity(one) for one in frames.histories]) + told(model, frames)
+
+
+def strangers_paths(frames: FrameSet, steps: int = STEPS, seed: int = 0) -> Array:
+    """`expected_paths` of a training split, each by an MLP that was trained without that frame's scene.
+
+    On its own training frames an MLP errs less than it will anywhere else, and who learns to correct it there learns to
+    correct too little. Scenes are dealt out to `FOLDS` in turn, as our sets deal theirs out to as many towns.
+    """
+    scenes = {name: turn % FOLDS for turn, name in enumerate(dict.fromkeys(one.scene for one in frames.samples))}
+    fold = np.array([scenes[one.scene] for one in frames.samples])
+    found = np.zeros((len(fold), FUTURE, 2))
+    for own in (fold == number for number in np.unique(fold)):
+        mine = frames.part(own)
+        found[own] = expected_paths(train_status_mlp(frames.part(~own), mine, steps, seed), mine)
+    return found

@@ -49,6 +49,11 @@ class FrameSet:
         """What the navigation says."""
         return [one.command for one in self.samples]
 
+    def part(self, kept: NDArray[np.bool_]) -> FrameSet:
+        """Those frames alone, by a mask (n,)."""
+        samples = tuple(one for one, own in zip(self.samples, kept, strict=True) if own)
+        return FrameSet(samples, self.pictures[kept], self.histories[kept], self.futures[kept], self.known[kept])
+
     @property
     def ego(self) -> Array:
         """`ego_features` of each, (n, EGO_WIDTH), float32."""

@@ -19,21 +19,24 @@ from chauffeur.bench.openloop.conventions import CONVENTIONS, errors, fails
 from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleration, constant_velocity
 from chauffeur.bench.openloop.frames import SIMULATED
 from chauffeur.drive.files import publish
-from chauffeur.models.vilad.frames_baselines import STEPS, train_status_mlp
+from chauffeur.models.vilad.frames_baselines import STEPS, strangers_paths, train_status_mlp
 from chauffeur.models.vilad.frames_data import FrameSet, load_frames
 from chauffeur.models.vilad.frames_recipe import FramesRecipe, train_frames
-from chauffeur.models.vilad.frames_store import FramesMethod, FramesModel, measured, store_frames_model
-from chauffeur.models.vilad.frames_vision import VisionRecipe, plain, tokens_of, train_vision
+from chauffeur.models.vilad.frames_store import VERSION, FramesMethod, FramesModel, measured, store_frames_model
+from chauffeur.models.vilad.frames_vision import VisionRecipe, plain, train_vision, views_of
 from chauffeur.models.vilad.waypoints import CODES, codebook
 
 Array = np.ndarray[Any, Any]
 Told = Callable[[str, int, int], None]
 """Is told (stage, done, of how many)."""
 
-VERSION: Final = "vilad-frames-v1"
 FIGURES_HEAD: Final = (
     "method", "1 s (ST-P3)", "2 s", "3 s", "avg.", "avg. (UniAD)", "avg. (OpenEMMA)", "failures %", "passes",
 )  # fmt: skip
+
+
+VIEWS: Final = 4
+"""Lights in which decoders see each training picture."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,11 +81,12 @@ def make_frames_model(data: Path, folder: Path, plan: FramesPlan, told: Told) ->
         return lambda step, loss, seconds: told(f"{stage}, loss {loss:.3f}, {seconds:.2f} s", step + 1, steps)
 
     seeing = train_vision(runs / "vision", plan.vision, train, watch("encoder", plan.vision.steps))
-    tokens = tokens_of(seeing, train.pictures)
-    book = codebook(train.histories, train.futures, plan.codes, plan.decoder.seed)
+    tokens = views_of(seeing, train.pictures, VIEWS)
+    off = train.futures - strangers_paths(train, plan.status_steps)
+    book = codebook(off, plan.codes, plan.decoder.seed)
     decoders = {
         mode: train_frames(
-            runs / mode, replace(plan.decoder, mode=mode), book, train, tokens, watch(mode, plan.decoder.steps)
+            runs / mode, replace(plan.decoder, mode=mode), book, train, tokens, off, watch(mode, plan.decoder.steps)
         )
         for mode in ("vilad", "twin")
     }

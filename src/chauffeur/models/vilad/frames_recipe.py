@@ -49,6 +49,7 @@ class FramesRecipe:
         full: Share of samples with every waypoint masked (`losses.Noise`).
         soft_m: A true waypoint's weight is spread over codes nearby: deviation at 0.5 s, growing with time.
         dropped: Share of a picture's numbers that are hidden.
+        jitter: Noise added to what is known of own motion.
         seed: Of everything.
     """
 
@@ -57,12 +58,13 @@ class FramesRecipe:
     layers: int = 2
     heads: int = 4
     inner: int = 256
-    steps: int = 1500
+    steps: int = 500
     batch: int = 64
     rate: float = 1.5e-3
     full: float = 0.5
     soft_m: float = 0.15
-    dropped: float = 0.1
+    dropped: float = 0.3
+    jitter: float = 0.03
     seed: int = 0
 
     def rate_at(self, step: int) -> float:
@@ -94,9 +96,8 @@ def prompts(ego: Array, commands: list[str]) -> torch.Tensor:
     return torch.from_numpy(found)
 
 
-def soft_targets(book: WaypointCodebook, histories: Array, futures: Array, soft_m: float) -> Array:
-    """Weights of the codes of each waypoint, (n, FUTURE, codes), float32: a Gaussian round the true one."""
-    off = book.displacements(histories, futures)
+def soft_targets(book: WaypointCodebook, off: Array, soft_m: float) -> Array:
+    """Weights of the codes of each displacement (n, FUTURE, 2), (n, FUTURE, codes), float32: a Gaussian round it."""
     away = np.linalg.norm(off[:, :, None] - book.centres[None], axis=-1)
     near = away.min(axis=-1, keepdims=True)
     deviation = soft_m * np.arange(1, FUTURE + 1)[None, :, None]
@@ -110,6 +111,7 @@ def train_frames(
     book: WaypointCodebook,
     frames: FrameSet,
     tokens: torch.Tensor,
+    off: Array,
     watch: Callable[[int, float, float], None] | None = None,
 ) -> Vilad:
     """Train, or go on in this folder; the mean of the weights.
@@ -119,7 +121,8 @@ def train_frames(
         recipe: What decides it.
         book: Of the waypoints.
         frames: The training split.
-        tokens: Of its pictures, (n, T, width).
+        tokens: Of its pictures, each in several lights, (views, n, T, width).
+        off: Of its true waypoints from the expected ones, (n, FUTURE, 2).
         watch: Is told (step, loss, seconds).
 
     Raises:
@@ -127,13 +130,13 @@ def train_frames(
     """
     torch.manual_seed(recipe.seed)
     template = book.template
-    model = Vilad(recipe.config(tokens.shape[2]), template)
+    model = Vilad(recipe.config(tokens.shape[3]), template)
     words = prompts(frames.ego, frames.commands)
-    codes = book.nearest(frames.histories, frames.futures)
+    codes = book.nearest(off)
     rows = torch.from_numpy(np.tile(template.canvas, (len(codes), 1)))
     maskable = torch.from_numpy(template.maskable)
     rows[:, maskable] = torch.from_numpy(codes) + book.first
-    soft = torch.from_numpy(soft_targets(book, frames.histories, frames.futures, recipe.soft_m))
+    soft = torch.from_numpy(soft_targets(book, off, recipe.soft_m))
     codes_at = slice(book.first, book.first + book.codes)
     known = torch.ones((recipe.batch, PROMPT), dtype=torch.bool)
     noise = Noise(0.1, recipe.full)
@@ -141,16 +144,18 @@ def train_frames(
     def loss(drawn: tuple[int, torch.Tensor]) -> torch.Tensor:
         step, chosen = drawn
         generator = torch.Generator().manual_seed(recipe.seed * 1_000_003 + step)
-        seen = tokens[chosen]
+        seen = tokens[torch.randint(len(tokens), (len(chosen),), generator=generator), chosen]
         seen = seen * (torch.rand(seen.shape, generator=generator) >= recipe.dropped)
+        told = words[chosen]
+        told[:, 0, :EGO_WIDTH] += recipe.jitter * torch.randn((len(chosen), EGO_WIDTH), generator=generator)
         own = rows[chosen]
         many = known[: len(chosen)]
         if recipe.mode == "twin":
             hidden, t = maskable.expand(len(own), -1), torch.ones(len(own))
-            logits = model(words[chosen], many, seen, own)
+            logits = model(told, many, seen, own)
         else:
             own, hidden, t = masked(own, maskable, noise, generator)
-            logits = model(words[chosen], many, seen, own)
+            logits = model(told, many, seen, own)
         wrong = -(soft[chosen] * functional.log_softmax(logits[:, maskable, codes_at], dim=-1)).sum(dim=-1)
         return ((wrong * hidden[:, maskable]).sum(dim=1) / t).mean() / FUTURE  # Eq. 30, soft targets
 
@@ -160,7 +165,7 @@ def train_frames(
         loss,
         recipe.rate_at,
         folder,
-        asdict(recipe) | {"codes": book.codes},
+        asdict(recipe) | {"codes": book.codes, "round": "ego-status MLP"},
         recipe.steps,
         Optimisation(ema=0.995, precision="float32"),
         watch=watch,
@@ -210,7 +215,7 @@ class _ToldTwin(Twin):
 def plan_path(
     model: Vilad,
     book: WaypointCodebook,
-    history: Array,
+    expected: Array,
     words: torch.Tensor,
     tokens: torch.Tensor,
     how: Unmasking = ONE_PASS,
@@ -220,7 +225,7 @@ def plan_path(
     Args:
         model: Trained; a causal one is the twin.
         book: Of the waypoints.
-        history: (5, 3).
+        expected: Where own motion and command lead, (FUTURE, 2).
         words: (1, PROMPT, WIDTH).
         tokens: Of the picture, (1, T, width).
         how: Rule, bound and steps; of no meaning to the twin.
@@ -237,14 +242,14 @@ def plan_path(
         decided = unmask(told, template.canvas, allowed, how)
         held = np.stack([told.logits[decided.order[place] - 1][place] for place in places])
     shares = distribution(np.where(allowed[places], held, NEVER))[:, book.first : book.first + book.codes]
-    return PlannedPath(book.waypoints(history, shares), decided)
+    return PlannedPath(book.waypoints(expected, shares), decided)
 
 
 @torch.no_grad()
 def plan_paths(
     model: Vilad,
     book: WaypointCodebook,
-    histories: Array,
+    expected: Array,
     words: torch.Tensor,
     tokens: torch.Tensor,
     how: Unmasking = ONE_PASS,
@@ -255,23 +260,23 @@ def plan_paths(
     Args:
         model: Trained; a causal one is the twin.
         book: Of the waypoints.
-        histories: (n, 5, 3).
+        expected: Where own motion and command lead, (n, FUTURE, 2).
         words: (n, PROMPT, WIDTH).
         tokens: Of the pictures, (n, T, width).
         how: Rule, bound and steps; of no meaning to the twin.
         batch: Frames at a time.
     """
     found: list[PlannedPath] = []
-    for start in range(0, len(histories), batch):
+    for start in range(0, len(expected), batch):
         own = slice(start, start + batch)
-        found += _plan_batch(model, book, histories[own], words[own], tokens[own], how)
+        found += _plan_batch(model, book, expected[own], words[own], tokens[own], how)
     return found
 
 
 def _plan_batch(
-    model: Vilad, book: WaypointCodebook, histories: Array, words: torch.Tensor, tokens: torch.Tensor, how: Unmasking
+    model: Vilad, book: WaypointCodebook, expected: Array, words: torch.Tensor, tokens: torch.Tensor, how: Unmasking
 ) -> list[PlannedPath]:
-    template, many = book.template, len(histories)
+    template, many = book.template, len(expected)
     allowed = template.allowed(tokens.shape[1])
     places = np.flatnonzero(template.maskable)
     known = torch.ones((many, words.shape[1]), dtype=torch.bool)
@@ -297,4 +302,4 @@ def _plan_batch(
     else:
         decided = unmask_many(predict, canvas, np.tile(allowed, (many, 1, 1)), how)
     shares = distribution(np.where(allowed[places], held[:, places], NEVER))[..., book.first : book.first + book.codes]
-    return [PlannedPath(book.waypoints(histories[i], shares[i]), decided[i]) for i in range(many)]
+    return [PlannedPath(book.waypoints(expected[i], shares[i]), decided[i]) for i in range(many)]

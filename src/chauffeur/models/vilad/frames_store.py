@@ -22,7 +22,7 @@ from chauffeur.bench.openloop.extrapolation import constant_velocity
 from chauffeur.concept import DataError
 from chauffeur.drive.files import publish
 from chauffeur.models.net.vision import VisionConfig
-from chauffeur.models.vilad.frames_baselines import told
+from chauffeur.models.vilad.frames_baselines import expected_paths
 from chauffeur.models.vilad.frames_data import FrameSet, ego_features
 from chauffeur.models.vilad.frames_recipe import ONE_PASS, FramesRecipe, plan_path, plan_paths, prompts
 from chauffeur.models.vilad.frames_vision import SAID, SEEN_WIDTH, SeeingHead, StatusHead, regressed, tokens_of
@@ -33,6 +33,8 @@ from chauffeur.planners.vilad.unmasking import Unmasking
 Array = np.ndarray[Any, Any]
 FramesMethod = Literal["vilad", "twin", "regression", "status"]
 METHODS: Final = get_args(FramesMethod)
+VERSION: Final = "vilad-frames-v2"
+"""Of what is stored: codes of the first were displacements from constant velocity."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class FramesModel:
 
     Attributes:
         vision: Encoder with the head of its own training.
-        vilad, twin: Decoders over its tokens.
+        vilad, twin: Decoders over its tokens, round the paths that the MLP expects.
         status: Ego-status MLP.
         book: Of the waypoints.
         about: What `model.json` says.
@@ -79,20 +81,21 @@ class FramesModel:
             how: Rule of the unmasking.
         """
         ego = ego_features(history)
-        if method in ("vilad", "twin"):
-            tokens = tokens_of(self.vision, picture[None])
-            model = self.vilad if method == "vilad" else self.twin
-            path = plan_path(model, self.book, history, prompts(ego[None], [command]), tokens, how)
-            return path.waypoints, path.decided.passes
         said = np.zeros((1, len(SAID)), np.float32)
         if command in SAID:
             said[0, SAID.index(command)] = 1.0
         known = torch.from_numpy(np.concatenate((ego[None], said), axis=1))
-        if method == "status":
-            off = self.status(known)
-        else:
+        if method == "regression":
             off, _ = self.vision(torch.from_numpy(np.ascontiguousarray(picture[None])), known)
-        return constant_velocity(history) + off[0].numpy(), 1
+        else:
+            off = self.status(known)
+        path = constant_velocity(history) + off[0].numpy()
+        if method in ("status", "regression"):
+            return path, 1
+        model = self.vilad if method == "vilad" else self.twin
+        tokens = tokens_of(self.vision, picture[None])
+        planned = plan_path(model, self.book, path, prompts(ego[None], [command]), tokens, how)
+        return planned.waypoints, planned.decided.passes
 
 
 def store_frames_model(folder: Path, model: FramesModel) -> None:
@@ -130,6 +133,10 @@ def load_frames_model(folder: Path) -> FramesModel:
             f"{folder} holds no frames model that can be read: {error}.",
             hint="Train one: chauffeur model train vilad-frames",
         ) from error
+    if about["version"] != VERSION:
+        raise DataError(
+            f"{folder} is {about['version']}, not {VERSION}.", hint="Train it again: model train vilad-frames"
+        )
     return FramesModel(parts["vision"], parts["vilad"], parts["twin"], parts["status"], book, about)
 
 
@@ -145,13 +152,15 @@ def measured(
     model: FramesModel, method: FramesMethod, frames: FrameSet, how: Unmasking = ONE_PASS, *, black: bool = False
 ) -> tuple[Array, float]:
     """Waypoints (n, 6, 2) of a set, and mean passes; `black` shows black pictures in place of the real ones."""
-    if method in ("status", "regression"):
-        off = told(model.status, frames) if method == "status" else regressed(model.vision, frames)
-        return np.stack([constant_velocity(one) for one in frames.histories]) + off, 1.0
+    if method == "status":
+        return expected_paths(model.status, frames), 1.0
+    if method == "regression":
+        return np.stack([constant_velocity(one) for one in frames.histories]) + regressed(model.vision, frames), 1.0
     if black:
         tokens = tokens_of(model.vision, np.zeros_like(frames.pictures[:1])).expand(len(frames.samples), -1, -1)
     else:
         tokens = tokens_of(model.vision, frames.pictures)
     decoder = model.vilad if method == "vilad" else model.twin
-    paths = plan_paths(decoder, model.book, frames.histories, prompts(frames.ego, frames.commands), tokens, how)
+    expected = expected_paths(model.status, frames)
+    paths = plan_paths(decoder, model.book, expected, prompts(frames.ego, frames.commands), tokens, how)
     return np.stack([one.waypoints for one in paths]), float(np.mean([one.decided.passes for one in paths]))

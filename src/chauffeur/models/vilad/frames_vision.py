@@ -22,7 +22,7 @@ from chauffeur.bench.openloop.nuscenes import FUTURE
 from chauffeur.models.net.vision import VisionConfig, VisionEncoder, vision
 from chauffeur.models.train.trainer import Optimisation, fit
 from chauffeur.models.vilad.frames_data import EGO_WIDTH, FrameSet
-from chauffeur.models.vilad.waypoints import WaypointCodebook
+from chauffeur.models.vilad.waypoints import displacements
 
 Array = np.ndarray[Any, Any]
 
@@ -45,7 +45,7 @@ class VisionRecipe:
     """
 
     vision: VisionConfig = field(default_factory=lambda: VisionConfig("small", (96, 160), (32, 64, 96, 128), stem=4))
-    steps: int = 1600
+    steps: int = 1000
     batch: int = 32
     rate: float = 1.5e-3
     seed: int = 0
@@ -148,7 +148,7 @@ def train_vision(
     torch.manual_seed(recipe.seed)
     model = SeeingHead(recipe.vision)
     pictures, said = torch.from_numpy(frames.pictures), torch.from_numpy(status(frames))
-    truth = torch.from_numpy(WaypointCodebook.displacements(frames.histories, frames.futures)).float()
+    truth = torch.from_numpy(displacements(frames.histories, frames.futures)).float()
     known = torch.from_numpy(frames.known)
 
     def loss(drawn: tuple[int, torch.Tensor]) -> torch.Tensor:
@@ -187,6 +187,19 @@ def tokens_of(model: SeeingHead, pictures: Array, batch: int = 64) -> torch.Tens
     """Tokens (n, SEEN_TOKENS, SEEN_WIDTH) of pictures (n, H, W, 3), computed once."""
     held = torch.from_numpy(pictures)
     return torch.cat([model.see(held[i : i + batch]) for i in range(0, len(held), batch)])
+
+
+@torch.no_grad()
+def views_of(model: SeeingHead, pictures: Array, views: int, seed: int = 0, batch: int = 64) -> torch.Tensor:
+    """Tokens of pictures as they are and in other lights, (views, n, SEEN_TOKENS, SEEN_WIDTH): a decoder that knew one
+    view of each by heart would read less out of a new picture."""
+    generator = torch.Generator().manual_seed(seed)
+    held = torch.from_numpy(pictures)
+    found = [tokens_of(model, pictures, batch)]
+    for _ in range(views - 1):
+        parts = [model.see(disturbed(held[i : i + batch], generator)) for i in range(0, len(held), batch)]
+        found.append(torch.cat(parts))
+    return torch.stack(found)
 
 
 @torch.no_grad()

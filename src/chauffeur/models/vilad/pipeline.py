@@ -114,7 +114,7 @@ def make_model(model: ViladModel, folder: Path, recipe: ViladRecipe, told: Told,
         folder: Of the run.
         recipe: How it is trained.
         told: Is told what is done.
-        base: Folder of a run on another task that training begins with.
+        base: What training begins with: folder of a run on another task, or of a model that ships.
 
     Raises:
         ConfigError: The folder holds a run of another recipe, or the recipe is the twin's, which does not ship.
@@ -128,7 +128,7 @@ def make_model(model: ViladModel, folder: Path, recipe: ViladRecipe, told: Told,
         recipe,
         load_words(SHIPPED / "words.npz"),
         lambda step, loss, seconds: told(f"training, loss {loss:.3f}, {seconds:.2f} s", step + 1, recipe.steps),
-        base=None if base is None else base / "training",
+        base=base if base is None or (base / "model.onnx").exists() else base / "training",
     )
     return ship(model, network, recipe, folder / "model", told)
 

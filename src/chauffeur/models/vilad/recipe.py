@@ -16,6 +16,7 @@ import torch
 
 from chauffeur.concept import ConfigError
 from chauffeur.models.train.trainer import Optimisation, fit, stored
+from chauffeur.models.vilad.export import exported_weights
 from chauffeur.models.vilad.losses import Noise, diffusion_loss, masked, next_token_loss
 from chauffeur.models.vilad.network import SIZES, Vilad, ViladConfig
 from chauffeur.planners.vilad.template import ActionTemplate
@@ -240,15 +241,25 @@ def train(
 
 
 def _take_over(model: Vilad, base: Path) -> None:
-    """The reading of another run: how words are connected, and the transformer."""
+    """All of a run or of a network that ships, if it learned this task; of another's, how words are connected and the
+    transformer: its reading."""
     state = stored(base)
-    if state is None:
-        raise ConfigError(f"{base} holds no run to begin with.", hint="Give the folder `training` of a run.")
-    held = {name: value for name, value in state["mean"].items() if name.startswith(("words.", "body."))}
+    if state is not None:
+        given = state["mean"]
+    elif (base / "model.onnx").exists():
+        given = exported_weights(base, model.config.body.layers)
+    else:
+        raise ConfigError(f"{base} holds no run to begin with.", hint="Give a folder with `state.pt` or `model.onnx`.")
     own = model.state_dict()
-    if any(name not in own or own[name].shape != value.shape for name, value in held.items()):
+    fits = {name for name, value in given.items() if name in own and own[name].shape == value.shape}
+    if any(name.startswith(_READING) for name in given.keys() - fits):
         raise ConfigError(f"The run in {base} is of another size.", hint="Begin with one of the same --size.")
+    same = len(fits) == len(given)
+    held = {name: value for name, value in given.items() if same or name.startswith(_READING)}
     model.load_state_dict(held, strict=False)
+
+
+_READING: Final = ("words.", "body.")
 
 
 def continues(recipe: ViladRecipe) -> Callable[[dict[str, Any], int], bool]:

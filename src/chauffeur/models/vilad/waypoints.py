@@ -1,9 +1,9 @@
 """Waypoints as tokens: one token a waypoint, from a codebook; the fixed pattern that holds them.
 
-A token stands for a displacement from where constant velocity would take the car, so that a few dozen of them tell
-what the car does, at any speed. One token a quantity cannot contradict itself, as digits that are unmasked in one step
-do (MVLAD-AD, 2026, went the same way from ViLaD's digit strings). What is read out of a slot is not its likeliest token
-but the geometric median of its distribution: the point of least expected L2 error.
+A token stands for a displacement from where own motion and command alone would lead (`frames_baselines`), so that a
+few dozen of them tell what a picture adds, at any speed. One token a quantity cannot contradict itself, as digits that
+are unmasked in one step do (MVLAD-AD, 2026, went the same way from ViLaD's digit strings). What is read out of a slot
+is not its likeliest token but the geometric median of its distribution: the point of least expected L2 error.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _MEDIAN_ROUNDS: Final = 12
 
 @dataclass(frozen=True)
 class WaypointCodebook:
-    """Displacements from constant velocity.
+    """Displacements from an expected path.
 
     Attributes:
         centres: (FUTURE, codes, 2), m, ego frame.
@@ -57,20 +57,18 @@ class WaypointCodebook:
         """Token id of the first code; the others follow."""
         return self.template.ids["#0"]
 
-    def nearest(self, histories: Array, futures: Array) -> NDArray[np.int64]:
-        """Codes (n, FUTURE) of true waypoints (n, FUTURE, 2) after histories (n, 5, 3)."""
-        off = self.displacements(histories, futures)
+    def nearest(self, off: Array) -> NDArray[np.int64]:
+        """Codes (n, FUTURE) of displacements (n, FUTURE, 2) of the true waypoints from the expected ones."""
         return np.linalg.norm(off[:, :, None] - self.centres[None], axis=-1).argmin(axis=-1)
 
-    @staticmethod
-    def displacements(histories: Array, futures: Array) -> Array:
-        """Of waypoints from constant velocity, (n, FUTURE, 2)."""
-        return futures - np.stack([constant_velocity(one) for one in histories])
+    def waypoints(self, expected: Array, shares: Array) -> Array:
+        """Waypoints (FUTURE, 2) round expected ones, of each slot's distribution over the codes (FUTURE, codes)."""
+        return expected + np.stack([geometric_median(*pair) for pair in zip(self.centres, shares, strict=True)])
 
-    def waypoints(self, history: Array, shares: Array) -> Array:
-        """Waypoints (FUTURE, 2) after a history (5, 3), of each slot's distribution over the codes (FUTURE, codes)."""
-        median = np.stack([geometric_median(*pair) for pair in zip(self.centres, shares, strict=True)])
-        return constant_velocity(history) + median
+
+def displacements(histories: Array, futures: Array) -> Array:
+    """Of waypoints from constant velocity, (n, FUTURE, 2)."""
+    return futures - np.stack([constant_velocity(one) for one in histories])
 
 
 def geometric_median(points: Array, weights: Array) -> Array:
@@ -82,16 +80,14 @@ def geometric_median(points: Array, weights: Array) -> Array:
     return at
 
 
-def codebook(histories: Array, futures: Array, codes: int = CODES, seed: int = 0) -> WaypointCodebook:
+def codebook(off: Array, codes: int = CODES, seed: int = 0) -> WaypointCodebook:
     """The codebook of a training split: k-means of each waypoint's displacement, by Lloyd's rounds.
 
     Args:
-        histories: (n, 5, 3).
-        futures: (n, FUTURE, 2).
+        off: Of the true waypoints from the expected ones, (n, FUTURE, 2).
         codes: Tokens of a slot.
         seed: Of the first centres.
     """
-    off = WaypointCodebook.displacements(histories, futures)
     rng = np.random.default_rng([seed, 17])
     centres = np.zeros((FUTURE, codes, 2))
     for slot in range(FUTURE):

@@ -12,8 +12,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from chauffeur.concept import InstructionError, Parameters, ParkingLot, Plan, PlanRequest, Street, Thoughts, Usage
+from chauffeur.language.corrections import last_said
 from chauffeur.planners.base import declined
+from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.vilad.driving import TEMPLATE as DRIVE
 from chauffeur.planners.vilad.driving import asked_of_drive
 from chauffeur.planners.vilad.driving_planning import (
@@ -29,7 +33,9 @@ from chauffeur.planners.vilad.parking import (
     CRITERIA,
     LANDMARKS,
     NONE,
+    ROWS,
     TEMPLATE,
+    WIDTH,
     asked_of,
     free_spots,
     in_words,
@@ -85,7 +91,7 @@ class ViladPlanner:
         return shipped(SHIPPED_DRIVE) if self._driving is None else self._driving
 
     async def plan(self, request: PlanRequest) -> Plan:
-        """One plan; declined where there is neither a lot nor a street, and for what cannot be done there.
+        """One plan; declined where there is neither a lot nor a street, and for what cannot or must not be done there.
 
         Raises:
             InstructionError: The wish is empty.
@@ -94,6 +100,7 @@ class ViladPlanner:
         text = request.instruction.text.strip()
         if not text:
             raise InstructionError("The instruction is empty.", hint="Say where to park, or where to drive.")
+        text = last_said(text)
         if request.context.lot is not None:
             return self._park(request, request.context.lot, text, begun)
         if request.context.street is not None:
@@ -103,6 +110,8 @@ class ViladPlanner:
 
     def _drive(self, request: PlanRequest, street: Street, text: str, begun: float) -> Plan:
         engine = self._driving_engine
+        if why := danger(text):
+            return declined(self, why, begun, intent="declined")
         written = write_drive(engine, text, street, self._how or HOW_DRIVEN)
         usage = Usage(completion_tokens=len(DRIVE.slots), requests=written.decided.passes)
         asked = asked_of_drive(written.values)
@@ -144,6 +153,9 @@ class ViladPlanner:
         candidate = int(values["spot"])
         if named:  # whoever names a spot has said what they want; the network is not asked to doubt it
             candidate, said = max(candidate, 1), f"You named {names[max(candidate, 1) - 1]}, and it is free."
+        elif not any(asked[name] != NONE for name in LANDMARKS) and (why := danger(text)):
+            # Near a place is near no danger: "as close as you can get to the lift" is no tailgating in a lot.
+            return declined(self, why, begun, intent="park", usage=_usage(decided.passes), raw=written)
         elif candidate == 0:
             words = f"No free spot is {in_words(asked)}."
             return declined(self, words, begun, intent="park", usage=_usage(decided.passes), raw=written)
@@ -166,6 +178,14 @@ class ViladPlanner:
             latency_s=time.perf_counter() - begun,
             raw=written,
         )
+
+
+def parking_wish(text: str) -> dict[str, str]:
+    """What a wish asks of a parking spot, wherever that may be: the shipped network's reading of it, on no lot."""
+    nothing = np.zeros((2, WIDTH), np.float32)
+    nothing[0, WIDTH - len(ROWS) - 1] = 1.0
+    decided = shipped().decide(TEMPLATE, last_said(text), nothing, HOW)
+    return asked_of(TEMPLATE.decode(decided.row))
 
 
 def _usage(passes: int) -> Usage:
