@@ -183,7 +183,9 @@ def _action(scene: QaScene) -> str:
         return reason
     if _gap(scene) != "closes" or "beside left" in scene.unclear:
         return ""
-    return "pass" if scene.own > 0 and scene.left is None else "slow"
+    if scene.own == 0 or scene.left is not None:
+        return "slow"
+    return "" if scene.left_taken else "pass"
 
 
 def sighted(scene: QaScene, reach_m: float = 70.0, hidden: float = 0.6) -> frozenset[int | str]:

@@ -13,7 +13,7 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Final, Literal
 
-from chauffeur.bench.nuplanqa.scenes.scene import Layout, Motion, QaScene, QaUser, RoadKind, Sky
+from chauffeur.bench.nuplanqa.scenes.scene import LEFT_TAKEN_M, Layout, Motion, QaScene, QaUser, RoadKind, Sky
 from chauffeur.concept import ScenarioError
 from chauffeur.concept.scene import Observation, Signal, VehicleState
 from chauffeur.describe.road import ego_lane, own_direction
@@ -29,7 +29,8 @@ _UNCLEAR_M: Final = 80.0
 """A junction this near is ahead; one between the two is neither there nor not."""
 _LIGHT_M: Final = 60.0
 _BESIDE_M: Final = (-3.0, 10.0)
-_NOT_BESIDE_M: Final = (-12.0, 18.0)
+_NOT_BESIDE_M: Final = (-9.0, 14.0)
+"""Middles of who is beside lie between the former; who reaches between the latter with front or rear is unclear."""
 _BEHIND_M: Final = 28.0
 _NOT_BEHIND_M: Final = 60.0
 _IN_LANE: Final = 0.42
@@ -173,6 +174,7 @@ def read_scene(
         sky=sky,
         light=None if light is None or light.state == "off" else light.state,
         light_id="" if light is None else light.id,
+        left_taken=own > 0 and _left_taken(way, lanes[own - 1]),
         lead=lead,
         left=left,
         right=right,
@@ -259,13 +261,22 @@ def _beside(way: _Way, lanes: Sequence[Lane], own: int, side: int, unclear: set[
     width, name = lanes[own + side].width_m, f"beside {'left' if side < 0 else 'right'}"
     found: QaUser | None = None
     for one, ahead, offset in _vehicles(way):
-        if not _NOT_BESIDE_M[0] < ahead < _NOT_BESIDE_M[1] or abs(offset - middle) > _HALF_IN_LANE * width:
+        front, rear = ahead + one.length_m / 2.0, ahead - one.length_m / 2.0
+        near = front > _NOT_BESIDE_M[0] and rear < _NOT_BESIDE_M[1]
+        if not near or abs(offset - middle) > _HALF_IN_LANE * width:
             continue
         inside = _BESIDE_M[0] < ahead < _BESIDE_M[1] and abs(offset - middle) <= _IN_LANE * width
         if not inside or found is not None:
             unclear.add(name)
         found = found or QaUser(one.id, one.kind, ahead)
     return found
+
+
+def _left_taken(way: _Way, lane: Lane) -> bool:
+    middle = (way.lane.width_m + lane.width_m) / 2.0
+    return any(
+        0.0 < ahead < LEFT_TAKEN_M and abs(offset - middle) < lane.width_m / 2.0 for _, ahead, offset in _vehicles(way)
+    )
 
 
 def _behind(way: _Way, unclear: set[str]) -> QaUser | None:

@@ -14,6 +14,9 @@ STEP_S: Final = 0.5
 FAST_MPS: Final = 14.5
 """Above it the ego's speed tells what kind of road it is on, and nothing that hangs on the road is asked."""
 
+LEFT_TAKEN_M: Final = 50.0
+"""Somebody this near in the lane on the left is in the way of who would pass there."""
+
 Motion = Literal["still", "steady", "faster", "slower"]
 Sky = Literal["clear day", "rainy day", "foggy day", "snowy day", "clear night", "rainy night"]
 SKIES: Final[tuple[Sky, ...]] = (
@@ -59,6 +62,7 @@ class QaScene:
         sky: Weather and light.
         light: What the ego's traffic light shows; None without one.
         light_id: Its id in the observations.
+        left_taken: Whether somebody is farther ahead in the lane on the left, and passing is a matter of opinion.
         lead, left, right, behind: Who is ahead in the ego's lane, beside it on either side, behind it; None for nobody.
         walker: Who is on the road ahead; None for nobody.
         walker_from: From which side they come.
@@ -78,6 +82,7 @@ class QaScene:
     sky: Sky
     light: SignalState | None
     light_id: str = ""
+    left_taken: bool = False
     lead: QaUser | None
     left: QaUser | None
     right: QaUser | None

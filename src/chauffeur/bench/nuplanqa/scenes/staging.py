@@ -12,7 +12,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Literal
 
-from chauffeur.bench.nuplanqa.scenes.scene import SAMPLES, SKIES, STEP_S, Layout, Motion, QaScene, QaUser, Sky
+from chauffeur.bench.nuplanqa.scenes.scene import (
+    LEFT_TAKEN_M,
+    SAMPLES,
+    SKIES,
+    STEP_S,
+    Layout,
+    Motion,
+    QaScene,
+    QaUser,
+    Sky,
+)
 from chauffeur.bench.nuplanqa.scenes.streets import WIDTH_M, StreetKind, StreetPlan, road_of
 from chauffeur.concept.scene import AgentKind, Observation, Signal, SignalState, VehicleState
 from chauffeur.geometry.box import overlap
@@ -148,6 +158,10 @@ def _draw(token: str, rng: np.random.Generator) -> StagedScene | None:
         sky=sky,
         light=light,
         light_id="own",
+        left_taken=any(
+            0.0 < one.station_m < LEFT_TAKEN_M and abs(one.offset_m - plan.lane_offset(own - 1)) < WIDTH_M / 2.0
+            for one in crowd.movers
+        ),
         lead=_user(lead),
         left=_user(left),
         right=_user(right),
