@@ -4,7 +4,8 @@
 
 One sample and one command of each task; turns are left out, as the network was taught none. Each is planned twice: from
 the state, and from what BEV-LLM sees in six rendered pictures; checks, driving and judgement are the same. Told as
-well: how often it was right about whether anybody is ahead (within 60 m), and how far off its distance was.
+well: how often it was right about whether anybody is ahead within 60 m (one that it sees farther away counts as
+nobody), and how far off its distance was.
 """
 
 from __future__ import annotations
@@ -66,9 +67,10 @@ def main() -> None:
             other = next(one for one in observation.others if one.id == lead.id)
             gap = ((other.x_m - observation.ego.x_m) ** 2 + (other.y_m - observation.ego.y_m) ** 2) ** 0.5
         near = gap is not None and gap <= NEAR_M
+        said_near = answers.ahead is not None and answers.ahead_m <= NEAR_M
         scenes += 1
-        ahead_right += (answers.ahead is not None) == near
-        if near and gap is not None and answers.ahead is not None:
+        ahead_right += said_near == near
+        if near and gap is not None and said_near:
             off_m.append(abs(answers.ahead_m - gap))
         cells: list[str] = []
         for how, context in contexts.items():

@@ -129,16 +129,18 @@ def test_what_is_wrong_with_one_question_costs_that_one_alone(tmp_path: Path) ->
     (tmp_path / "part_0" / f"{questions()[3].token}_CAM_B0.jpg").write_bytes(b"\xff\xd8 cut off")
     metadata = json.loads((tmp_path / "metadata.json").read_text())
     del metadata[questions()[6].token]
+    del metadata[questions()[7].token]["cams"]["CAM_R2"]
     (tmp_path / "metadata.json").write_text(json.dumps(metadata))
     bench = NuPlanQaBenchmark(str(tmp_path), frames="single")
-    assert [one.name for one in bench.frames.missing([questions()[0].token])] == [f"{questions()[0].token}_CAM_L0.jpg"]
+    every = [item.token for item in questions()]
+    assert [one.name for one in bench.frames.missing(every)] == [f"{questions()[0].token}_CAM_L0.jpg"]
     done, rows = run(tmp_path, Oracle(), frames="single")
     statuses = [row["status"] for row in rows]
     assert statuses == [
-        "missing view", "answered", "answered", "corrupt image", "answered", "answered", "no metadata", "answered",
+        "missing view", "answered", "answered", "corrupt image", "answered", "answered", "no metadata", "missing view",
         "unknown subtask",
     ]  # fmt: skip
-    assert [row["correct"] for row in rows if row["status"] != "answered"] == [None] * 4
+    assert [row["correct"] for row in rows if row["status"] != "answered"] == [None] * 5
     assert "CAM_L0" in rows[0]["detail"] and "Parking" in rows[8]["detail"]
     assert "| corrupt image | 1 | 1 |" in (done.folder / "table.md").read_text()
     assert done.halt is None

@@ -24,6 +24,15 @@ OPTIONS = {
     "object": ("A cyclist", "A pedestrian", "A bus", "A truck"),
     "sky": ("Clear skies with good visibility.", "Foggy, poor visibility.", "Rain at night.", "None of the above."),
     "lanes": ("One", "Two", "Three", "Four"),
+    "colour": ("Red.", "Yellow.", "Green.", "There is none."),
+    "vehicle": ("A car is there.", "A truck is there.", "A bus is there.", "Nobody is there."),
+    "action": (
+        "Stop for the traffic light.",
+        "Drive on, the way is free.",
+        "Overtake in the free left lane.",
+        "Slow down and stay behind the vehicle.",
+    ),
+    "count": ("There is one lane.", "There are two lanes.", "There are three lanes.", "There are four lanes."),
 }
 ANSWERS = [
     line.split("\t", 2)
@@ -32,7 +41,7 @@ ANSWERS = [
 
 
 def test_every_hand_checked_answer_is_read_as_the_person_read_it() -> None:
-    assert len(ANSWERS) >= 200
+    assert len(ANSWERS) >= 300
     wrong: list[str] = []
     for name, expected, answer in ANSWERS:
         found = read_choice(answer.replace("\\n", "\n") if "boxed" not in answer else answer, OPTIONS[name])

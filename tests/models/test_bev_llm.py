@@ -23,7 +23,7 @@ from chauffeur.models.bev_llm.fusion import BevFusion, FusionConfig, rig_tensors
 from chauffeur.models.bev_llm.geometry import BevGrid, rig_geometry  # noqa: E402
 from chauffeur.models.bev_llm.network import CompactBevLlm, MllamaBevLlm  # noqa: E402
 from chauffeur.models.bev_llm.recipe import BevLlmRecipe, CompactAnswerer, compact, train_compact  # noqa: E402
-from chauffeur.models.bev_llm.views import VIEWS, camera_of, cut, view_cameras  # noqa: E402
+from chauffeur.models.bev_llm.views import FRONT_VIEWS, VIEWS, camera_of, cut, view_cameras  # noqa: E402
 from chauffeur.models.bev_llm.words import QuestionWordTable  # noqa: E402
 
 RIG = nuplan_rig(112, 64).only("CAM_F0", "CAM_L0", "CAM_B0")
@@ -203,17 +203,18 @@ def test_labels_say_what_is_known_and_no_more() -> None:
     assert sorted(set(cells.tolist())) == [-1, 0, KINDS.index("car")] and (cells > 0).sum() == 1
 
 
-def test_the_middle_of_the_front_picture_is_a_camera_of_its_own() -> None:
+def test_cuts_of_the_front_picture_are_cameras_of_their_own() -> None:
     from PIL import Image
 
     front = nuplan_rig(224, 128)["CAM_F0"]
-    whole, middle = view_cameras([front], (64, 112))
+    cameras = view_cameras([front], (64, 112))
     points = np.array([[30.0, 1.0, 1.0], [60.0, -2.0, 3.0]])
     pixels, _ = front.project(points)
     picture = np.zeros((128, 224, 3), np.uint8)
     for u, v in pixels:
         picture[int(v), int(u)] = 255
-    for camera in (whole, middle):
+    assert len(cameras) == FRONT_VIEWS
+    for camera in cameras:
         shown = cut(Image.fromarray(picture), camera.name, (64, 112)).sum(axis=0)
         for u, v in camera.project(points)[0]:
             assert shown[int(v) - 1 : int(v) + 2, int(u) - 1 : int(u) + 2].max() > 100

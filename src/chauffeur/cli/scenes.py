@@ -101,10 +101,13 @@ Examples:
 
     chauffeur bench scenes qa --out words --scenes 500 --no-render
 
+    chauffeur bench scenes qa --out streets --scenes 1000 --sources staged
+
     chauffeur bench scenes qa --out qa --scenes 2000 --pairs 50
 
-Streets are drawn, road users staged, pictures rendered, and questions of NuPlanQA's nine subtasks answered from the
-ground truth, about what can be seen. Simulated, and named so. At the end tricks are tried on the test split (words of
+Streets are drawn and road users staged, or our highway, crossing, towns and parking lots driven by their own drivers;
+pictures are rendered, and questions of NuPlanQA's nine subtasks answered from the ground truth, about what can be seen.
+Simulated, and named so. At the end tricks are tried on the test split (words of
 the options, control signals, lengths, letters): above 35 % is a failure. Ctrl-C keeps what is rendered; the same
 command goes on.
 """
@@ -127,6 +130,10 @@ def qa(
     look: Annotated[
         str, typer.Option(help="Palette and lens of the test split: `default`, `held_out_a`...")
     ] = "default",
+    sources: Annotated[
+        str, typer.Option(help="Where scenes come from: `all`, `staged` streets, or our `worlds` and their drivers.")
+    ] = "all",
+    front: Annotated[int, typer.Option(min=1, max=4, help="Times as wide and high as others: front pictures.")] = 1,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
 ) -> None:
     """Questions about pictures in NuPlanQA's format, from scenes of our own, that no trick can answer."""
@@ -135,7 +142,7 @@ def qa(
     from chauffeur.cli.console import stdout
 
     console = stdout()
-    config = QaConfig(scenes, seed, width, height, frames, pairs, render, look)
+    config = QaConfig(scenes, seed, width, height, frames, pairs, render, look, sources, front)
     try:
         with progress(console, "scenes") as show:
             made = make_set(out, config, workers or os.cpu_count() or 1, show)

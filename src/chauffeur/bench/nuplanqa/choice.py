@@ -1,8 +1,9 @@
 """Which option an answer in free words chooses, or why it chooses none.
 
-Read in this order, the first that decides stands: a stated answer ("the answer is (b)"), a letter in front, the only
-letter in brackets, the text of exactly one option, an ordinal ("the second one"). What names two options, refuses, or
-says "none" chooses nothing, and how it failed is counted.
+Read in this order, the first that decides stands: a ticked letter, a stated answer ("the answer is (b)"), a
+conclusion ("so d"), a letter in front, the only letter in brackets, the text of exactly one option, an ordinal ("the
+second one"), what is left when three are ruled out. What names two options, refuses, or says "none" chooses nothing,
+and how it failed is counted.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Final, Literal
 
 from chauffeur.bench.nuplanqa.questions import LETTERS
 
-EXTRACTION: Final = "choice-v1"
+EXTRACTION: Final = "choice-v2"
 
 How = Literal["letter", "text", "ordinal", "none", "refused", "several", "unclear", "empty"]
 
@@ -53,8 +54,29 @@ _FRONT: Final = re.compile(
 )
 _ALONE: Final = re.compile(r"^[\W_]{0,12}([a-dA-D])[\W_]{0,12}$")
 _BRACKETED: Final = re.compile(r"[\(\[]\s{0,3}([a-dA-D])\s{0,3}[\)\]]|(?<![\w(])([a-dA-D])\)")
-_BARE: Final = re.compile(r"(?<![\w'’])([B-D]|A(?!\s{1,3}[a-z]))(?![\w'’])")
-"""A capital by itself; an A before a word is the article."""
+_BARE: Final = re.compile(r"(?<![\w'’])([b-dB-D]|A(?!\s{1,3}[a-z])|a(?=\s{1,3}(?:or|and)\s{1,3}[b-d]\b))(?![\w'’])")
+"""A letter by itself; an A before a word, and a small one, is the article."""
+_TICKED: Final = re.compile(
+    rf"\[[xX✓✔]\]\s{{0,3}}{_L}{_END}|\|\s{{0,3}}{_L}\s{{0,3}}\|\s{{0,3}}(?:yes|correct|right|true|✓|✔)", re.IGNORECASE
+)
+_CONCLUDED: Final = re.compile(
+    rf"\b(?:so|therefore|thus|hence|leaves|leaving|maybe|perhaps|probably|guess)\b[\s,:]{{1,3}}"
+    rf"(?:it(?:'s|’s| is)\s{{1,3}}|is\s{{1,3}})?{_L}\s{{0,3}}(?:[.!?;,]|$)"
+    rf"|\bonly\s{{1,3}}{_L}\s{{1,3}}(?:remains|is left)\b|(?<![\w-])correct\s{{0,3}}:\s{{0,3}}{_L}{_END}",
+    re.IGNORECASE | re.MULTILINE,
+)
+_LIST: Final = rf"{_L}(?:\s{{0,3}},\s{{0,3}}{_L})?\s{{0,3}},?\s{{0,3}}(?:and|or|nor)\s{{1,3}}{_L}{_END}"
+_LISTED_OUT: Final = re.compile(
+    rf"(?:options?\s{{1,3}})?{_LIST}\s{{1,3}}(?:can be|are|could be)\s{{1,3}}(?:all\s{{1,3}})?"
+    rf"(?:excluded|ruled out|eliminated|wrong|incorrect|false)|\b(?:cannot|can't|can’t|not)\s{{1,3}}be\s{{1,3}}{_LIST}",
+    re.IGNORECASE,
+)
+"""Several letters that are ruled out in one breath."""
+_CAPITAL_OUT: Final = re.compile(
+    r"(?<![\w'’])([A-D])\s{1,3}(?:is|seems)\s{1,3}(?:clearly )?(?:wrong|incorrect|false|ruled out)"
+)
+_MARKUP: Final = re.compile(r"<(b|i|u|p|em|strong)>([^<]{0,400})</\1>", re.IGNORECASE)
+_WRONG: Final = r"\s{1,3}(?:is|would be|seems)\s{1,3}(?:clearly\s{1,3})?(?:wrong|incorrect|false|not)\b"
 _NEGATED: Final = re.compile(
     rf"(?:\b(?:not|isn't|isn’t|never|neither|nor|rule out|ruled out|exclude|excluding|except|rather than|instead of|"
     rf"unlike)\b\s{{1,3}}(?:the\s{{1,3}})?(?:option|choice|answer)?\s{{0,3}}(?:is\s{{1,3}})?{_L}{_END})"
@@ -106,7 +128,8 @@ def read_choice(answer: str, options: Sequence[str]) -> OptionChoice:
         answer: What the model wrote, its thinking taken out.
         options: Texts of the options, in the order in which they were lettered.
     """
-    text = unicodedata.normalize("NFKC", answer).strip()
+    text = unicodedata.normalize("NFKC", answer).rpartition("</think>")[2].strip()
+    text = _MARKUP.sub(r"\2", text)
     if not text:
         return OptionChoice(None, "empty")
     if (alone := _ALONE.match(text)) is not None:
@@ -114,28 +137,36 @@ def read_choice(answer: str, options: Sequence[str]) -> OptionChoice:
     exact = _same(text, options)
     if exact is not None:
         return OptionChoice(exact, "text")
-    kept = _without_options(_NEGATED.sub(" ", text), options)
-    for pattern in (_BOXED, _TAGGED):
+    positive = _NEGATED.sub(" ", _CAPITAL_OUT.sub(" ", _LISTED_OUT.sub(" ", text)))
+    kept = _without_options(positive, options)
+    for pattern in (_BOXED, _TAGGED, _TICKED):
         if found := _letters(pattern.findall(kept)):
             return _letter(found[-1])  # a model that corrects itself ends with what it means
     if (stated := _stated(kept)) is not None:
         return stated
+    if concluded := _letters(_CONCLUDED.findall(kept)):
+        return _letter(concluded[-1])
     front = _FRONT.match(kept)
     bracketed = _letters(_BRACKETED.findall(kept))
     if front is not None and _leads(front.group(1), bracketed, kept, front.end()):
         return _letter(front.group(1))
     if len(set(bracketed)) == 1:
         return _letter(bracketed[0])
-    named = _named(_NEGATED.sub(" ", text), options)
+    named = _named(positive, options)
     if not bracketed and len(named) == 1:
         return OptionChoice(named[0], "text")
-    return _rest(kept, bracketed, named)
+    found = _rest(kept, bracketed, named)
+    left = _left_over(text) if found.index is None and not bracketed else None
+    return found if left is None else _letter(left)
 
 
 def _rest(kept: str, bracketed: Sequence[str], named: Sequence[int]) -> OptionChoice:
     """What is left when no letter and no single option decides."""
     if len(set(bracketed)) > 1:
         last = _letters(_BRACKETED.findall(kept.splitlines()[-1]))
+        listed = len({match.group(1).lower() for match in _FRONT.finditer(kept)}) > 1
+        if listed and _FRONT.match(kept.splitlines()[-1]) and bracketed.count(last[-1] if last else "") < 2:
+            return OptionChoice(None, "several")
         if len(set(last)) == 1 and ("\n" in kept and (bracketed.count(last[0]) > 1 or not _lists_all(bracketed))):
             return _letter(last[0])
         return OptionChoice(None, "several")
@@ -156,6 +187,13 @@ def _rest(kept: str, bracketed: Sequence[str], named: Sequence[int]) -> OptionCh
     return OptionChoice(None, "several" if bare else "unclear")
 
 
+def _left_over(text: str) -> str | None:
+    """The one letter that is not ruled out, where three are."""
+    told = [one for pattern in (_NEGATED, _LISTED_OUT, _CAPITAL_OUT) for one in pattern.findall(text)]
+    out = {letter.lower() for found in told for letter in found if letter}
+    return (set(LETTERS) - out).pop() if len(out) == len(LETTERS) - 1 else None
+
+
 def _lists_all(bracketed: Sequence[str]) -> bool:
     """Whether an answer goes through all options."""
     return len(set(bracketed)) == len(LETTERS)
@@ -166,7 +204,9 @@ def _stated(text: str) -> OptionChoice | None:
     found = list(_STATED.finditer(text))
     if not found:
         return None
-    last = found[-1]
+    # "Option (B) is unsafe" speaks of an option; "Selected option: (A)" chooses one.
+    said = [one for one in found if not one.group().lower().startswith("option") or ":" in one.group()]
+    last = (said or found)[-1]
     tail = text[last.end() : last.end() + 24]
     other = re.match(rf"\s*(?:and|or|/|&|,)\s*(?:also\s+|maybe\s+|option\s+)?{_L}{_END}", tail, re.IGNORECASE)
     if other is not None and other.group(1).lower() != last.group(1).lower():
@@ -203,6 +243,9 @@ def _same(text: str, options: Sequence[str]) -> int | None:
 
 def _named(text: str, options: Sequence[str]) -> list[int]:
     """Options whose text stands in an answer, those left out whose text is part of another one's that does."""
+    for option in options:
+        name = re.escape(option.rstrip("."))
+        text = re.sub(rf"{name}{_WRONG}|\bnot\s{{1,3}}{name}\b", " ", text, flags=re.IGNORECASE)
     said = f" {_plain(text)} "
     found = [(index, _plain(option)) for index, option in enumerate(options)]
     held = [(index, option) for index, option in found if option and f" {option} " in said]

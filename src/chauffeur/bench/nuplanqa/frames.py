@@ -111,11 +111,13 @@ class FrameSource:
         return back * STEP_S if then is None or now is None else round((now - then) * 1e-6, 2)
 
     def missing(self, tokens: Sequence[str]) -> tuple[Path, ...]:
-        """Files that the samples need and that are not there."""
+        """Files that the samples need and that are not there, as far as the metadata name them."""
         wanted: dict[Path, None] = {}
         for token in tokens:
-            if token in self.metadata:
+            try:
                 wanted |= dict.fromkeys(frame.path for frame in self.paths(token))
+            except DataError:  # told of the item itself, when it is asked
+                continue
         return tuple(path for path in wanted if not path.is_file())
 
 

@@ -1,4 +1,4 @@
-"""Trips that frames are taken from: the world's own driver in town, on the highway and at a crossing.
+"""Trips that frames are taken from: the world's own driver in town, on the highway, at a crossing and in a parking lot.
 
 Every trip is a generator of `FrameMoment`s, two a second, with what the navigation says at that moment. It says
 which way at the next junction, or which lane: where the junction begins is for the eye.
@@ -7,7 +7,7 @@ which way at the next junction, or which lane: where the junction begins is for 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
@@ -22,7 +22,7 @@ from chauffeur.geometry import LaneId, RoadGraph
 from chauffeur.geometry.road_graph import turn_of
 from chauffeur.worlds.base import EGO, Perception
 
-Place = Literal["town", "highway", "crossing"]
+Place = Literal["town", "highway", "crossing", "lot"]
 Turn = Literal["left", "straight", "right"]
 TOWNS: Final = ("Gridford", "Hillcrest", "Northport", "Ringstead")
 UNSEEN_TOWN: Final = "Oldbridge"
@@ -72,6 +72,7 @@ class TrafficTrip:
         town: Of a trip in town.
         seed: Of everything.
         seconds: How long, at most.
+        config: The world's configuration; None has one drawn.
     """
 
     name: str
@@ -79,6 +80,7 @@ class TrafficTrip:
     town: str
     seed: int
     seconds: float
+    config: Mapping[str, Any] | None = None
 
 
 def instants(trip: TrafficTrip) -> Iterator[FrameMoment]:
@@ -89,7 +91,7 @@ def instants(trip: TrafficTrip) -> Iterator[FrameMoment]:
         MissingExtraError: The town's simulator is not installed.
     """
     rng = np.random.default_rng([trip.seed, 11])
-    yield from {"town": _town, "highway": _highway, "crossing": _crossing}[trip.place](trip, rng)
+    yield from {"town": _town, "highway": _highway, "crossing": _crossing, "lot": _lot}[trip.place](trip, rng)
 
 
 def _town(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
@@ -166,7 +168,7 @@ def _highway(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMomen
         "ego_vehicle": ego,
         "redraw_unfit": True,
     }
-    scenario = Scenario(trip.name, "highway", config, trip.seed)
+    scenario = Scenario(trip.name, "highway", config if trip.config is None else dict(trip.config), trip.seed)
     world = make_world(scenario)
     world.reset(scenario)
     driver, perception = world.driver(), world.perception()
@@ -197,6 +199,34 @@ def _free(perception: Perception, lane: LaneId) -> bool:
     )
 
 
+def _lot(trip: TrafficTrip, rng: np.random.Generator) -> Iterator[FrameMoment]:
+    drawn = {
+        "aisles": int(rng.integers(2, 5)),
+        "spots_a_row": int(rng.integers(6, 14)),
+        "taken": float(rng.uniform(0.4, 0.9)),
+        "cars": int(rng.integers(0, 3)),
+        "walkers": int(rng.integers(0, 3)),
+    }
+    scenario = Scenario(trip.name, "parking", drawn if trip.config is None else dict(trip.config), trip.seed)
+    world = make_world(scenario)
+    world.reset(scenario)
+    driver = world.driver()
+    wishes = driver.initial_setpoints()
+    every = round(STEP_S / world.dt_s)
+    for tick in range(round(trip.seconds / world.dt_s)):
+        seen = world.observe()
+        if seen.ended:
+            return
+        if tick % every == 0:
+            if rng.random() < _OTHERWISE:  # to another speed, or a halt
+                wishes = replace(wishes, target_speed_mps=float(max(0.0, rng.uniform(-2.0, 6.0))))
+            yield _instant(seen, COMMANDS[""], SEES_M)
+        wishes = driver.settle(wishes)
+        actuate(world, seen, driver.command(wishes), None, None)
+
+
+_OTHERWISE: Final = 0.15
+"""How often, each half second, the driver in a lot is given another speed."""
 _WAITS_S: Final = 1.0
 _CLEAR_M: Final = 25.0
 

@@ -58,11 +58,11 @@ def labels_of(truth: Mapping[str, Any], of: Facets) -> NDArray[np.int64]:
 
 
 def cells_of(truth: Mapping[str, Any], grid: BevGrid) -> NDArray[np.int64]:
-    """Kind of the road user in each cell, (cells,); -1 where somebody is whom no picture shows."""
+    """Kind of the road user in each cell, (cells,); -1 where somebody is whom no picture shows, or of no such kind."""
     found = np.zeros(grid.cells, np.int64)
     for kind, x_m, y_m, seen in truth["users"]:
         row = int((x_m + grid.behind_m) / (grid.ahead_m + grid.behind_m) * grid.rows // 1)
         column = int((y_m + grid.side_m) / (2.0 * grid.side_m) * grid.columns // 1)
         if 0 <= row < grid.rows and 0 <= column < grid.columns:
-            found[row * grid.columns + column] = KINDS.index(kind) if seen else -1
+            found[row * grid.columns + column] = KINDS.index(kind) if seen and kind in KINDS else -1
     return found

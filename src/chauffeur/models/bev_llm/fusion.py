@@ -66,7 +66,7 @@ class CrossAttention(nn.Module):
         self.before_q, self.before_k = nn.LayerNorm(queries), nn.LayerNorm(keys)
 
     def forward(self, queries: torch.Tensor, keys: torch.Tensor, bias: torch.Tensor | None = None) -> torch.Tensor:
-        """(B, N, queries), (B, M, keys), bias (N, M) or none, to (B, N, queries)."""
+        """(B, N, queries), (B, M, keys), bias (N, M), (B, N, M) or none, to (B, N, queries)."""
         batch = queries.shape[0]
         normed = self.before_k(keys)
 
@@ -75,6 +75,8 @@ class CrossAttention(nn.Module):
 
         q, k, v = split(self.q(self.before_q(queries))), split(self.k(normed)), split(self.v(normed))
         mask = None if bias is None else bias.to(q.dtype)
+        if mask is not None and mask.dim() == 3:
+            mask = mask[:, None]
         mixed = nn.functional.scaled_dot_product_attention(q, k, v, attn_mask=mask)
         return self.out(mixed.transpose(1, 2).reshape(batch, queries.shape[1], -1))
 
@@ -119,7 +121,8 @@ class BevFusion(nn.Module):
         Args:
             now: Features of every patch at the last instant, (B, M, layers * width); M is views * patches.
             past: Of the instants before, oldest first, (B, T - 1, K, layers * width): of the first K of those patches.
-            rig: `rays`, `bias` and `places` of RigGeometry as tensors.
+            rig: `rays`, `bias` and `places` of RigGeometry as tensors; the first two with a row a scene, where rigs
+                differ.
             motion: How the ego has moved since the instant before, (B, T, 3): forward and leftward, in tens of metres,
                 and turned, rad; it shifts what the cells remember.
             bev: Whether the cells are used, where there are any.
@@ -129,7 +132,7 @@ class BevFusion(nn.Module):
         """
         rays, _, _ = rig
         parts = list(now.split(self.config.width, dim=-1))
-        rayed = self.ray(rays[: now.shape[1]])
+        rayed = self.ray(rays[..., : now.shape[1], :])
         if not (bev and self.config.bev):
             return torch.cat([part + rayed for part in parts], dim=-1), None
         cells = self.cells(now, past, rig, motion)
@@ -148,8 +151,8 @@ class BevFusion(nn.Module):
             before = cells + self.motion(motion[:, instant])[:, None]
             cells = self.tsa(query, torch.cat([query, before], dim=1)) + before
             patches = views.shape[1]
-            shown = views[:, :, : self.config.width] + self.ray(rays[:patches])
-            cells = cells + self.sca(cells, shown, bias[:, :patches] * self.sharpness.exp())
+            shown = views[:, :, : self.config.width] + self.ray(rays[..., :patches, :])
+            cells = cells + self.sca(cells, shown, bias[..., :patches] * self.sharpness.exp())
             cells = cells + self.mix(cells)
         return cells
 

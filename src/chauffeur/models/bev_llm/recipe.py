@@ -164,10 +164,7 @@ def load_split(folder: Path, limit: int = 0) -> QaTensors:
         if instants > 1:
             _look(past[row, 0], {one.camera: one.path for one in frames[: len(CAMERAS)]})
         motion[row], speeds[row] = _motion(metadata, token, instants)
-    with _opened(folder / metadata[first]["cams"][VIEWS[0]]["data_path"]) as image:
-        size = image.size
-    cams = metadata[first]["cams"]
-    cameras = view_cameras([_camera(cams, name, size) for name in CAMERAS], SIZE)
+    cameras = view_cameras([_camera(folder, metadata[first]["cams"], name) for name in CAMERAS], SIZE)
     questions = tuple(tuple(by_token[token]) for token in tokens)
     return QaTensors(now, past, motion, tuple(truth[token] for token in tokens), speeds, questions, cameras)
 
@@ -193,8 +190,10 @@ def _opened(path: Path) -> Any:
         raise DataError(f"Cannot read the picture {path}: {error}.") from error
 
 
-def _camera(cams: Mapping[str, Any], name: str, size: tuple[int, int]) -> Camera:
+def _camera(folder: Path, cams: Mapping[str, Any], name: str) -> Camera:
     one = cams[name]
+    with _opened(folder / one["data_path"]) as image:
+        size = image.size
     return Camera.of_calibration(
         name, size, one["sensor2ego_translation"], one["sensor2ego_rotation"], one["cam_intrinsic"]
     )
@@ -362,10 +361,7 @@ class CompactAnswerer:
     @classmethod
     def load(cls, folder: Path) -> CompactAnswerer:
         """A saved network. Raises DataError: there is none in the folder."""
-        try:
-            about = json.loads((folder / "bev_llm.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise _no_network(folder, error) from error
+        about = _about(folder)
         network = CompactBevLlm(CompactConfig.of(about["network"]))
         network.load_state_dict(cls.stored_weights(folder))
         cameras = [Camera(**{name: _tuple(value) for name, value in one.items()}) for one in about["cameras"]]
@@ -406,12 +402,41 @@ def _read(
     return network(tokens[rows], words, (words != PAD).long())
 
 
-def _begin(network: CompactBevLlm, folder: Path) -> None:
-    """Take over the weights of a saved network, as far as names and shapes agree; the others stay as they are."""
-    saved = CompactAnswerer.stored_weights(folder)
-    shapes = {name: value.shape for name, value in network.state_dict().items()}
-    fitting = {name: value for name, value in saved.items() if shapes.get(name) == value.shape}
+def _begin(answerer: CompactAnswerer, folder: Path) -> None:
+    """Take over the weights of a saved network, as far as names and shapes agree; the others stay as they are.
+
+    What it knew of a view or of a class goes to the view or class of that name, wherever these have moved; a view that
+    it did not have adds nothing to the gist at first.
+    """
+    saved, about = CompactAnswerer.stored_weights(folder), _about(folder)
+    network, state = answerer.network, answerer.network.state_dict()
+    views = [str(camera["name"]) for camera in about["cameras"]]
+    patches = saved["gist.patches.weight"].unflatten(1, (len(views), -1))
+    own = torch.zeros(len(patches), network.config.views, patches.shape[2])
+    for place, camera in enumerate(answerer.cameras):
+        if camera.name in views:
+            own[:, place] = patches[:, views.index(camera.name)]
+    saved["gist.patches.weight"] = own.flatten(1)
+    heads = {str(name): (place, [str(one) for one in classes]) for place, (name, classes) in enumerate(about["facets"])}
+    taken = {name: value for name, value in saved.items() if not name.startswith("taught.")}
+    for place, (name, classes) in enumerate(answerer.facets):
+        for part in ("weight", "bias"):
+            head = state[f"taught.{place}.{part}"].clone()
+            before, known = heads.get(name, (0, []))
+            for row, one in enumerate(classes):
+                if one in known:
+                    head[row] = saved[f"taught.{before}.{part}"][known.index(one)]
+            taken[f"taught.{place}.{part}"] = head
+    fitting = {name: value for name, value in taken.items() if name in state and state[name].shape == value.shape}
     network.load_state_dict(fitting, strict=False)
+
+
+def _about(folder: Path) -> dict[str, Any]:
+    """All that is needed to use a saved network, besides its weights. Raises DataError: there is none."""
+    try:
+        return json.loads((folder / "bev_llm.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise _no_network(folder, error) from error
 
 
 def train_compact(
@@ -440,9 +465,9 @@ def train_compact(
     torch.manual_seed(recipe.seed)
     words, of = QuestionWordTable.taught(recipe.half), facets()
     network = CompactBevLlm(compact(recipe, words, of, tuple(train.now.shape[-2:])))
-    if begin is not None:
-        _begin(network, begin)
     answerer = CompactAnswerer(network, words, of, train.cameras, recipe.ablation)
+    if begin is not None:
+        _begin(answerer, begin)
     told: Watch = watch or _unwatched
     plain = {**asdict(recipe), "facets": json.dumps(of), "begin": str(begin or "")}
     how = Optimisation(decay=0.05, precision="float32")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -18,7 +19,7 @@ from chauffeur.camera import Rig, nuplan_rig
 from chauffeur.describe.vision import SceneAnswers
 from chauffeur.models.bev_llm.facets import APPROACHES_MPS, DISTANCES_M, KINDS
 from chauffeur.models.bev_llm.recipe import WEIGHTS, CompactAnswerer
-from chauffeur.models.bev_llm.views import FRONT_VIEWS, VIEWS, camera_of, cut
+from chauffeur.models.bev_llm.views import DETAIL, FRONT_VIEWS, VIEWS, camera_of, cut
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,11 +39,13 @@ class BevLlmReader:
         """Args: folder of a trained network; None for the shipped one. Raises DataError: there is none."""
         self._answerer = CompactAnswerer.load(folder or WEIGHTS)
         high, wide = self._answerer.network.config.size
-        self._rig = nuplan_rig(2 * wide, 2 * high).only(*CAMERAS)
+        rig = nuplan_rig(2 * wide, 2 * high).only(*CAMERAS)
+        front, *others = rig.cameras
+        self._rig = replace(rig, cameras=(front.sized(DETAIL * wide, DETAIL * high), *others))
 
     @property
     def rig(self) -> Rig:
-        """See SceneReader: twice the size of a view, as the middle of the front one is cut out."""
+        """See SceneReader: twice the size of a view, the front one four times, as its middle is cut out."""
         return self._rig
 
     def read(self, now: Pictures, before: Pictures, moved: tuple[float, float, float]) -> SceneAnswers:

@@ -1,9 +1,9 @@
-"""What the compact network looks at: six cameras, and the middle of the front one at full detail.
+"""What the compact network looks at: six cameras, and two cuts of the front one in which far things are larger.
 
-At a hundred pixels across, a car sixty metres ahead is three pixels wide. The middle of the front picture, cut out and
-kept at twice the detail, is one more view with a camera of its own (longer focal length), so that the geometry of the
-attention holds for it as for the others. It comes right after the front view: the first two are those of earlier
-instants, and those of a single camera.
+At a hundred pixels across, a car sixty metres ahead is three pixels wide. The middle of the front picture is kept at
+twice the detail, and the middle of that at four times it, as one more view each with a camera of its own (longer focal
+length), so that the geometry of the attention holds for them as for the others. They come right after the front view:
+the first three are those of earlier instants, and those of a single camera.
 """
 
 from __future__ import annotations
@@ -21,16 +21,20 @@ if TYPE_CHECKING:
 
 FRONT: Final = "CAM_F0"
 MIDDLE: Final = "CAM_F0.middle"
-FRONT_VIEWS: Final = 2
+FAR: Final = "CAM_F0.far"
+FRONT_VIEWS: Final = 3
 """Views of the front camera: all that is looked at of earlier instants."""
-VIEWS: Final = (FRONT, MIDDLE, "CAM_L0", "CAM_R0", "CAM_L2", "CAM_R2", "CAM_B0")
-_BOX: Final = (0.25, 0.2, 0.75, 0.7)
-"""Of the middle in the front picture: left, top, right, bottom, as shares; the horizon lies in it."""
+VIEWS: Final = (FRONT, MIDDLE, FAR, "CAM_L0", "CAM_R0", "CAM_L2", "CAM_R2", "CAM_B0")
+DETAIL: Final = 4
+"""How many times as wide and high as a view a front picture is whose cuts lose nothing."""
+_WHOLE: Final = (0.0, 0.0, 1.0, 1.0)
+_BOXES: Final = {MIDDLE: (0.25, 0.2, 0.75, 0.7), FAR: (0.375, 0.4, 0.625, 0.65)}
+"""Of the cuts in the front picture: left, top, right, bottom, as shares; the horizon lies in them."""
 
 
 def camera_of(view: str) -> str:
     """The camera that a view is a part of."""
-    return FRONT if view == MIDDLE else view
+    return FRONT if view in _BOXES else view
 
 
 def cut(image: Any, view: str, size: tuple[int, int]) -> NDArray[np.uint8]:
@@ -44,7 +48,7 @@ def cut(image: Any, view: str, size: tuple[int, int]) -> NDArray[np.uint8]:
     from PIL import Image
 
     wide, high = image.size
-    left, top, right, bottom = _BOX if view == MIDDLE else (0.0, 0.0, 1.0, 1.0)
+    left, top, right, bottom = _BOXES.get(view, _WHOLE)
     box = (left * wide, top * high, right * wide, bottom * high)
     small = image.resize((size[1], size[0]), Image.Resampling.BILINEAR, box=box)
     return np.asarray(small, np.uint8).transpose(2, 0, 1)
@@ -59,7 +63,7 @@ def view_cameras(cameras: Sequence[Camera], size: tuple[int, int]) -> tuple[Came
         if camera_of(view) not in by_name:
             continue
         whole = by_name[camera_of(view)]
-        left, top, right, bottom = _BOX if view == MIDDLE else (0.0, 0.0, 1.0, 1.0)
+        left, top, right, bottom = _BOXES.get(view, _WHOLE)
         across, down = width / ((right - left) * whole.width), height / ((bottom - top) * whole.height)
         (fx, fy), (cx, cy) = whole.focal_px, whole.centre_px
         found.append(

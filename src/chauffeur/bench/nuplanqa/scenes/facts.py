@@ -10,10 +10,10 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from chauffeur.bench.nuplanqa.scenes.staging import EGO_ID, EGO_SIZE, SIZES, StagedMover, StagedScene
+from chauffeur.bench.nuplanqa.scenes.scene import QaScene, QaUser
 from chauffeur.concept.scene import Observation
 
-VehicleObservation = Collection[int | str]
+Seen = Collection[int | str]
 """Ids of the road users and traffic lights that can be made out in at least one picture of the present instant."""
 
 FAMILIES: Final[Mapping[str, str]] = {
@@ -33,10 +33,14 @@ FAMILIES: Final[Mapping[str, str]] = {
 }
 """Families of questions, and the subtask each belongs to."""
 
-_FRONT_M: Final = EGO_SIZE[0] / 2.0
+ASKED_M: Final = 45.0
+"""Who is ahead at a greater distance is too small in the pictures to be asked about."""
 _CHANGE_M: Final = 2.0
 _SAME_M: Final = 0.8
 """Change of the gap over the clip from which it is told to open or close, and below which to stay."""
+_TOLD_APART: Final = ("nobody", "car", "truck", "bus")
+"""What is beside or behind, and is asked about."""
+_FAST_UNCLEAR: Final = frozenset({"light", "lanes", "layout", "key", "manoeuvre", "situation", "action"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,30 +58,33 @@ class Fact:
     value: str
 
 
-def facts_of(scene: StagedScene, seen: VehicleObservation) -> Iterator[Fact]:
-    """What can be asked about a scene."""
+def facts_of(scene: QaScene, seen: Seen, *, asked: bool = True) -> Iterator[Fact]:
+    """What can be asked about a scene; or, not `asked`, what is true of it and told by its speed as well."""
+    closed = scene.unclear | (_FAST_UNCLEAR if scene.fast and asked else frozenset())
     for family, value in _plain(scene, seen):
-        if value:
+        if value and family not in closed:
             yield Fact(family, "", value)
-    for side, mover, lane in (("left", scene.left, -1), ("right", scene.right, 1)):
-        own = round(-scene.ego.offset_m / 3.6 - 0.5)
-        if 0 <= own + lane < scene.plan.lanes and _clear(mover, seen):
-            yield Fact("beside", side, _kind(mover))
+    for side, user, lane in (("left", scene.left, -1), ("right", scene.right, 1)):
+        if not 0 <= scene.own + lane < scene.lanes or f"beside {side}" in closed or not _clear(user, seen):
+            continue
+        if (kind := _kind(user)) in _TOLD_APART:
+            yield Fact("beside", side, kind)
 
 
-def _plain(scene: StagedScene, seen: VehicleObservation) -> Iterator[tuple[str, str]]:
+def _plain(scene: QaScene, seen: Seen) -> Iterator[tuple[str, str]]:
     lead, light, walker = scene.lead, scene.light, scene.walker
-    light_seen = light is None or "own" in seen
-    lead_seen, walker_seen = _clear(lead, seen), _clear(walker, seen)
+    light_seen = light is None or scene.light_id in seen
+    lead_seen = "lead" not in scene.unclear and _clear(lead, seen) and (lead is None or lead.ahead_m <= ASKED_M)
     yield "light", (light or "none") if light_seen else ""
     yield "sky", scene.sky
-    yield "lanes", "" if scene.sky == "snowy day" else str(scene.plan.lanes)  # snow hides the markings
-    yield "layout", _layout(scene)
+    yield "lanes", "" if scene.sky == "snowy day" else str(scene.lanes)  # snow hides the markings
+    yield "layout", scene.layout
     yield "ahead", _kind(lead) if lead_seen else ""
-    yield "behind", _kind(scene.behind) if _clear(scene.behind, seen) else ""
+    behind = _kind(scene.behind)
+    yield "behind", behind if _clear(scene.behind, seen) and behind in _TOLD_APART else ""
     yield "density", _density(scene, seen)
     yield "gap", _gap(scene) if lead_seen else ""
-    if not (light_seen and lead_seen and walker_seen):
+    if not (light_seen and lead_seen and _clear(walker, seen)):
         return
     yield "key", _key(scene)
     yield "manoeuvre", _towards(scene)
@@ -85,54 +92,47 @@ def _plain(scene: StagedScene, seen: VehicleObservation) -> Iterator[tuple[str, 
     yield "action", _action(scene)
 
 
-def _clear(mover: StagedMover | None, seen: VehicleObservation) -> bool:
+def _clear(user: QaUser | None, seen: Seen) -> bool:
     """Whether somebody is seen, or is not there."""
-    return mover is None or mover.id in seen
+    return user is None or user.id in seen
 
 
-def _kind(mover: StagedMover | None) -> str:
-    return "nobody" if mover is None else mover.kind
+def _kind(user: QaUser | None) -> str:
+    return "nobody" if user is None else user.kind
 
 
-def _layout(scene: StagedScene) -> str:
-    plan = scene.plan
-    if plan.junction_m is not None:
-        return "junction"
-    return "straight" if plan.curvature_per_m == 0.0 else "left" if plan.curvature_per_m > 0.0 else "right"
-
-
-def _density(scene: StagedScene, seen: VehicleObservation) -> str:
-    """How many vehicles are wholly ahead of the ego's front; not asked where one is half beside it."""
-    ours = [one for one in scene.others if one.kind != "pedestrian" and one.offset_m < 0.0]
-    ahead = [one for one in ours if one.station_m - SIZES[one.kind][0] / 2.0 > _FRONT_M]
-    beside = [one for one in ours if one not in ahead and one.station_m + SIZES[one.kind][0] / 2.0 > _FRONT_M + 1.0]
-    if beside or any(one.id not in seen for one in ahead):
+def _density(scene: QaScene, seen: Seen) -> str:
+    """How many vehicles are ahead; not asked where one of them cannot be made out."""
+    if any(one.id not in seen for one in scene.ahead):
         return ""
-    return ("nobody", "one", "two", "more")[min(len(ahead), 3)]
+    return ("nobody", "one", "two", "more")[min(len(scene.ahead), 3)]
 
 
-def _gap(scene: StagedScene) -> str:
+def _gap(scene: QaScene) -> str:
     """How the gap to the lead vehicle has changed over the clip; of a standing ego it tells nothing."""
     if scene.motion == "still":
         return ""
     if scene.lead is None:
         return "nobody"
-    change = _distance_m(scene.now, scene.lead.id) - _distance_m(scene.instants[0], scene.lead.id)
+    now, before = (_distance_m(instant, scene.lead.id) for instant in (scene.now, scene.instants[0]))
+    if now is None or before is None:
+        return ""
+    change = now - before
     if abs(change) < _SAME_M:
         return "same"
     return "" if abs(change) < _CHANGE_M else "opens" if change > 0.0 else "closes"
 
 
-def _distance_m(instant: Observation, who: int) -> float:
-    one = next(one for one in instant.others if one.id == who)
-    return math.hypot(one.x_m - instant.ego.x_m, one.y_m - instant.ego.y_m)
+def _distance_m(instant: Observation, who: int) -> float | None:
+    one = next((one for one in instant.others if one.id == who), None)
+    return None if one is None else math.hypot(one.x_m - instant.ego.x_m, one.y_m - instant.ego.y_m)
 
 
-def _reasons(scene: StagedScene) -> list[str]:
+def _reasons(scene: QaScene) -> list[str]:
     """What the ego has to heed."""
     found: list[str] = []
     if scene.walker is not None:
-        found.append("walker left" if scene.walker.across_mps < 0.0 else "walker right")
+        found.append(f"walker {scene.walker_from}")
     if scene.light in ("red", "yellow"):
         found.append("light")
     if scene.lead is not None:
@@ -140,7 +140,7 @@ def _reasons(scene: StagedScene) -> list[str]:
     return found
 
 
-def _key(scene: StagedScene) -> str:
+def _key(scene: QaScene) -> str:
     """People on the road before lights, lights before vehicles; asked where no two compete."""
     found = _reasons(scene)
     if len(found) > 1:
@@ -148,28 +148,30 @@ def _key(scene: StagedScene) -> str:
     return found[0] if found else "nothing"
 
 
-def _towards(scene: StagedScene) -> str:
-    found = _reasons(scene)
-    if len(found) > 1 or (found == ["lead"] and scene.plan.junction_m is not None):
+def _towards(scene: QaScene) -> str:
+    found, junction = _reasons(scene), scene.layout == "junction"
+    if len(found) > 1 or (found == ["lead"] and junction):
         return ""
     if found:
         return found[0].partition(" ")[0]
-    return "green" if scene.light == "green" else "junction" if scene.plan.junction_m is not None else "free"
+    return "green" if scene.light == "green" else "junction" if junction else "free"
 
 
-def _situation(scene: StagedScene) -> str:
-    kind, found = scene.plan.kind, _reasons(scene)
+def _situation(scene: QaScene) -> str:
+    if scene.kind == "lot":
+        return "lot"
+    found = _reasons(scene)
     if len(found) > 1:
         return ""
-    if kind == "crossing":
-        if scene.lead is not None:
+    if scene.kind == "crossing":
+        if scene.lead is not None or scene.walker is not None:
             return ""
         return {"red": "crossing red", "green": "crossing green", None: "crossing open"}.get(scene.light, "")
     reason = found[0].partition(" ")[0] if found else "free"
-    return f"{kind} {reason}"
+    return "" if reason == "light" or (scene.kind, reason) == ("highway", "walker") else f"{scene.kind} {reason}"
 
 
-def _action(scene: StagedScene) -> str:
+def _action(scene: QaScene) -> str:
     """What a careful driver does next; of a standing ego nothing is asked."""
     found = _reasons(scene)
     if scene.motion == "still" or len(found) > 1:
@@ -179,13 +181,14 @@ def _action(scene: StagedScene) -> str:
     reason = found[0].partition(" ")[0]
     if reason != "lead":
         return reason
-    if _gap(scene) != "closes":
+    if _gap(scene) != "closes" or "beside left" in scene.unclear:
         return ""
-    own = round(-scene.ego.offset_m / 3.6 - 0.5)
-    return "pass" if own > 0 and scene.left is None else "slow"
+    if scene.own == 0 or scene.left is not None:
+        return "slow"
+    return "" if scene.left_taken else "pass"
 
 
-def sighted(scene: StagedScene, reach_m: float = 70.0, hidden: float = 0.6) -> frozenset[int | str]:
+def sighted(scene: QaScene, reach_m: float = 70.0, hidden: float = 0.6) -> frozenset[int | str]:
     """Who can be made out by geometry alone, where nothing is rendered: near enough, and not behind somebody nearer.
 
     Args:
@@ -207,7 +210,7 @@ def sighted(scene: StagedScene, reach_m: float = 70.0, hidden: float = 0.6) -> f
         for _, other, its_half, _ in arcs[:place]:
             apart = abs(math.remainder(bearing - other, math.tau))
             covered = max(covered, min(half + its_half - apart, 2.0 * min(half, its_half)))
-        if distance <= reach_m and covered <= hidden * 2.0 * half and who != EGO_ID:
+        if distance <= reach_m and covered <= hidden * 2.0 * half:
             seen.add(who)
     for signal in now.signals:
         (x0, y0), (x1, y1) = signal.stop_line_m

@@ -1,44 +1,55 @@
-"""A data set of staged scenes in NuPlanQA's format: questions, metadata, pictures, free pairs and a card.
+"""A data set of staged scenes and of scenes of our worlds in NuPlanQA's format: questions, metadata, pictures, pairs.
 
 Layout of each split's folder: `questions.json` (the published format), `metadata.json` (the keys of the published
 metadata: pictures, camera calibration, ego pose, `prev`), `truth.json` (classes of all families and who is where: for
 training, never shown to a model), `part_0/*.jpg`, and `pairs.json` with free question-answer pairs where asked for.
-Everything is rendered and staged, and says so.
+Everything is simulated and rendered, and says so.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import math
 import multiprocessing
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
 from chauffeur.bench.nuplanqa.frames import CAMERAS, FRAMES
 from chauffeur.bench.nuplanqa.questions import SUBTASKS, VqaItem
-from chauffeur.bench.nuplanqa.scenes.facts import Fact, VehicleObservation, facts_of, sighted
+from chauffeur.bench.nuplanqa.scenes.facts import Fact, Seen, facts_of, sighted
 from chauffeur.bench.nuplanqa.scenes.gate import GateLine, gate
-from chauffeur.bench.nuplanqa.scenes.staging import SAMPLES, STEP_S, StagedScene, stage
+from chauffeur.bench.nuplanqa.scenes.records import (
+    glimpsed_in,
+    instant_token,
+    made_out,
+    metadata_of,
+    save_pictures,
+    truth_of,
+    write_json,
+)
+from chauffeur.bench.nuplanqa.scenes.scene import SAMPLES, QaScene
+from chauffeur.bench.nuplanqa.scenes.staging import stage
 from chauffeur.bench.nuplanqa.scenes.wording import QuestionWriter, Split, free_pairs
-from chauffeur.camera import LOOKS, Camera, CameraImages, CameraLook, Conditions, Rig, make_renderer, nuplan_rig
+from chauffeur.bench.nuplanqa.scenes.worlds import CLIPS, world_scene
+from chauffeur.bench.openloop.driving import UNSEEN_TOWN, Place
+from chauffeur.camera import LOOKS, CameraLook, Conditions, Rig, make_renderer, nuplan_rig
 from chauffeur.concept import ConfigError
-from chauffeur.concept.scene import Observation
 from chauffeur.drive.files import publish
 
 if TYPE_CHECKING:
     from chauffeur.camera import Renderer
 
-MADE: Final = "staged-qa-v2"
+MADE: Final = "qa-v3"
 SIMULATED: Final = (
-    "Simulated: streets are drawn at random, road users staged, pictures rendered and answers read off the ground "
-    "truth. In NuPlanQA's format; nothing of nuPlan or NuPlanQA is in it."
+    "Simulated: scenes are staged on random streets, or taken from our highway, crossing, towns and parking lots as "
+    "their own drivers drive them; pictures are rendered and answers read off the ground truth. In NuPlanQA's format; "
+    "nothing of nuPlan or NuPlanQA is in it."
 )
 CONDITIONS: Final[Mapping[str, Conditions]] = {
     "clear day": Conditions(),
@@ -48,8 +59,19 @@ CONDITIONS: Final[Mapping[str, Conditions]] = {
     "clear night": Conditions(night=0.55),
     "rainy night": Conditions(rain=0.6, night=0.5),
 }
-LEAST_SHARE: Final = 0.35
-"""Share of a road user that must be unhidden in the picture that shows it best."""
+Staged = Literal["staged"]
+_STAGED: Final[Staged] = "staged"
+_CYCLE: Final[tuple[Place | Staged, ...]] = (
+    *(_STAGED, "highway", _STAGED, "town", _STAGED, "highway"),
+    *(_STAGED, "town", _STAGED, "highway", "crossing", "lot"),
+)
+"""Where scenes come from, one after the other."""
+assert _CYCLE.count("town") == CLIPS
+SOURCES: Final[Mapping[str, tuple[Place | Staged, ...]]] = {
+    "all": _CYCLE,
+    "staged": (_STAGED,),
+    "worlds": tuple(one for one in _CYCLE if one != _STAGED),
+}
 _SEED_OF: Final[Mapping[Split, int]] = {"train": 0, "val": 1, "test": 2}
 
 
@@ -65,6 +87,8 @@ class QaConfig:
         pairs: Free question-answer pairs for each fact of a training scene.
         pictures: Whether anything is rendered; without, visibility is computed from geometry.
         look: Palette, exposure and lens of the test split's pictures.
+        sources: Where scenes come from: `all`, `staged` or `worlds`.
+        front: How many times as wide and high the front camera's pictures are.
     """
 
     scenes: int = 1000
@@ -75,6 +99,15 @@ class QaConfig:
     pairs: int = 0
     pictures: bool = True
     look: str = "default"
+    sources: str = "all"
+    front: int = 1
+
+    @property
+    def rig(self) -> Rig:
+        """The cameras, with the size of their pictures."""
+        rig = nuplan_rig(self.width, self.height).only(*CAMERAS)
+        first, *others = rig.cameras
+        return replace(rig, cameras=(first.sized(self.front * self.width, self.front * self.height), *others))
 
     def count(self, split: Split) -> int:
         """Scenes of a split."""
@@ -107,7 +140,7 @@ def make_split(folder: Path, split: Split, config: QaConfig, watch: Watch) -> tu
         raise ConfigError(f"A clip has no {config.frames} instants.", hint=f"Give 1 to {SAMPLES}.")
     own = folder / split
     _claim(folder, config)
-    rig = nuplan_rig(config.width, config.height).only(*CAMERAS)
+    rig = config.rig
     look = LOOKS[config.look] if split == "test" else LOOKS["default"]
     renderer = make_renderer() if config.pictures else None
     writer = QuestionWriter(split)
@@ -119,11 +152,13 @@ def make_split(folder: Path, split: Split, config: QaConfig, watch: Watch) -> tu
     try:
         for number in range(count):
             scene, rng = _stage(config, split, number)
-            seen = sighted(scene) if renderer is None else _shoot(own, scene, rig, look, renderer, config.instants)
-            metadata |= _metadata(scene, rig, config)
+            seen = glimpsed = sighted(scene)
+            if renderer is not None:
+                seen, glimpsed = _shoot(own, scene, rig, look, renderer, config.instants)
+            metadata |= metadata_of(scene, rig, config.instants)
             facts = list(facts_of(scene, seen))
-            truth[scene.token] = _truth(scene, facts, seen, rig)
-            previous = _instant_token(scene.token, config.instants[-2]) if config.frames > 1 else ""
+            truth[scene.token] = truth_of(scene, seen, glimpsed, rig)
+            previous = instant_token(scene.token, config.instants[-2]) if config.frames > 1 else ""
             items += writer.write(scene, facts, previous, rng)
             pairs += _pairs(scene, facts, config.pairs if split == "train" else 0, rng)
             watch(number + 1, count)
@@ -139,10 +174,11 @@ def make_split(folder: Path, split: Split, config: QaConfig, watch: Watch) -> tu
 
 
 def shoot_part(folder: Path, split: Split, config: QaConfig, part: int, parts: int) -> int:
-    """Render every `parts`-th scene of a split from `part` on: one process's share. Gives how many."""
-    rig, renderer = nuplan_rig(config.width, config.height).only(*CAMERAS), make_renderer()
+    """Render one of so many parts of a split's scenes: one process's share. Gives how many."""
+    rig, renderer = config.rig, make_renderer()
     look = LOOKS[config.look] if split == "test" else LOOKS["default"]
-    numbers = range(part, config.count(split), parts)
+    count = config.count(split)
+    numbers = range(count * part // parts, count * (part + 1) // parts)  # neighbours may be of one trip
     try:
         for number in numbers:
             scene, _ = _stage(config, split, number)
@@ -176,6 +212,8 @@ def make_set(folder: Path, config: QaConfig, workers: int, watch: Watch) -> Made
     """
     if config.look not in LOOKS:
         raise ConfigError(f"There is no look {config.look!r}.", hint=f"Choose of: {', '.join(LOOKS)}.")
+    if config.sources not in SOURCES:
+        raise ConfigError(f"There are no scenes {config.sources!r}.", hint=f"Choose of: {', '.join(SOURCES)}.")
     splits: tuple[Split, ...] = ("train", "val", "test")
     total = sum(map(config.count, splits))
     _claim(folder, config)
@@ -227,7 +265,7 @@ def write_card(
     lines = ["# Data card: simulated questions in NuPlanQA's format", "", f"- {SIMULATED}", f"- Made by {MADE}."]
     lines += [f"- {name}: {value}" for name, value in asdict(config).items()]
     lines += [
-        "- Wordings of the test split are heard in no other split.",
+        f"- Wordings of the test split are heard in no other split; the town {UNSEEN_TOWN} is in no other split.",
         "",
         "| subtask | " + " | ".join(splits) + " |",
     ]
@@ -239,139 +277,47 @@ def write_card(
     publish(folder / "CARD.md", ("\n".join(lines) + "\n").encode(), "data card")
 
 
-def _stage(config: QaConfig, split: Split, number: int) -> tuple[StagedScene, np.random.Generator]:
+def _stage(config: QaConfig, split: Split, number: int) -> tuple[QaScene, np.random.Generator]:
     """A scene of a split, and the generator that goes on to draw its words."""
     rng = np.random.default_rng([config.seed, _SEED_OF[split], number])
-    return stage(_token(config.seed, split, number), rng), rng
+    token, cycle = _token(config.seed, split, number), SOURCES[config.sources]
+    turns, place = divmod(number, len(cycle))
+    source = cycle[place]
+    if source == "staged":
+        return stage(token, rng), rng
+    nth = turns * cycle.count(source) + cycle[:place].count(source)
+    # A number of its own for each seed and split, so that no trip is in two.
+    first = (config.seed * len(_SEED_OF) + _SEED_OF[split]) * 1_000_000
+    return world_scene(token, source, first + nth, split == "test", rng), rng
 
 
 def _shoot(
-    own: Path, scene: StagedScene, rig: Rig, look: CameraLook, renderer: Renderer, instants: Sequence[int]
-) -> VehicleObservation:
-    """Render what is not there yet; who can be made out at the present instant is stored beside the pictures."""
+    own: Path, scene: QaScene, rig: Rig, look: CameraLook, renderer: Renderer, instants: Sequence[int]
+) -> tuple[Seen, Seen]:
+    """Render what is not there yet. Who can be made out at the present instant, and who is glimpsed at least, is stored
+    beside the pictures."""
     record = own / "seen" / f"{scene.token}.json"
     if record.is_file():
-        return frozenset(json.loads(record.read_text(encoding="utf-8")))
+        held: dict[str, list[int | str]] = json.loads(record.read_text(encoding="utf-8"))
+        return frozenset(held["seen"]), frozenset(held["glimpsed"])
     conditions = CONDITIONS[scene.sky]
     place = int(scene.token[:8], 16)
     seen: Collection[int | str] = ()
+    glimpsed: Collection[int | str] = ()
     for number in instants:
         last = number == SAMPLES - 1
         taken = renderer.render(scene.instants[number], rig, conditions, place, look=look, truth=last)
-        save_pictures(own, _instant_token(scene.token, number), taken)
+        save_pictures(own, instant_token(scene.token, number), taken)
         if last:
             seen = made_out(taken)
+            glimpsed = seen | glimpsed_in(taken)
     record.parent.mkdir(exist_ok=True)
-    publish(record, json.dumps(sorted(seen, key=str)).encode(), "record of who is seen")
-    return seen
+    told = {"seen": sorted(seen, key=str), "glimpsed": sorted(glimpsed, key=str)}
+    publish(record, json.dumps(told).encode(), "record of who is seen")
+    return seen, glimpsed
 
 
-def save_pictures(folder: Path, token: str, taken: CameraImages) -> None:
-    """Write the pictures of an instant where `calibrated` says."""
-    from PIL import Image
-
-    (folder / "part_0").mkdir(parents=True, exist_ok=True)
-    for camera, image in zip(taken.cameras, taken.images, strict=True):
-        # Colours at full resolution: a lamp is two or three pixels.
-        Image.fromarray(image.pixels()).save(folder / _picture(token, camera.name), "JPEG", quality=92, subsampling=0)
-
-
-def calibrated(token: str, cameras: Sequence[Camera], instant: Observation) -> dict[str, Any]:
-    """Where the pictures of an instant are, their calibration, and the ego's pose: keys of the published metadata."""
-    cams = {
-        camera.name: {
-            "data_path": _picture(token, camera.name),
-            "sensor2ego_translation": list(camera.position_m),
-            "sensor2ego_rotation": list(camera.quaternion),
-            "cam_intrinsic": camera.intrinsics.tolist(),
-        }
-        for camera in cameras
-    }
-    return {"cams": cams, "ego_pose": _pose(instant)}
-
-
-def made_out(taken: CameraImages) -> frozenset[int | str]:
-    """Ids of the road users and lights that at least one picture shows large and free enough to be told apart."""
-    found: set[int | str] = set()
-    for truth in taken.truth:
-        height, width = truth.instances.shape
-        least = max(4.0, 12.0 * width * height / (112.0 * 64.0))
-        for one in truth.sightings:
-            lamp = one.instance.source == "signal"
-            if one.pixels >= (least / 3.0 if lamp else least) and one.visibility >= LEAST_SHARE:
-                found.add(one.instance.id)
-    return frozenset(found)
-
-
-def _metadata(scene: StagedScene, rig: Rig, config: QaConfig) -> dict[str, Any]:
-    """Metadata of the instants of a scene, with the keys of the published file."""
-    found: dict[str, Any] = {}
-    instants = config.instants
-    for place, number in enumerate(instants):
-        token = _instant_token(scene.token, number)
-        found[token] = {
-            **calibrated(token, rig.cameras, scene.instants[number]),
-            "frame_idx": number,
-            "timestamp": round(number * STEP_S * 1e6),
-            "scene_token": scene.token,
-            "scenario": scene.scene_type,
-            "traffic_light": [] if scene.light is None else [scene.light],
-            "prev": _instant_token(scene.token, instants[place - 1]) if place else "",
-            "next": _instant_token(scene.token, instants[place + 1]) if number + 1 < SAMPLES else "",
-        }
-    return found
-
-
-def _truth(scene: StagedScene, facts: Sequence[Fact], seen: VehicleObservation, rig: Rig) -> dict[str, Any]:
-    """What a network may be taught besides the questions: classes of all families, and who is where.
-
-    Road users are (kind, x, y, whether they can be made out), in the frame of the rig: x forward, y left, m. Of the
-    lead vehicle: how far ahead, centre to centre, m, and how much faster than the ego it is, m/s; nothing where it
-    cannot be made out, and an empty list for none.
-    """
-    lead = scene.lead
-    told: list[float] | None = []
-    if lead is not None:
-        faster = next(one.speed_mps for one in scene.now.others if one.id == lead.id) - scene.now.ego.speed_mps
-        told = [round(lead.station_m, 2), round(faster, 2)] if lead.id in seen else None
-    return {
-        "motion": scene.motion,
-        "lead": told,
-        "facts": [[fact.family, fact.side, fact.value] for fact in facts],
-        "users": truth_of_users(scene.now, seen, rig),
-    }
-
-
-def truth_of_users(
-    observation: Observation, seen: VehicleObservation, rig: Rig
-) -> list[tuple[str, float, float, bool]]:
-    """Road users as (kind, x, y, whether they can be made out), in the frame of the rig."""
-    ego = observation.ego
-    c, s = math.cos(ego.heading_rad), math.sin(ego.heading_rad)
-    users: list[tuple[str, float, float, bool]] = []
-    for one in observation.others:
-        dx, dy = one.x_m - ego.x_m, one.y_m - ego.y_m
-        x, y = c * dx + s * dy - rig.origin_ahead_m, c * dy - s * dx
-        users.append((one.kind, round(x, 2), round(y, 2), one.id in seen))
-    return users
-
-
-def _pose(instant: Observation) -> dict[str, float]:
-    ego = instant.ego
-    return {
-        "x": ego.x_m,
-        "y": ego.y_m,
-        "z": 0.0,
-        "qw": math.cos(ego.heading_rad / 2.0),
-        "qx": 0.0,
-        "qy": 0.0,
-        "qz": math.sin(ego.heading_rad / 2.0),
-        "vx": ego.speed_mps,
-        "acceleration_x": ego.acceleration_mps2,
-    }
-
-
-def _pairs(scene: StagedScene, facts: list[Fact], each: int, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
+def _pairs(scene: QaScene, facts: list[Fact], each: int, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
     for subtask, question, answer in free_pairs(scene, facts, each, rng):
         asked = (
             f"- Velocity(m/s): {list(scene.speeds_mps)}\n- Steering angles: {list(scene.steering_deg)}\n\n{question}"
@@ -383,17 +329,6 @@ def _token(seed: int, split: Split, number: int) -> str:
     return hashlib.sha256(f"{MADE} {seed} {split} {number}".encode()).hexdigest()[:16]
 
 
-def _instant_token(token: str, number: int) -> str:
-    """Token of an instant of a scene; the present one's is the scene's own."""
-    if number == SAMPLES - 1:
-        return token
-    return hashlib.sha256(f"{token} {number}".encode()).hexdigest()[:16]
-
-
-def _picture(token: str, camera: str) -> str:
-    return f"part_0/{token}_{camera}.jpg"
-
-
 def _claim(folder: Path, config: QaConfig) -> None:
     path = folder / "config.json"
     wanted = {"made": MADE, **asdict(config)}
@@ -403,9 +338,3 @@ def _claim(folder: Path, config: QaConfig) -> None:
         return
     folder.mkdir(parents=True, exist_ok=True)
     write_json(path, wanted)
-
-
-def write_json(path: Path, value: Any) -> None:
-    """Write a file of a set."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    publish(path, (json.dumps(value, ensure_ascii=False) + "\n").encode(), "data set")

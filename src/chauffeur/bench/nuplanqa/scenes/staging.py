@@ -12,6 +12,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Literal
 
+from chauffeur.bench.nuplanqa.scenes.scene import (
+    LEFT_TAKEN_M,
+    SAMPLES,
+    SKIES,
+    STEP_S,
+    Layout,
+    Motion,
+    QaScene,
+    QaUser,
+    Sky,
+)
 from chauffeur.bench.nuplanqa.scenes.streets import WIDTH_M, StreetKind, StreetPlan, road_of
 from chauffeur.concept.scene import AgentKind, Observation, Signal, SignalState, VehicleState
 from chauffeur.geometry.box import overlap
@@ -21,22 +32,9 @@ if TYPE_CHECKING:
 
     from chauffeur.geometry import RoadGraph
 
-SAMPLES: Final = 5
-STEP_S: Final = 0.5
-"""Instants of a clip: five, half a second apart, the last one now."""
 WHEELBASE_M: Final = 3.089
 """nuPlan's vehicle (Chrysler Pacifica): the angle of its front wheels is what the questions quote."""
 
-Motion = Literal["still", "steady", "faster", "slower"]
-Sky = Literal["clear day", "rainy day", "foggy day", "snowy day", "clear night", "rainy night"]
-SKIES: Final[tuple[Sky, ...]] = (
-    "clear day",
-    "rainy day",
-    "foggy day",
-    "snowy day",
-    "clear night",
-    "rainy night",
-)
 SIZES: Final[dict[AgentKind, tuple[float, float]]] = {
     "car": (4.6, 1.9),
     "truck": (9.0, 2.5),
@@ -46,13 +44,17 @@ SIZES: Final[dict[AgentKind, tuple[float, float]]] = {
     "pedestrian": (0.5, 0.6),
 }
 EGO_ID: Final = 0
+SHAKE_RAD: Final = math.radians(0.3)
+"""By how much the ego's front wheels shake, as a driver's do."""
 TOP_MPS: Final = 14.0
 """Everywhere the same: a higher speed on wide roads would tell from the control signals what the pictures show."""
 EGO_SIZE: Final = (5.2, 2.0)
 Theme = Literal["any", "junction", "walker", "pass", "slow", "dense"]
 _THEMES: Final[tuple[Theme, ...]] = ("any", "any", "junction", "junction", "walker", "pass", "slow", "dense")
 """What a scene is about. Without themes, a walker with nothing else to heed or a lane free to pass in is rare."""
-_LEADS: Final = ("none", "none", "near", "near", "closing", "opening", "opening")
+_LEADS: Final = ("none", "none", "near", "near", "closing", "opening", "opening", "far")
+_FAR_M: Final = (30.0, 95.0)
+"""Where a lead vehicle of `far` is; only the nearer ones are asked about."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,58 +92,19 @@ class StagedMover:
         )
 
 
-@dataclass(frozen=True)
-class StagedScene:
+@dataclass(frozen=True, kw_only=True)
+class StagedScene(QaScene):
     """A clip with what it was made from.
 
     Attributes:
-        token: Its name, 16 hexadecimal digits.
         plan: The street.
-        road: The same as a graph of lanes.
-        motion: Of the ego.
-        sky: Weather and light.
-        light: What the ego's traffic light shows; None without one.
         ego: The ego.
         others: All other road users.
-        lead, left, right, behind: Who is ahead in the ego's lane, beside it on either side, behind it; None for nobody.
-        walker: Who is on the road ahead; None for nobody.
-        instants: Observations, oldest first.
     """
 
-    token: str
     plan: StreetPlan
-    road: RoadGraph
-    motion: Motion
-    sky: Sky
-    light: SignalState | None
     ego: StagedMover
     others: tuple[StagedMover, ...]
-    lead: StagedMover | None
-    left: StagedMover | None
-    right: StagedMover | None
-    behind: StagedMover | None
-    walker: StagedMover | None
-    instants: tuple[Observation, ...]
-
-    @property
-    def now(self) -> Observation:
-        """The instant that is asked about."""
-        return self.instants[-1]
-
-    @property
-    def scene_type(self) -> str:
-        """For the breakdown by kind of scene; says that it is simulated."""
-        return f"simulated {self.plan.kind}"
-
-    @property
-    def speeds_mps(self) -> tuple[float, ...]:
-        """The ego's speed at each instant, as the questions quote it."""
-        return tuple(round(one.ego.speed_mps, 3) for one in self.instants)
-
-    @property
-    def steering_deg(self) -> tuple[float, ...]:
-        """Angle of its front wheels at each instant, degrees."""
-        return tuple(round(math.degrees(one.ego.steering_rad), 3) for one in self.instants)
 
 
 def stage(token: str, rng: np.random.Generator) -> StagedScene:
@@ -156,7 +119,7 @@ def _draw(token: str, rng: np.random.Generator) -> StagedScene | None:
     theme = _THEMES[int(rng.integers(len(_THEMES)))]
     plan = _street(rng, theme)
     motion: Motion = ("still", "steady", "faster", "slower")[int(rng.integers(4))]
-    speed = 0.0 if motion == "still" else float(rng.uniform(0.35, 1.0)) * TOP_MPS
+    speed = 0.0 if motion == "still" else float(rng.uniform(0.15, 1.0)) * TOP_MPS
     gain = {"still": 0.0, "steady": 0.0, "faster": 1.0, "slower": -1.0}[motion] * float(rng.uniform(0.9, 1.8))
     if gain > 0.0:
         speed = max(speed, 2.0 * gain + 0.5)
@@ -174,18 +137,63 @@ def _draw(token: str, rng: np.random.Generator) -> StagedScene | None:
     light: SignalState | None = None
     if plan.kind == "crossing" and rng.random() < 0.78:
         light = ("red", "yellow", "green")[int(rng.integers(3))]
-    _fill(plan, crowd, rng, None if lead is not None else own, theme)
+    near = lead is not None and lead.station_m < _FAR_M[0]
+    _fill(plan, crowd, rng, None if near else own, theme)
     road = road_of(plan)
     everybody = (ego, *crowd.movers)
     if _overlap(plan, everybody):
         return None
     sky: Sky = SKIES[int(rng.integers(len(SKIES)))]
     signals = _signals(plan, light)
-    shakes = rng.normal(0.0, math.radians(0.3), SAMPLES).tolist()
-    instants = tuple(_observe(plan, road, everybody, signals, place, shake) for place, shake in enumerate(shakes))
+    shakes = rng.normal(0.0, SHAKE_RAD, SAMPLES).tolist()
+    ahead, astride = _ahead(crowd.movers)
     return StagedScene(
-        token, plan, road, motion, sky, light, ego, tuple(crowd.movers), lead, left, right, behind, walker, instants
+        token=token,
+        source=f"staged {plan.kind}",
+        kind=plan.kind,
+        lanes=plan.lanes,
+        own=own,
+        layout=_layout(plan),
+        motion=motion,
+        sky=sky,
+        light=light,
+        light_id="own",
+        left_taken=any(
+            0.0 < one.station_m < LEFT_TAKEN_M and abs(one.offset_m - plan.lane_offset(own - 1)) < WIDTH_M / 2.0
+            for one in crowd.movers
+        ),
+        lead=_user(lead),
+        left=_user(left),
+        right=_user(right),
+        behind=_user(behind),
+        walker=_user(walker),
+        walker_from="left" if walker is not None and walker.across_mps < 0.0 else "right",
+        ahead=ahead,
+        unclear=frozenset({"density"} if astride else ()),
+        instants=tuple(_observe(plan, road, everybody, signals, place, shake) for place, shake in enumerate(shakes)),
+        plan=plan,
+        ego=ego,
+        others=tuple(crowd.movers),
     )
+
+
+def _user(mover: StagedMover | None) -> QaUser | None:
+    return None if mover is None else QaUser(mover.id, mover.kind, mover.station_m)
+
+
+def _layout(plan: StreetPlan) -> Layout:
+    if plan.junction_m is not None:
+        return "junction"
+    return "straight" if plan.curvature_per_m == 0.0 else "left" if plan.curvature_per_m > 0.0 else "right"
+
+
+def _ahead(movers: Sequence[StagedMover]) -> tuple[tuple[QaUser, ...], bool]:
+    """Vehicles wholly ahead of the ego's front in its direction, and whether one is half beside it."""
+    ours = [one for one in movers if one.kind != "pedestrian" and one.offset_m < 0.0]
+    front = EGO_SIZE[0] / 2.0
+    ahead = [one for one in ours if one.station_m - SIZES[one.kind][0] / 2.0 > front]
+    astride = any(one not in ahead and one.station_m + SIZES[one.kind][0] / 2.0 > front + 1.0 for one in ours)
+    return tuple(QaUser(one.id, one.kind, one.station_m) for one in ahead), astride
 
 
 def _street(rng: np.random.Generator, theme: Theme) -> StreetPlan:
@@ -237,6 +245,8 @@ def _lead(
         how = "closing"
     if theme == "walker" or (theme == "junction" and rng.random() < 0.5):
         how = "none"
+    if how == "far" and (plan.junction_m is not None or plan.curvature_per_m != 0.0 or plan.crosswalk_m is not None):
+        how = "near"
     if how == "none":
         return None
     kinds: tuple[AgentKind, ...] = (
@@ -249,6 +259,9 @@ def _lead(
     kind = kinds[int(rng.integers(len(kinds)))]
     room = plan.junction_m - 2.0 if plan.junction_m is not None else 32.0
     own_speed = ego.speed_mps
+    if how == "far":
+        its = max(0.0, own_speed + float(rng.uniform(-4.0, 4.0)))
+        return crowd.add(kind, float(rng.uniform(*_FAR_M)), plan.lane_offset(own), its, ego.acceleration_mps2)
     change = float(rng.uniform(1.6, 3.0) if how == "opening" else rng.uniform(2.5, 4.0))
     at = 5.5 + SIZES[kind][0] / 2.0 + float(rng.uniform(3.0, 14.0))
     if how == "opening":  # it was nearer before, and must not have overlapped the ego

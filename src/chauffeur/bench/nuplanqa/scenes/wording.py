@@ -21,12 +21,16 @@ from chauffeur.concept.data import read_data
 if TYPE_CHECKING:
     import numpy as np
 
-    from chauffeur.bench.nuplanqa.scenes.staging import StagedScene
+    from chauffeur.bench.nuplanqa.scenes.scene import QaScene
 
 Split = Literal["train", "val", "test"]
 _OPTIONS: Final = 4
 _SLACK: Final = 1
 """Questions by which a class may be ahead of the rarest one of its family."""
+
+
+_NEVER_FAST: Final = ("bicycle",)
+"""What is not met at a motorway's speed, and holds no other class back there."""
 
 
 @dataclass(frozen=True)
@@ -82,10 +86,12 @@ class QuestionWriter:
     """
 
     split: Split
-    _asked: dict[tuple[str, str, str], Counter[str]] = field(default_factory=dict[tuple[str, str, str], Counter[str]])
+    _asked: dict[tuple[str, str, str, bool], Counter[str]] = field(
+        default_factory=dict[tuple[str, str, str, bool], Counter[str]]
+    )
 
     def write(
-        self, scene: StagedScene, facts: Iterable[Fact], previous: str, rng: np.random.Generator
+        self, scene: QaScene, facts: Iterable[Fact], previous: str, rng: np.random.Generator
     ) -> Iterator[VqaItem]:
         """The questions that a scene adds.
 
@@ -99,16 +105,17 @@ class QuestionWriter:
             if self._wanted(scene, fact):
                 yield self._item(scene, fact, previous, rng)
 
-    def _wanted(self, scene: StagedScene, fact: Fact) -> bool:
-        """Whether the fact's class is not yet ahead of others, among scenes with the same ego motion."""
+    def _wanted(self, scene: QaScene, fact: Fact) -> bool:
+        """Whether the fact's class is not yet ahead of others, among scenes whose speeds tell the same."""
         bank = word_bank().families[fact.family]
-        count = self._asked.setdefault((fact.family, fact.side, scene.motion), Counter())
-        if count[fact.value] > min(count[name] for name in bank.classes) + _SLACK - 1:
+        count = self._asked.setdefault((fact.family, fact.side, scene.motion, scene.fast), Counter())
+        never = _NEVER_FAST if scene.fast else ()
+        if count[fact.value] > min(count[name] for name in bank.classes if name not in never) + _SLACK - 1:
             return False
         count[fact.value] += 1
         return True
 
-    def _item(self, scene: StagedScene, fact: Fact, previous: str, rng: np.random.Generator) -> VqaItem:
+    def _item(self, scene: QaScene, fact: Fact, previous: str, rng: np.random.Generator) -> VqaItem:
         question, options, answer, _ = phrase(fact, scene.motion, half_of(self.split), rng)
         return VqaItem(
             id="",
@@ -160,7 +167,7 @@ def phrase(fact: Fact, motion: str, half: str, rng: np.random.Generator) -> Phra
 
 
 def free_pairs(
-    scene: StagedScene, facts: Sequence[Fact], each: int, rng: np.random.Generator
+    scene: QaScene, facts: Sequence[Fact], each: int, rng: np.random.Generator
 ) -> Iterator[tuple[str, str, str]]:
     """Free questions and answers in training words, as (subtask, question, answer), `each` a fact."""
     for fact in facts:
