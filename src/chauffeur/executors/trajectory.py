@@ -7,7 +7,7 @@ manoeuvre: MPC across, PID along. Where it ends the car stops: whoever wants to 
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import Final
 
 import numpy as np
@@ -17,7 +17,7 @@ from chauffeur.executors.action_matrix import HEADWAY_S, chassis_of
 from chauffeur.executors.base import ExecutorBase
 from chauffeur.executors.reference import Reference
 from chauffeur.executors.tracking import DEFAULT_GAINS, PathTracker
-from chauffeur.geometry import Polyline, Pose
+from chauffeur.geometry import Polyline, Pose, joined
 from chauffeur.worlds.base import World
 
 _STAND_MPS: Final = 0.1
@@ -27,6 +27,11 @@ _SAME_M: Final = 0.05
 _EASY_MPS2: Final = 1.5
 _OFF_M: Final = 1.0
 """A car that is farther beside a trajectory than this has driven something else since it was planned."""
+_LOST_M: Final = 3.0
+"""A car that is farther beside its trajectory than this has been led elsewhere by the safety filter, past its turn say:
+it stops in the lane where it is, for the way back would lead across others."""
+_STOP_M: Final = 2.0
+_LANES: Final = 3
 _FIRM_MPS2: Final = 3.0
 _AHEAD_S: Final = 0.3
 """The drive answers so much later."""
@@ -43,6 +48,7 @@ class TrajectoryExecutor(ExecutorBase):
         self._tracker = PathTracker(chassis_of(world), world.dt_s, DEFAULT_GAINS)
         self._limit = world.perception().speed_limit
         self._reference: Reference | None = None
+        self._lost = False
 
     @property
     def tracker(self) -> PathTracker:
@@ -57,11 +63,13 @@ class TrajectoryExecutor(ExecutorBase):
         reference = reference_of(policy, Pose(ego.x_m, ego.y_m, ego.heading_rad), ego.speed_mps)
         self._tracker.follow(reference)
         self._reference, self._limits = reference, limits
-        self._status = "running"
+        self._status, self._lost = "running", False
         self._aim(observation)
 
     def step(self, observation: Observation, held: Setpoints | None = None) -> Command:
         """See Executor."""
+        if not self._lost and abs(self._tracker.offset_m) > _LOST_M:
+            self._stop_in_lane(observation)
         self._aim(observation)
         stands = (self._setpoints.target_speed_mps or 0.0) < _STAND_MPS
         command = self._tracker.command(observation, self._hold(held), self._setpoints.time_headway_s)
@@ -70,6 +78,18 @@ class TrajectoryExecutor(ExecutorBase):
         if left < _END_M or (stands and observation.ego.speed_mps < _STAND_MPS):
             self._status = "finished"
         return command
+
+    def _stop_in_lane(self, observation: Observation) -> None:
+        self._lost, ego, road = True, observation.ego, observation.road
+        lane = road.get(ego.lane)
+        if lane is None:
+            return
+        line = joined([one.centre for one in islice(road.ahead(lane.id), _LANES)])
+        start = line.nearest(ego.x_m, ego.y_m, high_m=lane.length_m)
+        path = line.between(start, min(line.length_m, start + _STOP_M + ego.speed_mps**2 / (2.0 * _EASY_MPS2)))
+        if path.length_m > _SAME_M:
+            self._reference = Reference(path, np.linspace(ego.speed_mps, 0.0, len(path.points_m)).tolist())
+            self._tracker.follow(self._reference)
 
     def _aim(self, observation: Observation) -> None:
         assert self._reference is not None

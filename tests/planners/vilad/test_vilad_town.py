@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -13,8 +14,11 @@ pytest.importorskip("osqp", reason="needs the extra `motion`")
 from chauffeur.bench.referees import referee_for
 from chauffeur.concept import Instruction, Limits, PlanRequest, Scenario, SystemMessage, Trajectory
 from chauffeur.describe.dispatch import describe
+from chauffeur.drive.actuate import actuate
 from chauffeur.drive.planning import checked
 from chauffeur.drive.session import drive_policy
+from chauffeur.executors.trajectory import TrajectoryExecutor
+from chauffeur.geometry import Pose
 from chauffeur.planners.vilad import ViladPlanner
 from chauffeur.worlds.town import TownWorld
 from chauffeur.worlds.town.pack import load
@@ -60,6 +64,25 @@ def test_a_command_is_driven_to_its_end(world: TownWorld, wish: str) -> None:
     driven_m = ((ego.x_m - before.x_m) ** 2 + (ego.y_m - before.y_m) ** 2) ** 0.5
     assert ego.speed_mps < 0.2
     assert (15.0 if "20" in wish else 20.0) < driven_m < (25.0 if "20" in wish else 35.0)
+
+
+def test_a_car_that_was_led_off_its_trajectory_stops_in_its_lane(world: TownWorld) -> None:
+    observation = world.reset(_before_a_junction(35.0))
+    ego = observation.ego
+    beside = Pose(ego.x_m, ego.y_m, ego.heading_rad).place(0.0, 6.0)
+    executor = TrajectoryExecutor(world)
+    ahead = Trajectory(tuple((3.0 * k, 0.0) for k in range(1, 10)), 1.0)
+    executor.start(ahead, observation, Limits(), replace(ego, x_m=beside[0], y_m=beside[1]))
+    for _ in range(300):
+        actuate(world, observation, executor.step(observation), None, None)
+        observation = world.observe()
+        if executor.status == "finished":
+            break
+    assert executor.status == "finished"
+    assert observation.ego.lane == ego.lane
+    assert ego.lane is not None
+    lane = observation.road[ego.lane]
+    assert abs(lane.centre.project(observation.ego.x_m, observation.ego.y_m)[1]) < 0.6
 
 
 def test_inside_a_junction_there_is_no_street_to_plan_on(world: TownWorld) -> None:
