@@ -67,7 +67,8 @@ def make(path: Path, count: int, seed: int) -> dict[str, np.ndarray]:
     renderer.close()
     found = {name: np.stack(values) for name, values in rows.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(path, **found)
+    with path.open("wb") as out:
+        np.savez_compressed(out, allow_pickle=False, **found)
     return found
 
 

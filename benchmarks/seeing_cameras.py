@@ -64,7 +64,7 @@ def main() -> None:
         answers, lead = told[-1], observation.front
         gap = None
         if lead is not None:
-            other = next(one for one in observation.others if one.id == lead.id)
+            other = next(one for one in observation.others if one.id == lead.vehicle)
             gap = ((other.x_m - observation.ego.x_m) ** 2 + (other.y_m - observation.ego.y_m) ** 2) ** 0.5
         near = gap is not None and gap <= NEAR_M
         said_near = answers.ahead is not None and answers.ahead_m <= NEAR_M

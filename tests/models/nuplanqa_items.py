@@ -11,23 +11,23 @@ from chauffeur.bench.nuplanqa.scenes.facts import Fact
 from chauffeur.bench.nuplanqa.scenes.wording import phrase
 from chauffeur.camera import nuplan_rig
 from chauffeur.models.bev_llm.recipe import QaTensors
-from chauffeur.models.bev_llm.views import view_cameras
+from chauffeur.models.bev_llm.views import FRONT_VIEWS, VIEWS, view_cameras
 
 LIGHTS = ("red", "yellow", "green", "none")
 SIZE = (32, 48)
 
 
 def tiny_split(scenes: int = 12) -> QaTensors:
-    """Seven views of noise and two of the instant before; the front one now has the colour of the light."""
+    """All views of noise and the front ones of the instant before; the front ones now have the colour of the light."""
     rng = np.random.default_rng(0)
     paints = np.array([(220, 30, 30), (220, 220, 30), (30, 220, 30), (90, 90, 90)], np.uint8)
-    now = rng.integers(0, 255, (scenes, 7, 3, *SIZE), dtype=np.uint8)
-    past = rng.integers(0, 255, (scenes, 1, 2, 3, *SIZE), dtype=np.uint8)
+    now = rng.integers(0, 255, (scenes, len(VIEWS), 3, *SIZE), dtype=np.uint8)
+    past = rng.integers(0, 255, (scenes, 1, FRONT_VIEWS, 3, *SIZE), dtype=np.uint8)
     found: list[tuple[VqaItem, ...]] = []
     truth: list[dict[str, Any]] = []
     for row in range(scenes):
         light = LIGHTS[row % 4]
-        now[row, :2] = paints[row % 4][:, None, None]
+        now[row, :FRONT_VIEWS] = paints[row % 4][:, None, None]
         question, options, answer, _ = phrase(Fact("light", "", light), "steady", "train", rng)
         item = VqaItem(
             str(row), f"{row:016x}", "", "Traffic Light", "train", PREAMBLE, (1.0,) * 5, (0.0,) * 5,

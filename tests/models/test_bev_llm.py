@@ -22,7 +22,14 @@ from chauffeur.models.bev_llm.facets import KINDS, cells_of, facets, labels_of  
 from chauffeur.models.bev_llm.fusion import BevFusion, FusionConfig, rig_tensors  # noqa: E402
 from chauffeur.models.bev_llm.geometry import BevGrid, rig_geometry  # noqa: E402
 from chauffeur.models.bev_llm.network import CompactBevLlm, MllamaBevLlm  # noqa: E402
-from chauffeur.models.bev_llm.recipe import BevLlmRecipe, CompactAnswerer, compact, train_compact  # noqa: E402
+from chauffeur.models.bev_llm.recipe import (  # noqa: E402
+    BevLlmRecipe,
+    CompactAnswerer,
+    compact,
+    joined,
+    take_over,
+    train_compact,
+)
 from chauffeur.models.bev_llm.views import FRONT_VIEWS, VIEWS, camera_of, cut, view_cameras  # noqa: E402
 from chauffeur.models.bev_llm.words import QuestionWordTable  # noqa: E402
 
@@ -94,7 +101,7 @@ def test_of_earlier_instants_fewer_patches_may_come() -> None:
 def test_training_learns_goes_on_and_is_loaded_again(tmp_path: Path) -> None:
     data = tiny_split()
     recipe = BevLlmRecipe(
-        steps=30, scenes=8, rate=3e-3, gather_steps=20, gather_scenes=8, word_steps=12, questions=6, word_rate=5e-3
+        steps=30, scenes=8, rate=3e-3, gather_steps=20, gather_scenes=8, word_steps=20, questions=6, word_rate=5e-3
     )
     one = train_compact(tmp_path / "one", recipe, data, data)
     assert one.perceived(data)["light"] > 0.9
@@ -114,6 +121,27 @@ def test_training_learns_goes_on_and_is_loaded_again(tmp_path: Path) -> None:
     assert after.perceived(data)["light"] == one.perceived(data)["light"]  # what was learned is taken over
     with pytest.raises(DataError, match="no BEV-LLM"):
         train_compact(tmp_path / "four", begun, data, data, begin=tmp_path / "nowhere")
+
+
+def test_what_was_known_of_a_view_goes_to_the_view_of_that_name(tmp_path: Path) -> None:
+    data = tiny_split(2)
+    new, old = _answerer(data), _answerer(data)
+    cameras = [data.cameras[-1], *(replace(one, name=f"{one.name}?") for one in data.cameras[1:-1]), data.cameras[0]]
+    CompactAnswerer(old.network, old.words, old.facets, cameras).save(tmp_path)
+    take_over(new, tmp_path)
+    before, after = (
+        one.network.gist.patches.weight.detach().half().unflatten(1, (len(VIEWS), -1)) for one in (old, new)
+    )
+    assert torch.equal(after[:, 0], before[:, -1]) and torch.equal(after[:, -1], before[:, 0])
+    assert not after[:, 1:-1].any()
+
+
+def test_splits_of_several_sets_are_learned_as_one() -> None:
+    one, two = tiny_split(3), tiny_split(2)
+    both = joined([one, two])
+    assert len(both.truth) == 5 and both.now.shape[0] == 5 and len(both.items) == len(one.items) + len(two.items)
+    with pytest.raises(DataError, match="cameras"):
+        joined([one, replace(two, cameras=two.cameras[:2])])
 
 
 def test_an_option_fits_as_far_as_what_it_means_is_believed() -> None:

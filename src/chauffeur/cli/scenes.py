@@ -131,7 +131,8 @@ def qa(
         str, typer.Option(help="Palette and lens of the test split: `default`, `held_out_a`...")
     ] = "default",
     sources: Annotated[
-        str, typer.Option(help="Where scenes come from: `all`, `staged` streets, or our `worlds` and their drivers.")
+        str,
+        typer.Option(help="`all`, `staged` streets, our `worlds`, or one: `highway`, `crossing`, `town`, `lot`."),
     ] = "all",
     front: Annotated[int, typer.Option(min=1, max=4, help="Times as wide and high as others: front pictures.")] = 1,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,

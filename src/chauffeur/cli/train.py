@@ -251,15 +251,17 @@ def vilad_frames(
 BEV_LLM_EXAMPLES = """
 Examples:
 
-    chauffeur bench scenes qa --out qa --scenes 3600 --width 224 --height 128 --frames 2
+    chauffeur bench scenes qa --out qa --scenes 3600 --width 224 --height 128 --frames 2 --front 2
 
     chauffeur model train bev-llm --data qa --out runs/bev-llm
+
+    chauffeur model train bev-llm --data qa --more highways --out runs/far --begin runs/bev-llm/model --steps 1000
 
     chauffeur model train bev-llm --data qa --out runs/no-bev --ablation no-bev
 
     chauffeur bench nuplanqa --data qa/test --planner bev-llm/runs/bev-llm/model
 
-The compact network is trained on pictures that are rendered and scenes that are staged: first perception, by the ground
+The compact network is trained on rendered pictures of staged scenes and of our worlds: first perception, by the ground
 truth of the scenes; then, with the encoder frozen and its features computed once, what gathers them; then the language
 of questions. `--begin` takes over the weights of a network, as far as they fit; a stage of no steps is left out.
 Ablations, trained so from the start: `no-bev`, `no-history`, `single-view`, `blind`; at the end the full network is
@@ -272,6 +274,9 @@ where more are asked for.
 def bev_llm(
     data: Annotated[Path, typer.Option(help="Set that `chauffeur bench scenes qa` has made.")],
     out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
+    more: Annotated[
+        list[Path] | None, typer.Option(help="Another set whose training split is learned as well; may be repeated.")
+    ] = None,
     steps: Annotated[int, typer.Option(min=0, help="Optimiser steps of perception.")] = 3000,
     gather_steps: Annotated[int, typer.Option(min=0, help="The same with the encoder frozen.")] = 1500,
     word_steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of language.")] = 300,
@@ -290,7 +295,7 @@ def bev_llm(
 
     needs("models", "Training", "torch", "transformers", "safetensors")
     from chauffeur.models.bev_llm.network import Keep
-    from chauffeur.models.bev_llm.recipe import BevLlmRecipe, load_split, train_compact
+    from chauffeur.models.bev_llm.recipe import BevLlmRecipe, joined, load_split, train_compact
 
     kept = next((one for one in get_args(Keep) if one == ablation), None)
     if kept is None:
@@ -305,6 +310,7 @@ def bev_llm(
 
     try:
         train, val, test = (load_split(data / split) for split in ("train", "val", "test"))
+        train = joined([train, *(load_split(one / "train") for one in more or ())])
         answerer = train_compact(out, recipe, train, val, told, begin=begin)
         tried = get_args(Keep) if kept == "full" else (kept,)
         found = {one: answerer.keeping(one).accuracy(test) for one in tried}

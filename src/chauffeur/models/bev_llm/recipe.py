@@ -169,6 +169,22 @@ def load_split(folder: Path, limit: int = 0) -> QaTensors:
     return QaTensors(now, past, motion, tuple(truth[token] for token in tokens), speeds, questions, cameras)
 
 
+def joined(splits: Sequence[QaTensors]) -> QaTensors:
+    """Splits of several sets as one. Raises DataError: their cameras or their instants differ."""
+    first, *others = splits
+    if any(one.cameras != first.cameras or one.past.shape[1:] != first.past.shape[1:] for one in others):
+        raise DataError("The sets differ in their cameras or their instants.", hint="Make them with the same options.")
+    return QaTensors(
+        np.concatenate([one.now for one in splits]),
+        np.concatenate([one.past for one in splits]),
+        np.concatenate([one.motion for one in splits]),
+        tuple(truth for one in splits for truth in one.truth),
+        np.concatenate([one.speeds_mps for one in splits]),
+        tuple(found for one in splits for found in one.questions),
+        first.cameras,
+    )
+
+
 def _look(out: NDArray[np.uint8], paths: Mapping[str, Path]) -> None:
     """Fill views, (views, 3, H, W), from pictures."""
     for camera, path in paths.items():
@@ -402,7 +418,7 @@ def _read(
     return network(tokens[rows], words, (words != PAD).long())
 
 
-def _begin(answerer: CompactAnswerer, folder: Path) -> None:
+def take_over(answerer: CompactAnswerer, folder: Path) -> None:
     """Take over the weights of a saved network, as far as names and shapes agree; the others stay as they are.
 
     What it knew of a view or of a class goes to the view or class of that name, wherever these have moved; a view that
@@ -467,7 +483,7 @@ def train_compact(
     network = CompactBevLlm(compact(recipe, words, of, tuple(train.now.shape[-2:])))
     answerer = CompactAnswerer(network, words, of, train.cameras, recipe.ablation)
     if begin is not None:
-        _begin(answerer, begin)
+        take_over(answerer, begin)
     told: Watch = watch or _unwatched
     plain = {**asdict(recipe), "facets": json.dumps(of), "begin": str(begin or "")}
     how = Optimisation(decay=0.05, precision="float32")

@@ -71,6 +71,10 @@ SOURCES: Final[Mapping[str, tuple[Place | Staged, ...]]] = {
     "all": _CYCLE,
     "staged": (_STAGED,),
     "worlds": tuple(one for one in _CYCLE if one != _STAGED),
+    "highway": ("highway",),
+    "crossing": ("crossing",),
+    "town": ("town",),
+    "lot": ("lot",),
 }
 _SEED_OF: Final[Mapping[Split, int]] = {"train": 0, "val": 1, "test": 2}
 
@@ -87,7 +91,7 @@ class QaConfig:
         pairs: Free question-answer pairs for each fact of a training scene.
         pictures: Whether anything is rendered; without, visibility is computed from geometry.
         look: Palette, exposure and lens of the test split's pictures.
-        sources: Where scenes come from: `all`, `staged` or `worlds`.
+        sources: Where scenes come from: see SOURCES.
         front: How many times as wide and high the front camera's pictures are.
     """
 

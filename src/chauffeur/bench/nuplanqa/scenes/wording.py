@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Split = Literal["train", "val", "test"]
 _OPTIONS: Final = 4
-_SLACK: Final = 1
+_SLACK: Final = 2
 """Questions by which a class may be ahead of the rarest one of its family."""
 
 
