@@ -13,7 +13,7 @@ from chauffeur.concept import ConfigError, PersonId
 from chauffeur.memory import VaultMemory
 from chauffeur.memory.privacy import PRIVACY_FILE, RETENTION_DAYS, Privacy, read_privacy, write_privacy
 
-Setpoints = Callable[..., list[str]]
+Wishes = Callable[..., list[str]]
 ANN = PersonId("Ann")
 
 
@@ -26,7 +26,7 @@ def test_ninety_days_are_kept_unless_somebody_says_otherwise(tmp_path: Path) -> 
 
 
 def test_in_privacy_mode_nothing_new_is_kept_and_what_is_there_is_recalled(
-    tmp_path: Path, clock: Clock, setpoints: Setpoints
+    tmp_path: Path, clock: Clock, wishes: Wishes
 ) -> None:
     VaultMemory(tmp_path, clock=clock).remember(trip("Ann", "drive faster"))
     before = {path: path.read_bytes() for path in tmp_path.rglob("*.db")}
@@ -34,7 +34,7 @@ def test_in_privacy_mode_nothing_new_is_kept_and_what_is_there_is_recalled(
     private = VaultMemory(tmp_path, clock=clock)
     private.remember(trip("Ann", "drive much faster"))
     private.remember(trip("Ben", "hurry up"))
-    assert setpoints(private, "Ann") == ["drive faster"]
+    assert wishes(private, "Ann") == ["drive faster"]
     assert {path: path.read_bytes() for path in tmp_path.rglob("*.db")} == before, "not a byte was written"
 
 

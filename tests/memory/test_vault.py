@@ -28,7 +28,7 @@ from chauffeur.memory import Memory, VaultMemory, interpret_feedback
 from chauffeur.memory.records import MAX_CHARS
 
 ANN, BEN = PersonId("Ann"), PersonId("Ben")
-Setpoints = Callable[..., list[str]]
+Wishes = Callable[..., list[str]]
 
 
 def recall(vault: VaultMemory, person: PersonId, text: str = "drive faster", k: int = 3) -> History:
@@ -111,10 +111,10 @@ def test_both_sides_of_a_conflict_come_back_with_their_dates(vault: VaultMemory,
     assert {item.when[:10]: item.feedback[0].speed for item in items} == {"2026-03-01": -1, "2026-03-04": 1}
 
 
-def test_opposite_wishes_are_not_recalled(vault: VaultMemory, setpoints: Setpoints) -> None:
+def test_opposite_wishes_are_not_recalled(vault: VaultMemory, wishes: Wishes) -> None:
     vault.remember(trip("Ann", "Drive slower"))
     vault.remember(trip("Ann", "Please hurry up"))
-    assert setpoints(vault, "Ann", "Can you drive faster?") == ["Please hurry up"]
+    assert wishes(vault, "Ann", "Can you drive faster?") == ["Please hurry up"]
 
 
 def test_recall_of_nobody_and_of_strangers_writes_nothing(vault: VaultMemory, tmp_path: Path) -> None:
@@ -130,13 +130,13 @@ def test_recall_of_nobody_and_of_strangers_writes_nothing(vault: VaultMemory, tm
     assert not (tmp_path / "home").exists()
 
 
-def test_forget_last_tells_what_it_forgot(vault: VaultMemory, setpoints: Setpoints) -> None:
+def test_forget_last_tells_what_it_forgot(vault: VaultMemory, wishes: Wishes) -> None:
     vault.remember(trip("Ann", "drive faster", id="a"))
     vault.remember(trip("Ann", "drive a lot faster", id="b"), Feedback("no"))
     forgotten = vault.forget_last(ANN)
     assert forgotten is not None
     assert (forgotten.trip_id, forgotten.feedback) == ("b", (Feedback("no"),))
-    assert setpoints(vault, "Ann") == ["drive faster"]
+    assert wishes(vault, "Ann") == ["drive faster"]
     vault.forget_last(ANN)
     assert vault.forget_last(ANN) is None
     assert vault.people() == (ANN,)
@@ -177,29 +177,27 @@ def test_files_are_for_their_owner_alone(vault: VaultMemory, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     "name", ["../../etc/passwd", "/etc/passwd", "a/b", "..", "\x00", "ü" * 400, "CON", "*", "\ud800"]
 )
-def test_any_name_is_only_a_name(vault: VaultMemory, tmp_path: Path, setpoints: Setpoints, name: str) -> None:
+def test_any_name_is_only_a_name(vault: VaultMemory, tmp_path: Path, wishes: Wishes, name: str) -> None:
     vault.remember(trip(name, "drive faster"))
-    assert setpoints(vault, name) == ["drive faster"]
+    assert wishes(vault, name) == ["drive faster"]
     assert vault.people() == (PersonId(name),)
     assert {path.parent.name for path in tmp_path.rglob("*") if path.is_file()} == {"profiles", "keys"}
     assert vault.erase(PersonId(name))
 
 
-def test_the_same_name_in_other_code_points_is_the_same_person(vault: VaultMemory, setpoints: Setpoints) -> None:
+def test_the_same_name_in_other_code_points_is_the_same_person(vault: VaultMemory, wishes: Wishes) -> None:
     vault.remember(trip("Zoe\u0308", "drive faster"))
-    assert setpoints(vault, " Zo\u00eb ") == ["drive faster"]
+    assert wishes(vault, " Zo\u00eb ") == ["drive faster"]
 
 
-def test_retention_hides_at_once_and_deletes_at_the_next_write(
-    tmp_path: Path, clock: Clock, setpoints: Setpoints
-) -> None:
+def test_retention_hides_at_once_and_deletes_at_the_next_write(tmp_path: Path, clock: Clock, wishes: Wishes) -> None:
     vault = VaultMemory(tmp_path, clock=clock)
     vault.remember(trip("Ann", "drive faster"))
     clock.pass_by(days=89)
     vault.remember(trip("Ann", "drive much faster"))
-    assert len(setpoints(vault, "Ann")) == 2
+    assert len(wishes(vault, "Ann")) == 2
     clock.pass_by(days=2)
-    assert setpoints(vault, "Ann") == ["drive much faster"]
+    assert wishes(vault, "Ann") == ["drive much faster"]
     assert len(json.loads(vault.export(ANN))["trips"]) == 2
     vault.remember(trip("Ann", "hurry up"))
     assert len(json.loads(vault.export(ANN))["trips"]) == 2
@@ -227,32 +225,32 @@ def test_the_export_is_json_with_everything(vault: VaultMemory, clock: Clock) ->
     ]  # fmt: skip
 
 
-def test_two_memories_see_each_other_s_writes(tmp_path: Path, clock: Clock, setpoints: Setpoints) -> None:
+def test_two_memories_see_each_other_s_writes(tmp_path: Path, clock: Clock, wishes: Wishes) -> None:
     one, two = VaultMemory(tmp_path, clock=clock), VaultMemory(tmp_path, clock=clock)
     one.remember(trip("Ann", "drive faster"))
-    assert setpoints(two, "Ann") == ["drive faster"]
+    assert wishes(two, "Ann") == ["drive faster"]
     two.remember(trip("Ann", "hurry up"))
-    assert sorted(setpoints(one, "Ann")) == ["drive faster", "hurry up"]
+    assert sorted(wishes(one, "Ann")) == ["drive faster", "hurry up"]
     one.erase(ANN)
-    assert setpoints(two, "Ann") == []
+    assert wishes(two, "Ann") == []
     one.remember(trip("Ann", "speed up"))
-    assert setpoints(two, "Ann") == ["speed up"]
+    assert wishes(two, "Ann") == ["speed up"]
 
 
-def test_indexes_of_many_people_do_not_pile_up(vault: VaultMemory, setpoints: Setpoints) -> None:
+def test_indexes_of_many_people_do_not_pile_up(vault: VaultMemory, wishes: Wishes) -> None:
     for number in range(12):
         vault.remember(trip(f"p{number}", "drive faster"))
-        assert setpoints(vault, f"p{number}") == ["drive faster"]
+        assert wishes(vault, f"p{number}") == ["drive faster"]
     assert len(vault._opened) == 8
 
 
 def test_vectors_of_another_encoder_are_made_anew(
-    vault: VaultMemory, setpoints: Setpoints, monkeypatch: pytest.MonkeyPatch
+    vault: VaultMemory, wishes: Wishes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
         patch.setattr("chauffeur.memory.profile.ENCODER", "older-v0")
         vault.remember(trip("Ann", "drive faster"))
-    assert setpoints(vault, "Ann") == ["drive faster"]
+    assert wishes(vault, "Ann") == ["drive faster"]
 
 
 def test_the_data_directory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from chauffeur.memory.cipher import DatabaseError
 from chauffeur.memory.keys import KeyRing
 
 ANN, BEN = PersonId("Ann"), PersonId("Ben")
-Setpoints = Callable[..., list[str]]
+Wishes = Callable[..., list[str]]
 
 
 @pytest.fixture
@@ -64,18 +64,18 @@ def refused(vault: VaultMemory, person: PersonId = ANN) -> ProfileError:
 
 @pytest.mark.parametrize("keep", [0, 1, 100, 4096, 5000, 3 * 4096])
 def test_a_truncated_profile_is_said_and_the_others_go_on(
-    two: VaultMemory, home: Path, setpoints: Setpoints, keep: int, caplog: pytest.LogCaptureFixture
+    two: VaultMemory, home: Path, wishes: Wishes, keep: int, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = of(home, "Ann", "db")
     path.write_bytes(path.read_bytes()[:keep])
     assert "'Ann'" in refused(two).message
-    assert setpoints(two, "Ben") == ["drive faster"]
+    assert wishes(two, "Ben") == ["drive faster"]
     two.remember(trip("Ben", "hurry up"))
     assert two.people() == (BEN,)
     assert "profile left out" in caplog.text
     assert two.erase(ANN)
     two.remember(trip("Ann", "drive faster"))
-    assert setpoints(two, "Ann") == ["drive faster"]
+    assert wishes(two, "Ann") == ["drive faster"]
 
 
 def test_foreign_files_are_said(two: VaultMemory, home: Path) -> None:
@@ -104,15 +104,15 @@ def test_another_version_is_not_touched(vault: VaultMemory, monkeypatch: pytest.
     assert "unknown version 'chauffeur-profile-99'" in refused(vault).message
 
 
-def test_a_lost_key_is_said(two: VaultMemory, home: Path, setpoints: Setpoints) -> None:
+def test_a_lost_key_is_said(two: VaultMemory, home: Path, wishes: Wishes) -> None:
     path = of(home, "Ann", "key")
     content = path.read_bytes()
     path.unlink()
     assert "has no key" in refused(two).message
-    assert setpoints(two, "Ben") == ["drive faster"]
+    assert wishes(two, "Ben") == ["drive faster"]
     assert two.people() == (BEN,)
     path.write_bytes(content)
-    assert len(setpoints(two, "Ann")) == 10
+    assert len(wishes(two, "Ann")) == 10
     path.unlink()
     assert two.erase(ANN)
 
@@ -195,34 +195,32 @@ def test_a_missing_file_is_no_new_database(tmp_path: Path) -> None:
     assert not (tmp_path / "none.db").exists()
 
 
-def test_what_a_crash_left_behind_is_swept_away(vault: VaultMemory, home: Path, setpoints: Setpoints) -> None:
+def test_what_a_crash_left_behind_is_swept_away(vault: VaultMemory, home: Path, wishes: Wishes) -> None:
     vault.remember(trip("Ben", "drive faster"))
     alias = KeyRing(home / "keys").alias(ANN)
     (home / "profiles" / f"{alias}.draft").write_bytes(b"half")
     (home / "keys" / f"{alias}.key.0123.draft").write_bytes(b"half")
     vault.remember(trip("Ann", "drive faster"))
-    assert setpoints(vault, "Ann") == ["drive faster"]
+    assert wishes(vault, "Ann") == ["drive faster"]
     vault.erase(ANN)
     assert not [path for path in home.rglob("*") if alias in path.name]
 
 
-def test_a_key_made_before_a_crash_is_used(vault: VaultMemory, home: Path, setpoints: Setpoints) -> None:
+def test_a_key_made_before_a_crash_is_used(vault: VaultMemory, home: Path, wishes: Wishes) -> None:
     vault.remember(trip("Ann", "drive faster"))
     of(home, "Ann", "db").unlink()
-    assert setpoints(vault, "Ann") == []
+    assert wishes(vault, "Ann") == []
     vault.remember(trip("Ann", "hurry up"))
-    assert setpoints(vault, "Ann") == ["hurry up"]
+    assert wishes(vault, "Ann") == ["hurry up"]
 
 
 # Passphrase ----------------------------------------------------------------------------------------------------------
 
 
-def test_sealed_keys_open_only_with_the_passphrase(
-    home: Path, setpoints: Setpoints, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_sealed_keys_open_only_with_the_passphrase(home: Path, wishes: Wishes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CHAUFFEUR_PASSPHRASE", "correct horse")
     VaultMemory(home).remember(trip("Ann", "drive faster"))
-    assert setpoints(VaultMemory(home), "Ann") == ["drive faster"]
+    assert wishes(VaultMemory(home), "Ann") == ["drive faster"]
     assert b'"key"' not in of(home, "Ann", "key").read_bytes()
     assert "does not open" in refused(VaultMemory(home, passphrase="battery staple")).message
     assert "is sealed" in refused(VaultMemory(home, passphrase="")).message
@@ -231,12 +229,12 @@ def test_sealed_keys_open_only_with_the_passphrase(
     assert "does not open" in refused(VaultMemory(home)).message
 
 
-def test_setting_a_passphrase_seals_keys_made_without_one(home: Path, setpoints: Setpoints) -> None:
+def test_setting_a_passphrase_seals_keys_made_without_one(home: Path, wishes: Wishes) -> None:
     VaultMemory(home).remember(trip("Ann", "drive faster"))
     assert b'"key"' in of(home, "Ann", "key").read_bytes()
-    assert setpoints(VaultMemory(home, passphrase="p"), "Ann") == ["drive faster"]
+    assert wishes(VaultMemory(home, passphrase="p"), "Ann") == ["drive faster"]
     assert b'"key"' not in of(home, "Ann", "key").read_bytes()
-    assert setpoints(VaultMemory(home, passphrase="p"), "Ann") == ["drive faster"]
+    assert wishes(VaultMemory(home, passphrase="p"), "Ann") == ["drive faster"]
 
 
 def test_two_people_under_one_passphrase_have_different_keys(home: Path) -> None:
@@ -313,7 +311,7 @@ def test_processes_that_write_at_once_lose_nothing(home: Path) -> None:
 
 
 def test_a_profile_erased_between_making_and_writing_is_made_again(
-    vault: VaultMemory, setpoints: Setpoints, monkeypatch: pytest.MonkeyPatch
+    vault: VaultMemory, wishes: Wishes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ensure = vault._ensure
     times = 0
@@ -328,12 +326,12 @@ def test_a_profile_erased_between_making_and_writing_is_made_again(
     monkeypatch.setattr(vault, "_ensure", ensure_then_lose)
     vault.remember(trip("Ann", "drive faster"))
     assert times == 2
-    assert setpoints(vault, "Ann") == ["drive faster"]
+    assert wishes(vault, "Ann") == ["drive faster"]
 
 
-def test_the_vault_serves_threads(vault: VaultMemory, setpoints: Setpoints) -> None:
+def test_the_vault_serves_threads(vault: VaultMemory, wishes: Wishes) -> None:
     from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(lambda n: vault.remember(trip("Ann", f"drive faster {n}")), range(20)))
-        assert all(len(found) == 10 for found in pool.map(lambda _: setpoints(vault, "Ann"), range(8)))
+        assert all(len(found) == 10 for found in pool.map(lambda _: wishes(vault, "Ann"), range(8)))

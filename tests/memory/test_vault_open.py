@@ -21,7 +21,7 @@ from chauffeur.memory.similarity import ENCODER, encode
 pytestmark = pytest.mark.usefixtures("unsynced")
 
 ANN, BEN = PersonId("Ann"), PersonId("Ben")
-Setpoints = Callable[..., list[str]]
+Wishes = Callable[..., list[str]]
 
 
 @pytest.fixture(autouse=True)
@@ -58,30 +58,30 @@ def loads(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def test_a_file_stays_open_and_its_columns_follow_what_is_written(
-    vault: VaultMemory, setpoints: Setpoints, clock: Clock, monkeypatch: pytest.MonkeyPatch
+    vault: VaultMemory, wishes: Wishes, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     read = loads(monkeypatch)
     vault.remember(trip("Ann", "drive faster"))
-    assert setpoints(vault, "Ann") == ["drive faster"]
+    assert wishes(vault, "Ann") == ["drive faster"]
     first = opened(vault)
     for number in range(5):
         vault.remember(trip("Ann", "hurry up", id=str(number)), Feedback("too fast", speed=-1))
         vault.attach_feedback(ANN, Feedback("too close", gap=-1), str(number))
-        assert len(setpoints(vault, "Ann")) == 2 + number
+        assert len(wishes(vault, "Ann")) == 2 + number
     assert columns(vault).signs[1].tolist() == [0, -1, -1, -1, -1, -1]
     vault.forget_last(ANN)
-    assert len(setpoints(vault, "Ann")) == 5
+    assert len(wishes(vault, "Ann")) == 5
     clock.pass_by(days=91)
     vault.remember(trip("Ann", "faster, please"))
-    assert setpoints(vault, "Ann") == ["faster, please"]
+    assert wishes(vault, "Ann") == ["faster, please"]
     assert opened(vault) is first
     assert len(read) == 1, "the index was read from the file once, when it was opened"
 
 
 def test_what_the_columns_became_is_what_is_read_from_the_file(vault: VaultMemory, clock: Clock) -> None:
-    setpoints = ["drive faster", "slow down", "keep a distance of 20 meters", "go 100 km/h", "turn left"]
+    wishes = ["drive faster", "slow down", "keep a distance of 20 meters", "go 100 km/h", "turn left"]
     for number in range(30):
-        vault.remember(trip("Ann", setpoints[number % 5], id=str(number), world="ab"[number % 2]))
+        vault.remember(trip("Ann", wishes[number % 5], id=str(number), world="ab"[number % 2]))
         if number % 3 == 0:
             vault.attach_feedback(ANN, Feedback("x", comfort=-1), str(number // 2))
         if number % 7 == 0:
@@ -100,68 +100,68 @@ def test_what_the_columns_became_is_what_is_read_from_the_file(vault: VaultMemor
         assert np.array_equal(mine[kept], other)
 
 
-def test_what_another_process_writes_is_seen_at_once(vault: VaultMemory, tmp_path: Path, setpoints: Setpoints) -> None:
+def test_what_another_process_writes_is_seen_at_once(vault: VaultMemory, tmp_path: Path, wishes: Wishes) -> None:
     other = VaultMemory(tmp_path / "home", clock=vault._clock)
     for number in range(6):
         writer, reader = (vault, other) if number % 2 else (other, vault)
         writer.remember(trip("Ann", f"drive faster {number}"))
-        assert len(setpoints(reader, "Ann")) == number + 1
+        assert len(wishes(reader, "Ann")) == number + 1
     vault.forget_last(ANN)
-    assert len(setpoints(other, "Ann")) == 5
+    assert len(wishes(other, "Ann")) == 5
     other.attach_feedback(ANN, Feedback("too fast", speed=-1))
-    assert columns_after_recall(vault, setpoints).judged.tolist() == [False, False, False, False, True]
+    assert columns_after_recall(vault, wishes).judged.tolist() == [False, False, False, False, True]
 
 
-def columns_after_recall(vault: VaultMemory, setpoints: Setpoints) -> Columns:
-    setpoints(vault, "Ann")
+def columns_after_recall(vault: VaultMemory, wishes: Wishes) -> Columns:
+    wishes(vault, "Ann")
     return columns(vault)
 
 
 def test_a_write_after_another_process_wrote_does_not_hide_it(
-    vault: VaultMemory, tmp_path: Path, setpoints: Setpoints
+    vault: VaultMemory, tmp_path: Path, wishes: Wishes
 ) -> None:
     other = VaultMemory(tmp_path / "home", clock=vault._clock)
     vault.remember(trip("Ann", "drive faster"))
-    setpoints(vault, "Ann")
+    wishes(vault, "Ann")
     other.remember(trip("Ann", "hurry up"))
     vault.remember(trip("Ann", "faster, please"))
-    assert sorted(setpoints(vault, "Ann")) == ["drive faster", "faster, please", "hurry up"]
+    assert sorted(wishes(vault, "Ann")) == ["drive faster", "faster, please", "hurry up"]
 
 
 def test_what_another_process_erased_is_never_recalled_and_its_columns_are_overwritten(
-    vault: VaultMemory, tmp_path: Path, setpoints: Setpoints
+    vault: VaultMemory, tmp_path: Path, wishes: Wishes
 ) -> None:
     vault.remember(trip("Ann", "drive faster"))
     vault.remember(trip("Ben", "drive faster"))
-    assert setpoints(vault, "Ann") == ["drive faster"]
+    assert wishes(vault, "Ann") == ["drive faster"]
     read = next(one.index.columns for one in vault._opened.values() if one.profile.person == ANN)
     numbers = read._marks._vectors, read.rows, read.whens
     other = VaultMemory(tmp_path / "home", clock=vault._clock)
     assert other.erase(ANN)
-    assert setpoints(vault, "Ben") == ["drive faster"], "to look at anybody is enough"
+    assert wishes(vault, "Ben") == ["drive faster"], "to look at anybody is enough"
     assert not any(one.any() for one in numbers)
     assert len(vault._opened) == 1
     other.remember(trip("Ann", "hurry up"))
-    assert setpoints(vault, "Ann") == ["hurry up"]
+    assert wishes(vault, "Ann") == ["hurry up"]
     other.erase(ANN)
     other.remember(trip("Ann", "faster, please"))
-    assert setpoints(vault, "Ann") == ["faster, please"], "also where there is a new file under the old name"
+    assert wishes(vault, "Ann") == ["faster, please"], "also where there is a new file under the old name"
     vault.remember(trip("Ann", "hurry up"))
-    assert sorted(setpoints(other, "Ann")) == ["faster, please", "hurry up"]
+    assert sorted(wishes(other, "Ann")) == ["faster, please", "hurry up"]
 
 
 @pytest.mark.parametrize("way", ["erase", "close", "dropped"])
-def test_nothing_read_of_a_person_stays_in_the_process(tmp_path: Path, setpoints: Setpoints, way: str) -> None:
+def test_nothing_read_of_a_person_stays_in_the_process(tmp_path: Path, wishes: Wishes, way: str) -> None:
     vault = VaultMemory(tmp_path)
     for number in range(5):
         vault.remember(trip("Ann", f"keep a distance of {number} meters"))
-    assert len(setpoints(vault, "Ann", "keep a distance of 3 meters")) == 5
+    assert len(wishes(vault, "Ann", "keep a distance of 3 meters")) == 5
     read, held = columns(vault), vault._opened
     numbers = [read._marks._vectors, read.rows, read.whens, read._marks._amounts.values]
     assert all(one.any() for one in numbers)
     if way == "erase":
         assert vault.erase(ANN)
-        assert setpoints(vault, "Ann", "keep a distance of 3 meters") == []
+        assert wishes(vault, "Ann", "keep a distance of 3 meters") == []
     elif way == "close":
         vault.close()
     else:
@@ -170,47 +170,45 @@ def test_nothing_read_of_a_person_stays_in_the_process(tmp_path: Path, setpoints
     assert not any(one.any() for one in numbers)
     assert held == {}
     if way == "close":
-        assert len(setpoints(vault, "Ann", "keep a distance of 3 meters")) == 5
+        assert len(wishes(vault, "Ann", "keep a distance of 3 meters")) == 5
 
 
-def test_after_a_write_the_file_alone_is_the_profile(vault: VaultMemory, tmp_path: Path, setpoints: Setpoints) -> None:
+def test_after_a_write_the_file_alone_is_the_profile(vault: VaultMemory, tmp_path: Path, wishes: Wishes) -> None:
     for number in range(3):
         vault.remember(trip("Ann", f"drive faster {number}"))
-    setpoints(vault, "Ann")
+    wishes(vault, "Ann")
     home, copy = tmp_path / "home", tmp_path / "copy"
     (copy / "profiles").mkdir(parents=True)
     (path,) = home.rglob("*.db")
     (copy / "profiles" / path.name).write_bytes(path.read_bytes())
-    assert len(setpoints(VaultMemory(copy, keys=home / "keys", clock=vault._clock), "Ann")) == 3
+    assert len(wishes(VaultMemory(copy, keys=home / "keys", clock=vault._clock), "Ann")) == 3
     for one in (home / "profiles").iterdir():
         assert one.stat().st_mode & 0o077 == 0
 
 
-def test_a_file_cut_or_changed_while_it_is_open_is_said(
-    vault: VaultMemory, tmp_path: Path, setpoints: Setpoints
-) -> None:
+def test_a_file_cut_or_changed_while_it_is_open_is_said(vault: VaultMemory, tmp_path: Path, wishes: Wishes) -> None:
     for number in range(40):
         vault.remember(trip("Ann", f"drive faster {number}"))
     vault.remember(trip("Ben", "drive faster"))
     (path,) = [one for one in (tmp_path / "home").rglob("*.db") if one.stem == vault._ring.alias(ANN)]
     whole = path.read_bytes()
     for content in (whole[: len(whole) // 2], whole[:100], b"", os.urandom(len(whole))):
-        assert len(setpoints(vault, "Ann", k=50)) == 40
+        assert len(wishes(vault, "Ann", k=50)) == 40
         path.write_bytes(content)
         with pytest.raises(ProfileError, match="'Ann'"):
-            setpoints(vault, "Ann")
-        assert setpoints(vault, "Ben") == ["drive faster"]
+            wishes(vault, "Ann")
+        assert wishes(vault, "Ben") == ["drive faster"]
         path.write_bytes(whole)
 
 
-def test_a_lost_key_closes_the_file(vault: VaultMemory, tmp_path: Path, setpoints: Setpoints) -> None:
+def test_a_lost_key_closes_the_file(vault: VaultMemory, tmp_path: Path, wishes: Wishes) -> None:
     vault.remember(trip("Ann", "drive faster"))
-    setpoints(vault, "Ann")
+    wishes(vault, "Ann")
     numbers = columns(vault)._marks._vectors
     (path,) = (tmp_path / "home").rglob("*.key")
     path.unlink()
     with pytest.raises(ProfileError, match="has no key"):
-        setpoints(vault, "Ann")
+        wishes(vault, "Ann")
     assert not numbers.any()
     assert vault._opened == {}
 
@@ -227,21 +225,21 @@ def test_a_file_that_changed_just_now_is_opened_anew(vault: VaultMemory, monkeyp
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
-def test_a_forked_process_opens_its_own(vault: VaultMemory, setpoints: Setpoints) -> None:
+def test_a_forked_process_opens_its_own(vault: VaultMemory, wishes: Wishes) -> None:
     vault.remember(trip("Ann", "drive faster"))
-    setpoints(vault, "Ann")
+    wishes(vault, "Ann")
     child = os.fork()
     if child == 0:
-        seen = setpoints(vault, "Ann") == ["drive faster"]
+        seen = wishes(vault, "Ann") == ["drive faster"]
         vault.remember(trip("Ann", "hurry up"))
         vault.close()
         os._exit(0 if seen and len(vault_module._inherited) == 1 else 1)
     assert os.waitpid(child, 0)[1] == 0
-    assert sorted(setpoints(vault, "Ann")) == ["drive faster", "hurry up"]
+    assert sorted(wishes(vault, "Ann")) == ["drive faster", "hurry up"]
     assert vault_module._inherited == []
 
 
-def test_files_of_earlier_versions_are_read(vault: VaultMemory, setpoints: Setpoints, clock: Clock) -> None:
+def test_files_of_earlier_versions_are_read(vault: VaultMemory, wishes: Wishes, clock: Clock) -> None:
     """Vectors with their zeros, no weather, no index by time; and vectors of an encoder that is no more."""
     for number, text in enumerate(["drive faster", "drive at 100 km/h", "hurry up"]):
         vault.remember(trip("Ann", text, id=str(number)))
@@ -260,7 +258,7 @@ def test_files_of_earlier_versions_are_read(vault: VaultMemory, setpoints: Setpo
 
 
 def test_a_checkpoint_that_fails_loses_nothing(
-    vault: VaultMemory, setpoints: Setpoints, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    vault: VaultMemory, wishes: Wishes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Somebody reads for long: the write waits for them as long as for any lock, then stands in the log."""
     monkeypatch.setattr(cipher, "BUSY_S", 0.05)
@@ -272,15 +270,15 @@ def test_a_checkpoint_that_fails_loses_nothing(
     reader.execute("BEGIN")
     reader.execute("SELECT count(*) FROM trips").fetchall()
     vault.remember(trip("Ann", "hurry up"))
-    assert sorted(setpoints(vault, "Ann")) == ["drive faster", "hurry up"]
+    assert sorted(wishes(vault, "Ann")) == ["drive faster", "hurry up"]
     assert reader.execute("SELECT count(*) FROM trips").fetchall() == [(1,)], "a reader sees one state of the file"
     reader.close()
-    assert sorted(setpoints(VaultMemory(tmp_path / "home", clock=vault._clock), "Ann")) == ["drive faster", "hurry up"]
+    assert sorted(wishes(VaultMemory(tmp_path / "home", clock=vault._clock), "Ann")) == ["drive faster", "hurry up"]
 
 
-def test_open_profiles_are_few_and_never_cross(vault: VaultMemory, setpoints: Setpoints) -> None:
+def test_open_profiles_are_few_and_never_cross(vault: VaultMemory, wishes: Wishes) -> None:
     for number in range(20):
         vault.remember(trip(f"p{number}", f"drive faster {number}"))
     for number in range(20):
-        assert setpoints(vault, f"p{number}") == [f"drive faster {number}"]
+        assert wishes(vault, f"p{number}") == [f"drive faster {number}"]
     assert len(vault._opened) == 8

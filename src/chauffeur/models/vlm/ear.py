@@ -3,8 +3,8 @@
 
 The network knows what words mean from a table of vectors and a few thousand sentences; the sorter
 (`chauffeur.language.text_classifier`) knows which words and pairs of words writers used; the encoder (all-MiniLM-L6-v2)
-knows the world's English, and what somebody late for a train is after. On unseen writers all three together err least: the
-planner multiplies what they find, with an exponent each.
+knows the world's English, and what somebody late for a train is after. On unseen writers all three together err least:
+the planner multiplies what they find, with an exponent each.
 """
 
 from __future__ import annotations
