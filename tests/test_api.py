@@ -47,7 +47,7 @@ def test_a_benchmark_is_run_and_gone_on_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A smaller one than the README's; the second call finds all done."""
-    block = BLOCKS[2].replace('"passengers", planner="onboard"', '"alignment", items=2')
+    block = BLOCKS[2].replace('"passengers", planner="onboard"', '"faithfulness", items=2')
     assert block != BLOCKS[2]
     _run(block, tmp_path, monkeypatch)
     results = (tmp_path / "runs/onboard/results.jsonl").read_text()

@@ -34,7 +34,10 @@ world that nobody steps, hands it to nobody."""
 COMPILES_A_LIBRARY = {"worlds/track/dynamics.py"}
 """Compiles the functions of an installed library, whose text no model writes."""
 
-STEPS_AN_OPTIMISER = {"models/train/trainer.py", "models/onboard/adaptation.py", "models/vilad/frames_baselines.py"}
+STEPS_AN_OPTIMISER = {
+    "models/train/trainer.py", "models/onboard/adaptation.py", "models/vilad/frames_baselines.py",
+    "models/vlm/ear.py",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)

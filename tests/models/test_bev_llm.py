@@ -26,8 +26,8 @@ from chauffeur.models.bev_llm.recipe import (  # noqa: E402
     BevLlmRecipe,
     CompactAnswerer,
     compact,
+    inherit_weights,
     joined,
-    take_over,
     train_compact,
 )
 from chauffeur.models.bev_llm.views import FRONT_VIEWS, VIEWS, camera_of, cut, view_cameras  # noqa: E402
@@ -128,7 +128,7 @@ def test_what_was_known_of_a_view_goes_to_the_view_of_that_name(tmp_path: Path) 
     new, old = _answerer(data), _answerer(data)
     cameras = [data.cameras[-1], *(replace(one, name=f"{one.name}?") for one in data.cameras[1:-1]), data.cameras[0]]
     CompactAnswerer(old.network, old.words, old.facets, cameras).save(tmp_path)
-    take_over(new, tmp_path)
+    inherit_weights(new, tmp_path)
     before, after = (
         one.network.gist.patches.weight.detach().half().unflatten(1, (len(VIEWS), -1)) for one in (old, new)
     )

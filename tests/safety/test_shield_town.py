@@ -60,7 +60,7 @@ def test_who_stands_astride_a_line_waits_for_green_with_its_tail_before_it(front
     rear = 80.0 + front_over_m - LINCOLN_MKZ.rear_to_middle_m - LINCOLN_MKZ.length_m / 2.0
     state, red = BicycleState(Pose(rear, 0.0, 0.0), 0.0), (Signal("s", "red", ("a",), LINE),)
     for tick in range(100):
-        command = shield.guard(instant(state, tick, signals=red), Command(1.5, 0.0)).command
+        command = shield.filter(instant(state, tick, signals=red), Command(1.5, 0.0)).command
         state = advanced(state, command.acceleration_mps2, command.steering_rad, DT, LINCOLN_MKZ)
     tail = state.middle(LINCOLN_MKZ).x_m - 0.8 * LINCOLN_MKZ.length_m / 2.0
     assert (tail > 80.0) is goes_on

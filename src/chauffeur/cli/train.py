@@ -255,7 +255,7 @@ Examples:
 
     chauffeur model train bev-llm --data qa --out runs/bev-llm
 
-    chauffeur model train bev-llm --data qa --more highways --out runs/far --begin runs/bev-llm/model --steps 1000
+    chauffeur model train bev-llm --data qa --also highways --out runs/far --begin runs/bev-llm/model --steps 1000
 
     chauffeur model train bev-llm --data qa --out runs/no-bev --ablation no-bev
 
@@ -274,7 +274,7 @@ where more are asked for.
 def bev_llm(
     data: Annotated[Path, typer.Option(help="Set that `chauffeur bench scenes qa` has made.")],
     out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
-    more: Annotated[
+    also: Annotated[
         list[Path] | None, typer.Option(help="Another set whose training split is learned as well; may be repeated.")
     ] = None,
     steps: Annotated[int, typer.Option(min=0, help="Optimiser steps of perception.")] = 3000,
@@ -310,7 +310,7 @@ def bev_llm(
 
     try:
         train, val, test = (load_split(data / split) for split in ("train", "val", "test"))
-        train = joined([train, *(load_split(one / "train") for one in more or ())])
+        train = joined([train, *(load_split(one / "train") for one in also or ())])
         answerer = train_compact(out, recipe, train, val, told, begin=begin)
         tried = get_args(Keep) if kept == "full" else (kept,)
         found = {one: answerer.keeping(one).accuracy(test) for one in tried}

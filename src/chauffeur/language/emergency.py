@@ -141,7 +141,7 @@ _REASON: Final = (
 )
 _STOP_CLAUSE: Final = re.compile(rf"^ (?P<lead>{_LEAD})(?P<stop>{_STOP})(?P<trail>{_TRAIL})(?: ?$|(?={_REASON}))")
 _HOMOPHONE: Final = re.compile(
-    rf"^ (?:{_COURTESY} )*+(?P<stop>break(?: break)*)(?: (?:now|hard|please|break)(?= |$))*+ ?$"
+    rf"^ (?:{_COURTESY} )*+(?P<stop>break(?: break)*+)(?: (?:now|hard|please|break)(?= |$))*+ ?$"
 )
 _NEED: Final = re.compile(
     rf"^ (?:{_COURTESY} )*+(?:we|i) (?:really |just )?(?:must|should|have to|need to|have got to|got to|want to|better)"

@@ -418,7 +418,7 @@ def _read(
     return network(tokens[rows], words, (words != PAD).long())
 
 
-def take_over(answerer: CompactAnswerer, folder: Path) -> None:
+def inherit_weights(answerer: CompactAnswerer, folder: Path) -> None:
     """Take over the weights of a saved network, as far as names and shapes agree; the others stay as they are.
 
     What it knew of a view or of a class goes to the view or class of that name, wherever these have moved; a view that
@@ -483,7 +483,7 @@ def train_compact(
     network = CompactBevLlm(compact(recipe, words, of, tuple(train.now.shape[-2:])))
     answerer = CompactAnswerer(network, words, of, train.cameras, recipe.ablation)
     if begin is not None:
-        take_over(answerer, begin)
+        inherit_weights(answerer, begin)
     told: Watch = watch or _unwatched
     plain = {**asdict(recipe), "facets": json.dumps(of), "begin": str(begin or "")}
     how = Optimisation(decay=0.05, precision="float32")
