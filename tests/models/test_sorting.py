@@ -25,6 +25,7 @@ from chauffeur.models.sorting.sentences import Sentence, kinds_of, sentences
 from chauffeur.models.sorting.tables import WRITER, drawn
 from chauffeur.models.sorting.training import SortingRecipe, by_writer, right, train, write
 from chauffeur.models.sorting.weather import TEST_WRITERS, weather_sentences
+from chauffeur.planners.onboard import town_intents
 from chauffeur.planners.talk2drive import hints
 
 KINDS = ("fast", "slow")
@@ -44,7 +45,7 @@ MADE_UP = tuple(
 )
 
 
-@pytest.mark.parametrize("name", ["wishes", "remarks", "weather"])
+@pytest.mark.parametrize("name", ["wishes", "remarks", "town", "weather"])
 def test_the_tables_are_whole_and_every_kind_is_in_them(name: tables.Name) -> None:
     found = sentences(name)
     assert {one.kind for one in found} == set(kinds_of(name))
@@ -106,12 +107,13 @@ def test_what_cannot_be_is_not_learned_against() -> None:
 def test_what_ships_is_of_these_kinds() -> None:
     assert load_sorter(remarks.WEIGHTS).kinds == tuple(kinds_of("remarks"))
     assert load_sorter(hints.WEIGHTS).kinds == tuple(kinds_of("wishes"))
+    assert load_sorter(town_intents.WEIGHTS).kinds == tuple(kinds_of("town"))
     some = sentences("remarks")[::40]
     assert np.mean(right(load_sorter(remarks.WEIGHTS), some)) > 0.95
 
 
 def test_the_command_writes_sorters_and_their_card(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    names: tuple[tables.Name, ...] = ("wishes", "remarks", "weather")
+    names: tuple[tables.Name, ...] = ("wishes", "remarks", "town", "weather")
     some = {name: sentences(name)[::60] for name in names}
 
     def few(seed: int, without: Collection[str] = ()) -> tuple[Sentence, ...]:
@@ -125,7 +127,7 @@ def test_the_command_writes_sorters_and_their_card(monkeypatch: pytest.MonkeyPat
     card = (tmp_path / "made" / "CARD.md").read_text()
     assert "when their writer was left out" in card
     assert "| too_fast/bit |" in card and "only looks so" in card
-    for name in ("wishes", "weather"):
+    for name in ("wishes", "town", "weather"):
         assert load_sorter(tmp_path / "made" / f"{name}.npz").kinds == tuple(kinds_of(name))
 
 

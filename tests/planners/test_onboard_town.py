@@ -180,3 +180,73 @@ def test_a_place_is_driven_to(text: str, place: str) -> None:
     policy = planned(text).policy
     assert isinstance(policy, Parameters)
     assert policy.route == place
+
+
+STANDING = Situation("town", 0.0, 11.1, 1, 0, False, None, None, EVERY_WAY)
+
+
+def planned_at(situation: Situation, text: str) -> Plan:
+    request = PlanRequest(Instruction(text), Context("I am in a town.", situation), SystemMessage(""))
+    return asyncio.run(RetrievalPlanner().plan(request))
+
+
+@pytest.mark.parametrize(
+    "story",
+    [
+        "My neighbour used to turn left at every junction, what a character.",
+        "When we were kids we always stopped at the bakery on the way home.",
+        "Thank you, that was a lovely bit of driving just now.",
+    ],
+)
+def test_a_story_asks_for_nothing(story: str) -> None:
+    plan = planned(story)
+    assert plan.policy is None
+    assert not plan.offer or plan.intent == "ask"
+
+
+@pytest.mark.parametrize(
+    ("text", "route"),
+    [
+        ("I have to pick up a prescription, so the chemist's, please.", "pharmacy"),
+        ("Take me to the muse... sorry, no, the town hall.", "town hall"),
+        ("Train station please, but we go by the bakery first", "bakery"),
+        ("Run us over to school, lessons begin at quarter to nine.", "school"),
+    ],
+)
+def test_a_place_is_found_by_what_people_call_it(text: str, route: str) -> None:
+    plan = planned(text)
+    assert isinstance(plan.policy, Parameters), plan.refusal
+    assert plan.policy.route == route
+
+
+def test_where_there_is_no_place_it_asks_where() -> None:
+    assert "Name a place" in planned("Take us somewhere nice to eat.").refusal
+    assert "where you live" in planned("Let's go home now.").refusal
+
+
+@pytest.mark.parametrize(("text", "least", "most"), [("a bit slower, please", 8.0, 11.0), ("drive faster", 11.0, 11.2)])
+def test_a_change_of_speed_at_a_stand_is_measured_from_what_is_set_out_for(
+    text: str, least: float, most: float
+) -> None:
+    plan = planned_at(STANDING, text)
+    assert plan.policy is not None, plan.refusal
+    assert least <= dict(plan.settings)["target_speed_mps"] <= most
+
+
+@pytest.mark.parametrize("text", ["Wait here, do not drive off yet.", "Don't set off, her seat belt is not fastened."])
+def test_who_is_to_wait_stands(text: str) -> None:
+    source = source_of(planned(text))
+    assert "while True:\n        yield stop()" in source
+
+
+def test_a_turn_that_is_far_away_is_not_at_the_next_junction() -> None:
+    source = source_of(planned("In 300 metres turn right."))
+    order = ["drive_on(260)", 'if can_go("right")', "turn_right_at_next_intersection()"]
+    assert sorted(order, key=source.index) == order
+
+
+def test_what_is_not_sure_is_asked_and_a_yes_drives_it() -> None:
+    plan = planned("The old fellow would have gone left at this point.")
+    assert plan.policy is None
+    if plan.offer:
+        assert planned(plan.offer).policy is not None

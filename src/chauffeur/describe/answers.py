@@ -87,7 +87,12 @@ _TOPICS: Final[tuple[tuple[re.Pattern[str], Callable[[Situation], str]], ...]] =
         ((r"\b(?:weather|raining|rain|snowing|foggy|forecast)\b(?! tomorrow)",), _of_scene("weather")),
         ((r"\btraffic (?:like|ahead|rules?)\b|\btraffic$",), _of_scene("traffic")),
         (
-            (r"\b(?:which|what) (?:road|street|highway|motorway) (?:is this|are we|am i)\b", r"^where are we\b"),
+            (
+                r"\b(?:which|what) (?:road|street|highway|motorway) (?:is this|are we|am i)\b",
+                r"^where are we\b",
+                r"\b(?:whats?|what is) (?:this|the name of (?:this|the)) (?:road|street)\b",
+                r"\b(?:road|street) (?:name|called)\b|\bhow (?:it is|is it|is this (?:road|street)) called\b",
+            ),
             _of_scene("road"),
         ),
         (

@@ -37,7 +37,8 @@ def describe_town(observation: Observation) -> Context:
     lanes = [one for one in own_direction(observation) if not one.emergency]  # a town's are the strip along the kerb
     route = () if observation.route is None else observation.route.lanes
     turns = turns_ahead(observation.road, lane.id, route)
-    situation = replace(situation_of(observation, turns), lane_count=len(lanes), emergency_lane=False)
+    scene = (("road", f"This is {lane.street}."),) if lane.street else ()
+    situation = replace(situation_of(observation, turns), lane_count=len(lanes), emergency_lane=False, scene=scene)
     where = "crossing a junction" if lane.junction else f"in the {ordinal(situation.lane_index + 1)} lane from the left"
     of_street = f" of {lane.street}" if lane.street else ""
     of = "" if lane.junction else f" of {len(lanes)}"

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from chauffeur.concept import Plan, PlanRequest, Thoughts
 from chauffeur.describe.answers import DONT_KNOW, answer_to, asks_to_know
-from chauffeur.planners.base import Planner, declined
+from chauffeur.planners.base import NO_WISH, Planner, declined
 
 ANSWERED = "answer"
 """The intent of a plan that answers a question and drives nothing."""
@@ -28,6 +28,6 @@ async def plan_or_answer(planner: Planner, request: PlanRequest) -> Plan:
     if said:
         return declined(planner, said, begun, intent=ANSWERED)
     plan = await planner.plan(request)
-    if plan.policy is None and not plan.offer and asks_to_know(words):
+    if plan.policy is None and not plan.offer and plan.intent != NO_WISH and asks_to_know(words):
         return replace(plan, thoughts=Thoughts(DONT_KNOW), refusal=DONT_KNOW, intent=ANSWERED)
     return plan

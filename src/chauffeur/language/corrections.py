@@ -14,7 +14,7 @@ _VERBS: Final = (
 )
 _TAKES_BACK: Final = re.compile(
     rf"(?<=\w)[\s,.;…-]+(?:"
-    r"no,? wait|wait,? no|no,? no|scratch that|strike that|forget (?:it|that|what i said)|never ?mind(?: that)?|"
+    r"no,? wait|wait,? no|no,? no|(?:scratch|scrap|strike) that|forget (?:it|that|what i said)|never ?mind(?: that)?|"
     r"actually,? (?:no|don't|do not)|i said it wrong|not that|correction"
     rf")\b(?:[\s,.;:…-]+(?:sorry|uh|um|hmm|no|actually|rather|i mean|i meant|scratch that|strike that)){{0,4}}"
     rf"[,.;:…-]+\s*(?=\w)|(?<=\w)\s*[,.;…-]+\s*(?:(?:uh|um|oh|no|wait)[\s,]+){{0,4}}"

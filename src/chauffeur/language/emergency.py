@@ -313,7 +313,8 @@ _SAFE: Final = re.compile(
 _GRAVE: Final = re.compile(
     r"\b(?:(?:there is|i (?:can )?(?:see|smell)|(?:see|smell)s?(?: like| of)?|is that|lots? of|so much|black|white"
     r"|filling with|full of)"
-    r" (?:\w+ )?(?:smoke|flames|burning|gas|petrol|fuel)|smoke (?:is|in|from|under|out|coming|everywhere|inside|behind)"
+    r" (?:\w+ )?(?:smoke|flames|burning|(?:gas|petrol|fuel)(?! (?:stations?|pumps?|prices?)))"
+    r"|smoke (?:is|in|from|under|out|coming|everywhere|inside|behind)"
     r"|(?:smell|smells|smelling|smelled) (?:of |like )?(?:\w+ )?(?:burning|burnt|smoke|fire|gas|petrol|fuel)"
     r"|burning smell|smell of fire|flames (?:are|coming|from|out|in|under)"
     r"|fire smell|on fire|caught fire|catching fire|(?:there is|a) fire (?:in|under|inside|here)|(?:something|engine"

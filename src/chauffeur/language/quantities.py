@@ -27,6 +27,7 @@ TENS: Final = ("twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty
 _ONES = {word: float(value) for value, word in enumerate(ONES)}
 _TENS = {word: 10.0 * (2 + k) for k, word in enumerate(TENS)}
 _TENS["fourty"] = 40.0
+_SHARES = {"half": 0.5, "quarter": 0.25}
 _VAGUE = {"couple": 2.0, "few": 3.0, "several": 4.0, "dozen": 12.0}
 """Counts people use loosely; the plan says which number it took."""
 
@@ -77,7 +78,7 @@ _EXTRA = ("more", "extra", "additional", "further", "full", "whole", "less", "fe
 _ONE_MEANS_UNIT = ("second", "sec", "car", "carlength", "meter", "metre", "foot", "yard", "mile", "lane", "kilometer")
 
 _COUNTS = re.compile(
-    rf"\d|{'|'.join((*_ONES, *_TENS, *_VAGUE, 'half', 'hundred'))}"
+    rf"\d|{'|'.join((*_ONES, *_TENS, *_VAGUE, *_SHARES, 'hundred'))}"
     rf"|an?(?:[^a-z]+s)*[^a-z]+(?:{'|'.join(_ONE_MEANS_UNIT)})"
 )
 """Found in every lower-case ASCII text in which there is a number, and in some others."""
@@ -197,8 +198,8 @@ def _number(tokens: list[str], i: int) -> tuple[float, int, bool] | None:
     value = _digits(word)
     if value is not None:
         return _tail(tokens, value, i + 1, sure=True)
-    if word == "half" and i + 1 < len(tokens) and tokens[i + 1] in ("a", "an", "of"):
-        return 0.5, i + 1, False
+    if word in _SHARES and i + 1 < len(tokens):
+        return _share(tokens, i)
     if word in ("a", "an") and i + 1 < len(tokens):
         return _after_article(tokens, i)
     if word in _VAGUE:
@@ -214,9 +215,21 @@ def _number(tokens: list[str], i: int) -> tuple[float, int, bool] | None:
     return _tail(tokens, value, j, sure=not (word == "one" and j == i + 1))
 
 
+def _share(tokens: list[str], i: int) -> tuple[float, int, bool] | None:
+    """Parts of a unit: half a mile, a quarter of a mile, another quarter mile."""
+    after = tokens[i + 1]
+    if tokens[i] == "half" and after in ("a", "an", "of"):
+        return _SHARES[tokens[i]], i + 1, False
+    if after == "of" and tokens[i + 2 : i + 3] in (["a"], ["an"]):
+        return _SHARES[tokens[i]], i + 2, False
+    return (_SHARES[tokens[i]], i + 1, False) if unit_of(tokens, i + 1) is not None else None
+
+
 def _after_article(tokens: list[str], i: int) -> tuple[float, int, bool] | None:
     """Numbers that begin with "a": a hundred, a couple of, a second."""
     following = tokens[i + 1]
+    if following in _SHARES and i + 2 < len(tokens):
+        return _share(tokens, i + 1)
     if following in _VAGUE:
         return _VAGUE[following], i + 2, False
     if following == "hundred":

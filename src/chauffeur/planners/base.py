@@ -5,10 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, runtime_checkable
 
 from chauffeur.concept import Plan, PlanRequest, Thoughts, Usage
 from chauffeur.planners.prompts import Message
+
+NO_WISH: Final = "none"
+"""The intent of a plan that drives nothing because words hold nothing for the driver: a story, praise, small talk."""
 
 OnText = Callable[[str, int], None]
 """Gets each piece of a reply, and the number of the request it belongs to: a new number means: start over."""

@@ -1,7 +1,8 @@
-"""From the sentences to the three sorters that ship, with their cards.
+"""From the sentences to the four sorters that ship, with their cards.
 
 folder/wishes.npz     for `chauffeur.planners.talk2drive`
 folder/remarks.npz    for `chauffeur.memory`
+folder/town.npz       for `chauffeur.planners.onboard`, in towns
 folder/weather.npz    for `chauffeur.language`
 folder/CARD.md        data and models: how many sentences, how well writers never learned from are sorted
 """
@@ -27,8 +28,8 @@ from chauffeur.models.sorting.weather import TEST_WRITERS, WeatherFigures, weath
 Told = Callable[[str, int, int], None]
 """Is told a stage, how much of it is done, and of how much."""
 
-VERSION: Final = "sorters-v4"
-NAMES: Final[tuple[Name, ...]] = ("wishes", "remarks")
+VERSION: Final = "sorters-v5"
+NAMES: Final[tuple[Name, ...]] = ("wishes", "remarks", "town")
 """Those that are measured on each writer in turn; weather is composed, and measured on six."""
 
 
@@ -144,20 +145,21 @@ def _unheard(figures: Figures) -> str:
 
 _HEAD: Final = """# Data and model card: {version}
 
-Three sorters of short English sentences: what a passenger is after who only hints at it (for the `talk2drive`
-planner), what a remark after a drive says (for feedback), and what is said of weather or road (for the `vlm` planner).
+Four sorters of short English sentences: what a passenger is after who only hints at it (for the `talk2drive`
+planner), what a remark after a drive says (for feedback), what a passenger in a town is after (for the on-board
+planners), and what is said of weather or road (for the `vlm` planner).
 Softmax regression over hashed words, pairs of words, negated words and parts of words; int8 weights, {epochs} epochs,
 seed {seed}. `chauffeur model train sorters --out DIR` makes the same files again from the tables in `data/sorters`.
 
 - **Data**: written for this repository by writers (large language models) who were told the situation and what a
   passenger has in mind, and nothing of the planner, its tables, or the words it is measured on; three writers are the
   planner's developers: j and k (the tuning half of the simulated passengers) with older development data, bb with plain
-  sentences that had been misread. Nobody's own words are in it. To the wishes, sentences of the on-board model's tables
-  are added ({tables:,}), half of them of kinds no hint is sorted as. One label a sentence: what is vague by nature
-  has the label it was written for.
+  sentences that had been misread. The 20 people of the town's sentences are four writers playing five each, who knew
+  the kinds and nothing else; a 21st is `describe.navigation`, which composes. Nobody's own words are in it. To the
+  wishes, sentences of the on-board model's tables are added ({tables:,}), half of them of kinds no hint is sorted as.
+  One label a sentence: what is vague by nature has the label it was written for.
 - **Meant for** reading hints behind the refusal of dangerous wishes, and before all checks: a hint becomes an ordinary
   wish, never more. Feedback that known phrases read is left as they read it, but where this is sure of another thing.
-- **Not for** other languages, longer texts, roads other than highways, junctions and parking lots, or deciding anything
-  about a person.
+- **Not for** other languages, longer texts, other roads than each was made for, or deciding anything about a person.
 - **Licence**: that of the repository.
 """

@@ -2,8 +2,9 @@
 
 Tables in `data/sorters`, one sentence a line: label, sentence, writer, parted by tabs. A label of `wishes.tsv` is a
 world, what is wished for and how directly (I asks, II remarks on the road, III only hints; `highway/pass/II`); one of
-`remarks.tsv` what the drive was blamed or praised for, and how strongly (`too_fast/bit`); one of `weather.tsv` what a
-sentence of `wishes.tsv` says of the weather or the road, or that it says nothing of them though its words look so.
+`remarks.tsv` what the drive was blamed or praised for, and how strongly (`too_fast/bit`); one of `town.tsv` what a
+passenger in a town is after; one of `weather.tsv` what a sentence of `wishes.tsv` says of the weather or the road, or
+that it says nothing of them though its words look so.
 """
 
 from __future__ import annotations
@@ -16,9 +17,10 @@ from chauffeur.concept import DataError
 from chauffeur.concept.data import read_data
 from chauffeur.language.weather import SAID_WEATHERS
 from chauffeur.memory.remarks import REMARK_KINDS
+from chauffeur.planners.onboard.town_intents import TOWN_INTENTS
 from chauffeur.planners.talk2drive.hints import HINT_KINDS
 
-Name = Literal["wishes", "remarks", "weather"]
+Name = Literal["wishes", "remarks", "town", "weather"]
 
 _WORLDS: Final[Mapping[str, str]] = {"highway": "highway", "crossing": "intersection", "lot": "parking"}
 _MOODS: Final[Mapping[tuple[str, str], str]] = {
@@ -69,6 +71,8 @@ def kinds_of(name: Name) -> Sequence[str]:
     """What a sorter can find, in the order of its numbers."""
     if name == "remarks":
         return REMARK_KINDS
+    if name == "town":
+        return TOWN_INTENTS
     if name == "weather":
         return SAID_WEATHERS
     return tuple(dict.fromkeys(kind for each in HINT_KINDS.values() for kind in each))

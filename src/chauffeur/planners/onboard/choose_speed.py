@@ -44,7 +44,9 @@ _WARY: tuple[float, float, str] = (
 def choose_speed(meaning: Meaning, options: Options) -> Chosen | Declined:
     """Exemplar for a wish about speed."""
     if meaning.variant == "hold" or (meaning.change == 0 and meaning.amount is None and not meaning.variant):
-        return _chosen(meaning, options, "speed.hold", options.speed, f"keep our {speed_words(options.speed)}")
+        return _chosen(
+            meaning, options, "speed.hold", options.cruise_mps, f"keep our {speed_words(options.cruise_mps)}"
+        )
     if meaning.variant == "limit":
         return _limit(meaning, options)
     if meaning.variant == "match":
@@ -68,19 +70,19 @@ def _named(meaning: Meaning, amount: Amount, options: Options) -> Chosen | Decli
     if amount.bound == "at_least":
         return _chosen(meaning, options, "speed.floor", value, f"stay at or above {speed_words(value)}", assumed)
     if amount.frame == "factor":
-        target = value * options.speed
+        target = value * options.cruise_mps
         does = f"drive at {number(value)} times our speed, about {speed_words(target)}"
         return _chosen(meaning, options, "speed.multiply", target, does, assumed, factor=value)
     if amount.frame == "relative":
         if meaning.change == 0:
             return Declined(f"By {amount.said}: faster or slower?")
-        target = options.speed + meaning.change * value
+        target = options.cruise_mps + meaning.change * value
         if target < 0:
-            return Declined(f"We drive {speed_words(options.speed)}; we cannot go {amount.said} slower than that.")
+            return Declined(f"We drive {speed_words(options.cruise_mps)}; we cannot go {amount.said} slower than that.")
         way = ("speed.up_by", "speed up") if meaning.change > 0 else ("speed.down_by", "slow down")
         does = f"{way[1]} by {number(value)} m/s, to about {speed_words(target)}, and hold it"
         return _chosen(meaning, options, way[0], target, does, assumed, delta_mps=value)
-    if value >= options.speed:
+    if value >= options.cruise_mps:
         return _chosen(
             meaning, options, "speed.set_up", value, f"speed up to {speed_words(value)} and hold it", assumed
         )
@@ -114,27 +116,31 @@ def _match(meaning: Meaning, options: Options) -> Chosen:
 
 def _step(meaning: Meaning, options: Options) -> Chosen | Declined:
     """A change without a number: a step of the planner's own, inside the sign and above a crawl."""
-    scale = max(0.3, min(1.0, options.speed / 25.0))
+    scale = max(0.3, min(1.0, options.cruise_mps / 25.0))
     step = _STEP_MPS.get(meaning.degree, _PLAIN_STEP_MPS) * scale
     leaning = options.leaning.speed_mps
     name = {BIT: "_bit", MUCH: "_much"}.get(meaning.degree, "")
     amount = {BIT: "a little ", MUCH: "a lot "}.get(meaning.degree, "")
+    if meaning.change > 0 and options.speed < options.cruise_mps:  # we stand: faster than that is to set out
+        does = f"set out for what is allowed, {speed_words(options.own_cap_mps)}"
+        return _chosen(meaning, options, f"speed.up{name}", options.own_cap_mps, does)
     if meaning.change > 0:
-        target = min(options.speed + max(_FELT_MPS, step + leaning), options.own_cap_mps)
-        if target < options.speed + 0.3:
+        target = min(options.cruise_mps + max(_FELT_MPS, step + leaning), options.own_cap_mps)
+        if target < options.cruise_mps + 0.3:
             return Declined(
-                f"We already drive {speed_words(options.speed)}, and {speed_words(options.own_cap_mps)} is what is "
-                "allowed here. I do not go above that by myself; name a speed if you want another."
+                f"We already drive {speed_words(options.cruise_mps)}, and {speed_words(options.own_cap_mps)} is what "
+                "is allowed here. I do not go above that by myself; name a speed if you want another."
             )
-        does = f"go {amount}faster, from {number(options.speed)} to {speed_words(target)}"
+        does = f"go {amount}faster, from {number(options.cruise_mps)} to {speed_words(target)}"
         return _chosen(meaning, options, f"speed.up{name}", target, does)
     slowest = _SLOWEST_SHARE * options.sign_mps
-    target = max(options.speed - max(0.5, step - leaning), min(slowest, options.speed))
-    if target > options.speed - 0.3:
+    target = max(options.cruise_mps - max(0.5, step - leaning), min(slowest, options.cruise_mps))
+    if target > options.cruise_mps - 0.3:
         return Declined(
-            f"We only drive {speed_words(options.speed)}; any slower and we are in the way of others. Shall I stop?"
+            f"We only drive {speed_words(options.cruise_mps)}; any slower and we are in the way of others. "
+            "Shall I stop?"
         )
-    does = f"go {amount}slower, from {number(options.speed)} to {speed_words(target)}"
+    does = f"go {amount}slower, from {number(options.cruise_mps)} to {speed_words(target)}"
     return _chosen(meaning, options, f"speed.down{name}", target, does)
 
 
@@ -143,12 +149,12 @@ def choose_style(meaning: Meaning, options: Options) -> Chosen | Declined:
     share, headway, words = _STYLES[meaning.variant]
     if options.wary and PACES[meaning.variant] > 0:
         share, headway, words = _WARY
-    wanted = options.speed * share + options.leaning.speed_mps
+    wanted = options.cruise_mps * share + options.leaning.speed_mps
     if share > 1.0:
         target = min(wanted, options.own_cap_mps)  # in a hurry at the limit already, the gap is all that can be gained
     else:
         target = min(max(wanted, _SLOWEST_SHARE * options.sign_mps), options.own_cap_mps)
-    target = within_mood(target, PACES[meaning.variant], options.speed, options.cap_mps)
+    target = within_mood(target, PACES[meaning.variant], options.cruise_mps, options.cap_mps)
     headway = min(options.headway(headway + options.leaning.headway_s), API_MAX_HEADWAY_S)
     headway = max(headway, options.headway(0.8))
     does = f"{words}: {speed_words(target)} and {number(headway)} s behind others"
@@ -159,8 +165,8 @@ def choose_resume(meaning: Meaning, options: Options) -> Chosen | Declined:
     """Exemplar for leaving things as they are, or driving normally again."""
     headway = options.headway(USUAL_HEADWAY_S)
     if meaning.manoeuvre == "keep" or meaning.variant == "hold":
-        does = f"change nothing: this lane, at our {speed_words(options.speed)}"
-        return _chosen(meaning, options, "keep.as_is", options.speed, does)
+        does = f"change nothing: this lane, at our {speed_words(options.cruise_mps)}"
+        return _chosen(meaning, options, "keep.as_is", options.cruise_mps, does)
     does = f"drive normally: at the limit of {speed_words(options.own_cap_mps)}, {number(headway)} s behind others"
     return _chosen(meaning, options, "resume.normal", options.own_cap_mps, does, headway=headway)
 

@@ -29,7 +29,7 @@ from chauffeur.planners.onboard.prompt import history_words, prompt
 from chauffeur.planners.onboard.quoted_numbers import named, taken_over, unnamed
 from chauffeur.planners.onboard.reply import OnboardReply, read_reply
 from chauffeur.planners.onboard.thoughts import thoughts_of
-from chauffeur.planners.onboard.town import plan_in_town
+from chauffeur.planners.onboard.town import asked_plainly, plan_in_town
 from chauffeur.planners.onboard.understand import meanings_said
 
 SHIPPED: Final = Path(__file__).parent / "weights"
@@ -222,6 +222,13 @@ class LanguageModelPlanner:
             return await EmbeddedParameters(self).plan(request)
         if (told := plan_in_town(self, request)) is not None:
             return told
+        plan = self._in_words(request, begun)
+        if (plainly := asked_plainly(request, plan)) is not None:
+            return self._in_words(plainly, begun)
+        return plan
+
+    def _in_words(self, request: PlanRequest, begun: float) -> Plan:
+        """The plan that the network writes."""
         settled = self.settle(request, begun)
         if isinstance(settled, Plan):
             return settled

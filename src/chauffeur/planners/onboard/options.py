@@ -12,12 +12,15 @@ from chauffeur.planners.onboard.exemplars import Filled
 from chauffeur.planners.onboard.exemplars.library import number
 from chauffeur.planners.onboard.meaning import Amount, Change
 from chauffeur.planners.onboard.personal import Leaning
+from chauffeur.programs.catalogue import vocabulary_of
 
 USUAL_HEADWAY_S = 1.5
 """Time headway the car keeps when nobody asked for another."""
 
 API_MAX_HEADWAY_S = 2.0
 """Largest time headway the driving APIs keep."""
+
+_STANDING_MPS = 0.5
 
 SAFE_HEADWAY_S = 0.8
 """Smallest headway the planner chooses by itself while it follows, however low the limits are."""
@@ -90,6 +93,13 @@ class Options:
     def speed(self) -> float:
         """Speed now, m/s."""
         return self.situation.speed_mps
+
+    @property
+    def cruise_mps(self) -> float:
+        """Speed that a change is measured from, m/s: the present one; in a town, where a car stands every other minute,
+        what it sets out for from there."""
+        stands = self.speed < _STANDING_MPS and vocabulary_of(self.situation.world) == "town"
+        return self.own_cap_mps if stands else self.speed
 
     @property
     def sign_mps(self) -> float:

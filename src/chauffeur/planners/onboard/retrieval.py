@@ -16,7 +16,7 @@ from chauffeur.planners.onboard.meaning import NotUnderstood
 from chauffeur.planners.onboard.options import Declined
 from chauffeur.planners.onboard.personal import corrections_of, leaning_of
 from chauffeur.planners.onboard.thoughts import thoughts_of
-from chauffeur.planners.onboard.town import plan_in_town
+from chauffeur.planners.onboard.town import asked_plainly, plan_in_town
 from chauffeur.planners.onboard.understand import understand
 
 VERSION = "meaning-v2"
@@ -48,6 +48,13 @@ class RetrievalPlanner:
         begun = time.perf_counter()
         if (told := plan_in_town(self, request)) is not None:
             return told
+        plan = self._by_rules(request, begun)
+        if (plainly := asked_plainly(request, plan)) is not None:
+            return self._by_rules(plainly, begun)
+        return plan
+
+    def _by_rules(self, request: PlanRequest, begun: float) -> Plan:
+        """The plan that the rules find."""
         ready = Wish.of(self, request.instruction, begun)
         if ready.declined is not None and not danger(request.instruction.text):
             return ready.declined

@@ -84,6 +84,7 @@ _CHANGE_LEAST_M: Final = 14.0
 _CHANGE_S: Final = 3.5
 _ROOM_M: Final = 12.0
 """Who has to change lanes waits for a gap so far before the lane's end, where there is room left to do it."""
+_LANE_BESIDE_M: Final = 5.0
 _HERE_M: Final = 3.0
 _LOST_M: Final = 3.0
 _EVERY: Final = 2
@@ -373,7 +374,8 @@ class TownDriver:
         """Begin or end a change of lanes."""
         ego, stretch = seen.ego, self._stretch
         if self._changing_to is not None:
-            if self._station > self._changing_to:
+            waits = ego.speed_mps < _STANDING_MPS and stretch.end_m - self._station - self._nose_m < _ROOM_M + _HERE_M
+            if self._station > self._changing_to or waits:  # who waits for the next change ends this one where it is
                 self._changing_to = None
             return
         at, lane = stretch.lane_at(self._station + self._nose_m)
@@ -637,9 +639,10 @@ class TownDriver:
             ahead, aside = here.sees(other.x_m, other.y_m)
             if ahead * ahead + aside * aside > (reach + 10.0 + _COMING_S * other.speed_mps) ** 2:
                 continue
-            behind = ahead < -(ego.length_m + other.length_m) / 2.0 and abs(aside) < 2.2
+            beside = 2.2 if self._changing_to is None else _LANE_BESIDE_M
+            behind = ahead < -(ego.length_m + other.length_m) / 2.0 and abs(aside) < beside
             if behind and math.cos(other.heading_rad - ego.heading_rad) > 0.7:
-                continue  # who follows minds us
+                continue  # who follows minds us; so does who comes up in the lane that is changed into
             if own is not None and other.speed_mps < 0.15 and ahead < -ego.length_m:
                 continue
             around.append(other)

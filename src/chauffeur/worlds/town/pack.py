@@ -155,6 +155,21 @@ class Place:
 
 
 _ARTICLES: Final = re.compile(r"^(?:the|a|an|my|our)\s+")
+PLACE_WORDS: Final[Mapping[str, tuple[str, ...]]] = {
+    "church": ("chapel", "cathedral", "kirk"),
+    "station": ("train station", "railway station", "trains"),
+    "school": ("primary", "kindergarten"),
+    "bakery": ("baker", "baker's", "bakers"),
+    "town_hall": ("city hall", "town council"),
+    "hospital": ("clinic", "emergency room", "a and e", "accident and emergency", "er"),
+    "pharmacy": ("chemist", "chemist's", "chemists", "drugstore", "drug store"),
+    "supermarket": ("grocery store", "grocery", "groceries", "grocer", "food shop"),
+    "hotel": ("inn", "guest house", "guesthouse"),
+    "museum": ("gallery",),
+    "post_office": ("post",),
+    "bus_stop": ("bus station",),
+}
+"""What else people call a kind of place."""
 
 
 def places_called(places: Sequence[Place], name: str) -> tuple[Place, ...]:

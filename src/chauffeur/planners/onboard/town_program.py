@@ -1,0 +1,135 @@
+"""Driving programs for the steps of an instruction in a town: a learned one as it is, or several put together."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Final
+
+from chauffeur.planners.onboard.town_steps import LANE_CHANGES, WORDS, TownStep
+
+_STOPS_BEFORE_M: Final = 12.0
+_ANNOUNCED_M: Final = 40.0
+"""From so far before the place that is said on, the next junction is the one that is meant."""
+
+
+def program_of(steps: Sequence[TownStep]) -> str:
+    """A learned program as it is, or several steps as one program."""
+    first = steps[0].recalled
+    if first is not None and all(step.plain for step in steps):
+        return first.entry.source  # navigation says the rest again when this is done
+    body: list[str] = []
+    for step in steps:
+        if step.place:
+            name = re.sub(r"[^\w'. -]", "", step.place)[:40].replace('"', "")
+            body += [
+                f'    if get_distance_to_place("{name}") < 0:',
+                f'        say("I do not find {name} ahead on this way, so I go straight on.")',
+                "        yield proceed(check_speed_limit())",
+                "        return",
+                "    for _ in range(12000):",
+                f'        if get_distance_to_place("{name}") < 0:',
+                "            break",
+                "        yield proceed(check_speed_limit())",
+            ]
+        if step.after_m is not None:
+            near = step.after_m - _ANNOUNCED_M if step.turn else step.after_m
+            body += [f"    yield from drive_on({near:.0f})"]
+        if step.before_junction:
+            body += [
+                "    for _ in range(12000):",
+                f"        if get_distance_to_junction() < {_STOPS_BEFORE_M}:",
+                "            break",
+                "        yield proceed(check_speed_limit())",
+            ]
+        if step.waits:
+            body += [
+                '    say("I wait here. Tell me when to go on.")',
+                "    while True:",
+                "        yield stop()",
+            ]
+            break
+        if step.out:
+            body += [
+                '    say("I stop here. Please look round before you get out.")',
+                "    for _ in range(200):",
+                "        yield stop()",
+            ]
+            break
+        if step.recalled is None:
+            if step.after_m is None:
+                body += ["    while True:", "        yield proceed(check_speed_limit())"]
+                break
+            continue
+        if step.nth > 1:
+            body += [
+                f"    for _ in range({step.nth - 1}):",
+                f'        yield from pass_a_way("{step.turn}")',
+            ]
+        if step.turn and not step.plain:  # the first junction from there on that leads so
+            body += [
+                "    for _ in range(12000):",
+                f'        if can_go("{step.turn}"):',
+                "            break",
+                "        yield proceed(check_speed_limit())",
+            ]
+        if step.turn:
+            verb = "go_straight" if step.turn == "straight" else f"turn_{step.turn}"
+            body += [
+                f'    if not can_go("{step.turn}"):',
+                f'        say("No way leads {WORDS[step.turn]} at the next junction, so I go straight on.")',
+                "        yield proceed(check_speed_limit())",
+                "        return",
+                f"    {verb}_at_next_intersection()",
+                "    yield from cross_the_junction()",
+            ]
+        else:
+            lane = next((name for name in LANE_CHANGES if name in step.calls), "")
+            body += [f"    {lane}()"] if lane else []
+            body += ["    for _ in range(100):", "        yield proceed(check_speed_limit())"]
+    helpers = [
+        *([_CROSSING] if any(step.turn for step in steps) else []),
+        *([_PASSING] if any(step.nth > 1 for step in steps) else []),
+        *([_FAR] if any(step.after_m is not None for step in steps) else []),
+    ]
+    return "\n".join(["".join(helpers), "def as_told():", *body, ""]).lstrip("\n")
+
+
+_CROSSING: Final = """def cross_the_junction():
+    last = get_distance_to_junction()
+    for _ in range(12000):
+        now = get_distance_to_junction()
+        if now > last + 10:
+            break
+        last = now
+        yield proceed(check_speed_limit())
+    gone = 0.0
+    for _ in range(12000):
+        gone = gone + 0.05 * get_speed_of(get_ego_vehicle())
+        if gone > 40.0:
+            break
+        yield proceed(check_speed_limit())
+
+
+"""
+_PASSING: Final = """def pass_a_way(side):
+    counted = can_go(side)
+    yield from cross_the_junction()
+    for _ in range(8):
+        if counted:
+            break
+        counted = can_go(side)
+        yield from cross_the_junction()
+
+
+"""
+_FAR: Final = """def drive_on(far):
+    gone = 0.0
+    for _ in range(12000):
+        gone = gone + 0.05 * get_speed_of(get_ego_vehicle())
+        if gone > far:
+            break
+        yield proceed(check_speed_limit())
+
+
+"""
