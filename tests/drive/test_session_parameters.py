@@ -8,7 +8,7 @@ import pytest
 
 from chauffeur.bench.referees import referee_for
 from chauffeur.cli.replay import drive_again
-from chauffeur.concept import Instruction, Limits, Parameters
+from chauffeur.concept import Instruction, Limits, Parameters, Plan, PlanRequest, Thoughts
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import Session
@@ -53,3 +53,29 @@ def test_a_turn_where_there_is_none_is_refused_by_the_checks(planner: Planner) -
     recorded = driven(planner, "Turn left.", "cruise")
     assert recorded.trip.outcome == "refused"
     assert recorded.frames == ()
+
+
+def test_a_way_in_a_town_is_done_when_it_is_taken(planner: Planner) -> None:
+    pytest.importorskip("libsumo")
+    recorded = driven(planner, "Turn left at the next light.", "town")
+    assert recorded.trip.outcome == "success"
+    assert recorded.final is not None
+    assert recorded.final.time_s < 120.0
+
+
+def test_a_stop_in_a_town_is_done_when_the_car_stands() -> None:
+    pytest.importorskip("libsumo")
+    recorded = driven(Standing(), "Wait here.", "town")
+    assert recorded.trip.outcome == "success"
+    assert recorded.final is not None
+    assert recorded.final.ego.speed_mps < 0.1
+
+
+class Standing:
+    """A planner that stops, whatever is said."""
+
+    id, model = "standing", ""
+
+    async def plan(self, request: PlanRequest) -> Plan:
+        del request
+        return Plan(Thoughts("I stop."), Parameters(0.0, 12.0, 2.0, 0, ""), intent="stop", planner=self.id)
