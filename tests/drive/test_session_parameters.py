@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 
 import pytest
 
 from chauffeur.bench.referees import referee_for
 from chauffeur.cli.replay import drive_again
 from chauffeur.concept import Instruction, Limits, Parameters, Plan, PlanRequest, Thoughts
-from chauffeur.drive.recording import RecordedTrip
+from chauffeur.drive import recording
+from chauffeur.drive.recording import RecordedTrip, write_trip
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import Session
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
+from chauffeur.worlds.town.driver import TOWN_CAPABILITIES
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +72,15 @@ def test_a_stop_in_a_town_is_done_when_the_car_stands() -> None:
     assert recorded.trip.outcome == "success"
     assert recorded.final is not None
     assert recorded.final.ego.speed_mps < 0.1
+
+
+def test_the_longest_drive_through_a_town_can_be_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("libsumo")
+    recorded = driven(Standing(), "Wait here.", "town")
+    of_all = len(recorded.frames) * 0.05 / TOWN_CAPABILITIES.horizon_s
+    for bound in ("_MAX_VALUES", "_MAX_UNPACKED_BYTES", "_MAX_BYTES"):
+        monkeypatch.setattr(recording, bound, int(getattr(recording, bound) * of_all))
+    write_trip(tmp_path / "trip.mcap", recorded.trip, recorded.frames, recorded.scenario, final=recorded.final)
 
 
 class Standing:
