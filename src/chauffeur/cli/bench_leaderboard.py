@@ -68,7 +68,8 @@ def leaderboard(
         int | None, typer.Option(min=1, help="Worker processes; default one per core.", rich_help_panel=_WHERE)
     ] = None,
     shard: Annotated[
-        str | None, typer.Option(help="Only part i of n, as for `bench lampilot`.", rich_help_panel=_WHERE)
+        str | None,
+        typer.Option(help="Only part i of n; without it, what shards have done is taken over.", rich_help_panel=_WHERE),
     ] = None,
     ray: Annotated[
         str | None, typer.Option(help="Work on a Ray cluster, as for `bench lampilot`.", rich_help_panel=_WHERE)
