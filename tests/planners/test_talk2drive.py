@@ -174,6 +174,10 @@ def test_in_a_town_it_takes_the_way_that_is_meant(embedded: Planner, wish: str, 
     assert parameters(planned(embedded, wish, TOWN)).route == way
 
 
+def test_in_a_town_it_stops_to_let_people_out(embedded: Planner) -> None:
+    assert parameters(planned(embedded, "Let me out here, please.", TOWN)).target_speed_mps == 0.0
+
+
 @pytest.mark.parametrize(
     "wish", ["Turn right after the church and let me out.", "Take the second left.", "Turn left, then right."]
 )

@@ -145,7 +145,7 @@ class EmbeddedParameters:
                 return self._take_to(place, request, begun)
             if later := _later(steps):
                 return declined(self, later, begun)
-            if plainly := _turn_words(steps):  # "turn right" is read as a change of the lane on other roads
+            if plainly := _plain_words(steps):  # on other roads "turn right" may be a change of the lane
                 request = replace(request, instruction=replace(request.instruction, text=plainly))
         settled = self._model.settle(_compared(request), begun)
         reads = () if isinstance(settled, Plan) else tuple(map(kind_of, settled.linked.choice.intent.split("+")))
@@ -437,9 +437,13 @@ def _later(steps: Sequence[TownStep]) -> str:
     return _AT_ONCE if bound else ""
 
 
-def _turn_words(steps: Sequence[TownStep]) -> str:
-    """A turn through a town in words that are read as nothing else; empty where it is none."""
-    return f"Turn {steps[0].turn} at the next junction." if steps and steps[0].turn in ("left", "right") else ""
+def _plain_words(steps: Sequence[TownStep]) -> str:
+    """A turn, or a stop to get out, in words that are read as nothing else; empty where it is neither."""
+    if not steps:
+        return ""
+    if steps[0].out:
+        return "Stop the car."
+    return f"Turn {steps[0].turn} at the next junction." if steps[0].turn in ("left", "right") else ""
 
 
 def _sideways(step: Chosen) -> bool:
