@@ -9,7 +9,7 @@ import pytest
 
 from chauffeur.bench.referees import referee_for
 from chauffeur.cli.replay import drive_again
-from chauffeur.concept import Instruction, Limits, Parameters, Plan, PlanRequest, Thoughts
+from chauffeur.concept import ChauffeurError, Instruction, Limits, Parameters, Plan, PlanRequest, Thoughts
 from chauffeur.drive import recording
 from chauffeur.drive.recording import RecordedTrip, write_trip
 from chauffeur.drive.scenarios import find
@@ -17,6 +17,7 @@ from chauffeur.drive.session import Session
 from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES
+from chauffeur.worlds.town.sumo import Sumo
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +82,20 @@ def test_the_longest_drive_through_a_town_can_be_kept(tmp_path: Path, monkeypatc
     for bound in ("_MAX_VALUES", "_MAX_UNPACKED_BYTES", "_MAX_BYTES"):
         monkeypatch.setattr(recording, bound, int(getattr(recording, bound) * of_all))
     write_trip(tmp_path / "trip.mcap", recorded.trip, recorded.frames, recorded.scenario, final=recorded.final)
+
+
+def test_an_engine_that_dies_on_the_way_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    libsumo = pytest.importorskip("libsumo")
+    step = Sumo.step
+
+    def dies(engine: Sumo) -> None:
+        if libsumo.simulation.getTime() > 1.0:
+            libsumo.close()
+        step(engine)
+
+    monkeypatch.setattr(Sumo, "step", dies)
+    with pytest.raises(ChauffeurError, match="SUMO failed while it ran"):
+        driven(Standing(), "Wait here.", "town")
 
 
 class Standing:
