@@ -16,6 +16,8 @@ from chauffeur.planners.talk2drive.style import destination_of
         ("Drop me at the bakery and wait", "bakery"),
         ("Take me to the church but don't drive fast", "church"),
         ("Please take me home", "home"),
+        ("No, to the bakery, please", "bakery"),
+        ("To the left lane", ""),
         ("Let's go home now", "home"),
         ("Don't take me home", ""),
         ("Drive to the left", ""),

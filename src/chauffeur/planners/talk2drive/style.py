@@ -68,6 +68,9 @@ _TAKES: Final = re.compile(
     re.IGNORECASE,
 )
 _HOME: Final = re.compile(r"\b(?:take|bring|drive|get|go|head)\b(?: \w+){0,2} (?P<place>home)\b", re.IGNORECASE)
+_BARE: Final = re.compile(
+    r"^(?:(?:no|please|ok|now)\b[\s,]*)*to\s+(?:the|my|our)\s+(?P<place>(?:St\.|[^.,;!?])+)", re.IGNORECASE
+)
 _NO_PLACE: Final = re.compile(r"^(?:left|right|straight|stop|a stop|the (?:left|right)|\d)", re.IGNORECASE)
 _TRAILING: Final = re.compile(
     r"\s{1,3}(?:please|now|quickly|as (?:fast|soon|quickly).{0,200}|(?:and|as|because|but|since|without) .{0,200})$",
@@ -81,7 +84,7 @@ _CLAUSE: Final = re.compile(r"[,;!?]|(?<!\bSt)\.|\bbut (?=don't|do not|never)", 
 def destination_of(wish: str) -> str:
     """The place of a town that a wish asks to be taken to, in its own words; empty where it asks for none, or says that
     it is not to be gone to."""
-    for found in (*_TAKES.finditer(wish), *_HOME.finditer(wish)):
+    for found in (*_TAKES.finditer(wish), *_HOME.finditer(wish), *_BARE.finditer(wish)):
         begins = max((one.end() for one in _CLAUSE.finditer(wish, 0, found.start())), default=0)
         place = _TRAILING.sub("", found["place"].strip())
         denied = denied_words(f"{wish[begins : found.start('place')]} {place}")
