@@ -97,6 +97,36 @@ def test_a_run_goes_on_where_it_stopped_and_its_shards_are_the_whole(stranger: M
         BenchRun(folder, other, Tired())
 
 
+def test_the_whole_takes_over_what_its_shards_have_done(stranger: ModuleType, tmp_path: Path) -> None:
+    bench, folder = stranger.RightOfWay(), tmp_path / "run"
+    whole = BenchRun(tmp_path / "whole", bench, stranger.Polite()).run(quiet, EFFORT)
+    for shard in (Shard(1, 2), Shard(2, 2)):
+        BenchRun(folder / shard.folder, bench, stranger.Polite(), shard=shard).run(quiet, EFFORT)
+
+    class Silent(stranger.Polite):
+        async def write(self, messages: Any) -> Any:
+            raise AssertionError("asked again")
+
+    assert BenchRun(folder, bench, Silent()).run(quiet, EFFORT) == whole
+    for name in ("results.jsonl", "table.md", "report.json"):
+        assert (folder / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_a_shard_of_another_run_is_passed_over(stranger: ModuleType, tmp_path: Path) -> None:
+    other, shard = stranger.RightOfWay(), Shard(1, 1)
+    other.config = {"questions": 9}
+    BenchRun(tmp_path / "run" / shard.folder, other, stranger.Polite(), shard=shard).run(quiet, EFFORT)
+
+    class Counting(stranger.Polite):
+        asked = 0
+
+        async def write(self, messages: Any) -> Any:
+            Counting.asked += 1
+            return await super().write(messages)
+
+    assert len(BenchRun(tmp_path / "run", stranger.RightOfWay(), Counting()).run(quiet, EFFORT)) == Counting.asked == 3
+
+
 def test_damaged_rows_are_told_and_done_again(stranger: ModuleType, tmp_path: Path) -> None:
     run = BenchRun(tmp_path / "run", stranger.RightOfWay(), stranger.Polite())
     rows = run.run(quiet, EFFORT)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from chauffeur.bench.leaderboard.rollout import RouteJob, traffic_of
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.geometry import Pose
+from chauffeur.worlds.town import pack
 from chauffeur.worlds.town.pack import load
 from chauffeur.worlds.town.sumo import Sumo
 
@@ -117,6 +119,33 @@ def test_a_drive_leaves_a_map_of_its_route(expert: dict[str, Any], tmp_path: Pat
     assert drawing.startswith("<svg")
     assert "out of time" in drawing
     assert expert["engine"] in drawing
+
+
+def test_a_route_is_driven_again_once_its_town_is_there_or_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was said of a missing town is no result that a repeated command may go by."""
+    monkeypatch.setattr(pack, "maps_folder", lambda: tmp_path / "maps")
+    (tmp_path / "routes.xml").write_text(NOWHERE)
+
+    def key() -> str:
+        bench = LeaderboardBenchmark(str(tmp_path / "routes.xml"), scenarios="none", seeds=1)
+        return bench.job(bench.items()[0], None).key
+
+    missing = key()
+    shutil.copytree(pack.OWN_TOWNS / "Gridford", tmp_path / "maps" / "Nowhere")
+    there = key()
+    shutil.rmtree(tmp_path / "maps" / "Nowhere")
+    shutil.copytree(pack.OWN_TOWNS / "Oldbridge", tmp_path / "maps" / "Nowhere")
+    assert len({missing, there, key()}) == 3
+
+
+def test_towns_are_named_as_people_write_lists_and_an_unknown_one_is_refused() -> None:
+    bench = LeaderboardBenchmark("own", seeds=1, towns="Gridford, Ringstead")
+    assert {item.town for item in bench.items()} == {"Gridford", "Ringstead"}
+    with pytest.raises(ConfigError, match="Gridfrod") as error:
+        LeaderboardBenchmark("own", seeds=1, towns="Gridford,Gridfrod")
+    assert "Ringstead" in error.value.hint
 
 
 def test_own_routes_are_the_same_every_time_and_lie_in_all_own_towns() -> None:

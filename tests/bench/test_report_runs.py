@@ -9,6 +9,7 @@ import pytest
 from report_folders import mixed, outcome, read_lines, write, write_lines, write_run
 
 from chauffeur.bench.lampilot.benchmark import NOT_ASKED
+from chauffeur.bench.lampilot.merge import merge_shards
 from chauffeur.bench.report.rulers import under_one_ruler
 from chauffeur.bench.report.runs import load_run, load_runs, on_common_items
 from chauffeur.concept import ConfigError, DataError
@@ -31,6 +32,18 @@ def test_rows_of_the_first_version_are_read(tmp_path: Path) -> None:
     rows = [{k: v for k, v in row.items() if k not in gone} for row in read_lines(folder / "results.jsonl")]
     write_lines(folder / "results.jsonl", [row | {"schema": "lampilot-results-v1"} for row in rows])
     assert load_run(folder).ruler == "lampilot-origin-v1"
+
+
+def test_a_run_of_another_benchmark_is_named(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    write(folder / "plan.json", {"bench": "leaderboard-1.0-v1", "items": ["a-s0"]})
+    with pytest.raises(DataError, match="holds a run of leaderboard-1") as error:
+        load_run(folder)
+    assert "table.md" in error.value.hint
+    with pytest.raises(DataError, match="leaderboard") as error:
+        merge_shards(tmp_path / "whole", [folder])
+    assert "without --shard" in error.value.hint
 
 
 def _missing(folder: Path) -> None:

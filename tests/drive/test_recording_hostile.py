@@ -97,7 +97,7 @@ def test_many_chunks_are_refused_together(tmp_path: Path) -> None:
     assert len(read_trip(path).frames) == 1
     path = with_chunks(tmp_path / "trip.mcap", *[chunk] * 280)
     assert path.stat().st_size < 300_000
-    assert "it would unpack to more than 268435456 bytes" in refused(path)
+    assert "it would unpack to more than 536870912 bytes" in refused(path)
 
 
 def test_values_too_many_to_hold_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,13 +9,15 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sample_trips import HOSTILE, doubted, guarded, highway_trip, intersection_trip, refused_trip
 
-from chauffeur.concept import DataError, RoadGraph
+from chauffeur.concept import DataError, Parameters, RoadGraph
+from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi.page import embed_json, render_page, write_page
 
 
@@ -55,6 +57,23 @@ def payload_of(text: str) -> dict[str, object]:
 @pytest.fixture(scope="module")
 def highway_page() -> str:
     return render_page(highway_trip())
+
+
+def places_shown(trip: RecordedTrip) -> dict[str, bool]:
+    drive: Any = payload_of(render_page(trip))["drive"]
+    return {place["n"]: place["to"] for place in drive["places"]}
+
+
+def test_the_places_of_a_town_are_shown_and_which_of_them_is_driven_to() -> None:
+    """Where the town is not on this machine the page is made all the same."""
+    trip = intersection_trip()
+    plan = replace(trip.trip.plan, policy=Parameters(10.0, 12.0, 2.0, 0, "bakery"))
+    driven = replace(trip, trip=replace(trip.trip, plan=plan))
+    shown = places_shown(replace(driven, scenario=replace(trip.scenario, config={"town": "Gridford"})))
+    assert shown["Miller's Bakery"]
+    assert sum(shown.values()) == 1 < len(shown)
+    assert places_shown(replace(driven, scenario=replace(trip.scenario, config={"town": "Atlantis"}))) == {}
+    assert places_shown(trip) == {}
 
 
 def test_it_asks_for_nothing_from_outside(highway_page: str) -> None:

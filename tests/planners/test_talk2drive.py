@@ -158,6 +158,35 @@ def test_turns_become_the_route(embedded: Planner) -> None:
     assert parameters(planned(embedded, "Turn left at the junction.", junction)).route == "left"
 
 
+TOWN = Situation("town", 0.0, 11.1, 1, 0, False, None, None, ("left", "straight", "right"))
+
+
+@pytest.mark.parametrize(
+    ("wish", "way"),
+    [
+        ("Turn right", "right"),
+        ("take a right, please", "right"),
+        ("Go left at the next light.", "left"),
+        ("Drop me off in front of the station.", "station"),
+    ],
+)
+def test_in_a_town_it_takes_the_way_that_is_meant(embedded: Planner, wish: str, way: str) -> None:
+    assert parameters(planned(embedded, wish, TOWN)).route == way
+
+
+def test_in_a_town_it_stops_to_let_people_out(embedded: Planner) -> None:
+    assert parameters(planned(embedded, "Let me out here, please.", TOWN)).target_speed_mps == 0.0
+
+
+@pytest.mark.parametrize(
+    "wish", ["Turn right after the church and let me out.", "Take the second left.", "Turn left, then right."]
+)
+def test_half_of_what_is_asked_in_a_town_is_not_driven(embedded: Planner, wish: str) -> None:
+    plan = planned(embedded, wish, TOWN)
+    assert plan.policy is None
+    assert plan.refusal.startswith("With these parameters I can")
+
+
 # Behind an endpoint ---------------------------------------------------------------------------------------------------
 
 

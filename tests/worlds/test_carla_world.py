@@ -16,8 +16,8 @@ from carla_stand_in import StandInClient, StandInWorld
 from chauffeur.concept import Command, Scenario, ScenarioError
 from chauffeur.geometry import Pose
 from chauffeur.worlds.base import Stage, World
-from chauffeur.worlds.carla import CarlaWorld
-from chauffeur.worlds.carla.server import lacks
+from chauffeur.worlds.carla import CarlaWorld, server
+from chauffeur.worlds.carla.server import SERVER_VARIABLE, address, connect, lacks
 from chauffeur.worlds.town.build import build, sources_of
 from chauffeur.worlds.town.pack import MapPack
 
@@ -117,3 +117,25 @@ def test_a_server_that_dies_or_lacks_something_is_said(client: StandInClient, to
     client.world.dies = True
     with pytest.raises(ScenarioError, match="stopped answering"):
         world.step(Command(0.0, 0.0))
+
+
+@pytest.mark.parametrize("named", ["here", "localhost:abc", ":2000", "localhost:99999", "localhost:0", "localhost:²"])
+def test_an_address_that_is_none_is_refused(named: str) -> None:
+    with pytest.raises(ScenarioError, match="must be HOST:PORT"):
+        address({SERVER_VARIABLE: named})
+
+
+def test_a_host_that_nobody_knows_is_a_server_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Library:
+        @staticmethod
+        def Client(host: str, port: int) -> None:
+            raise RuntimeError("resolve: Host not found (authoritative)")
+
+    monkeypatch.setattr(server, "library", Library)
+    monkeypatch.setenv(SERVER_VARIABLE, "nowhere:2000")
+    with pytest.raises(ScenarioError, match="No CARLA server answers at nowhere:2000"):
+        connect()
+
+
+def test_no_address_is_the_usual_one() -> None:
+    assert address({}) == address({SERVER_VARIABLE: ""}) == ("localhost", 2000)

@@ -7,6 +7,7 @@ from typing import Final
 from chauffeur.bench.lampilot.understood import referee_for as lampilot_referee
 from chauffeur.concept import Parameters, Plan, Program, Scenario, Trajectory
 from chauffeur.drive.episode import Referee
+from chauffeur.drive.fulfilment import Fulfilment, can_be_judged
 from chauffeur.geometry import Pose, Turn
 from chauffeur.safety.constant_calls import read_program
 from chauffeur.worlds.base import World
@@ -16,14 +17,15 @@ TURN_CALLS: Final[dict[str, Turn]] = {
     "turn_right_at_next_intersection": "right",
     "go_straight_at_next_intersection": "straight",
 }
+_TURNS: Final[tuple[Turn, ...]] = ("left", "right", "straight")
 RED_S: Final = 90.0
 """Who drives a trajectory in a town may stand so long on the way: a light's cycle, and people."""
 
 
 def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
     """The judge of a trip: LaMPilot's by the scenario's own goal, else what the planner understood, else none. In a
-    parking lot, the judge of the spot that is meant; in a town, of the place; on an open road and in a town, of a
-    trajectory's end.
+    parking lot, the judge of the spot that is meant; in a town, of the place or of the ways and stops; on an open road
+    and in a town, of a trajectory's end.
 
     Raises:
         ScenarioError: There is no such spot.
@@ -31,13 +33,13 @@ def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
     if isinstance(plan.policy, Trajectory) and world.capabilities.turns and world.capabilities.places:
         return _end_referee(world, plan.policy, waits_s=RED_S)
     if world.capabilities.places:
-        return _town_referee(world, plan) or _parking_referee(world, plan)
+        return _town_referee(world, scenario, plan) or _parking_referee(world, plan)
     if isinstance(plan.policy, Trajectory):
         return _street_referee(world, plan.policy)
     return lampilot_referee(world, scenario, plan)
 
 
-def _town_referee(world: World, plan: Plan) -> Referee | None:
+def _town_referee(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
     from chauffeur.worlds.town import TownReferee, TownWorld, WayReferee
 
     if not isinstance(world, TownWorld):
@@ -48,6 +50,13 @@ def _town_referee(world: World, plan: Plan) -> Referee | None:
         if turns or "stop" in calls:
             return WayReferee(world, turns, stops="stop" in calls)
         return None  # nothing that could be over
+    if isinstance(plan.policy, Parameters) and not (scenario.config.get("goal") or scenario.config.get("goal_m")):
+        if plan.policy.route in _TURNS:
+            return WayReferee(world, [turn for turn in _TURNS if turn == plan.policy.route], stops=False)
+        if not plan.policy.route and plan.policy.target_speed_mps <= 0.0:
+            return WayReferee(world, (), stops=True)
+        if not plan.policy.route:
+            return Fulfilment(world, plan) if can_be_judged(plan) else None
     return TownReferee(world)
 
 

@@ -238,7 +238,7 @@ def merge(
     shards: Annotated[list[Path], typer.Argument(help="Folders of all its shards.")],
     metrics: MetricsOption = "origin",
 ) -> None:
-    """Put the shards of a run together, and score it as if it had been one."""
+    """Put the shards of a LaMPilot-Bench run together, and score it as if it had been one."""
     from chauffeur.bench.lampilot.merge import merge_shards
     from chauffeur.bench.lampilot.report import family_lines
     from chauffeur.cli.console import stdout

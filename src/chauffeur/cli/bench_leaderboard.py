@@ -68,7 +68,8 @@ def leaderboard(
         int | None, typer.Option(min=1, help="Worker processes; default one per core.", rich_help_panel=_WHERE)
     ] = None,
     shard: Annotated[
-        str | None, typer.Option(help="Only part i of n, as for `bench lampilot`.", rich_help_panel=_WHERE)
+        str | None,
+        typer.Option(help="Only part i of n; without it, what shards have done is taken over.", rich_help_panel=_WHERE),
     ] = None,
     ray: Annotated[
         str | None, typer.Option(help="Work on a Ray cluster, as for `bench lampilot`.", rich_help_panel=_WHERE)
@@ -114,12 +115,16 @@ def leaderboard(
     work = effort(workers, ray=ray)
     rows = carry_out(console, run, lambda watch: run.run(watch, work), f"Leaderboard 1.0, {planner}")
     show_tables(console, tables(bench.tables, rows))
-    for why, times in Counter(row["detail"] for row in rows if row["engine"] == NOT_DRIVEN).most_common():
-        console.print(f"Not driven, counted as 0: {times} of {len(rows)}. {why}", style="yellow", soft_wrap=True)
+    undriven = Counter((row["infra_failed"], row["detail"]) for row in rows if row["engine"] == NOT_DRIVEN)
+    for (infra, why), times in undriven.most_common():
+        counted = "not counted" if infra else "counted as 0"
+        console.print(f"Not driven, {counted}: {times} of {len(rows)}. {why}", style="yellow", soft_wrap=True)
     if rows:
         results = {item.id: run.stages.outcome(item).result for item in run.items}
         written = write_artefacts(run.folder, bench, rows, results)
-        console.print(f"Official results: {written[0]}; {len(written) - 1} route maps beside it.", soft_wrap=True)
+        drawn = len(written) - 1
+        maps = "1 route map" if drawn == 1 else f"{drawn} route maps"
+        console.print(f"Official results: {written[0]}; {maps} beside it.", soft_wrap=True)
         console.print(NOTE)
         console.print()
         show_table(console, "Beside the paper's Tab. V", HEADER, beside_the_paper(planner, bench.setting, rows))

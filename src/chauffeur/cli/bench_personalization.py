@@ -39,7 +39,9 @@ def personalization(
     half: Annotated[str, typer.Option(help="Wordings: `test`, or `tuning` to improve a planner.")] = "test",
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/personalization-PLANNER.")] = None,
     workers: Annotated[int, typer.Option(min=1, help="Simulation processes.")] = 1,
-    shard: Annotated[str | None, typer.Option(help="Only part i of n, as for `bench lampilot`.")] = None,
+    shard: Annotated[
+        str | None, typer.Option(help="Only part i of n; without it, what shards have done is taken over.")
+    ] = None,
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
 ) -> None:
     """Takeover rates of simulated passengers (paper Tab. VIII, IX, X): keywords, Talk2Drive, and with memory."""

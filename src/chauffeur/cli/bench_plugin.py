@@ -56,7 +56,9 @@ def plugin(
     max_requests: Annotated[int | None, typer.Option(min=0, help="Budget of the run in requests.")] = None,
     price: Annotated[str | None, typer.Option(help="USD per million tokens, IN/OUT, where it is not known.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Worker processes; default one per core.")] = None,
-    shard: Annotated[str | None, typer.Option(help="Only part i of n, as for `bench lampilot`.")] = None,
+    shard: Annotated[
+        str | None, typer.Option(help="Only part i of n; without it, what shards have done is taken over.")
+    ] = None,
     ray: Annotated[str | None, typer.Option(help="Work on a Ray cluster, as for `bench lampilot`.")] = None,
 ) -> None:
     """Run a benchmark of an installed package."""

@@ -103,7 +103,7 @@ def _carla_server() -> tuple[str, ...]:
     from chauffeur.concept import ChauffeurError
     from chauffeur.worlds.carla.server import SERVER_VARIABLE, connect, lacks
 
-    if SERVER_VARIABLE not in os.environ:
+    if not os.environ.get(SERVER_VARIABLE):
         return ()
     try:
         return lacks(connect()) or ("It has everything that driving needs.",)

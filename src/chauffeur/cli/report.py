@@ -47,7 +47,7 @@ def report(
     ] = None,
     browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = False,
 ) -> None:
-    """Report benchmark runs: scores with intervals, comparisons, costs, and a gallery of failures."""
+    """Report runs of LaMPilot-Bench: scores with intervals, comparisons, costs, and a gallery of failures."""
     from rich.padding import Padding
     from rich.text import Text
 

@@ -58,9 +58,10 @@ _SCHEMAS_BYTES = 1 << 16
 # A recording may come from anybody, and a few kilobytes can unpack to gigabytes. What is written keeps the same bounds.
 _MAX_BYTES = 128 << 20
 _MAX_CHUNK_BYTES = 32 << 20
-_MAX_UNPACKED_BYTES = 256 << 20
-_MAX_VALUES = 8_000_000
-"""JSON values of all messages: 25 minutes among forty cars. A value of two bytes becomes an object of a hundred."""
+_MAX_UNPACKED_BYTES = 512 << 20
+_MAX_VALUES = 16_000_000
+"""JSON values of all messages: ten minutes of a town at 20 Hz among a hundred cars and people, the longest drive that
+ends by itself. A value of two bytes becomes an object of a hundred."""
 
 _UNREADABLE = (
     McapError,

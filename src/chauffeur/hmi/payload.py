@@ -31,8 +31,10 @@ from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.interventions import rule_counts, stretches_of
 from chauffeur.hmi.road import BAR_M, Bounds, PaintedRoad, draw_road, track_box
-from chauffeur.hmi.view import facing_right, frame_drive, instants_of
+from chauffeur.hmi.view import facing_right, frame_drive, instants_of, place_facing_right
 from chauffeur.safety.faithfulness import KINDS, score_words
+from chauffeur.worlds.town.pack import places_called
+from chauffeur.worlds.town.scenarios import places_of
 
 _WAYPOINTS_TOLD = 6
 _STRAIGHT_M = 0.05
@@ -249,7 +251,8 @@ def _history_item(item: HistoryItem) -> Json:
 
 def _drive(recorded: RecordedTrip) -> Json | None:
     """The moving part: one column per quantity, one entry per instant."""
-    shots = facing_right(instants_of(recorded))
+    seen = instants_of(recorded)
+    shots = facing_right(seen)
     if not shots:
         return None
     frames = recorded.frames
@@ -269,6 +272,7 @@ def _drive(recorded: RecordedTrip) -> Json | None:
         "ego": {**_column([s.ego for s in shots]), "first": 0, "l": shots[0].ego.length_m, "w": shots[0].ego.width_m},
         "cars": _cars(shots, sight),
         "lights": _lights(shots, sight),
+        "places": _places(recorded, seen[0], sight),
         "speed": [round(s.ego.speed_mps, 2) for s in shots],
         "acceleration": [round(row.applied.acceleration_mps2, 2) if row else 0.0 for row in rows],
         "asked": [round(row.requested.acceleration_mps2, 2) if row else 0.0 for row in rows],
@@ -350,6 +354,19 @@ def _lights(shots: tuple[Observation, ...], sight: Bounds) -> list[Json]:
             if not one["s"] or one["s"][-1][1] != light.state:
                 one["s"].append([index, light.state])
     return list(found.values())
+
+
+def _places(recorded: RecordedTrip, first: Observation, sight: Bounds) -> list[Json]:
+    """The places of a town that come into sight, and whether the drive leads there."""
+    policy = recorded.trip.plan.policy
+    there = places_of(recorded.scenario)
+    meant = places_called(there, policy.route) if isinstance(policy, Parameters) and policy.route else ()
+    found: list[Json] = []
+    for place in there:
+        x, y = place_facing_right(first, place.x_m, place.y_m)
+        if sight.x0 <= x <= sight.x1 and sight.y0 <= y <= sight.y1:
+            found.append({"n": place.name, "x": round(x, 1), "y": round(y, 1), "to": place in meant})
+    return found
 
 
 def _road(road: PaintedRoad) -> Json:

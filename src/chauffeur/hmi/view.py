@@ -45,10 +45,17 @@ def facing_right(instants: tuple[Observation, ...]) -> tuple[Observation, ...]:
 
     Who heads that way within a few degrees is not turned: a straight road stays level.
     """
-    if not instants:
-        return instants
-    heading = instants[0].ego.heading_rad
-    return _turned(instants, _Turn.by(0.0 if abs(math.sin(heading / 2.0)) < _LEVEL else heading))
+    return _turned(instants, _to_the_right(instants[0])) if instants else instants
+
+
+def place_facing_right(first: Observation, x_m: float, y_m: float) -> tuple[float, float]:
+    """A point of the world in that frame, from the first instant as it was."""
+    return _to_the_right(first).point(x_m, y_m)
+
+
+def _to_the_right(first: Observation) -> _Turn:
+    heading = first.ego.heading_rad
+    return _Turn.by(0.0 if abs(math.sin(heading / 2.0)) < _LEVEL else heading)
 
 
 def in_picture(instants: tuple[Observation, ...]) -> tuple[Observation, ...]:

@@ -66,6 +66,14 @@ def test_a_command_is_driven_to_its_end(world: TownWorld, wish: str) -> None:
     assert (15.0 if "20" in wish else 20.0) < driven_m < (25.0 if "20" in wish else 35.0)
 
 
+def test_a_place_further_on_is_declined(world: TownWorld) -> None:
+    context = describe(world.reset(_before_a_junction(35.0)))
+    wish = Instruction("Take me to the station.")
+    plan = asyncio.run(ViladPlanner().plan(PlanRequest(wish, context, SystemMessage(""))))
+    assert plan.policy is None
+    assert "the way there" in plan.refusal
+
+
 def test_a_car_that_was_led_off_its_trajectory_stops_in_its_lane(world: TownWorld) -> None:
     observation = world.reset(_before_a_junction(35.0))
     ego = observation.ego

@@ -27,7 +27,7 @@ from chauffeur.bench.kernel.pace import Gate, Window
 from chauffeur.bench.kernel.pipeline import Pipeline, Watch
 from chauffeur.bench.kernel.report import report_markdown, tables
 from chauffeur.bench.kernel.shards import WHOLE, Shard
-from chauffeur.bench.kernel.stages import Manifest, StageStore
+from chauffeur.bench.kernel.stages import Manifest, StageStore, take_over_shards
 from chauffeur.bench.kernel.store import Row, Scribe, sole_writer
 from chauffeur.concept import ChauffeurError, ConfigError
 from chauffeur.drive.files import publish
@@ -137,7 +137,7 @@ class BenchRun:
 
     def run(self, watch: Watch, effort: Effort | None = None) -> list[Row]:
         """Do all that is not done yet and score; afterwards `halt` says whether, and why, it stopped asking before
-        the end. Interrupting keeps everything finished.
+        the end. Interrupting keeps everything finished. What its shards have done in folders beneath it is taken over.
 
         Args:
             watch: Is told where the run stands.
@@ -149,6 +149,8 @@ class BenchRun:
         """
         with sole_writer(self.folder):
             try:
+                if self.manifest.shard == WHOLE and not self.stages.settled:
+                    take_over_shards(self.stages, self.folder)
                 if not self.stages.settled:
                     asyncio.run(self._work(watch, effort or Effort()))
             except BaseExceptionGroup as group:

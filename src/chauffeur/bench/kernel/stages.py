@@ -207,6 +207,34 @@ class StageStore(Generic[T]):
         return ItemOutcome(item, self.answer(item), error, result)
 
 
+def take_over_shards(stages: StageStore[Any], folder: Path) -> None:
+    """Append what shards of this run have in the folders beneath its own, so that it is not done again.
+
+    Folders of other runs are passed over, and so is what failed there and is present here. Raises StorageError.
+    """
+    for part in sorted(folder.glob("shard-*-of-*")):
+        try:
+            about = parsed(part / "plan.json", (part / "plan.json").read_bytes())
+        except (OSError, DataError):
+            continue
+        if any(about.get(name) != value for name, value in stages.manifest.about.items()):
+            continue
+        for store in stages.stores:
+            there = RowStore(part / store.path.name, store.key).rows
+            rows = [row for key, row in sorted(there.items()) if key not in store.rows or _better(row, store.rows[key])]
+            if rows:
+                store.append(*rows)
+
+
+def _better(row: Row, known: Row) -> bool:
+    """Whether a row has what another one of the same key was tried for in vain."""
+    return _in_vain(known) and not _in_vain(row)
+
+
+def _in_vain(row: Row) -> bool:
+    return bool(row.get("infra_failed") or (row.get("error") and not row.get("plan")))
+
+
 def _version(distribution: str) -> str:
     try:
         return version(distribution)

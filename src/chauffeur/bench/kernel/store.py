@@ -64,6 +64,7 @@ class RowStore:
 
     Attributes:
         path: The file.
+        key: The field.
         rows: Present rows by key.
         damaged: Numbers, from 1, of lines that cannot be read, the torn end of a crash not among them.
     """
@@ -73,7 +74,7 @@ class RowStore:
         self.path = path
         self.rows: dict[str, Row] = {}
         self.damaged: list[int] = []
-        self._key = key
+        self.key = key
         self._descriptor: int | None = None
         self._size = 0
         self._good: list[bytes] = []
@@ -93,7 +94,7 @@ class RowStore:
         for number, line in enumerate(lines, start=1):
             try:
                 row = unseal(line)
-                self.rows[str(row[self._key])] = row
+                self.rows[str(row[self.key])] = row
                 good.append(line)
             except (ValueError, KeyError, TypeError, RecursionError):
                 self.damaged.append(number)
@@ -113,7 +114,7 @@ class RowStore:
     def keep(self, *rows: Row) -> None:
         """Take rows that are, or are being, written."""
         for row in rows:
-            self.rows[str(row[self._key])] = row
+            self.rows[str(row[self.key])] = row
 
     def write(self, lines: bytes) -> None:
         """Append sealed lines. Raises StorageError as `append` does."""

@@ -21,11 +21,12 @@ from chauffeur.bench.leaderboard.rollout import ROUTE_VERSION, RouteJob
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute, RouteFile, read_routes
 from chauffeur.bench.leaderboard.scoring import RouteScore, Scoring, penalty, route_score
 from chauffeur.bench.leaderboard.triggers import Trigger, TriggerSet, read_triggers
-from chauffeur.concept import ConfigError
+from chauffeur.concept import ChauffeurError, ConfigError
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.onboard.town import SNIPPETS
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.shield import SHIELD_VERSION
+from chauffeur.worlds.town.pack import load
 
 BENCH: Final = "leaderboard-1.0-v1"
 
@@ -155,11 +156,16 @@ class LeaderboardBenchmark(Unasked):
         self._planner = planner
         self.setting = "" if planner is None else planner.setting
         self._triggers: Mapping[str, tuple[Trigger, ...]] = found.towns
-        wanted = {town for town in towns.split(",") if town}
+        wanted = {town.strip() for town in towns.split(",") if town.strip()}
+        there = {one.town for one in self._file.routes}
+        if missing := sorted(wanted - there):
+            raise ConfigError(
+                f"No route of {routes} is in {' or '.join(missing)}.",
+                hint=f"There are routes in {', '.join(sorted(there))}; leave --towns out for all.",
+            )
         chosen = [one for one in self._file.routes if not wanted or one.town in wanted]
         self._routes = {one.id: one for one in (chosen[:limit] if limit else chosen)}
-        if not self._routes:
-            raise ConfigError(f"No route of {routes} is in {towns}.", hint="Leave --towns out for all.")
+        self._maps: dict[str, str] = {}
         self._config = {
             "routes": self._file.name,
             "routes_sha256": self._file.sha256,
@@ -198,12 +204,22 @@ class LeaderboardBenchmark(Unasked):
         """The route of an item."""
         return self._routes[item.route]
 
+    def _map_hash(self, town: str) -> str:
+        """What a town was built from; empty where it is not there (yet)."""
+        if town not in self._maps:
+            try:
+                self._maps[town] = load(town).source_hash
+            except ChauffeurError:
+                self._maps[town] = ""
+        return self._maps[town]
+
     def job(self, item: RouteItem, answer: Row | None) -> RouteJob:
         """See Benchmark."""
         del answer
         route = self.route_of(item)
         triggers = self._triggers.get(route.town, ())
         parts = [ROUTE_VERSION, _route_hash(route), self._config["triggers_sha256"], self._scenarios, self._driver]
+        parts += [self._map_hash(route.town)]
         parts += [item.seed, self._density, self._people, self._config["shield"]]
         if self._planner is not None:
             parts += self._planner.parts

@@ -8,7 +8,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Final, cast
 
 from chauffeur.bench.kernel.store import Row, unseal
 from chauffeur.bench.lampilot.benchmark import NOT_ASKED
@@ -137,6 +137,9 @@ def _short(folder: Path, folders: Sequence[Path]) -> str:
     return str(folder)
 
 
+_LAMPILOT: Final = "lampilot-bench"
+
+
 def load_run(folder: Path) -> Run:
     """Read one run folder of `chauffeur bench lampilot`.
 
@@ -151,6 +154,12 @@ def load_run(folder: Path) -> Run:
             hint="Give the folder that chauffeur bench lampilot wrote, e.g. runs/lampilot-onboard.",
         )
     plan = _json(folder / "plan.json")
+    bench = str(plan.get("bench", _LAMPILOT))
+    if not bench.startswith(_LAMPILOT):
+        raise DataError(
+            f"{folder} holds a run of {bench}; a report is made of runs of LaMPilot-Bench.",
+            hint=f"Its tables are in {folder / 'table.md'}, its figures with intervals in report.json beside it.",
+        )
     if not isinstance(plan.get("items"), list) or not plan["items"]:
         raise DataError(f"{folder / 'plan.json'} plans no items, so there is nothing to report.")
     if not (folder / "results.jsonl").is_file():

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
-from chauffeur.concept.registry import load_plugin
+from chauffeur.drive.live.mirror import live_world
 from chauffeur.drive.live.settings import Settings, ring
 from chauffeur.worlds.base import MirroredWorld
 
@@ -62,7 +62,7 @@ def _ready(folder: Path, role: str) -> None:
 
 def _world(settings: Settings) -> MirroredWorld:
     """The world of the drive; what is slow about its starts is done before anything moves."""
-    world: MirroredWorld = load_plugin("chauffeur.worlds", settings.starts[0].scenario.world)()
+    world = live_world(settings.starts[0].scenario)
     for start in settings.starts:
         world.reset(start.scenario, start.seed)
     return world

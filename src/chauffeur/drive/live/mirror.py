@@ -3,12 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
-from chauffeur.concept import DataError, Limits
+from chauffeur.concept import DataError, Limits, Scenario, ScenarioError
+from chauffeur.concept.registry import load_plugin
 from chauffeur.drive.live.messages import MessageError, MirroredInstant
 from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
-from chauffeur.worlds.base import MirroredWorld
+from chauffeur.worlds.base import MirroredWorld, World
+
+
+def live_world(scenario: Scenario) -> MirroredWorld:
+    """A fresh world to drive in in real time. Raises ScenarioError where other processes cannot follow it."""
+    world: World = load_plugin("chauffeur.worlds", scenario.world)()
+    # isinstance would read the properties of a world that has not been reset.
+    if not hasattr(world, "adopt"):
+        raise ScenarioError(
+            f"{scenario.title or scenario.id} cannot be driven in real time: the world {scenario.world!r} does "
+            "not show its present instant to other processes.",
+            hint=f'Drive it in simulated time: chauffeur drive "WISH" --scenario {scenario.id}. Or talk on a highway, '
+            "at a crossing or in a parking lot: chauffeur show scenarios.",
+        )
+    return cast("MirroredWorld", world)
 
 
 class Mirror:

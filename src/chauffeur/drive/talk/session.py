@@ -19,12 +19,12 @@ from chauffeur.concept.units import kmh
 from chauffeur.drive.emergency import GOING_ON, QUESTION, STOPPING, brings_to_a_stand, stop_wanted
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live.messages import Report
+from chauffeur.drive.live.mirror import live_world
 from chauffeur.drive.live.recorder import LiveRecorder
 from chauffeur.drive.live.settings import Settings, ring
 from chauffeur.drive.live.supervisor import Interaction, Runtime
 from chauffeur.drive.live.trip_memory import trip_of
 from chauffeur.drive.questions import ANSWER_WITHIN_S
-from chauffeur.drive.session import make_world
 from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.attention import Attention
 from chauffeur.drive.talk.conversations import Conversations
@@ -130,7 +130,7 @@ class Talk:
         self._voice = voice
         self._attention = Attention(engine, sound, voice, self._say, self._act_on)
         self._most_s, self._ask_after_s = most_s, ask_after_s
-        self._dt_s = make_world(settings.starts[0].scenario).dt_s
+        self._dt_s = live_world(settings.starts[0].scenario).dt_s
         self._runtime: Runtime | None = None
         self._view: View | None = None
         self._window = SeatWindow()

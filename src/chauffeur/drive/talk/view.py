@@ -6,13 +6,12 @@ from collections import OrderedDict
 from typing import Final
 
 from chauffeur.concept import DataError, Observation, VehicleState
-from chauffeur.concept.registry import load_plugin
 from chauffeur.drive.live.messages import MessageError, MirroredInstant, Report
+from chauffeur.drive.live.mirror import live_world
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.talk.messages import Road, RoadLane, Scene, ShownBody
 from chauffeur.drive.talk.seat_view import SeatWindow
-from chauffeur.worlds.base import MirroredWorld
 
 _INSTANTS: Final = 100
 """Instants that are kept, 10 s of them: plans are judged a moment after they were seen."""
@@ -29,7 +28,7 @@ class View:
             observations: What control shows.
         """
         self._starts = settings.starts
-        self._world: MirroredWorld = load_plugin("chauffeur.worlds", settings.starts[0].scenario.world)()
+        self._world = live_world(settings.starts[0].scenario)
         self._world.reset(self._starts[0].scenario, self._starts[0].seed)
         self._world.adopt(self._world.mirrored())  # what is slow the first time is done before anything moves
         self._world.observe()

@@ -163,6 +163,20 @@ function makeStage() {
     }
   }
 
+  /* Where one may be taken to; the destination on a plate. */
+  function drawPlaces() {
+    for (const place of drive.places) {
+      const x = sx(place.x);
+      const y = sy(place.y);
+      ctx.beginPath();
+      ctx.arc(x, y, place.to ? 6 : 4, 0, 2 * Math.PI);
+      ctx.fillStyle = place.to ? colour['ego-fill'] : colour['ground-ink'];
+      ctx.fill();
+      if (place.to) label(place.n, x + 11, y);
+      else text(place.n, x + 9, y, { size: 11.5, align: 'left' });
+    }
+  }
+
   function drawPerson(body, at) {
     ctx.beginPath();
     ctx.arc(sx(at.x), sy(at.y), Math.max(3.5, body.w * 0.75 * view.scale), 0, 2 * Math.PI);
@@ -327,6 +341,7 @@ function makeStage() {
     drawTrail(at);
     drawSigns();
     drawLights(index);
+    drawPlaces();
     const labelLead = drawLead(index, at, ego);
     for (const cone of drive.cones) drawCone(cone);
     for (const thing of drive.obstacles) drawBody(thing, { ...thing, crashed: false }, '#c9452f', '#3d0f08', false);

@@ -36,7 +36,7 @@ from chauffeur.planners.onboard.moods import EASE, HURRY
 from chauffeur.planners.onboard.options import Chosen, Declined, speed_words
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.thoughts import thoughts_of
-from chauffeur.planners.onboard.town import town_destination
+from chauffeur.planners.onboard.town import TownStep, snippets, steps_of, town_destination
 from chauffeur.planners.onboard.understand import meanings_said
 from chauffeur.planners.talk2drive.habits import SIGN_SETTING, kind_of, pace_of, speed_for
 from chauffeur.planners.talk2drive.hints import HINT_KINDS, WEIGHTS, Hint, goes_with, hint_of
@@ -51,6 +51,7 @@ from chauffeur.planners.talk2drive.style import (
     named_spot,
     place_of,
 )
+from chauffeur.worlds.town.recipes import PLACE_KINDS
 
 _STANDING: Final = frozenset({"stop", "pull_over"})
 _ELSEWHERE: Final[dict[str, str]] = {
@@ -137,9 +138,15 @@ class EmbeddedParameters:
         if ready.declined is not None:
             return ready.declined
         wish = ready.instruction.text
-        if situation.world == "town" and (place := town_destination(wish)):
-            return self._take_to(place, request, begun)
         request = replace(request, instruction=ready.instruction)
+        if situation.world == "town":
+            steps = steps_of(wish, snippets()) or ()
+            if place := town_destination(wish) or _got_out_at(steps):
+                return self._take_to(place, request, begun)
+            if later := _later(steps):
+                return declined(self, later, begun)
+            if plainly := _plain_words(steps):  # on other roads "turn right" may be a change of the lane
+                request = replace(request, instruction=replace(request.instruction, text=plainly))
         settled = self._model.settle(_compared(request), begun)
         reads = () if isinstance(settled, Plan) else tuple(map(kind_of, settled.linked.choice.intent.split("+")))
         known = situation.world in HINT_KINDS
@@ -266,7 +273,7 @@ class EmbeddedParameters:
         """To a place of a town. Whether it has such a place, the town says; the car keeps to its limits by itself."""
         limit = request.context.situation.speed_limit_mps
         found = _parameters(min(limit, request.limits.most_mps(limit)), LOOK_AHEAD["usual"], place)
-        return self._plan(found, f"You want to go to {place}. I {does(found)}.", "go_to", request, begun)
+        return self._plan(found, f"You want to go to {_the(place)}. I {does(found)}.", "go_to", request, begun)
 
     def _paced(self, found: Parameters, intent: str, request: PlanRequest, begun: float, wants: str = "") -> Plan:
         """A plan by rule, at the speed this person likes for such wishes."""
@@ -307,6 +314,11 @@ def _spot_read(wish: str, settled: Settled | Plan, hint: Hint | None) -> str:
 def _compared(request: PlanRequest) -> PlanRequest:
     """The same request with only those trips that memory found alike, which are what the model is shown."""
     return replace(request, history=History(tuple(item for item in request.history.items if item.similarity >= 0.0)))
+
+
+def _the(place: str) -> str:
+    """A place in a sentence: the kinds of our own towns take an article, names do not."""
+    return f"the {place}" if place.replace(" ", "_") in PLACE_KINDS else place
 
 
 def _parameters(speed_mps: float, look: LookAhead, route: str = "") -> Parameters:
@@ -412,6 +424,28 @@ def _in_time(step: DialectStep) -> bool:
     return depends or step.wait_s is not None
 
 
+def _got_out_at(steps: Sequence[TownStep]) -> str:
+    """The place of a town to be let out at; empty for none."""
+    return steps[0].place if len(steps) == 1 and steps[0].out else ""
+
+
+def _later(steps: Sequence[TownStep]) -> str:
+    """Why steps through a town are no matter of parameters: several, or one for further on. Empty where they are."""
+    if len(steps) > 1:
+        return _ONE_BY_ONE
+    bound = any(step.place or step.nth > 1 or step.after_m is not None or step.before_junction for step in steps)
+    return _AT_ONCE if bound else ""
+
+
+def _plain_words(steps: Sequence[TownStep]) -> str:
+    """A turn, or a stop to get out, in words that are read as nothing else; empty where it is neither."""
+    if not steps:
+        return ""
+    if steps[0].out:
+        return "Stop the car."
+    return f"Turn {steps[0].turn} at the next junction." if steps[0].turn in ("left", "right") else ""
+
+
 def _sideways(step: Chosen) -> bool:
     """Whether it leaves the lane, if only for a while."""
     return step.lanes_moved != 0 or step.intent.startswith("overtake")
@@ -455,7 +489,7 @@ def does(parameters: Parameters) -> str:
     """What parameters make the car do, as a clause after "I"."""
     speed = parameters.target_speed_mps
     pace = "stop" if speed == 0.0 else f"set the target speed to {speed_words(speed)}"
-    way = _WAY_WORDS.get(parameters.route, f", take the way to {parameters.route}") if parameters.route else ""
+    way = _WAY_WORDS.get(parameters.route, f", take the way to {_the(parameters.route)}") if parameters.route else ""
     return (
         f"{pace}{_LANE_WORDS[parameters.lane]}{way}, and look ahead {number(parameters.look_ahead_ratio)} s "
         f"along my path, {number(parameters.look_ahead_m)} m at least"

@@ -10,6 +10,9 @@ import re
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from chauffeur.language.denials import denied_words
+from chauffeur.language.tokens import tokens_of
+
 Manner = Literal["gentle", "usual", "lively"]
 
 
@@ -64,17 +67,30 @@ _TAKES: Final = re.compile(
     r"\b(?:take|bring|drive|drop|get|go|head|run)\b[^.;!?]*?\b(?:to|at|for)\s+(?:the\s+|my\s+|our\s+)?(?P<place>(?:St\.|[^.,;!?])+)",
     re.IGNORECASE,
 )
+_HOME: Final = re.compile(r"\b(?:take|bring|drive|get|go|head)\b(?: \w+){0,2} (?P<place>home)\b", re.IGNORECASE)
+_BARE: Final = re.compile(
+    r"^(?:(?:no|please|ok|now)\b[\s,]*)*to\s+(?:the|my|our)\s+(?P<place>(?:St\.|[^.,;!?])+)", re.IGNORECASE
+)
 _NO_PLACE: Final = re.compile(r"^(?:left|right|straight|stop|a stop|the (?:left|right)|\d)", re.IGNORECASE)
 _TRAILING: Final = re.compile(
-    r"\s{1,3}(?:please|now|quickly|as (?:fast|soon|quickly).{0,200}|and .{0,200})$", re.IGNORECASE
+    r"\s{1,3}(?:please|now|quickly|as (?:fast|soon|quickly).{0,200}|(?:and|as|because|but|since|without) .{0,200})$",
+    re.IGNORECASE,
 )
 
 
+_CLAUSE: Final = re.compile(r"[,;!?]|(?<!\bSt)\.|\bbut (?=don't|do not|never)", re.IGNORECASE)
+
+
 def destination_of(wish: str) -> str:
-    """The place of a town that a wish asks to be taken to, in its own words; empty where it asks for none."""
-    found = _TAKES.search(wish)
-    place = _TRAILING.sub("", found["place"].strip()) if found else ""
-    return "" if _NO_PLACE.match(place) else place
+    """The place of a town that a wish asks to be taken to, in its own words; empty where it asks for none, or says that
+    it is not to be gone to."""
+    for found in (*_TAKES.finditer(wish), *_HOME.finditer(wish), *_BARE.finditer(wish)):
+        begins = max((one.end() for one in _CLAUSE.finditer(wish, 0, found.start())), default=0)
+        place = _TRAILING.sub("", found["place"].strip())
+        denied = denied_words(f"{wish[begins : found.start('place')]} {place}")
+        if not denied & {*tokens_of(found.group())[:1], *tokens_of(place)}:
+            return "" if _NO_PLACE.match(place) else place
+    return ""
 
 
 def named_spot(wish: str) -> str:

@@ -18,6 +18,7 @@ from chauffeur.concept import InstructionError, Parameters, ParkingLot, Plan, Pl
 from chauffeur.language.corrections import last_said
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.dangers import danger
+from chauffeur.planners.onboard.town import landmark_in, town_destination
 from chauffeur.planners.vilad.driving import TEMPLATE as DRIVE
 from chauffeur.planners.vilad.driving import asked_of_drive
 from chauffeur.planners.vilad.driving_planning import (
@@ -112,6 +113,9 @@ class ViladPlanner:
         engine = self._driving_engine
         if why := danger(text):
             return declined(self, why, begun, intent="declined")
+        if request.context.situation.world == "town" and landmark_in(town_destination(text)):
+            words = "I write the next few seconds on the road, and the way there is longer. Say where to turn next."
+            return declined(self, words, begun, intent="declined")
         written = write_drive(engine, text, street, self._how or HOW_DRIVEN)
         usage = Usage(completion_tokens=len(DRIVE.slots), requests=written.decided.passes)
         asked = asked_of_drive(written.values)

@@ -24,9 +24,12 @@ class CarlaAddress(NamedTuple):
 
 def address(environ: Mapping[str, str] = os.environ) -> CarlaAddress:
     """The server's address. Raises ScenarioError for one that is none."""
-    host, _, port = environ.get(SERVER_VARIABLE, "localhost:2000").rpartition(":")
-    if not host or not port.isdigit():
-        raise ScenarioError(f"{SERVER_VARIABLE} must be HOST:PORT.", hint=f"export {SERVER_VARIABLE}=localhost:2000")
+    named = environ.get(SERVER_VARIABLE, "") or "localhost:2000"
+    host, _, port = named.rpartition(":")
+    if not host or not (port.isascii() and port.isdigit()) or not 0 < int(port) < 1 << 16:
+        raise ScenarioError(
+            f"{SERVER_VARIABLE} is {named!r} and must be HOST:PORT.", hint=f"export {SERVER_VARIABLE}=localhost:2000"
+        )
     return CarlaAddress(host, int(port))
 
 
@@ -45,9 +48,9 @@ def library() -> Any:
 def connect() -> Any:
     """A client of the server. Raises MissingExtraError, ScenarioError."""
     carla, where = library(), address()
-    client = carla.Client(where.host, where.port)
-    client.set_timeout(_TIMEOUT_S)
     try:
+        client = carla.Client(where.host, where.port)  # looks the host up
+        client.set_timeout(_TIMEOUT_S)
         client.get_server_version()
     except RuntimeError as error:
         raise ScenarioError(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from chauffeur.concept import Scenario
+from chauffeur.concept import ChauffeurError, Scenario
+from chauffeur.worlds.town.pack import Place, load
 
 
 def _built_in(name: str, config: dict[str, Any], seed: int, wish: str, title: str) -> Scenario:
@@ -34,3 +35,14 @@ BUILT_IN: tuple[Scenario, ...] = (
         "Ringstead, a town with a ring road",
     ),
 )
+
+
+def places_of(scenario: Scenario) -> tuple[Place, ...]:
+    """The places of the town that a scenario is set in; none where it names no town, or one that is not here."""
+    town = scenario.config.get("town")
+    if not isinstance(town, str):
+        return ()
+    try:
+        return load(town).places
+    except ChauffeurError:
+        return ()

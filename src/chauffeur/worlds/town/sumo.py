@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from chauffeur.concept import AgentKind, MissingExtraError, ScenarioError
+from chauffeur.concept import AgentKind, ChauffeurError, MissingExtraError, ScenarioError
 from chauffeur.geometry import Pose
 from chauffeur.worlds.town.bodies import Trails
 
@@ -147,9 +147,17 @@ class Sumo:
             self._sumo.close()
 
     def step(self) -> None:
-        """Let the traffic go on for a period. Raises ScenarioError once another simulation was opened."""
+        """Let the traffic go on for a period.
+
+        Raises:
+            ScenarioError: Another simulation was opened.
+            ChauffeurError: SUMO failed; it is good for nothing more.
+        """
         self._ours()
-        self._sumo.simulationStep()
+        try:
+            self._sumo.simulationStep()
+        except (self._sumo.TraCIException, self._sumo.FatalTraCIError) as error:
+            raise ChauffeurError(f"SUMO failed while it ran: {error}", hint="Run the same command again.") from error
 
     # Traffic ----------------------------------------------------------------------------------------------------------
 
