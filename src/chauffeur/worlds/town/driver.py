@@ -28,7 +28,18 @@ from chauffeur.concept import (
 from chauffeur.control.idm import IdmParameters, free_acceleration, idm_acceleration
 from chauffeur.control.kinematic_bicycle import KinematicBicycle
 from chauffeur.control.pure_pursuit import pursuit_steering
-from chauffeur.geometry import JunctionWay, Lane, Pose, RoadGraph, Route, Turn, choice_ahead, wrap_to_pi
+from chauffeur.geometry import (
+    JunctionWay,
+    Lane,
+    Polyline,
+    Pose,
+    RoadGraph,
+    Route,
+    Turn,
+    choice_ahead,
+    joined,
+    wrap_to_pi,
+)
 from chauffeur.worlds.town.foresight import Foresight, Meeting
 from chauffeur.worlds.town.way import RouteCorridor, Stretch, astride_m, blended, free_route
 
@@ -85,6 +96,9 @@ _CHANGE_S: Final = 3.5
 _ROOM_M: Final = 12.0
 """Who has to change lanes waits for a gap so far before the lane's end, where there is room left to do it."""
 _LANE_BESIDE_M: Final = 5.0
+_UPSTREAM_M: Final = 60.0
+"""Who is on a way into a lane that is changed into is minded from so far."""
+_MOST_WAYS: Final = 6
 _HERE_M: Final = 3.0
 _LOST_M: Final = 3.0
 _EVERY: Final = 2
@@ -144,6 +158,7 @@ class TownDriver:
         self._sign: tuple[int, float] | None = None
         self._tail_over = False
         self._lines: dict[tuple[str, float], tuple[Stretch, float]] = {}
+        self._into: dict[LaneId, tuple[Polyline, ...]] = {}
         self.why = ""
 
     def head_for(self, route: Route) -> None:
@@ -448,7 +463,46 @@ class TownDriver:
                 needed = 2.5 + 0.7 * along + closing * closing / 4.0
             if gap < needed:
                 return False
-        return True
+        return not any(self._comes_up(one, goal.lanes[0].id, here, ego) for one in seen.others)
+
+    def _comes_up(self, other: VehicleState, goal: LaneId, here: float, ego: VehicleState) -> bool:
+        """Whether somebody who is not in a lane yet, but on a way into it, would come too close behind the ego.
+
+        Args:
+            other: Who.
+            goal: The lane.
+            here: Where the ego is along it, m.
+            ego: The ego.
+        """
+        if math.dist((other.x_m, other.y_m), (ego.x_m, ego.y_m)) > _UPSTREAM_M:
+            return False
+        for line in self._upstream(goal):
+            station, aside = line.project(other.x_m, other.y_m)
+            pose = line.at(station)
+            turned = wrap_to_pi(other.heading_rad - pose.heading_rad)
+            if abs(aside) > 1.9 + other.width_m / 2.0 or station >= line.length_m or math.cos(turned) < 0.7:
+                continue
+            along = other.speed_mps * math.cos(turned)
+            closing = max(0.0, along - ego.speed_mps)
+            gap = here + line.length_m - station - (ego.length_m + other.length_m) / 2.0
+            if gap < 2.5 + 0.7 * along + closing * closing / 4.0:
+                return True
+        return False
+
+    def _upstream(self, lane: LaneId) -> tuple[Polyline, ...]:
+        """The ways into a lane, as far back as somebody who is fast has to be seen."""
+        known = self._into.get(lane)
+        if known is None:
+            done: list[list[Lane]] = []
+            rim: list[tuple[list[Lane], float]] = [([], 0.0)]
+            while rim:
+                way, length = rim.pop()
+                before = () if length > _UPSTREAM_M else self._road.predecessors(way[0].id if way else lane)
+                if way and not before:
+                    done.append(way)
+                rim += [([one, *way], length + one.length_m) for one in before]
+            known = self._into[lane] = tuple(joined([one.centre for one in way]) for way in done[:_MOST_WAYS])
+        return known
 
     # Speed ------------------------------------------------------------------------------------------------------------
 
