@@ -206,10 +206,9 @@ class _ToldTwin(Twin):
         super().__init__(*given)
         self.logits: dict[int, Array] = {}
 
-    def _scored(self, hidden: torch.Tensor, row: Array, first: int = 0) -> Array:
-        found = super()._scored(hidden, row, first)
-        self.logits[first] = found[0]
-        return found
+    def told(self, row: Array, place: int, done: int, *, keep: bool) -> Array:
+        self.logits[place] = super().told(row, place, done, keep=keep)
+        return self.logits[place]
 
 
 def plan_path(
