@@ -19,6 +19,8 @@ Examples:
 
     chauffeur bench openloop --data nuscenes --tables v1.0-mini --planner openai/MODEL --setting chain-of-thought
 
+    chauffeur bench openloop --data frames --planner vilad-frames --setting sft
+
     chauffeur bench openloop --data frames --planner vilad-frames/runs/frames/model --setting sft
 
     chauffeur bench openloop --data frames --planner openai/MODEL --beside runs/openloop-vilad-frames
@@ -47,7 +49,7 @@ simulated and rendered. Ctrl-C keeps whole trips; the same command goes on.
 def openloop(
     data: Annotated[Path, typer.Option(help="Folder with nuScenes' tables and `samples`.")],
     planner: Annotated[
-        str, typer.Option(help="The model: openai/NAME, transformers/FOLDER, vilad-frames/FOLDER.")
+        str, typer.Option(help="The model: openai/NAME, transformers/FOLDER, vilad-frames or vilad-frames/FOLDER.")
     ] = "",
     tables_of: Annotated[str, typer.Option("--tables", help="E.g. v1.0-mini; default the only one.")] = "",
     setting: Annotated[str, typer.Option(help="`zero-shot`, `chain-of-thought` or `sft`.")] = "zero-shot",

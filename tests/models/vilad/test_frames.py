@@ -29,7 +29,7 @@ from chauffeur.models.vilad.frames_baselines import FOLDS, expected_paths, stran
 from chauffeur.models.vilad.frames_data import ego_features, joined, load_frames  # noqa: E402
 from chauffeur.models.vilad.frames_pipeline import FramesPlan, make_frames_model  # noqa: E402
 from chauffeur.models.vilad.frames_recipe import ONE_PASS, FramesRecipe, plan_path, plan_paths, prompts, soft_targets  # noqa: E402
-from chauffeur.models.vilad.frames_store import load_frames_model, measured, store_frames_model  # noqa: E402
+from chauffeur.models.vilad.frames_store import OWN, load_frames_model, measured, store_frames_model  # noqa: E402
 from chauffeur.models.vilad.frames_vision import VisionRecipe, tokens_of  # noqa: E402
 from chauffeur.models.vilad.waypoints import codebook, displacements, geometric_median  # noqa: E402
 from chauffeur.planners.vilad.template import MASK  # noqa: E402
@@ -194,6 +194,18 @@ def test_half_the_bits_answer_alike(tmp_path: Path, trained: tuple[Path, Path, l
     whole, _ = measured(model, "regression", frames)
     half, _ = measured(load_frames_model(tmp_path), "regression", frames)
     assert np.abs(whole - half).max() < 0.1
+
+
+def test_what_ships_answers() -> None:
+    answerer = FramesAnswerer.from_spec("")
+    assert answerer.id == "vilad-frames/,vilad" and "vilad-frames-v2" in answerer.model
+    model = load_frames_model(OWN)
+    history = np.stack((np.linspace(-12.0, 0.0, 5), np.zeros(5), np.zeros(5)), axis=1)
+    found, passes = model.waypoints("vilad", history, COMMANDS[""], np.full((*model.size, 3), 110, np.uint8))
+    assert passes == 1 and found.shape == (6, 2) and np.isfinite(found).all()
+    assert sum(one.stat().st_size for one in OWN.iterdir()) < 4e6
+    unseen = {one["method"]: one["l2"]["stp3"][3] for one in model.about["figures"]["test"]}
+    assert unseen["ViLaD"] < min(unseen["ego-status MLP"], unseen["autoregressive twin"])
 
 
 def test_displacements_are_from_constant_velocity() -> None:
