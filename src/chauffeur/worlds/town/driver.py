@@ -62,6 +62,7 @@ _LEAST_LOOK_M: Final = 3.2
 _SIDE_M: Final = 0.35
 _MOST_BRAKING_MPS2: Final = 8.0
 _YELLOW_MPS2: Final = 3.0
+_HARD_MPS2: Final = 5.0
 _GONE_S: Final = 2.5
 """A car that stands astride a line needs so long to have all of itself behind it."""
 _LINE_M: Final = 0.7
@@ -157,6 +158,7 @@ class TownDriver:
         self._tick = 0
         self._sign: tuple[int, float] | None = None
         self._tail_over = False
+        self._yellow_m: float | None = None
         self._lines: dict[tuple[str, float], tuple[Stretch, float]] = {}
         self._into: dict[LaneId, tuple[Polyline, ...]] = {}
         self.why = ""
@@ -533,7 +535,7 @@ class TownDriver:
             else:
                 stop = self._yields(meeting, nose, speed, target)
                 if stop is not None:
-                    stops.append(stop)
+                    stops += [stop, *self._rather_before_yellow(nose, speed)]
         for stop in stops:
             asked = _stopping(speed, stop.at_m - nose, idm)
             if asked < least:
@@ -564,7 +566,7 @@ class TownDriver:
     def _stops(self, seen: Observation, nose: float) -> list[_Stop]:
         """Where it has to stop for the end of the line, lights, signs, and a junction that is blocked."""
         stretch, speed, length = self._stretch, seen.ego.speed_mps, self._chassis.length_m
-        self._sign, self._tail_over = None, False
+        self._sign, self._yellow_m, self._tail_over = None, None, False
         stops = [_Stop(stretch.end_m - _ROOM_M, "room to change lanes")]
         if stretch.goal:
             stops = [_Stop(stretch.end_m + self._chassis.length_m / 2.0, "the goal")]
@@ -579,6 +581,8 @@ class TownDriver:
             if lane.id in lights:
                 line = self._line_m(lights[lane.id], start, end)
                 self._tail_over |= line + astride_m(length) < nose < line + length + _CLEAR_M
+                if lights[lane.id].state == "yellow" and line > nose:
+                    self._yellow_m = line
                 if self._light_stops(lights[lane.id], line, nose, speed):
                     stops.append(_Stop(line - _LINE_M, f"light {lights[lane.id].state}"))
                 elif self._no_room_behind(line, nose, speed):
@@ -623,6 +627,14 @@ class TownDriver:
         assert light.remaining_s is not None
         through = (ahead + self._chassis.length_m + 2.0) / max(speed, 3.0)
         return gently and ahead < 25.0 and through > light.remaining_s + 1.0 and speed > 1.0
+
+    def _rather_before_yellow(self, nose: float, speed: float) -> list[_Stop]:
+        """A stop before a line whose light is yellow, harder than for the light alone: who lets somebody go first in
+        the junction would stand astride the line when it turns red."""
+        if self._yellow_m is None:
+            return []
+        room = self._yellow_m - _LINE_M - nose
+        return [_Stop(self._yellow_m - _LINE_M, "light yellow")] if speed * speed <= 2.0 * _HARD_MPS2 * room else []
 
     def _no_room_behind(self, line: float, nose: float, speed: float) -> bool:
         """Whether who is ahead would leave no room for all of the car behind a line that it can still stop at.
