@@ -96,6 +96,8 @@ _CHANGE_LEAST_M: Final = 14.0
 _CHANGE_S: Final = 3.5
 _ROOM_M: Final = 12.0
 """Who has to change lanes waits for a gap so far before the lane's end, where there is room left to do it."""
+_SEAM_M: Final = 45.0
+"""A change that is begun before a seam of the road ends at most so far beyond it."""
 _LANE_BESIDE_M: Final = 5.0
 _UPSTREAM_M: Final = 60.0
 """Who is on a way into a lane that is changed into is minded from so far."""
@@ -403,13 +405,13 @@ class TownDriver:
         goal = self._beside(lane.id, changes, setpoints)
         if goal is None:
             return
-        _, end = stretch.span(at)
+        other = self._corridor.stretch(layer, goal)
+        end = self._beside_until(at, other)
         room = min(end, stretch.end_m if stretch.goal else end) - self._station - self._nose_m
         way = max(_CHANGE_LEAST_M, ego.speed_mps * _CHANGE_S)
         if room < _CHANGE_LEAST_M * 0.6:
             return
         way = min(way, max(room, _CHANGE_LEAST_M * 0.6))
-        other = self._corridor.stretch(layer, goal)
         if not self._has_gap(seen, other):
             return
         rear = Pose(ego.x_m, ego.y_m, ego.heading_rad).ahead(-self._chassis.rear_to_middle_m)
@@ -418,6 +420,18 @@ class TownDriver:
         self._station = self._rear_station(ego, 0.0, 10.0)
         self._changing_to = first.length_m - 2.0
         self._meetings = self._met(seen)
+
+    def _beside_until(self, at: int, other: Stretch) -> float:
+        """Station up to which another line runs beside this one, from a lane of this one on: a road is cut into
+        sections, and who waits just before a seam has room beyond it."""
+        stretch = self._stretch
+        first_end = end = stretch.span(at)[1]
+        for own, beside in zip(range(at + 1, len(stretch.lanes)), other.lanes[1:], strict=False):
+            lane = stretch.lanes[own]
+            if lane.junction or beside is lane or not self._road.places_between(lane.id, beside.id):
+                break
+            end = stretch.span(own)[1]
+        return min(end, first_end + _SEAM_M)
 
     def _beside(self, lane: LaneId, changes: object, setpoints: Setpoints) -> LaneId | None:
         """The lane beside that is to be changed into: as the route needs, else as is wished."""
@@ -476,7 +490,9 @@ class TownDriver:
             here: Where the ego is along it, m.
             ego: The ego.
         """
-        if math.dist((other.x_m, other.y_m), (ego.x_m, ego.y_m)) > _UPSTREAM_M:
+        ahead, aside = Pose(ego.x_m, ego.y_m, ego.heading_rad).sees(other.x_m, other.y_m)
+        follows = ahead < 0.0 and abs(aside) < (ego.width_m + other.width_m) / 2.0
+        if follows or math.hypot(ahead, aside) > _UPSTREAM_M:
             return False
         for line in self._upstream(goal):
             station, aside = line.project(other.x_m, other.y_m)
