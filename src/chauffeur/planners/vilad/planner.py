@@ -18,7 +18,8 @@ from chauffeur.concept import InstructionError, Parameters, ParkingLot, Plan, Pl
 from chauffeur.language.corrections import last_said
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.dangers import danger
-from chauffeur.planners.onboard.town import landmark_in, town_destination
+from chauffeur.planners.onboard.town import town_destination
+from chauffeur.planners.onboard.town_steps import landmark_in
 from chauffeur.planners.vilad.driving import TEMPLATE as DRIVE
 from chauffeur.planners.vilad.driving import asked_of_drive
 from chauffeur.planners.vilad.driving_planning import (
