@@ -7,7 +7,7 @@ from typing import Final
 
 from chauffeur.concept import DataError, Observation, VehicleState
 from chauffeur.drive.live.messages import MessageError, MirroredInstant, Report
-from chauffeur.drive.live.mirror import live_world
+from chauffeur.drive.live.mirror import mirror_of
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.talk.messages import Road, RoadLane, Scene, ShownBody
@@ -28,7 +28,7 @@ class View:
             observations: What control shows.
         """
         self._starts = settings.starts
-        self._world = live_world(settings.starts[0].scenario)
+        self._world = mirror_of(settings.starts[0].scenario)
         self._world.reset(self._starts[0].scenario, self._starts[0].seed)
         self._world.adopt(self._world.mirrored())  # what is slow the first time is done before anything moves
         self._world.observe()
