@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Final
 
 from chauffeur.concept import Command, Limits, Observation, Parameters, ScenarioError, Setpoints, Turn, VehicleState
 from chauffeur.executors.base import DriverLed, ExecutorBase, HeldSetpoints, PolicyTick
@@ -10,6 +11,9 @@ from chauffeur.executors.pursuit import ParametersDriver, number
 from chauffeur.geometry.road_graph import TURNS
 from chauffeur.worlds.base import World
 from chauffeur.worlds.places import TownPlaces
+
+_ROUNDED_MPS: Final = 0.02
+"""Planners say the limit in hundredths of a metre a second, and may have cut it off."""
 
 
 def parameters_executor(world: World) -> PursuitExecutor | TownSetPoints:
@@ -99,7 +103,7 @@ class TownSetPoints(DriverLed):
         self._lane, self._turn = beside if policy.lane else None, turn
         sign = 0.0 if here is None else self._world.perception().speed_limit(here)
         self._policy_mps, self._limits = number(policy.target_speed_mps, 0.0), limits
-        self._free = self._policy_mps >= sign
+        self._free = self._policy_mps >= sign - _ROUNDED_MPS
 
     def tick(self) -> HeldSetpoints:
         """See RunningPolicy."""

@@ -20,16 +20,19 @@ import struct
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice, takewhile
 from typing import Final
 
 from chauffeur.concept import (
     ActionMatrix,
     ChauffeurError,
+    LaneId,
     Observation,
     Parameters,
     Plan,
     Program,
     ProgramState,
+    RoadGraph,
     SandboxError,
     ScenarioError,
     Setpoints,
@@ -368,7 +371,7 @@ class Policy:
             # Gains, a speed, and a way by its name rely neither on the lane nor on who is ahead; waypoints are checked
             # again as they are seen now.
             return ""
-        if scene.lane != now.lane:
+        if not _goes_on(self._mirror.world.observe().road, scene.lane, now.lane):
             return "The car is in another lane than the plan was made for."
         if scene.lead != now.lead:
             return "Another car is ahead than the plan was made for."
@@ -511,4 +514,14 @@ class Policy:
         self._rings.events.write(encode(DriveEvent(kind, wish, text[:MOST_SAID], self._trip, self._mirror.tick)))
 
 
+def _goes_on(road: RoadGraph, before: LaneId | None, now: LaneId | None) -> bool:
+    """Whether a lane is the one before, or the one that it leads into short of the next junction."""
+    if before == now:
+        return True
+    onward = islice(road.ahead(before), 1, _SECTIONS + 1) if before is not None and before in road else ()
+    return any(lane.id == now for lane in takewhile(lambda lane: not lane.junction, onward))
+
+
+_SECTIONS: Final = 3
+"""Sections of a lane that a car may have passed while it was planned for."""
 _ENDS: Final[dict[ProgramState, WishEventKind]] = {"finished": "finished", "failed": "failed"}

@@ -39,7 +39,11 @@ _SIGN: Final = re.compile(
 """Where to turn, not what to do about the sign."""
 _TIME: Final = re.compile(r"\b(?:quarter|half|past|o'clock|noon|midnight|minutes?|hours?|time|least|once|all)\b")
 """What stands behind "at" or "for" and is no place."""
-_CORRECTS: Final = re.compile(r"\b(?:sorry|no,|actually|hang on|scrap|rather|wrong|instead|i mean)\b", re.IGNORECASE)
+_CORRECTS: Final = re.compile(
+    r"\b(?:sorry|no,|actually|hang on|scrap|rather|wrong|instead|forget|i mean)\b", re.IGNORECASE
+)
+_TO: Final = re.compile(r"\s{0,3}(?:(?:no|rather|please|now|then|better)[\s,]{1,3}){0,2}to\b", re.IGNORECASE)
+"""Whoever begins so and names a place wants to go there."""
 _MOST_WORDS: Final = 3
 """A longer name of a place has words of the sentence in it."""
 _HOME: Final = re.compile(r"\b(?:home|my (?:place|house|flat))\b", re.IGNORECASE)
@@ -149,7 +153,7 @@ def plan_in_town(planner: Planner, request: PlanRequest, repository: PolicyRepos
     if (plan := _declined(planner, meant, begun)) is not None:
         return plan
     if there := town_destination(said, meant):
-        question = "" if meant.likely else f"Shall I take you to {there}?"
+        question = "" if meant.likely or _TO.match(said) else f"Shall I take you to {there}?"
         return _first_asked(
             planner, driven_to(planner, there, request, begun), question, f"Take me to the {there}.", request
         )
