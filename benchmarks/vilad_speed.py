@@ -1,12 +1,18 @@
-"""Fig. 17 on one CPU core: masked diffusion and its autoregressive twin, without and with caches; same tokens.
+"""Fig. 17 on one CPU core or an accelerator: masked diffusion and its autoregressive twin; same tokens, with caches.
 
     python benchmarks/vilad_speed.py
     python benchmarks/vilad_speed.py --sizes lot 3M 10M 30M --repeats 5 --json speed.json --plot speed.svg
+    python benchmarks/vilad_speed.py --device cuda --dtype bfloat16 --sizes 170M 8B --prompts 128 1024 3700
     python benchmarks/vilad_speed.py --frames frames --model runs/frames/model --json quality.json
 
 Weights are random: time does not depend on them. The number of forward passes (NFE) of a trained model does, so it is
 set here, and beside the time stands up to how many passes the diffusion model is the faster one. Milliseconds of CPU
 time of one thread, which other work on the machine disturbs least; the median of the repeats.
+
+With `--device cuda` it is wall time between two synchronisations, and each way to decide stands there twice: launched
+kernel by kernel, and with its passes recorded as CUDA graphs (`vilad_graphs`), without the prompt's connectors, which
+are computed once. Beside each stands what the machine allows (`vilad_limits`) and which share of it is reached. A long
+prompt is mostly words: that of a picture, which no decision points into.
 
 With `--frames` trained networks decide real frames (`chauffeur model train vilad-frames`): what is measured is then
 time and quality together, L2 (m, ST-P3's average) on the test split beside milliseconds and passes.
@@ -16,8 +22,11 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
+import platform
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -31,6 +40,7 @@ from chauffeur.models.vilad.network import SIZES, Vilad, ViladConfig
 from chauffeur.planners.vilad.parking import TEMPLATE
 from chauffeur.planners.vilad.template import ActionSlot, ActionTemplate, digit_slots
 from chauffeur.planners.vilad.unmasking import Unmasking, unmask
+from vilad_limits import Limit, Machine, diffusion_passes, limit, machine, twin_passes
 from vilad_speed_svg import drawn
 
 WORDS, SCENE = 96, 27
@@ -73,15 +83,55 @@ def cpu_ms(run: Callable[[], object], repeats: int) -> float:
     return median(found)
 
 
-def measured(size: str, template: ActionTemplate, prompt: int, passes: int, repeats: int) -> dict[str, Any]:
+def wall_ms(run: Callable[[], object], repeats: int, most_s: float = 1.5) -> float:
+    """Median wall time of a call on an accelerator after one to warm up; of fewer calls where they take long."""
+    run()
+    found: list[float] = []
+    while not found or (len(found) < repeats and sum(found) < 1000.0 * most_s):
+        torch.cuda.synchronize()
+        begun = time.perf_counter()
+        run()
+        torch.cuda.synchronize()
+        found.append(1000.0 * (time.perf_counter() - begun))
+    return median(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """Where the networks are, in which precision, and what the machine allows there (not asked of a CPU)."""
+
+    device: torch.device
+    dtype: torch.dtype
+    on: Machine | None
+
+    def built(self, config: ViladConfig, template: ActionTemplate) -> Vilad:
+        """A network with random weights, made where it stays."""
+        torch.manual_seed(0)
+        before = torch.get_default_dtype()
+        torch.set_default_dtype(self.dtype)
+        try:
+            with self.device:
+                return Vilad(config, template).to(self.device).eval()
+        finally:
+            torch.set_default_dtype(before)
+
+
+def measured(
+    size: str, template: ActionTemplate, prompt: int, passes: int, repeats: int, where: Where
+) -> dict[str, Any]:
     """One row of the table."""
-    torch.manual_seed(0)
     config = ViladConfig(SIZES[size], WORDS, SCENE)
-    model = Vilad(config, template).eval()
-    twin = Vilad(config.twin, template).eval()
-    words, scene = torch.randn(1, min(64, prompt // 2), WORDS), torch.rand(1, prompt - min(64, prompt // 2), SCENE)
+    model, twin = where.built(config, template), where.built(config.twin, template)
+    torch.manual_seed(0)
+    near = min(64, prompt - prompt // 2)  # candidates; the rest are words
+    words = torch.randn(1, prompt - near, WORDS).to(where.device, where.dtype)
+    scene = torch.rand(1, near, SCENE).to(where.device, where.dtype)
     length, allowed = template.length, template.allowed(scene.shape[1])
-    slots = int(template.maskable.sum())
+    places = [int(one) for one in np.flatnonzero(template.maskable)]
+    slots = len(places)
+    share = math.ceil(slots / passes)  # of the decisions, each pass
+    done = math.ceil(slots / share)
+    clock = cpu_ms if where.on is None else wall_ms
 
     def diffusion(make: Callable[[], Uncached], steps: int) -> Callable[[], object]:
         how = Unmasking(steps=steps, tau=2.0)  # no confidence is above 2: the schedule alone decides, in `steps` passes
@@ -97,7 +147,7 @@ def measured(size: str, template: ActionTemplate, prompt: int, passes: int, repe
         return AdaptiveCached(model, words, scene, length, Refresh(25, 7, 0.25))
 
     def twins(*, cached: bool, skip: bool) -> float:
-        return cpu_ms(
+        return clock(
             lambda: Twin(twin, words, scene, length).decide(template, allowed, cached=cached, skip=skip), repeats
         )
 
@@ -107,22 +157,70 @@ def measured(size: str, template: ActionTemplate, prompt: int, passes: int, repe
         "prompt": prompt,
         "length": length,
         "decided": slots,
-        "passes": passes,
+        "passes": done,
         "twin": twins(cached=False, skip=False),
         "twin, KV": twins(cached=True, skip=False),
         "twin, KV, pattern skipped": twins(cached=True, skip=True),
-        "diffusion": cpu_ms(diffusion(plain, passes), repeats),
-        "diffusion, prefix": cpu_ms(diffusion(prefix, passes), repeats),
-        "diffusion, adaptive": cpu_ms(diffusion(adaptive, passes), repeats),
-        "one pass": cpu_ms(diffusion(plain, 1), repeats),
-        "a pass a decision": cpu_ms(diffusion(prefix, slots), repeats),
+        "diffusion": clock(diffusion(plain, passes), repeats),
+        "diffusion, prefix": clock(diffusion(prefix, passes), repeats),
+        "diffusion, adaptive": clock(diffusion(adaptive, passes), repeats),
+        "one pass": clock(diffusion(plain, 1), repeats),
+        "a pass a decision": clock(diffusion(prefix, slots), repeats),
     }
-    further = max(1e-6, (row["diffusion, prefix"] - row["one pass"]) / (passes - 1))
-    row["faster up to"] = 1 + int(max(0.0, row["twin, KV"] - row["one pass"]) / further)
-    row["faster up to, pattern skipped"] = 1 + int(
-        max(0.0, row["twin, KV, pattern skipped"] - row["one pass"]) / further
-    )
+    if where.on is not None:
+        from vilad_graphs import RecordedPrefix, RecordedTwin, RecordedUncached
+
+        for name, skip in (("twin, KV", False), ("twin, KV, pattern skipped", True)):
+            one = RecordedTwin(twin, words, scene, length)
+            one.decide(template, allowed, skip=skip)  # records
+            row[f"{name}, graph"] = clock(lambda d=one, k=skip: d.decide(template, allowed, skip=k), repeats)
+            del one
+            torch.cuda.empty_cache()
+        bound = RecordedUncached(model, words, scene, length)
+        bound(template.canvas)
+        row["diffusion, graph"] = clock(diffusion(lambda: bound, passes), repeats)
+        row["one pass, graph"] = clock(diffusion(lambda: bound, 1), repeats)
+        for name, steps, times in (
+            ("diffusion, prefix, graph", passes, done),
+            ("a pass a decision, graph", slots, slots),
+        ):
+            kept = RecordedPrefix(model, words, scene, length, times)
+            diffusion(lambda d=kept: d, steps)()
+            row[name] = clock(diffusion(lambda d=kept: d, steps), repeats)
+        every = list(range(length))
+        ways = {
+            "twin": twin_passes(prompt, every, cached=False),
+            "twin, KV": twin_passes(prompt, every, cached=True),
+            "twin, KV, pattern skipped": twin_passes(prompt, places, cached=True),
+            "diffusion": diffusion_passes(prompt, length, done, prefix=False),
+            "diffusion, prefix": diffusion_passes(prompt, length, done, prefix=True),
+            "one pass": diffusion_passes(prompt, length, 1, prefix=False),
+            "a pass a decision": diffusion_passes(prompt, length, slots, prefix=True),
+        }
+        width = words.element_size()
+        for name, each in ways.items():
+            least = limit(config.body, each, width, where.on)
+            for way in (name, f"{name}, graph"):
+                if way in row:
+                    row[f"{way}: limit"] = reached(least, row[way], where.on)
+    kind = ", graph" if where.on is not None else ""
+    further = max(1e-6, (row[f"diffusion, prefix{kind}"] - row[f"one pass{kind}"]) / max(1, done - 1))
+    for name in ("", ", pattern skipped"):
+        gap = row[f"twin, KV{name}{kind}"] - row[f"one pass{kind}"]
+        row[f"faster up to{name}"] = 1 + int(max(0.0, gap) / further) if gap > 0.0 else 0
     return row
+
+
+def reached(least: Limit, ms: float, on: Machine) -> dict[str, float]:
+    """The limit (ms), the share of it that a time reaches, of FLOP and of bandwidth, and what bounds it."""
+    seconds = ms / 1000.0
+    return {
+        "ms": 1000.0 * least.seconds,
+        "share": least.seconds / seconds,
+        "flop share": least.flop / on.peak / seconds,
+        "bandwidth share": least.moved / on.bandwidth / seconds,
+        "bound by bytes": least.by_bytes / least.seconds,
+    }
 
 
 def trained(data: Path, folder: Path, repeats: int, limit: int) -> list[dict[str, Any]]:
@@ -181,12 +279,26 @@ def trained(data: Path, folder: Path, repeats: int, limit: int) -> list[dict[str
     return rows
 
 
+def told(row: dict[str, Any]) -> str:
+    """A row in a line."""
+    return ", ".join(
+        f"{name} {value['ms']:.1f} ({value['share']:.0%})"
+        if isinstance(value, dict)
+        else f"{name} {value:.1f}"
+        if isinstance(value, float)
+        else f"{name} {value}"
+        for name, value in row.items()
+    )
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sizes", nargs="+", default=["lot", "3M", "10M"], choices=sorted(SIZES))
     parser.add_argument("--prompts", nargs="+", type=int, default=[36, 128])
     parser.add_argument("--tasks", nargs="+", default=list(TASKS), choices=list(TASKS))
+    parser.add_argument("--device", default="cpu", choices=["cpu", "cuda"])
+    parser.add_argument("--dtype", default="float32", choices=["float32", "bfloat16"])
     parser.add_argument("--passes", type=int, default=4)
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--json", type=Path, default=None)
@@ -203,17 +315,23 @@ def main() -> None:
         if args.json is not None:
             args.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
         return
+    device, dtype = torch.device(args.device), getattr(torch, args.dtype)
+    where = Where(device, dtype, machine(device, dtype) if args.device == "cuda" else None)
+    about = {"python": platform.python_version(), "torch": torch.__version__, "device": args.device}
+    if where.on is not None:
+        about |= {"device": torch.cuda.get_device_name(), "copy TB/s": f"{where.on.bandwidth / 1e12:.2f}"}
+        about |= {"peak TFLOP/s": f"{where.on.peak / 1e12:.0f}"}
+    print(", ".join(f"{k} {v}" for k, v in about.items()), flush=True)
     rows: list[dict[str, Any]] = []
     for size in args.sizes:
         for name in args.tasks:
             template = TASKS[name]
             for prompt in args.prompts:
-                row = {"task": name, **measured(size, template, prompt, args.passes, args.repeats)}
-                rows.append(row)
-                told = ", ".join(f"{k} {v:.1f}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items())
-                print(told, flush=True)
-    if args.json is not None:
-        args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+                row = {"task": name, **measured(size, template, prompt, args.passes, args.repeats, where)}
+                rows.append(row | {"machine": about})
+                print(told(row), flush=True)
+                if args.json is not None:
+                    args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     if args.plot is not None:
         args.plot.write_text(drawn(rows), encoding="utf-8")
     gain = np.array([row["twin, KV"] / row["diffusion, prefix"] for row in rows])

@@ -21,8 +21,18 @@ def test_splits_share_no_trip_and_the_test_town_is_in_no_other() -> None:
     seeds = [trip.seed for split in SPLITS for trip in trips[split]]
     assert len(set(seeds)) == len(seeds)
     assert {trip.town for trip in trips["test"]} == {UNSEEN_TOWN, ""}
-    assert {trip.town for split in ("train", "val") for trip in trips[split]} <= {*TOWNS, ""}
+    assert {trip.town for trip in trips["train"]} == {trip.town for trip in trips["val"]} == {*TOWNS, ""}
     assert {trip.place for trip in trips["train"]} == {"town", "highway", "crossing"}
+
+
+def test_other_towns_are_driven_in_turn_but_never_the_test_splits() -> None:
+    towns = tuple(f"town-{i}" for i in range(7))
+    config = FramesConfig(trips=32, towns=towns)
+    drawn = [trip_of(config, "train", i).town for i in range(32)]
+    assert [one for one in drawn if one] == [towns[i % 7] for i in range(24)]
+    for wrong in ((), ("Gridford", UNSEEN_TOWN)):
+        with pytest.raises(ConfigError):
+            FramesConfig(towns=wrong)
 
 
 def test_of_each_kind_its_share_is_kept() -> None:

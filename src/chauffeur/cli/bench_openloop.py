@@ -19,6 +19,8 @@ Examples:
 
     chauffeur bench openloop --data nuscenes --tables v1.0-mini --planner openai/MODEL --setting chain-of-thought
 
+    chauffeur bench openloop --data frames --planner vilad-frames --setting sft
+
     chauffeur bench openloop --data frames --planner vilad-frames/runs/frames/model --setting sft
 
     chauffeur bench openloop --data frames --planner openai/MODEL --beside runs/openloop-vilad-frames
@@ -47,7 +49,7 @@ simulated and rendered. Ctrl-C keeps whole trips; the same command goes on.
 def openloop(
     data: Annotated[Path, typer.Option(help="Folder with nuScenes' tables and `samples`.")],
     planner: Annotated[
-        str, typer.Option(help="The model: openai/NAME, transformers/FOLDER, vilad-frames/FOLDER.")
+        str, typer.Option(help="The model: openai/NAME, transformers/FOLDER, vilad-frames or vilad-frames/FOLDER.")
     ] = "",
     tables_of: Annotated[str, typer.Option("--tables", help="E.g. v1.0-mini; default the only one.")] = "",
     setting: Annotated[str, typer.Option(help="`zero-shot`, `chain-of-thought` or `sft`.")] = "zero-shot",
@@ -152,8 +154,13 @@ def frames(
     height: Annotated[int, typer.Option(min=32, help="Pictures' height, px.")] = 96,
     seconds: Annotated[float, typer.Option(min=10.0, help="Of a trip in town, at most.")] = 80.0,
     most: Annotated[int, typer.Option(min=6, help="Frames kept of a trip, at most.")] = 60,
+    town: Annotated[
+        list[str] | None,
+        typer.Option(help="Town of training and validation, by its pack's name; four of ours by default. Repeatable."),
+    ] = None,
 ) -> None:
     """Front pictures of our own traffic with 2 s of motion before and 3 s after them, in nuScenes' format."""
+    from chauffeur.bench.openloop.driving import TOWNS
     from chauffeur.bench.openloop.extrapolation import FUTURE_KINDS
     from chauffeur.bench.openloop.frames import SIMULATED, FramesConfig, make_frames
     from chauffeur.cli.console import stdout
@@ -161,7 +168,7 @@ def frames(
     from chauffeur.cli.tables import show_table
 
     console = stdout()
-    config = FramesConfig(trips, seed, width, height, seconds, most)
+    config = FramesConfig(trips, seed, width, height, seconds, most, tuple(town) if town else TOWNS)
     try:
         with progress(console, "trips") as show:
             counts = make_frames(out, config, show)

@@ -203,6 +203,8 @@ Examples:
 
     chauffeur model train vilad-frames --data frames --out runs/frames
 
+    chauffeur model train vilad-frames --data frames --also more --out runs/long --encoder-steps 8000 --device cuda
+
     chauffeur bench openloop --data frames --planner vilad-frames/runs/frames/model --setting sft
 
     chauffeur bench openloop --data frames --planner vilad-frames/runs/frames/model,twin --setting sft
@@ -219,7 +221,12 @@ def vilad_frames(
     out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
     seed: Annotated[int, typer.Option(min=0, help="Seed of weights and batches.")] = 0,
     encoder_steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of the encoder.")] = 1_000,
+    encoder_batch: Annotated[int, typer.Option(min=1, help="Frames of one of its steps.")] = 32,
     steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of the decoders, each.")] = 500,
+    also: Annotated[
+        list[Path] | None, typer.Option(help="Another set whose training split is trained on too. Repeatable.")
+    ] = None,
+    device: Annotated[str, typer.Option(help="Where networks are trained: cpu, cuda.")] = "cpu",
 ) -> None:
     """ViLaD on frames: a front picture, own motion and a command to waypoints, by masked diffusion (paper Sec. VII)."""
     from dataclasses import replace
@@ -236,11 +243,11 @@ def vilad_frames(
     plan = FramesPlan()
     plan = replace(
         plan,
-        vision=replace(plan.vision, steps=encoder_steps, seed=seed),
+        vision=replace(plan.vision, steps=encoder_steps, batch=encoder_batch, seed=seed),
         decoder=replace(plan.decoder, steps=steps, seed=seed),
     )
     try:
-        model, lines = make_frames_model(data, out, plan, stage_lines(console))
+        model, lines = make_frames_model(data, out, plan, stage_lines(console), also or (), device)
     except KeyboardInterrupt:
         console.print(f"Stopped. What is saved is kept in {out}; run the same command to go on.", soft_wrap=True)
         raise typer.Exit(130) from None

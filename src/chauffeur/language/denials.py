@@ -10,7 +10,7 @@ from chauffeur.language.tokens import tokens_of
 
 _ANYTHING_BUT: Final = re.compile(r"\b(?:any|every)(?:thing|where) (?:but|except)\b")
 _NO_DENIAL: Final = re.compile(
-    r"\bnot (?:mind|hesitate|be afraid|forget|fail)\b|\bwhy (?:do )?not\b"
+    r"\brather\b(?! (?:than|not)\b)|\bnot (?:mind|hesitate|be afraid|forget|fail)\b|\bwhy (?:do )?not\b"
     r"|\b(?:can|could|do|will|would) not (?:you|we)\b"
 )
 """Negations that ask for what they negate."""

@@ -3,6 +3,7 @@
 # ruff: noqa: E402
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -65,6 +66,54 @@ def test_a_cache_refreshed_at_every_pass_is_none_bit_for_bit(made: tuple[Any, An
         assert found.confidence.tobytes() == wanted.confidence.tobytes()
         assert cached.passes == plain.passes == wanted.passes
         assert cached.tokens == plain.tokens
+
+
+def test_fused_kernels_are_the_written_out_layers_but_for_rounding(made: tuple[Any, Any, Any, Any]) -> None:
+    model, twin, words, scene = made
+    allowed = TEMPLATE.allowed(S)
+    exact, fused = Uncached(model, words, scene, L), Uncached(model, words, scene, L)
+    assert not exact.fused  # what an accelerator takes
+    fused.fused = True
+    assert np.allclose(fused(TEMPLATE.canvas), exact(TEMPLATE.canvas), atol=1e-4)
+    for skip in (False, True):
+        plain = Twin(twin, words, scene, L).decide(TEMPLATE, allowed, skip=skip)
+        for cached in (False, True):
+            other = Twin(twin, words, scene, L)
+            other.fused = True
+            found = other.decide(TEMPLATE, allowed, cached=cached, skip=skip)
+            assert np.array_equal(found.row, plain.row)
+            assert np.allclose(found.confidence, plain.confidence, atol=1e-4)
+
+
+@pytest.mark.parametrize("fused", [False, True])
+def test_a_network_keeps_its_precision_and_tells_float32(made: tuple[Any, Any, Any, Any], fused: bool) -> None:
+    model, twin, words, scene = made
+    low = deepcopy(model).bfloat16(), deepcopy(twin).bfloat16()
+    exact = Uncached(model, words, scene, L)(TEMPLATE.canvas)
+    for make in (Uncached, PrefixCached, AdaptiveCached):
+        bound = make(low[0], words, scene, L)
+        bound.fused = fused
+        found = bound(TEMPLATE.canvas)
+        assert found.dtype == np.float32
+        assert np.abs(found - exact).mean() < 0.05 * np.abs(exact).mean()
+        TEMPLATE.validate(unmask(bound, TEMPLATE.canvas, TEMPLATE.allowed(S), Unmasking(steps=4)).row, S)
+    told = Twin(low[1], words, scene, L)
+    told.fused = fused
+    TEMPLATE.validate(told.decide(TEMPLATE, TEMPLATE.allowed(S)).row, S)
+
+
+def test_passes_can_be_recorded_by_name(made: tuple[Any, Any, Any, Any]) -> None:
+    _, twin, words, scene = made
+    asked: list[tuple[Any, ...]] = []
+
+    class Recorded(Twin):
+        def run_pass(self, row: Any, compute: Any, *given: int) -> Any:
+            asked.append((compute.__name__, *given))
+            return super().run_pass(row, compute, *given)
+
+    found = Recorded(twin, words, scene, L).decide(TEMPLATE, TEMPLATE.allowed(S))
+    assert len(asked) == len(set(asked)) == found.passes == L  # each pass has a name of its own
+    assert len({one[0] for one in asked}) == 2  # the prompt's, and those after it
 
 
 def test_caches_compute_less_and_deviate_little(made: tuple[Any, Any, Any, Any]) -> None:

@@ -26,10 +26,10 @@ from chauffeur.concept import ConfigError, DataError  # noqa: E402
 from chauffeur.models.net.vision import VisionConfig  # noqa: E402
 from chauffeur.models.vilad.frames_answerer import FramesAnswerer  # noqa: E402
 from chauffeur.models.vilad.frames_baselines import FOLDS, expected_paths, strangers_paths, train_status_mlp  # noqa: E402
-from chauffeur.models.vilad.frames_data import ego_features, load_frames  # noqa: E402
+from chauffeur.models.vilad.frames_data import ego_features, joined, load_frames  # noqa: E402
 from chauffeur.models.vilad.frames_pipeline import FramesPlan, make_frames_model  # noqa: E402
 from chauffeur.models.vilad.frames_recipe import ONE_PASS, FramesRecipe, plan_path, plan_paths, prompts, soft_targets  # noqa: E402
-from chauffeur.models.vilad.frames_store import load_frames_model  # noqa: E402
+from chauffeur.models.vilad.frames_store import OWN, load_frames_model, measured, store_frames_model  # noqa: E402
 from chauffeur.models.vilad.frames_vision import VisionRecipe, tokens_of  # noqa: E402
 from chauffeur.models.vilad.waypoints import codebook, displacements, geometric_median  # noqa: E402
 from chauffeur.planners.vilad.template import MASK  # noqa: E402
@@ -177,6 +177,37 @@ def test_a_run_goes_on_and_keeps_to_its_recipe(trained: tuple[Path, Path, list[A
         make_frames_model(data, folder.parent, other, lambda stage, done, of: None)
 
 
+def test_sets_are_joined_scene_by_scene(trained: tuple[Path, Path, list[Any]]) -> None:
+    one = load_frames(trained[0], "train", SIZE)
+    both = joined([one, one])
+    assert len(both.samples) == len(both.pictures) == len(both.futures) == len(both.known) == 2 * len(one.samples)
+    assert len({sample.scene for sample in both.samples}) == 2 * len({sample.scene for sample in one.samples})
+    assert joined([one]) is one
+
+
+def test_half_the_bits_answer_alike(tmp_path: Path, trained: tuple[Path, Path, list[Any]]) -> None:
+    data, folder, _ = trained
+    model, frames = load_frames_model(folder), load_frames(data, "test", SIZE)
+    store_frames_model(tmp_path, model, half=True)
+    size = sum(one.stat().st_size for one in tmp_path.glob("*.safetensors"))
+    assert size < 0.6 * sum(one.stat().st_size for one in folder.glob("*.safetensors"))
+    whole, _ = measured(model, "regression", frames)
+    half, _ = measured(load_frames_model(tmp_path), "regression", frames)
+    assert np.abs(whole - half).max() < 0.1
+
+
+def test_what_ships_answers() -> None:
+    answerer = FramesAnswerer.from_spec("")
+    assert answerer.id == "vilad-frames/,vilad" and "vilad-frames-v2" in answerer.model
+    model = load_frames_model(OWN)
+    history = np.stack((np.linspace(-12.0, 0.0, 5), np.zeros(5), np.zeros(5)), axis=1)
+    found, passes = model.waypoints("vilad", history, COMMANDS[""], np.full((*model.size, 3), 110, np.uint8))
+    assert passes == 1 and found.shape == (6, 2) and np.isfinite(found).all()
+    assert sum(one.stat().st_size for one in OWN.iterdir()) < 4e6
+    unseen = {one["method"]: one["l2"]["stp3"][3] for one in model.about["figures"]["test"]}
+    assert unseen["ViLaD"] < min(unseen["ego-status MLP"], unseen["autoregressive twin"])
+
+
 def test_displacements_are_from_constant_velocity() -> None:
     histories = np.zeros((1, 5, 3))
     histories[0, :, 0] = [-12.0, -9.0, -6.0, -3.0, 0.0]
@@ -186,7 +217,10 @@ def test_displacements_are_from_constant_velocity() -> None:
 
 def test_whoever_expects_a_frame_was_trained_without_its_scene(trained: tuple[Path, Path, list[Any]]) -> None:
     frames = load_frames(trained[0], "train", SIZE)
-    turn = np.arange(len(frames.samples)) % FOLDS  # a frame a scene
+    roads = ["town"] * 12 + ["highway"] * 12  # each place's scenes are dealt out, so no fold is a place of its own
+    samples = tuple(replace(one, place=road) for one, road in zip(frames.samples, roads, strict=True))
+    frames = replace(frames, samples=samples)
+    turn = np.arange(len(frames.samples)) % 12 % FOLDS  # a frame a scene
     found = strangers_paths(frames, steps=20)
     for fold in (0, FOLDS - 1):
         own = turn == fold

@@ -367,6 +367,8 @@ def reached(placed: Placed, observation: Observation) -> bool:
     return math.hypot(pose.x_m - ego.x_m, pose.y_m - ego.y_m) < REACHED_M
 
 
+SWITCHES_LIGHTS: Final = (7, 8, 9)
+"""Scenarios that take a junction's lights in hand."""
 _Maker = Callable[[Placed, RouteTrack, RoadGraph, Stage, np.random.Generator], Behaviour]
 
 

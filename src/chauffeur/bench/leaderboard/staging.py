@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from chauffeur.bench.leaderboard.behaviours import Behaviour, reached, set_off
+from chauffeur.bench.leaderboard.behaviours import SWITCHES_LIGHTS, Behaviour, Lights, reached, set_off
 from chauffeur.bench.leaderboard.track import RouteTrack
 from chauffeur.bench.leaderboard.triggers import Placed
 from chauffeur.concept import Command, Observation, Scenario, ScenarioError
@@ -73,6 +73,8 @@ class ScenarioWorld:
         """See World; scenarios disturb the command and act before the world goes on."""
         now = self._world.observe()
         for placed in [one for one in self._waiting if reached(one, now)]:
+            if placed.trigger.scenario in SWITCHES_LIGHTS and any(isinstance(one, Lights) for one in self._running):
+                continue  # two at one junction would set its lights against each other
             self._waiting.remove(placed)
             try:
                 self._running.append(set_off(placed, self._track, now.road, self._world, self._rng))

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 Split = Literal["train", "val", "test"]
 SPLITS: Final[tuple[Split, ...]] = ("train", "val", "test")
-MADE: Final = "frames-v2"
+MADE: Final = "frames-v3"
 SIMULATED: Final = (
     "Simulated: driven by the worlds' own drivers in our towns, on our highway and crossing, and rendered. In "
     "nuScenes' file format; nothing of nuScenes is in it."
@@ -69,6 +69,7 @@ class FramesConfig:
         width, height: Of the pictures, px.
         seconds: Of a trip in town, at most.
         most: Frames that are kept of a trip, at most.
+        towns: Of training and validation, in turn; other towns than ours are found by the name of their pack.
     """
 
     trips: int = 160
@@ -77,6 +78,15 @@ class FramesConfig:
     height: int = 96
     seconds: float = 80.0
     most: int = 60
+    towns: tuple[str, ...] = TOWNS
+
+    def __post_init__(self) -> None:
+        """Raises ConfigError: no town, or the test split's own."""
+        if not self.towns or UNSEEN_TOWN in self.towns:
+            raise ConfigError(
+                f"Frames need towns to drive in, and {UNSEEN_TOWN} is the test split's.",
+                hint=f"By default they are {', '.join(TOWNS)}.",
+            )
 
     def count(self, split: Split) -> int:
         """Trips of a split."""
@@ -93,7 +103,8 @@ def trip_of(config: FramesConfig, split: Split, number: int) -> TrafficTrip:
     seed = int(np.random.SeedSequence([config.seed, SPLITS.index(split), number]).generate_state(1)[0])
     turn = number % 8
     place: Place = "highway" if turn == 3 else "crossing" if turn == 7 else "town"
-    town = UNSEEN_TOWN if split == "test" else TOWNS[number % len(TOWNS)]
+    in_town = number // 4 * 3 + number % 4  # how many trips before this one are in town
+    town = UNSEEN_TOWN if split == "test" else config.towns[in_town % len(config.towns)]
     seconds = {"town": config.seconds, "highway": min(60.0, config.seconds), "crossing": min(30.0, config.seconds)}
     return TrafficTrip(f"{split}-{number:04}-{place}", place, town if place == "town" else "", seed, seconds[place])
 
@@ -243,7 +254,7 @@ def make_frames(
 
 
 def _claim(root: Path, config: FramesConfig) -> None:
-    path, wanted = root / "config.json", {"made": MADE, **asdict(config)}
+    path, wanted = root / "config.json", {"made": MADE, **asdict(config), "towns": list(config.towns)}
     if path.is_file():
         if json.loads(path.read_text(encoding="utf-8")) != wanted:
             raise ConfigError(f"{root} holds a set of another configuration.", hint="Choose another folder.")
@@ -254,10 +265,10 @@ def _claim(root: Path, config: FramesConfig) -> None:
 
 def _card(root: Path, config: FramesConfig, counts: Mapping[Split, Mapping[str, int]]) -> None:
     lines = ["# Data card: frames of our own camera and traffic", "", f"- {SIMULATED}", f"- Made by {MADE}."]
-    values: dict[str, Any] = asdict(config)
+    values: dict[str, Any] = {name: value for name, value in asdict(config).items() if name != "towns"}
     lines += [f"- {name}: {value}" for name, value in values.items()]
     lines += [
-        f"- Towns of training and validation: {', '.join(TOWNS)}; of the test split: {UNSEEN_TOWN}.",
+        f"- Towns of training and validation: {', '.join(config.towns)}; of the test split: {UNSEEN_TOWN}.",
         "- Not the natural mix of driving: frames are of steady motion, chosen by what happens next, so that a car's",
         "  own motion does not tell it.",
         "",

@@ -11,17 +11,22 @@ All of them run the same written-out layers, so a cache that is refreshed at eve
 `twin`            left to right, with or without the usual cache of keys and values.
 
 Bidirectional keys of the prompt depend on the template, so these caches are approximations; the twin's is exact.
+
+Networks stay where they are and in their own precision: rows go to the model's device, logits come back as float32
+numpy. On an accelerator attention and normalisation are one kernel each (`fused`), so "the same bits" holds on the CPU,
+"the same but for rounding" there.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import torch
 
-from chauffeur.models.net.transformer import attended, projected, rotary
+from chauffeur.models.net.transformer import attended, attended_fused, projected, rotary
 from chauffeur.models.vilad.network import Vilad
 from chauffeur.planners.vilad.template import MASK, ActionTemplate
 from chauffeur.planners.vilad.unmasking import NEVER, Decided, Unmasking, distribution, unmask
@@ -44,6 +49,9 @@ class Uncached:
 
     def __init__(self, model: Vilad, words: torch.Tensor, scene: torch.Tensor, length: int) -> None:
         """Args: the network, in evaluation mode; words (1, T, width); candidates (1, S, width); L."""
+        weight = model.tokens.weight
+        self._device, dtype = weight.device, weight.dtype
+        words, scene = words.to(self._device, dtype), scene.to(self._device, dtype)
         self._model, self._scene = model, scene
         self._config = model.config.body
         with torch.no_grad():
@@ -51,33 +59,46 @@ class Uncached:
         self._words = words.shape[1]
         self._many = self._prompt.shape[1]
         self._length = length
-        angles = rotary(
-            self._config.head_width, self._config.rope_theta, model.places(words.shape[1], scene.shape[1], length)
-        )
-        self._cos, self._sin = (one[None, None] for one in angles)
-        total = self._many + length
-        after = torch.ones((total, total), dtype=torch.bool).triu(1)
-        self._blocked = torch.zeros((total, total)).masked_fill(after, NEVER) if self._config.causal else None
-        self._candidates = torch.zeros(0)
+        places = model.places(words.shape[1], scene.shape[1], length).to(self._device)
+        angles = rotary(self._config.head_width, self._config.rope_theta, places)  # in float32, rounded once
+        self._cos, self._sin = (one[None, None].to(dtype) for one in angles)
+        self._total = self._many + length
+        after = torch.ones((self._total, self._total), dtype=torch.bool, device=self._device).triu(1)
+        none = torch.zeros(after.shape, dtype=dtype, device=self._device)
+        self._blocked = none.masked_fill(after, NEVER) if self._config.causal else None
+        self._candidates = scene[:, :0]
+        self.fused = self._device.type != "cpu"
         self.passes = 0
         self.tokens = 0
 
     @torch.no_grad()
     def __call__(self, row: Array) -> Array:
         """Logits (L, V) of y_t (L,)."""
-        hidden, _ = self._whole(row)
-        return self._scored(hidden[:, -self._length :], row)
+        return self.run_pass(row, self._plain)
 
-    def _whole(self, row: Array) -> tuple[torch.Tensor, list[_Kept]]:
+    def run_pass(self, row: Array, compute: Callable[..., torch.Tensor], *given: int) -> Array:
+        """One forward pass: `compute(rows, *given)` of y_t as (1, L) on the model's device; logits (n, V), float32.
+
+        Computations read nothing of `rows` but its values, and leave what they keep in tensors that the next one reads.
+        So who overrides this may record them and replay them, told apart by their names and what is given.
+        """
+        self.passes += 1
+        return compute(torch.from_numpy(row)[None].to(self._device), *given)[0].float().cpu().numpy()
+
+    def _plain(self, rows: torch.Tensor) -> torch.Tensor:
+        hidden, _ = self._whole(rows)
+        return self._scored(hidden[:, -self._length :], rows)
+
+    def _whole(self, rows: torch.Tensor) -> tuple[torch.Tensor, list[_Kept]]:
         """Vectors of prompt and template after the transformer, and what each layer leaves."""
-        own = self._model.embedded(torch.from_numpy(row)[None], self._scene)
+        own = self._model.embedded(rows, self._scene)
         hidden = torch.cat((self._prompt, own), dim=1)
-        self._count(hidden.shape[1])
+        self.tokens += hidden.shape[1]
         kept: list[_Kept] = []
         for layer in self._model.layers:
             hidden, left = self._layer(layer, hidden, self._cos, self._sin)
             kept.append(left)
-        hidden = self._model.body.norm(hidden)
+        hidden = self._normed(self._model.body.norm, hidden)
         self._candidates = hidden[:, self._words : self._many]
         return hidden, kept
 
@@ -85,45 +106,51 @@ class Uncached:
         self, layer: Any, hidden: torch.Tensor, cos: torch.Tensor, sin: torch.Tensor
     ) -> tuple[torch.Tensor, _Kept]:
         config = self._config
-        normed = layer.input_layernorm(hidden)
+        normed = self._normed(layer.input_layernorm, hidden)
         q, k, v = projected(layer.self_attn, normed, config.heads, config.kv_heads, cos, sin)
-        many = hidden.shape[1]
-        blocked = None if self._blocked is None else self._blocked[:many, :many]
-        added = layer.self_attn.o_proj(attended(q, k, v, blocked))
+        added = layer.self_attn.o_proj(self._attended(q, k, v, 0))
         hidden = hidden + added
-        fed = layer.mlp(layer.post_attention_layernorm(hidden))
+        fed = layer.mlp(self._normed(layer.post_attention_layernorm, hidden))
         begin = self._many
         return hidden + fed, _Kept(k, v, added[:, begin:], fed[:, begin:])
 
-    def _some(self, row: Array, places: slice, kept: list[_Kept]) -> torch.Tensor:
+    def _attended(self, q: torch.Tensor, k: torch.Tensor, v: torch.Tensor, first: int) -> torch.Tensor:
+        """Attention to all keys, or of the causal twin from place `first` on to those that stand before."""
+        many, seen = q.shape[2], k.shape[2]
+        blocked = None if self._blocked is None else self._blocked[first : first + many, :seen]
+        if not self.fused:
+            return attended(q, k, v, blocked)
+        causal = blocked is not None and many == seen
+        return attended_fused(q, k, v, None if causal or many == 1 else blocked, causal=causal)
+
+    def _normed(self, norm: Any, hidden: torch.Tensor) -> torch.Tensor:
+        if not self.fused:
+            return norm(hidden)
+        return torch.nn.functional.rms_norm(hidden, hidden.shape[-1:], norm.weight, self._config.epsilon)
+
+    def _some(self, rows: torch.Tensor, places: slice, kept: list[_Kept]) -> torch.Tensor:
         """Vectors (1, n, hidden) of some of the template's tokens, all others' keys and values as they are kept.
 
         What is computed takes the place of what was kept.
         """
         model, config = self._model, self._config
-        hidden = model.embedded(torch.from_numpy(row)[None], self._scene)[:, places]
-        self._count(hidden.shape[1])
+        hidden = model.embedded(rows, self._scene)[:, places]
+        self.tokens += hidden.shape[1]
         where = slice(self._many + places.start, self._many + places.stop)
         cos, sin = self._cos[:, :, where], self._sin[:, :, where]
         for layer, left in zip(model.layers, kept, strict=True):
-            normed = layer.input_layernorm(hidden)
+            normed = self._normed(layer.input_layernorm, hidden)
             q, k, v = projected(layer.self_attn, normed, config.heads, config.kv_heads, cos, sin)
             left.keys[:, :, where], left.values[:, :, where] = k, v
-            added = layer.self_attn.o_proj(attended(q, left.keys, left.values))
+            added = layer.self_attn.o_proj(self._attended(q, left.keys, left.values, where.start))
             hidden = hidden + added
-            fed = layer.mlp(layer.post_attention_layernorm(hidden))
+            fed = layer.mlp(self._normed(layer.post_attention_layernorm, hidden))
             hidden = hidden + fed
             left.attended[:, places], left.fed[:, places] = added, fed
-        return model.body.norm(hidden)
+        return self._normed(model.body.norm, hidden)
 
-    def _scored(self, hidden: torch.Tensor, row: Array, first: int = 0) -> Array:
-        rows = torch.from_numpy(row)[None]
-        logits: torch.Tensor = self._model.scored(hidden, self._scene, self._candidates, rows, first)
-        return logits[0].float().numpy()
-
-    def _count(self, tokens: int) -> None:
-        self.passes += 1
-        self.tokens += tokens
+    def _scored(self, hidden: torch.Tensor, rows: torch.Tensor, first: int = 0) -> torch.Tensor:
+        return self._model.scored(hidden, self._scene, self._candidates, rows, first)
 
 
 class PrefixCached(Uncached):
@@ -143,10 +170,14 @@ class PrefixCached(Uncached):
         """Logits (L, V) of y_t (L,)."""
         fresh = self._calls % self._interval == 0
         self._calls += 1
-        if fresh:
-            hidden, self._kept = self._whole(row)
-            return self._scored(hidden[:, -self._length :], row)
-        return self._scored(self._some(row, slice(0, self._length), self._kept), row)
+        return self.run_pass(row, self._fresh if fresh else self._response)
+
+    def _fresh(self, rows: torch.Tensor) -> torch.Tensor:
+        hidden, self._kept = self._whole(rows)
+        return self._scored(hidden[:, -self._length :], rows)
+
+    def _response(self, rows: torch.Tensor) -> torch.Tensor:
+        return self._scored(self._some(rows, slice(0, self._length), self._kept), rows)
 
 
 class BlockCached(Uncached):
@@ -180,15 +211,19 @@ class BlockCached(Uncached):
     def _bound(self, row: Array, places: slice) -> Any:
         kept: list[_Kept] = []
 
+        def first(rows: torch.Tensor) -> torch.Tensor:
+            hidden, found = self._whole(rows)
+            kept.extend(found)
+            begin = self._many
+            return self._scored(hidden[:, begin + places.start : begin + places.stop], rows, places.start)
+
+        def further(rows: torch.Tensor) -> torch.Tensor:
+            return self._scored(self._some(rows, places, kept), rows, places.start)
+
         def predict(part: Array) -> Array:
             whole = row.copy()
             whole[places] = part
-            if not kept:
-                hidden, found = self._whole(whole)
-                kept.extend(found)
-                begin = self._many
-                return self._scored(hidden[:, begin + places.start : begin + places.stop], whole, places.start)
-            return self._scored(self._some(whole, places, kept), whole, places.start)
+            return self.run_pass(whole, further if kept else first)
 
         return predict
 
@@ -225,20 +260,27 @@ class AdaptiveCached(Uncached):
         """Logits (L, V) of y_t (L,)."""
         call, self._calls = self._calls, self._calls + 1
         if call % self._refresh.prompt == 0:
-            hidden, self._kept = self._whole(row)
-            return self._scored(hidden[:, -self._length :], row)
-        if call % self._refresh.response == 0:
-            return self._scored(self._some(row, slice(0, self._length), self._kept), row)
-        return self._scored(self._changed(row), row)
+            return self.run_pass(row, self._fresh)
+        return self.run_pass(row, self._response if call % self._refresh.response == 0 else self._partly)
 
-    def _changed(self, row: Array) -> torch.Tensor:
+    def _fresh(self, rows: torch.Tensor) -> torch.Tensor:
+        hidden, self._kept = self._whole(rows)
+        return self._scored(hidden[:, -self._length :], rows)
+
+    def _response(self, rows: torch.Tensor) -> torch.Tensor:
+        return self._scored(self._some(rows, slice(0, self._length), self._kept), rows)
+
+    def _partly(self, rows: torch.Tensor) -> torch.Tensor:
+        return self._scored(self._changed(rows), rows)
+
+    def _changed(self, rows: torch.Tensor) -> torch.Tensor:
         model, config, begin = self._model, self._config, self._many
         count = max(1, round(self._refresh.ratio * self._length))
-        hidden = model.embedded(torch.from_numpy(row)[None], self._scene)
-        self._count(count)
+        hidden = model.embedded(rows, self._scene)
+        self.tokens += count
         cos, sin = self._cos[:, :, begin:], self._sin[:, :, begin:]
         for layer, left in zip(model.layers, self._kept, strict=True):
-            normed = layer.input_layernorm(hidden)
+            normed = self._normed(layer.input_layernorm, hidden)
             values = layer.self_attn.v_proj(normed)
             before = left.values[:, :, begin:].transpose(1, 2).flatten(2)
             alike = torch.nn.functional.cosine_similarity(values, before, dim=-1)[0]
@@ -248,11 +290,11 @@ class AdaptiveCached(Uncached):
                 layer.self_attn, some, config.heads, config.kv_heads, cos[:, :, chosen], sin[:, :, chosen]
             )
             left.keys[:, :, begin + chosen], left.values[:, :, begin + chosen] = k, v
-            left.attended[:, chosen] = layer.self_attn.o_proj(attended(q, left.keys, left.values))
+            left.attended[:, chosen] = layer.self_attn.o_proj(self._attended(q, left.keys, left.values, begin))
             hidden = hidden + left.attended
-            left.fed[:, chosen] = layer.mlp(layer.post_attention_layernorm(hidden[:, chosen]))
+            left.fed[:, chosen] = layer.mlp(self._normed(layer.post_attention_layernorm, hidden[:, chosen]))
             hidden = hidden + left.fed
-        return model.body.norm(hidden)
+        return self._normed(model.body.norm, hidden)
 
 
 class Twin(Uncached):
@@ -272,48 +314,54 @@ class Twin(Uncached):
         row = template.canvas.copy()
         order, sure = np.zeros(len(row), np.int64), np.ones(len(row))
         before = self.passes
-        kept: list[_Kept] = []
-        done = 0  # tokens of the template whose keys are kept
+        done = -1  # tokens of the template whose keys are kept; -1 where not even the prompt's are
         for place in range(len(row)):
             if skip and not template.maskable[place]:
                 continue
-            if not cached or not kept:
-                hidden, found = self._part(row[:place])
-                kept = found if cached else []
-            else:
-                hidden = self._more(row[done:place], done, kept)
-            done = place
-            logits = np.where(allowed[place], self._scored(hidden[:, -1:], row, place)[0], NEVER)
+            told = self.told(row, place, done, keep=cached)
+            done = place if cached else -1
+            logits = np.where(allowed[place], told, NEVER)
             if template.maskable[place]:
                 row[place] = int(logits.argmax())
                 order[place] = self.passes - before
                 sure[place] = float(distribution(logits)[row[place]])
         return Decided(row, order, sure, self.passes - before)
 
-    def _part(self, row: Array) -> tuple[torch.Tensor, list[_Kept]]:
-        own = self._model.embedded(torch.from_numpy(row)[None], self._scene)
+    def told(self, row: Array, place: int, done: int, *, keep: bool) -> Array:
+        """Logits (V,) of a place. Keys and values of `done` tokens of the template are kept; below 0 none are, yet."""
+        if done < 0:
+            return self.run_pass(row, self._part, place, int(keep))[0]
+        return self.run_pass(row, self._more, place, done)[0]
+
+    def _part(self, rows: torch.Tensor, place: int, keep: int) -> torch.Tensor:
+        """All that stands before a place. What is kept of it lies where there is room for the rest of the template."""
+        own = self._model.embedded(rows[:, :place], self._scene)
         hidden = torch.cat((self._prompt, own), dim=1)
         many = hidden.shape[1]
-        self._count(many)
-        kept: list[_Kept] = []
+        self.tokens += many
+        self._kept: list[torch.Tensor] = []  # of each layer, (2, 1, heads, N, width)
         for layer in self._model.layers:
             hidden, left = self._layer(layer, hidden, self._cos[:, :, :many], self._sin[:, :, :many])
-            kept.append(left)
-        hidden = self._model.body.norm(hidden)
+            if keep:
+                room = left.keys.new_empty((2, *left.keys.shape[:2], self._total, left.keys.shape[3]))
+                room[0, :, :, :many], room[1, :, :, :many] = left.keys, left.values
+                self._kept.append(room)
+        hidden = self._normed(self._model.body.norm, hidden)
         self._candidates = hidden[:, self._words : self._many]
-        return hidden, kept
+        return self._scored(hidden[:, -1:], rows, place)
 
-    def _more(self, row: Array, done: int, kept: list[_Kept]) -> torch.Tensor:
+    def _more(self, rows: torch.Tensor, place: int, done: int) -> torch.Tensor:
+        """The tokens from `done` to a place, after those that are kept."""
         model, config = self._model, self._config
-        hidden = model.embedded(torch.from_numpy(row)[None], self._scene, done)
-        self._count(hidden.shape[1])
-        start, stop = self._many + done, self._many + done + hidden.shape[1]
-        cos, sin = self._cos[:, :, start:stop], self._sin[:, :, start:stop]
-        blocked = None if self._blocked is None else self._blocked[start:stop, :stop]
-        for layer, left in zip(model.layers, kept, strict=True):
-            normed = layer.input_layernorm(hidden)
+        hidden = model.embedded(rows[:, done:place], self._scene, done)
+        self.tokens += hidden.shape[1]
+        where = slice(self._many + done, self._many + place)
+        cos, sin = self._cos[:, :, where], self._sin[:, :, where]
+        for layer, room in zip(model.layers, self._kept, strict=True):
+            normed = self._normed(layer.input_layernorm, hidden)
             q, k, v = projected(layer.self_attn, normed, config.heads, config.kv_heads, cos, sin)
-            left.keys, left.values = torch.cat((left.keys, k), dim=2), torch.cat((left.values, v), dim=2)
-            hidden = hidden + layer.self_attn.o_proj(attended(q, left.keys, left.values, blocked))
-            hidden = hidden + layer.mlp(layer.post_attention_layernorm(hidden))
-        return model.body.norm(hidden)
+            room[0, :, :, where], room[1, :, :, where] = k, v
+            keys, values = room[:, :, :, : where.stop]
+            hidden = hidden + layer.self_attn.o_proj(self._attended(q, keys, values, where.start))
+            hidden = hidden + layer.mlp(self._normed(layer.post_attention_layernorm, hidden))
+        return self._scored(self._normed(model.body.norm, hidden)[:, -1:], rows, place)

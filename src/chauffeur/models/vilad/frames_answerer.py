@@ -25,33 +25,38 @@ if TYPE_CHECKING:
 class FramesAnswerer:
     """Answers with waypoints; it writes nothing else.
 
-    `vilad-frames/FOLDER` asks the diffusion model; with `,twin`, `,regression` or `,status` behind the folder its
-    autoregressive twin, the encoder's own head, or the MLP that sees no picture.
+    `vilad-frames/FOLDER` asks the diffusion model, `vilad-frames` the one that ships; with `,twin`, `,regression` or
+    `,status` behind the folder its autoregressive twin, the encoder's own head, or the MLP that sees no picture.
     """
 
-    def __init__(self, folder: Path, method: FramesMethod = "vilad") -> None:
-        """Args: folder of a trained model; which part of it. Raises DataError: there is none."""
-        from chauffeur.models.vilad.frames_store import load_frames_model
+    def __init__(self, folder: Path | None, method: FramesMethod = "vilad") -> None:
+        """Args: folder of a trained model, None for what ships; which part of it. Raises DataError: there is none."""
+        from chauffeur.models.vilad.frames_store import OWN, load_frames_model
 
         self._folder = folder
         self._method: FramesMethod = method
-        self._model = load_frames_model(folder)
+        self._model = load_frames_model(folder or OWN)
 
     @classmethod
     def from_spec(cls, argument: str) -> Self:
-        """Model for `vilad-frames/FOLDER` or `vilad-frames/FOLDER,PART`. Raises ConfigError: no such part."""
+        """Model for `vilad-frames`, `vilad-frames/FOLDER` or `vilad-frames/FOLDER,PART`.
+
+        Raises:
+            ConfigError: There is no such part.
+            DataError: The folder holds no model.
+        """
         from chauffeur.models.vilad.frames_store import METHODS
 
         folder, _, method = argument.partition(",")
         found = next((one for one in METHODS if one == (method or "vilad")), None)
         if found is None:
             raise ConfigError(f"A frames model has no part {method!r}.", hint=f"Choose of: {', '.join(METHODS)}.")
-        return cls(Path(folder), found)
+        return cls(Path(folder) if folder else None, found)
 
     @property
     def id(self) -> str:
-        """`vilad-frames/FOLDER,PART`."""
-        return f"vilad-frames/{self._folder},{self._method}"
+        """`vilad-frames/FOLDER,PART`; no folder of the one that ships."""
+        return f"vilad-frames/{self._folder or ''},{self._method}"
 
     @property
     def model(self) -> str:

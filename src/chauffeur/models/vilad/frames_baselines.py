@@ -7,6 +7,7 @@ figure without this one beside it says nothing. It minimises the very L2 error t
 
 from __future__ import annotations
 
+from collections import Counter
 from copy import deepcopy
 from typing import Any, Final
 
@@ -68,9 +69,14 @@ def strangers_paths(frames: FrameSet, steps: int = STEPS, seed: int = 0) -> Arra
     """`expected_paths` of a training split, each by an MLP that was trained without that frame's scene.
 
     On its own training frames an MLP errs less than it will anywhere else, and who learns to correct it there learns to
-    correct too little. Scenes are dealt out to `FOLDS` in turn, as our sets deal theirs out to as many towns.
+    correct too little. The scenes of each place are dealt out to `FOLDS` in turn, so that no MLP has to tell of a kind
+    of road that it never met.
     """
-    scenes = {name: turn % FOLDS for turn, name in enumerate(dict.fromkeys(one.scene for one in frames.samples))}
+    scenes: dict[str, int] = {}
+    met: Counter[str] = Counter()
+    for name, place in {one.scene: one.place for one in frames.samples}.items():
+        scenes[name] = met[place] % FOLDS
+        met[place] += 1
     fold = np.array([scenes[one.scene] for one in frames.samples])
     found = np.zeros((len(fold), FUTURE, 2))
     for own in (fold == number for number in np.unique(fold)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -127,6 +127,18 @@ def load_frames(root: Path, split: str, size: tuple[int, int], limit: int = 0) -
         np.stack([one.future for one in samples]),
         _known(tables.folder / PERCEPTION, samples),
     )
+
+
+def joined(sets: Sequence[FrameSet]) -> FrameSet:
+    """Several sets as one; scenes of the same name in two of them stay two."""
+    if len(sets) == 1:
+        return sets[0]
+    samples = [replace(one, scene=f"{at}/{one.scene}") for at, held in enumerate(sets) for one in held.samples]
+    pictures = np.concatenate([one.pictures for one in sets])
+    histories, futures, known = (
+        np.concatenate([getattr(one, name) for one in sets]) for name in ("histories", "futures", "known")
+    )
+    return FrameSet(tuple(samples), pictures, histories, futures, known)
 
 
 def _known(path: Path, samples: Sequence[PlanningSample]) -> Array:

@@ -7,7 +7,7 @@ folder/model/       what `vilad-frames/FOLDER` reads
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -20,7 +20,7 @@ from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleratio
 from chauffeur.bench.openloop.frames import SIMULATED
 from chauffeur.drive.files import publish
 from chauffeur.models.vilad.frames_baselines import STEPS, strangers_paths, train_status_mlp
-from chauffeur.models.vilad.frames_data import FrameSet, load_frames
+from chauffeur.models.vilad.frames_data import FrameSet, joined, load_frames
 from chauffeur.models.vilad.frames_recipe import FramesRecipe, train_frames
 from chauffeur.models.vilad.frames_store import VERSION, FramesMethod, FramesModel, measured, store_frames_model
 from chauffeur.models.vilad.frames_vision import VisionRecipe, plain, train_vision, views_of
@@ -66,27 +66,45 @@ class FramesLine:
     passes: float
 
 
-def make_frames_model(data: Path, folder: Path, plan: FramesPlan, told: Told) -> tuple[Path, list[FramesLine]]:
+def make_frames_model(
+    data: Path, folder: Path, plan: FramesPlan, told: Told, also: Sequence[Path] = (), device: str = "cpu"
+) -> tuple[Path, list[FramesLine]]:
     """Train everything, or go on in this folder; the model folder, and figures on the test split.
+
+    Args:
+        data: The set.
+        folder: Of the run.
+        plan: What decides it.
+        told: Is told how far it is.
+        also: Sets whose training split is trained on too.
+        device: Where encoder and decoders are trained.
 
     Raises:
         ConfigError: The folder holds a run of another recipe.
         DataError: The set cannot be read.
     """
     size = plan.vision.vision.size
-    train, val = load_frames(data, "train", size), load_frames(data, "val", size)
+    train = joined([load_frames(one, "train", size) for one in (data, *also)])
+    val = load_frames(data, "val", size)
     runs = folder / "training"
 
     def watch(stage: str, steps: int) -> Callable[[int, float, float], None]:
         return lambda step, loss, seconds: told(f"{stage}, loss {loss:.3f}, {seconds:.2f} s", step + 1, steps)
 
-    seeing = train_vision(runs / "vision", plan.vision, train, watch("encoder", plan.vision.steps))
+    seeing = train_vision(runs / "vision", plan.vision, train, watch("encoder", plan.vision.steps), device)
     tokens = views_of(seeing, train.pictures, VIEWS)
     off = train.futures - strangers_paths(train, plan.status_steps)
     book = codebook(off, plan.codes, plan.decoder.seed)
     decoders = {
         mode: train_frames(
-            runs / mode, replace(plan.decoder, mode=mode), book, train, tokens, off, watch(mode, plan.decoder.steps)
+            runs / mode,
+            replace(plan.decoder, mode=mode),
+            book,
+            train,
+            tokens,
+            off,
+            watch(mode, plan.decoder.steps),
+            device,
         )
         for mode in ("vilad", "twin")
     }

@@ -113,8 +113,9 @@ def train_frames(
     tokens: torch.Tensor,
     off: Array,
     watch: Callable[[int, float, float], None] | None = None,
+    device: str = "cpu",
 ) -> Vilad:
-    """Train, or go on in this folder; the mean of the weights.
+    """Train, or go on in this folder; the mean of the weights, on the CPU.
 
     Args:
         folder: Of the run.
@@ -124,17 +125,19 @@ def train_frames(
         tokens: Of its pictures, each in several lights, (views, n, T, width).
         off: Of its true waypoints from the expected ones, (n, FUTURE, 2).
         watch: Is told (step, loss, seconds).
+        device: Where it is trained.
 
     Raises:
         ConfigError: The folder holds a run of another recipe.
     """
     torch.manual_seed(recipe.seed)
     template = book.template
-    model = Vilad(recipe.config(tokens.shape[3]), template)
+    model = Vilad(recipe.config(tokens.shape[3]), template).to(device)
     words = prompts(frames.ego, frames.commands)
     codes = book.nearest(off)
     rows = torch.from_numpy(np.tile(template.canvas, (len(codes), 1)))
     maskable = torch.from_numpy(template.maskable)
+    places = maskable.to(device)
     rows[:, maskable] = torch.from_numpy(codes) + book.first
     soft = torch.from_numpy(soft_targets(book, off, recipe.soft_m))
     codes_at = slice(book.first, book.first + book.codes)
@@ -152,12 +155,12 @@ def train_frames(
         many = known[: len(chosen)]
         if recipe.mode == "twin":
             hidden, t = maskable.expand(len(own), -1), torch.ones(len(own))
-            logits = model(told, many, seen, own)
         else:
             own, hidden, t = masked(own, maskable, noise, generator)
-            logits = model(told, many, seen, own)
-        wrong = -(soft[chosen] * functional.log_softmax(logits[:, maskable, codes_at], dim=-1)).sum(dim=-1)
-        return ((wrong * hidden[:, maskable]).sum(dim=1) / t).mean() / FUTURE  # Eq. 30, soft targets
+        logits = model(*(one.to(device) for one in (told, many, seen, own)))
+        wanted, counted = soft[chosen].to(device), (hidden[:, maskable] / t[:, None]).to(device)
+        wrong = -(wanted * functional.log_softmax(logits[:, places, codes_at], dim=-1)).sum(dim=-1)
+        return (wrong * counted).sum(dim=1).mean() / FUTURE  # Eq. 30, soft targets
 
     mean = fit(
         model,
@@ -172,7 +175,7 @@ def train_frames(
         save_s=30.0,
     )
     assert isinstance(mean, Vilad)
-    return mean.eval()
+    return mean.cpu().eval()
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,10 +209,9 @@ class _ToldTwin(Twin):
         super().__init__(*given)
         self.logits: dict[int, Array] = {}
 
-    def _scored(self, hidden: torch.Tensor, row: Array, first: int = 0) -> Array:
-        found = super()._scored(hidden, row, first)
-        self.logits[first] = found[0]
-        return found
+    def told(self, row: Array, place: int, done: int, *, keep: bool) -> Array:
+        self.logits[place] = super().told(row, place, done, keep=keep)
+        return self.logits[place]
 
 
 def plan_path(

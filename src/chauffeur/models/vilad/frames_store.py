@@ -28,11 +28,14 @@ from chauffeur.models.vilad.frames_recipe import ONE_PASS, FramesRecipe, plan_pa
 from chauffeur.models.vilad.frames_vision import SAID, SEEN_WIDTH, SeeingHead, StatusHead, regressed, tokens_of
 from chauffeur.models.vilad.network import Vilad
 from chauffeur.models.vilad.waypoints import WaypointCodebook
+from chauffeur.planners.vilad.engine import SHIPPED
 from chauffeur.planners.vilad.unmasking import Unmasking
 
 Array = np.ndarray[Any, Any]
 FramesMethod = Literal["vilad", "twin", "regression", "status"]
 METHODS: Final = get_args(FramesMethod)
+OWN: Final = SHIPPED / "frames"
+"""The model that ships."""
 VERSION: Final = "vilad-frames-v2"
 """Of what is stored: codes of the first were displacements from constant velocity."""
 
@@ -98,14 +101,15 @@ class FramesModel:
         return planned.waypoints, planned.decided.passes
 
 
-def store_frames_model(folder: Path, model: FramesModel) -> None:
-    """Write it. Raises DataError: a file cannot be written."""
+def store_frames_model(folder: Path, model: FramesModel, *, half: bool = False) -> None:
+    """Write it, or half the bits of it: float16, as what ships. Raises DataError: a file cannot be written."""
     from safetensors.torch import save_file
 
     folder.mkdir(parents=True, exist_ok=True)
     for name in ("vision", "vilad", "twin", "status"):
         state: dict[str, torch.Tensor] = getattr(model, name).state_dict()
-        save_file({key: value.contiguous() for key, value in state.items()}, folder / f"{name}.safetensors")
+        kept = {key: (value.half() if half else value).contiguous() for key, value in state.items()}
+        save_file(kept, folder / f"{name}.safetensors")
     np.savez_compressed(folder / "codebook.npz", centres=model.book.centres.astype(np.float32))
     publish(folder / "model.json", (json.dumps(dict(model.about), indent=1) + "\n").encode(), "model's facts")
 

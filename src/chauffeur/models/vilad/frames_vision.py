@@ -119,11 +119,11 @@ def l2(found: torch.Tensor, truth: torch.Tensor) -> torch.Tensor:
 
 def disturbed(pictures: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
     """Pictures (B, H, W, 3) uint8 as floats 0..1, in another light, a few pixels aside."""
-    batch = len(pictures)
-    light = 0.8 + 0.4 * torch.rand((batch, 1, 1, 3), generator=generator)
+    batch, device = len(pictures), pictures.device
+    light = (0.8 + 0.4 * torch.rand((batch, 1, 1, 3), generator=generator)).to(device)
     down, right = (int(v) for v in torch.randint(-2, 3, (2,), generator=generator))
     moved = torch.roll(pictures.float() / 255.0, (down, right), (1, 2))
-    return (moved * light + 0.02 * torch.randn((batch, 1, 1, 3), generator=generator)).clamp(0.0, 1.0)
+    return (moved * light + 0.02 * torch.randn((batch, 1, 1, 3), generator=generator).to(device)).clamp(0.0, 1.0)
 
 
 def batches(count: int, batch: int, seed: int) -> Callable[[int], Iterator[tuple[int, torch.Tensor]]]:
@@ -142,21 +142,29 @@ def batches(count: int, batch: int, seed: int) -> Callable[[int], Iterator[tuple
 
 
 def train_vision(
-    folder: Path, recipe: VisionRecipe, frames: FrameSet, watch: Callable[[int, float, float], None] | None = None
+    folder: Path,
+    recipe: VisionRecipe,
+    frames: FrameSet,
+    watch: Callable[[int, float, float], None] | None = None,
+    device: str = "cpu",
 ) -> SeeingHead:
-    """Train the encoder, or go on in this folder. Raises ConfigError: the folder holds a run of another recipe."""
+    """Train the encoder on a device, or go on in this folder; it is given back on the CPU.
+
+    Raises:
+        ConfigError: The folder holds a run of another recipe.
+    """
     torch.manual_seed(recipe.seed)
-    model = SeeingHead(recipe.vision)
-    pictures, said = torch.from_numpy(frames.pictures), torch.from_numpy(status(frames))
-    truth = torch.from_numpy(displacements(frames.histories, frames.futures)).float()
-    known = torch.from_numpy(frames.known)
+    model = SeeingHead(recipe.vision).to(device)
+    pictures, said = torch.from_numpy(frames.pictures).to(device), torch.from_numpy(status(frames)).to(device)
+    truth = torch.from_numpy(displacements(frames.histories, frames.futures)).float().to(device)
+    known = torch.from_numpy(frames.known).to(device)
 
     def loss(drawn: tuple[int, torch.Tensor]) -> torch.Tensor:
-        step, rows = drawn
+        step, rows = drawn[0], drawn[1].to(device)
         generator = torch.Generator().manual_seed(recipe.seed * 1_000_003 + step)
         found, told = model(disturbed(pictures[rows], generator), said[rows])
         there = ~torch.isnan(known[rows])
-        off = torch.where(there, told - torch.nan_to_num(known[rows]), torch.zeros(())).abs()
+        off = torch.where(there, told - torch.nan_to_num(known[rows]), torch.zeros((), device=device)).abs()
         return l2(found, truth[rows]) + _WEIGHT * off.mean()
 
     mean = fit(
@@ -172,7 +180,7 @@ def train_vision(
         save_s=30.0,
     )
     assert isinstance(mean, SeeingHead)
-    return mean.eval()
+    return mean.cpu().eval()
 
 
 def plain(recipe: VisionRecipe) -> dict[str, Any]:

@@ -69,6 +69,8 @@ _NAMES: Final = {
     for name in (kind.replace("_", " "), *(" ".join(tokens_of(one)) for one in PLACE_WORDS.get(kind, ())))
 }
 """What our own towns' places are called, and their kinds."""
+_JUST: Final = re.compile(r"\b(?:straight|just)\s{1,3}$", re.IGNORECASE)
+"""Before "after": at once."""
 _STRAIGHT: Final = re.compile(r"\bstraight\b(?! (?:after|past|away|behind))", re.IGNORECASE)
 
 
@@ -186,7 +188,7 @@ def _step_of(part: str, repository: PolicyRepository, meant: TownIntent) -> Town
     place = "" if found is None else found["place"].strip()
     if len(place.split()) > _MOST_WORDS:
         place = landmark_in(place) or place
-    words = part if found is None else f"{part[: found.start()]} {part[found.end() :]}".strip(" ,.;")
+    words = part if found is None else f"{_JUST.sub('', part[: found.start()])} {part[found.end() :]}".strip(" ,.;")
     fit = _recalled(words, repository, denied, meant)
     if not fit:
         return None

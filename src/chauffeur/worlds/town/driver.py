@@ -28,7 +28,18 @@ from chauffeur.concept import (
 from chauffeur.control.idm import IdmParameters, free_acceleration, idm_acceleration
 from chauffeur.control.kinematic_bicycle import KinematicBicycle
 from chauffeur.control.pure_pursuit import pursuit_steering
-from chauffeur.geometry import JunctionWay, Lane, Polyline, Pose, RoadGraph, Route, Turn, choice_ahead, wrap_to_pi
+from chauffeur.geometry import (
+    JunctionWay,
+    Lane,
+    Polyline,
+    Pose,
+    RoadGraph,
+    Route,
+    Turn,
+    choice_ahead,
+    joined,
+    wrap_to_pi,
+)
 from chauffeur.worlds.town.course import Course
 from chauffeur.worlds.town.foresight import Foresight, Meeting
 from chauffeur.worlds.town.way import RouteCorridor, Stretch, astride_m, blended, free_route
@@ -52,6 +63,7 @@ _LEAST_LOOK_M: Final = 3.2
 _SIDE_M: Final = 0.35
 _MOST_BRAKING_MPS2: Final = 8.0
 _YELLOW_MPS2: Final = 3.0
+_HARD_MPS2: Final = 5.0
 _GONE_S: Final = 2.5
 """A car that stands astride a line needs so long to have all of itself behind it."""
 _LINE_M: Final = 0.7
@@ -86,6 +98,9 @@ _CHANGE_S: Final = 3.5
 _ROOM_M: Final = 12.0
 """Who has to change lanes waits for a gap so far before the lane's end, where there is room left to do it."""
 _LANE_BESIDE_M: Final = 5.0
+_UPSTREAM_M: Final = 60.0
+"""Who is on a way into a lane that is changed into is minded from so far."""
+_MOST_WAYS: Final = 6
 _HERE_M: Final = 3.0
 _LOST_M: Final = 3.0
 _EVERY: Final = 2
@@ -144,7 +159,9 @@ class TownDriver:
         self._tick = 0
         self._sign: tuple[int, float] | None = None
         self._tail_over = False
+        self._yellow_m: float | None = None
         self._lines: dict[tuple[str, float], tuple[Stretch, float]] = {}
+        self._into: dict[LaneId, tuple[Polyline, ...]] = {}
         self.why = ""
 
     def head_for(self, route: Route) -> None:
@@ -498,7 +515,46 @@ class TownDriver:
                 needed = 2.5 + 0.7 * along + closing * closing / 4.0
             if gap < needed:
                 return False
-        return True
+        return not any(self._comes_up(one, goal.lanes[0].id, here, ego) for one in seen.others)
+
+    def _comes_up(self, other: VehicleState, goal: LaneId, here: float, ego: VehicleState) -> bool:
+        """Whether somebody who is not in a lane yet, but on a way into it, would come too close behind the ego.
+
+        Args:
+            other: Who.
+            goal: The lane.
+            here: Where the ego is along it, m.
+            ego: The ego.
+        """
+        if math.dist((other.x_m, other.y_m), (ego.x_m, ego.y_m)) > _UPSTREAM_M:
+            return False
+        for line in self._upstream(goal):
+            station, aside = line.project(other.x_m, other.y_m)
+            pose = line.at(station)
+            turned = wrap_to_pi(other.heading_rad - pose.heading_rad)
+            if abs(aside) > 1.9 + other.width_m / 2.0 or station >= line.length_m or math.cos(turned) < 0.7:
+                continue
+            along = other.speed_mps * math.cos(turned)
+            closing = max(0.0, along - ego.speed_mps)
+            gap = here + line.length_m - station - (ego.length_m + other.length_m) / 2.0
+            if gap < 2.5 + 0.7 * along + closing * closing / 4.0:
+                return True
+        return False
+
+    def _upstream(self, lane: LaneId) -> tuple[Polyline, ...]:
+        """The ways into a lane, as far back as somebody who is fast has to be seen."""
+        known = self._into.get(lane)
+        if known is None:
+            done: list[list[Lane]] = []
+            rim: list[tuple[list[Lane], float]] = [([], 0.0)]
+            while rim:
+                way, length = rim.pop()
+                before = () if length > _UPSTREAM_M else self._road.predecessors(way[0].id if way else lane)
+                if way and not before:
+                    done.append(way)
+                rim += [([one, *way], length + one.length_m) for one in before]
+            known = self._into[lane] = tuple(joined([one.centre for one in way]) for way in done[:_MOST_WAYS])
+        return known
 
     # Speed ------------------------------------------------------------------------------------------------------------
 
@@ -529,7 +585,7 @@ class TownDriver:
             else:
                 stop = self._yields(meeting, nose, speed, target)
                 if stop is not None:
-                    stops.append(stop)
+                    stops += [stop, *self._rather_before_yellow(nose, speed)]
         for stop in stops:
             asked = _stopping(speed, stop.at_m - nose, idm)
             if asked < least:
@@ -560,7 +616,7 @@ class TownDriver:
     def _stops(self, seen: Observation, nose: float) -> list[_Stop]:
         """Where it has to stop for the end of the line, lights, signs, and a junction that is blocked."""
         stretch, speed, length = self._stretch, seen.ego.speed_mps, self._chassis.length_m
-        self._sign, self._tail_over = None, False
+        self._sign, self._yellow_m, self._tail_over = None, None, False
         stops = [_Stop(stretch.end_m - _ROOM_M, "room to change lanes")]
         if stretch.goal:
             stops = [_Stop(stretch.end_m + self._chassis.length_m / 2.0, "the goal")]
@@ -575,6 +631,8 @@ class TownDriver:
             if lane.id in lights:
                 line = self._line_m(lights[lane.id], start, end)
                 self._tail_over |= line + astride_m(length) < nose < line + length + _CLEAR_M
+                if lights[lane.id].state == "yellow" and line > nose:
+                    self._yellow_m = line
                 if self._light_stops(lights[lane.id], line, nose, speed):
                     stops.append(_Stop(line - _LINE_M, f"light {lights[lane.id].state}"))
                 elif self._no_room_behind(line, nose, speed):
@@ -619,6 +677,14 @@ class TownDriver:
         assert light.remaining_s is not None
         through = (ahead + self._chassis.length_m + 2.0) / max(speed, 3.0)
         return gently and ahead < 25.0 and through > light.remaining_s + 1.0 and speed > 1.0
+
+    def _rather_before_yellow(self, nose: float, speed: float) -> list[_Stop]:
+        """A stop before a line whose light is yellow, harder than for the light alone: who lets somebody go first in
+        the junction would stand astride the line when it turns red."""
+        if self._yellow_m is None:
+            return []
+        room = self._yellow_m - _LINE_M - nose
+        return [_Stop(self._yellow_m - _LINE_M, "light yellow")] if speed * speed <= 2.0 * _HARD_MPS2 * room else []
 
     def _no_room_behind(self, line: float, nose: float, speed: float) -> bool:
         """Whether who is ahead would leave no room for all of the car behind a line that it can still stop at.
