@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -9,7 +12,13 @@ import pytest
 from live_rig import Rig
 
 from chauffeur.concept import Parameters, Scenario
+from chauffeur.drive.events import DriveEvent
+from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
+from chauffeur.drive.live.supervisor import Runtime
+from chauffeur.drive.scenarios import find
+from chauffeur.drive.talk.messages import encode
+from chauffeur.drive.talk.view import View
 from chauffeur.programs import Budget, Sandbox
 from chauffeur.worlds.town.pack import load, places_called
 
@@ -158,3 +167,58 @@ def test_the_wheel_moves_the_car_and_gives_it_back(rig: Rig) -> None:
     rig.bench.take_over(False)
     rig.period(5)
     assert rig.reports[-1].level in ("follow", "hold")
+
+
+def test_a_screen_sees_the_road_the_lights_and_the_name_of_the_street(rig: Rig) -> None:
+    view = View(Settings(rig.starts), rig.bench.observations)
+    road, scene = view.look(None)
+    rig.period(5)
+    for _ in range(600):
+        rig.period()
+        _, scene = view.look(rig.reports[-1])
+        if scene is not None and scene.street and scene.lights:
+            break
+    assert road is not None
+    assert scene is not None
+    assert {"driving", "sidewalk"} <= {lane.what for lane in road.lanes}
+    assert any(lane.junction for lane in road.lanes)
+    assert scene.street in {lane.street for lane in load("Gridford").road.lanes}
+    assert {light.state for light in scene.lights} <= {"red", "yellow", "green", "off"}
+    assert any(body.what == "pedestrian" for body in scene.others)
+    assert encode(scene)
+
+
+def test_the_processes_drive_a_town_and_one_that_is_killed_is_replaced() -> None:
+    """Control alone has a simulator. Words go in, the car goes to the place; a stop is a stop."""
+    start = Start(find("town"), 4, most_s=600.0)
+    heard: list[DriveEvent] = []
+
+    def until(runtime: Runtime, holds: Callable[[], bool]) -> None:
+        end = time.monotonic() + 60.0
+        while not holds():
+            assert time.monotonic() < end, "it did not come to pass in time"
+            assert runtime.driving, "control has ended"
+            runtime.poll()
+            time.sleep(0.005)
+
+    def follows(runtime: Runtime, wish: str) -> bool:
+        report = runtime.report
+        return report is not None and (report.plan, report.level) == (wish, "follow")
+
+    with Runtime(Settings((start,), planner="retrieval", realtime=False), heard.append) as runtime:
+        wish = runtime.ask("Take me to the station.")
+        until(runtime, lambda: follows(runtime, wish))
+        before = runtime.pid("policy")
+        os.kill(before, signal.SIGKILL)
+        until(runtime, lambda: any(event.kind == "resumed" for event in heard))
+        until(runtime, lambda: follows(runtime, wish))
+        other = runtime.ask("Change of mind: take me to the church.")
+        until(runtime, lambda: follows(runtime, other))
+        runtime.ask("Stop!")
+        end = time.monotonic() + 30.0
+        while runtime.driving and time.monotonic() < end:
+            runtime.poll()
+            time.sleep(0.005)
+        assert runtime.report is not None
+        assert runtime.report.outcome == "stopped"
+        assert runtime.report.faults == 0

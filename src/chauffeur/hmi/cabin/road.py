@@ -36,7 +36,14 @@ def drawn(road: Road) -> dict[str, Any]:
         "kind": road.kind,
         "world": road.world,
         "lanes": [
-            {"id": lane.id, "p": _flat(lane.centre.points_m), "w": lane.width_m, "road": lane.road, "i": lane.index}
+            {
+                "id": lane.id,
+                "p": _flat(lane.centre.points_m),
+                "w": lane.width_m,
+                "road": lane.road,
+                "i": lane.index,
+                "e": lane.emergency,
+            }
             for lane in lanes
             if lane.kind not in _ON_FOOT
         ],

@@ -191,7 +191,7 @@ def plan_in_town(planner: Planner, request: PlanRequest, repository: PolicyRepos
     plan = undenied(planner, plan, request, begun)
     shall_i, offer = _offered(steps[0])
     whole = meant if len(steps) == 1 or meant.likely else intent_of(steps[0].words)
-    doubted = not (whole.likely and (whole is meant and len(steps) > 1 or _fits(steps[0], whole)))
+    doubted = not (whole.likely and ((whole is meant and len(steps) > 1) or _fits(steps[0], whole)))
     return _first_asked(planner, plan, shall_i if doubted else "", offer, request)
 
 

@@ -436,7 +436,7 @@ export function makeScene(canvas) {
     if (!scene || !road) return '';
     const parts = [`At ${kmh(scene.ego.speed_mps)} km/h${scene.street ? ` on ${scene.street}` : ''}.`];
     const lane = laneOf(scene.ego.x_m, scene.ego.y_m, scene.ego.heading_rad);
-    const abreast = lane && lane.road ? road.lanes.filter((other) => other.road === lane.road) : [];
+    const abreast = lane && lane.road ? road.lanes.filter((other) => other.road === lane.road && (!other.e || lane.e)) : [];
     if (abreast.length > 1) {
       parts.push(`Lane ${lane.i + 1} of ${abreast.length} from the left.`);
     }
