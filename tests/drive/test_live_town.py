@@ -32,6 +32,7 @@ WITHIN = 3000
 """Periods: two and a half minutes of the car's time."""
 ON = "def go():\n    while True:\n        yield proceed(check_speed_limit())\n"
 OUT = "def out():\n    while True:\n        yield stop()\n"
+SLOW = "def slow():\n    while True:\n        yield proceed(5.0)\n"
 TURN = "def go():\n    turn_{0}_at_next_intersection()\n    while True:\n        yield proceed(check_speed_limit())\n"
 
 
@@ -116,6 +117,40 @@ def test_a_change_of_mind_is_another_way_and_a_turn_gives_the_place_up(rig: Rig)
     assert ("superseded", "w1") in kinds
     assert ("superseded", "w2") in kinds
     assert ("started", "w3") in kinds
+
+
+def test_a_turn_is_taken_once_and_another_pace_does_not_take_it_again(rig: Rig) -> None:
+    world = rig.bench.world
+    drive_until(rig, lambda: (ahead := world.perception().junction_ahead()) is not None and ahead[0] > 30.0)
+    ahead = world.perception().junction_ahead()
+    assert ahead is not None
+    side = next(side for side in ahead[1] if side != "straight")
+    rig.order(Parameters(11.1, 12.0, 2.0, 0, side))
+    assert (steered := rig.period(5).steered) is not None
+    assert isinstance(steered.policy, Parameters)
+    assert steered.policy.route == side
+    drive_until(rig, lambda: rig.reports[-1].setpoints.turn == side)
+    drive_until(rig, lambda: rig.reports[-1].setpoints.turn is None)
+    rig.order(Parameters(6.0, 12.0, 2.0, 0, ""), "w2")
+    assert (steered := rig.period(5).steered) is not None
+    assert isinstance(steered.policy, Parameters)
+    assert steered.policy.route == ""
+    assert rig.reports[-1].setpoints.target_speed_mps == 6.0
+
+
+def test_another_pace_leaves_the_place_that_is_made_for(rig: Rig) -> None:
+    rig.order(go_to("the station"))
+    rig.period(20)
+    way = rig.bench.world.observe().route
+    rig.order(Parameters(5.0, 12.0, 2.0, 0, ""), "w2")
+    assert (steered := rig.period(5).steered) is not None
+    assert isinstance(steered.policy, Parameters)
+    assert steered.policy.route == "the station"
+    rig.order(SLOW, "w3")
+    rig.period(5)
+    assert rig.bench.world.observe().route == way
+    drive_until(rig, lambda: bool(said(rig)))
+    assert stands(rig)
 
 
 def test_a_place_that_is_not_there_is_refused_and_the_way_goes_on(rig: Rig) -> None:
