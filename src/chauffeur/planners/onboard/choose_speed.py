@@ -33,6 +33,13 @@ _STYLES: dict[str, tuple[float, float, str]] = {
     "eco": (0.85, 1.8, "hold a moderate speed that changes as little as possible"),
 }
 """Share of the present speed, time headway in s, and words."""
+_FROM_A_STAND: dict[str, str] = {
+    "hurry": "set out for what is allowed and keep a shorter gap",
+    "relax": "set out evenly and leave plenty of room",
+    "comfort": "set out so softly that it is hardly felt, and stay far behind others",
+    "careful": "set out with care, leave a long gap and never pass anyone quickly",
+}
+"""The words where the car stands: nothing is slowed down from."""
 _WARY: tuple[float, float, str] = (
     1.0,
     2.0,
@@ -121,7 +128,8 @@ def _step(meaning: Meaning, options: Options) -> Chosen | Declined:
     leaning = options.leaning.speed_mps
     name = {BIT: "_bit", MUCH: "_much"}.get(meaning.degree, "")
     amount = {BIT: "a little ", MUCH: "a lot "}.get(meaning.degree, "")
-    if meaning.change > 0 and options.speed < options.cruise_mps:  # we stand: faster than that is to set out
+    stands = options.speed < options.cruise_mps
+    if meaning.change > 0 and stands:
         does = f"set out for what is allowed, {speed_words(options.own_cap_mps)}"
         return _chosen(meaning, options, f"speed.up{name}", options.own_cap_mps, does)
     if meaning.change > 0:
@@ -140,6 +148,10 @@ def _step(meaning: Meaning, options: Options) -> Chosen | Declined:
             f"We only drive {speed_words(options.cruise_mps)}; any slower and we are in the way of others. "
             "Shall I stop?"
         )
+    if stands:
+        below = speed_words(options.cruise_mps)
+        does = f"set out for {speed_words(target)}, {amount}below the {below} that are allowed"
+        return _chosen(meaning, options, "speed.set_up", target, does)
     does = f"go {amount}slower, from {number(options.cruise_mps)} to {speed_words(target)}"
     return _chosen(meaning, options, f"speed.down{name}", target, does)
 
@@ -147,6 +159,8 @@ def _step(meaning: Meaning, options: Options) -> Chosen | Declined:
 def choose_style(meaning: Meaning, options: Options) -> Chosen | Declined:
     """Exemplar for a way of driving or a feeling that asks for one."""
     share, headway, words = _STYLES[meaning.variant]
+    if options.speed < options.cruise_mps:
+        words = _FROM_A_STAND.get(meaning.variant, words)
     if options.wary and PACES[meaning.variant] > 0:
         share, headway, words = _WARY
     wanted = options.cruise_mps * share + options.leaning.speed_mps

@@ -188,9 +188,9 @@ def speed_of(amount: Amount, options: Options, change: Change = 0) -> tuple[floa
         return amount.value, ()
     unit, factor = _unit_of_signs(options.sign_mps)
     value, why = amount.value * factor, "the unit of the signs on this road"
-    if change and amount.frame == "absolute" and (value - options.speed) * change < 0:
+    if change and amount.frame == "absolute" and (value - options.cruise_mps) * change < 0:
         for other, scale in (("km/h", MPS_PER_KMH), ("mph", MPS_PER_MPH), ("m/s", 1.0)):
-            if (amount.value * scale - options.speed) * change > 0:
+            if (amount.value * scale - options.cruise_mps) * change > 0:
                 unit, value = other, amount.value * scale
                 why = "because only then it is " + ("faster than now" if change > 0 else "slower than now")
                 break

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from chauffeur.concept import Parameters, Plan, PlanRequest, Program, Situation, Thoughts
-from chauffeur.describe.answers import DONT_KNOW
+from chauffeur.describe.answers import DONT_KNOW, answer_to
 from chauffeur.language.corrections import last_said
 from chauffeur.language.emergency import SAFE_STOP_WISH
 from chauffeur.memory.policies import PolicyRepository
@@ -24,7 +24,14 @@ from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.doubts import CAN_DO
 from chauffeur.planners.onboard.town_intents import PLAIN_WISHES, TownIntent, intent_of
 from chauffeur.planners.onboard.town_program import program_of
-from chauffeur.planners.onboard.town_steps import LANE_CHANGES, WORDS, TownStep, landmarks_in, steps_of
+from chauffeur.planners.onboard.town_steps import (
+    LANE_CHANGES,
+    WORDS,
+    TownStep,
+    landmarks_in,
+    speaks_to_somebody,
+    steps_of,
+)
 from chauffeur.planners.onboard.understand import meanings_said
 from chauffeur.planners.talk2drive.style import LOOK_AHEAD, destination_of
 from chauffeur.programs.catalogue import vocabulary_of
@@ -80,11 +87,11 @@ def town_destination(wish: str, meant: TownIntent | None = None) -> str:
         return ""
     named = landmarks_in(wish)
     place = "" if _ANYWHERE.search(wish) else destination_of(wish)
+    if len(named) > 1 and goes and _CORRECTS.search(wish):
+        return named[-1]
     if place and not _TIME.search(place) and not _HOME.search(place) and (not named or named[0] in landmarks_in(place)):
         return named[0] if len(place.split()) > _MOST_WORDS and named else place
-    if named and goes:
-        return named[-1] if _CORRECTS.search(wish) else named[0]
-    return ""
+    return named[0] if named and goes else ""
 
 
 def driven_to(planner: Planner, place: str, request: PlanRequest, begun: float, later: str = "") -> Plan:
@@ -100,8 +107,8 @@ def driven_to(planner: Planner, place: str, request: PlanRequest, begun: float, 
     )
     return Plan(
         thoughts=Thoughts(
-            f"You want to go to {place}. I take the way there, as fast as the signs allow."
-            + (f" Tell me there when to go on to {later}." if later else "")
+            f"You want to go to {_called(place)}. I take the way there, as fast as the signs allow."
+            + (f" Tell me there when to go on to {_called(later)}." if later else "")
         ),
         policy=policy,
         intent="go_to",
@@ -150,33 +157,28 @@ def plan_in_town(planner: Planner, request: PlanRequest, repository: PolicyRepos
         return declined(planner, _NO_U_TURN, begun, intent="not there")
     if reason := danger(_SIGN.sub("", request.instruction.text)):
         return declined(planner, f"{reason} {CAN_DO}", begun, intent="refuse")
-    if (plan := _declined(planner, meant, begun)) is not None:
+    if (plan := _declined(planner, said, meant, request.context.situation, begun)) is not None:
         return plan
-    if there := town_destination(said, meant):
-        question = "" if meant.likely or _TO.match(said) else f"Shall I take you to {there}?"
-        return _first_asked(
-            planner, driven_to(planner, there, request, begun), question, f"Take me to the {there}.", request
-        )
-    if meant.likely and _HOME.search(said) and meant.kind in ("goto", "go", "hurry", "uturn"):
-        return declined(planner, _NO_HOME, begun, intent="ask")
-    if meant.likely and meant.kind == "goto":
-        return declined(planner, _WHERE, begun, intent="ask")
+    if (plan := _to_a_place(planner, said, meant, request, begun)) is not None:
+        return plan
     if meant.surely(*PLAIN_WISHES, "speed"):
         return None  # a way of driving: no way to go
+    if speaks_to_somebody(said) and not meant.surely("stop"):
+        return _stop_asked(planner, begun)
     steps = steps_of(request.instruction.text, repository or snippets(), meant)
-    if steps is None and meant.likely and meant.kind == "stop":
-        steps = (TownStep(said, out=True),)
-        return asked(planner, f"{UNSURE_WORDS} {_offered(steps[0])[0]}", begun, offer=_offered(steps[0])[1])
-    if steps is None or (
-        _kind(steps[0]) == "" and meant.kind not in ("", "straight", "go", "yield", "wait", "turn", "lane")
-    ):
+    if not steps:
+        if meant.likely and meant.kind == "goto":
+            return declined(planner, _WHERE, begun, intent="ask")
+        return _stop_asked(planner, begun) if meant.likely and meant.kind == "stop" else None
+    first = steps[0]
+    if not _kind(first) and meant.kind not in _GOES_ON:
         return None
-    if len(steps) == 1 and steps[0].out and steps[0].place:  # "drop me off in front of the station"
-        there = steps[0].place
-        question = "" if meant.likely and _fits(steps[0], meant) else f"Shall I take you to {there}?"
+    if len(steps) == 1 and first.out and first.place:  # "drop me off in front of the station"
+        there = first.place
+        question = "" if meant.likely and _fits(first, meant) else f"Shall I take you to {_called(there)}?"
         plan = driven_to(planner, there, request, begun)
-        return _first_asked(planner, plan, question, f"Take me to the {there}.", request)
-    if words := _impossible(steps[0], request.context.situation):
+        return _first_asked(planner, plan, question, f"Take me to {_called(there)}.", request)
+    if words := _impossible(first, request.context.situation):
         return declined(planner, words, begun, intent="not there")
     near = [step.recalled for step in steps if step.recalled is not None]
     plan = Plan(
@@ -189,10 +191,34 @@ def plan_in_town(planner: Planner, request: PlanRequest, repository: PolicyRepos
         raw="; ".join(f"{one.entry.callable_name} ({one.similarity:.2f}): {one.entry.command}" for one in near),
     )
     plan = undenied(planner, plan, request, begun)
-    shall_i, offer = _offered(steps[0])
-    whole = meant if len(steps) == 1 or meant.likely else intent_of(steps[0].words)
-    doubted = not (whole.likely and ((whole is meant and len(steps) > 1) or _fits(steps[0], whole)))
+    shall_i, offer = _offered(first)
+    whole = meant if len(steps) == 1 or meant.likely else intent_of(first.words)
+    doubted = not (whole.likely and ((whole is meant and len(steps) > 1) or _fits(first, whole)))
     return _first_asked(planner, plan, shall_i if doubted else "", offer, request)
+
+
+def _to_a_place(planner: Planner, said: str, meant: TownIntent, request: PlanRequest, begun: float) -> Plan | None:
+    """The plan to go where words name a place, or the question which one; None where they want to go nowhere."""
+    if there := town_destination(said, meant):
+        later = next((one for one in landmarks_in(said) if one not in there), "") if meant.likely else ""
+        later = "" if _CORRECTS.search(said) else later
+        question = "" if meant.likely or _TO.match(said) else f"Shall I take you to {_called(there)}?"
+        plan = driven_to(planner, there, request, begun, later)
+        return _first_asked(planner, plan, question, f"Take me to {_called(there)}.", request)
+    if meant.likely and _HOME.search(said) and meant.kind in ("goto", "go", "hurry", "uturn"):
+        return declined(planner, _NO_HOME, begun, intent="ask")
+    return declined(planner, _WHERE, begun, intent="ask") if meant.surely("goto") else None
+
+
+def _called(place: str) -> str:
+    """A place as it is spoken of: a kind of place with its article."""
+    return f"the {place}" if landmarks_in(place) == (place,) else place
+
+
+def _stop_asked(planner: Planner, begun: float) -> Plan:
+    """The question whether to stop."""
+    question, offer = _offered(TownStep("", out=True))
+    return asked(planner, f"{UNSURE_WORDS} {question}", begun, offer=offer)
 
 
 def _first_asked(planner: Planner, plan: Plan, question: str, offer: str, request: PlanRequest) -> Plan:
@@ -207,9 +233,11 @@ _KINDS: Final = {
     "turn": ("turn",),
     "straight": ("straight", "go"),
     "lane": ("lane",),
-    "stop": ("stop", "goto", "distress"),
+    "stop": ("stop", "distress"),
 }
 """Which intents fit what is to be done."""
+_GOES_ON: Final = ("straight", "go", "yield", "wait", "turn", "lane")
+"""Intents that are served by going on where nothing else is to be done."""
 
 
 def _kind(step: TownStep) -> str:
@@ -239,11 +267,14 @@ def _offered(step: TownStep) -> tuple[str, str]:
     }.get(_kind(step), ("", ""))
 
 
-def _declined(planner: Planner, meant: TownIntent, begun: float) -> Plan | None:
+def _declined(planner: Planner, said: str, meant: TownIntent, situation: Situation, begun: float) -> Plan | None:
     """What is answered in words; None where something is to be driven."""
     if not meant.sure and not (meant.likely and meant.kind == "unsafe"):
         return None
-    words = {"none": _NOTHING, "unsafe": _UNSAFE, "distress": _HELP, "question": DONT_KNOW}
+    if meant.kind == "question":  # one clause of it may be answered
+        told = (answer_to(clause, situation) for clause in re.split(r"[.,;!?]+", said))
+        return declined(planner, next(filter(None, told), DONT_KNOW), begun, intent=NO_WISH)
+    words = {"none": _NOTHING, "unsafe": _UNSAFE, "distress": _HELP}
     if meant.kind not in words:
         return None
     plan = declined(planner, words[meant.kind], begun, intent=_INTENTS.get(meant.kind, "ask"))

@@ -51,6 +51,8 @@ _OUT: Final = re.compile(
     r"|\bstop\s{1,3}(?:here|there|for\s{1,3}me)\b|^\W{0,9}stop\W{0,9}$",
     re.IGNORECASE,
 )
+_STOPS_SOMEBODY: Final = re.compile(r"\bstop\s{1,3}(?:it|that|him|her|them|\w{2,12}ing)\b", re.IGNORECASE)
+"""Said to a child."""
 _ON: Final = re.compile(
     r"^\W{0,9}(?:just\s{1,3})?(?:follow|keep\s{1,3}to|stay\s{1,3}on|(?:continue|drive|go)\s{1,3}(?:along|on\s{1,3}along))"
     r"\s{1,3}(?:the|this)\s{1,3}(?:road|street)(?:\s{1,3}for\s{1,3}(?:about\s{1,3})?\d{1,5}\s{1,3}met(?:er|re)s)?\W{0,9}$",
@@ -59,7 +61,8 @@ _ON: Final = re.compile(
 """Nothing is to be chosen: the road is followed."""
 _PLACE: Final = re.compile(
     r"\b(?:after|past|behind|beyond)\s{1,3}(?:the\s{1,3}|that\s{1,3}(?:big\s{1,3})?)?"
-    r"(?P<place>(?!that\b|this\b|these\b|next\b|lights?\b|junction\b|\d)[\w'.\- ]{1,60}?)"
+    r"(?P<place>(?!that\b|this\b|these\b|next\b|lights?\b|junction\b|\d)"
+    r"(?!(?:\w+ ){1,3}(?:met(?:er|re)s?|yards?|feet|miles?)\b)[\w'.\- ]{1,60}?)"
     r"(?=[,;!?]|\.?$|\s{1,3}(?:turn|take|go|make|keep|bear|carry|continue|where|which|that|is|please|you|we|hang)\b)",
     re.IGNORECASE,
 )
@@ -213,6 +216,11 @@ def _recalled(words: str, repository: PolicyRepository, denied: frozenset[str], 
         side = next((one for one in SIDES if one in tokens_of(said)), "")
         near = repository.recall(f"Change to the {side} lane now.", "town", NEIGHBOURS) if side else near
     return [one for one in near if one.similarity >= NEAR and _agrees(words, one, over, denied)]
+
+
+def speaks_to_somebody(words: str) -> bool:
+    """Whether words may tell somebody else in the car to stop what they do."""
+    return _STOPS_SOMEBODY.search(words) is not None
 
 
 def landmark_in(words: str) -> str:

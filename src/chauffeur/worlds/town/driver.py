@@ -46,7 +46,7 @@ from chauffeur.worlds.town.way import RouteCorridor, Stretch, astride_m, blended
 
 TOWN_CAPABILITIES: Final = Capabilities(
     roads=("town",),
-    policies=("parameters", "trajectory", "program"),
+    policies=("program", "parameters", "trajectory"),
     lane_changes=True,
     turns=True,
     stop_signs=True,
