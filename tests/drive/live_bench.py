@@ -48,7 +48,7 @@ class Bench:
         self.hand.write(WheelHand(on, key).encode(), self.now_ns)
 
     def tick(self) -> Report:
-        self.now_ns += round(DT_NS / self.speed)
+        self.now_ns += round(self.world.dt_s * 1e9 / self.speed)
         return self.control.tick()
 
     def observed(self) -> MirroredInstant:

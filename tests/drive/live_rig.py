@@ -36,7 +36,7 @@ class Rig:
         self._heard = Reader(self.events, old=True)
 
     def new_policy(self) -> PolicyProcess:
-        mirror = Mirror(self.bench.new_world(), self.starts, self.bench.observations)
+        mirror = Mirror(self.bench.new_world().mirror(), self.starts, self.bench.observations)
         return PolicyProcess(mirror, self.rings, self.sandbox, clock_ns=lambda: self.bench.now_ns)
 
     def period(self, count: int = 1) -> LiveSetpoints:

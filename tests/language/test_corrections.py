@@ -23,6 +23,8 @@ from chauffeur.language.tokens import tokens_of
         ("Take your time, no, strike that, hurry.", "hurry."),
         ("I want, uh, actually, go past him", "go past him"),
         ("Drive at seventy, no wait, sixty", "drive at sixty"),
+        ("Change of mind: to the church", "to the church"),
+        ("No, I've changed my mind, take me to the bakery", "take me to the bakery"),
         ("Drive at 70 km/h, no, sorry, 60.", "drive at 60 km/h"),
         ("go 70 mph, I mean 60 mph please", "go 60 mph"),
         ("keep 40 m, make that 50", "keep 50 m"),

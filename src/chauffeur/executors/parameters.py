@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Final
 
 from chauffeur.concept import Command, Limits, Observation, Parameters, ScenarioError, Setpoints, Turn, VehicleState
-from chauffeur.executors.base import DriverLed, Executor, ExecutorBase, HeldSetpoints, PolicyTick
+from chauffeur.executors.base import DriverLed, ExecutorBase, HeldSetpoints, PolicyTick
 from chauffeur.executors.pursuit import ParametersDriver, number
 from chauffeur.geometry.road_graph import TURNS
 from chauffeur.worlds.base import World
-from chauffeur.worlds.parking.lot import Spot
 from chauffeur.worlds.places import TownPlaces
 
+_ROUNDED_MPS: Final = 0.02
+"""Planners say the limit in hundredths of a metre a second, and may have cut it off."""
 
-def parameters_executor(world: World) -> Executor:
-    """What drives parameters there."""
+
+def parameters_executor(world: World) -> PursuitExecutor | TownSetPoints:
+    """What drives parameters there; its `route` is what is left of theirs."""
     return TownSetPoints(world) if isinstance(world, TownPlaces) else PursuitExecutor(world)
 
 
@@ -58,9 +61,10 @@ class PursuitExecutor(ExecutorBase):
         return () if self._driver is None else self._driver.notes
 
     @property
-    def spot(self) -> Spot | None:
-        """The spot that is made for."""
-        return self._driving().spot
+    def route(self) -> str:
+        """Where it goes: the spot that is made for by its name, or what the policy said."""
+        driver = self._driving()
+        return driver.route if driver.spot is None else driver.spot.name
 
     def _aim(self, observation: Observation) -> None:
         self._setpoints, self._aimed = self._driving().setpoints(), observation.tick
@@ -83,21 +87,23 @@ class TownSetPoints(DriverLed):
         self._policy_mps, self._free = 0.0, False
         self._lane: str | None = None
         self._turn: Turn | None = None
+        self._place = ""
 
     def start(
         self, policy: Parameters, observation: Observation, limits: Limits, origin: VehicleState | None = None
     ) -> None:
         """See Executor."""
         turn: Turn | None = next((one for one in TURNS if one == policy.route), None)
-        if policy.route and turn is None:
-            assert isinstance(self._world, TownPlaces)
-            self._world.head_for(policy.route)
+        place = "" if turn is not None else policy.route
+        if place and not (place == self._place and self._status == "running"):
+            self._town.head_for(place)
+        self._place, self._status = place, "running"
         here = (observation.ego if origin is None else origin).lane
         beside = None if here is None else observation.road.neighbour(here, policy.lane)
         self._lane, self._turn = beside if policy.lane else None, turn
         sign = 0.0 if here is None else self._world.perception().speed_limit(here)
         self._policy_mps, self._limits = number(policy.target_speed_mps, 0.0), limits
-        self._free = self._policy_mps >= sign
+        self._free = self._policy_mps >= sign - _ROUNDED_MPS
 
     def tick(self) -> HeldSetpoints:
         """See RunningPolicy."""
@@ -106,7 +112,21 @@ class TownSetPoints(DriverLed):
         sign = 0.0 if here is None else self._world.perception().speed_limit(here)
         most = self._limits.most_mps(sign)
         speed = min(sign, most) if self._free else min(self._policy_mps, most)
-        self._setpoints = replace(
-            driver.settle(driver.initial_setpoints()), target_speed_mps=speed, target_lane=self._lane, turn=self._turn
-        )
-        return HeldSetpoints(self._setpoints)
+        if self._place and self._town.reached() == self._place:
+            self._status = "finished"
+        if self._status == "finished":
+            speed = 0.0  # there, until something else is wished
+        settled = driver.settle(replace(driver.initial_setpoints(), turn=self._turn))
+        self._turn = settled.turn  # a turn that is taken is not taken again at the next junction
+        self._setpoints = replace(settled, target_speed_mps=speed, target_lane=self._lane)
+        return HeldSetpoints(self._setpoints, state="finished" if self._status == "finished" else "none")
+
+    @property
+    def route(self) -> str:
+        """The place it goes to, or the turn that is still to be taken."""
+        return self._place or self._turn or ""
+
+    @property
+    def _town(self) -> TownPlaces:
+        assert isinstance(self._world, TownPlaces)
+        return self._world

@@ -108,7 +108,7 @@ class ParametersDriver:
         self._notes: list[tuple[float, str]] = []
         observation = world.observe()
         self._road = observation.road
-        self._route = policy.route
+        self.route = policy.route
         self._turn: Turn | None = _turn_of(policy.route, observation)
         self.spot: Spot | None = None
         self._stretch: _Stretch | None = None
@@ -134,7 +134,7 @@ class ParametersDriver:
             policy: To drive from now on.
             origin: Lane its lane wish counts from; the ego's own by default.
         """
-        if policy.route != self._route:
+        if policy.route != self.route:
             return False
         self._tune(policy, origin)
         return True

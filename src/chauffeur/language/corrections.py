@@ -23,6 +23,13 @@ _TAKES_BACK: Final = re.compile(
     re.IGNORECASE,
 )
 """Words that take back those before them. The weaker ones ("sorry", "I mean") only before what may be a wish."""
+_ANEW: Final = re.compile(
+    r"^\s*(?:(?:no|oh|sorry|wait|actually|ok|okay)[\s,]+){0,2}(?:(?:i|we)(?:'ve| have)?\s+)?"
+    r"(?:(?:a |had a )?chang(?:e|es|ed|ing) (?:of|my|our|the|in) (?:minds?|plans?)|new plan|different plan)"
+    r"(?:[\s,.;:!…-]+(?:and|so))?[\s,.;:!…-]+(?=\w)",
+    re.IGNORECASE,
+)
+"""Words ahead of a wish that take back the one that is driven: "change of mind: to the church"."""
 _LEAST: Final = re.compile(r"[a-z]{3}", re.IGNORECASE)
 
 
@@ -44,7 +51,7 @@ def last_said(text: str) -> str:
 
     Where a mere side or number takes the place of another, the rest of the wish stays: "do seventy, no wait, sixty".
     """
-    text = text.replace("’", "'")
+    text = _ANEW.sub("", text.replace("’", "'"))
     if (mended := _with_part(text)) is not None:
         return mended
     parts = [part for part in _TAKES_BACK.split(text) if _LEAST.search(part)]

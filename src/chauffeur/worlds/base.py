@@ -175,6 +175,15 @@ class MirroredWorld(World, Protocol):
         """The present instant, without what is the same throughout a trip."""
         ...
 
+    def mirror(self) -> WorldMirror:
+        """A copy for another process, to be reset there. It is never stepped, and so needs no simulator."""
+        ...
+
+
+@runtime_checkable
+class WorldMirror(MirroredWorld, Protocol):
+    """A copy of a world that nobody steps: it is at the instants that it is shown."""
+
     def adopt(self, observation: bytes) -> None:
         """Be at that instant. Raises DataError if it is none of this scenario; the world then stays as it was."""
         ...

@@ -58,3 +58,11 @@ class TownPlaces(Protocol):
     def head_for(self, place: str) -> None:
         """Set out for a place. Raises ScenarioError: there is no such place, or no way there."""
         ...
+
+    def leave(self) -> None:
+        """Drive on from a place: no goal holds the car any more."""
+        ...
+
+    def reached(self) -> str | None:
+        """The place that was set out for, while the car stands there."""
+        ...

@@ -15,11 +15,13 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
+from typing import TypeVar
 
-from chauffeur.drive.live.mirror import live_world
+from chauffeur.drive.live.mirror import Mirror, live_world, mirror_of
 from chauffeur.drive.live.settings import Settings, ring
-from chauffeur.worlds.base import MirroredWorld
+from chauffeur.worlds.base import World
 
+_W = TypeVar("_W", bound=World)
 FIGURES_FILE = "punctuality.json"
 READY_SUFFIX = ".ready"
 _ENDS_WITHIN_S = 10.0
@@ -60,19 +62,24 @@ def _ready(folder: Path, role: str) -> None:
     (folder / f"{role}{READY_SUFFIX}").touch()
 
 
-def _world(settings: Settings) -> MirroredWorld:
-    """The world of the drive; what is slow about its starts is done before anything moves."""
-    world = live_world(settings.starts[0].scenario)
+def _begun(world: _W, settings: Settings) -> _W:
+    """A world of the drive; what is slow about its starts is done before anything moves."""
     for start in settings.starts:
         world.reset(start.scenario, start.seed)
     return world
+
+
+def _mirror(folder: Path, settings: Settings) -> Mirror:
+    """What control shows, in a copy of its world."""
+    world = _begun(mirror_of(settings.starts[0].scenario), settings)
+    return Mirror(world, settings.starts, ring(folder, "observations"))
 
 
 def _control(folder: Path, settings: Settings, over: Callable[[], bool]) -> None:
     from chauffeur.drive.live.control import Control, Rings, run
     from chauffeur.drive.live.realtime import Ticker, become_realtime, punctuality
 
-    world = _world(settings)
+    world = _begun(live_world(settings.starts[0].scenario), settings)
     rings = Rings(
         ring(folder, "setpoints"), ring(folder, "observations"), ring(folder, "reports"), ring(folder, "hand")
     )
@@ -111,17 +118,15 @@ def _policy(
 ) -> None:
     import time
 
-    from chauffeur.drive.live.mirror import Mirror
     from chauffeur.drive.live.policy import LIVE_BUDGET, Policy, PolicyRings
     from chauffeur.drive.live.realtime import become_favoured
     from chauffeur.programs import Sandbox
 
-    world = _world(settings)
-    mirror = Mirror(world, settings.starts, ring(folder, "observations"))
+    mirror = _mirror(folder, settings)
     rings = PolicyRings(
         ring(folder, "orders"), ring(folder, "setpoints"), ring(folder, "policy_events"), ring(folder, "checkpoints")
     )
-    pause_s = world.dt_s / settings.speed / 20.0
+    pause_s = mirror.world.dt_s / settings.speed / 20.0
     if settings.realtime:
         become_favoured()
     with Sandbox(LIVE_BUDGET) as sandbox:
@@ -140,7 +145,6 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     import importlib
 
     from chauffeur.describe.services.sources import read_sources
-    from chauffeur.drive.live.mirror import Mirror
     from chauffeur.drive.live.planning import Planning, PlanningRings
     from chauffeur.drive.loop import LoopMemory
     from chauffeur.drive.session import Forgetful
@@ -149,8 +153,7 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     from chauffeur.planners.talk2drive.recent import fitting
 
     _end_for_sure(over)
-    world = _world(settings)
-    mirror = Mirror(world, settings.starts, ring(folder, "observations"))
+    mirror = _mirror(folder, settings)
     rings = PlanningRings(
         ring(folder, "requests"), ring(folder, "orders"), ring(folder, "briefs"), ring(folder, "planner_events")
     )

@@ -31,6 +31,7 @@ from chauffeur.executors import Executor, executor_for
 from chauffeur.safety.bounds import least_target_mps
 from chauffeur.safety.shield import GroundShield, Shield, rollout, shield_for
 from chauffeur.worlds.base import Driver, MirroredWorld
+from chauffeur.worlds.places import TownPlaces
 
 AHEAD_NS: Final = 50_000_000
 """How far in the future a wish may claim to be issued: clocks of one machine agree far better."""
@@ -101,6 +102,9 @@ class Control:
         self._steering = 0.0
         """Angle of the wheel as the vehicle has it."""
         self._now: Observation | None = None
+        self._places = world if isinstance(world, TownPlaces) else None
+        self._there: str | None = None
+        """The place where the car stands, as it was told."""
         self._refused: Counter[str] = Counter()
         self._faults = 0
         self._stopping = False
@@ -163,6 +167,7 @@ class Control:
         self._shield = shield_for(self._world, start.limits)
         self._tick, self._steering = 0, 0.0
         self._let_go()
+        self._there = None
         self._now = self._world.observe()
         self._show()
         return True
@@ -197,6 +202,7 @@ class Control:
         self._tick += 1
         self._steering = done.applied.steering_rad
         self._now = self._world.observe()
+        said += self._arrival()
         outcome = self._outcome(observation, self._now, start)
         wish = self._wish
         report = Report(
@@ -247,6 +253,7 @@ class Control:
         handovers = self._wheel.handovers
         keys = self._wheel.hear(self._refused)
         if self._wheel.handovers != handovers:
+            self._leave()
             # What is, is kept: speed and lane; and the way, where a crossing is ahead.
             held, self._held = self._held, self._driver.initial_setpoints()
             self._held = replace(
@@ -267,6 +274,8 @@ class Control:
             try:
                 wish = self._believed(LiveSetpoints.decode(message.payload))
                 if wish is not None:
+                    if self._wish is not None and wish.plan != self._wish.plan:
+                        self._leave()
                     self._bind(wish, start)
                     self._wish = wish
             except MessageError as error:
@@ -326,6 +335,16 @@ class Control:
             raise MessageError("no way for this policy") from error
         self._noted = len(executor.notes) if executor is self._executor else 0
         self._executor, self._bound = executor, bound
+
+    def _leave(self) -> None:
+        """Whoever stands at the place they wanted to go to is held there until something else is wished."""
+        if self._places is not None and self._there is not None:
+            self._places.leave()
+
+    def _arrival(self) -> tuple[str, ...]:
+        """What there is to tell once the car stands at the place that was wished."""
+        before, self._there = self._there, None if self._places is None else self._places.reached()
+        return () if self._there is None or before is not None else (f"Here we are: {self._there}.",)
 
     def _choose(self, at_s: float, age_s: float, observation: Observation) -> tuple[FallbackLevel, Setpoints]:
         if self._stopping:

@@ -10,27 +10,32 @@ from chauffeur.concept.registry import load_plugin
 from chauffeur.drive.live.messages import MessageError, MirroredInstant
 from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.starts import Start
-from chauffeur.worlds.base import MirroredWorld, World
+from chauffeur.worlds.base import MirroredWorld, World, WorldMirror
 
 
 def live_world(scenario: Scenario) -> MirroredWorld:
     """A fresh world to drive in in real time. Raises ScenarioError where other processes cannot follow it."""
     world: World = load_plugin("chauffeur.worlds", scenario.world)()
     # isinstance would read the properties of a world that has not been reset.
-    if not hasattr(world, "adopt"):
+    if not hasattr(world, "mirror"):
         raise ScenarioError(
             f"{scenario.title or scenario.id} cannot be driven in real time: the world {scenario.world!r} does "
             "not show its present instant to other processes.",
             hint=f'Drive it in simulated time: chauffeur drive "WISH" --scenario {scenario.id}. Or talk on a highway, '
-            "at a crossing or in a parking lot: chauffeur show scenarios.",
+            "at a crossing, in a parking lot or in a town: chauffeur show scenarios.",
         )
     return cast("MirroredWorld", world)
+
+
+def mirror_of(scenario: Scenario) -> WorldMirror:
+    """A copy to look on with. Raises ScenarioError as `live_world`."""
+    return live_world(scenario).mirror()
 
 
 class Mirror:
     """A world that nobody steps: it follows what control shows."""
 
-    def __init__(self, world: MirroredWorld, starts: Sequence[Start], observations: Ring) -> None:
+    def __init__(self, world: WorldMirror, starts: Sequence[Start], observations: Ring) -> None:
         self.world = world
         self._starts, self._observations = starts, observations
         self._seen = 0

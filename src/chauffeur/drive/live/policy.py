@@ -20,16 +20,19 @@ import struct
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice, takewhile
 from typing import Final
 
 from chauffeur.concept import (
     ActionMatrix,
     ChauffeurError,
+    LaneId,
     Observation,
     Parameters,
     Plan,
     Program,
     ProgramState,
+    RoadGraph,
     SandboxError,
     ScenarioError,
     Setpoints,
@@ -61,7 +64,7 @@ from chauffeur.drive.live.plan_messages import (
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.planning import START_WITHIN_S
 from chauffeur.executors import Executor, executor_for
-from chauffeur.executors.parameters import PursuitExecutor
+from chauffeur.executors.parameters import TownSetPoints, parameters_executor
 from chauffeur.executors.pursuit import HEADWAY_S
 from chauffeur.executors.trajectory import rebased
 from chauffeur.geometry import Pose
@@ -96,10 +99,19 @@ class PolicyRings:
 
 @dataclass(slots=True)
 class _Along:
-    """A policy that control drives, and its executor here, whose commands go nowhere; parameters need none."""
+    """A policy that control drives, and its executor here, whose commands go nowhere; the path of parameters needs
+    none."""
 
     steered: Steered
     executor: Executor | None = None
+
+    @property
+    def route(self) -> str | None:
+        """Where parameters lead, or what is left of that; None for policies of other kinds."""
+        policy, executor = self.steered.policy, self.executor
+        if not isinstance(policy, Parameters):
+            return None
+        return executor.route if isinstance(executor, TownSetPoints) else policy.route
 
 
 @dataclass(slots=True)
@@ -201,7 +213,7 @@ class Policy:
         self._trip = self._mirror.trip
         self._handovers = self._mirror.handovers
         self._handover_tick = self._mirror.tick if self._handovers else 0
-        self._setpoints = starting_setpoints(self._mirror.world.perception())
+        self._setpoints = self._mirror.world.driver().initial_setpoints()
         if self._first:
             self._first = False
             self._pick_up()
@@ -301,7 +313,7 @@ class Policy:
         """A policy as control will drive it, from where the car is now. Raises ScenarioError."""
         ego = observation.ego
         if isinstance(policy, Parameters):
-            return _Along(self._way_of(policy, observation))
+            return self._way_of(policy, observation)
         if isinstance(policy, Trajectory):
             if len(policy.waypoints_m) > MOST_WAYPOINTS or not LEAST_PERIOD_S <= policy.period_s <= MOST_PERIOD_S:
                 raise ScenarioError(
@@ -313,17 +325,18 @@ class Policy:
         pose = (round(ego.x_m, 3), round(ego.y_m, 3), round(ego.heading_rad, 5), round(max(ego.speed_mps, 0.0), 3))
         return self._along(Steered(policy, ego.lane, pose), observation)
 
-    def _way_of(self, policy: Parameters, observation: Observation) -> Steered:
+    def _way_of(self, policy: Parameters, observation: Observation) -> _Along:
         """Parameters, with the way that goes on where they name none. Raises ScenarioError."""
-        before = None if self._driven is None or self._driven.state != "running" else self._driven.steered
-        was = None if before is None or not isinstance(before.policy, Parameters) else before.policy.route
+        before = None if self._driven is None or self._driven.state != "running" else self._driven.by
+        was = before.route if isinstance(before, _Along) else None
         route = policy.route
         if not route:
             route = self._turn_wished(observation) if was is None else was
-        if route != was:
-            tried = PursuitExecutor(self._mirror.world)
-            tried.start(replace(policy, route=route), observation, self._mirror.limits)
-            route = route if tried.spot is None else tried.spot.name
+        executor = parameters_executor(self._mirror.world)
+        goes_along = isinstance(executor, TownSetPoints)
+        if route != was or goes_along:
+            executor.start(replace(policy, route=route), observation, self._mirror.limits)
+            route = executor.route
         bounded = replace(
             policy,
             target_speed_mps=min(policy.target_speed_mps, MOST_SPEED_MPS),
@@ -331,7 +344,7 @@ class Policy:
             look_ahead_ratio=min(policy.look_ahead_ratio, MOST_LOOK_AHEAD_S),
             route=route,
         )
-        return Steered(bounded, observation.ego.lane)
+        return _Along(Steered(bounded, observation.ego.lane), executor if goes_along else None)
 
     def _along(self, steered: Steered, observation: Observation) -> _Along:
         executor = executor_for(steered.policy, self._mirror.world)
@@ -358,7 +371,7 @@ class Policy:
             # Gains, a speed, and a way by its name rely neither on the lane nor on who is ahead; waypoints are checked
             # again as they are seen now.
             return ""
-        if scene.lane != now.lane:
+        if not _goes_on(self._mirror.world.observe().road, scene.lane, now.lane):
             return "The car is in another lane than the plan was made for."
         if scene.lead != now.lead:
             return "Another car is ahead than the plan was made for."
@@ -389,7 +402,10 @@ class Policy:
         spot and the car is parked in it, others where their executor says so."""
         policy, world = along.steered.policy, self._mirror.world
         ended = ""
-        if isinstance(policy, Parameters):
+        if isinstance(along.executor, TownSetPoints):
+            self._setpoints = along.executor.tick().setpoints
+            ended = "We are there." if along.executor.status == "finished" else ""
+        elif isinstance(policy, Parameters):
             self._setpoints = Setpoints(policy.target_speed_mps, HEADWAY_S, None, _TURNS.get(policy.route))
             spot = world.parked() if isinstance(world, ParkingPlaces) else None
             ended = f"Parked in {spot}." if spot is not None and spot == policy.route else ""
@@ -470,7 +486,9 @@ class Policy:
     def _taken_up(self, steered: Steered | None, state: bytes) -> ProgramExecutor | _Along:
         """What is driven, as it was put down. Raises SandboxError or ScenarioError."""
         if steered is not None and isinstance(steered.policy, Parameters):
-            return _Along(steered)  # not tried again: the way to a spot is none once the car is on it
+            executor = parameters_executor(self._mirror.world)
+            if not isinstance(executor, TownSetPoints):
+                return _Along(steered)  # not tried again: the way to a spot is none once the car is on it
         if steered is not None:
             return self._along(steered, self._mirror.world.observe())
         by = ProgramExecutor(sandbox=self._sandbox)
@@ -496,4 +514,14 @@ class Policy:
         self._rings.events.write(encode(DriveEvent(kind, wish, text[:MOST_SAID], self._trip, self._mirror.tick)))
 
 
+def _goes_on(road: RoadGraph, before: LaneId | None, now: LaneId | None) -> bool:
+    """Whether a lane is the one before, or the one that it leads into short of the next junction."""
+    if before == now:
+        return True
+    onward = islice(road.ahead(before), 1, _SECTIONS + 1) if before is not None and before in road else ()
+    return any(lane.id == now for lane in takewhile(lambda lane: not lane.junction, onward))
+
+
+_SECTIONS: Final = 3
+"""Sections of a lane that a car may have passed while it was planned for."""
 _ENDS: Final[dict[ProgramState, WishEventKind]] = {"finished": "finished", "failed": "failed"}

@@ -11,8 +11,9 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from chauffeur.concept import AgentKind, LaneId, Mark, mark_of
+from chauffeur.concept import AgentKind, LaneId, Mark, SignalState, mark_of
 from chauffeur.drive.live.messages import MessageError
+from chauffeur.geometry.road_graph import LaneKind
 
 MOST_TEXT: Final = 2000
 """Characters of what a person says or types at once."""
@@ -50,7 +51,8 @@ class SessionState:
 
 @dataclass(frozen=True, slots=True)
 class RoadLane:
-    """A lane, m: its place among those of its road (0 leftmost); a `shoulder` is drawn but not driven."""
+    """A lane, m: its place among those of its road (0 leftmost); what is no carriageway is drawn but not driven, as a
+    `shoulder` is. Lanes inside a `junction` name it."""
 
     id: LaneId
     width_m: float
@@ -58,6 +60,8 @@ class RoadLane:
     index: int
     shoulder: bool
     centre_m: tuple[tuple[float, float], ...]
+    what: LaneKind = "driving"
+    junction: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +88,14 @@ class ShownBody:
 
 
 @dataclass(frozen=True, slots=True)
+class ShownLight:
+    """A traffic light: what it shows, and the ends of its stop line, m."""
+
+    state: SignalState
+    stop_line_m: tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True)
 class Scene:
     """An instant of the drive.
 
@@ -100,6 +112,8 @@ class Scene:
         shield: Why the shield changed the command; empty where it did not.
         taken_over: The person drives.
         missed: Control periods never begun, since the start.
+        lights: Traffic lights around.
+        street: Name of the street, where it has one.
     """
 
     time_s: float
@@ -118,6 +132,8 @@ class Scene:
     shield: str
     taken_over: bool
     missed: int
+    lights: tuple[ShownLight, ...] = ()
+    street: str = ""
     kind: Literal["scene"] = "scene"
 
 

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from typing import Final
 
-from chauffeur.concept import DataError, Observation, VehicleState
+from chauffeur.concept import DataError, Observation, Sign, VehicleState
 from chauffeur.drive.live.messages import MessageError, MirroredInstant, Report
-from chauffeur.drive.live.mirror import live_world
+from chauffeur.drive.live.mirror import mirror_of
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import Settings
-from chauffeur.drive.talk.messages import Road, RoadLane, Scene, ShownBody
+from chauffeur.drive.talk.messages import Road, RoadLane, Scene, ShownBody, ShownLight
 from chauffeur.drive.talk.seat_view import SeatWindow
 
 _INSTANTS: Final = 100
-"""Instants that are kept, 10 s of them: plans are judged a moment after they were seen."""
+"""Instants that are kept, 5 to 10 s of them: plans are judged a moment after they were seen."""
+_SIGHT_M: Final = 100.0
 
 
 class View:
@@ -28,7 +30,7 @@ class View:
             observations: What control shows.
         """
         self._starts = settings.starts
-        self._world = live_world(settings.starts[0].scenario)
+        self._world = mirror_of(settings.starts[0].scenario)
         self._world.reset(self._starts[0].scenario, self._starts[0].seed)
         self._world.adopt(self._world.mirrored())  # what is slow the first time is done before anything moves
         self._world.observe()
@@ -88,7 +90,9 @@ class View:
             time_s=round(seen.tick * self._world.dt_s, 3),
             taken_over=seen.handovers % 2 == 1,
             ego=_body(observation.ego),
-            others=tuple(_body(each) for each in (*observation.others, *observation.objects)),
+            others=tuple(
+                _body(each) for each in (*observation.others, *observation.objects, *_stop_signs(observation))
+            ),
             acceleration_mps2=0.0 if told is None else told.applied.acceleration_mps2,
             steering_rad=0.0 if told is None else told.applied.steering_rad,
             limit_mps=limit,
@@ -101,6 +105,8 @@ class View:
             line=None if told is None else told.line,
             shield="" if told is None else " ".join(change.reason for change in told.interventions),
             missed=0 if told is None else told.missed,
+            lights=tuple(ShownLight(light.state, light.stop_line_m) for light in observation.signals),
+            street=_street(observation),
         )
 
 
@@ -117,9 +123,38 @@ def _body(state: VehicleState) -> ShownBody:
     )
 
 
+def _street(observation: Observation) -> str:
+    """The name of the street; in a junction that of the one it leads into."""
+    road, lane = observation.road, observation.road.get(observation.ego.lane)
+    if lane is None or lane.street:
+        return "" if lane is None else lane.street
+    onward = road.onward(lane.id) if lane.junction else None
+    return "" if onward is None else onward.street
+
+
+def _stop_signs(observation: Observation) -> tuple[VehicleState, ...]:
+    """Stop signs near that the road has, and not its instants."""
+    ego = observation.ego
+    return tuple(
+        VehicleState(number, "stop_sign", *_stop_line(sign), 0.0, 0.0, 1.0, 1.0, sign.lanes[0] if sign.lanes else None)
+        for number, sign in enumerate(observation.signs)
+        if sign.kind == "stop" and math.hypot(sign.x_m - ego.x_m, sign.y_m - ego.y_m) < _SIGHT_M
+    )
+
+
+def _stop_line(sign: Sign) -> tuple[float, float]:
+    """Where one stops for it."""
+    if sign.stop_line_m is None:
+        return sign.x_m, sign.y_m
+    (ax, ay), (bx, by) = sign.stop_line_m
+    return (ax + bx) / 2.0, (ay + by) / 2.0
+
+
 def _road(observation: Observation) -> Road:
     lanes = (
-        RoadLane(lane.id, lane.width_m, lane.road, lane.index, lane.emergency, lane.centre.points_m)
+        RoadLane(
+            lane.id, lane.width_m, lane.road, lane.index, lane.emergency, lane.centre.points_m, lane.kind, lane.junction
+        )
         for lane in observation.road.lanes
     )
     return Road(observation.kind, tuple(lanes))

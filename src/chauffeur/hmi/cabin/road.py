@@ -10,6 +10,7 @@ from chauffeur.geometry import Polyline
 from chauffeur.hmi.road import Bounds, draw_road
 
 _MARGIN_M = 20.0
+_ON_FOOT = ("sidewalk", "crossing")
 
 
 def drawn(road: Road) -> dict[str, Any]:
@@ -20,9 +21,10 @@ def drawn(road: Road) -> dict[str, Any]:
             Polyline.of((x, -y) for x, y in lane.centre_m),
             lane.width_m,
             0.0,
-            kind="emergency" if lane.shoulder else "driving",
+            kind="emergency" if lane.shoulder else lane.what,
             road=lane.road,
             index=lane.index,
+            junction=lane.junction,
         )
         for lane in road.lanes
     )
@@ -34,11 +36,20 @@ def drawn(road: Road) -> dict[str, Any]:
         "kind": road.kind,
         "world": road.world,
         "lanes": [
-            {"id": lane.id, "p": _flat(lane.centre.points_m), "w": lane.width_m, "road": lane.road, "i": lane.index}
+            {
+                "id": lane.id,
+                "p": _flat(lane.centre.points_m),
+                "w": lane.width_m,
+                "road": lane.road,
+                "i": lane.index,
+                "e": lane.emergency,
+            }
             for lane in lanes
+            if lane.kind not in _ON_FOOT
         ],
         "surfaces": [{"p": _flat(s.centre_m), "w": s.width_m, "e": s.emergency} for s in painted.surfaces],
         "lines": [{"p": _flat(line.points_m), "s": line.style} for line in painted.lines],
+        "bars": [_flat(bar) for bar in painted.bars_m],
     }
 
 

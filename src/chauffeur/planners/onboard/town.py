@@ -46,7 +46,11 @@ _SIGN: Final = re.compile(
 """Where to turn, not what to do about the sign."""
 _TIME: Final = re.compile(r"\b(?:quarter|half|past|o'clock|noon|midnight|minutes?|hours?|time|least|once|all)\b")
 """What stands behind "at" or "for" and is no place."""
-_CORRECTS: Final = re.compile(r"\b(?:sorry|no,|actually|hang on|scrap|rather|wrong|instead|i mean)\b", re.IGNORECASE)
+_CORRECTS: Final = re.compile(
+    r"\b(?:sorry|no,|actually|hang on|scrap|rather|wrong|instead|forget|i mean)\b", re.IGNORECASE
+)
+_TO: Final = re.compile(r"\s{0,3}(?:(?:no|rather|please|now|then|better)[\s,]{1,3}){0,2}to\b", re.IGNORECASE)
+"""Whoever begins so and names a place wants to go there."""
 _MOST_WORDS: Final = 3
 """A longer name of a place has words of the sentence in it."""
 _HOME: Final = re.compile(r"\b(?:home|my (?:place|house|flat))\b", re.IGNORECASE)
@@ -198,7 +202,7 @@ def _to_a_place(planner: Planner, said: str, meant: TownIntent, request: PlanReq
     if there := town_destination(said, meant):
         later = next((one for one in landmarks_in(said) if one not in there), "") if meant.likely else ""
         later = "" if _CORRECTS.search(said) else later
-        question = "" if meant.likely else f"Shall I take you to {_called(there)}?"
+        question = "" if meant.likely or _TO.match(said) else f"Shall I take you to {_called(there)}?"
         plan = driven_to(planner, there, request, begun, later)
         return _first_asked(planner, plan, question, f"Take me to {_called(there)}.", request)
     if meant.likely and _HOME.search(said) and meant.kind in ("goto", "go", "hurry", "uturn"):

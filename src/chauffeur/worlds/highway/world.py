@@ -123,6 +123,10 @@ class HighwayWorld:
             twin._driver = self._driver.copy(core, twin._perception)
         return twin
 
+    def mirror(self) -> HighwayWorld:
+        """A copy for another process."""
+        return HighwayWorld()
+
     def mirrored(self) -> bytes:
         """The present instant, for a copy of this world in another process."""
         return _INSTANT.pack(self._tick, self._clock_s) + self._road().state()

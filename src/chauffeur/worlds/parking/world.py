@@ -207,6 +207,10 @@ class ParkingWorld:
         twin._driver = ParkingDriver(CHASSIS, DT_S, twin.observe, twin._way_to_lane)
         return twin
 
+    def mirror(self) -> ParkingWorld:
+        """A copy for another process."""
+        return ParkingWorld()
+
     def mirrored(self) -> bytes:
         """The present instant, for a copy of this world in another process."""
         self._started()

@@ -40,6 +40,7 @@ from chauffeur.geometry import (
     joined,
     wrap_to_pi,
 )
+from chauffeur.worlds.town.course import Course
 from chauffeur.worlds.town.foresight import Foresight, Meeting
 from chauffeur.worlds.town.way import RouteCorridor, Stretch, astride_m, blended, free_route
 
@@ -171,6 +172,46 @@ class TownDriver:
         self._goal, self._turn = True, None
         self._take(route, ego.lane if ego.lane in route.lanes else route.lanes[0], ego)
 
+    def roam(self) -> None:
+        """Go on along the road from here on: there is no goal any more."""
+        self._goal = False
+
+    @property
+    def course(self) -> Course:
+        """What another process has to know of it."""
+        stretch, led = self._stretch, self._stretch.led
+        return Course(
+            route=self._corridor.route,
+            goal=self._goal,
+            turn=self._turn,
+            turning_at=self._turning_at,
+            layer=stretch.layer,
+            lanes=tuple(lane.id for lane in stretch.lanes),
+            led_m=() if led is None else led.points_m,
+            ends=stretch.goal,
+            station_m=self._station,
+            changing_to_m=self._changing_to,
+            ahead=self._ahead,
+            sign=self._sign,
+        )
+
+    def adopt(self, course: Course) -> None:
+        """Be a copy of a driver elsewhere, to answer as it does. Raises KeyError for lanes that the road has not."""
+        was = self._stretch, self._stretch.led
+        led = () if was[1] is None else was[1].points_m
+        corridor = self._corridor
+        if course.route != corridor.route:
+            corridor = RouteCorridor(self._road, course.route)
+        same = (course.layer, course.lanes, course.led_m) == (was[0].layer, tuple(one.id for one in was[0].lanes), led)
+        if corridor is not self._corridor or not same or course.ends != was[0].goal:
+            lanes = [self._road[lane] for lane in course.lanes]
+            first = Polyline.of(course.led_m) if course.led_m else None
+            self._stretch = Stretch.of(lanes, course.layer, course.route.goal_m if course.ends else None, first)
+        self._corridor, self._goal, self._turn = corridor, course.goal, course.turn
+        self._turning_at, self._station, self._changing_to = course.turning_at, course.station_m, course.changing_to_m
+        self._meetings = [] if course.ahead is None else [course.ahead]
+        self._sign = course.sign
+
     # What a world asks ------------------------------------------------------------------------------------------------
 
     @property
@@ -206,10 +247,20 @@ class TownDriver:
         return (*own, *(lane for lane in rest if lane))
 
     @property
+    def has_goal(self) -> bool:
+        """Whether its route leads somewhere, and is not just the way on."""
+        return self._goal
+
+    @property
+    def _ahead(self) -> Meeting | None:
+        """Who is ahead on the line, people left out."""
+        now = [one for one in self._meetings if one.now and one.other.kind != "pedestrian"]
+        return min(now, key=lambda one: one.first_m, default=None)
+
+    @property
     def lead(self) -> Lead | None:
         """Who is ahead on the line, from centre to centre."""
-        now = [one for one in self._meetings if one.now and one.other.kind != "pedestrian"]
-        nearest = min(now, key=lambda one: one.first_m, default=None)
+        nearest = self._ahead
         if nearest is None:
             return None
         gap = nearest.first_m - self._station - self._nose_m
@@ -219,8 +270,7 @@ class TownDriver:
     @property
     def gap_ahead(self) -> tuple[float, float] | None:
         """(m between the bumpers, its speed) of who or what is ahead on the line, people left out; None without."""
-        now = [one for one in self._meetings if one.now and one.other.kind != "pedestrian"]
-        nearest = min(now, key=lambda one: one.first_m, default=None)
+        nearest = self._ahead
         if nearest is None:
             return None
         return max(0.0, nearest.first_m - self._station - self._nose_m), max(0.0, nearest.along_mps)

@@ -142,6 +142,7 @@ class Stretch:
         x, y, heading: Every metre.
         most_mps: Speed there for the bends and limits ahead.
         limit_mps: What the sign says there.
+        led: What is driven in place of the start of its first lanes; None where nothing is.
         sweeps: What `swept` has found already.
     """
 
@@ -156,6 +157,7 @@ class Stretch:
     heading: Array
     most_mps: Array
     limit_mps: Array
+    led: Polyline | None = None
     sweeps: dict[float, tuple[Array, Array, Array]] = field(default_factory=dict[float, "tuple[Array, Array, Array]"])
 
     @classmethod
@@ -187,6 +189,7 @@ class Stretch:
             heading,
             most_mps(heading, limits),
             limits,
+            first,
         )
 
     def swept(self, overhang_m: float) -> tuple[Array, Array, Array]:

@@ -10,39 +10,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-
-from chauffeur.concept import (
-    AgentKind,
-    Command,
-    DataError,
-    Lead,
-    Observation,
-    Scenario,
-    ScenarioError,
-    Signal,
-    SignalState,
-    VehicleState,
-)
+from chauffeur.concept import AgentKind, Command, Observation, Scenario, ScenarioError, SignalState, VehicleState
 from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, BicycleState, advanced
-from chauffeur.geometry import LaneId, LanePlace, Pose, Route, overlap, plan_route
+from chauffeur.geometry import LaneId, Pose, overlap
 from chauffeur.worlds.base import EGO
-from chauffeur.worlds.parking.path_follower import Chassis
-from chauffeur.worlds.town import pack as packs
 from chauffeur.worlds.town.brakes import TrafficBrakes
-from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
-from chauffeur.worlds.town.pack import MapPack, SignalGroup, places_called
+from chauffeur.worlds.town.mirror import TownMirror
+from chauffeur.worlds.town.pack import MapPack
 from chauffeur.worlds.town.people import People
-from chauffeur.worlds.town.perception import TownPerception
-from chauffeur.worlds.town.sumo import EGO_NAME, MAKES, Link, Mover, Sumo, engine_name
+from chauffeur.worlds.town.scene import DT_S, SEES_M, TownScene
+from chauffeur.worlds.town.sumo import EGO_NAME, MAKES, Link, Mover, Sumo
 from chauffeur.worlds.town.traffic import Traffic
 
-DT_S: Final = 0.05
-SEES_M: Final = 100.0
-"""Who is farther away is not shown."""
 TOUCHES_M: Final = 60.0
 FIRST_WALKER: Final = 10_001
 FIRST_ACTOR: Final = 20_001
@@ -62,37 +43,6 @@ _NEAR_LANE_M: Final = 3.0
 _AMID_M: Final = 0.5
 
 
-class TownConfig(BaseModel):
-    """A trip in a town.
-
-    Attributes:
-        town: Name of a map pack, or the folder of one.
-        start: Where the ego begins: lane and station, or (x, y, heading); by default somewhere, as the seed says.
-        goal: Name of a place, or (x, y); by default there is none.
-        lanes: The route itself, lane by lane; `start` and `goal_m` are then stations on its first and last lane.
-        start_m, goal_m: Of `lanes`.
-        vehicles: In the traffic; fewer where the town is full.
-        people: On foot.
-        ego_speed: At the start, m/s.
-        duration_s: Time limit.
-        contact_ends: Whether a collision ends the trip; a benchmark may count it and go on.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    town: str
-    start: tuple[str, float] | tuple[float, float, float] | None = None
-    goal: str | tuple[float, float] | None = None
-    lanes: tuple[str, ...] = ()
-    start_m: float = 0.0
-    goal_m: float | None = None
-    vehicles: int = Field(default=60, ge=0, le=400)
-    people: int = Field(default=20, ge=0, le=200)
-    ego_speed: float = Field(default=0.0, ge=0.0, le=30.0)
-    duration_s: float = Field(default=600.0, gt=0.0, le=36_000.0)
-    contact_ends: bool = True
-
-
 @dataclass(slots=True)
 class _Actor:
     """What a scenario put on the road."""
@@ -105,40 +55,14 @@ class _Actor:
     width_m: float
 
 
-class TownWorld:
+class TownWorld(TownScene):
     """A town, stepped at 20 Hz. One a process at a time: the one reset last drives, and the others say so."""
-
-    capabilities = TOWN_CAPABILITIES
 
     def __init__(self, town: MapPack | None = None) -> None:
         """Args: the town to drive in, whatever scenarios say; by default they do."""
-        self._given = town
-        self._town: MapPack | None = None
-        self._config: TownConfig | None = None
+        super().__init__(town)
         self._sumo: Sumo | None = None
         self._state = BicycleState(Pose(0.0, 0.0, 0.0), 0.0)
-
-    @property
-    def engine(self) -> str:
-        """SUMO and its version. Its figures are no CARLA driving scores."""
-        return engine_name()
-
-    @property
-    def dt_s(self) -> float:
-        """Control period, s."""
-        return DT_S
-
-    @property
-    def chassis(self) -> Chassis:
-        """The ego's size, axles and bounds."""
-        return Chassis.of(LINCOLN_MKZ)
-
-    @property
-    def town(self) -> MapPack:
-        """Where it is driven. Raises ScenarioError before the first reset."""
-        if self._town is None:
-            raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
-        return self._town
 
     def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
         """Set up a town, its traffic and the ego.
@@ -147,51 +71,38 @@ class TownWorld:
             ScenarioError: The configuration is malformed, a place or way does not exist, or SUMO cannot run.
             MissingExtraError: SUMO is not installed.
         """
-        config = _parse(scenario)
-        town = self._given or self._load(config.town)
+        trip = self._begin(scenario, seed)
+        town, config, start, rng = trip.town, trip.config, trip.start, trip.rng
         if town.sumo is None:
             raise ScenarioError(
                 f"The map pack {town.name!r} has no SUMO network.", hint="Build it again: chauffeur maps build."
             )
-        drawn = np.random.SeedSequence(scenario.seed if seed is None else seed)
-        rng = np.random.Generator(np.random.PCG64(drawn))
-        self._town, self._config = town, config
         self._net = town.sumo
         self.close()
-        self._sumo = Sumo(town.sumo.path, DT_S, int(drawn.generate_state(1)[0]))
+        self._sumo = Sumo(town.sumo.path, DT_S, trip.simulator_seed)
         self._brakes = TrafficBrakes(self._sumo, DT_S)
-        start, route = self._start(config, rng)
         pose = town.road[start.lane].centre.at(start.station_m)
         rear = pose.ahead(-LINCOLN_MKZ.rear_to_middle_m)
         self._state = BicycleState(rear, config.ego_speed)
-        self._lane: LaneId | None = start.lane
         self._offset_m = 0.0
-        self._tick, self._touched = 0, frozenset[int]()
+        self._touched = frozenset[int]()
         self._crashed = False
         self._ids: dict[str, int] = {}
         self._lane_places: dict[str, tuple[tuple[str, float, float], LaneId | None]] = {}
         self._actors: dict[int, _Actor] = {}
         self._next_actor = FIRST_ACTOR
-        self._forced: dict[str, SignalState] = {}
         self._links = self._sumo.links()
         self._link_lanes = _ruled(town, self._links)
         self._phases: list[int] = []
         self._lights_until_s = 0.0
         self._states: dict[str, SignalState] = {}
         self._lane_lights: dict[LaneId, SignalState] = {}
-        self._places = [_middle(group) for group in town.signals]
-        self._shown: Observation | None = None
         self._in_traffic: dict[int, str] = {}
         self._puppets = 0
         self._told: tuple[str, ...] = ()
-        self._others: tuple[VehicleState, ...] = ()
-        self._lead: Lead | None = None
         self._people = People(town.road, town.crossings, config.people, FIRST_WALKER, rng)
-        self._route = route
         self._mind_lights()
-        self._driver: TownDriver | None = None
-        self._driver = TownDriver(town.road, LINCOLN_MKZ, DT_S, self.observe, route)
-        self._perception = TownPerception(town.road, self.observe, self._driver, town.places)
+        self._take_seat()
         way = self._edges_ahead() or [self._edge_of(start.lane)]
         self._sumo.place(EGO_NAME, LINCOLN_MKZ.length_m, LINCOLN_MKZ.width_m, way, SEES_M)
         self._mind_lights()
@@ -228,36 +139,12 @@ class TownWorld:
         self._sumo.step()
         self._traffic.mind()
         self._look_round()
+        self._mind_the_place(self._ego())
         return Command(self._state.acceleration_mps2, self._state.steering_rad)
 
-    def observe(self) -> Observation:
-        """The present instant as frozen values."""
-        if self._shown is None:
-            self._shown = self._look()
-        return self._shown
-
-    @property
-    def ended(self) -> bool:
-        """Crash, off the road, at the goal, or out of time."""
-        return self.observe().ended
-
-    def perception(self) -> TownPerception:
-        """Questions about the present instant."""
-        assert self.town is not None
-        return self._perception
-
-    def driver(self) -> TownDriver:
-        """The low-level driver of the present trip; the same until the next reset."""
-        assert self.town is not None
-        assert self._driver is not None
-        return self._driver
-
-    def head_for(self, place: str) -> None:
-        """Set out for a place of the town from where the ego is. Raises ScenarioError: no such place, no way there."""
-        assert self._driver is not None
-        self._route = self._way_to(place)
-        self._driver.head_for(self._route)
-        self._shown = None
+    def mirror(self) -> TownMirror:
+        """A copy for another process, which needs no simulator."""
+        return TownMirror(self._given)
 
     @property
     def mean_traffic_mps(self) -> float:
@@ -269,14 +156,6 @@ class TownWorld:
     def vehicles(self) -> int:
         """How many vehicles the traffic has."""
         return self._traffic.count
-
-    @property
-    def arrived(self) -> bool:
-        """Whether the ego is at its goal."""
-        driver = self._driver
-        if driver is None or self._route is None or not driver.stretch.goal:
-            return False
-        return driver.station_m + LINCOLN_MKZ.rear_to_middle_m > driver.stretch.end_m - 3.0
 
     # The stage of a scenario ------------------------------------------------------------------------------------------
 
@@ -311,72 +190,6 @@ class TownWorld:
         self._phases = []
         self._mind_lights()
         self._shown = None
-
-    # Setting up -------------------------------------------------------------------------------------------------------
-
-    def _load(self, name: str) -> MapPack:
-        try:
-            return packs.load(name)
-        except DataError as error:
-            raise ScenarioError(str(error), hint=error.hint) from error
-
-    def _start(self, config: TownConfig, rng: np.random.Generator) -> tuple[LanePlace, Route | None]:
-        road = self.town.road
-        if config.lanes:
-            unknown = [lane for lane in config.lanes if lane not in road]
-            if unknown:
-                raise ScenarioError(f"{self.town.name} has no lane {unknown[0]!r}, which the route names.")
-            end = road[config.lanes[-1]].length_m
-            goal = end if config.goal_m is None else min(config.goal_m, end)
-            return LanePlace(config.lanes[0], config.start_m, 0.0), Route(config.lanes, config.start_m, goal)
-        start = self._somewhere(rng) if config.start is None else self._place(config.start)
-        if config.goal is None:
-            return start, None
-        goal = self._goal(config.goal)
-        route = plan_route(road, start, goal)
-        if route is None:
-            raise ScenarioError(f"No way leads to {config.goal!r} from here.", hint="Choose another goal.")
-        return start, route
-
-    def _way_to(self, place: str) -> Route:
-        assert self._lane is not None
-        start = LanePlace(self._lane, self._ego_station, 0.0)
-        route = plan_route(self.town.road, start, self._goal(place))
-        if route is None:
-            raise ScenarioError(f"No way leads to {place!r} from here.", hint="Choose another place.")
-        return route
-
-    def _place(self, start: tuple[Any, ...]) -> LanePlace:
-        road = self.town.road
-        if isinstance(start[0], str):
-            if start[0] not in road:
-                raise ScenarioError(f"{self.town.name} has no lane {start[0]!r}.")
-            return LanePlace(start[0], float(start[1]), 0.0)
-        x, y, heading = (float(value) for value in start)
-        place = road.locate(x, y, heading, ("driving",))
-        if place is None:
-            raise ScenarioError(f"{self.town.name} has no lane at ({x}, {y}).")
-        return place
-
-    def _goal(self, goal: str | tuple[float, float]) -> LanePlace:
-        if isinstance(goal, str):
-            found = place_named(self.town, goal)
-            return LanePlace(found.lane, found.station_m, 0.0)
-        place = self.town.road.locate(*goal, None, ("driving",))
-        if place is None:
-            raise ScenarioError(f"{self.town.name} has no lane at {goal}.")
-        return place
-
-    def _somewhere(self, rng: np.random.Generator) -> LanePlace:
-        lanes = [
-            one
-            for one in self.town.road.lanes
-            if one.kind == "driving" and not one.junction and one.length_m > 20.0 and one.successors
-        ]
-        if not lanes:
-            raise ScenarioError(f"{self.town.name} has no lane to start on.")
-        lane = lanes[int(rng.integers(len(lanes)))]
-        return LanePlace(lane.id, lane.length_m / 2.0, 0.0)
 
     # Telling SUMO -----------------------------------------------------------------------------------------------------
 
@@ -468,21 +281,25 @@ class TownWorld:
                 self._lane_lights.update(dict.fromkeys(head.lanes, shown))
         self._sumo.show(self._links, {lane: self._states[head] for lane, head in self._link_lanes.items()})
 
-    def _signals_near(self, ego: VehicleState) -> tuple[Signal, ...]:
-        found: list[Signal] = []
-        for group, (x, y) in zip(self.town.signals, self._places, strict=True):
-            if abs(x - ego.x_m) < SEES_M and abs(y - ego.y_m) < SEES_M:
-                for one in group.signals(self._tick * DT_S):
-                    forced = self._forced.get(one.id)
-                    found.append(one if forced is None else replace(one, state=forced, remaining_s=None))
-        return tuple(found)
-
     # Looking ----------------------------------------------------------------------------------------------------------
 
     @property
     def _stopped(self) -> bool:
         assert self._config is not None
         return self._crashed and self._config.contact_ends
+
+    @property
+    def _off_road(self) -> bool:
+        lane = self.town.road.get(self._lane)
+        return lane is None or abs(self._offset_m) > lane.width_m / 2.0 + _OFF_ROAD_M
+
+    @property
+    def _over(self) -> bool:
+        config = self._config
+        assert config is not None
+        late = self._tick * DT_S >= config.duration_s
+        at_goal = (config.goal is not None or bool(config.lanes)) and not self._heads_elsewhere and self.arrived
+        return self._stopped or self._off_road or late or at_goal
 
     def _locate(self) -> None:
         """The ego's lane: one of its line's that it is in, the one it was in, or whichever is closest.
@@ -501,8 +318,6 @@ class TownWorld:
         place = road.locate(middle.x_m, middle.y_m, middle.heading_rad, ("driving",))
         if place is not None:
             self._lane, self._offset_m, self._ego_station = place.lane, place.offset_m, place.station_m
-
-    _ego_station = 0.0
 
     def _road_users(self) -> tuple[VehicleState, ...]:
         return (self._ego(), *(one for one in self._others if one.kind != "pedestrian"))
@@ -626,60 +441,9 @@ class TownWorld:
             state.steering_rad,
         )
 
-    def _look(self) -> Observation:
-        assert self._config is not None
-        ego, town = self._ego(), self.town
-        lane = town.road.get(self._lane)
-        off_road = lane is None or abs(self._offset_m) > lane.width_m / 2.0 + _OFF_ROAD_M
-        late = self._tick * DT_S >= self._config.duration_s
-        return Observation(
-            time_s=round(self._tick * DT_S, 6),
-            tick=self._tick,
-            kind="town",
-            ego=ego,
-            others=self._others,
-            objects=(),
-            road=town.road,
-            front=None if self._driver is None else self._driver.lead,
-            stop_sign_m=None if self._driver is None or self._driver.stop_sign is None else self._driver.stop_sign[1],
-            off_road=off_road,
-            ended=self._stopped or off_road or late or self.arrived,
-            signals=self._signals_near(ego),
-            signs=town.signs,
-            route=self._route if self._driver is None else self._driver.route,
-        )
-
-
-def place_named(town: MapPack, name: str) -> Any:
-    """The place of a town that a name means. Raises ScenarioError, saying what places there are."""
-    found = places_called(town.places, name)
-    if found:
-        return found[0]
-    raise ScenarioError(
-        f"{town.name} has no place {name!r}.",
-        hint="It has " + (", ".join(place.name for place in town.places) or "no places with names") + ".",
-    )
-
-
-def _middle(group: SignalGroup) -> tuple[float, float]:
-    """Amid the stop lines of a junction's lights."""
-    points = [point for head in group.heads for point in head.stop_line_m]
-    return sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
-
 
 def _ruled(town: MapPack, links: tuple[Link, ...]) -> dict[str, str]:
     """Which head rules each SUMO lane before a light."""
     assert town.sumo is not None
     of_link = {(light, index): head for head, (light, indices) in town.sumo.links.items() for index in indices}
     return {link.lane: of_link[link.light, link.index] for link in links if (link.light, link.index) in of_link}
-
-
-def _parse(scenario: Scenario) -> TownConfig:
-    try:
-        return TownConfig.model_validate(scenario.config)
-    except ValidationError as error:
-        faults = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'config'}: {e['msg']}" for e in error.errors())
-        raise ScenarioError(
-            f"Scenario {scenario.id!r} has a bad town configuration: {faults}.",
-            hint="Compare it with a built-in one: chauffeur show scenarios.",
-        ) from error

@@ -6,6 +6,8 @@ const LONGEST_GLIDE_MS = 300;
 const JUMP_M = 30;
 const SIGHT_M = 100;
 const STRAIGHT_RAD = 0.05;
+const LAMPS = { red: '#e5322b', yellow: '#f2b200', green: '#27a04a', off: '#8a8a8a' };
+const NAMES = { car: 'A car', truck: 'A truck', bus: 'A bus', bicycle: 'A bicycle', motorcycle: 'A motorcycle', obstacle: 'An obstacle', static: 'An obstacle' };
 const COLOURS = ['ground', 'tuft', 'verge', 'asphalt', 'asphalt-edge', 'mark', 'centre', 'hatch', 'car', 'car-edge', 'ego-fill', 'ego-edge',
   'ring', 'label-back', 'label-ink', 'brake', 'thing', 'thing-edge', 'sign', 'sign-ink', 'sans'];
 
@@ -15,6 +17,18 @@ function pathOf(points) {
   const path = new Path2D();
   for (let i = 0; i < points.length; i += 2) path.lineTo(points[i], points[i + 1]);
   return path;
+}
+
+/* The box that a line of points is in: what is out of sight is not drawn. */
+function boxOf(points) {
+  const box = { x0: Infinity, y0: Infinity, x1: -Infinity, y1: -Infinity };
+  for (let i = 0; i < points.length; i += 2) {
+    box.x0 = Math.min(box.x0, points[i]);
+    box.x1 = Math.max(box.x1, points[i]);
+    box.y0 = Math.min(box.y0, points[i + 1]);
+    box.y1 = Math.max(box.y1, points[i + 1]);
+  }
+  return box;
 }
 
 function directions(lane) {
@@ -63,9 +77,10 @@ export function makeScene(canvas) {
   function setRoad(told) {
     const headings = told.lanes.flatMap(directions);
     road = {
-      lanes: told.lanes.map((lane) => ({ ...lane, path: pathOf(lane.p) })),
-      surfaces: told.surfaces.map((surface) => ({ ...surface, path: pathOf(surface.p) })),
-      lines: told.lines.map((line) => ({ ...line, path: pathOf(line.p) })),
+      lanes: told.lanes.map((lane) => ({ ...lane, path: pathOf(lane.p), box: boxOf(lane.p) })),
+      surfaces: told.surfaces.map((surface) => ({ ...surface, path: pathOf(surface.p), box: boxOf(surface.p) })),
+      lines: told.lines.map((line) => ({ ...line, path: pathOf(line.p), box: boxOf(line.p) })),
+      bars: (told.bars || []).map((p) => ({ path: pathOf(p), box: boxOf(p) })),
       straight: headings.every((heading) => Math.abs(turned(headings[0], heading)) < STRAIGHT_RAD),
       tight: told.world === 'parking',
     };
@@ -155,11 +170,14 @@ export function makeScene(canvas) {
   }
 
   function drawRoad(at) {
+    const reach = Math.hypot(size.width, size.height) / at.scale;
+    const inSight = ({ box }) => box.x0 < at.x + reach && box.x1 > at.x - reach && box.y0 < at.y + reach && box.y1 > at.y - reach;
+    const surfaces = road.surfaces.filter(inSight);
     ctx.lineCap = road.straight ? 'butt' : 'round'; // no gaps where lanes meet at an angle
     ctx.lineJoin = 'round';
     for (const [extra, name] of [[3, 'verge'], [0.8, 'asphalt-edge'], [0.06, 'asphalt']]) {
       ctx.strokeStyle = colour[name];
-      for (const surface of road.surfaces) {
+      for (const surface of surfaces) {
         ctx.lineWidth = surface.w + (road.tight ? Math.min(extra, 1) : extra);
         ctx.stroke(surface.path);
       }
@@ -167,9 +185,12 @@ export function makeScene(canvas) {
     ctx.lineCap = 'butt';
     ctx.strokeStyle = colour.hatch;
     ctx.lineWidth = 0.16;
-    for (const surface of road.surfaces) if (surface.e) hatch(surface, at);
+    for (const surface of surfaces) if (surface.e) hatch(surface, at);
     ctx.lineWidth = Math.max(0.16, 1.3 / at.scale);
-    for (const line of road.lines) {
+    ctx.strokeStyle = colour.mark;
+    ctx.lineWidth = 0.5;
+    for (const bar of road.bars) if (inSight(bar)) ctx.stroke(bar.path);
+    for (const line of road.lines.filter(inSight)) {
       ctx.strokeStyle = line.s === 'centre' ? colour.centre : colour.mark;
       ctx.setLineDash(line.s === 'dashed' ? [3, 6] : []);
       ctx.stroke(line.path);
@@ -195,8 +216,9 @@ export function makeScene(canvas) {
     ctx.stroke();
   }
 
+  const near = (x, y) => road.lanes.filter(({ box }) => box.x0 < x + 30 && box.x1 > x - 30 && box.y0 < y + 30 && box.y1 > y - 30);
   const laneOf = (x, y, h) => {
-    const found = road.lanes.map((lane) => ({ lane, ...beside(lane, x, y) })).filter((one) => Math.cos(one.heading - h) > 0.5);
+    const found = near(x, y).map((lane) => ({ lane, ...beside(lane, x, y) })).filter((one) => Math.cos(one.heading - h) > 0.5);
     found.sort((a, b) => a.off - b.off);
     return found.length && found[0].off < found[0].lane.w ? found[0].lane : null;
   };
@@ -228,7 +250,35 @@ export function makeScene(canvas) {
     ctx.restore();
   }
 
+  /* Stop lines in the colour that their light shows. */
+  function drawLights(at) {
+    ctx.lineWidth = Math.max(0.6, 3 / at.scale);
+    for (const light of scene.lights || []) {
+      const [[ax, ay], [bx, by]] = light.stop_line_m;
+      ctx.beginPath();
+      ctx.moveTo(ax, -ay);
+      ctx.lineTo(bx, -by);
+      ctx.strokeStyle = LAMPS[light.state];
+      ctx.stroke();
+    }
+  }
+
+  function drawPerson(body) {
+    const at = placeOf(body);
+    ctx.beginPath();
+    ctx.arc(at.x, at.y, 0.55, 0, 7);
+    ctx.fillStyle = colour.thing;
+    ctx.fill();
+    ctx.lineWidth = 0.2;
+    ctx.strokeStyle = colour['thing-edge'];
+    ctx.stroke();
+  }
+
   function drawBody(body, mine) {
+    if (body.what === 'pedestrian') {
+      drawPerson(body);
+      return;
+    }
     const at = placeOf(body);
     const [l, w] = [body.length_m, body.width_m];
     const thing = body.what === 'obstacle';
@@ -272,7 +322,7 @@ export function makeScene(canvas) {
   }
 
   function drawSign(sign, at) {
-    const lanes = road.lanes.map((lane) => beside(lane, sign.x_m, sign.y_m)).sort((a, b) => a.off - b.off);
+    const lanes = near(sign.x_m, sign.y_m).map((lane) => beside(lane, sign.x_m, sign.y_m)).sort((a, b) => a.off - b.off);
     const heading = lanes.length ? lanes[0].heading : sign.heading_rad;
     const [rx, ry] = [-Math.sin(heading), Math.cos(heading)];
     enterWorld(at);
@@ -324,10 +374,21 @@ export function makeScene(canvas) {
   }
 
   function lead() {
-    const near = scene.others.filter((body) => body.what !== 'stop_sign').map(seen)
+    const found = scene.others.filter((body) => body.what !== 'stop_sign' && body.what !== 'pedestrian').map(seen)
       .filter((one) => one.ahead > 0 && one.ahead < 120 && Math.abs(one.right) < 2.2);
-    near.sort((a, b) => a.ahead - b.ahead);
-    return near[0] || null;
+    found.sort((a, b) => a.ahead - b.ahead);
+    return found[0] || null;
+  }
+
+  /* The nearest stop line with a light that the car drives towards. */
+  function lightAhead() {
+    const found = (scene.lights || []).map((light) => {
+      const [[ax, ay], [bx, by]] = light.stop_line_m;
+      const { ahead, right } = seen({ x_m: (ax + bx) / 2, y_m: -(ay + by) / 2 });
+      return { state: light.state, ahead: ahead - scene.ego.length_m / 2, right };
+    }).filter((one) => one.ahead > -1 && one.ahead < 80 && Math.abs(one.right) < 2.2);
+    found.sort((a, b) => a.ahead - b.ahead);
+    return found[0] || null;
   }
 
   const gapTo = (one) => Math.max(0, one.ahead - (scene.ego.length_m + one.body.length_m) / 2);
@@ -345,7 +406,7 @@ export function makeScene(canvas) {
     ctx.stroke();
     ctx.setLineDash([]);
     // Beside the road on its left, where it covers nobody.
-    const lefts = road.lanes.map((lane) => beside(lane, there.x, there.y)).filter((lane) => lane.off < 25 && Math.cos(lane.heading - there.h) > 0.7);
+    const lefts = near(there.x, there.y).map((lane) => beside(lane, there.x, there.y)).filter((lane) => lane.off < 25 && Math.cos(lane.heading - there.h) > 0.7);
     const left = Math.min(-2, ...lefts.map((lane) => lane.right - 2)) - 1.2;
     const [x, y] = toScreen(at, there.x - Math.sin(there.h) * left, there.y + Math.cos(there.h) * left);
     const metres = gapTo(one).toFixed(0);
@@ -359,6 +420,7 @@ export function makeScene(canvas) {
     const at = camera();
     drawGround(at);
     drawRoad(at);
+    drawLights(at);
     drawGoal();
     const nameLead = drawLead(at);
     for (const body of scene.others) if (body.what === 'stop_sign') drawSign(body, at);
@@ -372,20 +434,24 @@ export function makeScene(canvas) {
   /* What is to be seen, in words. */
   function words() {
     if (!scene || !road) return '';
-    const parts = [`At ${kmh(scene.ego.speed_mps)} km/h.`];
+    const parts = [`At ${kmh(scene.ego.speed_mps)} km/h${scene.street ? ` on ${scene.street}` : ''}.`];
     const lane = laneOf(scene.ego.x_m, scene.ego.y_m, scene.ego.heading_rad);
-    const abreast = lane && lane.road ? road.lanes.filter((other) => other.road === lane.road) : [];
+    const abreast = lane && lane.road ? road.lanes.filter((other) => other.road === lane.road && (!other.e || lane.e)) : [];
     if (abreast.length > 1) {
       parts.push(`Lane ${lane.i + 1} of ${abreast.length} from the left.`);
     }
     const one = lead();
     if (!one) parts.push('Nobody close ahead.');
-    else parts.push(`${one.body.what === 'obstacle' ? 'An obstacle' : `A car doing ${kmh(one.body.speed_mps)} km/h`} ${gapTo(one).toFixed(0)} m ahead.`);
+    else parts.push(`${NAMES[one.body.what] || 'Something'}${one.body.what === 'obstacle' || one.body.what === 'static' ? '' : ` doing ${kmh(one.body.speed_mps)} km/h`} ${gapTo(one).toFixed(0)} m ahead.`);
+    const light = lightAhead();
+    if (light) parts.push(`The light ${light.ahead.toFixed(0)} m ahead is ${light.state}.`);
+    const person = scene.others.filter((body) => body.what === 'pedestrian').map(seen).filter((other) => other.ahead > 0 && other.ahead < 30 && Math.abs(other.right) < 5);
+    if (person.length) parts.push('Somebody on foot ahead.');
     for (const [side, sign] of [['left', -1], ['right', 1]]) {
-      const near = scene.others.filter((body) => body.what === 'car').map(seen)
+      const close = scene.others.filter((body) => body.what === 'car').map(seen)
         .filter((other) => other.right * sign > 2.2 && other.right * sign < 6 && Math.abs(other.ahead) < 40);
-      near.sort((a, b) => Math.abs(a.ahead) - Math.abs(b.ahead));
-      if (near.length) parts.push(`A car on the ${side}, ${where(near[0].ahead)}.`);
+      close.sort((a, b) => Math.abs(a.ahead) - Math.abs(b.ahead));
+      if (close.length) parts.push(`A car on the ${side}, ${where(close[0].ahead)}.`);
     }
     if (scene.others.some((body) => body.what === 'stop_sign' && seen(body).ahead > 0 && seen(body).ahead < 80 && Math.abs(seen(body).right) < 4)) parts.push('A stop sign ahead.');
     if (scene.shield) parts.push(`The shield acts: ${scene.shield}.`);

@@ -1,0 +1,247 @@
+"""A town as it is seen and asked at an instant, whoever moves it: what its simulation and its copies share."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from chauffeur.concept import Observation, Scenario, ScenarioError, Signal, SignalState, VehicleState
+from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ
+from chauffeur.geometry import LaneId, LanePlace, Route, plan_route
+from chauffeur.worlds.parking.path_follower import Chassis
+from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
+from chauffeur.worlds.town.instant import TownInstant
+from chauffeur.worlds.town.pack import MapPack, SignalGroup
+from chauffeur.worlds.town.perception import TownPerception
+from chauffeur.worlds.town.sumo import engine_name
+from chauffeur.worlds.town.trip import TownConfig, TownTrip, goal_in
+
+DT_S: Final = 0.05
+SEES_M: Final = 100.0
+"""Who is farther away is not shown."""
+_SLOWING_MPS2: Final = 1.5
+"""Another way begins where the car could stop by then: a turn nearer than that could not be taken."""
+_ROOM_M: Final = 4.0
+_AT_GOAL_M: Final = 3.0
+_STANDS_MPS: Final = 0.1
+_LEFT_M: Final = 8.0
+"""A place has been left when the car is so far from where it stood."""
+
+
+class TownScene:
+    """Road, lights, driver and perception of a trip. Who and what is where, its heirs say."""
+
+    capabilities = TOWN_CAPABILITIES
+
+    def __init__(self, town: MapPack | None = None) -> None:
+        """Args: the town to drive in, whatever scenarios say; by default they do."""
+        self._given = town
+        self._town: MapPack | None = None
+        self._config: TownConfig | None = None
+        self._driver: TownDriver | None = None
+        self._route: Route | None = None
+        self._lane: LaneId | None = None
+        self._ego_station = 0.0
+        self._tick = 0
+        self._shown: Observation | None = None
+        self._others: tuple[VehicleState, ...] = ()
+        self._forced: dict[str, SignalState] = {}
+        self._place = ""
+        """The place that was set out for."""
+        self._stood: tuple[str, float, float] | None = None
+        """The place that was reached, and where the car stood."""
+
+    @property
+    def engine(self) -> str:
+        """SUMO and its version. Its figures are no CARLA driving scores."""
+        return engine_name()
+
+    @property
+    def dt_s(self) -> float:
+        """Control period, s."""
+        return DT_S
+
+    @property
+    def chassis(self) -> Chassis:
+        """The ego's size, axles and bounds."""
+        return Chassis.of(LINCOLN_MKZ)
+
+    @property
+    def town(self) -> MapPack:
+        """Where it is driven. Raises ScenarioError before the first reset."""
+        if self._town is None:
+            raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
+        return self._town
+
+    def observe(self) -> Observation:
+        """The present instant as frozen values."""
+        if self._shown is None:
+            self._shown = self._look()
+        return self._shown
+
+    @property
+    def ended(self) -> bool:
+        """Crash, off the road, at the scenario's goal, or out of time."""
+        return self.observe().ended
+
+    def perception(self) -> TownPerception:
+        """Questions about the present instant."""
+        assert self.town is not None
+        return self._perception
+
+    def driver(self) -> TownDriver:
+        """The low-level driver of the present trip; the same until the next reset."""
+        assert self.town is not None
+        assert self._driver is not None
+        return self._driver
+
+    # Places -----------------------------------------------------------------------------------------------------------
+
+    def head_for(self, place: str) -> None:
+        """Set out for a place of the town from where the ego is. Raises ScenarioError: no such place, no way there."""
+        assert self._driver is not None
+        self._route = self._way_to(goal_in(self.town, place), place)
+        self._driver.head_for(self._route)
+        self._place, self._stood, self._shown = place, None, None
+
+    def leave(self) -> None:
+        """Be held by no goal any more: the road leads on."""
+        assert self._driver is not None
+        self._driver.roam()
+        self._place, self._stood, self._route, self._shown = "", None, None, None
+
+    def reached(self) -> str | None:
+        """The place that was set out for, while the car stands there."""
+        return None if self._stood is None else self._stood[0]
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the ego is at its goal."""
+        driver = self._driver
+        if self._stood is not None:
+            return True
+        if driver is None or self._route is None or not driver.has_goal or not driver.stretch.goal:
+            return False
+        return driver.station_m + LINCOLN_MKZ.rear_to_middle_m > driver.stretch.end_m - _AT_GOAL_M
+
+    def _mind_the_place(self, ego: VehicleState) -> None:
+        """Note when the car stands at the place that was set out for, and when it has left."""
+        driver = self.driver()
+        if self._stood is not None:
+            _, x, y = self._stood
+            if abs(ego.x_m - x) + abs(ego.y_m - y) > _LEFT_M:
+                self._stood = None
+        elif self._place and not driver.has_goal:
+            self._place = ""  # another way was wished since
+        elif self._place and self.arrived and ego.speed_mps < _STANDS_MPS:
+            self._stood, self._place = (self._place, ego.x_m, ego.y_m), ""
+
+    def _way_to(self, goal: LanePlace, name: str) -> Route:
+        """The way to a place; it begins where the car can still choose it, or else where the car is."""
+        assert self._lane is not None
+        assert self._driver is not None
+        road, ego = self.town.road, self.observe().ego
+        here = LanePlace(self._lane, self._ego_station, 0.0)
+        ahead_m = self._ego_station + ego.speed_mps**2 / (2.0 * _SLOWING_MPS2) + _ROOM_M
+        before: list[LaneId] = []
+        lanes = self._driver.lanes_ahead()
+        for lane in lanes[lanes.index(here.lane) :] if here.lane in lanes and ego.speed_mps > 1.0 else ():
+            if ahead_m <= road[lane].length_m:
+                onward = plan_route(road, LanePlace(lane, ahead_m, 0.0), goal)
+                if onward is not None:
+                    return Route((*before, *onward.lanes), here.station_m, onward.goal_m)
+                break
+            ahead_m -= road[lane].length_m
+            before.append(lane)
+        route = plan_route(road, here, goal)
+        if route is None:
+            raise ScenarioError(f"No way leads to {name!r} from here.", hint="Choose another place.")
+        return route
+
+    @property
+    def _heads_elsewhere(self) -> bool:
+        """Whether somebody wished for another place than the scenario's goal."""
+        return bool(self._place) or self._stood is not None
+
+    # Looking ----------------------------------------------------------------------------------------------------------
+
+    def _begin(self, scenario: Scenario, seed: int | None) -> TownTrip:
+        """Be at the start of a trip, before anything moves; its driver is `_take_seat`'s."""
+        trip = TownTrip.of(scenario, seed, self._given)
+        self._town, self._config, self._route = trip.town, trip.config, trip.route
+        self._lane, self._ego_station = trip.start.lane, trip.start.station_m
+        self._tick, self._others, self._forced, self._shown = 0, (), {}, None
+        self._place, self._stood, self._driver = "", None, None
+        self._signal_places = [_middle(group) for group in trip.town.signals]
+        return trip
+
+    def _take_seat(self) -> TownDriver:
+        """The driver and the perception of the trip."""
+        town = self.town
+        self._driver = driver = TownDriver(town.road, LINCOLN_MKZ, DT_S, self.observe, self._route)
+        self._perception = TownPerception(town.road, self.observe, driver, town.places)
+        self._shown = None
+        return driver
+
+    def mirrored(self) -> bytes:
+        """The present instant, for copies in other processes."""
+        return TownInstant(
+            tick=self._tick,
+            ego=self._ego(),
+            others=self._others,
+            lane=self._lane,
+            station_m=self._ego_station,
+            off_road=self._off_road,
+            over=self._over,
+            forced=self._forced,
+            place=self._place,
+            stood=self._stood,
+            course=self.driver().course,
+        ).encode()
+
+    def _ego(self) -> VehicleState:
+        raise NotImplementedError
+
+    @property
+    def _off_road(self) -> bool:
+        raise NotImplementedError
+
+    @property
+    def _over(self) -> bool:
+        """Whether nothing will move any more."""
+        raise NotImplementedError
+
+    def _look(self) -> Observation:
+        town, sign = self.town, None if self._driver is None else self._driver.stop_sign
+        ego = self._ego()
+        return Observation(
+            time_s=round(self._tick * DT_S, 6),
+            tick=self._tick,
+            kind="town",
+            ego=ego,
+            others=self._others,
+            objects=(),
+            road=town.road,
+            front=None if self._driver is None else self._driver.lead,
+            stop_sign_m=None if sign is None else sign[1],
+            off_road=self._off_road,
+            ended=self._over,
+            signals=self._signals_near(ego),
+            signs=town.signs,
+            route=self._route if self._driver is None else self._driver.route,
+        )
+
+    def _signals_near(self, ego: VehicleState) -> tuple[Signal, ...]:
+        found: list[Signal] = []
+        for group, (x, y) in zip(self.town.signals, self._signal_places, strict=True):
+            if abs(x - ego.x_m) < SEES_M and abs(y - ego.y_m) < SEES_M:
+                for one in group.signals(self._tick * DT_S):
+                    forced = self._forced.get(one.id)
+                    found.append(one if forced is None else replace(one, state=forced, remaining_s=None))
+        return tuple(found)
+
+
+def _middle(group: SignalGroup) -> tuple[float, float]:
+    """Amid the stop lines of a junction's lights."""
+    points = [point for head in group.heads for point in head.stop_line_m]
+    return sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
