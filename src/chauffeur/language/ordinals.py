@@ -20,18 +20,18 @@ _WAYS: Final = (
     r"(?:(?:sets? of )?(?:traffic )?(?:lights?|signals?)|streets?|roads?|turn(?:ing|ings|off|s)?|junctions?|"
     r"intersections?|crossings?|crossroads?|corners?|exits?|lefts?|rights?|side streets?)"
 )
-_NTH: Final = re.compile(rf"\b(?P<nth>{'|'.join(_ORDINALS)})\s+(?:one\s+)?(?:on\s+(?:the|your|my)\s+)?{_WAYS}\b")
+_NTH: Final = re.compile(rf"\b(?P<nth>{'|'.join(_ORDINALS)}) (?:one )?(?:on (?:the|your|my) )?{_WAYS}\b")
 _NTH_ONE: Final = re.compile(rf"\b(?P<nth>{'|'.join(_NAMES[1:])})\b")
 _COUNTED: Final = re.compile(
     rf"(?P<passed>\b(?:after|past|pass|skip|ignore|miss|through)\b[^,;.]{{0,20}}?)?"
-    rf"\b(?P<count>\d|{'|'.join(_NUMBERS)})(?:\s+of)?\s+(?P<more>(?:more|other)\s+)?{_WAYS}\b"
+    rf"\b(?P<count>\d|{'|'.join(_NUMBERS)})(?: of)? (?P<more>(?:more|other) )?{_WAYS}\b"
 )
 _SKIPPED: Final = re.compile(
-    rf"\b(?:not|skip|miss|ignore|pass|forget|leave out|don't take|after|past)\s+(?:the|this|that)?\s*"
-    rf"(?P<nth>{'|'.join(_ORDINALS)}|next)\s+(?:one\s+)?(?:{_WAYS}|one)\b"
+    rf"\b(?:not|skip|miss|ignore|pass|forget|leave out|don't take|after|past) (?:the|this|that)? ?"
+    rf"(?P<nth>{'|'.join(_ORDINALS)}|next) (?:one )?(?:{_WAYS}|one)\b"
 )
 _ONE_AFTER: Final = re.compile(
-    r"\b(?:the\s+)?(?:one|lights?|turn(?:ing)?|street|junction) after (?:that|it|these|this)\b"
+    r"\b(?:the )?(?:one|lights?|turn(?:ing)?|street|junction) after (?:that|it|these|this)\b"
 )
 _MOST: Final = 9
 
