@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from chauffeur.concept import (
@@ -20,8 +21,6 @@ from chauffeur.concept import (
     Lead,
     Observation,
     Setpoints,
-    Sign,
-    Signal,
     SignalState,
     VehicleState,
 )
@@ -37,12 +36,12 @@ from chauffeur.geometry import (
     Route,
     Turn,
     choice_ahead,
-    joined,
-    wrap_to_pi,
 )
 from chauffeur.worlds.town.course import Course
 from chauffeur.worlds.town.foresight import Foresight, Meeting
-from chauffeur.worlds.town.way import RouteCorridor, Stretch, astride_m, blended, free_route
+from chauffeur.worlds.town.gaps import COMING_S, NEAR_M, GapAcceptance
+from chauffeur.worlds.town.stop_lines import OVER_M, SIGHT_M, STANDING_MPS, Stop, StopLines
+from chauffeur.worlds.town.way import RouteCorridor, Stretch, blended, first_m, free_route
 
 TOWN_CAPABILITIES: Final = Capabilities(
     roads=("town",),
@@ -62,23 +61,8 @@ _LOOK_S: Final = 0.6
 _LEAST_LOOK_M: Final = 3.2
 _SIDE_M: Final = 0.35
 _MOST_BRAKING_MPS2: Final = 8.0
-_YELLOW_MPS2: Final = 3.0
-_HARD_MPS2: Final = 5.0
-_GONE_S: Final = 2.5
-"""A car that stands astride a line needs so long to have all of itself behind it."""
-_LINE_M: Final = 0.7
-"""The front bumper stops so far before a stop line."""
-_OVER_M: Final = 1.0
-_ROOM_BEHIND_M: Final = 5.0
-"""Between a stop line and who stands ahead, beside its own length: a car stops up to 4 m behind, and is clear by 1."""
-_CLEAR_M: Final = 1.2
 _CLOSE_M: Final = 1.0
 """Who stands with its tail over a stop line draws up so close to who is ahead."""
-_TO_A_STAND: Final = 5.0
-"""Who is ahead may stand as soon as comfortable braking, 2.5 m/s2, allows: twice that, m/s2."""
-_STANDING_MPS: Final = 0.08
-_SERVED_S: Final = 0.7
-_AT_SIGN_M: Final = 3.0
 _BEFORE_M: Final = 2.2
 """The front bumper stops so far before somebody's way."""
 _BEFORE_PERSON_M: Final = 3.0
@@ -88,11 +72,6 @@ _CLEAR_S: Final = 1.2
 """By how much time somebody who crosses is missed by a car that goes first."""
 _AFTER_S: Final = 0.4
 _ACCELERATING_MPS2: Final = 1.5
-_NEAR_M: Final = 70.0
-_ASIDE_M: Final = 8.0
-"""Whose middle is farther than this from a lane is not in it."""
-_COMING_S: Final = 5.0
-"""Who is fast is minded from farther away: from as far as it gets in that time."""
 _CHANGE_LEAST_M: Final = 14.0
 _CHANGE_S: Final = 3.5
 _ROOM_M: Final = 12.0
@@ -100,27 +79,14 @@ _ROOM_M: Final = 12.0
 _SEAM_M: Final = 45.0
 """A change that is begun before a seam of the road ends at most so far beyond it."""
 _LANE_BESIDE_M: Final = 5.0
-_UPSTREAM_M: Final = 60.0
-"""Who is on a way into a lane that is changed into is minded from so far."""
-_MOST_WAYS: Final = 6
 _HERE_M: Final = 3.0
 _LOST_M: Final = 3.0
 _EVERY: Final = 2
 """The others are looked at every so many periods."""
-FIRST_SIGN: Final = 30_001
-"""Number of the first sign of a town, as driving programs name it."""
 _KERB_M: Final = 2.6
 _WAITS_M: Final = 3.8
 """Who stands as close to the line as that may be about to cross."""
 _PEOPLE_MPS: Final = 4.5
-
-
-@dataclass(frozen=True, slots=True)
-class _Stop:
-    """Where the front bumper has to stop, station of the stretch, and why."""
-
-    at_m: float
-    why: str
 
 
 class TownDriver:
@@ -155,15 +121,9 @@ class TownDriver:
         self._station = self._first_station(ego)
         self._changing_to: float | None = None
         self._wanted: LaneId | None = None
-        self._served: frozenset[str] = frozenset()
-        self._stood_s = 0.0
+        self._stop_lines, self._gaps = StopLines(chassis.length_m, dt_s), GapAcceptance(road)
         self._meetings: list[Meeting] = []
         self._tick = 0
-        self._sign: tuple[int, float] | None = None
-        self._tail_over = False
-        self._yellow_m: float | None = None
-        self._lines: dict[tuple[str, float], tuple[Stretch, float]] = {}
-        self._into: dict[LaneId, tuple[Polyline, ...]] = {}
         self.why = ""
 
     def head_for(self, route: Route) -> None:
@@ -192,7 +152,7 @@ class TownDriver:
             station_m=self._station,
             changing_to_m=self._changing_to,
             ahead=self._ahead,
-            sign=self._sign,
+            sign=self._stop_lines.sign,
         )
 
     def adopt(self, course: Course) -> None:
@@ -210,7 +170,7 @@ class TownDriver:
         self._corridor, self._goal, self._turn = corridor, course.goal, course.turn
         self._turning_at, self._station, self._changing_to = course.turning_at, course.station_m, course.changing_to_m
         self._meetings = [] if course.ahead is None else [course.ahead]
-        self._sign = course.sign
+        self._stop_lines.sign = course.sign
 
     # What a world asks ------------------------------------------------------------------------------------------------
 
@@ -279,20 +239,21 @@ class TownDriver:
         """(state, m from the front bumper to the stop line) of the next light on the line; None where none is near."""
         seen, nose = self._look(), self._station + self._nose_m
         lights = {lane: signal for signal in seen.signals for lane in signal.lanes}
+        line_m = partial(self._stop_lines.line_m, self._stretch)
         at, _ = self._stretch.lane_at(self._station - 2.0)
         for i in range(at, len(self._stretch.lanes)):
             start, end = self._stretch.span(i)
             light = lights.get(self._stretch.lanes[i].id)
             if start > nose + 100.0:
                 break
-            if light is not None and (ahead := self._line_m(light, start, end) - nose) > -_OVER_M:
+            if light is not None and (ahead := line_m(light, start, end) - nose) > -OVER_M:
                 return light.state, max(0.0, ahead)
         return None
 
     @property
     def stop_sign(self) -> tuple[int, float] | None:
         """(number, distance from the ego's centre) of the next stop sign on the line that is not served."""
-        return self._sign
+        return self._stop_lines.sign
 
     # Wishes -----------------------------------------------------------------------------------------------------------
 
@@ -362,7 +323,7 @@ class TownDriver:
 
     def _first_station(self, ego: VehicleState) -> float:
         """On a new line, which begins in the ego's lane: its way may come by the same place again later."""
-        return self._rear_station(ego, -math.inf, _first_m(self._stretch) + _HERE_M)
+        return self._rear_station(ego, -math.inf, first_m(self._stretch) + _HERE_M)
 
     def _turn_to(self, setpoints: Setpoints, ego: VehicleState) -> None:
         """Another way at the next junction, where the wish is another than the route; and over, where a free way is."""
@@ -443,7 +404,7 @@ class TownDriver:
         """Begin or end a change of lanes."""
         ego, stretch = seen.ego, self._stretch
         if self._changing_to is not None:
-            waits = ego.speed_mps < _STANDING_MPS and stretch.end_m - self._station - self._nose_m < _ROOM_M + _HERE_M
+            waits = ego.speed_mps < STANDING_MPS and stretch.end_m - self._station - self._nose_m < _ROOM_M + _HERE_M
             if self._station > self._changing_to or waits:  # who waits for the next change ends this one where it is
                 self._changing_to = None
             return
@@ -462,10 +423,10 @@ class TownDriver:
         if room < _CHANGE_LEAST_M * 0.6:
             return
         way = min(way, max(room, _CHANGE_LEAST_M * 0.6))
-        if not self._has_gap(seen, other):
+        if not self._gaps.accepts(seen, other):
             return
         rear = Pose(ego.x_m, ego.y_m, ego.heading_rad).ahead(-self._chassis.rear_to_middle_m)
-        first = blended(stretch.line, (rear.x_m, rear.y_m), other.line, self._station, way, _first_m(other))
+        first = blended(stretch.line, (rear.x_m, rear.y_m), other.line, self._station, way, first_m(other))
         self._stretch = Stretch.of(other.lanes, layer, self._corridor.route.goal_m if other.goal else None, first)
         self._station = self._rear_station(ego, 0.0, 10.0)
         self._changing_to = first.length_m - 2.0
@@ -500,78 +461,6 @@ class TownDriver:
             return None  # the route would be missed
         return beside
 
-    def _has_gap(self, seen: Observation, goal: Stretch) -> bool:
-        """Whether there is room in another lane, ahead and behind."""
-        ego = seen.ego
-        here = goal.line.nearest(ego.x_m, ego.y_m, 0.0, _first_m(goal))
-        reach = _NEAR_M + _COMING_S * max([0.0, *(one.speed_mps - ego.speed_mps for one in seen.others)])
-        low, high = goal.index(here - reach), goal.index(here + _NEAR_M) + 1
-        x, y = goal.x[low:high], goal.y[low:high]
-        for other in seen.others:
-            if math.dist((other.x_m, other.y_m), (ego.x_m, ego.y_m)) > reach:
-                continue
-            away = (x - other.x_m) ** 2 + (y - other.y_m) ** 2
-            at = int(away.argmin())
-            if away[at] > _ASIDE_M**2:
-                continue
-            station = goal.line.nearest(other.x_m, other.y_m, low + at - 2.0, low + at + 2.0)
-            pose = goal.line.at(station)
-            aside = abs(pose.sees(other.x_m, other.y_m)[1])
-            if aside > 1.9 + other.width_m / 2.0:
-                continue
-            along = other.speed_mps * math.cos(wrap_to_pi(other.heading_rad - pose.heading_rad))
-            gap = abs(station - here) - (ego.length_m + other.length_m) / 2.0
-            if station >= here:
-                closing = max(0.0, ego.speed_mps - along)
-                needed = 2.5 + 0.3 * ego.speed_mps + closing * closing / 4.0
-            else:
-                closing = max(0.0, along - ego.speed_mps)
-                needed = 2.5 + 0.7 * along + closing * closing / 4.0
-            if gap < needed:
-                return False
-        return not any(self._comes_up(one, goal.lanes[0].id, here, ego) for one in seen.others)
-
-    def _comes_up(self, other: VehicleState, goal: LaneId, here: float, ego: VehicleState) -> bool:
-        """Whether somebody who is not in a lane yet, but on a way into it, would come too close behind the ego.
-
-        Args:
-            other: Who.
-            goal: The lane.
-            here: Where the ego is along it, m.
-            ego: The ego.
-        """
-        ahead, aside = Pose(ego.x_m, ego.y_m, ego.heading_rad).sees(other.x_m, other.y_m)
-        follows = ahead < 0.0 and abs(aside) < (ego.width_m + other.width_m) / 2.0
-        if follows or math.hypot(ahead, aside) > _UPSTREAM_M:
-            return False
-        for line in self._upstream(goal):
-            station, aside = line.project(other.x_m, other.y_m)
-            pose = line.at(station)
-            turned = wrap_to_pi(other.heading_rad - pose.heading_rad)
-            if abs(aside) > 1.9 + other.width_m / 2.0 or station >= line.length_m or math.cos(turned) < 0.7:
-                continue
-            along = other.speed_mps * math.cos(turned)
-            closing = max(0.0, along - ego.speed_mps)
-            gap = here + line.length_m - station - (ego.length_m + other.length_m) / 2.0
-            if gap < 2.5 + 0.7 * along + closing * closing / 4.0:
-                return True
-        return False
-
-    def _upstream(self, lane: LaneId) -> tuple[Polyline, ...]:
-        """The ways into a lane, as far back as somebody who is fast has to be seen."""
-        known = self._into.get(lane)
-        if known is None:
-            done: list[list[Lane]] = []
-            rim: list[tuple[list[Lane], float]] = [([], 0.0)]
-            while rim:
-                way, length = rim.pop()
-                before = () if length > _UPSTREAM_M else self._road.predecessors(way[0].id if way else lane)
-                if way and not before:
-                    done.append(way)
-                rim += [([one, *way], length + one.length_m) for one in before]
-            known = self._into[lane] = tuple(joined([one.centre for one in way]) for way in done[:_MOST_WAYS])
-        return known
-
     # Speed ------------------------------------------------------------------------------------------------------------
 
     def _acceleration(self, seen: Observation, setpoints: Setpoints) -> float:
@@ -588,7 +477,7 @@ class TownDriver:
             least = -1.0  # who is to stand does not creep
         self.why = ""
         stops = self._stops(seen, nose)
-        follows = replace(idm, jam_distance_m=_CLOSE_M) if self._tail_over else idm
+        follows = replace(idm, jam_distance_m=_CLOSE_M) if self._stop_lines.tail_over else idm
         for meeting in self._meetings:
             if meeting.now and (meeting.along or meeting.along_mps > -0.5 or meeting.other.speed_mps < 0.5):
                 gap = meeting.first_m - nose
@@ -601,7 +490,7 @@ class TownDriver:
             else:
                 stop = self._yields(meeting, nose, speed, target)
                 if stop is not None:
-                    stops += [stop, *self._rather_before_yellow(nose, speed)]
+                    stops += [stop, *self._stop_lines.before_yellow(nose, speed)]
         for stop in stops:
             asked = _stopping(speed, stop.at_m - nose, idm)
             if asked < least:
@@ -629,137 +518,43 @@ class TownDriver:
 
     # Stops ------------------------------------------------------------------------------------------------------------
 
-    def _stops(self, seen: Observation, nose: float) -> list[_Stop]:
+    def _stops(self, seen: Observation, nose: float) -> list[Stop]:
         """Where it has to stop for the end of the line, lights, signs, and a junction that is blocked."""
-        stretch, speed, length = self._stretch, seen.ego.speed_mps, self._chassis.length_m
-        self._sign, self._yellow_m, self._tail_over = None, None, False
-        stops = [_Stop(stretch.end_m - _ROOM_M, "room to change lanes")]
+        stretch = self._stretch
+        stops = [Stop(stretch.end_m - _ROOM_M, "room to change lanes")]
         if stretch.goal:
-            stops = [_Stop(stretch.end_m + self._chassis.length_m / 2.0, "the goal")]
-        lights = {lane: signal for signal in seen.signals for lane in signal.lanes}
-        signs = {lane: (n, sign) for n, sign in enumerate(seen.signs) if sign.kind == "stop" for lane in sign.lanes}
+            stops = [Stop(stretch.end_m + self._chassis.length_m / 2.0, "the goal")]
+        stops += self._stop_lines.stops(seen, stretch, self._station, nose, self._meetings)
         at, _ = stretch.lane_at(self._station - 2.0)
         for i in range(at, len(stretch.lanes)):
             start, end = stretch.span(i)
-            if start > nose + 80.0:
+            if start > nose + SIGHT_M:
                 break
             lane = stretch.lanes[i]
-            if lane.id in lights:
-                line = self._line_m(lights[lane.id], start, end)
-                self._tail_over |= line + astride_m(length) < nose < line + length + _CLEAR_M
-                if lights[lane.id].state == "yellow" and line > nose:
-                    self._yellow_m = line
-                if self._light_stops(lights[lane.id], line, nose, speed):
-                    stops.append(_Stop(line - _LINE_M, f"light {lights[lane.id].state}"))
-                elif self._no_room_behind(line, nose, speed):
-                    stops.append(_Stop(line - _LINE_M, "no room behind the stop line"))
-                elif self._waits_astride(lights[lane.id], line, nose, speed):
-                    stops.append(_Stop(line + astride_m(length), "its tail before the stop line"))
-            if lane.id in signs and signs[lane.id][1].id not in self._served:
-                number, sign = signs[lane.id]
-                line = self._line_m(sign, start, end)
-                if not self._serves(sign, line, nose, speed):
-                    stops.append(_Stop(line - _LINE_M, "stop sign"))
-                    if self._sign is None:
-                        self._sign = FIRST_SIGN + number, line - nose + self._chassis.length_m / 2.0
             if lane.junction and start > nose - 0.5 and self._road.conflicts(lane.id):
                 blocked = self._blocked(i, start, end)
                 if blocked is not None:
                     stops.append(blocked)
         return stops
 
-    def _line_m(self, what: Signal | Sign, start: float, end: float) -> float:
-        """Where a stop line is on the stretch: at the end of the lane where nobody says."""
-        if what.stop_line_m is None:
-            return end
-        known = self._lines.get((what.id, start))
-        if known is None or known[0] is not self._stretch:
-            (ax, ay), (bx, by) = what.stop_line_m
-            at = self._stretch.line.nearest((ax + bx) / 2.0, (ay + by) / 2.0, start, end + 6.0)
-            known = self._lines[what.id, start] = self._stretch, min(max(at, start), end + 6.0)
-        return known[1]
-
-    def _light_stops(self, light: Signal, line: float, nose: float, speed: float) -> bool:
-        ahead = line - nose
-        if light.state in ("off", "green") and not (light.state == "green" and light.remaining_s is not None):
-            return False
-        if ahead < -_OVER_M or (ahead < 0.0 and speed > 2.0):
-            return False  # over it already: clear the junction
-        gently = speed * speed / (2.0 * _YELLOW_MPS2) <= max(0.0, ahead - _LINE_M) + 0.3
-        if light.state == "red":
-            return True
-        if light.state == "yellow":
-            return gently
-        assert light.remaining_s is not None
-        through = (ahead + self._chassis.length_m + 2.0) / max(speed, 3.0)
-        return gently and ahead < 25.0 and through > light.remaining_s + 1.0 and speed > 1.0
-
-    def _rather_before_yellow(self, nose: float, speed: float) -> list[_Stop]:
-        """A stop before a line whose light is yellow, harder than for the light alone: who lets somebody go first in
-        the junction would stand astride the line when it turns red."""
-        if self._yellow_m is None:
-            return []
-        room = self._yellow_m - _LINE_M - nose
-        return [_Stop(self._yellow_m - _LINE_M, "light yellow")] if speed * speed <= 2.0 * _HARD_MPS2 * room else []
-
-    def _no_room_behind(self, line: float, nose: float, speed: float) -> bool:
-        """Whether who is ahead would leave no room for all of the car behind a line that it can still stop at.
-
-        Who stands on a line when its light turns red has run it.
-        """
-        ahead = line - _LINE_M - nose
-        if ahead < -_LINE_M or speed * speed > 2.0 * _YELLOW_MPS2 * (max(0.0, ahead) + 0.3):
-            return False
-        return self._crowded(line)
-
-    def _crowded(self, line: float) -> bool:
-        """Whether who is ahead leaves no room for all of the car behind a line, should they stop."""
-        needed = line + self._chassis.length_m + _ROOM_BEHIND_M
-        return any(
-            one.now and one.along and line - 0.5 < one.first_m < needed - max(0.0, one.along_mps) ** 2 / _TO_A_STAND
-            for one in self._meetings
-        )
-
-    def _waits_astride(self, light: Signal, line: float, nose: float, speed: float) -> bool:
-        """Whether a car whose front is over a line waits there with its tail before it: it came to a stand in a queue,
-        and its light has turned red since, or there is no room behind the line yet."""
-        room = line + astride_m(self._chassis.length_m) - nose
-        if nose < line or light.state == "off" or speed * speed > 2.0 * _YELLOW_MPS2 * max(0.0, room):
-            return False
-        turns = light.state == "yellow" and light.remaining_s is not None and light.remaining_s < _GONE_S
-        return light.state == "red" or turns or self._crowded(line)
-
-    def _serves(self, sign: Sign, line: float, nose: float, speed: float) -> bool:
-        """Whether a stop sign is served, or has been passed."""
-        if nose > line + _AT_SIGN_M:
-            self._served |= {sign.id}
-            return True
-        if speed < _STANDING_MPS and abs(line - _LINE_M - nose) < _AT_SIGN_M:
-            self._stood_s += self._dt_s
-            if self._stood_s >= _SERVED_S:
-                self._served |= {sign.id}
-                self._stood_s = 0.0
-                return True
-        return False
-
     def _wait_line(self, i: int) -> float:
         """Where to wait before a junction: at its stop line, else at its edge."""
         start, _ = self._stretch.span(i)
         return start - 0.5
 
-    def _blocked(self, i: int, start: float, end: float) -> _Stop | None:
+    def _blocked(self, i: int, start: float, end: float) -> Stop | None:
         """A stop before a junction that could be entered, but not be left."""
         needed = end + self._chassis.length_m + 2.5
         for meeting in self._meetings:
             if meeting.now and meeting.along and start < meeting.first_m < needed and meeting.along_mps < 1.5:
-                return _Stop(self._wait_line(i), "the junction is not clear")
+                return Stop(self._wait_line(i), "the junction is not clear")
         return None
 
     # Others -----------------------------------------------------------------------------------------------------------
 
     def _met(self, seen: Observation) -> list[Meeting]:
         ego, stretch = seen.ego, self._stretch
-        reach = min(_NEAR_M, 22.0 + 3.0 * ego.speed_mps)
+        reach = min(NEAR_M, 22.0 + 3.0 * ego.speed_mps)
         low = stretch.index(self._station - 1.0)
         high = stretch.index(self._station + self._nose_m + reach) + 1
         here = Pose(ego.x_m, ego.y_m, ego.heading_rad)
@@ -769,7 +564,7 @@ class TownDriver:
             if other.kind == "stop_sign":
                 continue
             ahead, aside = here.sees(other.x_m, other.y_m)
-            if ahead * ahead + aside * aside > (reach + 10.0 + _COMING_S * other.speed_mps) ** 2:
+            if ahead * ahead + aside * aside > (reach + 10.0 + COMING_S * other.speed_mps) ** 2:
                 continue
             beside = 2.2 if self._changing_to is None else _LANE_BESIDE_M
             behind = ahead < -(ego.length_m + other.length_m) / 2.0 and abs(aside) < beside
@@ -783,7 +578,7 @@ class TownDriver:
         half = self._chassis.width_m / 2.0 + _SIDE_M
         return self._foresight.meetings(seen, around, line, float(low), half + wider[low:high])
 
-    def _yields(self, meeting: Meeting, nose: float, speed: float, target: float) -> _Stop | None:
+    def _yields(self, meeting: Meeting, nose: float, speed: float, target: float) -> Stop | None:
         """Where to stop for somebody whose way crosses, unless one is through before the other comes."""
         person = meeting.other.kind == "pedestrian"
         before = _BEFORE_PERSON_M if person else _BEFORE_M
@@ -805,7 +600,7 @@ class TownDriver:
         if meeting.along and meeting.other.speed_mps < 0.15:
             return None
         line = self._waiting(nose, at)
-        return _Stop(line, f"letting {meeting.other.kind} {meeting.other.id} go first")
+        return Stop(line, f"letting {meeting.other.kind} {meeting.other.id} go first")
 
     def _waiting(self, nose: float, at: float) -> float:
         """Where to wait: before the junction where there would be no room behind its line."""
@@ -819,11 +614,6 @@ class TownDriver:
         if start > nose - 0.3 and at < start + self._chassis.length_m + 3.0:
             return min(start, at)
         return at
-
-
-def _first_m(stretch: Stretch) -> float:
-    """Where the first lane of a stretch ends."""
-    return stretch.span(0)[1]
 
 
 def _finite(value: float | None, otherwise: float) -> float:

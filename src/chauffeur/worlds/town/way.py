@@ -228,6 +228,11 @@ class Stretch:
         return self.starts_m[at], end
 
 
+def first_m(stretch: Stretch) -> float:
+    """Where the first lane of a stretch ends."""
+    return stretch.span(0)[1]
+
+
 def astride_m(length_m: float) -> float:
     """How far beyond a stop line the front bumper of a car may wait: its tail is not over the line yet.
 
