@@ -154,10 +154,10 @@ def frames(
     height: Annotated[int, typer.Option(min=32, help="Pictures' height, px.")] = 96,
     seconds: Annotated[float, typer.Option(min=10.0, help="Of a trip in town, at most.")] = 80.0,
     most: Annotated[int, typer.Option(min=6, help="Frames kept of a trip, at most.")] = 60,
-    town: Annotated[
-        list[str] | None,
-        typer.Option(help="Town of training and validation, by its pack's name; four of ours by default. Repeatable."),
-    ] = None,
+    towns: Annotated[
+        str,
+        typer.Option(help="Towns of training and validation, by their packs' names with commas between; four of ours."),
+    ] = "",
 ) -> None:
     """Front pictures of our own traffic with 2 s of motion before and 3 s after them, in nuScenes' format."""
     from chauffeur.bench.openloop.driving import TOWNS
@@ -168,7 +168,7 @@ def frames(
     from chauffeur.cli.tables import show_table
 
     console = stdout()
-    config = FramesConfig(trips, seed, width, height, seconds, most, tuple(town) if town else TOWNS)
+    config = FramesConfig(trips, seed, width, height, seconds, most, tuple(one.strip() for one in towns.split(",") if one.strip()) or TOWNS)
     try:
         with progress(console, "trips") as show:
             counts = make_frames(out, config, show)
