@@ -168,7 +168,15 @@ def frames(
     from chauffeur.cli.tables import show_table
 
     console = stdout()
-    config = FramesConfig(trips, seed, width, height, seconds, most, tuple(one.strip() for one in towns.split(",") if one.strip()) or TOWNS)
+    config = FramesConfig(
+        trips,
+        seed,
+        width,
+        height,
+        seconds,
+        most,
+        tuple(one.strip() for one in towns.split(",") if one.strip()) or TOWNS,
+    )
     try:
         with progress(console, "trips") as show:
             counts = make_frames(out, config, show)
