@@ -40,7 +40,7 @@ from chauffeur.geometry import (
 from chauffeur.worlds.town.course import Course
 from chauffeur.worlds.town.foresight import Foresight, Meeting
 from chauffeur.worlds.town.gaps import COMING_S, NEAR_M, GapAcceptance
-from chauffeur.worlds.town.stop_lines import OVER_M, SIGHT_M, STANDING_MPS, Stop, StopLines
+from chauffeur.worlds.town.stop_lines import OVER_M, SIGHT_M, STANDING_MPS, StopLineRules, StopPoint
 from chauffeur.worlds.town.way import RouteCorridor, Stretch, blended, first_m, free_route
 
 TOWN_CAPABILITIES: Final = Capabilities(
@@ -121,7 +121,7 @@ class TownDriver:
         self._station = self._first_station(ego)
         self._changing_to: float | None = None
         self._wanted: LaneId | None = None
-        self._stop_lines, self._gaps = StopLines(chassis.length_m, dt_s), GapAcceptance(road)
+        self._stop_lines, self._gaps = StopLineRules(chassis.length_m, dt_s), GapAcceptance(road)
         self._meetings: list[Meeting] = []
         self._tick = 0
         self.why = ""
@@ -518,12 +518,12 @@ class TownDriver:
 
     # Stops ------------------------------------------------------------------------------------------------------------
 
-    def _stops(self, seen: Observation, nose: float) -> list[Stop]:
+    def _stops(self, seen: Observation, nose: float) -> list[StopPoint]:
         """Where it has to stop for the end of the line, lights, signs, and a junction that is blocked."""
         stretch = self._stretch
-        stops = [Stop(stretch.end_m - _ROOM_M, "room to change lanes")]
+        stops = [StopPoint(stretch.end_m - _ROOM_M, "room to change lanes")]
         if stretch.goal:
-            stops = [Stop(stretch.end_m + self._chassis.length_m / 2.0, "the goal")]
+            stops = [StopPoint(stretch.end_m + self._chassis.length_m / 2.0, "the goal")]
         stops += self._stop_lines.stops(seen, stretch, self._station, nose, self._meetings)
         at, _ = stretch.lane_at(self._station - 2.0)
         for i in range(at, len(stretch.lanes)):
@@ -542,12 +542,12 @@ class TownDriver:
         start, _ = self._stretch.span(i)
         return start - 0.5
 
-    def _blocked(self, i: int, start: float, end: float) -> Stop | None:
+    def _blocked(self, i: int, start: float, end: float) -> StopPoint | None:
         """A stop before a junction that could be entered, but not be left."""
         needed = end + self._chassis.length_m + 2.5
         for meeting in self._meetings:
             if meeting.now and meeting.along and start < meeting.first_m < needed and meeting.along_mps < 1.5:
-                return Stop(self._wait_line(i), "the junction is not clear")
+                return StopPoint(self._wait_line(i), "the junction is not clear")
         return None
 
     # Others -----------------------------------------------------------------------------------------------------------
@@ -578,7 +578,7 @@ class TownDriver:
         half = self._chassis.width_m / 2.0 + _SIDE_M
         return self._foresight.meetings(seen, around, line, float(low), half + wider[low:high])
 
-    def _yields(self, meeting: Meeting, nose: float, speed: float, target: float) -> Stop | None:
+    def _yields(self, meeting: Meeting, nose: float, speed: float, target: float) -> StopPoint | None:
         """Where to stop for somebody whose way crosses, unless one is through before the other comes."""
         person = meeting.other.kind == "pedestrian"
         before = _BEFORE_PERSON_M if person else _BEFORE_M
@@ -600,7 +600,7 @@ class TownDriver:
         if meeting.along and meeting.other.speed_mps < 0.15:
             return None
         line = self._waiting(nose, at)
-        return Stop(line, f"letting {meeting.other.kind} {meeting.other.id} go first")
+        return StopPoint(line, f"letting {meeting.other.kind} {meeting.other.id} go first")
 
     def _waiting(self, nose: float, at: float) -> float:
         """Where to wait: before the junction where there would be no room behind its line."""

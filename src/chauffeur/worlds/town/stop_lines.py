@@ -35,14 +35,14 @@ FIRST_SIGN: Final = 30_001
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class StopPoint:
     """Where the front bumper has to stop, station of the stretch, and why."""
 
     at_m: float
     why: str
 
 
-class StopLines:
+class StopLineRules:
     """The lines of one trip.
 
     Attributes:
@@ -62,7 +62,7 @@ class StopLines:
 
     def stops(
         self, seen: Observation, stretch: Stretch, station: float, nose: float, meetings: Sequence[Meeting]
-    ) -> list[Stop]:
+    ) -> list[StopPoint]:
         """Where to stop for lights and signs.
 
         Args:
@@ -73,7 +73,7 @@ class StopLines:
         """
         speed, length = seen.ego.speed_mps, self._length_m
         self.sign, self._yellow_m, self.tail_over = None, None, False
-        stops: list[Stop] = []
+        stops: list[StopPoint] = []
         lights = {lane: signal for signal in seen.signals for lane in signal.lanes}
         signs = {lane: (n, sign) for n, sign in enumerate(seen.signs) if sign.kind == "stop" for lane in sign.lanes}
         at, _ = stretch.lane_at(station - 2.0)
@@ -89,16 +89,16 @@ class StopLines:
                 if light.state == "yellow" and line > nose:
                     self._yellow_m = line
                 if self._light_stops(light, line, nose, speed):
-                    stops.append(Stop(line - _LINE_M, f"light {light.state}"))
+                    stops.append(StopPoint(line - _LINE_M, f"light {light.state}"))
                 elif self._no_room_behind(line, nose, speed, meetings):
-                    stops.append(Stop(line - _LINE_M, "no room behind the stop line"))
+                    stops.append(StopPoint(line - _LINE_M, "no room behind the stop line"))
                 elif self._waits_astride(light, line, nose, speed, meetings):
-                    stops.append(Stop(line + astride_m(length), "its tail before the stop line"))
+                    stops.append(StopPoint(line + astride_m(length), "its tail before the stop line"))
             if lane.id in signs and signs[lane.id][1].id not in self._served:
                 number, sign = signs[lane.id]
                 line = self.line_m(stretch, sign, start, end)
                 if not self._serves(sign, line, nose, speed):
-                    stops.append(Stop(line - _LINE_M, "stop sign"))
+                    stops.append(StopPoint(line - _LINE_M, "stop sign"))
                     if self.sign is None:
                         self.sign = FIRST_SIGN + number, line - nose + length / 2.0
         return stops
@@ -129,13 +129,13 @@ class StopLines:
         through = (ahead + self._length_m + 2.0) / max(speed, 3.0)
         return gently and ahead < 25.0 and through > light.remaining_s + 1.0 and speed > 1.0
 
-    def before_yellow(self, nose: float, speed: float) -> list[Stop]:
+    def before_yellow(self, nose: float, speed: float) -> list[StopPoint]:
         """A stop before a line whose light is yellow, harder than for the light alone: who lets somebody go first in
         the junction would stand astride the line when it turns red."""
         if self._yellow_m is None:
             return []
         room = self._yellow_m - _LINE_M - nose
-        return [Stop(self._yellow_m - _LINE_M, "light yellow")] if speed * speed <= 2.0 * _HARD_MPS2 * room else []
+        return [StopPoint(self._yellow_m - _LINE_M, "light yellow")] if speed * speed <= 2.0 * _HARD_MPS2 * room else []
 
     def _no_room_behind(self, line: float, nose: float, speed: float, meetings: Sequence[Meeting]) -> bool:
         """Whether who is ahead would leave no room for all of the car behind a line that it can still stop at.
