@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
+from chauffeur.language.quantities import ONES
 from chauffeur.language.tokens import tokens_of
 
 JUNCTION_WORDS: Final = frozenset(
@@ -12,7 +13,7 @@ JUNCTION_WORDS: Final = frozenset(
 )
 """What a junction is called."""
 
-_NUMBERS: Final = {"one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "couple": 2}
+_NUMBERS: Final = {**{word: number for number, word in enumerate(ONES[:7]) if number}, "couple": 2}
 _NAMES: Final = ("first", "second", "third", "fourth", "fifth", "sixth")
 _ORDINALS: Final = {name: number for number, name in enumerate(_NAMES, start=1)}
 _DIGITS: Final = re.compile(r"\b([1-6])(?:st|nd|rd|th)\b")

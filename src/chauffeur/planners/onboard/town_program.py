@@ -27,21 +27,13 @@ def program_of(steps: Sequence[TownStep]) -> str:
                 f'        say("I do not find {name} ahead on this way, so I go straight on.")',
                 "        yield proceed(check_speed_limit())",
                 "        return",
-                "    for _ in range(12000):",
-                f'        if get_distance_to_place("{name}") < 0:',
-                "            break",
-                "        yield proceed(check_speed_limit())",
+                *_driven_until(f'get_distance_to_place("{name}") < 0'),
             ]
         if step.after_m is not None:
             near = step.after_m - _ANNOUNCED_M if step.turn else step.after_m
             body += [f"    yield from drive_on({near:.0f})"]
         if step.before_junction:
-            body += [
-                "    for _ in range(12000):",
-                f"        if get_distance_to_junction() < {_STOPS_BEFORE_M}:",
-                "            break",
-                "        yield proceed(check_speed_limit())",
-            ]
+            body += _driven_until(f"get_distance_to_junction() < {_STOPS_BEFORE_M}")
         if step.waits:
             body += [
                 '    say("I wait here. Tell me when to go on.")',
@@ -67,12 +59,7 @@ def program_of(steps: Sequence[TownStep]) -> str:
                 f'        yield from pass_a_way("{step.turn}")',
             ]
         if step.turn and not step.plain:  # the first junction from there on that leads so
-            body += [
-                "    for _ in range(12000):",
-                f'        if can_go("{step.turn}"):',
-                "            break",
-                "        yield proceed(check_speed_limit())",
-            ]
+            body += _driven_until(f'can_go("{step.turn}")')
         if step.turn:
             verb = "go_straight" if step.turn == "straight" else f"turn_{step.turn}"
             body += [
@@ -93,6 +80,16 @@ def program_of(steps: Sequence[TownStep]) -> str:
         *([_FAR] if any(step.after_m is not None for step in steps) else []),
     ]
     return "\n".join(["".join(helpers), "def as_told():", *body, ""]).lstrip("\n")
+
+
+def _driven_until(condition: str) -> list[str]:
+    """Lines that drive on until a condition holds."""
+    return [
+        "    for _ in range(12000):",
+        f"        if {condition}:",
+        "            break",
+        "        yield proceed(check_speed_limit())",
+    ]
 
 
 _CROSSING: Final = """def cross_the_junction():

@@ -52,8 +52,7 @@ class GapAcceptance:
                 closing = max(0.0, ego.speed_mps - along)
                 needed = 2.5 + 0.3 * ego.speed_mps + closing * closing / 4.0
             else:
-                closing = max(0.0, along - ego.speed_mps)
-                needed = 2.5 + 0.7 * along + closing * closing / 4.0
+                needed = _behind_m(along, ego.speed_mps)
             if gap < needed:
                 return False
         return not any(self._comes_up(one, goal.lanes[0].id, here, ego) for one in seen.others)
@@ -78,9 +77,8 @@ class GapAcceptance:
             if abs(aside) > 1.9 + other.width_m / 2.0 or station >= line.length_m or math.cos(turned) < 0.7:
                 continue
             along = other.speed_mps * math.cos(turned)
-            closing = max(0.0, along - ego.speed_mps)
             gap = here + line.length_m - station - (ego.length_m + other.length_m) / 2.0
-            if gap < 2.5 + 0.7 * along + closing * closing / 4.0:
+            if gap < _behind_m(along, ego.speed_mps):
                 return True
         return False
 
@@ -98,3 +96,9 @@ class GapAcceptance:
                 rim += [([one, *way], length + one.length_m) for one in before]
             known = self._into[lane] = tuple(joined([one.centre for one in way]) for way in done[:_MOST_WAYS])
         return known
+
+
+def _behind_m(along_mps: float, ego_mps: float) -> float:
+    """Gap that somebody who comes up from behind needs, by their speed and the ego's."""
+    closing = max(0.0, along_mps - ego_mps)
+    return 2.5 + 0.7 * along_mps + closing * closing / 4.0
