@@ -16,10 +16,11 @@ from pydantic import TypeAdapter
 from typer.testing import CliRunner, Result
 
 from chauffeur import __version__
-from chauffeur.cli.doctor import install_command, installed_parts
+from chauffeur.cli.doctor import installed_parts
 from chauffeur.cli.failures import show_crash
 from chauffeur.cli.main import app
 from chauffeur.concept import ChauffeurError, PlannerError, ScenarioError, Verdict
+from chauffeur.concept.extras import install_command
 from chauffeur.drive.recording import read_trip, write_trip
 
 WISH = "Overtake the car in front of you."

@@ -192,7 +192,7 @@ def test_a_missing_package_is_said_with_the_command_that_installs_it(
         async with serving(WheelSession(run, SteppedClock(), str)):
             pass
 
-    with pytest.raises(MissingExtraError, match=r'pip install "chauffeur\[page\]"'):
+    with pytest.raises(MissingExtraError, match=r"-m pip install .*\[page\]"):
         asyncio.run(check())
 
 

@@ -45,7 +45,7 @@ def test_each_part_says_what_it_needs(
     library: str, use: Callable[[Path], object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'chauffeur\[speech\]'"):
+    with pytest.raises(MissingExtraError, match=r"-m pip install .*\[speech\]"):
         use(tmp_path)
 
 

@@ -85,9 +85,7 @@ class GrammarRecogniser:
         try:
             import pocketsphinx
         except ImportError as error:
-            raise MissingExtraError(
-                "The offline speech engine needs pocketsphinx.", hint="Run: pip install 'chauffeur[speech]'"
-            ) from error
+            raise MissingExtraError("The offline speech engine needs pocketsphinx.", extra="speech") from error
         library: Any = pocketsphinx
         self.grammar = driving_grammar() if grammar is None else grammar
         """What it can hear."""

@@ -55,9 +55,7 @@ class WhisperRecogniser:
         try:
             from faster_whisper import WhisperModel  # pyright: ignore[reportMissingImports]
         except ImportError as error:
-            raise MissingExtraError(
-                "Whisper needs faster-whisper.", hint="Run: pip install 'chauffeur[speech]'"
-            ) from error
+            raise MissingExtraError("Whisper needs faster-whisper.", extra="speech") from error
         try:
             self._model: Any = WhisperModel(
                 str(folder), device="cpu", compute_type="int8", cpu_threads=threads, local_files_only=True

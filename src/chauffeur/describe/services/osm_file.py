@@ -46,7 +46,7 @@ def load_road_map(path: Path) -> RoadMap:
         import osmium.filter
         import osmium.osm
     except ImportError as error:
-        raise MissingExtraError("Reading maps needs pyosmium.", hint="Run: pip install 'chauffeur[map]'") from error
+        raise MissingExtraError("Reading maps needs pyosmium.", extra="map") from error
     try:
         # Filtered in C++: only roads come as far as Python, and nodes only as places of their points.
         processor = (

@@ -319,7 +319,7 @@ def _adapted(
 
         from chauffeur.models.onboard.export import export
     except ImportError as error:
-        raise MissingExtraError(f"Adapting needs {error.name}.", hint="Run: pip install 'chauffeur[models]'") from error
+        raise MissingExtraError(f"Adapting needs {error.name}.", extra="models") from error
     del peft
     if recipe.threads:
         torch.set_num_threads(recipe.threads)

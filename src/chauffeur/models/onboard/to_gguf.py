@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chauffeur.concept import DataError, MissingExtraError
+from chauffeur.concept.extras import install_command
 
 PRE_TOKENIZER: Final = "smollm"
 """llama.cpp's name for what the tokenizer does first: each digit alone, then words as GPT-2 cuts them."""
@@ -52,9 +53,7 @@ def to_gguf(checkpoint: Path, target: Path, *, eight_bit: bool = False) -> Path:
         from safetensors import SafetensorError
         from safetensors.torch import load_file
     except ImportError as error:
-        raise MissingExtraError(
-            f"GGUF needs {error.name}.", hint="Run: pip install gguf 'chauffeur[models]'"
-        ) from error
+        raise MissingExtraError(f"GGUF needs {error.name}.", hint=f"Run: {install_command('models')} gguf") from error
     try:
         config: dict[str, Any] = json.loads((checkpoint / "config.json").read_text(encoding="utf-8"))
         tokenizer: dict[str, Any] = json.loads((checkpoint / "tokenizer.json").read_text(encoding="utf-8"))

@@ -78,7 +78,7 @@ class RosbridgeVehicle(ThreadedVehicle):
             VehicleError: The URL is none.
         """
         if find_spec("websockets") is None:  # said here; the thread that uses it could not raise it
-            raise MissingExtraError("A rosbridge vehicle needs websockets.", hint="Run: pip install 'chauffeur[ros]'")
+            raise MissingExtraError("A rosbridge vehicle needs websockets.", extra="ros")
         super().__init__(stack, "rosbridge", close_s=OPENING_S + 1.0)
         self._url, self._clock, self._retry_s = _checked_url(settings.url), clock, retry_s
         self._ros: Final = 1 if isinstance(stack, AutowareAi) else 2

@@ -97,7 +97,7 @@ def _store_of(
         from rosbags.serde.errors import SerdeError
         from rosbags.typesys import Stores, get_types_from_msg, get_typestore
     except ImportError as error:
-        raise MissingExtraError("A ROS vehicle needs rosbags.", hint="Run: pip install 'chauffeur[ros]'") from error
+        raise MissingExtraError("A ROS vehicle needs rosbags.", extra="ros") from error
     store = get_typestore(Stores.ROS1_NOETIC if ros == 1 else Stores.ROS2_HUMBLE)
     for name, definition in definitions:
         text = "".join(f"{kind} {field}\n" for kind, field in definition)
