@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import shutil
+import signal
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -14,6 +15,12 @@ import pytest
 from hypothesis import settings
 
 SHARED_DATA = Path(os.environ.get("CHAUFFEUR_TEST_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+
+# Whoever starts the tests in the background may have these ignored, and every process that a test starts would inherit
+# it: the signals that tests send must arrive.
+for _number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    if signal.getsignal(_number) == signal.SIG_IGN:
+        signal.signal(_number, signal.default_int_handler if _number == signal.SIGINT else signal.SIG_DFL)
 
 # Everybody's run tries the same examples, however busy the machine; HYPOTHESIS_PROFILE=default looks for new ones.
 settings.register_profile("same-for-all", derandomize=True, deadline=None)
