@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from chauffeur.concept import DataError
-from chauffeur.speech.whisper import PROMPT, WhisperRecogniser, transcript
+from chauffeur.speech.whisper import WhisperRecogniser, prompt_for, transcript
 
 SOUND = np.random.default_rng(0).integers(-3000, 3000, size=16000).astype(np.int16)
-AFTER = len(PROMPT) + 4
+AFTER = len(prompt_for("open")) + 4
 """Tokens before the answer: the mark of the prompt, a blank and its letters, the marks of the answer."""
 
 

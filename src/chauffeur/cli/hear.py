@@ -89,6 +89,9 @@ def hear(
             for note in recording.notes:
                 console.print(f"  {note}", style="dim", markup=False)
     if wishes == 0:
+        if count and not button and not as_json:
+            hint = "Without a button, only what begins with “command” or “evaluate” is meant for the car: --button command."
+            console.print(hint, style="dim")
         raise typer.Exit(FAILED)
 
 
