@@ -90,8 +90,7 @@ def hear(
                 console.print(f"  {note}", style="dim", markup=False)
     if wishes == 0:
         if count and not button and not as_json:
-            hint = "Without a button, only what begins with “command” or “evaluate” is meant for the car: --button command."
-            console.print(hint, style="dim")
+            console.print("No button was held: say “command ...” to the car, or give --button command.", style="dim")
         raise typer.Exit(FAILED)
 
 
