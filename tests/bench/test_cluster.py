@@ -151,7 +151,7 @@ asyncio.run(main())
     here = str(Path(__file__).parent)
     environ |= {"HOME": str(tmp_path / "home"), "PYTHONPATH": here}
     done = subprocess.run(
-        [sys.executable, "-c", script, here], capture_output=True, text=True, timeout=120, check=False, env=environ
+        [sys.executable, "-c", script, here], capture_output=True, text=True, timeout=600, check=False, env=environ
     )
     assert done.returncode == 0 and done.stdout.split()[-1] == "7", done.stdout + done.stderr
     assert not list((tmp_path / "home").glob(".ray*")), "no token, no settings"

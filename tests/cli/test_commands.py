@@ -155,7 +155,7 @@ def test_a_command_that_stands_in_a_group_is_found() -> None:
 
 def test_the_module_is_the_command() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "chauffeur", "--version"], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-m", "chauffeur", "--version"], capture_output=True, text=True, timeout=600, check=False
     )
     assert (done.returncode, done.stdout.strip()) == (0, f"chauffeur {__version__}")
 

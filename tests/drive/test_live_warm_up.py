@@ -51,7 +51,7 @@ assert sum(before.values()) >= 7
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(360)
+@pytest.mark.timeout(1200)
 def test_the_first_rescue_at_a_crossing_loads_nothing(tmp_path: Path) -> None:
     here = Path(__file__).parent
     done = subprocess.run(
