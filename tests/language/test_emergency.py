@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.language.emergency import MOST_CHARACTERS, SAFE_STOP_WISH, read_emergency
+from chauffeur.language.emergency import SAFE_STOP_WISH, read_emergency
+from chauffeur.language.plain_line import MOST_CHARACTERS
 
 BEFORE = (
     "",
