@@ -38,7 +38,7 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.drive.answers import plan_or_answer
-from chauffeur.drive.emergency import check_told_not_to
+from chauffeur.drive.emergency import ALARM_WORDS, alarm_of, check_told_not_to, is_bare_stop, raised
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
 from chauffeur.planners.base import Planner
 from chauffeur.safety.base import Check
@@ -144,14 +144,10 @@ async def plan_once(instruction: Instruction, steps: PlanSteps) -> Planned:
         ChauffeurError: No plan could be had.
     """
     request = await request_once(instruction, steps)
-    own = steps.own(instruction.text)
-    if own is None:
-        plan = await _worth_asking(steps.fit(await _planned(request, steps)), request, steps)
-    else:
-        plan = steps.fit(own)
+    own, plan = await _answered(request, steps)
     steps.tell(DriveEvent("plan", text=plan.thoughts.text, value=plan))
-    verdicts, now = await steps.check(plan, own is not None)
-    if own is None:
+    verdicts, now = await steps.check(plan, own)
+    if not own:
         verdicts = (*verdicts, *check_told_not_to(instruction.text, plan, now))
     steps.tell(DriveEvent("verdicts", value=verdicts))
     return Planned(plan, verdicts, request)
@@ -205,6 +201,21 @@ async def _planned(request: PlanRequest, steps: PlanSteps) -> Plan:
     if isinstance(error, ChauffeurError) or not isinstance(error, Exception):
         raise error
     raise PlannerError(f"The planner failed: {type(error).__name__}: {error}", retryable=True) from error
+
+
+async def _answered(request: PlanRequest, steps: PlanSteps) -> tuple[bool, Plan]:
+    """(whether it is the car's own answer, R and P): a planner that understands an alarm is not left to answer it."""
+    text = request.instruction.text
+    own = steps.own(text)
+    if own is not None:
+        return True, steps.fit(own)
+    plan = await _worth_asking(steps.fit(await _planned(request, steps)), request, steps)
+    alarm = alarm_of(plan, text)
+    if not alarm and is_bare_stop(plan, text):
+        verdicts, _ = await (steps.check if steps.check_yes is None else steps.check_yes)(plan, False)
+        alarm = "stop" if any(one.stops for one in verdicts) else ""
+    answer = steps.own(ALARM_WORDS[alarm]) if alarm else None
+    return (False, plan) if answer is None else (True, steps.fit(raised(alarm, answer, text)))
 
 
 async def _worth_asking(plan: Plan, request: PlanRequest, steps: PlanSteps) -> Plan:

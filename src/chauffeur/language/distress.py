@@ -37,7 +37,8 @@ _GRAVE: Final = re.compile(
     r"|wheels?)|steering (?:wheel )?(?:is |does |has )?(?:shaking|locked|stuck|not work\w*|gone)|warning light"
     r"|can not see (?:anything|a thing)|lost my sight|broken? (?:my|his|her) (?:arm|leg|neck|hand|foot|rib)s?"
     r"|engine (?:has |is |just )*(?:died|dying|failed|failing|overheating)"
-    r"|heart attack|(?:having|has|had) a stroke(?! of\b)|cardiac arrest|chest (?:pains?|hurts?|is (?:tight|hurting|aching)"
+    r"|heart attack|(?:having|has|had) a stroke(?! of\b)|cardiac arrest"
+    r"|chest (?:pains?|hurts?|is (?:tight|hurting|aching)"
     r"|feels tight|aches)"
     r"|(?:pains?|tightness|pressure) in (?:my|his|her|the) chest|(?:can not|can barely|can hardly|hard to"
     r"|struggling to|unable to|trouble|difficulty|could not) breath(?:e|ing)?"
@@ -80,15 +81,16 @@ _BODY: Final = re.compile(
     r"|not (?:breathing|responding|responsive|conscious|waking(?: up)?)"
     r"|stopped (?:breathing|responding)"
     r")\b"
-    rf"|\b{_PERSON}{_STATE}{{0,3}} (?:will|does|can) not (?:respond|answer(?: me| us)?|wake(?: up)?|breathe|(?:talk|speak)"
-    r"(?: (?:properly|clearly))?)(?= ?(?:[.,!]|and\b|$))"
+    rf"|\b{_PERSON}{_STATE}{{0,3}} (?:will|does|can) not (?:respond|answer(?: me| us)?|wake(?: up)?|breathe"
+    r"|(?:talk|speak)(?: (?:properly|clearly))?)(?= ?(?:[.,!]|and\b|$))"
 )
 """A state of a person who is meant by a word for a person: "my husband's lips are going blue"."""
 _LIMB: Final = r"(?:(?:left|right|whole|upper) ){0,2}(?:arms?|side|face|tongue|throat|neck|airway|lips|mouth|jaw)"
 _GRAVER: Final = re.compile(
     r"\bcan (?:not|barely|hardly) (?:feel|move) (?:my|his|her) (?:(?:left|right|whole) )?(?:arms?|side)\b"
-    rf"|\b(?:my|his|her|{_KIN}) {_LIMB} (?:(?:is|are|has|have|feels?|gone|going|went|started|all) ){{0,4}}(?:numb|drooping"
-    r"|droops|paraly\w+|swelling|swollen|closing(?: up)?|tingling)\b|\b(?:is|be|having) (?:a )?stroke\b(?! of\b)"
+    rf"|\b(?:my|his|her|{_KIN}) {_LIMB} (?:(?:is|are|has|have|feels?|gone|going|went|started|all) ){{0,4}}(?:numb"
+    r"|drooping|droops|paraly\w+|swelling|swollen|closing(?: up)?|tingling)\b"
+    r"|\b(?:is|be|having) (?:a )?stroke\b(?! of\b)"
     r"|\bblood (?:is )?(?:coming|pouring|gushing|everywhere|all over)\b"
     r"|\b(?:so much|lots of|a lot of|pool of|covered in) blood\b|\b(?:shooting|shot) at (?:us|me)\b"
     r"|\b(?:filling (?:up )?with|full of) (?:\w+ )?fumes\b|\bfumes (?:in here|inside|everywhere)\b"
@@ -106,11 +108,13 @@ _UNWELL: Final = re.compile(
     r"|(?:feel|feels|feeling|felt) (?:\w+ ){0,2}(?:sick(?! (?:and tired )?of\b)|faint|dizzy|nauseous|queasy|woozy"
     r"|light ?headed)"
     r"|(?:not|do not|does not) (?:feel|feeling)(?: \w+){0,2}? (?:well|good|great|right|ok)\b"
-    r"|throwing up|vomiting|blacking out|getting blurry|(?:everything|head|world) is spinning|makes? me (?:sick|dizzy"
+    r"|throwing up(?! (?:\w+ )?(?:stones?|gravel|dust|dirt|mud|spray|water))"
+    r"|vomiting|blacking out|getting blurry|(?:everything|head|world) is spinning|makes? me (?:sick|dizzy"
     r"|nauseous))\b"
 )
 _EMERGENCY_ALONE: Final = re.compile(
-    rf"^ (?:{COURTESY} )*?(?!please)(?:(?:emergency|mayday|sos|help us|help me|(?:i |we )?(?:need )?help|smoke|fire|please)[., !]*+)++$"
+    rf"^ (?:{COURTESY} )*?(?!please)(?:(?:emergency|mayday|sos|help us|help me|(?:i |we )?(?:need )?help|smoke"
+    r"|fire|please)[., !]*+)++$"
 )
 _STOP_THAT: Final = re.compile(rf"^ (?:{COURTESY} )*+(?:stop (?:it|that|this))(?: {COURTESY}(?= |$))*+ ?$")
 _SAID_WHAT_TO_DO: Final = re.compile(

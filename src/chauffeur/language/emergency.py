@@ -94,7 +94,7 @@ _STOP: Final = (
 _SHARP: Final = (
     rf"(?:freeze|(?:abort|terminate)(?: (?:the|this|our) (?:drive|ride|trip|journey|mission))?|hold it right there"
     rf"|shut (?:it|everything) (?:all )?down|brakes? on|(?:emergency|parking|park|hand) ?brake(?= now| on| please)"
-    rf"|(?:drop|throw out) (?:the )?anchors?|anchors? (?:on|out|down)|not {_STEP}|no (?:further|farther)"
+    rf"|(?:drop|throw out) (?:the )?anchors?|anchors? (?:on|out|down)|not {_STEP}"
     rf"|(?:do not|never) (?:move|go|drive|roll)(?: {_CAR})? (?:any (?:further|farther)|{_STEP}))"
 )
 """A call for a stop whose words mean something else where more follows: "freeze the gap where it is"."""
@@ -252,3 +252,21 @@ def _distress_in(line: str) -> Emergency | None:
         return Emergency("ask", words)
     need = next((found for piece, _ in pieces_of(line) if (found := _NEED.match(piece))), None)
     return None if need is None or is_only_told(line) else Emergency("ask", need[0].strip())
+
+
+# An alarm in the words of a model ------------------------------------------------------------------------------------
+
+_TOLD_OF: Final = re.compile(
+    r"\b(?:emergency|ambulance|distress|in danger|heart attack|unconscious|not breathing|medical (?:help|attention)"
+    r"|(?:wants?|wish(?:es)?|asks?|asked|asking|demands?|needs?|tells?|told|request(?:s|ed)?|orders?|call(?:s|ed)?)"
+    r"(?: \w+){0,4} (?:to|for an?) (?:immediate |emergency |sudden |full )*+(?:stop|halt|brake|freeze)"
+    r" ?(?:[.,!]|the (?:car|vehicle)\b|immediately\b|now\b|at once\b|here\b|because\b|$))"
+)
+_OF_NONE: Final = re.compile(
+    r"\bemergency (?:lane|vehicle|light)s?\b|\b(?:no|not an?|without an?|not|than) (?:\w+ )?emergency\b"
+)
+
+
+def tells_of_alarm(thoughts: str) -> bool:
+    """Whether a model's own words say that a person asks for a stop at once, or is in distress."""
+    return _TOLD_OF.search(_OF_NONE.sub(" ", line_of(thoughts))) is not None

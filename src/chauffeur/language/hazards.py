@@ -28,8 +28,8 @@ _THING: Final = (
 )
 _VEHICLE: Final = r"(?:car|truck|lorry|bus|van|bike|motorbike|motorcycle|train|tram|tanker|tractor)"
 _ROAD: Final = (
-    r"(?:all over|on|in|onto|into|across|over) (?:the|our|my|your) (?:middle of the )?(?:road|street|lane|way|path|highway"
-    r"|motorway|freeway|carriageway|track|tarmac|autobahn)"
+    r"(?:all over|on|in|onto|into|across|over) (?:the|our|my|your) (?:middle of the )?(?:road|street|lane|way|path"
+    r"|highway|motorway|freeway|carriageway|track|tarmac|autobahn)"
 )
 _FRONT: Final = (
     rf"(?:{_ROAD}|in front of (?:us|you|the car|me)|ahead of us|(?:right|just|straight|directly) ahead|in the way"

@@ -15,7 +15,7 @@ from typing import Final
 
 from chauffeur.concept import CameraImage, ChauffeurError, Context, History, Instruction, Observation, PersonId, Plan
 from chauffeur.describe.services.sources import Sources, SourceSettings
-from chauffeur.drive.emergency import NO_SHOULDER, planned_for
+from chauffeur.drive.emergency import NO_SHOULDER, STOPPING, planned_for
 from chauffeur.drive.events import DriveEvent, WishEventKind
 from chauffeur.drive.live.messages import MessageError
 from chauffeur.drive.live.mirror import Mirror
@@ -128,6 +128,9 @@ class Planning:
             return
         except Exception as error:  # noqa: BLE001 - services and memories are others' code, too; the wish is answered
             self._tell("unplanned", request.wish, f"The planner failed: {type(error).__name__}: {error}")
+            return
+        if order.plan.alarm == "stop":
+            self._tell("halt", request.wish, STOPPING)  # to stand in a lane is control's
             return
         if order.plan.refusal or order.plan.policy is None:
             words = order.plan.refusal or "The planner gave no program."

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import partial
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program
-from chauffeur.planners.arbitration import Wish, asked, slow_words, unanswered, undenied, wary_of
+from chauffeur.planners.arbitration import Wish, alarm_in, asked, slow_words, unanswered, undenied, wary_of
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.choose import choose
 from chauffeur.planners.onboard.dangers import danger
@@ -66,15 +67,16 @@ class RetrievalPlanner:
         corrections = corrections_of(request.rounds)
         leaning = partial(leaning_of, request.history, corrections=corrections)
         wary = wary_of(ready.instruction.text, "+".join(step.family for step in reading.steps))
+        alarm = alarm_in(ready.instruction.text, [step.family for step in reading.steps], reading.steps)
         choice = choose(reading, request.context.situation, request.limits, leaning, wary=wary)
         if isinstance(choice, Declined):
             intent = "+".join(step.family for step in reading.steps)
-            return declined(self, choice.words, begun, intent=intent)
+            return replace(declined(self, choice.words, begun, intent=intent), alarm=alarm)
         used = [leaning(step.family) for step in reading.steps]
         if why := slow_words(choice.steps, request.context.situation, request.limits):
             does = ", then ".join(step.does for step in choice.steps)
             if question := unanswered(request.instruction, f"{why} Shall I {does}?"):
-                return asked(self, question, begun, offer=ready.instruction.text)
+                return replace(asked(self, question, begun, offer=ready.instruction.text), alarm=alarm)
         source = program_of([step.filled for step in choice.steps])
         plan = Plan(
             thoughts=thoughts_of(reading, choice, request.context.situation, used),

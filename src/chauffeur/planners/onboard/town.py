@@ -278,7 +278,7 @@ def _declined(planner: Planner, said: str, meant: TownIntent, situation: Situati
     if meant.kind not in words:
         return None
     plan = declined(planner, words[meant.kind], begun, intent=_INTENTS.get(meant.kind, "ask"))
-    return replace(plan, offer=SAFE_STOP_WISH) if meant.kind == "distress" else plan
+    return replace(plan, offer=SAFE_STOP_WISH, alarm="distress") if meant.kind == "distress" else plan
 
 
 def _impossible(step: TownStep, situation: Situation) -> str:

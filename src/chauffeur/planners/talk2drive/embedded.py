@@ -148,6 +148,8 @@ class EmbeddedParameters:
             if plainly := _plain_words(steps):  # on other roads "turn right" may be a change of the lane
                 request = replace(request, instruction=replace(request.instruction, text=plainly))
         settled = self._model.settle(_compared(request), begun)
+        if isinstance(settled, Plan) and settled.alarm == "stop":
+            return settled  # no hint outweighs it
         reads = () if isinstance(settled, Plan) else tuple(map(kind_of, settled.linked.choice.intent.split("+")))
         known = situation.world in HINT_KINDS
         hint = hint_of(wish, situation, request.history, reads[0] if reads else "") if known else None
