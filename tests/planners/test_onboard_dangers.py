@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from parameters_asked import LEFT, plan
 
-from chauffeur.planners.onboard.dangers import danger
+from chauffeur.safety.dangers import danger
 from chauffeur.planners.onboard.doubts import foreign
 from chauffeur.planners.onboard.draft import draft
 from chauffeur.planners.registry import make_planner

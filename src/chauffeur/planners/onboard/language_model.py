@@ -25,7 +25,6 @@ from chauffeur.planners.arbitration import (
     wary_of,
 )
 from chauffeur.planners.base import OnText, Planner, declined
-from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import DialectStep, shall_i
 from chauffeur.planners.onboard.dialect import write as program_of
 from chauffeur.planners.onboard.doubts import ENGLISH_ONLY, foreign
@@ -40,6 +39,7 @@ from chauffeur.planners.onboard.reply import OnboardReply, read_reply
 from chauffeur.planners.onboard.thoughts import thoughts_of
 from chauffeur.planners.onboard.town import asked_plainly, plan_in_town
 from chauffeur.planners.onboard.understand import meanings_said
+from chauffeur.safety.dangers import danger
 
 SHIPPED: Final = Path(__file__).parent / "weights"
 """The model that comes with the package."""

@@ -10,7 +10,6 @@ from chauffeur.concept import ConfigError, Plan, PlanRequest, Program
 from chauffeur.planners.arbitration import Wish, alarm_in, asked, slow_words, unanswered, undenied, wary_of
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.choose import choose
-from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.doubts import CAN_DO
 from chauffeur.planners.onboard.exemplars import program_of
 from chauffeur.planners.onboard.meaning import NotUnderstood
@@ -19,6 +18,7 @@ from chauffeur.planners.onboard.personal import corrections_of, leaning_of
 from chauffeur.planners.onboard.thoughts import thoughts_of
 from chauffeur.planners.onboard.town import asked_plainly, plan_in_town
 from chauffeur.planners.onboard.understand import understand
+from chauffeur.safety.dangers import danger
 
 VERSION = "meaning-v2"
 """Changes whenever the same request could be planned differently."""

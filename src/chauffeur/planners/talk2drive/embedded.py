@@ -27,7 +27,6 @@ from chauffeur.planners.arbitration import (
     within_mood,
 )
 from chauffeur.planners.base import declined
-from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import DialectStep
 from chauffeur.planners.onboard.doubts import foreign
 from chauffeur.planners.onboard.exemplars.library import number
@@ -51,6 +50,7 @@ from chauffeur.planners.talk2drive.style import (
     named_spot,
     place_of,
 )
+from chauffeur.safety.dangers import danger
 from chauffeur.worlds.town.recipes import PLACE_KINDS
 
 _STANDING: Final = frozenset({"stop", "pull_over"})

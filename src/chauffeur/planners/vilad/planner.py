@@ -27,7 +27,6 @@ from chauffeur.concept import (
 )
 from chauffeur.language.corrections import last_said
 from chauffeur.planners.base import declined
-from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.town import town_destination
 from chauffeur.planners.onboard.town_steps import landmark_in
 from chauffeur.planners.vilad.driving import TEMPLATE as DRIVE
@@ -54,6 +53,7 @@ from chauffeur.planners.vilad.parking import (
     verified,
 )
 from chauffeur.planners.vilad.unmasking import Unmasking, unmask
+from chauffeur.safety.dangers import danger
 
 SPEED_MPS: Final = 3.0
 """In a parking lot, where ways are narrow."""
