@@ -33,7 +33,7 @@ from chauffeur.drive.loop import LoopMemory
 from chauffeur.drive.planning import PLAN_WITHIN_S, RECALLED, START_WITHIN_S, Judged, PlanSteps, plan_once
 from chauffeur.drive.seat import SeatCamera
 from chauffeur.drive.session import parse_wish
-from chauffeur.drive.surroundings import describing, opened
+from chauffeur.drive.surroundings import describing, opened, weathered
 from chauffeur.memory.tolerant import TolerantMemory
 from chauffeur.planners.base import Planner, looks
 from chauffeur.planners.prompts import Setting, build_system_message
@@ -151,7 +151,7 @@ class Planning:
         instruction = replace(parse_wish(request.text, PersonId(request.person)), confirmed=request.confirmed)
 
         async def describe() -> Context:
-            return (await describing(self._sources))(observation)
+            return weathered(self._mirror.world, await describing(self._sources))(observation)
 
         async def recall(instruction: Instruction, context: Context) -> History:
             return self._memory.recall(instruction.person, instruction, context, RECALLED)
