@@ -39,6 +39,7 @@ from chauffeur.planners.onboard.reply import OnboardReply, read_reply
 from chauffeur.planners.onboard.thoughts import thoughts_of
 from chauffeur.planners.onboard.town import asked_plainly, plan_in_town
 from chauffeur.planners.onboard.understand import meanings_said
+from chauffeur.planners.weather_doubts import never_faster
 from chauffeur.safety.dangers import danger
 
 SHIPPED: Final = Path(__file__).parent / "weights"
@@ -222,6 +223,7 @@ class LanguageModelPlanner:
         """Version of the model."""
         return str(self._engine.about.get("version", "unnamed"))
 
+    @never_faster
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; what is not understood, not possible or not to be done is declined in words."""
         begun = time.perf_counter()

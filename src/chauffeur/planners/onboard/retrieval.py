@@ -18,6 +18,7 @@ from chauffeur.planners.onboard.personal import corrections_of, leaning_of
 from chauffeur.planners.onboard.thoughts import thoughts_of
 from chauffeur.planners.onboard.town import asked_plainly, plan_in_town
 from chauffeur.planners.onboard.understand import understand
+from chauffeur.planners.weather_doubts import never_faster
 from chauffeur.safety.dangers import danger
 
 VERSION = "meaning-v2"
@@ -44,6 +45,7 @@ class RetrievalPlanner:
         """Rule set with its version."""
         return VERSION
 
+    @never_faster
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; a wish that is not understood or not possible is declined in words."""
         begun = time.perf_counter()

@@ -50,6 +50,7 @@ from chauffeur.planners.talk2drive.style import (
     named_spot,
     place_of,
 )
+from chauffeur.planners.weather_doubts import never_faster
 from chauffeur.safety.dangers import danger
 from chauffeur.worlds.town.recipes import PLACE_KINDS
 
@@ -125,6 +126,7 @@ class EmbeddedParameters:
         """Version of the model that reads the words."""
         return self._model.model
 
+    @never_faster
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; what is not understood, not possible or no matter of parameters is declined in words."""
         begun = time.perf_counter()
