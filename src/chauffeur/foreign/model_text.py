@@ -67,7 +67,10 @@ _ANSWERING: Final = re.compile(r"^[ \t]*(?:`{3}|~{3}|def |import |REFUSE)|[{]|\[
 _PLAIN: Final = (
     # harmony and Granite, their tokens taken out by a server
     (re.compile(r"\A\s*(?:assistant)?analysis(?=[A-Z\"'(])"), re.compile(r"assistant\s?final(?=\s?\S)")),
-    (re.compile(r"\A\s*Here(?:'s|’s| is) my thought process:", re.I), re.compile(r"Here(?:'s|’s| is) my response:", re.I)),
+    (
+        re.compile(r"\A\s*Here(?:'s|’s| is) my thought process:", re.I),
+        re.compile(r"Here(?:'s|’s| is) my response:", re.I),
+    ),
 )
 _DETAILS: Final = "detai"
 _MESSAGE: Final = frozenset(
@@ -159,7 +162,7 @@ class _Scan:
         piece = self.text[self._from : end]
         self.kept.append(piece)
         self._from = end
-        self._spoken = self._spoken or not piece.isspace() and bool(piece)
+        self._spoken = self._spoken or (not piece.isspace() and bool(piece))
 
     def _take(self, mark: re.Match[str]) -> None:
         if mark["fence"] is not None:

@@ -6,7 +6,9 @@ import re
 import unicodedata
 from typing import Final
 
-NUMBER: Final = re.compile(r"(?<![\w.+-])[-+]?(?:\d{1,40}\.?\d{0,60}|\.\d{1,60})(?:[eE][-+]?\d{1,3})?(?![\w.]{0,40}\d|_)")
+NUMBER: Final = re.compile(
+    r"(?<![\w.+-])[-+]?(?:\d{1,40}\.?\d{0,60}|\.\d{1,60})(?:[eE][-+]?\d{1,3})?(?![\w.]{0,40}\d|_)"
+)
 """One number of a text that `plain_signs` has passed; not the digits of a name such as `x1`."""
 _SIGNS: Final = str.maketrans(
     {
@@ -25,7 +27,9 @@ _SIGNS: Final = str.maketrans(
     }
 )
 _SUPER: Final = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻", "0123456789+-")
-_POWER: Final = re.compile(r"\s?[×x·*⋅]\s?10(?:\^\{?\s?|\*\*\s?)?([⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{1,3}|(?<=[\^{* ])[-+\u2212\u2013]?\d{1,3})\}?")
+_POWER: Final = re.compile(
+    r"\s?[×x·*⋅]\s?10(?:\^\{?\s?|\*\*\s?)?([⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{1,3}|(?<=[\^{* ])[-+\u2212\u2013]?\d{1,3})\}?"
+)
 _DIGIT: Final = re.compile(r"[^\W\x00-\x7fa-zA-Z]")
 _GROUPED: Final = re.compile(r"(?<=\d)[\u00a0\u2007\u2009\u202f](?=\d{3}(?!\d))")
 _AWAY: Final = re.compile(r"(?<![\w)\]%])([-+]) {1,2}(?=[\d.])")

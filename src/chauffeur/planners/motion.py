@@ -61,7 +61,9 @@ def read_matrix(text: str, *, whole: bool = True) -> tuple[ActionMatrix | None, 
     if not meant:
         return None, Reply(thoughts, problem="the answer holds no action matrix; give P = [[Kp, Ki, Kd], [Wl, Wh, Ws]]")
     if len(meant) > 1:
-        return None, Reply(thoughts, problem="the answer holds different action matrices; give one, as P = [[...], [...]]")
+        return None, Reply(
+            thoughts, problem="the answer holds different action matrices; give one, as P = [[...], [...]]"
+        )
     pid, mpc = meant.pop()
     if len(pid) != len(mpc) or len(pid) != _ROW:
         return None, Reply(thoughts, problem="the action matrix is no two rows of three numbers")

@@ -24,7 +24,8 @@ READING: Final = "read-v2"
 _GROUP: Final = re.compile(r"[(\[{]([^()\[\]{}]{1,200})[)\]}]")
 _LINE_CHARS: Final = 200
 _BREAK: Final = re.compile(
-    r"\n\s{0,9}\n|[.!?]\s{1,9}[A-Z]|\b(?:from|relative|origin|was|were|instead|or|better)\b|[\])}][^\[({]*\Z", re.IGNORECASE
+    r"\n\s{0,9}\n|[.!?]\s{1,9}[A-Z]|\b(?:from|relative|origin|was|were|instead|or|better)\b|[\])}][^\[({]*\Z",
+    re.IGNORECASE,
 )
 """What parts two lists of points: a sentence or paragraph that ends, a word that compares, the end of a list."""
 _GAP_CHARS: Final = 80
