@@ -51,6 +51,8 @@ class _BoundedBody(httpx.AsyncByteStream):
                 except zlib.error as error:
                     raise ForeignBodyError(f"The answer cannot be unpacked: {error}.") from error
                 rest = unpack.unconsumed_tail
+        if unpack is not None and not unpack.eof:
+            raise ForeignBodyError("The packed answer breaks off.")
 
 
 def bounding(most_bytes: int) -> Callable[[httpx.Response], Awaitable[None]]:
