@@ -27,9 +27,6 @@ def server_words(found: object, depth: int = 0) -> str:
         fields = cast("Mapping[str, Any]", found)
         words = next((said for name in _WORDS if (said := server_words(fields.get(name), depth + 1))), "")
         where: Any = fields.get("loc")
-        return (
-            f"{'.'.join(map(str, cast('list[object]', where)))}: {words}"
-            if words and isinstance(where, list)
-            else words
-        )
+        place = ".".join(map(str, cast("list[object]", where))) if isinstance(where, list) else ""
+        return f"{place}: {words}" if words and place else words
     return ""

@@ -9,8 +9,9 @@ stand anywhere:
 - a closing mark alone ends a reasoning that the chat template began: all before it is reasoning;
 - an opening mark alone begins a reasoning that never ended: the reply is unfinished, and has no answer.
 
-A control token of a chat template ends the turn, and so does a line that begins another speaker's turn behind an answer:
-what follows is a conversation that the model made up. In comments and strings of a fenced program, marks are text.
+A control token of a chat template ends the turn, and so does a line that begins another speaker's turn behind an
+answer: what follows is a conversation that the model made up. In comments and strings of a fenced program, marks are
+text.
 
 Nothing here raises, and all of it is linear in the length of the text.
 """
@@ -43,19 +44,19 @@ _TAG: Final = (
 _CHANNEL: Final = (
     r"(?P<left><channel\|>)|(?P<channel><\|channel\|?>\s{0,3}(?P<role>\w{1,20})[^<\n]{0,60}(?:<\|message\|>)?)"
 )
-# <|im_end|>, <\|im\_start\|>, <｜end▁of▁sentence｜>, <|im_end where it is cut, and a block of our own prompt
-_TOKEN: Final = (
+# <|im_end|>, <\|im\_start\|>, <｜end▁of▁sentence｜>, <|im_end where it is cut
+_CONTROL: Final = (
     r"(?P<token>(?:&lt;|\\u003c|\\?<)\s?\\?[|｜]\s?/?(?P<name>[\w▁ .:\\-]{1,40})\s?\\?[|｜]\s?\\?(?:>|&gt;|\\u003e)"
     r"|<\|im_(?:start|end)|\\?</?s>|\\?</?(?:start_of_turn|end_of_turn|end_of_utterance|eos|bos)>|<\|turn>|<turn\|>"
-    r"|\[/?INST\]|<</?SYS>>|^<data name=\")"
+    r"|\[/?INST\]|<</?SYS>>)"
 )
-# "### Human:", "User:", "**Assistant:**" at the beginning of a line
+# "### Human:", "User:", "**Assistant:**", or a block of our own prompts, at the beginning of a line
 _SPEAKER: Final = (
     r"^[ \t]{0,3}(?:\#{2,6}[ \t]{0,3}|\*\*|\[)?"
     r"(?:(?P<asker>human|user|passenger|instruction|input)|(?P<answerer>assistant|AI|response))"
-    r"(?:\*\*|\])?[ \t]{0,3}:(?:\*\*)?"
+    r"(?:\*\*|\])?[ \t]{0,3}:(?:\*\*)?|(?P<quoted>^<data name=\")"
 )
-_MARK: Final = re.compile("|".join((_TAG, _CHANNEL, _TOKEN, _SPEAKER, f"(?P<fence>{FENCE})")), re.I | re.M)
+_MARK: Final = re.compile("|".join((_TAG, _CHANNEL, _CONTROL, _SPEAKER, f"(?P<fence>{FENCE})")), re.I | re.M)
 _NEUTRAL: Final = re.compile(r"box|python|message|constrain|tool|vision|image|ref|quad|solution|response|answer", re.I)
 """Control tokens that stand around parts of an answer."""
 _BEGINS: Final = re.compile(r"start|begin|assistant|bos|header|model|sep|inst|<s>|sys|\|turn", re.I)
@@ -236,7 +237,7 @@ class _Scan:
         self.thinking.append(about)
 
     def _at_token(self, mark: re.Match[str]) -> None:
-        token, name = mark["token"], mark["name"] or mark["token"]
+        name = mark["name"] or mark["token"]
         role = _ROLE.match(self.text, mark.end())
         own = role is None or role[1].lower() in ("assistant", "model")
         if self.thinking:
@@ -244,7 +245,7 @@ class _Scan:
             self.over = not ("channel" in self.thinking and (name in ("end", "message") or (name == "start" and own)))
             return
         self._keep(mark.start())
-        if _NEUTRAL.search(name) and "<data" not in token:
+        if _NEUTRAL.search(name):
             self._from = mark.end()
         elif self._spoken or self._fence or not (own and _BEGINS.search(name)):
             self.over = True
@@ -252,11 +253,11 @@ class _Scan:
             self._from = mark.end() if role is None else role.end()
 
     def _at_speaker(self, mark: re.Match[str]) -> None:
-        """Another speaker's turn ends the answer, unless the model only tells who asked before it answers."""
+        """Another speaker's turn ends the answer, unless the model repeats what it was asked before it answers."""
         if not self._spoken and not self.text[self._from : mark.start()].strip():
             self._from = mark.end() if mark["answerer"] else self._from
         elif self._blocks or (
-            mark["asker"] and (self._last(_ANSWERER) >= mark.end() or self._last(_ANSWERING) < mark.end())
+            not mark["answerer"] and (self._last(_ANSWERER) >= mark.end() or self._last(_ANSWERING) < mark.end())
         ):
             self._keep(mark.start())
             self.over = True

@@ -166,8 +166,11 @@ class LlmPlanner:
             if not findings:
                 break
             _log.info("%s: asking for a repair: %s", self.id, "; ".join(findings))
-            messages = [*messages, *repair_turns(completion.text, findings)]
+            refused = completion.text
+            messages = [*messages, *repair_turns(refused, findings)]
             completion, reply, findings = await self._answer(messages, request, bill)
+            if completion.text == refused:  # it would say the same again
+                break
         return completion, reply
 
     async def _answer(

@@ -12,6 +12,7 @@ from typing import Final
 from chauffeur.foreign.fences import fenced_blocks, without_blocks
 from chauffeur.foreign.fields import says_nothing
 from chauffeur.foreign.model_text import read_model_text
+from chauffeur.planners.prompts.turns import REFUSED_BY_CHECKS
 
 _REFUSE: Final = re.compile(r"^[ \t>*_#]*REFUSE[*_ \t]*:[*_ \t]{0,20}([^\n]{0,600})", re.MULTILINE)
 _LABEL: Final = re.compile(r"\A[\s*_#]*Thoughts?[*_ \t]*:[*_ \t]*", re.IGNORECASE)
@@ -66,6 +67,8 @@ def read_reply(text: str, *, cut: bool = False) -> Reply:
         return Reply("", problem="the answer was empty")
     if found.several:
         return Reply(tidy(prose), problem="the answer holds different programs; give the one that is meant")
+    if program is None and REFUSED_BY_CHECKS in answer:  # small models repeat the repair turn
+        return Reply("", problem="the answer repeats what the checks said; write the program itself")
     if program is None:
         return Reply(tidy(prose), problem="the answer holds no program; give it in one ```python block")
     return Reply(tidy(without_blocks(found.thoughts, fenced_blocks(found.thoughts))), source=program)

@@ -39,8 +39,8 @@ def settings_of(policy: ActionMatrix) -> tuple[tuple[str, float], ...]:
 def read_matrix(text: str, *, whole: bool = True) -> tuple[ActionMatrix | None, Reply]:
     """(the action matrix of a reply, its thoughts or refusal or what is wrong). Never raises.
 
-    What is named P counts before what thoughts compare it with; two different ones are none. A reply that was cut counts
-    where its matrix is named P.
+    What is named P counts before what thoughts compare it with; two different ones are none. A reply that was cut
+    counts where its matrix is named P.
 
     Args:
         text: The reply.

@@ -60,9 +60,9 @@ def extract_program(answer: str) -> Extracted:
     """Take the program out of an answer, reasoning and later turns gone (`foreign.model_text`).
 
     The program is the block that defines the generator function: a block that only uses it is an example, one that
-    defines a function which the program calls is joined in front of it, and the same program twice is one. Two different
-    programs are none: the last is not better for being last. Without blocks the text itself may be the program, or the
-    part of it that begins with `def` or `import math`.
+    defines a function which the program calls is joined in front of it, and the same program twice is one. Two
+    different programs are none: the last is not better for being last. Without blocks the text itself may be the
+    program, or the part of it that begins with `def` or `import math`.
     """
     text = marks_on_own_lines(answer[:MAX_REPLY_CHARS].replace("\r\n", "\n").replace("\r", "\n"))
     blocks = fenced_blocks(text)[:_MAX_BLOCKS]

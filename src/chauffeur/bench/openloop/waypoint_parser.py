@@ -40,7 +40,7 @@ def read_waypoints(words: str) -> FloatArray | None:
 
     Read are brackets of any kind that hold two numbers, with or without names (`(1, 0.2)`, `[1, 0.2]`, `{"x": 1, "y":
     0.2}`), or three of which the first is the time; else lines with two numbers. Points that follow each other are one
-    list, of whose last six count: models go on from the past that they were told. What stands beside a list of six is no
+    list, whose last six count: models go on from the past that they were told. What stands beside a list of six is no
     part of it; two different lists of six are no answer, and neither are fewer.
     """
     text = plain_signs(answer_in(words))
