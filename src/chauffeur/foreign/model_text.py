@@ -36,7 +36,7 @@ _NAMES: Final = (
 # <think>, </seed:think>, <|end_of_thought|>, <|thinking_end|>, ◁/think▷, &lt;thinking effort="high"&gt;
 _TAG: Final = (
     r"(?P<tag>(?:&lt;|\\?<|[◁＜〈⟨])\s?\\?[|｜]?\s?(?P<end>/|end_?(?:of_?)?)?\s?(?:(?:begin|start)_?(?:of_?)?)?"
-    rf"(?:[a-z]{{1,12}}[:_])?(?P<about>{_NAMES})(?P<tail>_?(?:end|begin|start))?(?P<more>\s[^<>▷\n]{{0,200}})?"
+    rf"(?:[a-z]{{1,12}}[:_])?(?P<about>{_NAMES})(?P<tail>_?(?:end|begin|start))?(?P<more>\s[\w:-]{{1,30}}=[^<>▷\n]{{0,200}})?"
     r"(?P<empty>/)?\s?\\?[|｜]?\\?(?:>|&gt;|[▷＞〉⟩]))"
     r"|(?P<square>\[(?P<shut>/)?(?:think|thinking|reasoning)\])"
 )
