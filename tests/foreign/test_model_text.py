@@ -13,6 +13,8 @@ from chauffeur.foreign.model_text import MAX_REPLY_CHARS, read_model_text
 DRAFT = "Maybe faster?\n```python\ndef drive():\n    set_target_speed(31)\n    yield autopilot()\n```\nREFUSE: no\nHm."
 ANSWER = "Slower.\n```python\ndef drive():\n    yield autopilot()\n```"
 
+FINAL = "<|start|>assistant<|channel|>final <|message|>"
+
 REASONING = {
     "think": "<think>{}</think>",
     "thinking": "<thinking>{}</thinking>",
@@ -28,7 +30,10 @@ REASONING = {
     "attributes": '<think effort="high" budget=512>{}</think>',
     "blanks": "< think >{}< / think >",
     "name space": "<seed:think>{}</seed:think>",
-    "other name space": "<thinking>{}</thinking>",
+    "run together": "<antThinking>{}</antThinking>",
+    "plan": "<planning>{}</planning>",
+    "words in brackets": "[BEGIN THINKING]{}[END THINKING]",
+    "Ollama's words": "Thinking...\n{}\n...done thinking.\n",
     "bars": "<|thinking|>{}<|/thinking|>",
     "begin and end": "<|begin_of_thought|>{}<|end_of_thought|>",
     "start and end": "<|START_THINKING|>{}<|END_THINKING|>",
@@ -41,8 +46,8 @@ REASONING = {
     "backslashes": r"\<think\>{}\</think\>",
     "details": '<details type="reasoning" done="true"><summary>Thought for 5 s</summary>{}</details>',
     "harmony": "<|channel|>analysis<|message|>{}<|end|><|start|>assistant<|channel|>final<|message|>",
-    "harmony, whole": "<|start|>assistant<|channel|>analysis<|message|>{}<|end|><|start|>assistant<|channel|>final <|message|>",
-    "harmony, commentary": "<|channel|>commentary to=functions<|message|>{}<|end|><|start|>assistant<|channel|>final<|message|>",
+    "harmony, whole": f"<|start|>assistant<|channel|>analysis<|message|>{{}}<|end|>{FINAL}",
+    "harmony, commentary": f"<|channel|>commentary to=functions<|message|>{{}}<|end|>{FINAL}",
     "harmony without tokens": "analysisWe think. {}assistantfinal",
     "channel": "<|channel>thought\n{}<channel|>",
     "plain words": "Here is my thought process: {} Here is my response: ",
@@ -69,13 +74,14 @@ def test_reasoning_is_left_out_in_every_spelling(name: str) -> None:
     assert not found.cut
 
 
+BEGINNINGS = ("harmony without tokens", "harmony, whole", "plain words", "Ollama's words")
 WITH_AN_END = [name for name in REASONING if "closed" not in name and name not in ("two", "fenced", "nested")]
 
 
 @pytest.mark.parametrize("name", WITH_AN_END)
 @pytest.mark.parametrize("before", ["", "\n\n", "Let me see. "])
 def test_reasoning_without_its_end_leaves_no_answer(name: str, before: str) -> None:
-    if before.strip() and name in ("harmony without tokens", "harmony, whole", "plain words"):
+    if before.strip() and name in BEGINNINGS:
         pytest.skip("these begin a reply")
     opening = REASONING[name].split("{}")[0]
     found = read_model_text(f"{before}{opening}{DRAFT}")
@@ -98,13 +104,16 @@ def test_a_message_given_as_an_object_is_its_content(fields: str) -> None:
 
 
 ENDS = [
-    "<|im_end|>", "<|im_start|>user\n", "<|endoftext|>", "<|eot_id|>", "<|end_of_text|>", "<|end|>", "<|return|>", "<|eom_id|>",
+    "<|im_end|>", "<|im_start|>user\n", "<|endoftext|>", "<|eot_id|>", "<|end_of_text|>", "<|end|>", "<|return|>",
+    "<|eom_id|>",
     "<|start_header_id|>user<|end_header_id|>", "<|user|>", "<|User|>", "<|observation|>", "<end_of_turn>",
     "<start_of_turn>user", "</s>", "[INST]", "[/INST]", "<</SYS>>", "<｜end▁of▁sentence｜>", "<｜User｜>", "<eos>",
-    "<|END_OF_TURN_TOKEN|>", "<|eot|>", r"<\|im_start\|>user", r"<\|im\_end\|>", "&lt;|im_end|&gt;", r"\u003c|im_end|\u003e",
+    "<|END_OF_TURN_TOKEN|>", "<|eot|>", r"<\|im_start\|>user", r"<\|im\_end\|>", "&lt;|im_end|&gt;",
+    r"\u003c|im_end|\u003e",
     "< |im_end| >", "<|im_end", "<|turn>user", "<turn|>",
     "### Human: more", "### User: more", "\n## Instruction: more", "User: more", "USER: more", "**User:** more",
-    "Human: more", "[User]: more", "Passenger: more", '<data name="instruction">\n| more',
+    "Human: more", "[User]: more", "Passenger: more", "user\nmore", "Question: more",
+    '<data name="instruction">\n| more',
 ]  # fmt: skip
 
 

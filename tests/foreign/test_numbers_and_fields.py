@@ -42,6 +42,7 @@ from chauffeur.foreign.numbers import numbers_in, plain_signs
         ("1,000.5, 2", [1000.5, 2.0]),
         ("+2.5, +.1", [2.5, 0.1]),
         ("2.5m, -0.1 m", [2.5, -0.1]),
+        ("2.5, minus 0.1", [2.5, -0.1]),
         ("x1: 2.5, y_2: 0.1", [2.5, 0.1]),
         ("2.5\u200b, \u200e-0.1", [2.5, -0.1]),
     ],
@@ -63,12 +64,14 @@ def test_plain_signs_of_plain_signs_are_the_same(text: str) -> None:
 
 NOTHING = (
     "", " ", "N/A", "n/a.", "NA", "None", "none.", "**none**", "no", "No.", "NULL", "nil", "-", "—", "...", "(none)",
-    "[none]", "not applicable", "Not applicable.", "nothing", "No refusal", "no refusal needed", "N/A - the wish is safe",
+    "[none]", "not applicable", "Not applicable.", "nothing", "No refusal", "no refusal needed",
+    "N/A - the wish is safe",
     "None; this is harmless", "none (safe)", "<the reason in one sentence, addressed to the passenger>", "{reason}",
     "[reason]", "ｎｏｎｅ", '"none"', "false", "I do not refuse.", None, False,
 )  # fmt: skip
 SOMETHING = (
-    "No lane", "No lane is free.", "None of the lanes is free", "Not here.", "no, too fast", "unsafe", "Nothing is free",
+    "No lane", "No lane is free.", "None of the lanes is free", "Not here.", "no, too fast", "unsafe",
+    "Nothing is free",
     "Nobody may do that.", "Not possible", "not safe", "It is unlawful.", "-10 degrees is too cold", True, 5,
 )  # fmt: skip
 
@@ -86,7 +89,8 @@ def test_a_reason_that_begins_with_no_is_one(value: object) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        '{"a": -2}', 'Here: {"a": -2}.', "```json\n{'a': -2, 'b': None}\n```", '{"a": -2,}', "｛＂a＂：－2｝", "{“a”: −2}",
+        '{"a": -2}', 'Here: {"a": -2}.', "```json\n{'a': -2, 'b': None}\n```", '{"a": -2,}', "｛＂a＂：－2｝",
+        "{“a”: −2}",
         '{"a": \u20132}', "{'a': -2, }",
     ],
 )  # fmt: skip

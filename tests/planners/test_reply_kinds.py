@@ -62,7 +62,9 @@ EASES = "def drive():\n    yield from ease(22)\n"
 MEANT = {
     "a draft in thoughts of any spelling": f"<scratchpad>{DRAFT}</scratchpad>\n{GOOD}",
     "a draft in closed thoughts": f"{DRAFT}</think>\n{GOOD}",
-    "a draft in an analysis channel": f"<|channel|>analysis<|message|>{DRAFT}<|end|><|start|>assistant<|channel|>final<|message|>{GOOD}",
+    "a draft in an analysis channel": (
+        f"<|channel|>analysis<|message|>{DRAFT}<|end|><|start|>assistant<|channel|>final<|message|>{GOOD}"
+    ),
     "thoughts behind the answer": f"{GOOD}\n<think>{DRAFT}</think>",
     "a turn made up": f"{GOOD}\n<|im_end|>\n<|im_start|>user\nfaster\n<|im_start|>assistant\n{DRAFT}",
     "a turn made up, escaped": f"{GOOD}\n<\\|im_end\\|>\n{DRAFT}",

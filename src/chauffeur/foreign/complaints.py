@@ -8,7 +8,19 @@ from typing import Any, Final, cast
 from chauffeur.concept import ChauffeurError
 
 _DEPTH: Final = 5
-_WORDS: Final = ("message", "msg", "detail", "error", "errors", "error_message", "error_description", "title", "reason")
+_WORDS: Final = (
+    "message",
+    "msg",
+    "detail",
+    "error",
+    "errors",
+    "error_message",
+    "error_description",
+    "title",
+    "reason",
+    "metadata",
+    "raw",
+)
 """Fields in which servers say what is wrong: OpenAI's, FastAPI's (`detail`, a list of `msg` and `loc`), RFC 9457's."""
 
 

@@ -31,14 +31,16 @@ MAX_REPLY_CHARS: Final = 200_000
 _NAMES: Final = (
     r"think(?:ing)?|thoughts?|reason(?:ing)?(?:_content)?|reflect(?:ion|ing)?|scratch[_-]?pad|analysis|rationale"
     r"|(?:inner|internal)[_ -]?(?:monologue|thoughts?|voice|reasoning)|chain[_ -]of[_ -]thoughts?|cot"
-    r"|deliberat(?:e|ion)|thought[_ -]process|draft|details"
+    r"|deliberat(?:e|ion)|(?:thought|thinking)[_ -]process|draft|plan(?:ning)?|brainstorm(?:ing)?"
+    r"|internal|hidden|monologue|musings?|self[_ -]?(?:reflection|talk)|details"
 )
 # <think>, </seed:think>, <|end_of_thought|>, <|thinking_end|>, ◁/think▷, &lt;thinking effort="high"&gt;
 _TAG: Final = (
     r"(?P<tag>(?:&lt;|\\?<|[◁＜〈⟨])\s?\\?[|｜]?\s?(?P<end>/|end_?(?:of_?)?)?\s?(?:(?:begin|start)_?(?:of_?)?)?"
-    rf"(?:[a-z]{{1,12}}[:_])?(?P<about>{_NAMES})(?P<tail>_?(?:end|begin|start))?(?P<more>\s[\w:-]{{1,30}}=[^<>▷\n]{{0,200}})?"
+    rf"(?:[a-z]{{1,12}}[:_]|ant)?(?P<about>{_NAMES})(?P<tail>_?(?:end|begin|start))?"
+    rf"(?P<more>\s[\w:-]{{1,30}}=[^<>▷\n]{{0,200}})?"
     r"(?P<empty>/)?\s?\\?[|｜]?\\?(?:>|&gt;|[▷＞〉⟩]))"
-    r"|(?P<square>\[(?P<shut>/)?(?:think|thinking|reasoning)\])"
+    r"|(?P<square>\[(?P<shut>/|end[ _](?:of[ _])?)?(?:(?:begin|start)[ _](?:of[ _])?)?(?:think|thinking|reasoning)\])"
 )
 # <|channel|>analysis<|message|> of gpt-oss, <|channel>thought and <channel|> of Gemma
 _CHANNEL: Final = (
@@ -50,11 +52,14 @@ _CONTROL: Final = (
     r"|<\|im_(?:start|end)|\\?</?s>|\\?</?(?:start_of_turn|end_of_turn|end_of_utterance|eos|bos)>|<\|turn>|<turn\|>"
     r"|\[/?INST\]|<</?SYS>>)"
 )
-# "### Human:", "User:", "**Assistant:**", or a block of our own prompts, at the beginning of a line
+_ASKERS: Final = r"human|user|passenger|customer|driver|instruction|input|question|q|wish"
+# At the beginning of a line: "### Human:", "User:", "**Assistant:**"; "user" alone, where a server takes tokens out; a
+# block of our own prompts
 _SPEAKER: Final = (
     r"^[ \t]{0,3}(?:\#{2,6}[ \t]{0,3}|\*\*|\[)?"
-    r"(?:(?P<asker>human|user|passenger|instruction|input)|(?P<answerer>assistant|AI|response))"
-    r"(?:\*\*|\])?[ \t]{0,3}:(?:\*\*)?|(?P<quoted>^<data name=\")"
+    rf"(?:(?P<asker>{_ASKERS})|(?P<answerer>assistant|AI|response))"
+    r"(?:\*\*|\])?[ \t]{0,3}:(?:\*\*)?"
+    r"|^(?:(?P<asks>user)|(?P<answers>assistant|model))[ \t]*$|(?P<quoted>^<data name=\")"
 )
 _MARK: Final = re.compile("|".join((_TAG, _CHANNEL, _CONTROL, _SPEAKER, f"(?P<fence>{FENCE})")), re.I | re.M)
 _NEUTRAL: Final = re.compile(r"box|python|message|constrain|tool|vision|image|ref|quad|solution|response|answer", re.I)
@@ -62,7 +67,9 @@ _NEUTRAL: Final = re.compile(r"box|python|message|constrain|tool|vision|image|re
 _BEGINS: Final = re.compile(r"start|begin|assistant|bos|header|model|sep|inst|<s>|sys|\|turn", re.I)
 """Control tokens that may stand in front of an answer."""
 _ROLE: Final = re.compile(r"\s{0,3}(assistant|model|user|human|system|tool)\b:?", re.I)
-_ANSWERER: Final = re.compile(_SPEAKER.replace("human|user|passenger|instruction|input", "(?!)"), re.I | re.M)
+_ANSWERER: Final = re.compile(
+    _SPEAKER.replace(f"(?P<asker>{_ASKERS})", "(?!)").replace("(?P<asks>user)", "(?!)"), re.I | re.M
+)
 _ANSWERING: Final = re.compile(r"^[ \t]*(?:`{3}|~{3}|def |import |REFUSE)|[{]|\[\s{0,9}[\[(]", re.M)
 """How a program, an object, a matrix, waypoints or a refusal begins."""
 _PLAIN: Final = (
@@ -72,6 +79,7 @@ _PLAIN: Final = (
         re.compile(r"\A\s*Here(?:'s|’s| is) my thought process:", re.I),
         re.compile(r"Here(?:'s|’s| is) my response:", re.I),
     ),
+    (re.compile(r"\A\s*Thinking\.\.\.\s"), re.compile(r"\.\.\.\s?done thinking\.?")),  # Ollama's command line
 )
 _DETAILS: Final = "detai"
 _MESSAGE: Final = frozenset(
@@ -254,10 +262,11 @@ class _Scan:
 
     def _at_speaker(self, mark: re.Match[str]) -> None:
         """Another speaker's turn ends the answer, unless the model repeats what it was asked before it answers."""
+        answerer = mark["answerer"] or mark["answers"]
         if not self._spoken and not self.text[self._from : mark.start()].strip():
-            self._from = mark.end() if mark["answerer"] else self._from
+            self._from = mark.end() if answerer else self._from
         elif self._blocks or (
-            not mark["answerer"] and (self._last(_ANSWERER) >= mark.end() or self._last(_ANSWERING) < mark.end())
+            not answerer and (self._last(_ANSWERER) >= mark.end() or self._last(_ANSWERING) < mark.end())
         ):
             self._keep(mark.start())
             self.over = True

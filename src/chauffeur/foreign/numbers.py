@@ -32,6 +32,7 @@ _POWER: Final = re.compile(
 )
 _DIGIT: Final = re.compile(r"[^\W\x00-\x7fa-zA-Z]")
 _GROUPED: Final = re.compile(r"(?<=\d)[\u00a0\u2007\u2009\u202f](?=\d{3}(?!\d))")
+_IN_WORDS: Final = re.compile(r"\b(?:minus|negative)\s{1,3}(?=[\d.])", re.IGNORECASE)
 _AWAY: Final = re.compile(r"(?<![\w)\]%])([-+]) {1,2}(?=[\d.])")
 """A sign set apart from its number."""
 _DECIMAL_COMMA: Final = re.compile(r"(?<=\d),(?=\d)")
@@ -46,7 +47,7 @@ def plain_signs(text: str) -> str:
     text = _POWER.sub(lambda found: f"e{found[1].translate(_SUPER).translate(_SIGNS)}", text)
     text = unicodedata.normalize("NFKC", _GROUPED.sub("", text).translate(_SIGNS)).translate(_SIGNS)
     text = _DIGIT.sub(lambda found: str(unicodedata.decimal(found[0], found[0])), text)
-    return _AWAY.sub(r"\1", text)
+    return _AWAY.sub(r"\1", _IN_WORDS.sub("-", text))
 
 
 def numbers_in(text: str) -> list[float]:

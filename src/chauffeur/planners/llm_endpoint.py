@@ -48,7 +48,7 @@ _DISLIKES = frozenset({400, 422})
 _NO_SYSTEM: Final = re.compile(
     r"(?=.{0,200}\b(?:system|developer)\b)(?=.{0,200}\b(?:roles?|messages?|prompts?|instructions?)\b)"
     r".{0,200}\b(?:not|only|unsupported|unknown|unexpected|unrecogni[sz]ed|invalid|must)\b"
-    r"|roles? must alternate|only user and assistant roles",
+    r"|roles? must alternate|\brole\b.{0,120}\buser\b.{0,20}\bassistant\b|only user and assistant roles",
     re.IGNORECASE | re.DOTALL,
 )
 """How servers whose template knows no system turn say so: Gemma's and Mistral's, behind vLLM, llama.cpp and TGI."""

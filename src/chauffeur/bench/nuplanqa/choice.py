@@ -125,7 +125,17 @@ _VERDICT: Final = re.compile(
     re.IGNORECASE | re.MULTILINE,
 )
 """A letter or number with what is said of it."""
+_SIGNED: Final = re.compile(r"(?:([✓✔✅☑])|([✗✘❌☒✖]))\s{0,3}[\(\[*_]{0,4}([a-dA-D])(?![\w'’])")
+"""A letter behind its sign."""
+_DENIED: Final = re.compile(r"\bnot\b|n['’]t\b|\bnever\b|\bhardly\b", re.IGNORECASE)
+_UNDECIDED: Final = re.compile(
+    rf"\b(?:either|between|maybe|perhaps|possibly|both)\s{{1,3}}{_L}\s{{0,3}},?\s{{0,3}}(?:(?:and|or)\s{{1,3}})?"
+    rf"(?:(?:else|maybe|perhaps|possibly)\s{{1,3}})?{_L}{_END}",
+    re.IGNORECASE,
+)
 _LEAST_VERDICTS: Final = 3
+_SHORT: Final = 3
+"""Characters of an option that is too short to be told from other words."""
 _SAID: Final = {"True": "yes", "False": "no"}
 _ONCE_MORE: Final = (
     r"wait|actually|no|hold on|on second thoughts?|on reflection|correction|scratch that|sorry|i mean|i meant|make that"
@@ -228,6 +238,13 @@ def _read(answer: str, options: Sequence[str]) -> OptionChoice:
         return _letter(corrected[-1])
     if (stated := _stated(kept)) is not None:
         return stated
+    undecided = _UNDECIDED.search(kept)
+    if (
+        undecided is not None
+        and undecided[1].lower() != undecided[2].lower()
+        and not _CONCLUDED.search(kept, undecided.end())
+    ):
+        return OptionChoice(None, "several")
     if concluded := _letters(_CONCLUDED.findall(kept)):
         return _letter(concluded[-1])
     front = _FRONT.match(kept)
@@ -246,10 +263,22 @@ def _read(answer: str, options: Sequence[str]) -> OptionChoice:
 
 def _judged(text: str, options: Sequence[str]) -> OptionChoice | None:
     """The one option that is called right, or left, where each is judged; None where an answer is stated besides."""
-    without = _without_options(text, options)
-    found = list(_VERDICT.finditer(without))
-    verdicts = {_lettered(one[1]): one[2] is not None for one in found}
-    if len(verdicts) < _LEAST_VERDICTS or len(found) != len(verdicts) or _STATED.search(without, found[-1].end()):
+    for index, option in enumerate(options):  # an option named by its text is named
+        if len(option) > _SHORT:
+            name = re.escape(option.rstrip("."))
+            text = re.sub(
+                rf"(?<!\w){name}(?=\s{{0,3}}[:=?–—-])", f" {LETTERS[index].upper()} ", text, flags=re.IGNORECASE
+            )
+    first, sign = _VERDICT.search(text), _SIGNED.search(text)
+    if sign is not None and (first is None or sign.start() < first.start()):
+        found = [(one[3].lower(), one[1] is not None, one.end()) for one in _SIGNED.finditer(text)]
+    else:
+        found = [
+            (_lettered(one[1]), one[2] is not None and _DENIED.search(one.group()) is None, one.end())
+            for one in _VERDICT.finditer(text)
+        ]
+    verdicts = {letter: is_right for letter, is_right, _ in found}
+    if len(verdicts) < _LEAST_VERDICTS or len(found) != len(verdicts) or _STATED.search(text, found[-1][2]):
         return None
     right = [letter for letter, is_right in verdicts.items() if is_right]
     if len(right) > 1:
@@ -359,6 +388,6 @@ def _named(text: str, options: Sequence[str]) -> list[int]:
 def _without_options(text: str, options: Sequence[str]) -> str:
     """An answer without the options' own words, which may hold single letters and ordinals ("the first car")."""
     for option in sorted(options, key=len, reverse=True):
-        if len(option) > 3:
+        if len(option) > _SHORT:
             text = re.sub(re.escape(option.rstrip(".")), " ", text, flags=re.IGNORECASE)
     return text

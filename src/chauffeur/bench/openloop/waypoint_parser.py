@@ -23,6 +23,9 @@ READING: Final = "read-v2"
 """Id of the rules below; figures belong to them."""
 _GROUP: Final = re.compile(r"[(\[{]([^()\[\]{}]{1,200})[)\]}]")
 _LINE_CHARS: Final = 200
+_COUNT: Final = re.compile(r"\A\s{0,9}\d{1,2}[.):]\s{1,9}(?=\S)")
+_SIDE: Final = re.compile(r"\b(?:right|behind|back)\b", re.IGNORECASE)
+"""A side in words, whose sign would have to be guessed."""
 _BREAK: Final = re.compile(
     r"\n\s{0,9}\n|[.!?]\s{1,9}[A-Z]|\b(?:from|relative|origin|was|were|instead|or|better)\b|[\])}][^\[({]*\Z",
     re.IGNORECASE,
@@ -76,7 +79,7 @@ def _lines(text: str) -> list[list[Pair]]:
     """Pairs of lines that follow each other."""
     lists: list[list[Pair]] = [[]]
     for line in text.splitlines():
-        pair = _pair(line) if len(line) <= _LINE_CHARS else None
+        pair = _pair(_COUNT.sub("", line)) if len(line) <= _LINE_CHARS else None
         if pair is not None:
             lists[-1].append(pair)
         elif line.strip():
@@ -86,6 +89,8 @@ def _lines(text: str) -> list[list[Pair]]:
 
 def _pair(text: str) -> Pair | None:
     """(x, y, time or None) of a bracket or line; None where it holds no pair."""
+    if _SIDE.search(text):
+        return None
     x, y = _X.search(text), _Y.search(text)
     if x is not None and y is not None:
         return float(x[1]), float(y[1]), None
