@@ -11,7 +11,7 @@ import asyncio
 import json
 import os
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, is_dataclass
 from pathlib import Path
@@ -168,27 +168,23 @@ class BenchRun:
                 for store in self.stages.stores:
                     store.close()
             rows = self.score()
-        if self.halt is None and self.manifest.shard == WHOLE and self._nothing_done:
+        vain = self._undriven()
+        if self.halt is None and self.manifest.shard == WHOLE and self._all(vain):
             raise BenchError(
-                f"None of the {len(self.items)} items could be driven, so there is no score. {self._reasons}",
-                hint=f"Is it the right file for this benchmark? Every item's reason: {self.folder / 'results.jsonl'}",
+                f"None of the {len(self.items)} items could be driven or asked, so there is no score. {_reasons(vain)}",
+                hint="The same command tries again."
+                if all(one.failed for one in vain)
+                else f"Is it the right file for this benchmark? Every item's reason is in {self.folder}.",
             )
         return rows
 
-    @property
     def _undriven(self) -> list[ItemOutcome[Any]]:
+        """Of the items that are accounted for, those of which nothing came for no fault of an answer."""
         outcomes = (self.stages.outcome(item) for item in self.items if self.stages.asked(item))
         return [one for one in outcomes if one.undriven]
 
-    @property
-    def _nothing_done(self) -> bool:
-        return 0 < len(self._undriven) == sum(map(self.stages.asked, self.items))
-
-    @property
-    def _reasons(self) -> str:
-        """The most frequent reasons why items were not driven, in words."""
-        counts = Counter(one.why or "no reason is stored" for one in self._undriven).most_common(_REASONS)
-        return " ".join(f"{times} times: {why.rstrip('.')}." for why, times in counts)
+    def _all(self, outcomes: Sequence[ItemOutcome[Any]]) -> bool:
+        return 0 < len(outcomes) == sum(map(self.stages.asked, self.items))
 
     async def _work(self, watch: Watch, effort: Effort) -> None:
         loop = asyncio.get_running_loop()
@@ -253,15 +249,15 @@ class BenchRun:
             found = [dict(row) for row in self.benchmark.together(found)]
         lines = [json.dumps(row, ensure_ascii=True) for row in found]
         rows: list[Row] = [json.loads(line) for line in lines]  # as they are read again: tuples become lists
-        undriven = self._undriven
-        filled = [] if self._nothing_done else tables(self.benchmark.tables, rows)
+        undriven = self._undriven()
+        filled = () if self._all(undriven) else tables(self.benchmark.tables, rows)
         asked = sum(map(self.stages.asked, self.items))
         notes = [*self.manifest.labels]
         if asked < len(self.items):
             notes.append(f"Partial: {asked} of {len(self.items)} items.")
         if undriven:
             share = 100.0 * len(undriven) / asked
-            notes.append(f"Not driven: {len(undriven)} of {asked} items ({share:.0f} %). {self._reasons}")
+            notes.append(f"Not driven: {len(undriven)} of {asked} items ({share:.0f} %). {_reasons(undriven)}")
         write_results(
             self.folder,
             {
@@ -272,6 +268,12 @@ class BenchRun:
             },
         )
         return rows
+
+
+def _reasons(outcomes: Sequence[ItemOutcome[Any]]) -> str:
+    """The most frequent reasons why nothing came of items, in words."""
+    counts = Counter(one.why or "no reason is stored" for one in outcomes).most_common(_REASONS)
+    return " ".join(f"{times} times: {why.rstrip('.')}." for why, times in counts)
 
 
 def as_json(value: Any) -> str:

@@ -26,7 +26,7 @@ _MPS: Final = {
 }
 _WRITTEN_UNITS: Final = frozenset({"m/s", "km/h", "mph"})
 """As the standard spells them."""
-_SPEED: Final = re.compile(r"\s*([-+]?[0-9]{1,12}(?:\.[0-9]{1,30})?(?:[eE][-+]?[0-9]{1,3})?)\s*([a-zA-Z/]{0,12})\s*")
+_SPEED: Final = re.compile(r"([-+]?[0-9]{1,12}(?:\.[0-9]{1,30})?(?:[eE][-+]?[0-9]{1,3})?) ?([a-zA-Z/]{0,12})")
 _NO_LIMIT: Final = frozenset({"no limit", "undefined", ""})
 _T = TypeVar("_T")
 _PLACES: Final = 3
@@ -135,7 +135,7 @@ def speed_mps(text: str, unit: str) -> float | None:
     """
     if text.strip().casefold() in _NO_LIMIT:
         return None
-    found = _SPEED.fullmatch(text)
+    found = _SPEED.fullmatch(text.strip())
     if found is None:
         raise OpenDriveError(f"a speed of {quoted(text)} is none")
     name = (unit.strip() or found[2]).casefold()
