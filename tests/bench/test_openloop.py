@@ -91,7 +91,7 @@ def test_where_a_scene_ends_the_truth_is_not_known(tmp_path: Path) -> None:
     [
         (lambda folder: (folder / "ego_pose.json").unlink(), "ego_pose"),
         (lambda folder: (folder / "sample.json").write_text("{nothing"), "sample.json"),
-        (lambda folder: (folder / "ego_pose.json").write_text("[]"), "no CAM_FRONT frame with a pose"),
+        (lambda folder: (folder / "ego_pose.json").write_text("[]"), "ego_pose.json has no row"),
         (lambda folder: (folder / "openloop.json").write_text('[{"token": 1}]'), "openloop.json"),
     ],
 )
