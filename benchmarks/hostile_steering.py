@@ -20,7 +20,7 @@ import sys
 import time
 from collections import Counter, deque
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -30,7 +30,7 @@ from shapely.geometry import LineString, Polygon
 
 from chauffeur.concept import Command, Observation, Scenario, VehicleState
 from chauffeur.drive.actuate import actuate
-from chauffeur.geometry import Polyline, Pose, RoadGraph, wrap_to_pi
+from chauffeur.geometry import Lane, Polyline, Pose, RoadGraph, wrap_to_pi
 from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.base import World
 from chauffeur.worlds.track.scenarios import street_scenario
@@ -55,6 +55,7 @@ JOINT_M: Final = 0.3
 BEHIND_S: Final = 3.0
 LATE_M: Final = 14.0
 HOLES_M2: Final = 60.0
+MAP_ENDS_M: Final = 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,13 +239,24 @@ class Judge:
 def asphalt(road: RoadGraph) -> Any:
     """The union of all lanes for cars, whatever their direction, gaps between them and islands of a few m2 closed."""
     kinds = ("driving", "aisle", "emergency", "parking")
-    united = shapely.union_all([strip(one.centre, one.width_m) for one in road.lanes if one.kind in kinds])
+    led = {one for lane in road.lanes for one in lane.successors}
+    united = shapely.union_all(
+        [strip(_drawn_out(one, led), one.width_m) for one in road.lanes if one.kind in kinds]
+    )
     closed = united.buffer(JOINT_M).buffer(-JOINT_M)
     parts = [closed] if isinstance(closed, Polygon) else list(closed.geoms)
     kept = [
         Polygon(part.exterior, [hole for hole in part.interiors if Polygon(hole).area > HOLES_M2]) for part in parts
     ]
     return shapely.union_all(kept)
+
+
+def _drawn_out(lane: Lane, led: set[str]) -> Polyline:
+    """The middle of a lane, on straight where the map ends: the world ends a trip there, and no filter knows of it."""
+    first, last = lane.centre.at(0.0), lane.centre.at(lane.length_m)
+    before = [first.place(-MAP_ENDS_M, 0.0)] if lane.id not in led else []
+    after = [last.place(MAP_ENDS_M, 0.0)] if not lane.successors else []
+    return Polyline.of([*before, *lane.centre.points_m, *after])
 
 
 def strip(centre: Polyline, width_m: float) -> Any:
@@ -293,7 +305,10 @@ def drive(job: Job, towns: tuple[str, ...] = TOWNS) -> dict[str, Any]:
     """Drive a trip; its row."""
     rng = np.random.default_rng([job.seed, KINDS.index(job.kind), 17])
     world, begun = world_of(job.place), time.process_time()
-    seen = world.reset(scenario(job.place, job.seed, towns))
+    scene = scenario(job.place, job.seed, towns)
+    seen = world.reset(scene)
+    if job.place == "town" and _too_close(seen):
+        seen = world.reset(replace(scene, config={**scene.config, "ego_speed": 0.0}))
     try:
         judge, hands = Judge(seen.road), Hands(job.kind, world, rng)
         shield = shield_for(world) if job.filtered else None
@@ -314,6 +329,13 @@ def drive(job: Job, towns: tuple[str, ...] = TOWNS) -> dict[str, Any]:
         "ticks": ticks, "changed": changed, "way_m": round(way, 1), "stood_s": round(stood, 1),
         "cpu_s": round(time.process_time() - begun, 2),
     }  # fmt: skip
+
+
+def _too_close(seen: Observation) -> bool:
+    """Whether a trip begins at a speed at which nobody could stop in time."""
+    here, reach = Pose(seen.ego.x_m, seen.ego.y_m, seen.ego.heading_rad), 8.0 + seen.ego.speed_mps**2 / 8.0
+    places = [here.sees(one.x_m, one.y_m) for one in seen.others]
+    return any(-6.0 < ahead < reach and abs(aside) < 5.0 for ahead, aside in places)
 
 
 def jobs(place: Place, count: int, first: int, filtered: bool) -> Iterator[Job]:

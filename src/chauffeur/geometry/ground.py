@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final, Literal
 
 import numba
@@ -32,6 +33,8 @@ FAR_M: Final = 7.0
 """A point farther than this from all ground is that far beyond it."""
 _ONWARD_M: Final = 100.0
 """Where a map ends its lanes go on: as far as is planned ahead."""
+_JOINT_M: Final = 0.3
+"""Legs overlap by so much, for there are slits where lines bend and where lanes follow one another."""
 _CELL_M: Final = 8.0
 _SPACING_M: Final = 1.3
 """Between two points of an outline: less than any kerb's corner sticks out between them."""
@@ -81,15 +84,18 @@ class Ground:
             )
         )  # fmt: skip
 
-    def beyond_m(self, poses: Array, length_m: float, width_m: float, *, stops: bool = False) -> Array:
+    def beyond_m(
+        self, poses: Array, length_m: float, width_m: float, *, stops: bool = False, either_way: bool = False
+    ) -> Array:
         """How far the outline of a body reaches beyond the ground it may be on, m, (n,); 0 where all of it is on it.
 
         Args:
             poses: (n, 3): x and y of the body's middle, m, and heading, rad.
             length_m, width_m: Of the body; 0 for a point.
             stops: Whether it comes to a stand there, or stands: shoulders and parking lanes are then its to use.
+            either_way: Whether lanes of the other direction count as well: what is left is where cars cannot drive.
         """
-        return self._asked(poses, length_m, width_m, stops=stops)[:, 0]
+        return self._asked(poses, length_m, width_m, stops=stops, either_way=either_way)[:, 0]
 
     def fault(
         self, poses: Array, length_m: float, width_m: float, *, stops: bool = False, edge_m: float = EDGE_M
@@ -105,13 +111,15 @@ class Ground:
 
     def off_m(self, x_m: float, y_m: float) -> float:
         """How far a place is beyond all ground that cars drive or stand on, whatever their direction, m."""
-        return float(self._asked(np.array([[x_m, y_m, math.nan]]), 0.0, 0.0, stops=True)[0, 0])
+        return float(self.beyond_m(np.array([[x_m, y_m, 0.0]]), 0.0, 0.0, stops=True, either_way=True)[0])
 
-    def _asked(self, poses: Array, length_m: float, width_m: float, *, stops: bool) -> Array:
+    def _asked(
+        self, poses: Array, length_m: float, width_m: float, *, stops: bool, either_way: bool = False
+    ) -> Array:
         """(n, 3): how far, and x and y of the outline's farthest point."""
         rows = np.ascontiguousarray(poses, dtype=np.float64)
         outline = _outline(length_m, width_m)
-        return beyond(rows, outline, stops, self._legs, self._keys, self._starts, self._order, self._paved)
+        return beyond(rows, outline, stops, either_way, self._legs, self._keys, self._starts, self._order, self._paved)
 
     def _kind(self, x_m: float, y_m: float) -> GroundFaultKind:
         kinds: tuple[GroundFaultKind, ...] = ("sidewalk", "bicycle", "emergency", "parking")
@@ -170,10 +178,10 @@ def _table(road: RoadGraph) -> tuple[int, Array]:
         cosine = _ANY_COS if either else _JUNCTION_COS if lane.junction else _ALONG_COS
         when = _STOPPING if lane.kind in ("emergency", "parking") else _MOVING
         points = lane.centre.points_m
-        for i, ((ax, ay), (bx, by)) in enumerate(zip(points, points[1:], strict=False)):
+        for i, ((ax, ay), (bx, by)) in enumerate(pairwise(points)):
             length = math.dist((ax, ay), (bx, by))
-            low = -_ONWARD_M if i == 0 and lane.id not in led else 0.0
-            high = length + _ONWARD_M if i == len(points) - 2 and not lane.successors else length
+            low = -_ONWARD_M if i == 0 and lane.id not in led else -_JOINT_M
+            high = length + (_ONWARD_M if i == len(points) - 2 and not lane.successors else _JOINT_M)
             rows.append((ax, ay, (bx - ax) / length, (by - ay) / length, low, high, lane.width_m / 2.0, cosine, when))
     return count, np.array(rows, dtype=np.float64).reshape(len(rows), 9)
 
@@ -210,15 +218,14 @@ def _key(cx: int, cy: int) -> int:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def beyond(poses, outline, stops, legs, keys, starts, order, paved):  # type: ignore[no-untyped-def]
+def beyond(poses, outline, stops, free, legs, keys, starts, order, paved):  # type: ignore[no-untyped-def]
     """See `Ground._asked`."""
     n = poses.shape[0]
     out = np.zeros((n, 3))
     last = -1
     for i in range(n):
         x, y, heading = poses[i, 0], poses[i, 1], poses[i, 2]
-        free = math.isnan(heading)
-        c, s = (1.0, 0.0) if free else (math.cos(heading), math.sin(heading))
+        c, s = math.cos(heading), math.sin(heading)
         out[i, 1], out[i, 2] = x, y
         for j in range(outline.shape[0]):
             px = x + c * outline[j, 0] - s * outline[j, 1]
@@ -256,7 +263,8 @@ def _off(leg, px, py, c, s, stops, free):  # type: ignore[no-untyped-def]
     if not free and c * leg[2] + s * leg[3] < leg[7]:
         return FAR_M
     dx, dy = px - leg[0], py - leg[1]
-    along = dx * leg[2] + dy * leg[3]
-    along = min(max(along, leg[4]), leg[5])
-    dx, dy = dx - along * leg[2], dy - along * leg[3]
-    return math.sqrt(dx * dx + dy * dy) - leg[6]
+    along, across = dx * leg[2] + dy * leg[3], abs(dy * leg[2] - dx * leg[3]) - leg[6]
+    past = max(leg[4] - along, along - leg[5])
+    if past <= 0.0:
+        return across
+    return math.hypot(past, max(across, 0.0))

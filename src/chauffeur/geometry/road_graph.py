@@ -135,7 +135,7 @@ class RoadGraph:
 
     Attributes:
         lanes: All of them.
-        paved: Ground around the lanes on which a car may be anywhere, as in a parking lot; None where lanes alone count.
+        paved: Ground on which a car may be anywhere, as in a parking lot; None where lanes alone count.
     """
 
     lanes: tuple[Lane, ...]
