@@ -33,7 +33,6 @@ _DISC_M = 1.0
 """Bodies of others are covered by discs so far apart."""
 _GAP_M = 0.6
 """Left to whoever is ahead."""
-_CLOSER_M = 1e-3
 _STANDS_MPS = 0.05
 
 
@@ -162,12 +161,52 @@ def _place(other: Array, ways: Array, sigma: float) -> tuple[float, float]:
 
 
 @compiled
+def _parted(pose: Array, front: float, back: float, wide: float, other: Array, side: float) -> bool:
+    """Whether a body, from so far behind its middle to so far ahead, is clear of one that stands, by separating axes."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    dx, dy = other[0] - pose[0], other[1] - pose[1]
+    u, v = c * dx + s * dy, c * dy - s * dx
+    tc, ts = math.cos(other[2] - pose[2]), math.sin(other[2] - pose[2])
+    a, b = other[4] / 2.0 + side, other[5] / 2.0 + side
+    along, across = abs(tc) * a + abs(ts) * b, abs(ts) * a + abs(tc) * b
+    if u - along >= front or u + along <= -back or abs(v) - across >= wide:
+        return True
+    middle, long = (front - back) / 2.0, (front + back) / 2.0
+    x, y = tc * (u - middle) + ts * v, tc * v - ts * (u - middle)
+    return abs(x) >= a + abs(tc) * long + abs(ts) * wide or abs(y) >= b + abs(ts) * long + abs(tc) * wide
+
+
+@compiled
+def _met_standing(poses: Array, car: Array, other: Array) -> int:
+    """The first pose at which a car comes too close to somebody who stands; as many as there are for none.
+
+    Who is too close already may not come closer; who touches may get away.
+    """
+    long, wide = car[2] / 2.0, car[3] / 2.0
+    share = 1.0
+    if not _parted(poses[0], long + _GAP_M, long, wide, other, other[6]):
+        low, high = 0.0, 1.0
+        if not _parted(poses[0], long, long, wide, other, 0.0):
+            return len(poses)
+        for _ in range(20):
+            share = (low + high) / 2.0
+            if _parted(poses[0], long + share * _GAP_M, long, wide, other, share * other[6]):
+                low = share
+            else:
+                high = share
+        share = low
+    for i in range(1, len(poses)):
+        if not _parted(poses[i], long + share * _GAP_M, long, wide, other, share * other[6]):
+            return i
+    return len(poses)
+
+
+@compiled
 def met(poses: Array, dt_s: float, car: Array, others: Array, ways: Array, braking_mps2: float) -> int:
     """The first row of the others whom a car may touch on its way; -1 for none.
 
     Somebody may be anywhere between where they get at their present speed and where they get if they brake at once, as
-    long as the car moves; where it stands at last nobody may be who could not stop before it. Who stands closer than is
-    to be kept already is not to be come closer to.
+    long as the car moves; where it stands at last nobody may be who could not stop before it.
     """
     long, wide = car[2] / 2.0, car[3] / 2.0
     last = len(poses) - 1
@@ -176,35 +215,25 @@ def met(poses: Array, dt_s: float, car: Array, others: Array, ways: Array, braki
     for k in range(len(others)):
         other = others[k]
         speed = other[3]
+        if speed < _STANDS_MPS:
+            at = _met_standing(poses, car, other)
+            if at < best:
+                best, found = at, k
+            continue
         step = min(_DISC_M, other[4])
         radius = math.hypot(step / 2.0, other[5] / 2.0) + other[6]
         half = other[4] / 2.0 - step / 2.0
         brakes = other[7] > 0.0
         stands_m = speed * speed / (2.0 * braking_mps2) if brakes else 0.0
-        own = math.ceil(2.0 * half / step) + 1
         reach_m = max(speed * until, other[12], other[13])
-        discs = own + math.ceil(reach_m / step)
-        gap, kept = _GAP_M, radius
-        for attempt in range(2 if speed < _STANDS_MPS else 0):
-            closest = math.inf
-            for d in range(own):
-                px, py = _place(other, ways, min(-half + d * step, half))
-                closest = min(closest, _apart(poses[0], px, py, long, wide, gap))
-            if closest >= radius:
-                break
-            gap = 0.0
-            if attempt == 1:
-                kept = closest - _CLOSER_M
         minds, enters = False, -1
-        for d in range(discs):
+        for d in range(math.ceil((2.0 * half + reach_m) / step) + 2):
             sigma = -half + d * step
             ahead = sigma - half
-            # The body's middle has come far enough for it to cover this place, and has not gone too far yet.
-            soonest = 0.0
-            if ahead > 1e-9:
-                soonest = ahead / speed if speed > 0.0 else math.inf
-            if ahead > reach_m:
+            if ahead > reach_m + step:
                 break
+            # The body is beyond the disc before this one, and has not gone too far yet.
+            soonest = max(0.0, ahead - step) / speed
             px, py = _place(other, ways, sigma)
             if soonest <= until:
                 far = sigma + half + step  # until then no other disc covers the body's end
@@ -213,17 +242,15 @@ def met(poses: Array, dt_s: float, car: Array, others: Array, ways: Array, braki
                     latest = (speed - math.sqrt(max(0.0, speed * speed - 2.0 * braking_mps2 * far))) / braking_mps2
                 end = last if latest > until else math.ceil(latest / dt_s)
                 for i in range(max(1, int(soonest / dt_s)), min(end, best - 1, last) + 1):
-                    if _apart(poses[i], px, py, long, wide, gap) < kept:
+                    if _apart(poses[i], px, py, long, wide, _GAP_M) < radius:
                         best, found = i, k
                         break
             if ahead > 1e-9 and not minds:
                 minds = _apart(poses[0], px, py, long, wide, 0.0) < radius  # it is in their way already
-                at = 1 if ahead <= other[13] else last
-                if enters < 0 and ahead <= max(other[12], other[13]):
-                    if _apart(poses[at], px, py, long, wide, 0.0) < radius:
-                        enters = at
-                    elif ahead <= other[12] and _apart(poses[last], px, py, long, wide, 0.0) < radius:
-                        enters = last
+                if ahead <= other[13] and _apart(poses[1], px, py, long, wide, 0.0) < radius:
+                    enters = 1
+                elif enters < 0 and ahead <= other[12] and _apart(poses[last], px, py, long, wide, 0.0) < radius:
+                    enters = last
         if enters >= 0 and not minds and enters < best:
             best, found = enters, k
     return found

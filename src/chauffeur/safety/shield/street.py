@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation, VehicleState
 from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle
 from chauffeur.geometry import Polyline, Pose, RoadGraph, Route, joined, wrap_to_pi
+from chauffeur.geometry.ground import Ground
 from chauffeur.safety.shield import failsafe
 from chauffeur.safety.shield.gaps import rss_gap_m
 from chauffeur.safety.shield.shield import FilterResult, Shield
@@ -42,6 +43,8 @@ _SIDE_M: Final = 0.15
 _PERSON_SIDE_M: Final = 0.4
 _EDGE_M: Final = 0.1
 """What the outline may reach over the edge of its ground: the filter knows the car exactly, and lanes to that."""
+_OVERHANG_M: Final = 0.4
+"""What a bumper may reach over a kerb in a bend that is too tight for it otherwise: less than to any walking person."""
 _LEVEL_M: Final = 1e-6
 _OVER_M: Final = 1.0
 """Who is farther over a line than this, and cannot wait with its tail before it, clears the junction."""
@@ -73,7 +76,6 @@ class _Way:
         most_mps: Speed for the bends ahead, every metre.
         edge_m: How far a car may reach beyond its ground, every metre: as far as one whose rear axle follows the line,
             for in the tightest bends no car's front keeps to the lane.
-        kerb_m: The same of the ground of both directions; the same array where all of the way is `_EDGE_M`.
     """
 
     lanes: tuple[LaneId, ...]
@@ -83,7 +85,6 @@ class _Way:
     own: int
     most_mps: Array
     edge_m: Array
-    kerb_m: Array
 
     def station_m(self, ego: VehicleState) -> float:
         """How far along the line the ego is."""
@@ -248,13 +249,8 @@ class StreetShield(Shield):
         return wrong
 
     def _fault(self, now: _Instant, way: _Way, poses: Array) -> _Fault | None:
-        rows = poses[:, 4].astype(np.int64)
-        for either_way, edge_m in ((False, way.edge_m), (True, way.kerb_m)):
-            if either_way and edge_m is way.edge_m:
-                break
-            beyond = self._beyond_m(now.road, poses[:, :3], either_way=either_way)
-            if (beyond[1:] > np.maximum(edge_m[rows[1:]], beyond[0]) + _LEVEL_M).any():
-                return _Fault()
+        if self._strays(now.road.ground, way, poses):
+            return _Fault()
         around = now.around
         if len(around.rows):
             row = failsafe.met(
@@ -264,9 +260,22 @@ class StreetShield(Shield):
                 return _Fault(around.who[row])
         return None
 
-    def _beyond_m(self, road: RoadGraph, poses: Array, *, either_way: bool) -> Array:
-        car = self._car
-        return road.ground.beyond_m(poses, car.length_m, car.width_m, stops=True, either_way=either_way)
+    def _strays(self, ground: Ground, way: _Way, poses: Array) -> bool:
+        """Whether the outline leaves its ground on a way, or gets farther out where it is out already."""
+        car, places = self._car, poses[:, :3]
+        beyond = ground.beyond_m(places, car.length_m, car.width_m, stops=True)
+        edge = way.edge_m[poses[:, 4].astype(np.int64)]
+        if (beyond[1:] > np.maximum(edge[1:], beyond[0]) + _LEVEL_M).any():
+            return True
+        swings = edge > _EDGE_M + _LEVEL_M
+        if not swings[1:].any():
+            return False
+        # Where a front swings out, it does so over lanes and kerbs, and the wheels stay on the road.
+        beyond = ground.beyond_m(places, car.length_m, car.width_m, stops=True, either_way=True)
+        if (beyond[1:] > np.maximum(_OVERHANG_M, beyond[0]) + _LEVEL_M).any():
+            return True
+        wheels = ground.beyond_m(places, car.wheelbase_m, car.width_m, stops=True, either_way=True)
+        return bool((wheels[1:] > np.maximum(_EDGE_M, wheels[0]) + _LEVEL_M).any())
 
     # The way ----------------------------------------------------------------------------------------------------------
 
@@ -538,15 +547,6 @@ def _laid(road: RoadGraph, chain: tuple[LaneId, ...], own: int, car: KinematicBi
     smooth[1:-1] = (smooth[:-2] + smooth[1:-1] + smooth[2:]) / 3.0
     ahead = car.rear_to_middle_m
     bodies = np.stack([rows[:, 0] + ahead * np.cos(smooth), rows[:, 1] + ahead * np.sin(smooth), smooth], axis=1)
-    edges = [
-        _widest(road.ground.beyond_m(bodies, car.length_m, car.width_m, stops=True, either_way=one)) + _EDGE_M
-        for one in (False, True)
-    ]
-    kerb = edges[1] if edges[0].max() > _EDGE_M else edges[0]
-    return _Way(chain, tuple(starts), line, rows, own, most, edges[0], kerb)
-
-
-def _widest(values: Array) -> Array:
-    """The greatest value within two places of each."""
-    padded = np.pad(values, 2, mode="edge")
-    return np.max([padded[i : i + len(values)] for i in range(5)], axis=0)
+    swing = np.pad(road.ground.beyond_m(bodies, car.length_m, car.width_m, stops=True), 2, mode="edge")
+    widest = np.max([swing[i : i + len(rows)] for i in range(5)], axis=0)
+    return _Way(chain, tuple(starts), line, rows, own, most, widest + _EDGE_M)
