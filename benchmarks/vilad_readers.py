@@ -2,7 +2,6 @@
 
     python benchmarks/vilad_readers.py                 # the models that ship, 300 commands a split
     python benchmarks/vilad_readers.py --seed 77       # other commands and scenes
-    python benchmarks/vilad_readers.py --write         # the models' cards and facts as well
 
 Success is judged by the solver that stands behind every row, so rows differ in how words are read and in nothing else.
 The first row reads nothing: it is what a scene gives away. Some four CPU minutes; the extra is `chauffeur[models]`.
@@ -11,14 +10,13 @@ The first row reads nothing: it is what a scene gives away. Some four CPU minute
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Mapping
 
 from chauffeur.bench.kernel.report import markdown
 from chauffeur.models.vilad.baseline import COMMANDS, linear_reader
 from chauffeur.models.vilad.evaluation import figures, solved
 from chauffeur.models.vilad.phrases import TESTS
-from chauffeur.models.vilad.pipeline import MODELS, TEST_COMMANDS, TEST_SEED, ViladModel, measure_again
+from chauffeur.models.vilad.pipeline import MODELS, TEST_COMMANDS, TEST_SEED, ViladModel
 from chauffeur.planners.vilad import driving, parking
 from chauffeur.planners.vilad.engine import SHIPPED, ViladEngine
 
@@ -52,24 +50,16 @@ def table(model: ViladModel, name: str, count: int, seed: int) -> str:
     return markdown(("success, %", *TESTS), cells)
 
 
-def _unheard(stage: str, done: int, of: int) -> None:
-    del stage, done, of
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=TEST_COMMANDS, help="commands a split")
     parser.add_argument("--seed", type=int, default=TEST_SEED, help="of commands and scenes")
-    parser.add_argument("--write", action="store_true", help="write the cards and facts of the models that ship")
+    parser.add_argument("--model", choices=list(MODELS), action="append", help="only this one; may come again")
     given = parser.parse_args()
-    for name, make in MODELS.items():
-        model = make()
+    for name in given.model or MODELS:
+        model = MODELS[name]()
         print(f"\n{name}, {given.count} commands a split, seed {given.seed}\n")
         print(table(model, name, given.count, given.seed), flush=True)
-        if given.write:
-            folder = FOLDERS[name][0]
-            about = json.loads((folder / "model.json").read_text(encoding="utf-8"))
-            measure_again(model, folder, about, _unheard)
 
 
 if __name__ == "__main__":

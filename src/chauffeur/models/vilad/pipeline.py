@@ -145,18 +145,13 @@ def ship(model: ViladModel, network: Vilad, recipe: ViladRecipe, target: Path, t
         "parameters": parameter_count(network),
     }
     export(network, target, about)
-    measure_again(model, target, about, told)
-    return target
-
-
-def measure_again(model: ViladModel, target: Path, about: dict[str, Any], told: Told) -> None:
-    """Measure what a folder holds; its facts (`model.json`, `about`) and its card then say so."""
     found, baseline = measured(model, target, told)
     about["figures"] = {split: asdict(one) for split, one in found.items()}
     about["linear_reader_and_solver"] = baseline
     publish(target / "model.json", (json.dumps(about, indent=1) + "\n").encode(), "model's facts")
     size = (target / "model.onnx").stat().st_size
     publish(target / "MODEL_CARD.md", model_card(model, about, size).encode(), "model card")
+    return target
 
 
 def measured(
