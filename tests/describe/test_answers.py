@@ -39,6 +39,26 @@ def test_what_c_holds_is_told(question: str, holds: str) -> None:
     assert holds in answer_to(question, WET)
 
 
+SEEN = "There is no car ahead of me in my lane within 100 m. The traffic light 24 m ahead is {}. We go on."
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        "Why are we standing?",
+        "why did you stop here",
+        "Why aren't we moving?",
+        "Why are you braking?",
+        "why have we stopped",
+    ],
+)
+def test_why_the_car_stands_is_read_off_what_is_ahead(question: str) -> None:
+    assert "traffic light 24 m ahead is red" in answer_to(question, ROAD, SEEN.format("red"))
+    assert "40 m" not in answer_to(question, ROAD, SEEN.format("green"))
+    assert "12 m" in answer_to(question, replace(ROAD, front=Lead(2, 12.0, 0.0)), SEEN.format("green"))
+    assert "no light" in answer_to(question, replace(ROAD, front=None), SEEN.format("green"))
+
+
 def test_what_c_does_not_hold_is_not_made_up() -> None:
     for question in ("What's the weather?", "What is the capital of France?", "What time is it?", "Who won the game?"):
         assert asks_to_know(question)

@@ -12,14 +12,29 @@ from typing import Final
 from chauffeur.concept import Situation
 from chauffeur.concept.units import kmh, mph
 from chauffeur.describe.road import SIGHT_M, ordinal
+from chauffeur.language.questions import ADDRESS
 from chauffeur.language.tokens import words_of
 
 DONT_KNOW: Final = "I don't know that. I can tell our speed, the limit, our lane and who is ahead."
 
+_US: Final = r"(?:i|we|you|it|he|the car)"
+_WHY_STANDING: Final = re.compile(
+    rf"{ADDRESS}why (?:(?:are|did|do|have|is|has) {_US} (?:just |now |still |all )?"
+    r"(?:stand\w*|stop\w*|wait\w*|brak\w*|slow(?:ed|ing)|still)|"
+    rf"(?:are|is) (?:not {_US}|{_US} (?:still )?not) (?:moving|driving|going))"
+    r"(?: (?:here|now|there|down|still|for|at all|anywhere))*$"
+)
+"""Why the car stands or brakes; not a complaint that it is slow, which is a wish."""
+_IN_THE_WAY: Final = re.compile(r"light [^.]{0,40}(?:red|yellow)|on foot|stop sign")
+_SENTENCE_ENDS: Final = re.compile(r"(?<=[a-z])\. ")
+_STANDS_BEHIND_M: Final = 25.0
+"""A car this near ahead, centre to centre, may be why one brakes or waits."""
+_NO_REASON: Final = "I see no light, sign, car or person ahead that would hold us up."
+
 _MAY: Final = r"(?:may|can|could|should|must)"
 _WE: Final = r"(?:i|we|you|one)"
 _ASKS: Final = re.compile(
-    r"^(?:(?:please|hey|ok|so|and|well|excuse me|sorry) ?,? ?)*"
+    rf"{ADDRESS}"
     r"(?:(?:can|could|would|will) you (?:please )?tell (?:me|us) |(?:do|did) you (?:happen to )?know |"
     r"tell (?:me|us) |i wonder )?"
     r"(?:whats?|which|how (?:fast|far|many|much|long|old|big|tall|close|late)|where|when|who|whose|"
@@ -128,15 +143,33 @@ _TOPICS: Final[tuple[tuple[re.Pattern[str], Callable[[Situation], str]], ...]] =
 )
 
 
+def _held_up(situation: Situation, seen: str) -> str:
+    """What C holds that may be why the car stands or brakes."""
+    front = situation.front
+    found = [one.rstrip(". ") for one in _SENTENCE_ENDS.split(seen) if _IN_THE_WAY.search(one) and "no stop" not in one]
+    if front is not None and front.distance_m < _STANDS_BEHIND_M:
+        found.append(_front(situation).rstrip("."))
+    told = ". ".join(re.sub(r"\bmy\b", "our", re.sub(r"\bme\b", "us", one)) for one in found)
+    return f"{told}." if told else _NO_REASON
+
+
 def asks_to_know(text: str) -> bool:
     """Whether words ask for knowledge and for nothing to be done."""
     words = words_of(text).rstrip(" ?.!")
     return _ASKS.match(words) is not None and _PROPOSES.search(words) is None and not re.search(r"[.,;!?]", words)
 
 
-def answer_to(text: str, situation: Situation) -> str:
-    """What C says to a question about it; empty where it is no such question, or C does not hold the answer."""
+def answer_to(text: str, situation: Situation, seen: str = "") -> str:
+    """What C says to a question about it; empty where it is no such question, or C does not hold the answer.
+
+    Args:
+        text: The person's words.
+        situation: C as numbers.
+        seen: C in words.
+    """
+    words = words_of(text).rstrip(" ?.!")
+    if _WHY_STANDING.match(words):
+        return _held_up(situation, seen)
     if not asks_to_know(text):
         return ""
-    words = words_of(text).rstrip(" ?.!")
     return next((said for pattern, answer in _TOPICS if pattern.search(words) and (said := answer(situation))), "")

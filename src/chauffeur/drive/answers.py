@@ -24,7 +24,7 @@ async def plan_or_answer(planner: Planner, request: PlanRequest) -> Plan:
     """
     begun = time.perf_counter()
     words = request.instruction.text
-    said = answer_to(words, request.context.situation)
+    said = answer_to(words, request.context.situation, request.context.text)
     if said:
         return declined(planner, said, begun, intent=ANSWERED)
     plan = await planner.plan(request)

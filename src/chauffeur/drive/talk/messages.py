@@ -237,6 +237,7 @@ class Conversation:
         opinion: What the person said of it afterwards.
         remembered: Where it stands in the memory, in words; empty where it is not remembered (yet).
         stages: Latency.
+        ends: Whether the plan may end by itself, as a turn or a way to a place; not one that holds a speed.
     """
 
     wish: str
@@ -255,6 +256,7 @@ class Conversation:
     remembered: str = ""
     stages: StageTimes = StageTimes()
     follows: str = ""
+    ends: bool = False
     kind: Literal["conversation"] = "conversation"
 
 

@@ -11,6 +11,7 @@ const STAGES = {
 };
 const OUTCOMES = {
   finished: ['✓', 'Done', 'good'],
+  answered: ['✓', 'Answered', 'good'],
   declined: ['–', 'Declined', 'bad'],
   unplanned: ['✕', 'No plan could be made', 'bad'],
   refused: ['✕', 'Refused by a check', 'bad'],
