@@ -44,14 +44,14 @@ _BESIDE: Final = re.compile(
 _CLAUSE_ENDS: Final = re.compile(r"[.,;!?]")
 
 _ACKNOWLEDGED: Final = re.compile(
-    r"(?:(?:ok|okay|yes|yeah|yep|yup|sure|fine|good|great|nice|perfect|cool|lovely|super|thanks|thank you|cheers|"
+    r"\A(?:(?:ok|okay|yes|yeah|yep|yup|sure|fine|good|great|nice|perfect|cool|lovely|super|thanks|thank you|cheers|"
     r"all right|alright|well done|good job|excellent|wonderful|brilliant|wow|oh|ah|aha|hm+|i see|got it|understood|"
     r"no problem|no worries|hello|hi|hey|car|chauffeur|very|so|much|a lot|then|it is)[ .,!]{0,3})+"
 )
 """An answer, thanks or a greeting, and nothing to be done."""
 
 _GOODBYES: Final = re.compile(
-    r"(?:(?:ok|okay|right|so|well|please|now|and|thanks|thank you|hey|car|chauffeur) ?,? ?)*"
+    r"\A(?:(?:ok|okay|right|so|well|please|now|and|thanks|thank you|hey|car|chauffeur) ?,? ?)*"
     r"(?::?q|quit|exit|end|bye|bye bye|goodbye|good bye|log out|logout|log off|sign off|see you|"
     r"(?:quit|exit|close|end|leave|finish|terminate|shut down|stop) (?:the |this |our )?"
     r"(?:session|program|programme|app|application|conversation|chat|talk|terminal)|"
