@@ -30,7 +30,8 @@ def test_a_question_has_its_form(text: str) -> None:
     [
         "Can you slow down?", "Could we overtake?", "Would you mind going faster?", "Will you please stop?",
         "Won't you let him in?", "How about the left lane?", "What about turning here?", "Why don't we turn left?",
-        "Is it possible to go faster?", "Is there any chance you could hurry?", "Do that again.", "Have the truck pass.",
+        "Is it possible to go faster?", "Is there any chance you could hurry?", "Do that again.",
+        "Have the truck pass.",
         "Do the next exit.", "What are you waiting for? Go!", "Why so slow, overtake him", "Turn left. Is that ok?",
         "When you can, turn left.", "Where it is safe, stop.", "Take the exit now.", "", "?",
     ],

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept import Situation
+from chauffeur.concept import Context, Situation
 from chauffeur.concept.units import kmh, mph
 from chauffeur.describe.road import SIGHT_M, ordinal
 from chauffeur.language.questions import ADDRESS
 from chauffeur.language.tokens import words_of
+from chauffeur.worlds.places import Destination
 
 DONT_KNOW: Final = "I don't know that. I can tell our speed, the limit, our lane and who is ahead."
 
@@ -38,7 +40,7 @@ _ASKS: Final = re.compile(
     r"(?:(?:can|could|would|will) you (?:please )?tell (?:me|us) |(?:do|did) you (?:happen to )?know |"
     r"tell (?:me|us) |i wonder )?"
     r"(?:whats?|which|how (?:fast|far|many|much|long|old|big|tall|close|late)|where|when|who|whose|"
-    r"is there|are there|is it)\b"
+    r"is there|are there|is it|are we (?:nearly |almost |soon |about )?there|will we (?:arrive|be there) soon)\b"
 )
 """How a question begins that wants to know something; not one that asks for something, complains or proposes."""
 _PROPOSES: Final = re.compile(
@@ -50,6 +52,10 @@ _THEIRS: Final = (
     r"(?:the|that|this) (?:\w+ )?(?:car|vehicle|truck|van|lorry|bus|one|guy|driver|front|lead)\b.*)"
 )
 _AHEAD: Final = r"(?:ahead|in front|before us|front|lead)"
+
+
+_WAY: Final = "way"
+"""Name of the fact how far it is to where the car is going."""
 
 
 def _speed(speed_mps: float) -> str:
@@ -92,6 +98,16 @@ def _turns(situation: Situation) -> str:
     return f"At the next junction we can go {' or '.join(situation.turns)}."
 
 
+def with_way(context: Context, there: Destination | None) -> Context:
+    """C that knows how far it is to where the car is going; as it was where that is nowhere."""
+    if there is None:
+        return context
+    left = f"{there.left_m / 1000.0:.1f} km" if there.left_m >= 1000.0 else f"{max(10.0, there.left_m):.0f} m"
+    words = f"It is about {left} by road to {there.name or 'where we are going'}."
+    situation = replace(context.situation, scene=(*context.situation.scene, (_WAY, words)))
+    return replace(context, situation=situation)
+
+
 def _of_scene(name: str) -> Callable[[Situation], str]:
     return lambda situation: dict(situation.scene).get(name, "")
 
@@ -99,6 +115,15 @@ def _of_scene(name: str) -> Callable[[Situation], str]:
 _TOPICS: Final[tuple[tuple[re.Pattern[str], Callable[[Situation], str]], ...]] = tuple(
     (re.compile("|".join(patterns)), answer)
     for patterns, answer in (
+        (
+            (
+                r"\b(?:are|were) we (?:\w+ )?there\b|\bwhen (?:do|will|are) we (?:arrive|get there|be there|there)\b",
+                r"\bhow (?:far|long(?! (?:ha|is|was|did))|much longer|many minutes|soon)\b"
+                r"(?!.*\b(?:ahead|front|away|behind)\b)",
+                r"\bwhere (?:are we (?:going|heading)|are you taking)\b|\bwill we (?:arrive|be there) soon\b",
+            ),
+            _of_scene(_WAY),
+        ),
         ((r"\b(?:weather|raining|rain|snowing|foggy|forecast)\b(?! tomorrow)",), _of_scene("weather")),
         ((r"\btraffic (?:like|ahead|rules?)\b|\btraffic$",), _of_scene("traffic")),
         (

@@ -217,7 +217,8 @@ def _meant(plan: Plan, instruction: Instruction) -> Plan:
     if plan.policy is None or instruction.confirmed or not is_question(instruction.text):
         return plan
     does = _FIRST_SENTENCE.match(plan.thoughts.text)
-    words = f"I go on as we are. Or did you mean that I should act? I would: {does[0] if does else instruction.text}"
+    as_read = "" if does is None or instruction.text in does[0] else f" As I read it: {does[0]}"
+    words = f"I take that for a question, and go on as we are. Shall I act on it?{as_read}"
     return replace(plan, policy=None, thoughts=Thoughts(words), refusal=words, offer=instruction.text, intent="ask")
 
 

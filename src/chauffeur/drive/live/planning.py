@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import CameraImage, ChauffeurError, Context, History, Instruction, Observation, PersonId, Plan
+from chauffeur.describe.answers import with_way
 from chauffeur.describe.services.sources import Sources, SourceSettings
 from chauffeur.drive.emergency import NO_SHOULDER, planned_for
 from chauffeur.drive.events import DriveEvent, WishEventKind
@@ -39,6 +40,7 @@ from chauffeur.planners.base import Planner, looks
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.programs.catalogue import vocabulary_of
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
+from chauffeur.worlds.places import TownPlaces
 
 FOLLOW_FOR_S: Final = 600.0
 """Vehicle time for which a plan may be followed."""
@@ -147,10 +149,12 @@ class Planning:
         self._mirror.follow()
         observation, limits = self._mirror.world.observe(), self._mirror.limits
         scene = PlannedScene.of(self._mirror.trip, observation)
+        world = self._mirror.world
+        there = world.destination() if isinstance(world, TownPlaces) else None
         instruction = replace(parse_wish(request.text, PersonId(request.person)), confirmed=request.confirmed)
 
         async def describe() -> Context:
-            return (await describing(self._sources))(observation)
+            return with_way((await describing(self._sources))(observation), there)
 
         async def recall(instruction: Instruction, context: Context) -> History:
             return self._memory.recall(instruction.person, instruction, context, RECALLED)

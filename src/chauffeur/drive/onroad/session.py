@@ -65,7 +65,7 @@ from chauffeur.drive.planning import (
     PlanSteps,
     plan_once,
 )
-from chauffeur.drive.questions import NOT_MEANT, OpenQuestion
+from chauffeur.drive.questions import NOT_MEANT, NOTHING_ASKED, OpenQuestion
 from chauffeur.drive.session import MAX_WISH_CHARACTERS
 from chauffeur.drive.session_recorder import FLUSH_TIMEOUT_S
 from chauffeur.language.questions import said_aside
@@ -77,6 +77,7 @@ from chauffeur.planners.talk2drive.planner import system_text
 from chauffeur.planners.talk2drive.style import LOOK_AHEAD
 from chauffeur.safety.audit.writer import utc_now
 from chauffeur.safety.words import reasons_once
+from chauffeur.speech.answers import takes_back
 from chauffeur.worlds.ros import Published, RosVehicleState, VehicleError, VehicleInterface
 from chauffeur.worlds.ros.autoware_ai import AutowareAi, PlannedSpeed
 from chauffeur.worlds.ros.settings import VehicleSettings
@@ -285,6 +286,8 @@ class VehicleSession:
         self, number: int, text: str, source: Literal["text", "speech"]
     ) -> tuple[OnRoadAnswer, PlanRequest | None]:
         """The answer, and what was planned for, if anything was."""
+        if takes_back(text) and not self._question.open:
+            return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "answered", NOTHING_ASKED), None
         try:
             meant = self._question.settle(text, self._person)
         except InstructionError as error:

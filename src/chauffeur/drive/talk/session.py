@@ -24,6 +24,7 @@ from chauffeur.drive.live.recorder import LiveRecorder
 from chauffeur.drive.live.settings import Settings, ring
 from chauffeur.drive.live.supervisor import Interaction, Runtime
 from chauffeur.drive.live.trip_memory import trip_of
+from chauffeur.drive.questions import NOTHING_ASKED
 from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.attention import Attention
 from chauffeur.drive.talk.conversations import Conversations
@@ -58,7 +59,7 @@ from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergen
 from chauffeur.language.questions import ends_session
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.safety.bounds import shoulder_at_right
-from chauffeur.speech.answers import answer_in
+from chauffeur.speech.answers import answer_in, takes_back
 
 ASK_AFTER_S: Final = 15.0
 """So long a wish is driven, in the car's time, before the car asks how it is: many have no end of their own."""
@@ -315,6 +316,10 @@ class Talk:
             self._say(Note(LEAVING))
             self._stop()
             return
+        if takes_back(words.text) and not self._on_its_way:
+            self._asking.pass_over(words.text, "answered", NOTHING_ASKED)
+            self._say(Note(NOTHING_ASKED))
+            return
         if self._stopping:
             self._say(Note(f"The car is stopping; “{words.text}” is not asked."))
             self._asking.pass_over(words.text, "not_asked", OVER)
@@ -323,6 +328,13 @@ class Talk:
             self._say(Note(f"You have the wheel; give it back before you wish for something: “{words.text}”."))
             return
         self._asking.put(words)
+
+    @property
+    def _on_its_way(self) -> bool:
+        """Whether a wish has no plan yet, which a newer one takes back."""
+        return self.busy or (
+            self._runtime is not None and any(one.stage == "asked" for one in self._runtime.open_wishes)
+        )
 
     def _act_on(self, hotword: str, words: Words) -> None:
         """What was heard and is meant."""

@@ -9,9 +9,10 @@ from chauffeur.concept import Observation, Scenario, ScenarioError, Signal, Sign
 from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ
 from chauffeur.geometry import LaneId, LanePlace, Route, plan_route
 from chauffeur.worlds.parking.path_follower import Chassis
+from chauffeur.worlds.places import Destination
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
 from chauffeur.worlds.town.instant import TownInstant
-from chauffeur.worlds.town.pack import MapPack, SignalGroup
+from chauffeur.worlds.town.pack import MapPack, SignalGroup, places_called
 from chauffeur.worlds.town.perception import TownPerception
 from chauffeur.worlds.town.sumo import engine_name
 from chauffeur.worlds.town.trip import TownConfig, TownTrip, goal_in
@@ -117,6 +118,19 @@ class TownScene:
     def reached(self) -> str | None:
         """The place that was set out for, while the car stands there."""
         return None if self._stood is None else self._stood[0]
+
+    def destination(self) -> Destination | None:
+        """Where the car is going; None where it goes nowhere, or is there."""
+        driver, road = self._driver, self.town.road
+        if driver is None or not driver.has_goal or self._stood is not None:
+            return None
+        route = driver.route
+        end = road[route.lanes[-1]].centre.at(route.goal_m)
+        here = next((i for i, lane in enumerate(route.lanes) if lane == self._lane), None)
+        if here is not None:
+            route = Route(route.lanes[here:], self._ego_station, route.goal_m)
+        named = places_called(self.town.places, self._place) if self._place else ()
+        return Destination(named[0].name if named else "", end.x_m, end.y_m, max(0.0, route.length_m(road)))
 
     @property
     def arrived(self) -> bool:

@@ -414,6 +414,24 @@ export function makeScene(canvas) {
     return () => label(words, x - 30, y - 14, colour['label-back'], colour['label-ink']);
   }
 
+  /* Where the car is going: a pin, or at the edge of the picture the direction of it. */
+  function drawDestination(at) {
+    const { goal } = scene;
+    if (!goal) return;
+    const [x, y] = toScreen(at, goal.x_m, -goal.y_m);
+    const [px, py] = [Math.min(Math.max(x, 24), size.width - 24), Math.min(Math.max(y, 64), size.height - 72)];
+    ctx.beginPath();
+    ctx.arc(px, py, 8, 0, 7);
+    ctx.fillStyle = colour['ego-fill'];
+    ctx.fill();
+    ctx.lineWidth = 3;
+    ctx.strokeStyle = colour['label-back'];
+    ctx.stroke();
+    label(goalWords(goal), px + 14, py, colour['label-back'], colour['label-ink']);
+  }
+
+  const goalWords = (goal) => `${goal.name || 'Destination'} · ${goal.left_m < 1000 ? `${Math.round(goal.left_m / 10) * 10} m` : `${(goal.left_m / 1000).toFixed(1)} km`}`;
+
   function draw(now) {
     if (!road || !scene || !size.width) return;
     glide(now);
@@ -429,12 +447,14 @@ export function makeScene(canvas) {
     drawBody(scene.ego, true);
     enterScreen();
     if (nameLead) nameLead();
+    drawDestination(at);
   }
 
   /* What is to be seen, in words. */
   function words() {
     if (!scene || !road) return '';
     const parts = [`At ${kmh(scene.ego.speed_mps)} km/h${scene.street ? ` on ${scene.street}` : ''}.`];
+    if (scene.goal) parts.push(`On the way: ${goalWords(scene.goal)}.`);
     const lane = laneOf(scene.ego.x_m, scene.ego.y_m, scene.ego.heading_rad);
     const abreast = lane && lane.road ? road.lanes.filter((other) => other.road === lane.road && (!other.e || lane.e)) : [];
     if (abreast.length > 1) {
