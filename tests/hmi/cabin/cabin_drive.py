@@ -84,7 +84,8 @@ def driving(scenario: str = "cruise", *, engine: str = "", planner: str = "retri
                                 drive.told.append(told)
                             talk.take(told)
                         talk.poll()
-                    talk.abort()
+                    if talk.driving:
+                        talk.abort()
             except BaseException as error:
                 failed.append(error)
 

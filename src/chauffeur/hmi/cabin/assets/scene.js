@@ -1,6 +1,6 @@
 /* The road from above, in metres; y grows to the right of +x, as on a canvas. The car stands near the middle. */
 
-import { kmh } from './words.js';
+import { goalWords, kmh } from './words.js';
 
 const LONGEST_GLIDE_MS = 300;
 const JUMP_M = 30;
@@ -427,10 +427,13 @@ export function makeScene(canvas) {
     ctx.lineWidth = 3;
     ctx.strokeStyle = colour['label-back'];
     ctx.stroke();
-    label(goalWords(goal), px + 14, py, colour['label-back'], colour['label-ink']);
+    if (px === x && py === y) return;
+    const turn = Math.atan2(y - py, x - px);
+    ctx.beginPath();
+    for (const [far, aside] of [[20, 0], [12, -0.6], [12, 0.6]]) ctx.lineTo(px + far * Math.cos(turn + aside), py + far * Math.sin(turn + aside));
+    ctx.fillStyle = colour['label-back'];
+    ctx.fill();
   }
-
-  const goalWords = (goal) => `${goal.name || 'Destination'} · ${goal.left_m < 1000 ? `${Math.round(goal.left_m / 10) * 10} m` : `${(goal.left_m / 1000).toFixed(1)} km`}`;
 
   function draw(now) {
     if (!road || !scene || !size.width) return;
@@ -454,7 +457,7 @@ export function makeScene(canvas) {
   function words() {
     if (!scene || !road) return '';
     const parts = [`At ${kmh(scene.ego.speed_mps)} km/h${scene.street ? ` on ${scene.street}` : ''}.`];
-    if (scene.goal) parts.push(`On the way: ${goalWords(scene.goal)}.`);
+    if (scene.goal) parts.push(`${goalWords(scene.goal)}.`);
     const lane = laneOf(scene.ego.x_m, scene.ego.y_m, scene.ego.heading_rad);
     const abreast = lane && lane.road ? road.lanes.filter((other) => other.road === lane.road && (!other.e || lane.e)) : [];
     if (abreast.length > 1) {
