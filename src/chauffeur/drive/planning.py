@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import re
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
@@ -42,6 +43,7 @@ from chauffeur.concept import (
 from chauffeur.drive.answers import plan_or_answer
 from chauffeur.drive.emergency import ALARM_WORDS, alarm_of, check_told_not_to, is_bare_stop, raised
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
+from chauffeur.language.questions import is_question
 from chauffeur.planners.base import Planner
 from chauffeur.planners.base import declined as declined_by
 from chauffeur.safety.base import Check
@@ -91,6 +93,7 @@ class PlanSteps:
         fit: What the vehicle takes of a plan, whose maker knows no vehicle.
         tell: Hears each letter as it comes.
         within_s: Time of the clock after which the planner is given up on.
+        runs: Whether an earlier wish is driven, or on its way: a question does not end it without a yes.
     """
 
     planner: Planner
@@ -105,6 +108,7 @@ class PlanSteps:
     fit: Callable[[Plan], Plan] = _as_it_is
     tell: Listener = nobody_listens
     within_s: float = math.inf
+    runs: bool = False
 
 
 @dataclass(frozen=True)
@@ -219,13 +223,27 @@ async def _answered(request: PlanRequest, wish: Verdict, steps: PlanSteps) -> tu
         return True, steps.fit(own)
     if wish.stops:
         return False, declined_by(steps.planner, wish.reason, time.perf_counter(), intent="refuse")
-    plan = await _worth_asking(steps.fit(await _planned(request, steps)), request, steps)
+    plan = steps.fit(await _planned(request, steps))
+    plan = await _worth_asking(_meant(plan, request.instruction) if steps.runs else plan, request, steps)
     alarm = alarm_of(plan, text)
     if not alarm and is_bare_stop(plan, text):
         verdicts, _ = await (steps.check if steps.check_yes is None else steps.check_yes)(plan, False)
         alarm = "stop" if any(one.stops for one in verdicts) else ""
     answer = steps.own(ALARM_WORDS[alarm]) if alarm else None
     return (False, plan) if answer is None else (True, steps.fit(raised(alarm, answer, text)))
+
+
+def _meant(plan: Plan, instruction: Instruction) -> Plan:
+    """The plan; of words that have the form of a question, the question whether it is to be driven."""
+    if plan.policy is None or instruction.confirmed or not is_question(instruction.text):
+        return plan
+    does = _FIRST_SENTENCE.match(plan.thoughts.text)
+    as_read = "" if does is None or instruction.text in does[0] else f" As I read it: {does[0]}"
+    words = f"I take that for a question, and go on as we are. Shall I act on it?{as_read}"
+    return replace(plan, policy=None, thoughts=Thoughts(words), refusal=words, offer=instruction.text, intent="ask")
+
+
+_FIRST_SENTENCE: Final = re.compile(r"[^.:!?]{0,200}(?:[:] [^.!?]{0,200})?[.!?]?")
 
 
 async def _worth_asking(plan: Plan, request: PlanRequest, steps: PlanSteps) -> Plan:
