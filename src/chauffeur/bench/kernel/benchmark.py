@@ -45,7 +45,8 @@ class BenchJob(Protocol):
         ...
 
     def run(self) -> Row:
-        """The result: JSON, with `key`, and `infra_failed` where only the machine is to blame."""
+        """The result: JSON, with `key`, `infra_failed` (whether only the machine is to blame) and, where the item's own
+        data forbid to do it at all, `undriven`."""
         ...
 
     def spoiled(self, detail: str) -> Row:
@@ -88,6 +89,16 @@ class ItemOutcome(Generic[T]):
     def failed(self) -> bool:
         """Whether it was tried in vain: no answer came, or the machine failed."""
         return bool(self.error and self.answer is None) or bool(self.result and self.result["infra_failed"])
+
+    @property
+    def undriven(self) -> bool:
+        """Whether it could not be done at all: tried in vain, or its own data forbid it."""
+        return self.failed or bool(self.result and self.result.get("undriven"))
+
+    @property
+    def why(self) -> str:
+        """What stood in the way, where something did."""
+        return self.error or str((self.result or {}).get("detail") or "")
 
 
 Asks = Literal["plans", "words", ""]
