@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +93,7 @@ def test_where_a_scene_ends_the_truth_is_not_known(tmp_path: Path) -> None:
     [
         (lambda folder: (folder / "ego_pose.json").unlink(), "ego_pose"),
         (lambda folder: (folder / "sample.json").write_text("{nothing"), "sample.json"),
-        (lambda folder: (folder / "ego_pose.json").write_text("[]"), "no CAM_FRONT frame with a pose"),
+        (lambda folder: (folder / "ego_pose.json").write_text("[]"), "ego_pose.json has no row"),
         (lambda folder: (folder / "openloop.json").write_text('[{"token": 1}]'), "openloop.json"),
     ],
 )
@@ -210,7 +210,24 @@ def test_what_motion_tells_and_what_it_does_not() -> None:
         "\n".join(f"{0.5 * (i + 1)} s: ({x:+}, {y:+})" for i, (x, y) in enumerate(PATH)),
         " ".join(f"({0.5 * (i + 1)}, {x}, {y})" for i, (x, y) in enumerate(PATH)),
         "\n".join(f"- x = {x} m, y = {y} m" for x, y in PATH),
-        waypoints_text(PATH).replace("-", "\u2212"),
+        *(
+            waypoints_text(PATH).replace("-", sign)
+            for sign in ("\u2212", "\u2013", "\uff0d", "- ", "\u2212 ", "minus ")
+        ),
+        waypoints_text(PATH).replace("0.10", "0.10000000000000001").replace("(", "（").replace(")", "）"),
+        waypoints_text(PATH).translate({48 + i: 0xFF10 + i for i in range(10)}),
+        waypoints_text(PATH).translate({48 + i: 0x660 + i for i in range(10)} | {46: 0x66B}),
+        waypoints_text(PATH).replace(", ", "; ").replace(".", ","),
+        " ".join(f"({x:e}, {y:e})" for x, y in PATH.tolist()),
+        "\n".join(f"{i + 1}. {x}, {y}" for i, (x, y) in enumerate(PATH.tolist())),
+        "| t | x | y |\n|---|---|---|\n" + "\n".join(f"| {i / 2 + 0.5} | {x} | {y} |" for i, (x, y) in enumerate(PATH)),
+        waypoints_text(PATH) + " relative to the car at (0, 0).",
+        waypoints_text(PATH) + ". All from (0.0, 0.0) on, heading (1, 0).",
+        " ".join(f"Waypoint {i + 1}: ({x}, {y})." for i, (x, y) in enumerate(PATH)),
+        f"<thinking>{waypoints_text(PATH * 2)}</thinking>{waypoints_text(PATH)}",
+        f"{waypoints_text(PATH * 2)}</think>{waypoints_text(PATH)}",
+        f"{waypoints_text(PATH)}<|im_end|>\n<|im_start|>user\nThen?\n<|im_start|>assistant\n{waypoints_text(PATH * 2)}",
+        f"{waypoints_text(PATH)}\nThat is, {waypoints_text(PATH)}",
     ],
 )
 def test_waypoints_are_read_however_they_are_written(words: str) -> None:
@@ -220,10 +237,41 @@ def test_waypoints_are_read_however_they_are_written(words: str) -> None:
 
 @pytest.mark.parametrize(
     "words",
-    ["", "I cannot say.", "[(1, 2), (3, 4)]", "(1e99, 0) " * 6, "(nan, nan) " * 6, "(1, 2, 3) " * 6, "(" * 100_000],
+    [
+        "",
+        "I cannot say.",
+        "[(1, 2), (3, 4)]",
+        "(1e99, 0) " * 6,
+        "(nan, nan) " * 6,
+        "(1, 2, 3) " * 6,
+        "(" * 100_000,
+        "(2.5 ahead, 0.1 right), " * 6,
+        "(10², 0.1) " * 6,
+        "(2.5-0.1) " * 6,
+        f"{waypoints_text(PATH)} or {waypoints_text(PATH * 2)}",
+        f"<think>{waypoints_text(PATH)}",
+    ],
 )
 def test_what_are_no_waypoints_is_not_read_as_some(words: str) -> None:
     assert read_waypoints(words) is None
+
+
+@pytest.mark.parametrize(
+    ("case", "file", "sign"),
+    [
+        ("waypoints-long-floats", "reply.txt", 1),
+        ("waypoints-long-floats", "fullwidth-brackets.txt", 1),
+        ("waypoints-sign-lost", "en-dash.txt", -1),
+        ("waypoints-sign-lost", "fullwidth.txt", -1),
+        ("waypoints-sign-lost", "space.txt", -1),
+    ],
+)
+def test_recorded_waypoints_keep_their_signs(
+    case_folder: Callable[[str], Path], case: str, file: str, sign: int
+) -> None:
+    found = read_waypoints((case_folder(case) / file).read_text(encoding="utf-8"))
+    steps = np.arange(1, 7)
+    assert found is not None and np.allclose(found, np.stack([2.5 * steps, sign * 0.1 * steps], axis=1))
 
 
 # Runs -----------------------------------------------------------------------------------------------------------------
