@@ -190,7 +190,11 @@ def test_other_versions_are_recognised(header: str, fine: bool) -> None:
         (town(30, 120) + town(50), "", [(120.0, 50.0), (80.0, 30.0)]),
         (town(50) + town(30, 199.9), "", [(200.0, 50.0)]),
         (town(50) + town(30, 0.1), "", [(200.0, 30.0)]),
-        (town(50) + town(30, 60) + town(20, 100), speed(10, 80), [(60.0, 50.0), (20.0, 30.0), (20.0, 10.0), (100.0, 10.0)]),
+        (
+            town(50) + town(30, 60) + town(20, 100),
+            speed(10, 80),
+            [(60.0, 50.0), (20.0, 30.0), (20.0, 10.0), (100.0, 10.0)],
+        ),
     ],
 )
 def test_a_limit_inside_a_road_holds_from_there(extra: str, speeds: str, found: list[tuple[float, float]]) -> None:
