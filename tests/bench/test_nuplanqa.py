@@ -160,7 +160,7 @@ def test_an_endpoint_without_vision_is_told_of_every_item(tmp_path: Path, status
     failure = blind(RefusedError(status, {"message": words}), "http://x/v1", "m", str)
     assert failure is not None
     assert failure.kind == "no_vision" and not failure.retryable
-    with pytest.raises(BenchError, match="None of the 9 items.*9 times: .*takes no pictures"):
+    with pytest.raises(BenchError, match=r"None of the 9 items.*9 times: .*takes no pictures"):
         run(tmp_path, Oracle(error=failure))
     (folder,) = tmp_path.glob("run-*")
     rows = [json.loads(line) for line in (folder / "results.jsonl").read_text().splitlines()]
