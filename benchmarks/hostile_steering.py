@@ -33,6 +33,7 @@ from chauffeur.drive.actuate import actuate
 from chauffeur.geometry import Lane, Polyline, Pose, RoadGraph, wrap_to_pi
 from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.base import World
+from chauffeur.worlds.track.manoeuvres import WEATHERS
 from chauffeur.worlds.track.scenarios import street_scenario
 from chauffeur.worlds.track.street import draw_street
 
@@ -190,6 +191,15 @@ class Judge:
         while self._seen[0].time_s < seen.time_s - BEHIND_S:
             self._seen.popleft()
 
+    def own_ground(self, heading_rad: float) -> Any:
+        """The asphalt without the lanes that lead the other way."""
+        against = [
+            one
+            for lane, one in self._lanes
+            if math.cos(lane.centre.at(lane.length_m / 2.0).heading_rad - heading_rad) < -0.5
+        ]
+        return shapely.difference(self._asphalt, shapely.union_all(against))
+
     def _against(self, ego: VehicleState) -> bool:
         middle = shapely.points(ego.x_m, ego.y_m)
         own = against = False
@@ -277,7 +287,8 @@ def scenario(place: Place, seed: int, towns: tuple[str, ...] = TOWNS) -> Scenari
     """Where a trip begins."""
     rng = np.random.default_rng([seed, 5])
     if place == "open-road":
-        return street_scenario("hostile", draw_street(rng), "", "", seed)
+        scene = street_scenario("hostile", draw_street(rng), "", "", seed)
+        return replace(scene, config={**scene.config, "weather": WEATHERS[int(rng.integers(len(WEATHERS)))]})
     config = {
         "town": towns[seed % len(towns)],
         "vehicles": int(rng.integers(15, 60)),
