@@ -2,8 +2,8 @@
 
     python benchmarks/gentle_trajectories.py --count 112 --first 70000
 
-Four kinds, at places drawn in towns and on open roads without anybody else: the lane kept, a lane change to either side
-whether or not there is a lane, a weave, a slow drift to one side. The judge is that of `hostile_steering`: it unites the
+Four kinds, at places drawn in towns and on open roads without anybody else: the lane kept, a lane change to a side
+whether or not there is a lane, a weave, a slow drift to a side. The judge is that of `hostile_steering`: it unites the
 outlines of lanes as polygons and knows nothing of the check. Refused although all of the planned outline lies on lanes
 of its own direction counts as refused wrongly. All simulated.
 """
@@ -15,17 +15,18 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, Final, Literal
 
 import numpy as np
 import shapely
-from hostile_steering import Judge, Place, rectangle, scenario, world_of
 
 from chauffeur.concept import Limits, Observation, Trajectory
 from chauffeur.drive.actuate import actuate
 from chauffeur.executors.trajectory import TrajectoryExecutor
 from chauffeur.geometry import Polyline, Pose, joined, wrap_to_pi
 from chauffeur.safety.trajectories import trajectory_faults
+from hostile_steering import Judge, Place, rectangle, scenario, world_of
 
 Kind = Literal["keep", "change", "weave", "drift"]
 KINDS: Final[tuple[Kind, ...]] = ("keep", "change", "weave", "drift")
@@ -77,7 +78,7 @@ def fits(judge: Judge, trajectory: Trajectory, seen: Observation) -> bool:
     start = Pose(ego.x_m, ego.y_m, ego.heading_rad)
     places = [start.place(*point) for point in ((0.0, 0.0), *trajectory.waypoints_m)]
     own = judge.own_ground(ego.heading_rad)
-    for (ax, ay), (bx, by) in zip(places, places[1:], strict=False):
+    for (ax, ay), (bx, by) in pairwise(places):
         if math.dist((ax, ay), (bx, by)) < 0.5:
             continue
         heading = math.atan2(by - ay, bx - ax)

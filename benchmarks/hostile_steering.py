@@ -157,6 +157,7 @@ class Judge:
     """Looks at a trip after each period; `row` says what came of it."""
 
     def __init__(self, road: RoadGraph) -> None:
+        self._road = road
         self._asphalt = asphalt(road)
         shapely.prepare(self._asphalt)
         self._lanes = [
@@ -192,13 +193,13 @@ class Judge:
             self._seen.popleft()
 
     def own_ground(self, heading_rad: float) -> Any:
-        """The asphalt without the lanes that lead the other way."""
+        """What cars drive on, without the lanes that lead the other way."""
         against = [
             one
             for lane, one in self._lanes
             if math.cos(lane.centre.at(lane.length_m / 2.0).heading_rad - heading_rad) < -0.5
         ]
-        return shapely.difference(self._asphalt, shapely.union_all(against))
+        return shapely.difference(asphalt(self._road, ("driving", "aisle")), shapely.union_all(against))
 
     def _against(self, ego: VehicleState) -> bool:
         middle = shapely.points(ego.x_m, ego.y_m)
@@ -246,9 +247,8 @@ class Judge:
         }
 
 
-def asphalt(road: RoadGraph) -> Any:
+def asphalt(road: RoadGraph, kinds: tuple[str, ...] = ("driving", "aisle", "emergency", "parking")) -> Any:
     """The union of all lanes for cars, whatever their direction, gaps between them and islands of a few m2 closed."""
-    kinds = ("driving", "aisle", "emergency", "parking")
     led = {one for lane in road.lanes for one in lane.successors}
     united = shapely.union_all([strip(_drawn_out(one, led), one.width_m) for one in road.lanes if one.kind in kinds])
     closed = united.buffer(JOINT_M).buffer(-JOINT_M)
