@@ -21,6 +21,7 @@ FALLBACK_LEVELS: Final[dict[FallbackLevel, str]] = {
 EVENTS: Final[dict[EventKind, tuple[str, str]]] = {
     "planned": ("thinks", "cyan"),
     "declined": ("declined", "bold yellow"),
+    "answered": ("answers", "cyan"),
     "unplanned": ("no plan", "bold yellow"),
     "superseded": ("superseded", "dim"),
     "started": ("drives", "green"),
@@ -32,6 +33,7 @@ EVENTS: Final[dict[EventKind, tuple[str, str]]] = {
     "resumed": ("goes on", "yellow"),
     "said": ("says", "magenta"),
     "garbage": ("garbage", "red"),
+    "halt": ("stops", "bold red"),
 }
 """Label and style of what becomes of a wish."""
 

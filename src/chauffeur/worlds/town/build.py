@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import shutil
 import tempfile
 from collections import Counter
@@ -14,6 +13,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from chauffeur.concept import DataError, Sign
+from chauffeur.concept.data import parse_json
 from chauffeur.geometry import LaneId, RoadGraph
 from chauffeur.geometry.opendrive import OpenDriveError, OpenDriveMap, read_opendrive
 from chauffeur.worlds.town.pack import (
@@ -131,7 +131,7 @@ def build_own(name: str, seed: int | None = None, folder: Path | None = None) ->
 
 def _hash_of(folder: Path) -> str:
     try:
-        return str(json.loads((folder / PACK_FILE).read_text()).get("source_hash", ""))
+        return str(parse_json((folder / PACK_FILE).read_text()).get("source_hash", ""))
     except ValueError:
         return ""
 
@@ -141,13 +141,20 @@ def _build(sources: MapSources, name: str, folder: Path, source_hash: str) -> No
         parsed = read_opendrive(sources.xodr)
     except OpenDriveError as error:
         raise DataError(f"{sources.xodr} is no OpenDRIVE file that can be read: {error}") from error
+    left = sum(one.left_hand for one in parsed.document.roads.values())
+    if left:
+        raise DataError(
+            f"{sources.xodr} has {left} roads that keep left (rule LHT).",
+            hint="A town's traffic and driver keep right; `parse_opendrive` reads such roads.",
+        )
     road = parsed.road
     crossings = crossings_of(parsed)
     groups, signs, boxes, notes = _lights_and_signs(sources, parsed, crossings)
+    notes = (*notes, *parsed.remarks)
     net = folder / "map.net.xml"
     # A group may stand at two junctions, where a street is crossed in two steps.
     lit = {junction_of(road, head.lanes) for group in groups for head in group.heads}
-    convert(sources.xodr, net, sorted(lit & road.junctions.keys()))
+    convert(sources.xodr, parsed, net, sorted(lit & road.junctions.keys()))
     made = reshape(net, road)
     links = _light(made, road, groups)
     if groups and (inside := sum(head.id not in links for group in groups for head in group.heads)):
@@ -202,7 +209,7 @@ def _lights_and_signs(
 
 def _table(path: Path) -> list[Any]:
     try:
-        content = json.loads(path.read_text())
+        content = parse_json(path.read_text())
     except ValueError as error:
         raise DataError(f"{path} is no JSON: {error}.") from error
     if not isinstance(content, list):
