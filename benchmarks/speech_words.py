@@ -60,6 +60,7 @@ VOICES = (
 )
 FIT_VOICES = ("espeak/en-us+m3", "espeak/en-gb-x-rp+f2", "espeak/en-us+f5", "flite/kal16")
 SPEEDS = (0.9, 1.0, 1.15)
+FIT_SPEEDS = (0.9, 1.1, 1.3)
 EACH_SPEEDS = (0.85, 1.1, 1.35)
 """136, 176 (espeak-ng's own) and 216 words a minute."""
 NOISES = ("none", "20", "10", "5")
@@ -154,7 +155,8 @@ def sayings(most: int, noises: Sequence[str], names: tuple[str, ...], seed: int,
     ways = (("command", False), ("", False), ("command", True))
     plan += [("elsewhere", text, *way) for text in texts[f"elsewhere{suffix}"] for way in ways]
     rng = np.random.default_rng(seed)
-    picks = [(names[int(rng.integers(len(names)))], SPEEDS[int(rng.integers(len(SPEEDS)))]) for _ in plan]
+    speeds = FIT_SPEEDS if suffix else SPEEDS
+    picks = [(names[int(rng.integers(len(names)))], speeds[int(rng.integers(len(speeds)))]) for _ in plan]
     found = [
         Said(*one, *pick, noise)
         for noise in noises
