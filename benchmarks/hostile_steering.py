@@ -240,9 +240,7 @@ def asphalt(road: RoadGraph) -> Any:
     """The union of all lanes for cars, whatever their direction, gaps between them and islands of a few m2 closed."""
     kinds = ("driving", "aisle", "emergency", "parking")
     led = {one for lane in road.lanes for one in lane.successors}
-    united = shapely.union_all(
-        [strip(_drawn_out(one, led), one.width_m) for one in road.lanes if one.kind in kinds]
-    )
+    united = shapely.union_all([strip(_drawn_out(one, led), one.width_m) for one in road.lanes if one.kind in kinds])
     closed = united.buffer(JOINT_M).buffer(-JOINT_M)
     parts = [closed] if isinstance(closed, Polygon) else list(closed.geoms)
     kept = [

@@ -162,7 +162,7 @@ def _place(other: Array, ways: Array, sigma: float) -> tuple[float, float]:
 
 @compiled
 def _parted(pose: Array, front: float, back: float, wide: float, other: Array, side: float) -> bool:
-    """Whether a body, from so far behind its middle to so far ahead, is clear of one that stands, by separating axes."""
+    """Whether a body, from so far behind its middle to so far ahead, is clear of one that stands: separating axes."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     dx, dy = other[0] - pose[0], other[1] - pose[1]
     u, v = c * dx + s * dy, c * dy - s * dx

@@ -286,9 +286,14 @@ def load(name_or_path: str | Path) -> MapPack:
         ) from error
 
 
+def has_pack(folder: Path) -> bool:
+    """Whether a folder holds a map pack."""
+    return any((folder / one).is_file() for one in (PACK_FILE, PACK_FILE + ".gz"))
+
+
 def _found(name_or_path: str | Path) -> Path:
     for folder in (Path(name_or_path), maps_folder() / name_or_path, OWN_TOWNS / name_or_path):
-        if any((folder / one).is_file() for one in (PACK_FILE, PACK_FILE + ".gz")):
+        if has_pack(folder):
             return folder
     raise DataError(
         f"There is no map pack {str(name_or_path)!r} in {maps_folder()}.",
