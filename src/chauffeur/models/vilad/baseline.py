@@ -118,6 +118,7 @@ def _fitted(criteria: Sequence[str], found: Sequence[AskedCommand], strength: fl
         from sklearn.feature_extraction.text import TfidfVectorizer
         from sklearn.linear_model import LogisticRegression
         from sklearn.pipeline import make_union
+        from threadpoolctl import threadpool_limits
     except ImportError as error:
         raise MissingExtraError(
             "The linear baseline needs scikit-learn.", hint="Run: pip install 'chauffeur[models]'"
@@ -133,5 +134,6 @@ def _fitted(criteria: Sequence[str], found: Sequence[AskedCommand], strength: fl
         if len(set(values)) == 1:
             models[name] = values[0]
         else:
-            models[name] = LogisticRegression(C=strength, max_iter=_ITERATIONS).fit(table, values)
+            with threadpool_limits(1):  # the work is sparse: threads of a dense library would only wait for each other
+                models[name] = LogisticRegression(C=strength, max_iter=_ITERATIONS).fit(table, values)
     return LinearReader(vectors, models, strength)
