@@ -61,3 +61,41 @@ def test_what_is_no_town_is_said(tmp_path: Path) -> None:
         said = run.invoke(app, ["maps", *arguments])
         assert said.exit_code != 0
         assert says in "".join(said.output.split("\n")) or says in str(said.exception)
+
+
+def test_a_file_with_odd_records_is_built_and_they_are_listed(tmp_path: Path) -> None:
+    """What this reader leaves out, netconvert does not meet either."""
+    pytest.importorskip("sumo", reason="needs the extra `maps`")
+    lanes = "".join(
+        f'<lane id="{number}" type="driving"><link><predecessor/><successor id="none"/></link>'
+        f'<border sOffset="0" a="{3.5 * number}" b="0" c="0" d="0"/>'
+        '<roadMark sOffset="0" type="broken" laneChange="perhaps"/></lane>'
+        for number in (-1, -2)
+    )
+    path = tmp_path / "odd.xodr"
+    path.write_text(
+        '<OpenDRIVE xmlns="http://code.asam.net/simulation/standard/opendrive_schema">'
+        '<header revMajor="1" revMinor="8"/>'
+        '<road id="1" length="200" junction="-1"><link><predecessor/></link>'
+        '<type s="0" type="town"><speed max="50" unit="KPH"/></type><type s="9" type="town"><speed max="a lot"/></type>'
+        '<planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>'
+        '<lanes><laneSection s="0"><center><lane id="0" type="none"/></center>'
+        f"<right>{lanes}</right></laneSection></lanes>"
+        '<signals><signal s="5" t="-9" id="7" type="274" value="none"/></signals></road></OpenDRIVE>'
+    )
+    result = run.invoke(app, ["maps", "build", str(path), "--out", str(tmp_path / "pack")])
+    assert result.exit_code == 0, result.output
+    said = " ".join(result.output.split())
+    assert "signal '7'" in said and "'a lot'" in said and "'perhaps'" in said and "'none'" in said
+
+
+def test_traffic_on_the_left_is_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "left.xodr"
+    path.write_text(
+        '<OpenDRIVE><header/><road id="1" length="90" rule="LHT"><planView>'
+        '<geometry s="0" x="0" y="0" hdg="0" length="90"><line/></geometry></planView>'
+        '<lanes><laneSection s="0"><left><lane id="1" type="driving">'
+        '<width sOffset="0" a="3" b="0" c="0" d="0"/></lane></left></laneSection></lanes></road></OpenDRIVE>'
+    )
+    result = run.invoke(app, ["maps", "build", str(path), "--out", str(tmp_path / "pack")])
+    assert result.exit_code == 2 and "keep left" in result.output

@@ -152,11 +152,13 @@ def is_bare_stop(plan: Plan, text: str) -> bool:
         return False
     match plan.policy:
         case Parameters(target_speed_mps=speed, lane=0, route=""):
-            return speed <= _STOPPED_MPS
+            return 0.0 <= speed <= _STOPPED_MPS
         case Program(source=source):
             uses = read_program(source).uses
             speeds = [use.values for use in uses if use.name == "set_target_speed"]
-            still = bool(speeds) and all(values and max(values) <= _STOPPED_MPS for values in speeds)
+            still = bool(speeds) and all(
+                values and 0.0 <= min(values) <= max(values) <= _STOPPED_MPS for values in speeds
+            )
             return still and not any("lane" in use.name and use.name.startswith("set") for use in uses)
         case _:
             return False

@@ -139,15 +139,22 @@ class Ground:
         return "off_road"
 
 
-def swept(poses: Array) -> Array:
-    """Poses with others between them, (n, 3) -> (m, 3), so that no part of a car leaps over a kerb or a car."""
+def swept(poses: Array) -> tuple[Array, Array]:
+    """Poses with others between them, so that no part of a car leaps over a kerb or a car.
+
+    Args:
+        poses: (n, 3): x, y, heading.
+
+    Returns:
+        (m, 3) poses, and (m,) where each lies between the given ones, 0 to n - 1.
+    """
     turned = np.diff(np.unwrap(poses[:, 2]))
     moved = np.hypot(np.diff(poses[:, 0]), np.diff(poses[:, 1])) + 2.5 * np.abs(turned)
     counts = np.maximum(1, np.ceil(moved / _SWEEP_M)).astype(np.int64)
     at = np.concatenate([[0.0], *(i + np.arange(1, n + 1) / n for i, n in enumerate(counts.tolist()))])
     rows = np.arange(len(poses), dtype=np.float64)
     heading = np.concatenate([poses[:1, 2], poses[0, 2] + np.cumsum(turned)])
-    return np.stack([np.interp(at, rows, one) for one in (poses[:, 0], poses[:, 1], heading)], axis=1)
+    return np.stack([np.interp(at, rows, one) for one in (poses[:, 0], poses[:, 1], heading)], axis=1), at
 
 
 @lru_cache(maxsize=64)
