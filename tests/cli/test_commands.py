@@ -127,7 +127,7 @@ def test_an_option_has_one_name() -> None:
     ("arguments", "module", "extra"),
     [
         (("model", "train", "onboard", "--out", "run"), "torch", "models"),
-        (("model", "adapt", "--base", "base", "--out", "run", "--as", "ana"), "peft", "models"),
+        (("model", "adapt-vlm", "--checkpoint", "base", "--out", "run"), "peft", "models"),
         (("report", "run", "--inspect", "run.eval"), "inspect_ai", "inspect"),
         (("study", "export", "lab", "--out", "trips.parquet"), "pyarrow", "tables"),
         (("bench", "lampilot", "--data", "DbLv1", "--ray", "local"), "ray", "cluster"),
