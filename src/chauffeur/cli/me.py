@@ -60,6 +60,7 @@ def show(person: Person, most: Annotated[int, typer.Option(min=1, help="Trips at
     from chauffeur.memory.choice import open_memory
     from chauffeur.memory.personal_limits import LIMITS_FILE, personal_limits
     from chauffeur.memory.privacy import read_privacy
+    from chauffeur.memory.records import result_of_kept
 
     console, privacy = stdout(), read_privacy()
     trips = json.loads(open_memory().export(PersonId(person)))["trips"]
@@ -67,7 +68,8 @@ def show(person: Person, most: Annotated[int, typer.Option(min=1, help="Trips at
         table = Table("when", "wish", "what came of it", "what you said", box=None, pad_edge=False)
         for trip in trips[::-1][:most]:
             said = "; ".join(each["text"] for each in trip["feedback"])
-            table.add_row(trip["when"][:16].replace("T", " "), plain(trip["instruction"]), trip["outcome"], plain(said))
+            when, result = trip["when"][:16].replace("T", " "), str(result_of_kept(trip))
+            table.add_row(when, plain(trip["instruction"]), result, plain(said))
         console.print(table)
         console.print(Text(f"{len(trips)} trips in all.", "dim"))
     else:

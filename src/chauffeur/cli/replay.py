@@ -61,7 +61,7 @@ def drive_again(recorded: RecordedTrip) -> RecordedTrip:
         raise DataError(f"The recording holds no drive: its outcome is {trip.outcome}.", hint="Replay a driven trip.")
     world = make_world(scenario)
     world.reset(scenario, trip.seed)
-    referee = referee_for(world, scenario, trip.plan)
+    referee = referee_for(world, scenario, trip.plan, trip.instruction.text)
     record = dict(trip.record)
     limits = Limits(**record["limits"])
     episode = drive_policy(

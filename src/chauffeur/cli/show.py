@@ -20,6 +20,8 @@ from rich.text import Text
 
 from chauffeur.cli.console import columns, path_text, plain
 from chauffeur.concept import (
+    ANSWERED,
+    ASKS,
     CameraImage,
     Context,
     Frame,
@@ -32,7 +34,6 @@ from chauffeur.concept import (
     Trip,
     Verdict,
 )
-from chauffeur.drive.answers import ANSWERED
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
@@ -159,7 +160,7 @@ class Teller(Quiet):
         super().end(recorded)
         trip = recorded.trip
         shielded = words.shield_words([change for frame in recorded.frames for change in frame.interventions])
-        for told in (*self._why_not(trip), words.end_words(trip), shielded):
+        for told in (*words.left_out_words(trip), *self._why_not(trip), words.end_words(trip), shielded):
             if told:
                 self.console.print(Padding(plain(self._units(told)), (0, 0, 0, 2)))
         self.console.print()
@@ -171,9 +172,9 @@ class Teller(Quiet):
         if not trip.causes.refused:
             return causes
         if trip.plan.policy is None:
-            return tuple(cause for cause in causes if cause != words.DECLINED)
+            return causes
         remedies = (verdict.remedy for verdict in trip.verdicts if verdict.stops and verdict.remedy)
-        return tuple(dict.fromkeys((*(cause for cause in causes if cause != words.DECLINED), *remedies)))
+        return tuple(dict.fromkeys((*causes, *remedies)))
 
     def _why(self, detail: str) -> None:
         """Told below, in the passenger's units."""
@@ -203,10 +204,14 @@ class Teller(Quiet):
         return Group(code, more) if more else code
 
     def _checks(self, verdicts: tuple[Verdict, ...]) -> RenderableType:
-        """Marks side by side, and below them what is not as it should be."""
+        """Marks side by side, and below them what is not as it should be, or was not compared."""
         marks: list[Text] = []
         told: list[RenderableType] = []
         for verdict in verdicts:
+            if verdict.mark == "not_compared":
+                why = f"{words.MARKS[verdict.mark]} {words.check_name(verdict.check)}: {words.not_compared_words(verdict)}"
+                told.append(Text(plain(self._units(why)).plain, words.MARK_STYLES[verdict.mark]))
+                continue
             if verdict.mark not in ("passed", "open"):
                 told.append(_told(verdict, self._units))
                 continue
@@ -298,6 +303,7 @@ class FullTeller(Teller):
     def _rows(self, recorded: RecordedTrip) -> Iterator[tuple[str, RenderableType]]:
         """Scores and provenance; the letters have been told."""
         trip = recorded.trip
+        yield "Judged", words.judged_words(trip) or "Not compared with the wish."
         for metric in trip.metrics:
             yield words.metric_name(metric.id), words.metric_value(metric)
         yield "Planner", plain(", ".join(part for part in (trip.plan.planner, trip.plan.model) if part))
@@ -316,7 +322,7 @@ class FullTeller(Teller):
 
     def _plan(self, plan: Plan) -> None:
         if plan.refusal:
-            head = {ANSWERED: "Answer: ", "ask": "Asks: "}.get(plan.intent, "Declined: ")
+            head = {ANSWERED: "Answer: ", ASKS: "Asks: "}.get(plan.intent, "Declined: ")
             self._letter("R", Text.assemble((head, "bold yellow"), plain(plan.refusal)))
             return
         self._thoughts(plan.thoughts, plan.intent)
@@ -333,6 +339,10 @@ class FullTeller(Teller):
     def _verdict(self, verdict: Verdict) -> None:
         if verdict.mark in ("differs", "failed"):
             self._letter("V", _told(verdict, self._units, check=True))
+            return
+        if verdict.mark == "not_compared":
+            said = Text(f"{words.MARKS[verdict.mark]} ").append_text(plain(words.not_compared_words(verdict)))
+            self._letter("V", said.append(f"  {verdict.check}"))
             return
         # Of what passed, the doubts are on the page and in the recording.
         reason = verdict.reason.split(". ", 1)[0].rstrip(".") + "." if verdict.reason else "passed"

@@ -25,6 +25,7 @@ from chauffeur.concept import (
     Trip,
     VehicleState,
     Verdict,
+    result_of,
 )
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
@@ -64,7 +65,7 @@ def page_payload(recorded: RecordedTrip) -> Json:
         "policy": policy_words(trip.plan.policy),
         "verdicts": [
             {"check": v.check, "passed": v.passed, "reason": _reason(v), "line": v.line, "remedy": v.remedy}
-            | {"vetoes": v.vetoes, "mark": v.mark, "sign": words.MARKS[v.mark]}
+            | {"vetoes": v.vetoes, "mark": v.mark, "sign": words.MARKS[v.mark], "not_compared": v.not_compared}
             for v in trip.verdicts
         ],
         "mismatches": [
@@ -75,7 +76,9 @@ def page_payload(recorded: RecordedTrip) -> Json:
         "outcome": {
             "label": label,
             "tone": tone,
-            "causes": words.cause_words(trip.causes),
+            "causes": [*words.left_out_words(trip), *words.cause_words(trip.causes)],
+            "result": str(result_of(trip)),
+            "judged": words.judged_words(trip),
             "end": words.end_words(trip),
         },
         "duration": round(trip.duration_s, 2),
@@ -197,6 +200,9 @@ def _program_lines(policy: Policy | None) -> list[list[tuple[str, str]]] | None:
 
 def _reason(verdict: Verdict) -> str:
     """Why; of an explanation that does not fit the single mismatches are shown beside it."""
+    if verdict.mark == "not_compared":
+        said = words.not_compared_words(verdict)
+        return f"{said[:1].upper()}{said[1:]}"
     if verdict.alignment is None or verdict.passed:
         return verdict.reason
     return f"{words.doubt_words(verdict.check)} ({score_words(verdict.alignment)})."

@@ -364,7 +364,7 @@ class MemoryWorker:
 
 def _entry_of(trip: dict[str, Any]) -> MemoryEntry:
     said = "; ".join(each["text"] for each in trip["feedback"])
-    return MemoryEntry(trip["trip"], trip["when"], trip["instruction"], trip["outcome"], said)
+    return MemoryEntry(trip["trip"], trip["when"], trip["instruction"], str(result_of_kept(trip)), said)
 
 
 def _whole_days(days: float | None) -> int | None:

@@ -70,7 +70,7 @@ function fillProgram() {
 }
 
 /* What a mark looks like and is called; which one a verdict gets was decided where it was judged. */
-const MARKS = { passed: ['pass', 'passed'], open: ['open', 'not proven'], differs: ['doubt', 'does not fit'], failed: ['fail', 'not passed'] };
+const MARKS = { passed: ['pass', 'passed'], open: ['open', 'not proven'], differs: ['doubt', 'does not fit'], failed: ['fail', 'not passed'], not_compared: ['uncompared', 'not compared'] };
 
 function fillVerdicts() {
   if (!trip.verdicts.length) $('verdicts').append(make('li', 'No check was run.', 'none'));
@@ -83,7 +83,7 @@ function fillVerdicts() {
     const where = verdict.line ? `${verdict.check}, line ${verdict.line}` : verdict.check;
     item.append(icon, make('span', verdict.reason || (verdict.passed ? 'Passed.' : 'Not passed.')));
     if (verdict.remedy && !verdict.passed && verdict.vetoes) item.append(make('span', verdict.remedy));
-    if (!verdict.passed && !verdict.vetoes) item.append(make('span', 'This informs; it stops nothing. The thoughts show where.'));
+    if (verdict.mark === 'differs') item.append(make('span', 'This informs; it stops nothing. The thoughts show where.'));
     item.append(make('small', where));
     $('verdicts').append(item);
   }
