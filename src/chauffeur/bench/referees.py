@@ -29,8 +29,8 @@ def referee_for(world: World, scenario: Scenario, plan: Plan, wish: str = "") ->
     of the spot that is meant; in a town, of the place or of the ways and stops; on an open road and in a town, of a
     trajectory's end.
 
-    Ways, sides, stops and speeds are those of the words, read by rules that see no plan; where they say none, those of the
-    plan. A place is the plan's: found by the planner, reached by the world's own geometry.
+    Ways, sides, stops and speeds are those of the words, read by rules that see no plan; where they say none, those of
+    the plan. A place is the plan's: found by the planner, reached by the world's own geometry.
 
     Raises:
         ScenarioError: There is no such spot.

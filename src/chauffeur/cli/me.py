@@ -56,7 +56,7 @@ def show(person: Person, most: Annotated[int, typer.Option(min=1, help="Trips at
     from chauffeur.cli.console import path_text, plain, stdout
     from chauffeur.concept import Limits, PersonId
     from chauffeur.concept.data import data_home
-    from chauffeur.concept.units import kmh
+    from chauffeur.concept.units import people_speed
     from chauffeur.memory.choice import open_memory
     from chauffeur.memory.personal_limits import LIMITS_FILE, personal_limits
     from chauffeur.memory.privacy import read_privacy
@@ -80,8 +80,10 @@ def show(person: Person, most: Annotated[int, typer.Option(min=1, help="Trips at
         console.print(Text("Privacy mode is on: nothing new is kept.", "bold yellow"))
     limits = personal_limits(PersonId(person), Limits())
     if limits != Limits():
-        cap = "" if limits.max_speed_mps is None else f"never above {kmh(limits.max_speed_mps):.0f} km/h, "
-        over = f"{kmh(limits.max_over_limit_mps):.0f} km/h above the sign at most"
+        cap = (
+            "" if limits.max_speed_mps is None else f"never above {people_speed(limits.max_speed_mps, at_most=True)}, "
+        )
+        over = f"{people_speed(limits.max_over_limit_mps, at_most=True)} above the sign at most"
         words = f"Your limits: {cap}{over}, {limits.min_time_headway_s:g} s headway or more "
         console.print(Text.assemble(words, "(", path_text(data_home() / LIMITS_FILE), ")"))
 

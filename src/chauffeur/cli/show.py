@@ -34,6 +34,7 @@ from chauffeur.concept import (
     Trip,
     Verdict,
 )
+from chauffeur.concept.units import SpeedUnit, people_speed
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
@@ -103,7 +104,7 @@ class Teller(Quiet):
         self._live = Live(console=console, transient=True, refresh_per_second=10) if console.is_terminal else None
         self._waiting = False
         self._reply, self._attempt = "", 0
-        self._unit: words.Pace = "km/h"
+        self._unit: SpeedUnit = "km/h"
         self._source: tuple[str, ...] = ()
         self._compiles = False
 
@@ -198,7 +199,7 @@ class Teller(Quiet):
 
     def _program(self, plan: Plan) -> RenderableType:
         if not isinstance(plan.policy, Program):
-            return plain(self._units(policy_words(plan.policy)))
+            return plain(policy_words(plan.policy, self._unit))
         more = Text("its helper functions: --full", "dim") if plan.policy.library else Text()
         code = Syntax(plain(plan.policy.source.rstrip("\n")).plain, **_CODE)
         return Group(code, more) if more else code
@@ -207,19 +208,19 @@ class Teller(Quiet):
         """Marks side by side, and below them what is not as it should be, or was not compared."""
         marks: list[Text] = []
         told: list[RenderableType] = []
+        why: dict[str, None] = {}
         for verdict in verdicts:
-            if verdict.mark == "not_compared":
-                why = f"{words.MARKS[verdict.mark]} {words.check_name(verdict.check)}: {words.not_compared_words(verdict)}"
-                told.append(Text(plain(self._units(why)).plain, words.MARK_STYLES[verdict.mark]))
-                continue
-            if verdict.mark not in ("passed", "open"):
+            if verdict.mark not in ("passed", "open", "not_compared"):
                 told.append(_told(verdict, self._units))
                 continue
+            if verdict.mark == "not_compared":
+                why.setdefault(words.not_compared_words(verdict), None)
             name = words.check_name(verdict.check)
             rest = ", not all proven" if verdict.mark == "open" else ""
             mark = (words.MARKS[verdict.mark], words.MARK_STYLES[verdict.mark])
             marks.append(Text.assemble(mark, f" {name}{rest}", no_wrap=True))
-        return Group(Columns(marks, padding=(0, 3)), *told)
+        grey = (Text(f"{words.MARKS['not_compared']} {plain(self._units(each)).plain}", "dim") for each in why)
+        return Group(Columns(marks, padding=(0, 3)), *grey, *told)
 
     def _units(self, text: str) -> str:
         return words.passenger_units(text, self._unit)
@@ -233,7 +234,7 @@ class Teller(Quiet):
         if self._live is None:
             return
         shot = frame.observation
-        parts = [f"{shot.time_s:5.1f} s", f"{words.pace(shot.ego.speed_mps, self._unit):>8}"]
+        parts = [f"{shot.time_s:5.1f} s", f"{people_speed(shot.ego.speed_mps, self._unit):>8}"]
         if shot.front is not None:
             parts.append(f"gap {shot.front.distance_m:3.0f} m")
         if shot.stop_sign_m is not None:

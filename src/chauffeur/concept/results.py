@@ -79,7 +79,8 @@ _OF_OUTCOMES: Final[dict[Outcome, Result]] = {
 
 def result_of_stored(outcome: str, intent: str) -> Result:
     """The result of a trip of which only outcome and intent were kept, as in memories of older versions."""
-    if outcome in iter(Result):
-        return Result(outcome)
+    known = next((result for result in Result if result == outcome), None)
+    if known is not None:
+        return known
     found = next((result for name, result in _OF_OUTCOMES.items() if name == outcome), None)
     return undriven(intent) if found is None else found

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Final
 
 from chauffeur.concept import Situation
-from chauffeur.concept.units import kmh, mph
+from chauffeur.concept.units import people_speed
 from chauffeur.describe.road import SIGHT_M, ordinal
 from chauffeur.language.tokens import words_of
 
@@ -38,7 +38,7 @@ _AHEAD: Final = r"(?:ahead|in front|before us|front|lead)"
 
 
 def _speed(speed_mps: float) -> str:
-    return f"{kmh(speed_mps):.0f} km/h ({mph(speed_mps):.0f} mph)"
+    return f"{people_speed(speed_mps)} ({people_speed(speed_mps, 'mph')})"
 
 
 def _own_speed(situation: Situation) -> str:

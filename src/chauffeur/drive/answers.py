@@ -12,6 +12,7 @@ from chauffeur.concept import ANSWERED, Plan, PlanRequest, Thoughts
 from chauffeur.describe.answers import DONT_KNOW, answer_to, asks_to_know
 from chauffeur.planners.base import NO_WISH, Planner, declined
 
+
 async def plan_or_answer(planner: Planner, request: PlanRequest) -> Plan:
     """The planner's plan; of a question, the answer, with nothing to drive.
 

@@ -37,6 +37,7 @@ from chauffeur.concept import (
     Thoughts,
     Verdict,
 )
+from chauffeur.drive import wish_parts
 from chauffeur.drive.answers import plan_or_answer
 from chauffeur.drive.emergency import check_told_not_to
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
@@ -152,7 +153,8 @@ async def plan_once(instruction: Instruction, steps: PlanSteps) -> Planned:
     steps.tell(DriveEvent("plan", text=plan.thoughts.text, value=plan))
     verdicts, now = await steps.check(plan, own is not None)
     if own is None:
-        verdicts = (*verdicts, *check_told_not_to(instruction.text, plan, now))
+        told = check_told_not_to(instruction.text, plan, now) or wish_parts.check_told_not_to(instruction.text, plan)
+        verdicts = (*verdicts, *told)
     steps.tell(DriveEvent("verdicts", value=verdicts))
     return Planned(plan, verdicts, request)
 

@@ -237,9 +237,7 @@ def _check_driven(plan: Plan, episode: Episode, limits: Limits) -> tuple[Verdict
     return informed(DRIVEN_CHECK, plan, episode.frames[0].observation, limits, driven)
 
 
-def informed(
-    name: str, plan: Plan, observation: Observation, limits: Limits, check: Check
-) -> tuple[Verdict, ...]:
+def informed(name: str, plan: Plan, observation: Observation, limits: Limits, check: Check) -> tuple[Verdict, ...]:
     """What a check says that only informs: one that breaks has compared nothing, which is told, and stops nothing."""
     verdicts = run_checks(plan, observation, limits, (check,))
     return tuple(replace(verdict, check=name, vetoes=False) for verdict in verdicts)

@@ -1,8 +1,8 @@
 """The parts of a wish beside the plan that was made of it: which of them the plan uses, and which it leaves out.
 
-The parts come from `language.wanted`, which sees no plan. A plan says its acts in `intent`; where it says none, the calls
-of its program stand for them. A planner that understood more acts than the rules is given the benefit: an act with which
-no part agrees takes one that the rules cannot name.
+The parts come from `language.wanted`, which sees no plan. A plan says its acts in `intent`; where it says none, the
+calls of its program stand for them. A planner that understood more acts than the rules is given the benefit: an act with
+which no part agrees takes one that the rules cannot name.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from chauffeur.concept import Parameters, Plan, Program
+from chauffeur.concept import Parameters, Plan, Program, Result, Verdict
+from chauffeur.concept.results import undriven
+from chauffeur.drive.events import EventKind
 from chauffeur.language.wanted import ActKind, WantedPart, WantedSide, read_wanted
 from chauffeur.safety.constant_calls import read_program
 from chauffeur.worlds.town.pack import PLACE_WORDS
@@ -19,7 +21,8 @@ from chauffeur.worlds.town.pack import PLACE_WORDS
 _KINDS: Final[dict[str, ActKind]] = {
     "turn": "turn", "way": "turn", "straight": "turn", "lane": "lane", "over": "lane", "overtake": "overtake",
     "pull_over": "pull_over", "stop": "stop", "park": "park", "go_to": "go_to", "speed": "speed", "gap": "gap",
-    "follow": "follow", "yield": "yield", "wait": "wait", "style": "style", "keep": "keep", "resume": "keep", "on": "keep",
+    "follow": "follow", "yield": "yield", "wait": "wait", "style": "style", "keep": "keep", "resume": "keep",
+    "on": "keep",
 }  # fmt: skip
 """First word of a part of `Plan.intent`, and the act it is."""
 _CALLS: Final[dict[str, tuple[ActKind, WantedSide]]] = {
@@ -120,6 +123,46 @@ def account_of(wish: str, plan: Plan) -> WishAccount:
     return WishAccount(tuple(served), tuple(dict.fromkeys(one.words for one in unused)), tuple(defied))
 
 
+TOLD_NOT_TO_CHECK: Final = "told-not-to-v1"
+
+
+def check_told_not_to(wish: str, plan: Plan) -> tuple[Verdict, ...]:
+    """A verdict on a plan that does what the words forbid ("don't let him in"); nothing on other plans."""
+    defied = account_of(wish, plan).defied
+    if not defied:
+        return ()
+    reason = f"You said “{defied[0]}”, and this plan would do it: it is not driven."
+    return (Verdict(TOLD_NOT_TO_CHECK, False, reason, None, "Say what the car is to do instead."),)
+
+
+_OF_EVENTS: Final[dict[EventKind, Result]] = {
+    "unplanned": Result.FAILED,
+    "stale": Result.FAILED,
+    "failed": Result.FAILED,
+    "refused": Result.DECLINED,
+    "superseded": Result.NOT_DONE,
+    "interrupted": Result.NOT_DONE,
+}
+
+
+def result_of_event(kind: EventKind, wish: str, plan: Plan | None) -> Result:
+    """What became of a wish in real time, where a drive is not judged: a program that has ended is done as far as the
+    plan uses the wish.
+
+    Args:
+        kind: The event that closed it, one of `drive.events.FINAL`.
+        wish: The words.
+        plan: What was made of them, where anything was.
+    """
+    if kind in _OF_EVENTS:
+        return _OF_EVENTS[kind]
+    if plan is None:
+        return Result.DECLINED if kind == "declined" else Result.DONE
+    if plan.policy is None:
+        return undriven(plan.intent, offer=bool(plan.offer))
+    return Result.PARTLY_DONE if account_of(wish, plan).unused else Result.DONE
+
+
 def _serving(part: WantedPart, planned: tuple[PlannedAct, ...], served: list[WantedPart | None]) -> int | None:
     """The act of a plan that serves a part: a free one of the same kind and side first."""
     kinds = _SERVES.get(part.act, ())
@@ -132,16 +175,13 @@ def _serving(part: WantedPart, planned: tuple[PlannedAct, ...], served: list[Wan
     return None
 
 
-_OPPOSITE: Final = {"left": "right", "right": "left"}
-
-
 def _does(part: WantedPart, planned: tuple[PlannedAct, ...]) -> bool:
     """Whether a plan does what a part forbids."""
     for act in planned:
         if part.act == "yield" and (act.kind == "yield" or (act.kind == "gap" and act.detail == "increase")):
             return True
-        if part.act in ("turn", "lane", "overtake", "stop", "pull_over", "park") and act.kind == part.act:
-            return not part.side or not act.side or act.side == part.side
+        if part.act in ("turn", "lane", "overtake") and act.kind == part.act and act.detail not in ("keep", "return"):
+            return not part.side or act.side == part.side
     return False
 
 

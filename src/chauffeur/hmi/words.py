@@ -1,4 +1,4 @@
-"""Names and numbers as people read them: speeds with both units, outcomes and scores in words."""
+"""Names and numbers as people read them: speeds whole and in one unit, results and scores in words."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from chauffeur.concept import (
     result_of,
 )
 from chauffeur.concept.results import ANSWERED_LABEL
-from chauffeur.concept.units import kmh, mph
+from chauffeur.concept.units import SpeedUnit, people_speed
 from chauffeur.safety.faithfulness import DRIVEN_CHECK, FAITHFULNESS_CHECK
 
 Tone = Literal["good", "bad", "neutral"]
@@ -65,7 +65,7 @@ RESULT_TONES: Final[dict[Result, Tone]] = {
 }
 _JUDGED_BY: Final[dict[JudgedBy, str]] = {
     "words": "Judged by your words, which rules read that see no plan.",
-    "plan": "Judged by what the planner understood: the rules read less in the words, so planner and judge share a reading.",
+    "plan": "Judged by what the planner understood, for rules alone read less in the words: judge and planner share that.",
     "goal": "Judged by the scenario's own goal.",
     "place": "Judged by the place: the planner chose it, the world's geometry says whether the car is there.",
 }
@@ -104,27 +104,19 @@ MARK_STYLES: Final[dict[Mark, str]] = {
     "not_compared": "dim",
 }
 
-Pace = Literal["km/h", "mph"]
-"""Units of speed that people drive by."""
-
 _MPH: Final = re.compile(r"\b(?:mph|miles? (?:per|an) hour)\b", re.IGNORECASE)
 _SPEED: Final = re.compile(r"(?<![\w.])(\d{1,4}(?:\.\d{1,9})?) m/s(?![²2^\w/])(?: \([^()\n]{1,40}\))?")
 _LENGTH: Final = re.compile(r"(?<![\w.])(\d{1,5}\.\d{1,9}) m(?![\w/])")
 
 
-def pace_of(wish: str) -> Pace:
+def pace_of(wish: str) -> SpeedUnit:
     """The unit of speed for a person, by the words of their wish."""
     return "mph" if _MPH.search(wish) else "km/h"
 
 
-def pace(speed_mps: float, unit: Pace = "km/h") -> str:
-    """A speed for the passenger: `85 km/h`."""
-    return f"{(mph if unit == 'mph' else kmh)(speed_mps):.0f} {unit}"
-
-
-def passenger_units(text: str, unit: Pace = "km/h") -> str:
+def passenger_units(text: str, unit: SpeedUnit = "km/h") -> str:
     """A text with its m/s in the person's unit and its metres whole; what stood in brackets behind was that, too."""
-    told = _SPEED.sub(lambda match: pace(float(match[1]), unit), text)
+    told = _SPEED.sub(lambda match: people_speed(float(match[1]), unit), text)
     return _LENGTH.sub(lambda match: f"{float(match[1]):.0f} m", told)
 
 
@@ -163,7 +155,7 @@ def left_out_words(trip: Trip) -> tuple[str, ...]:
 
 
 def judged_words(trip: Trip) -> str:
-    """What the drive was held against, and what that shares with the planner; empty where it was held against nothing."""
+    """What the drive was held against, and what that shares with the planner; empty where with nothing."""
     return _JUDGED_BY[trip.judged_by] if trip.judged_by else ""
 
 
@@ -207,7 +199,7 @@ def end_words(trip: Trip) -> str:
         parts.append(_beside("gap", found["end-gap-v1"], found.get("asked-gap-v1"), lambda gap: f"{gap:.0f} m"))
     if "end-speed-v1" in found:
         wanted = found.get("asked-speed-v1")
-        parts.append(_beside("speed", found["end-speed-v1"], wanted, lambda speed: pace(speed, unit)))
+        parts.append(_beside("speed", found["end-speed-v1"], wanted, lambda speed: people_speed(speed, unit)))
     text = ", ".join(parts)
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
@@ -318,24 +310,25 @@ def metric_name(metric_id: str) -> str:
     return _METRICS.get(name) or name.replace("-", " ").capitalize()
 
 
-def metric_value(metric: Metric) -> str:
-    """Value with its unit, or that it does not apply."""
+def metric_value(metric: Metric, unit: SpeedUnit | None = None) -> str:
+    """Value with its unit, a speed in the person's where one is given; or that it does not apply."""
     if not metric.applies:
         return "does not apply"
-    return speed(metric.value) if metric.unit == "m/s" else f"{metric.value:.1f} {metric.unit}".rstrip()
+    return speed(metric.value, unit) if metric.unit == "m/s" else f"{metric.value:.1f} {metric.unit}".rstrip()
 
 
-def speed(speed_mps: float) -> str:
-    """A speed in both units: `28.0 m/s (101 km/h)`."""
-    return f"{speed_mps:.1f} m/s ({kmh(speed_mps):.0f} km/h)"
+def speed(speed_mps: float, unit: SpeedUnit | None = None) -> str:
+    """A speed in the person's unit; for engineers, without one, `28.0 m/s (101 km/h)`."""
+    return people_speed(speed_mps, unit) if unit else f"{speed_mps:.1f} m/s ({people_speed(speed_mps)})"
 
 
-def setting(name: str, value: float) -> tuple[str, str]:
-    """A named number as (label, value with unit), read off the name's unit suffix."""
-    for suffix, unit in _SUFFIXES:
+def setting(name: str, value: float, unit: SpeedUnit | None = None) -> tuple[str, str]:
+    """A named number as (label, value with unit), read off the name's unit suffix; a speed in the person's unit where
+    one is given."""
+    for suffix, measure in _SUFFIXES:
         if name.endswith(suffix):
             label = name.removesuffix(suffix).replace("_", " ")
-            return label, speed(value) if unit == "m/s" else f"{value:g} {unit}"
+            return label, speed(value, unit) if measure == "m/s" else f"{value:g} {measure}"
     return name.replace("_", " "), f"{value:g}"
 
 

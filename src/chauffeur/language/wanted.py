@@ -17,8 +17,8 @@ from chauffeur.language.ordinals import nth_of
 from chauffeur.language.quantities import Quantity, read_quantities
 
 ActKind = Literal[
-    "turn", "lane", "overtake", "pull_over", "stop", "park", "go_to", "speed", "gap", "follow", "yield", "wait", "style",
-    "keep", "other",
+    "turn", "lane", "overtake", "pull_over", "stop", "park", "go_to", "speed", "gap", "follow", "yield", "wait",
+    "style", "keep", "other",
 ]  # fmt: skip
 """`yield` lets another vehicle in; `style` is a mood; `other` is an imperative that is no driving this module knows."""
 PartKind = Literal["act", "condition", "place", "exclusion"]
@@ -82,7 +82,12 @@ _NEGATED: Final = re.compile(
     r"skip|neither|nor)\b",
     re.IGNORECASE,
 )
-_NO_DENIAL: Final = re.compile(r"\b(?:(?:not|never|don'?t) (?:mind|hesitate|forget|worry)|no (?:problem|worries|rush|hurry|thanks))\b", re.I)
+_NO_DENIAL: Final = re.compile(
+    r"\b(?:(?:not|never|don'?t) (?:mind|hesitate|forget|worry)|no (?:problem|worries|rush|hurry|thanks)|"
+    r"(?:do not|don'?t) (?:you|we)|not too)\b",
+    re.IGNORECASE,
+)
+"""Negations that forbid nothing."""
 _REMARK: Final = re.compile(
     r"^(?:(?:i|we|he|she|it|they|there|this|that|these|those|you)(?:'\w+)?|i'm|my|our|his|her|their|everyone|everybody|"
     r"nobody|somebody|someone|what|who|which|why|how|the (?:\w+ ){1,3}(?:is|are|was|has|have|looks?|goes|drives?))\b",
@@ -96,57 +101,162 @@ _ALWAYS: Final = re.compile(
 )
 """In a condition: what the checks and the safety filter see to anyway, or leaves it to the driver."""
 
-_LANE_VERB: Final = r"(?:chang|switch|mov|merg|get|go|shift|swap|pull|slid|hop|come|return|back|div|us|tak|cross)\w{0,4}"
-_ACTS: Final[tuple[tuple[ActKind, int, re.Pattern[str]], ...]] = tuple(
-    (kind, sign, re.compile(rf"\b(?:{pattern})", re.IGNORECASE))
-    for kind, sign, pattern in (
+_SIDES: Final = r"(?:left|right)"
+_USER: Final = r"(?:it|him|her|them|car|truck|van|bus|lorry|vehicle|guy|one|driver|tractor|bike|cyclist|slowpoke|snail)"
+_ROOM: Final = r"(?:\w+ )?(?:room|space|distance|gap|headway)"
+_LANE_VERB: Final = (
+    r"(?:chang|switch|mov|merg|get|go|shift|swap|pull|slid|hop|come|return|back|div|us|tak|cross)\w{0,4}"
+)
+_PATTERNS: Final[tuple[tuple[ActKind, int, tuple[str, ...]], ...]] = (
+    (
+        "yield",
+        0,
         (
-            "yield",
-            0,
-            r"let(?:ting)?\b(?! (?:me|us)\b).{1,40}\b(?:in|merge|pass|by|through|first|squeeze|cut|ahead|join|go|over)\b|"
-            r"(?:make|leave) (?:room|way|space) for|give way|yield|allow\w*\b.{1,40}\b(?:merge|in|pass|cut|squeeze|join)\b|"
+            r"let(?:ting)?\b(?! (?:me|us)\b).{1,40}"
+            r"\b(?:in|merge|pass|by|through|first|squeeze|cut|ahead|join|go|over)\b",
+            r"(?:make|leave) (?:room|way|space) for",
+            r"give way|yield",
+            r"allow\w*\b.{1,40}\b(?:merge|in|pass|cut|squeeze|join)\b",
             r"open(?:ing)? (?:up )?(?:a|the) gap",
         ),
-        ("keep", 0, r"(?:stay|keep|remain|stick|hold)\w{0,3}\b(?! behind).{0,25}\blane"),
-        ("overtake", 0, r"over ?tak\w{1,4}|(?:pass|get past|go past|get around|go around|get by)(?:ing)? (?:the|this|that|it|"
-         r"him|her|them|these|those|a)\b(?=.{0,25}\b(?:it|him|her|them|car|truck|van|bus|lorry|vehicle|guy|one|driver|"
-         r"tractor|bike|cyclist|slowpoke|snail)\b)|leapfrog"),
-        ("pull_over", 0, r"pull(?:ing)? (?:over|up|aside|in(?! (?:front|behind|after)))|(?:hard )?shoulder|emergency lane"),
-        ("park", 0, r"park(?:ing)?\b"),
-        ("turn", 0, r"u[- ]?turn|turn(?:ing)? (?:a)?round|(?:turn\w{0,3}|bear|veer|hang|swing)\b.{0,25}\b(?:left|right)|"
-         r"(?:take|make|do|catch)\b.{0,25}\b(?:left|right)(?! lane|[- ]hand lane| side)|turn(?:ing)? (?:off|in|at|into|here)"
-         r"|(?:go|drive|head|continue|keep|straight) (?:straight|left|right)(?! (?:away|behind|to the)\b)"),
-        ("lane", 0, rf"{_LANE_VERB}\b.{{0,30}}\blanes?\b|(?:left|right|other|next|fast|slow|inside|outside|middle)"
-         r"(?:most|[- ]hand)? lane|(?:move|come|go|get) (?:over|back (?:in|over))\b"),
-        ("stop", 0, r"stop(?:ping)?\b(?! (?:sign|light|line))(?! \w+ing\b)|halt|come to (?:a|rest)|"
-         r"(?:let|drop|leave|set) (?:me|us|him|her|them) (?:out|off|down|here|there|at|by)|(?:get|hop|step) out"),
-        ("go_to", 0, r"(?:take|drive|bring|get|go|head|carry|run|deliver)(?:ing)? (?:me |us |him |her |them )?(?:back |over )?"
-         r"(?:to|towards?|home)\b(?! (?:the )?(?:left|right|\d|speed|sleep))"),
-        ("wait", 0, r"wait(?:ing)?\b|stand by\b|stay (?:here|there|put)"),
-        ("follow", 0, r"follow(?:ing)?\b(?! (?:the )?(?:road|street|signs?|rules?|limit))|(?:stay|keep|remain) behind"),
-        ("gap", 1, r"(?:more|larger|bigger|greater|wider|longer|extra|some) (?:\w+ )?(?:room|space|distance|gap|headway)|"
-         r"(?:further|farther) (?:back|away|behind)|(?:back|drop|fall|hang) (?:off|back)|(?:increase|widen|open)\b.{0,12}"
-         r"\b(?:gap|distance)|keep (?:your |a |some )?distance"),
-        ("gap", -1, r"(?:less|smaller|shorter) (?:\w+ )?(?:room|space|distance|gap|headway)|closer|nearer|close (?:the|up)|"
-         r"tailgat\w{2,3}|(?:reduce|shorten|close|decrease)\b.{0,12}\b(?:gap|distance)"),
-        ("gap", 0, r"(?:gap|headway|distance)\b|(?:keep|leave|stay|hold|follow)\b.{0,15}\d ?"
-         r"(?:m|met(?:re|er)s?|feet|foot|yards?|car lengths?|s|sec\w{0,4})\b"),
-        ("speed", 1, r"faster|quicker|speed(?:ing)? up|accelerat\w{1,3}|step on it|floor it|hurry up|more speed|"
-         r"(?:increase|raise)\b.{0,12}\b(?:speed|pace)"),
-        ("speed", -1, r"slower|slow(?:ing)?(?: it)? down|slow\b|brak(?:e|ing)|decelerat\w{1,3}|less speed|ease off|"
-         r"(?:decrease|reduce|lower)\b.{0,12}\b(?:speed|pace)"),
-        ("speed", 0, r"(?:speed|pace|cruise|km/h|kmh|mph|kph|kilomet\w{2,3} (?:per|an)|miles (?:per|an)|speed limit)\b|"
-         r"(?:go|do|drive|drive at|hold) \d"),
-        ("style", 0, r"careful\w{0,2}|gentl[ey]|smooth\w{0,2}|calm\w{0,2}|relax\w{0,3}|(?:in a|in no) (?:hurry|rush)|easy|"
-         r"sporty|econom\w{3,6}|comfort\w{0,5}|hurry"),
-        ("keep", 0, r"(?:keep|carry|go|drive) (?:on|going|driving|it up)|continue|stay\b|keep (?:it|this|that|the|your)\b"),
-    )
-)  # fmt: skip
+    ),
+    ("keep", 0, (r"(?:stay|keep|remain|stick|hold)\w{0,3}\b(?! behind).{0,25}\blane",)),
+    (
+        "overtake",
+        0,
+        (
+            r"over ?tak\w{1,4}|leapfrog",
+            r"(?:pass|get past|go past|get around|go around|get by)(?:ing)? "
+            rf"(?:the|this|that|it|him|her|them|these|those|a)\b(?=.{{0,25}}\b{_USER}\b)",
+            r"pass(?:ing)? (?:it|him|her|them)\b",
+        ),
+    ),
+    (
+        "pull_over",
+        0,
+        (r"pull(?:ing)? (?:over|up|aside|in(?! (?:front|behind|after)))", r"(?:hard )?shoulder|emergency lane"),
+    ),
+    ("park", 0, (r"park(?:ing)?\b",)),
+    (
+        "turn",
+        0,
+        (
+            r"u[- ]?turn|turn(?:ing)? (?:a)?round",
+            rf"(?:turn\w{{0,3}}|bear|veer|hang|swing)\b.{{0,25}}\b{_SIDES}",
+            rf"(?:take|make|do|catch)\b.{{0,25}}\b{_SIDES}(?! lane|[- ]hand lane| side)",
+            r"turn(?:ing)? (?:off|in|at|into|here)",
+            rf"(?:go|drive|head|continue|keep|straight) (?:straight|{_SIDES})(?! (?:away|behind|to the)\b)",
+        ),
+    ),
+    (
+        "lane",
+        0,
+        (
+            rf"{_LANE_VERB}\b.{{0,30}}\blanes?\b",
+            r"(?:left|right|other|next|fast|slow|inside|outside|middle)(?:most|[- ]hand)? lane",
+            r"(?:move|come|go|get) (?:over|back (?:in|over))\b",
+        ),
+    ),
+    (
+        "stop",
+        0,
+        (
+            r"stop(?:ping)?\b(?! (?:sign|light|line))(?! \w+ing\b)|halt|come to (?:a|rest)",
+            r"(?:let|drop|leave|set) (?:me|us|him|her|them) (?:out|off|down|here|there|at|by)|(?:get|hop|step) out",
+        ),
+    ),
+    (
+        "go_to",
+        0,
+        (
+            r"(?:take|drive|bring|get|go|head|carry|run|deliver)(?:ing)? (?:me |us |him |her |them )?(?:back |over )?"
+            r"(?:to|towards?|home)\b(?! (?:the )?(?:left|right|\d|speed|sleep))",
+        ),
+    ),
+    ("wait", 0, (r"wait(?:ing)?\b|stand by\b|stay (?:here|there|put)",)),
+    (
+        "follow",
+        0,
+        (r"follow(?:ing)?\b(?! (?:the )?(?:road|street|signs?|rules?|limit))|(?:stay|keep|remain) behind",),
+    ),
+    (
+        "gap",
+        1,
+        (
+            rf"(?:more|larger|bigger|greater|wider|longer|extra|some) {_ROOM}",
+            r"(?:further|farther) (?:back|away|behind)|(?:back|drop|fall|hang) (?:off|back)",
+            r"(?:increase|widen|open)\b.{0,12}\b(?:gap|distance)|keep (?:your |a |some )?distance",
+        ),
+    ),
+    (
+        "gap",
+        -1,
+        (
+            rf"(?:less|smaller|shorter) {_ROOM}",
+            r"closer|nearer|close (?:the|up)|tailgat\w{2,3}",
+            r"(?:reduce|shorten|close|decrease)\b.{0,12}\b(?:gap|distance)",
+        ),
+    ),
+    (
+        "gap",
+        0,
+        (
+            r"(?:gap|headway|distance)\b",
+            r"(?:keep|leave|stay|hold|follow)\b.{0,15}\d ?"
+            r"(?:m|met(?:re|er)s?|feet|foot|yards?|car lengths?|s|sec\w{0,4})\b",
+        ),
+    ),
+    (
+        "speed",
+        1,
+        (
+            r"faster|quicker|speed(?:ing)? up|accelerat\w{1,3}|step on it|floor it|hurry up|more speed",
+            r"(?:increase|raise)\b.{0,12}\b(?:speed|pace)",
+        ),
+    ),
+    (
+        "speed",
+        -1,
+        (
+            r"slower|slow(?:ing)?(?: it)? down|slow\b|brak(?:e|ing)|decelerat\w{1,3}|less speed|ease off",
+            r"(?:decrease|reduce|lower)\b.{0,12}\b(?:speed|pace)",
+        ),
+    ),
+    (
+        "speed",
+        0,
+        (
+            r"(?:speed|pace|cruise|km/h|kmh|mph|kph|kilomet\w{2,3} (?:per|an)|miles (?:per|an)|speed limit)\b",
+            r"(?:go|do|drive|drive at|hold) \d",
+        ),
+    ),
+    (
+        "style",
+        0,
+        (
+            r"careful\w{0,2}|gentl[ey]|smooth\w{0,2}|calm\w{0,2}|relax\w{0,3}|(?:in a|in no) (?:hurry|rush)|easy",
+            r"sporty|econom\w{3,6}|comfort\w{0,5}|hurry",
+        ),
+    ),
+    (
+        "keep",
+        0,
+        (
+            r"(?:keep|carry|go|drive) (?:on|going|driving|it up)|continue|stay\b",
+            r"keep (?:it|this|that|the|your)\b",
+        ),
+    ),
+)
+_ACTS: Final = tuple(
+    (kind, sign, re.compile("|".join(rf"\b(?:{pattern})" for pattern in patterns), re.IGNORECASE))
+    for kind, sign, patterns in _PATTERNS
+)
+"""An act with its sign, and the words for it; the first that begins earliest in a clause is meant."""
 _OTHER: Final = re.compile(
-    r"^(?:call|ring|phone|pick|collect|fetch|get|buy|bring|play|sing|open|close|shut|honk|beep|flash|signal|indicate|wave|"
-    r"tell|text|send|book|order|find|look|show|check|ask|say|put|give|use|watch|mind|wake|help|race|chase|reverse|back|load|"
-    r"unload|charge|refuel|fill|wash|visit|meet|return|come|take|turn (?:on|off|up|down)|switch|read|avoid|greet|drop|grab|"
-    r"leave|swerve|circle|film|photograph|move|join|merge|pull)\b",
+    r"^(?:call|ring|phone|pick|collect|fetch|get|buy|bring|play|sing|open|close|shut|honk|beep|flash|signal|indicate|"
+    r"wave|tell|text|send|book|order|find|look|show|check|ask|say|put|give|use|watch|mind|wake|help|race|chase|reverse|"
+    r"back|load|unload|charge|refuel|fill|wash|visit|meet|return|come|take|turn (?:on|off|up|down)|switch|read|avoid|"
+    r"greet|drop|grab|leave|swerve|circle|film|photograph|move|join|merge|pull)\b",
     re.IGNORECASE,
 )
 """Imperatives that are none of the acts above."""
@@ -159,49 +269,58 @@ _ELLIPTIC: Final = re.compile(
 _SIDE: Final = re.compile(r"\b(left|right)\b(?! (?:now|away|here|behind|there|after|before)\b)", re.IGNORECASE)
 _STRAIGHT: Final = re.compile(r"\bstraight\b(?! (?:away|after|behind|to)\b)", re.IGNORECASE)
 _PLACE: Final = re.compile(
-    r"\b(?:at|behind|beside|next to|near|close to|in front of|past|through|via|opposite|under|by|across from|around|between|"
-    r"from|over|along|outside|inside|onto|on|in|into|to|towards?|beyond) (?:the|a|an|that|this|my|our|some|any|[A-Z]\w+)\b"
+    r"\b(?:at|behind|beside|next to|near|close to|in front of|past|through|via|opposite|under|by|across from|around|"
+    r"between|from|over|along|outside|inside|onto|on|in|into|to|towards?|beyond) "
+    r"(?:the|a|an|that|this|my|our|some|any|[A-Z]\w+)\b"
     r"(?:(?! (?:at|behind|beside|next|near|in|past|through|via|opposite|by|from|to|on|onto|into|and|but|with|for) )"
     r" [\w'-]{1,30}){0,4}"
 )
 _SPAN: Final = re.compile(
-    r"\b(?:in|for|within|after) (?:about |the next |another |exactly |roughly )?(?:\d{1,5}(?:\.\d+)?|a few|a couple of|a|one|"
-    r"two|three|four|five|six|seven|eight|nine|ten|fifteen|twenty|thirty|forty|fifty|hundred|half an?)[ -]?"
+    r"\b(?:in|for|within|after) (?:about |the next |another |exactly |roughly )?"
+    r"(?:\d{1,5}(?:\.\d+)?|a few|a couple of|a|one|two|three|four|five|six|seven|eight|nine|ten|fifteen|"
+    r"twenty|thirty|forty|fifty|hundred|half an?)[ -]?"
     r"(?:hundred )?(?:m|metres?|meters?|km|kilomet(?:re|er)s?|miles?|yards?|s|secs?|seconds?|min(?:ute)?s?|hours?)\b",
     re.IGNORECASE,
 )
 _STANDING: Final = re.compile(
-    r"\b(?:by|faster|slower|more|less|than|over|under|below|above|most|least|max\w*|min\w*|up to|between|or|within|about|"
-    r"around|roughly|limit)\b",
+    r"\b(?:by|faster|slower|more|less|than|over|under|below|above|most|least|max\w*|min\w*|up to|between|or|within|"
+    r"about|around|roughly|limit)\b",
     re.IGNORECASE,
 )
 """Beside a number: it is no new value that is to be met."""
 
-_EMPTY: Final = frozenset(
-    "a an the this that these those my our your his her its their some any all me us you we i he she it they him them be "
-    "is are was were am been being do does did done have has had having will would can could shall should may might must "
-    "of to in on at by for with from as so too very please now then again also just only ahead here there and or not no "
-    "bit little lot way side hand next first second third fourth last other left right straight front behind back up down "
-    "out off away over under near close past until till after before when while if once unless soon long as moment time "
-    "every each s t d ll re ve m into onto beside beyond towards toward through via opposite across around between along "
-    "outside inside under right-hand left-hand hand-side never not mind".split()
-)
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+_EMPTY: Final = _words("""
+a an the this that these those my our your his her its their some any all me us you we i he she it they him them be
+is are was were am been being do does did done have has had having will would can could shall should may might must
+of to in on at by for with from as so too very please now then again also just only ahead here there and or not no
+bit little lot way side hand next first second third fourth last other left right straight front behind back up down
+out off away over under near close past until till after before when while if once unless soon long as moment time
+every each s t d ll re ve m into onto beside beyond towards toward through via opposite across around between along
+outside inside under right-hand left-hand hand-side never not mind
+""")
 """Words by which no place and no condition is known."""
-_ROAD: Final = frozenset(
-    "lane lanes shoulder road street highway motorway freeway junction junctions intersection crossing crossroad "
-    "crossroads corner light lights signal sign stop traffic roundabout speed limit pace gap distance hurry rush direction "
-    "middle emergency hard fast slow slower faster passing rest track course safety turn drive point journey".split()
-)
+_ROAD: Final = _words("""
+lane lanes shoulder road street highway motorway freeway junction junctions intersection crossing crossroad
+crossroads corner light lights signal sign stop traffic roundabout speed limit pace gap distance hurry rush
+direction middle emergency hard fast slow slower faster passing rest track course safety turn drive point journey
+""")
 """What every world knows."""
-_USERS: Final = frozenset(
-    "car cars vehicle vehicles truck trucks lorry lorries van vans bus buses bike cyclist cyclists motorcycle tractor guy "
-    "driver drivers one ones leader lead slowpoke red blue white black silver grey gray green yellow big small old".split()
-)
+_USERS: Final = _words("""
+car cars vehicle vehicles truck trucks lorry lorries van vans bus buses bike cyclist cyclists motorcycle tractor guy
+driver drivers one ones leader lead slowpoke red blue white black silver grey gray green yellow big small old
+""")
 """Road users and their looks: which of them is meant is no place."""
 _WORD: Final = re.compile(r"[a-z][a-z'-]{0,40}|\d{1,6}", re.IGNORECASE)
 _OWN: Final = re.compile(r"^(?:\w+ ){1,2}?(?:(?:you|we)(?:'\w+)?(?: (?:have|are|can|will))?|\w+ing\b)", re.IGNORECASE)
 """A condition about what the car itself does."""
-_FIRST_PERSON: Final = re.compile(r"^(?:while|as|when|so) (?:i|we)(?:'\w+)?\b(?! (?:say|tell|reach|get|come|pass|arrive))", re.I)
+_FIRST_PERSON: Final = re.compile(
+    r"^(?:while|as|when|so) (?:i|we)(?:'\w+)?\b(?! (?:say|tell|reach|get|come|pass|arrive))", re.I
+)
 
 
 @lru_cache(maxsize=64)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from chauffeur.concept import Command, Observation, VehicleState
-from chauffeur.concept.units import kmh
+from chauffeur.concept.units import people_speed
 from chauffeur.geometry import Box, Pose, overlap
 from chauffeur.worlds.parking.path_follower import HARDEST_MPS2, Chassis
 
@@ -70,7 +70,7 @@ class LotSafetyFilter:
         most = (most_mps - speed) / self._dt_s
         most = most if most >= 0.0 else max(most, -_EASY_MPS2)
         if asked > most + _LEVEL:
-            rule, reason = "speed", f"No faster than {kmh(most_mps):.0f} km/h here."
+            rule, reason = "speed", f"No faster than {people_speed(most_mps, at_most=True)} here."
         wanted = min(asked, most)
         others = [one for one in (*observation.others, *observation.objects) if self._near(observation.ego, one)]
         if self._ends_well(observation.ego, wanted, wheel, others):

@@ -75,9 +75,7 @@ class TownWay:
 class WayReferee:
     """Looks at a town after each control period: whether the car took the ways it was to take, and stood at the end."""
 
-    def __init__(
-        self, world: TownWorld, ways: Sequence[TownWay], stops: bool, judged_by: JudgedBy = "plan"
-    ) -> None:
+    def __init__(self, world: TownWorld, ways: Sequence[TownWay], stops: bool, judged_by: JudgedBy = "plan") -> None:
         """Take a task.
 
         Args:
@@ -127,11 +125,13 @@ class WayReferee:
             return
         if before is not None and lane.junction and not before.junction and self._left:
             ways = named_ways(road, before.id)
-            self._take(ways, next((turn for turn, those in ways.items() for one in those if lane.id in one.lanes), None))
+            self._take(
+                ways, next((turn for turn, those in ways.items() for one in those if lane.id in one.lanes), None)
+            )
         self._before = lane.id
 
     def _take(self, ways: Collection[Turn], way: Turn | None) -> None:
-        """Note which of the ways at a junction was taken; one that nobody asked for, beside one straight on, is astray."""
+        """Note the way taken at a junction; one that was not asked for, where straight on was possible, is astray."""
         meant = self._left[0]
         self._passed += meant.turn in ways
         if way == meant.turn and self._passed >= meant.nth:
