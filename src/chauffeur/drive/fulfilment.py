@@ -2,8 +2,8 @@
 
 A benchmark has goals of its own, and ends the instant one is met. A passenger who says "overtake and come back" has not
 been served in the left lane, nor one who wants 40 m when 38 m flash by. So a free drive is judged part by part: every
-part is done in its order, the set-points (lane, speed, gap) are reached and held, and a program that still has something
-to do has done it.
+part is done in its order, the set-points (lane, speed, gap) are reached and held, and a program that still has
+something to do has done it.
 
 Sides, directions and numbers are those of the words, read by rules that see no plan (`language.wanted`); what a mood
 comes to, and a number that only the plan has, are the plan's, and there judge and judged share a reading.

@@ -1,8 +1,8 @@
 """The parts of a wish beside the plan that was made of it: which of them the plan uses, and which it leaves out.
 
 The parts come from `language.wanted`, which sees no plan. A plan says its acts in `intent`; where it says none, the
-calls of its program stand for them. A planner that understood more acts than the rules is given the benefit: an act with
-which no part agrees takes one that the rules cannot name.
+calls of its program stand for them. A planner that understood more acts than the rules is given the benefit: an act
+with which no part agrees takes one that the rules cannot name.
 """
 
 from __future__ import annotations

@@ -65,7 +65,7 @@ RESULT_TONES: Final[dict[Result, Tone]] = {
 }
 _JUDGED_BY: Final[dict[JudgedBy, str]] = {
     "words": "Judged by your words, which rules read that see no plan.",
-    "plan": "Judged by what the planner understood, for rules alone read less in the words: judge and planner share that.",
+    "plan": "Judged by what the planner understood, for rules alone read less: judge and planner share it.",
     "goal": "Judged by the scenario's own goal.",
     "place": "Judged by the place: the planner chose it, the world's geometry says whether the car is there.",
 }
@@ -328,7 +328,9 @@ def setting(name: str, value: float, unit: SpeedUnit | None = None) -> tuple[str
     for suffix, measure in _SUFFIXES:
         if name.endswith(suffix):
             label = name.removesuffix(suffix).replace("_", " ")
-            return label, speed(value, unit) if measure == "m/s" else f"{value:g} {measure}"
+            if measure == "m/s" and unit:
+                return label, people_speed(value, unit, at_most=label.startswith("target"))
+            return label, speed(value) if measure == "m/s" else f"{value:g} {measure}"
     return name.replace("_", " "), f"{value:g}"
 
 

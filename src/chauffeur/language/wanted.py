@@ -247,7 +247,7 @@ _PATTERNS: Final[tuple[tuple[ActKind, int, tuple[str, ...]], ...]] = (
         ),
     ),
 )
-_ACTS: Final = tuple(
+_ACTS: Final[tuple[tuple[ActKind, int, re.Pattern[str]], ...]] = tuple(
     (kind, sign, re.compile("|".join(rf"\b(?:{pattern})" for pattern in patterns), re.IGNORECASE))
     for kind, sign, patterns in _PATTERNS
 )
