@@ -59,6 +59,7 @@ class Ask:
         detail: The rest: `left`, `set`, ...
         speed_mps, gap_m, headway_s: Numbers that go with it, where words or plan name them.
         sign: +1 where the words ask for more speed or room, -1 for less, 0 where they do not say.
+        returns: Whether the car is to be back in the lane where it began.
         said: Whether the words say it, too: read by rules that see no plan.
     """
 
@@ -68,6 +69,7 @@ class Ask:
     gap_m: float | None = None
     headway_s: float | None = None
     sign: int = 0
+    returns: bool = False
     said: bool = False
 
     @property
@@ -80,13 +82,14 @@ class Ask:
 def asked_of(plan: Plan, wish: str = "") -> tuple[Ask, ...]:
     """What is to be done, in its order: what the planner understood, as the words say it; where it does not tell, the
     words alone."""
-    understood = _understood(plan)
-    if not understood:
-        return tuple(ask for part in read_wanted(wish) if (ask := _alone(part)) is not None)
-    served = account_of(wish, plan).served if wish else ()
-    if len(served) != len(understood):
-        return understood
-    return tuple(ask if part is None else _as_said(ask, part) for ask, part in zip(understood, served, strict=True))
+    parts = read_wanted(wish)
+    asks = _understood(plan)
+    if not asks:
+        asks = tuple(ask for part in parts if (ask := _alone(part)) is not None)
+    elif wish and len(served := account_of(wish, plan).served) == len(asks):
+        asks = tuple(ask if part is None else _as_said(ask, part) for ask, part in zip(asks, served, strict=True))
+    back = any(part.act == "return" and not part.denied for part in parts)
+    return tuple(replace(ask, returns=back) if ask.kind == "overtake" else ask for ask in asks)
 
 
 def _as_said(ask: Ask, part: WantedPart) -> Ask:
@@ -220,7 +223,8 @@ class Fulfilment:
             return ""
         ask, shot = self._asks[self._done], self._world.observe()
         missing = _MISSING.get(ask.kind, "The car did not settle as planned.")
-        if ask.kind == "overtake" and self._passed and not self._in_lane(shot):
+        away = not self._in_lane(shot) or (ask.returns and _moved(self._began, shot) != 0)
+        if ask.kind == "overtake" and self._passed and away:
             missing = "The vehicle ahead was passed, but the car is not in the lane it was to end in."
         front = shot.front
         slow = front is not None and front.distance_m < _HELD_UP_M and front.speed_mps < self._wanted_mps(ask)
@@ -252,7 +256,8 @@ class Fulfilment:
     def _met(self, ask: Ask, shot: Observation) -> bool:
         match ask.kind:
             case "overtake":
-                return self._passed == (ask.detail or self._passed) != ""
+                passed = self._passed == (ask.detail or self._passed) != ""
+                return passed and (not ask.returns or _moved(self._began, shot) == 0)
             case "lane" if ask.detail in ("left", "right"):
                 return _moved(self._began, shot) * _QUARTERS[ask.detail] > 0
             case "turn":

@@ -39,6 +39,7 @@ _CALLS: Final[dict[str, tuple[ActKind, WantedSide]]] = {
 _SERVES: Final[dict[ActKind, tuple[ActKind, ...]]] = {
     "turn": ("turn",),
     "lane": ("lane", "overtake", "pull_over"),
+    "return": ("lane", "overtake", "go_to"),
     "overtake": ("overtake", "lane"),
     "pull_over": ("pull_over", "stop", "park", "go_to"),
     "stop": ("stop", "pull_over", "park", "go_to"),
@@ -53,6 +54,11 @@ _SERVES: Final[dict[ActKind, tuple[ActKind, ...]]] = {
 """Acts of a plan that serve an act that is wanted. A mood, and going on, are served by whatever is driven."""
 _ONCE_EACH: Final = frozenset(("turn", "go_to", "wait", "lane"))
 """Acts that are wanted as often as they are said; others may be said twice and wanted once."""
+
+
+_SEEN: Final = ("turn", "lane", "return", "overtake", "pull_over", "stop", "speed", "gap")
+"""Acts that a drive shows by itself: of a planner that does not tell what it understood, the judge says whether they
+were done, and not the calls of its program."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +115,7 @@ def account_of(wish: str, plan: Plan) -> WishAccount:
         place = _serving(part, planned, served)
         if place is not None:
             served[place] = served[place] or part
-        elif part.act not in ("style", "keep") and planned:
+        elif part.act not in ("style", "keep", *(() if plan.intent else _SEEN)) and planned:
             left_out.append(part)
     spare = [k for k, part in enumerate(served) if part is None]
     for part in [*left_out, *(one for one in parts if one.kind == "act" and one.act == "other" and not one.denied)]:
@@ -165,7 +171,7 @@ def result_of_event(kind: EventKind, wish: str, plan: Plan | None) -> Result:
 
 def _serving(part: WantedPart, planned: tuple[PlannedAct, ...], served: list[WantedPart | None]) -> int | None:
     """The act of a plan that serves a part: a free one of the same kind and side first."""
-    kinds = _SERVES.get(part.act, ())
+    kinds = (*_SERVES.get(part.act, ()), "other")  # a planner may call an act as nobody else does
     fits = [k for k, act in enumerate(planned) if act.kind in kinds]
     free = [k for k in fits if served[k] is None]
     for some in (free, [] if part.act in _ONCE_EACH else fits):

@@ -132,7 +132,7 @@ def trip_words(trip: Trip, *, timed: bool = False) -> tuple[str, str, Tone]:
     if trip.plan.refusal and trip.plan.intent == ANSWERED:
         return "■", ANSWERED_LABEL, "neutral"
     if result is Result.DONE and trip.outcome == "ended":
-        label, tone = "Driven", "neutral"
+        label, tone = "Done, not compared", "neutral"
     if result is Result.FAILED and trip.outcome in ("collision", "off_road"):
         label = f"{label}: {_WHY[trip.outcome][0].lower()}{_WHY[trip.outcome][1:-1]}"
     if timed and trip.duration_s:

@@ -17,10 +17,11 @@ from chauffeur.language.ordinals import nth_of
 from chauffeur.language.quantities import Quantity, read_quantities
 
 ActKind = Literal[
-    "turn", "lane", "overtake", "pull_over", "stop", "park", "go_to", "speed", "gap", "follow", "yield", "wait",
-    "style", "keep", "other",
+    "turn", "lane", "return", "overtake", "pull_over", "stop", "park", "go_to", "speed", "gap", "follow", "yield",
+    "wait", "style", "keep", "other",
 ]  # fmt: skip
-"""`yield` lets another vehicle in; `style` is a mood; `other` is an imperative that is no driving this module knows."""
+"""`return` is to the lane where it began; `yield` lets another vehicle in; `style` is a mood; `other` is an imperative
+that is no driving this module knows."""
 PartKind = Literal["act", "condition", "place", "exclusion"]
 WantedSide = Literal["left", "right", "straight", ""]
 
@@ -146,6 +147,16 @@ _PATTERNS: Final[tuple[tuple[ActKind, int, tuple[str, ...]], ...]] = (
             rf"(?:take|make|do|catch)\b.{{0,25}}\b{_SIDES}(?! lane|[- ]hand lane| side)",
             r"turn(?:ing)? (?:off|in|at|into|here)",
             rf"(?:go|drive|head|continue|keep|straight) (?:straight|{_SIDES})(?! (?:away|behind|to the)\b)",
+        ),
+    ),
+    (
+        "return",
+        0,
+        (
+            r"(?:com|go|get|pull|mov|merg|slid|cut|chang|switch)\w{0,4} back\b"
+            r"(?! to (?!(?:the|our|my|this|your) (?:\w+ )?lane))",
+            r"return(?:ing)?\b(?! (?:the|my|this|it|him|her|them)\b)",
+            r"back (?:in|into|to) (?:the|our|my|this|your) (?:\w+ )?lane",
         ),
     ),
     (
@@ -383,7 +394,7 @@ def _act(body: str, before: list[WantedPart], *, denied: bool) -> WantedPart | N
         if (hit := pattern.search(body)) is not None:
             found.append((hit.start(), order, kind, sign))
     alone = _ELLIPTIC.match(body)
-    if alone is not None and not (found and min(found)[2] in ("lane", "overtake", "pull_over", "park")):
+    if alone is not None and not (found and min(found)[2] in ("lane", "return", "overtake", "pull_over", "park")):
         earlier = next((part for part in reversed(before) if part.kind == "act"), None)
         kind: ActKind = earlier.act if earlier is not None and earlier.act in ("turn", "lane") else "turn"
         return WantedPart("act", body, kind, _side(alone["side"]), denied=denied, nth=nth_of(body))
@@ -397,7 +408,7 @@ def _act(body: str, before: list[WantedPart], *, denied: bool) -> WantedPart | N
     return WantedPart("act", body, "other", denied=denied) if _OTHER.match(body) else None
 
 
-_FIRST: Final = frozenset(("yield", "overtake", "pull_over", "park"))
+_FIRST: Final = frozenset(("yield", "overtake", "pull_over", "park", "return"))
 """Acts that decide a clause wherever their words stand in it."""
 
 
