@@ -70,7 +70,7 @@ _BREAK: Final = re.compile(
 _POLITE: Final = re.compile(
     r"^(?:(?:please|now|just|ok(?:ay)?|hey|hi|hello|well|so|oh|and|then|also|kindly|first|next|maybe|perhaps|chauffeur|"
     r"(?:can|could|would|will|might|may) (?:you|we)(?: (?:please|mind|kindly|maybe|just))?|"
-    r"(?:i|we) (?:would|'d) (?:like|love|prefer|rather)(?: (?:you|it))?(?: to| if you(?: could| would)?)?|"
+    r"(?:i|we)(?: would|'d) (?:like|love|prefer|rather)(?: (?:you|it))?(?: to| if you(?: could| would)?)?|"
     r"(?:i|we) (?:want|need|wish|have)(?: you)? to|(?:i|we)(?:'d| would) rather(?: you)?|"
     r"(?:you|we) (?:should|can|could|may|must|might|need to|have to|ought to)|do me a favou?r|"
     r"let(?:'s| us)|lets|go ahead|feel free to|try to|make sure(?: to| that you| you)?|be sure to|remember to|"
@@ -281,7 +281,7 @@ _SIDE: Final = re.compile(r"\b(left|right)\b(?! (?:now|away|here|behind|there|af
 _STRAIGHT: Final = re.compile(r"\bstraight\b(?! (?:away|after|behind|to)\b)", re.IGNORECASE)
 _PLACE: Final = re.compile(
     r"\b(?:at|behind|beside|next to|near|close to|in front of|past|through|via|opposite|under|by|across from|around|"
-    r"between|from|over|along|outside|inside|onto|on|in|into|to|towards?|beyond) "
+    r"between|(?:far |away )?from|over|along|outside|inside|onto|on|in|into|to|towards?|beyond) "
     r"(?:the|a|an|that|this|my|our|some|any|[A-Z]\w+)\b"
     r"(?:(?! (?:at|behind|beside|next|near|in|past|through|via|opposite|by|from|to|on|onto|into|and|but|with|for) )"
     r" [\w'-]{1,30}){0,4}"
@@ -399,7 +399,8 @@ def _act(body: str, before: list[WantedPart], *, denied: bool) -> WantedPart | N
         kind: ActKind = earlier.act if earlier is not None and earlier.act in ("turn", "lane") else "turn"
         return WantedPart("act", body, kind, _side(alone["side"]), denied=denied, nth=nth_of(body))
     if found:
-        _, order, kind, sign = min(found, key=lambda one: (one[1] if one[2] in _FIRST else 99, one[0], one[1]))
+        _, _, kind, sign = min(found, key=lambda one: (one[1] if one[2] in _FIRST else 99, one[0], one[1]))
+        sign = sign or next((more for _, _, same, more in found if same == kind and more), 0)
         side = _SIDE.search(body) if kind in ("turn", "lane", "overtake") else None
         word = "straight" if side is None and kind == "turn" and _STRAIGHT.search(body) else side[1] if side else ""
         return WantedPart(
