@@ -9,6 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from chauffeur.cli.main import app
+from chauffeur.drive.scenarios import find
+from chauffeur.drive.session import make_world
 
 run = CliRunner()
 
@@ -36,6 +38,15 @@ def test_a_town_is_built_and_found_by_name(tmp_path: Path, monkeypatch: pytest.M
     assert said.exit_code == 0, said.output
     assert "seed 3" in said.output
     assert "Ringstead-3" in run.invoke(app, ["maps", "list"]).output
+    assert "--scenario Ringstead-3" in " ".join(said.output.split())
+    monkeypatch.chdir(tmp_path)
+    for name in ("Ringstead-3", str(tmp_path / "maps" / "Ringstead-3")):
+        place = find(name)
+        assert make_world(place).reset(place).kind == "town"
+    driven = run.invoke(app, ["drive", "Turn right at the next junction.", "--scenario", "Ringstead-3", "--quiet"])
+    assert driven.exit_code == 0, driven.output
+    near = run.invoke(app, ["drive", "Turn right.", "--scenario", "Ringstead-4"])
+    assert "Ringstead-3" in near.output
 
 
 def test_what_is_no_town_is_said(tmp_path: Path) -> None:

@@ -352,7 +352,7 @@ def _result(each: Conversation) -> tuple[str, str]:
 
 def _summary(each: Conversation) -> Text:
     label, style = _result(each)
-    if each.outcome in ("superseded", "interrupted") and each.stages.check_s is not None:
+    if each.outcome in ("superseded", "interrupted") and each.stages.check_s is not None and not each.ends:
         label, style = "driven", "green"
     found = Text.assemble("“", plain(each.text), "” ", (label, style))
     if each.opinion:

@@ -142,6 +142,7 @@ def check_told_not_to(wish: str, plan: Plan) -> tuple[Verdict, ...]:
 
 
 _OF_EVENTS: Final[dict[EventKind, Result]] = {
+    "answered": Result.DONE,
     "unplanned": Result.FAILED,
     "stale": Result.FAILED,
     "failed": Result.FAILED,

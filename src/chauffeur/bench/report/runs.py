@@ -140,6 +140,19 @@ def _short(folder: Path, folders: Sequence[Path]) -> str:
 _LAMPILOT: Final = "lampilot-bench"
 
 
+def tables_of_another(folder: Path) -> str:
+    """The tables that a finished run of another benchmark wrote, as Markdown; empty for a run of LaMPilot-Bench.
+
+    Raises:
+        DataError: It is no run folder that can be read.
+    """
+    if not (folder / "plan.json").is_file():
+        return ""
+    bench = str(_json(folder / "plan.json").get("bench", _LAMPILOT))
+    table = folder / "table.md"
+    return "" if bench.startswith(_LAMPILOT) or not table.is_file() else _text(table)
+
+
 def load_run(folder: Path) -> Run:
     """Read one run folder of `chauffeur bench lampilot`.
 

@@ -29,6 +29,7 @@ from chauffeur.planners.prompts import Message, data_block, repair_turns, wish_t
 from chauffeur.planners.prompts.system import fill, template
 from chauffeur.planners.talk2drive.answer import ParametersAnswer, read_answer
 from chauffeur.planners.talk2drive.style import DISTANCE_M, RATIO_S
+from chauffeur.planners.weather_doubts import never_faster
 from chauffeur.planners.wish_goal import goal_of
 from chauffeur.safety.envelope import policy_findings
 
@@ -90,6 +91,7 @@ class Talk2DrivePlanner:
         """Model as asked for."""
         return self._name.partition("/")[2]
 
+    @never_faster
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan.
 
@@ -102,14 +104,14 @@ class Talk2DrivePlanner:
         begun = time.perf_counter()
         messages = messages_for(request)
         prose = await self._writer.write(messages)
-        usage, answer = prose.usage, read_answer(prose.text, whole=prose.whole)
+        usage, answer = prose.usage, _read(prose)
         for _ in range(self._repairs):
             findings = _findings(answer, request)
             if not findings:
                 break
             messages = [*messages, *repair_turns(prose.text, findings, ask=_ASK_AGAIN)]
             prose = await self._writer.write(messages)
-            usage, answer = _sum(usage, prose.usage), read_answer(prose.text, whole=prose.whole)
+            usage, answer = _sum(usage, prose.usage), _read(prose)
         return self._plan(request, answer, prose, usage, begun)
 
     def prompt(self, request: PlanRequest) -> Prompt:
@@ -140,6 +142,10 @@ class Talk2DrivePlanner:
             usage=usage,
             raw=prose.text,
         )
+
+
+def _read(prose: Prose) -> ParametersAnswer:
+    return ParametersAnswer("", refusal=prose.text) if prose.declined else read_answer(prose.text, whole=prose.whole)
 
 
 def _findings(answer: ParametersAnswer, request: PlanRequest) -> list[str]:

@@ -24,7 +24,7 @@ from chauffeur.worlds.town.levels import Levels
 Point = tuple[float, float]
 Line = tuple[Point, Point]
 
-BUILDER_VERSION: Final = "maps-v4"
+BUILDER_VERSION: Final = "maps-v5"
 """Changes with whatever would build another pack from the same sources. Another builder's pack is refused."""
 PACK_FILE: Final = "pack.json"
 OWN_TOWNS: Final = Path(__file__).with_name("towns")
@@ -286,9 +286,14 @@ def load(name_or_path: str | Path) -> MapPack:
         ) from error
 
 
+def has_pack(folder: Path) -> bool:
+    """Whether a folder holds a map pack."""
+    return any((folder / one).is_file() for one in (PACK_FILE, PACK_FILE + ".gz"))
+
+
 def _found(name_or_path: str | Path) -> Path:
     for folder in (Path(name_or_path), maps_folder() / name_or_path, OWN_TOWNS / name_or_path):
-        if any((folder / one).is_file() for one in (PACK_FILE, PACK_FILE + ".gz")):
+        if has_pack(folder):
             return folder
     raise DataError(
         f"There is no map pack {str(name_or_path)!r} in {maps_folder()}.",
