@@ -35,8 +35,7 @@ COMPILES_A_LIBRARY = {"worlds/track/dynamics.py"}
 """Compiles the functions of an installed library, whose text no model writes."""
 
 STEPS_AN_OPTIMISER = {
-    "models/train/trainer.py", "models/onboard/adaptation.py", "models/vilad/frames_baselines.py",
-    "models/vlm/ear.py",
+    "models/train/trainer.py", "models/vilad/frames_baselines.py", "models/vlm/ear.py",
 }  # fmt: skip
 
 
@@ -135,7 +134,6 @@ REQUESTS_MADE = {
     "bench/hostile/requests.py",  # what screening is worth is measured without it, too
     "bench/report/redrive.py",  # of a trip that is filed; nobody is asked
     "models/vlm/lora.py",  # of a training pair; nobody is asked
-    "planners/onboard/served.py",  # what a client of ours sent, taken apart
 }
 """Modules that may name the request of a planner as something to be made."""
 

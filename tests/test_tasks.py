@@ -8,17 +8,17 @@ import shlex
 import shutil
 import subprocess
 import sys
-import threading
 import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
-from chauffeur.cli.serve import ServedEndpoint
-from chauffeur.concept import Limits, Program
+sys.path.append(str(Path(__file__).resolve().parent / "planners"))
+from server import ModelServer
+
+from chauffeur.concept import Program
 from chauffeur.drive.recording import read_trip
-from chauffeur.planners.registry import make_planner
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 WITHIN_S = 600
@@ -31,12 +31,9 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def endpoint() -> Iterator[str]:
     """A chat-completions server on loopback."""
-    server = ServedEndpoint("127.0.0.1", 0, make_planner("onboard"), Limits())
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    yield f"http://127.0.0.1:{server.server_port}/v1"
-    server.shutdown()
-    server.server_close()
+    server = ModelServer()
+    yield server.url
+    server.close()
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +93,7 @@ def test_a_model_of_ones_own_is_evaluated(endpoint: str, suite: Path, tmp_path: 
     shutil.copytree(suite, tmp_path / "suite")
     run([first, *bench], tmp_path)
     trip = read_trip(tmp_path / "trips" / "first" / "trip.mcap").trip
-    assert trip.plan.planner == "openai/onboard" and isinstance(trip.plan.policy, Program)
+    assert trip.plan.planner == "openai/Qwen/Qwen2.5-7B-Instruct" and isinstance(trip.plan.policy, Program)
     assert (tmp_path / "runs" / "report" / "report.html").stat().st_size > 10_000
 
 

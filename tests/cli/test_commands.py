@@ -128,7 +128,7 @@ def test_an_option_has_one_name() -> None:
     ("arguments", "module", "extra"),
     [
         (("model", "train", "onboard", "--out", "run"), "torch", "models"),
-        (("model", "adapt", "--base", "base", "--out", "run", "--as", "ana"), "peft", "models"),
+        (("model", "adapt-vlm", "--checkpoint", "base", "--out", "run"), "peft", "models"),
         (("report", "run", "--inspect", "run.eval"), "inspect_ai", "inspect"),
         (("study", "export", "lab", "--out", "trips.parquet"), "pyarrow", "tables"),
         (("bench", "lampilot", "--data", "DbLv1", "--ray", "local"), "ray", "cluster"),
@@ -177,7 +177,7 @@ def test_a_wish_is_driven_and_everything_is_said(answers: str) -> None:
     assert result.exit_code == 0, result.output
     for words in (WISH, "Left is free.", "def overtake():", "✓", "simulated drive"):
         assert words in result.output
-    assert result.output.startswith("■ Drive ended after 5 s"), "what came of it comes first"
+    assert result.output.startswith("■ Done, not compared after 5 s"), "what came of it comes first"
     assert "Changing to the [bold]left[/] lane." in result.output, "a program's words are not markup"
     assert "\x1b" not in result.output, "no colour and no moving cursor in a pipe"
 
@@ -193,7 +193,7 @@ def test_an_explanation_that_does_not_fit_is_told_and_the_drive_goes_on(answers:
         "wrong side: “I move to the right lane.”, but it changes lanes to the left (line 6)",
         "≠ The drive did not go as explained (score 0.00 of 1, 1 claim compared) alignment-driven-v1",
         "wrong side: “I move to the right lane.”, but it changed lanes to the left",
-        "≠ Drive ended after 5 s, not as explained (simulated drive)",
+        "≠ Done, not compared after 5 s, not as explained (simulated drive)",
     ):
         assert words in told, words
 
@@ -209,7 +209,7 @@ def test_an_explanation_that_does_not_fit_is_told_and_the_drive_goes_on(answers:
     assert "Wrong side: “I move to the right lane.”, but it changes lanes to the left" in shown
     assert "score 0.00 of 1" in shown
     quiet = invoke("drive", MISTOLD, "--planner", answers, "-q").output
-    assert quiet.strip() == "≠ Drive ended after 5 s, not as explained (simulated drive)"
+    assert quiet.strip() == "≠ Done, not compared after 5 s, not as explained (simulated drive)"
 
 
 def test_a_recording_from_before_explanations_were_judged_is_read(driven: Path) -> None:
@@ -227,7 +227,7 @@ def test_a_judge_of_explanations_that_breaks_stops_nothing(answers: str, monkeyp
     monkeypatch.setattr("chauffeur.safety.faithfulness.check.judge", broken)
     result = invoke("drive", WISH, "--planner", answers)
     assert result.exit_code == 0, result.output
-    assert "≠ The check check_faithfulness could not judge this plan (RecursionError)." in " ".join(
+    assert "– not compared: the check check_faithfulness could not judge this plan (RecursionError)." in " ".join(
         result.output.split()
     )
 
@@ -272,7 +272,7 @@ def test_a_refusal_is_explained_and_is_a_failure(answers: str, tmp_path: Path) -
     result = invoke("drive", DECLINED, "--planner", answers, "--save", str(tmp_path))
     assert result.exit_code == 1
     assert "A car cannot fly." in result.output
-    assert "Refused" in result.output
+    assert "Declined" in result.output
     assert {p.name for p in tmp_path.iterdir() if p.suffix} == {"trip.mcap", "trip.html"}
     replayed = invoke("replay", str(tmp_path / "trip.mcap"))
     assert replayed.exit_code == 2

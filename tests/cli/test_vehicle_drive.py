@@ -31,7 +31,10 @@ def root() -> None:
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     path = tmp_path / "vehicle.toml"
-    path.write_text('interface = "ros1"\n[limits]\nmax_speed_mps = 10.0\n[ros1]\nmaster = "http://127.0.0.1:9"\n')
+    path.write_text(
+        'interface = "rosbridge"\nstack = "autoware.ai"\n[limits]\nmax_speed_mps = 10.0\n'
+        '[rosbridge]\nurl = "ws://127.0.0.1:9"\n'
+    )
     return path
 
 
@@ -119,7 +122,7 @@ def test_questions_and_leave_taking_ask_nothing_of_the_vehicle(file: Path, leave
 
 
 def test_without_a_vehicle_it_is_said(file: Path) -> None:
-    pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'chauffeur[ros]'")
+    pytest.importorskip("websockets", reason="websockets is not installed: pip install 'chauffeur[ros]'")
     result = invoke(file, "Drive at 20 km/h.", "--wait", 0.5)
     assert result.exit_code == 1
     assert "“Drive at 20 km/h.” unreachable" in one_line(result)

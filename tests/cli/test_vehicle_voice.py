@@ -152,7 +152,7 @@ def room(tmp_path: Path) -> Iterator[Room]:
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     path = tmp_path / "vehicle.toml"
-    path.write_text('interface = "ros1"\n[limits]\nmax_speed_mps = 10.0\n')
+    path.write_text('interface = "rosbridge"\nstack = "autoware.ai"\n[limits]\nmax_speed_mps = 10.0\n')
     return path
 
 

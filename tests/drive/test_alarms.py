@@ -108,7 +108,9 @@ def test_a_live_drive_is_brought_to_a_stand() -> None:
 
 
 def test_a_vehicle_is_asked_for_a_speed_of_0() -> None:
-    file = parse_settings('interface = "ros1"\n[limits]\nmax_speed_mps = 10.0\nlook_ahead_m = [4.0, 10.0]\n')
+    file = parse_settings(
+        'interface = "rosbridge"\nstack = "autoware.ai"\n[limits]\nmax_speed_mps = 10.0\nlook_ahead_m = [4.0, 10.0]\n'
+    )
     vehicle = open_vehicle(file, dry_run=True)
 
     async def answers() -> list[tuple[str, str]]:

@@ -212,7 +212,8 @@ def test_a_drive_by_lines_stops(tmp_path: Path) -> None:
 
 # A vehicle ------------------------------------------------------------------------------------------------------------
 
-FILE = """interface = "ros1"
+FILE = """interface = "rosbridge"
+stack = "autoware.ai"
 [limits]
 max_speed_mps = 10.0
 look_ahead_m = [4.0, 10.0]

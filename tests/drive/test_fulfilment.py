@@ -20,13 +20,14 @@ from chauffeur.concept import (
     Program,
     Scenario,
     Thoughts,
+    result_of,
 )
 from chauffeur.drive.again import drive_again
 from chauffeur.drive.fulfilment import GAP_M, HELD_S, SPEED_MPS, asked_of
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.scenarios import BUILT_IN, find, planner_for, seeds_with_lead, suiting
 from chauffeur.drive.session import Session, drive_without_program
-from chauffeur.hmi.words import end_words
+from chauffeur.hmi.words import end_words, left_out_words, trip_words
 from chauffeur.memory.choice import open_memory
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.planners.base import Planner
@@ -244,3 +245,44 @@ def test_feedback_on_a_gap_is_kept_to_in_the_next_drive() -> None:
     assert after["asked-gap-v1"] > once["asked-gap-v1"] + 3.0, "what was said counts"
     for drive in (once, after):
         assert abs(drive["end-gap-v1"] - drive["asked-gap-v1"]) <= max(GAP_M, 0.03 * drive["asked-gap-v1"])
+
+
+LEFT_LANE = """def drive():
+    set_target_lane(get_left_lane(get_ego_vehicle()))
+    for _ in range(100):
+        yield autopilot()
+"""
+
+
+def test_sides_and_speeds_are_those_of_the_words_and_not_of_the_plan() -> None:
+    place = find("overtake")
+    misread = driven("Change to the right lane.", place, Fixed(LEFT_LANE, "lane.left"))
+    assert result_of(misread.trip) == "not done", "the plan did what it understood, which was not what was said"
+    assert misread.trip.judged_by == "words"
+    untold = driven("Change to the left lane.", place, Fixed(LEFT_LANE, ""))
+    assert (result_of(untold.trip), untold.trip.judged_by) == ("done", "words")
+    mood = driven("I feel like flying today.", find("cruise"), Fixed(SLOW, "speed.set", (("target_speed_mps", 25.0),)))
+    assert mood.trip.judged_by == "plan", "the rules read nothing in it, so the judge shares the planner's reading"
+
+
+SLOW = """def drive():
+    set_target_speed(25.0)
+    while True:
+        yield autopilot()
+"""
+
+
+@pytest.mark.parametrize("wish", ["Slow down when it rains", "Drive at 90 km/h after the bridge"])
+def test_a_condition_that_is_not_used_is_named_and_the_drive_is_partly_done(wish: str) -> None:
+    recorded = driven(wish, find("cruise"), Fixed(SLOW, "speed.set", (("target_speed_mps", 25.0),)))
+    assert recorded.trip.outcome == "success"
+    assert result_of(recorded.trip) == "partly done"
+    assert recorded.trip.unused[0] in wish
+    sign, label, tone = trip_words(recorded.trip)
+    assert sign != "✓" and label.startswith("Partly done") and tone == "neutral"
+    assert recorded.trip.unused[0] in left_out_words(recorded.trip)[0]
+
+
+def test_what_was_told_not_to_be_done_is_not_driven() -> None:
+    recorded = driven("Do not overtake that car.", find("overtake"), Fixed(LEFT_LANE, "overtake.left"))
+    assert (result_of(recorded.trip), recorded.frames) == ("declined", ())

@@ -22,7 +22,7 @@ from chauffeur.worlds.ros.settings import parse_settings
 
 pytestmark = pytest.mark.server
 
-FILE = 'interface = "ros1"\n[limits]\nmax_speed_mps = 10.0\n'
+FILE = 'interface = "rosbridge"\nstack = "autoware.ai"\n[limits]\nmax_speed_mps = 10.0\n'
 GOOD = {"thoughts": "Slower.", "velocity_kmh": 20.0, "lookahead_distance_m": 12.0, "lookahead_ratio_s": 2.0}
 
 

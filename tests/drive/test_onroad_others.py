@@ -1,4 +1,4 @@
-"""Wishes for Autoware over DDS, another process at the other end; and for a vehicle behind rosbridge."""
+"""Wishes for Autoware over DDS, another process at the other end."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'chauffeur[ros]'")
+pytest.importorskip("websockets", reason="websockets is not installed: pip install 'chauffeur[ros]'")
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "worlds"))
 
-from ros_graph import FOLLOWER, REPLANNER, eventually
+from rosbridge_server import eventually
 
 from chauffeur.concept import Parameters
 from chauffeur.drive.events import DriveEvent
@@ -67,22 +67,3 @@ def test_autoware_gets_a_velocity_limit_and_its_own_speed_counts() -> None:
     context = next(event.text for event in told if event.kind == "context")
     assert "I am driving at 2.5 m/s (9 km/h)." in context
     assert "Its mode of operation is: autonomous." in context
-
-
-def test_a_bridge_has_it_and_more_is_not_known() -> None:
-    pytest.importorskip("websockets", reason="websockets is not installed: pip install 'chauffeur[ros]'")
-    from test_ros_bridge import Bridge
-
-    async def steps(road: VehicleSession) -> None:
-        answer = await road.ask("Drive at 20 km/h.")
-        assert answer.status == "delivered", answer.words
-        assert "who listens behind it is not known" in answer.words
-        await soon(lambda: len(bridge.published) == 2)
-
-    bridge = Bridge()
-    try:
-        head = f'interface = "rosbridge"\nstack = "autoware.ai"\n[rosbridge]\nurl = "{bridge.url}"\n'
-        drive(f"{head}[limits]\nmax_speed_mps = 10.0\n", steps)
-    finally:
-        bridge.close()
-    assert {topic for topic, _ in bridge.published} == {FOLLOWER, REPLANNER}

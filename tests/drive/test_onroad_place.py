@@ -26,7 +26,7 @@ from chauffeur.worlds.ros.settings import parse_settings
 
 pytestmark = pytest.mark.server
 
-FILE = 'interface = "ros1"\n[limits]\nmax_speed_mps = 10.0\n'
+FILE = 'interface = "rosbridge"\nstack = "autoware.ai"\n[limits]\nmax_speed_mps = 10.0\n'
 STREET = [(48.137, 11.56), (48.137, 11.59)]
 
 

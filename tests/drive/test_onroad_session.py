@@ -43,7 +43,8 @@ from chauffeur.worlds.ros.factory import open_vehicle
 from chauffeur.worlds.ros.settings import SENTENCE, VehicleSettings, parse_settings
 
 ANA = PersonId("ana")
-FILE = """interface = "ros1"
+FILE = """interface = "rosbridge"
+stack = "autoware.ai"
 [limits]
 max_speed_mps = 10.0
 look_ahead_m = [4.0, 10.0]
@@ -438,7 +439,7 @@ def test_a_trip_says_what_it_was_and_what_was_not_measured(embedded: Planner) ->
     assert any(event.kind == "trouble" and "locked" in event.text for event in told)
     first, second = kept
     record = dict(first.record)
-    assert (record["simulated"], record["dry_run"], record["interface"]) == (False, True, "ros1")
+    assert (record["simulated"], record["dry_run"], record["interface"]) == (False, True, "rosbridge")
     assert first.metrics == ()
     assert first.duration_s == 0.0
     assert "nothing of gaps" in record["metrics_absent"]
@@ -475,7 +476,7 @@ def test_the_log_holds_it_before_it_is_asked(tmp_path: Path, embedded: Planner) 
             return apply(parameters)
 
     async def whole() -> None:
-        with open_recorder(path, file, "ros1", dry_run=True) as books:
+        with open_recorder(path, file, "rosbridge", dry_run=True) as books:
             async with VehicleSession(Watched(), settings, embedded, person=ANA, books=books) as road:
                 await road.ask("Drive at 20 km/h.")
                 await road.evaluate("nice")
@@ -510,7 +511,7 @@ class Full(VehicleRecorder):
 def test_what_cannot_be_written_down_is_not_asked_unless_it_slows(tmp_path: Path) -> None:
     file = tmp_path / "vehicle.toml"
     file.write_text(FILE)
-    log = open_recorder(tmp_path / "audit.jsonl", file, "ros1", dry_run=True)
+    log = open_recorder(tmp_path / "audit.jsonl", file, "rosbridge", dry_run=True)
     with Full(log._log) as books:
         answers = ask(gives(5.0), "x", "stop", books=books)
     assert [one.status for one in answers] == ["failed", "dry-run"]

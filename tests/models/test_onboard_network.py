@@ -39,7 +39,6 @@ from chauffeur.models.onboard.training import (
 )
 from chauffeur.planners.onboard.dialect import DialectStep, Number, read
 from chauffeur.planners.onboard.engine import Engine
-from chauffeur.planners.onboard.hot import HotPlanner
 from chauffeur.planners.onboard.language_model import LanguageModelPlanner
 from chauffeur.planners.onboard.prompt import END, program_reply, prompt
 from chauffeur.planners.onboard.reply import read_reply
@@ -304,10 +303,7 @@ def test_only_words_of_wishes_are_blanked_and_never_numbers(tokenizer: Any, data
     assert {tokenizer.token_to_id(digit) for digit in "0123456789" if tokenizer.token_to_id(digit)} <= blanks.kept
 
 
-def test_a_link_to_a_model_is_followed_anew(exported: Path, tmp_path: Path) -> None:
-    pointer = tmp_path / "current"
-    pointer.symlink_to(exported, target_is_directory=True)
-    assert isinstance(make_planner(f"onboard/{pointer}"), HotPlanner)
+def test_a_folder_names_its_model(exported: Path) -> None:
     assert isinstance(make_planner(f"onboard/{exported}"), LanguageModelPlanner)
     with pytest.raises(ConfigError, match="no variant"):
         make_planner("onboard/huge")

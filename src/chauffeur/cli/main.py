@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 
 from chauffeur import __version__
-from chauffeur.cli import adapt as adapting
 from chauffeur.cli import adapt_vlm as adapting_vlm
 from chauffeur.cli import (
     apis,
@@ -34,7 +33,6 @@ from chauffeur.cli import (
     report,
     scenarios,
     scenes,
-    serve,
     talk,
     train,
     unmasking,
@@ -96,9 +94,7 @@ Examples:
 
     chauffeur model train onboard --out runs/onboard
 
-    chauffeur model adapt --base runs/onboard/transformers --out runs/ana --as ana
-
-    chauffeur model serve --port 8040
+    chauffeur model adapt-vlm --checkpoint Qwen/Qwen2.5-VL-7B-Instruct --out runs/qwen
 """
 
 DRIVE, LOOK, MEASURE, BUILD = "Drive", "Look", "Measure", "Build"
@@ -121,7 +117,7 @@ show_app = typer.Typer(
 model_app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",
-    help="Models of our own: train, adapt, export, serve; and the policies learned from feedback.",
+    help="Models of our own: train, fine-tune, quantise; and the policies learned from feedback.",
     epilog=MODEL_EXAMPLES,
 )
 
@@ -181,11 +177,8 @@ app.add_typer(maps_app, name="maps", rich_help_panel=BUILD)
 app.add_typer(audit_app, name="audit", rich_help_panel=BUILD)
 app.add_typer(check_app, name="check", rich_help_panel=BUILD)
 model_app.add_typer(train.train_app, name="train", epilog=train.ONBOARD_EXAMPLES)
-model_app.command(epilog=adapting.EXAMPLES)(adapting.adapt)
 model_app.command("adapt-vlm", epilog=adapting_vlm.EXAMPLES)(adapting_vlm.adapt_vlm)
 model_app.command("quantise-vlm", epilog=quantising_vlm.EXAMPLES)(quantising_vlm.quantise_vlm)
-model_app.command(epilog=serve.EXAMPLES)(serve.serve)
-model_app.command(epilog=train.GGUF_EXAMPLES)(train.gguf)
 model_app.add_typer(policies.policies_app, name="policies")
 
 

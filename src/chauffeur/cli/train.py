@@ -1,4 +1,4 @@
-"""`chauffeur model train`, and `model gguf`: models of our own, from data that is made from a seed."""
+"""`chauffeur model train`: models of our own, from data that is made from a seed."""
 
 from __future__ import annotations
 
@@ -377,29 +377,3 @@ def vlm(
         console.print(f"Stopped. What is done is kept in {out}; run the same command to go on.", soft_wrap=True)
         raise typer.Exit(130) from None
     console.print(f"Model: {model}; its card: {model / 'MODEL_CARD.md'}", soft_wrap=True)
-
-
-GGUF_EXAMPLES = """
-Examples:
-
-    chauffeur model gguf runs/onboard/transformers onboard.gguf
-
-    chauffeur model gguf runs/onboard/transformers onboard-q8.gguf --eight-bit
-
-    llama-server --model onboard.gguf --jinja --port 8080
-
-    chauffeur drive "Take the left lane." --planner openai/onboard --base-url http://localhost:8080/v1
-"""
-
-
-def gguf(
-    checkpoint: Annotated[Path, typer.Argument(help="Folder `transformers` of a run.")],
-    file: Annotated[Path, typer.Argument(help="GGUF file to write.")],
-    eight_bit: Annotated[bool, typer.Option("--eight-bit", help="Half the size: matrices in 8 bits (Q8_0).")] = False,
-) -> None:
-    """A trained model as one file for llama.cpp and what is built on it."""
-    from chauffeur.cli.console import stdout
-    from chauffeur.models.onboard.to_gguf import to_gguf
-
-    written = to_gguf(checkpoint, file, eight_bit=eight_bit)
-    stdout().print(f"Written: {written}, {written.stat().st_size / 1e6:.1f} MB", soft_wrap=True)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from chauffeur.worlds.ros import RosVehicleState, VehicleInterface
+    from chauffeur.worlds.ros.rosbridge import RosbridgeSettings
 
 vehicle_app = typer.Typer(
     cls=WithExamples,
@@ -45,7 +46,7 @@ These commands talk to a real vehicle, unless --dry-run is given. They publish a
 planner; they do not steer, brake or watch the road.
 """
 
-_NOT_FROM_HERE: Final = "Only a ROS 1 vehicle is engaged and disengaged from here."
+_NOT_FROM_HERE: Final = "Only a vehicle with Autoware.AI behind rosbridge is engaged and disengaged from here."
 _ON_ITS_OWN_SCREEN: Final = "Use the vehicle's own screen."
 
 File = Annotated[Path, typer.Argument(metavar="FILE", help="The vehicle's configuration file; see docs/ros.md.")]
@@ -116,7 +117,7 @@ def apply(
                 echo(line)  # unwrapped, to be copied
             stdout().print("Dry run: nothing was published.")
             return
-        state = _wait_for(car, wait, lambda state: state.delivered or state.link in ("refused", "replaced"))
+        state = _wait_for(car, wait, lambda state: state.delivered or state.link == "refused")
         _show(state)
     finally:
         car.close()
@@ -183,11 +184,8 @@ def engage(file: File, wait: Wait = 5.0) -> None:
     from chauffeur.concept import ConfigError
     from chauffeur.worlds.ros.engage import engage as engage_vehicle
     from chauffeur.worlds.ros.engage import word_to_type
-    from chauffeur.worlds.ros.settings import read_settings
 
-    settings = read_settings(file)
-    if settings.interface != "ros1":
-        raise ConfigError(_NOT_FROM_HERE, hint=_ON_ITS_OWN_SCREEN)
+    bridge = _engaged_over(file)
     if not sys.stdin.isatty():
         raise ConfigError(
             "Engaging needs a person at a terminal.", hint="Run it by hand; it takes no input from a file."
@@ -195,23 +193,31 @@ def engage(file: File, wait: Wait = 5.0) -> None:
     word = word_to_type()
     stdout().print("The vehicle will be driven by its computer. Hands on the wheel, foot over the brake.", style="bold")
     typed = typer.prompt(f"Type {word} to engage", default="", show_default=False)
-    nodes = engage_vehicle(settings.ros1, word, str(typed).strip(), within_s=wait)
-    stdout().print(plain(f"Engaged; {nodes} node{'s' if nodes > 1 else ''} took it."))
+    nodes = engage_vehicle(bridge, word, str(typed).strip(), within_s=wait)
+    stdout().print(plain(f"Engaged; {nodes} node{'s' if nodes > 1 else ''} listening."))
 
 
 @vehicle_app.command()
 def disengage(file: File, wait: Wait = 5.0) -> None:
     """Give the vehicle back to its driver. Nothing has to be typed for it."""
     from chauffeur.cli.console import plain, stdout
-    from chauffeur.concept import ConfigError
     from chauffeur.worlds.ros.engage import disengage as disengage_vehicle
+
+    bridge = _engaged_over(file)
+    nodes = disengage_vehicle(bridge, within_s=wait)
+    stdout().print(plain(f"Disengaged; {nodes} node{'s' if nodes > 1 else ''} listening."))
+
+
+def _engaged_over(file: Path) -> RosbridgeSettings:
+    """Where a vehicle is engaged; raises ConfigError for one that is not engaged from here."""
+    from chauffeur.concept import ConfigError
+    from chauffeur.worlds.ros.autoware_ai import AutowareAi
     from chauffeur.worlds.ros.settings import read_settings
 
     settings = read_settings(file)
-    if settings.interface != "ros1":
+    if settings.interface != "rosbridge" or not isinstance(settings.stack, AutowareAi):
         raise ConfigError(_NOT_FROM_HERE, hint=_ON_ITS_OWN_SCREEN)
-    nodes = disengage_vehicle(settings.ros1, within_s=wait)
-    stdout().print(plain(f"Disengaged; {nodes} node{'s' if nodes > 1 else ''} took it."))
+    return settings.rosbridge
 
 
 def _wait_for(car: VehicleInterface, within_s: float, enough: Callable[[RosVehicleState], bool]) -> RosVehicleState:

@@ -169,6 +169,8 @@ def _outline(length_m: float, width_m: float) -> Array:
     return np.array([*sides, *((u, v) for u in (a, -a) for v in wide.tolist())])
 
 
+_RECENT = 6
+"""Legs that a point was found on last are tried first: a body and its way are on few of them."""
 _MOVING, _STOPPING = 0.0, 1.0
 
 
@@ -209,32 +211,26 @@ def _half_m(lane: Lane, beside: Lane | None, x_m: float, y_m: float) -> float:
 
 def _grid(legs: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """(cells, where the legs of each begin, legs): those within `FAR_M` of a square of the plane, sorted by square."""
-    pairs: list[NDArray[np.int64]] = []
-    for row, (x, y, ux, uy, low, high, *halves) in enumerate(legs[:, :8].tolist()):
-        at = np.append(np.arange(low, high, _CELL_M / 2.0), high)
-        reach = math.ceil((FAR_M + max(halves)) / _CELL_M)
-        cells = {
-            (cx + dx, cy + dy)
-            for cx, cy in zip(
-                np.floor((x + at * ux) / _CELL_M).astype(int).tolist(),
-                np.floor((y + at * uy) / _CELL_M).astype(int).tolist(),
-                strict=True,
-            )
-            for dx in range(-reach, reach + 1)
-            for dy in range(-reach, reach + 1)
-        }
-        pairs.append(np.array([(_key(cx, cy), row) for cx, cy in sorted(cells)], dtype=np.int64))
-    if not pairs:
+    if not len(legs):
         empty = np.zeros(0, dtype=np.int64)
         return empty, np.zeros(1, dtype=np.int64), empty
-    table = np.concatenate(pairs)
-    table = table[np.lexsort((table[:, 1], table[:, 0]))]
-    keys, starts = np.unique(table[:, 0], return_index=True)
-    return keys, np.append(starts, len(table)).astype(np.int64), np.ascontiguousarray(table[:, 1])
+    low, high = legs[:, 4], legs[:, 5]
+    counts = np.ceil((high - low) / (_CELL_M / 2.0)).astype(np.int64) + 1
+    row = np.repeat(np.arange(len(legs)), counts)
+    step = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+    at = np.minimum(low[row] + step * (_CELL_M / 2.0), high[row])
+    cx = np.floor((legs[row, 0] + at * legs[row, 2]) / _CELL_M).astype(np.int64)
+    cy = np.floor((legs[row, 1] + at * legs[row, 3]) / _CELL_M).astype(np.int64)
+    reach = np.arange(-(most := math.ceil((FAR_M + float(legs[:, 6:8].max())) / _CELL_M)), most + 1)
+    keys = _key(cx[:, None, None] + reach[None, :, None], cy[:, None, None] + reach[None, None, :])
+    table = np.unique(np.stack([keys.ravel(), np.repeat(row, len(reach) ** 2)], axis=1), axis=0)
+    found, starts = np.unique(table[:, 0], return_index=True)
+    return found, np.append(starts, len(table)).astype(np.int64), np.ascontiguousarray(table[:, 1])
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _key(cx: int, cy: int) -> int:
+def _key(cx, cy):  # type: ignore[no-untyped-def]
+    """One number for a square of the plane."""
     return cx * 4_294_967_296 + cy
 
 
@@ -243,7 +239,8 @@ def beyond(poses, outline, stops, free, legs, keys, starts, order, paved):  # ty
     """See `Ground._asked`."""
     n = poses.shape[0]
     out = np.zeros((n, 3))
-    last = -1
+    recent = np.full(_RECENT, -1, dtype=np.int64)
+    newest = 0
     for i in range(n):
         x, y, heading = poses[i, 0], poses[i, 1], poses[i, 2]
         c, s = math.cos(heading), math.sin(heading)
@@ -251,7 +248,12 @@ def beyond(poses, outline, stops, free, legs, keys, starts, order, paved):  # ty
         for j in range(outline.shape[0]):
             px = x + c * outline[j, 0] - s * outline[j, 1]
             py = y + s * outline[j, 0] + c * outline[j, 1]
-            if last >= 0 and _off(legs[last], px, py, c, s, stops, free) <= 0.0:
+            on = False
+            for k in range(_RECENT):
+                if recent[k] >= 0 and _off(legs[recent[k]], px, py, c, s, stops, free) <= 0.0:
+                    on = True
+                    break
+            if on:
                 continue
             best = FAR_M
             if paved[0] < math.inf:
@@ -269,7 +271,8 @@ def beyond(poses, outline, stops, free, legs, keys, starts, order, paved):  # ty
                     if off < best:
                         best = off
                         if off <= 0.0:
-                            last = order[k]
+                            newest = (newest + 1) % _RECENT
+                            recent[newest] = order[k]
                             break
             if best > out[i, 0]:
                 out[i, 0], out[i, 1], out[i, 2] = best, px, py

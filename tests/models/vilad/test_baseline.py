@@ -30,21 +30,21 @@ def test_writers_that_choose_are_not_those_that_fit(bank) -> None:
 
 @pytest.mark.parametrize(
     ("task", "tests", "success", "understood"),
-    [(PARKING, cases, (82.0, 55.0), (65.0, 40.0)), (DRIVING, drive_cases, (95.0, 85.0), (90.0, 70.0))],
+    [(PARKING, cases, (66.0, 64.0), (45.0, 36.0)), (DRIVING, drive_cases, (77.0, 77.0), (62.0, 58.0))],
     ids=["parking", "driving"],
 )
 def test_the_reader_is_trained_to_the_end(task, tests, success, understood) -> None:
-    """A reader of 72 optimiser steps understood 30 % of what it had been trained on."""
+    """Stopped after 72 optimiser steps it understood 43 and 26 % of parking, of 3,000 commands; here it has 600."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # a fit that did not converge warns
-        reader = linear_reader(task, 5, commands=1_500)
+        reader = linear_reader(task, 5, commands=600)
     for split, least, read in zip(("seen", "phrasing"), success, understood, strict=True):
-        found = solved(reader, tests(split, 150, 9))
+        found = solved(reader, tests(split, 100, 9))
         assert found[0] >= least and found[1] >= read, (split, found)
 
 
 def test_the_same_seed_gives_the_same_reader() -> None:
-    readers = [linear_reader(PARKING, 5, commands=200) for _ in range(2)]
+    readers = [linear_reader(PARKING, 5, commands=100) for _ in range(2)]
     texts = [PARKING.command(np.random.default_rng(seed)).text for seed in range(20)]
     assert readers[0].read(texts) == readers[1].read(texts) == [readers[0](text) for text in texts]
     assert readers[0].inverse_strength == readers[1].inverse_strength

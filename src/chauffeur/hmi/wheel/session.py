@@ -10,7 +10,6 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from statistics import fmean
-from typing import cast
 
 from chauffeur.bench.kernel.store import Row, StorageError
 from chauffeur.bench.lampilot.families import family_of
@@ -18,7 +17,8 @@ from chauffeur.bench.lampilot.human import HandTrace, drive_by_hand, noted
 from chauffeur.bench.lampilot.human_run import HumanRun
 from chauffeur.bench.lampilot.metrics import points
 from chauffeur.bench.lampilot.referee import LampilotReferee
-from chauffeur.concept import ChauffeurError, Observation, Outcome
+from chauffeur.concept import RESULT_LABELS, ChauffeurError, Observation
+from chauffeur.concept.results import result_of_stored
 from chauffeur.hmi import words
 from chauffeur.hmi.wheel.commands import COUNTDOWN_S, WheelCommands, WheelInstant
 from chauffeur.hmi.wheel.mailbox import Mailbox
@@ -189,10 +189,10 @@ class WheelSession:
 
 
 def _result_message(trace: HandTrace, row: Row) -> Json:
-    label, tone = words.outcome_words(cast("Outcome", row["outcome"]))
+    result = result_of_stored(row["outcome"], "")
     return {
-        "label": label,
-        "tone": tone,
+        "label": RESULT_LABELS[result],
+        "tone": words.RESULT_TONES[result],
         "outcome": row["outcome"],
         "detail": row["detail"],
         "seconds": round(row["steps"] * trace.period_s, 1),

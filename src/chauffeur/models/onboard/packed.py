@@ -27,24 +27,22 @@ class Packed:
     replies: Array
 
     @classmethod
-    def of(cls, pairs: Sequence[tuple[str, str]], tokenizer: Any, end: int, longest: int | None = None) -> Packed:
+    def of(cls, pairs: Sequence[tuple[str, str]], tokenizer: Any, end: int) -> Packed:
         """Tokenise (prompt, reply) pairs.
 
         Args:
             pairs: Texts.
             tokenizer: A `tokenizers.Tokenizer`.
             end: Token that ends a reply.
-            longest: Tokens of a prompt that are kept, counted from its end; None for all.
         """
         tokens: list[int] = []
         starts, replies = [0], list[int]()
         prompts = tokenizer.encode_batch([prompt for prompt, _ in pairs])
         answers = tokenizer.encode_batch([reply for _, reply in pairs])
         for asked, answered in zip(prompts, answers, strict=True):
-            ids = asked.ids if longest is None else asked.ids[-longest:]
-            tokens += [*ids, *answered.ids, end]
+            tokens += [*asked.ids, *answered.ids, end]
             starts.append(len(tokens))
-            replies.append(len(ids))
+            replies.append(len(asked.ids))
         return cls(np.array(tokens, np.uint16), np.array(starts, np.int64), np.array(replies, np.int32))
 
     def __len__(self) -> int:

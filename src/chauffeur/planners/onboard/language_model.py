@@ -162,7 +162,7 @@ class LanguageModelPlanner:
 
     def __init__(
         self,
-        model: Path | Engine,
+        folder: Path,
         *,
         constrained: bool = True,
         history: bool = True,
@@ -172,7 +172,7 @@ class LanguageModelPlanner:
         """Load a model.
 
         Args:
-            model: Folder of the exported model, or the model itself, loaded already.
+            folder: Of the exported model.
             constrained, history, guarded: Whether decoding holds to the grammar, H is shown, and the guard looks on;
                 turned off for ablations only.
             on_text: Gets each piece of text as the model writes it.
@@ -181,7 +181,7 @@ class LanguageModelPlanner:
             DataError: The folder holds no model.
             MissingExtraError: A library is missing.
         """
-        self._engine = model if isinstance(model, Engine) else Engine(model)
+        self._engine = Engine(folder)
         self._constrained = constrained
         self._history = history
         self._guarded = guarded
@@ -191,8 +191,6 @@ class LanguageModelPlanner:
     @classmethod
     def from_spec(cls, argument: str, *, on_text: OnText | None = None) -> Planner:
         """The planner named `onboard`: the model of the package; `onboard/FOLDER` is the model of a folder.
-
-        A FOLDER that is a symbolic link is looked at before each request: `chauffeur model adapt` exchanges models so.
 
         Raises:
             ConfigError: The argument is no folder.
@@ -207,10 +205,6 @@ class LanguageModelPlanner:
                 f"The onboard planner has no variant {argument!r}.",
                 hint="Write just: onboard; or onboard/FOLDER for the language model of a folder.",
             )
-        if folder.is_symlink():
-            from chauffeur.planners.onboard.hot import HotPlanner
-
-            return HotPlanner(folder)
         return cls(folder, on_text=on_text)
 
     @property

@@ -71,6 +71,18 @@ def nearest(line: Array, x: float, y: float, guess: int, window: int) -> int:
 
 
 @compiled
+def along(line: Array, x: float, y: float, heading: float) -> tuple[float, float, float]:
+    """(station, offset to its left, angle against it) of somebody on a line; before its start and beyond its end, too.
+
+    Close to it: rows are a metre apart, and the leg from the closest one is taken.
+    """
+    row = nearest(line, x, y, -1, 0)
+    c, s = math.cos(line[row, 2]), math.sin(line[row, 2])
+    dx, dy = x - line[row, 0], y - line[row, 1]
+    return row + c * dx + s * dy, c * dy - s * dx, _wrapped(heading - line[row, 2])
+
+
+@compiled
 def pursuing(state: Array, line: Array, at: int, car: Array) -> float:
     """Wheel angle that leads a rear axle back to a line: pure pursuit, on beyond its end."""
     look = max(_LEAST_LOOK_M, _LOOK_S * state[3])

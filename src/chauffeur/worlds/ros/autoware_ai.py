@@ -1,4 +1,4 @@
-"""What is said to Autoware.AI (ROS 1), and why so: message definitions, topics, and every field's value.
+"""What is said to Autoware.AI (ROS 1, behind a rosbridge server), and why so: topics, and every field's value.
 
 Sources, read in `autowarefoundation/autoware_ai_planning`: `pure_pursuit/src/pure_pursuit_core.cpp` and
 `waypoint_maker/nodes/waypoint_replanner/`; message definitions as generated from `autoware_config_msgs`.
@@ -26,50 +26,12 @@ from chauffeur.worlds.ros.limits import CheckedWish, VehicleLimits
 
 FOLLOWER_TOPIC: Final = "/config/waypoint_follower"
 FOLLOWER_TYPE: Final = "autoware_config_msgs/ConfigWaypointFollower"
-FOLLOWER_DEFINITION: Final = (
-    ("Header", "header"),
-    ("int32", "param_flag"),
-    ("float32", "velocity"),
-    ("float32", "lookahead_distance"),
-    ("float32", "lookahead_ratio"),
-    ("float32", "minimum_lookahead_distance"),
-    ("float32", "displacement_threshold"),
-    ("float32", "relative_angle_threshold"),
-)
 
 REPLANNER_TOPIC: Final = "/config/waypoint_replanner"
 REPLANNER_TYPE: Final = "autoware_config_msgs/ConfigWaypointReplanner"
-REPLANNER_DEFINITION: Final = (
-    ("string", "multi_lane_csv"),
-    ("bool", "replanning_mode"),
-    ("bool", "use_decision_maker"),
-    ("float32", "velocity_max"),
-    ("float32", "velocity_min"),
-    ("float32", "accel_limit"),
-    ("float32", "decel_limit"),
-    ("float32", "radius_thresh"),
-    ("float32", "radius_min"),
-    ("bool", "resample_mode"),
-    ("float32", "resample_interval"),
-    ("int32", "velocity_offset"),
-    ("int32", "end_point_offset"),
-    ("int32", "braking_distance"),
-    ("bool", "replan_curve_mode"),
-    ("bool", "replan_endpoint_mode"),
-    ("bool", "overwrite_vmax_mode"),
-    ("bool", "realtime_tuning_mode"),
-)
 
 VELOCITY_TOPIC: Final = "/current_velocity"
 VELOCITY_TYPE: Final = "geometry_msgs/TwistStamped"
-
-DEFINITIONS: Final = {FOLLOWER_TYPE: FOLLOWER_DEFINITION, REPLANNER_TYPE: REPLANNER_DEFINITION}
-
-KNOWN_MD5: Final = {
-    "a96d66ec56e0a5b1d46eff2062a223b3": "autoware_config_msgs/ConfigWaypointFollower of Autoware.AI 1.9 to 1.14",
-    "377fcfc666c7fdd690ae1373651c353b": "autoware_config_msgs/ConfigWaypointReplanner of Autoware.AI 1.12 to 1.14",
-}
-"""Checksums seen in public builds; our own definitions must give the same."""
 
 WAYPOINT_SOURCE: Final = 0
 CONSTANT_SOURCE: Final = 1

@@ -64,9 +64,9 @@ class Published:
     words: str
 
 
-Link = Literal["dry-run", "connecting", "waiting", "up", "refused", "replaced", "closed"]
-"""`connecting`: no master, graph or server answers (yet, or any more). `waiting`: nobody listens to what is published.
-`up`: somebody does. `refused`: who listens expects another message. `replaced`: shut down from outside."""
+Link = Literal["dry-run", "connecting", "waiting", "up", "refused", "closed"]
+"""`connecting`: no graph or server answers (yet, or any more). `waiting`: nobody listens to what is published.
+`up`: somebody does. `refused`: who listens expects another message."""
 
 
 @dataclass(frozen=True, slots=True)

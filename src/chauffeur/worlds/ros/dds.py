@@ -6,16 +6,18 @@ of `rosidl` (`package::msg::dds_::Type_`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from chauffeur.concept import MissingExtraError
 from chauffeur.worlds.ros.base import Fields, VehicleError
-from chauffeur.worlds.ros.types import Definition, long_name
 
 if TYPE_CHECKING:
     from cyclonedds.pub import DataWriter
     from cyclonedds.sub import DataReader
+
+Definition = Sequence[tuple[str, str]]
+"""(type, name) of each field, in order, with types as a `.msg` file writes them."""
 
 _COMMON: Final[dict[str, Definition]] = {
     "builtin_interfaces/msg/Time": (("int32", "sec"), ("uint32", "nanosec")),
@@ -124,7 +126,7 @@ class Participant:
         values: dict[str, Any] = {}
         for name, value in fields.items():
             kind = inner[name]
-            values[name] = self.message(long_name(kind), cast("Fields", value)) if "/" in kind else value
+            values[name] = self.message(_long_name(kind), cast("Fields", value)) if "/" in kind else value
         return self.type_of(type_name)(**values)
 
     def type_of(self, name: str) -> Any:
@@ -151,7 +153,7 @@ class Participant:
         from cyclonedds.idl import types
 
         if "/" in kind:
-            return self.type_of(long_name(kind))
+            return self.type_of(_long_name(kind))
         simple: dict[str, Any] = {"bool": bool, "string": str}
         return simple.get(kind) or getattr(types, kind)
 
@@ -159,3 +161,9 @@ class Participant:
 def stamp_of(now_s: float) -> Fields:
     """`builtin_interfaces/Time` of a time of day."""
     return {"sec": int(now_s), "nanosec": int(now_s % 1.0 * 1e9)}
+
+
+def _long_name(name: str) -> str:
+    """`std_msgs/Bool` and `std_msgs/msg/Bool` are one type; the latter is how ROS 2 writes it."""
+    package, _, rest = name.partition("/")
+    return name if rest.startswith("msg/") else f"{package}/msg/{rest}"

@@ -22,14 +22,10 @@ def open_vehicle(settings: VehicleSettings, *, dry_run: bool = False) -> Vehicle
     stack = settings.stack
     if dry_run or settings.interface == "dry-run":
         return DryRun(stack, 1 if isinstance(stack, AutowareAi) else 2)
-    if settings.interface == "rosbridge":
+    if settings.interface == "rosbridge" or isinstance(stack, AutowareAi):  # ROS 1 is behind rosbridge only
         from chauffeur.worlds.ros.rosbridge import RosbridgeVehicle
 
         return RosbridgeVehicle(stack, settings.rosbridge)
-    if isinstance(stack, AutowareAi):
-        from chauffeur.worlds.ros.ros1 import Ros1Vehicle
-
-        return Ros1Vehicle(stack, settings.ros1)
     from chauffeur.worlds.ros.ros2 import Ros2Vehicle
 
     return Ros2Vehicle(stack, settings.ros2)

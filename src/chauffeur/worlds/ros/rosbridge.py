@@ -77,8 +77,7 @@ class RosbridgeVehicle(ThreadedVehicle):
             MissingExtraError: `websockets` is not installed.
             VehicleError: The URL is none.
         """
-        if find_spec("websockets") is None:  # said here; the thread that uses it could not raise it
-            raise MissingExtraError("A rosbridge vehicle needs websockets.", extra="ros")
+        needs_websockets()  # said here; the thread that uses it could not raise it
         super().__init__(stack, "rosbridge", close_s=OPENING_S + 1.0)
         self._url, self._clock, self._retry_s = _checked_url(settings.url), clock, retry_s
         self._ros: Final = 1 if isinstance(stack, AutowareAi) else 2
@@ -131,20 +130,10 @@ class RosbridgeVehicle(ThreadedVehicle):
 
     def _run(self) -> None:
         from websockets.exceptions import InvalidHandshake, InvalidMessage, WebSocketException
-        from websockets.sync.client import connect
 
         while not self._ending.is_set():
             try:
-                with connect(
-                    self._url,
-                    open_timeout=OPENING_S,
-                    close_timeout=1.0,
-                    ping_interval=SILENCE_S / 2,
-                    ping_timeout=SILENCE_S,
-                    max_size=LARGEST,
-                    compression=None,
-                    proxy=None,
-                ) as connection:
+                with bridged(self._url) as connection:
                     self._talk(connection)
             except (InvalidHandshake, InvalidMessage) as error:
                 self._lost(f"What answers at {self._url} is no rosbridge server: {error}.")
@@ -264,6 +253,36 @@ def _types_of(stack: AutowareAi | Autoware) -> _Topics:
     }
     return _Topics(
         published, {autoware.VELOCITY_TOPIC: autoware.VELOCITY_TYPE, autoware.MODE_TOPIC: autoware.MODE_TYPE}
+    )
+
+
+def needs_websockets() -> None:
+    """Raise MissingExtraError where `websockets` is not installed."""
+    if find_spec("websockets") is None:
+        raise MissingExtraError("A rosbridge vehicle needs websockets.", extra="ros")
+
+
+def bridged(url: str) -> ClientConnection:
+    """Connect to a rosbridge server.
+
+    Args:
+        url: As `RosbridgeSettings.url`.
+
+    Raises:
+        VehicleError: The URL is none.
+        OSError, WebSocketException: Nothing answers there, or no rosbridge server does.
+    """
+    from websockets.sync.client import connect
+
+    return connect(
+        _checked_url(url),
+        open_timeout=OPENING_S,
+        close_timeout=1.0,
+        ping_interval=SILENCE_S / 2,
+        ping_timeout=SILENCE_S,
+        max_size=LARGEST,
+        compression=None,
+        proxy=None,
     )
 
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 import datetime
 import ipaddress
 import tomllib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final, Literal, Self, TypeVar
-from urllib.parse import urlsplit
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
@@ -25,11 +23,10 @@ from chauffeur.worlds.ros.autoware_ai import (
     SpeedSource,
 )
 from chauffeur.worlds.ros.limits import VehicleLimits
-from chauffeur.worlds.ros.node import Ros1Settings
 from chauffeur.worlds.ros.ros2 import Ros2Settings
 from chauffeur.worlds.ros.rosbridge import RosbridgeSettings
 
-Interface = Literal["ros1", "ros2", "rosbridge", "dry-run"]
+Interface = Literal["ros2", "rosbridge", "dry-run"]
 """Ways to a vehicle."""
 
 SENTENCE: Final = "The follower will ignore planned stops and obstacles; only the driver's foot stops this vehicle."
@@ -44,27 +41,6 @@ FASTEST_MPS: Final = 60.0
 Speed = Annotated[float, Field(gt=0.0, le=FASTEST_MPS, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, le=1000.0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0, le=1000)]
-
-
-def _own_address(host: str) -> str:
-    try:
-        address = ipaddress.IPv4Address(host)
-    except ValueError as error:
-        raise ValueError("give one IPv4 address of this machine, e.g. 127.0.0.1") from error
-    if address.is_unspecified or address.is_multicast:
-        raise ValueError(f"{host} stands for every address; name the one that faces the vehicle")
-    return host
-
-
-_Reaching = TypeVar("_Reaching")
-
-
-def _checked_reach(table: _Reaching, host: str, others: Sequence[str]) -> _Reaching:
-    """The table, unless the vehicle is elsewhere and would be told a loopback address, which is its own."""
-    elsewhere = [one for one in others if one and one != "localhost" and not one.startswith("127.")]
-    if elsewhere and host.startswith("127."):
-        raise ValueError(f"{elsewhere[0]} cannot reach {host}; give this machine's address that it can reach as host")
-    return table
 
 
 class _Table(BaseModel):
@@ -120,21 +96,6 @@ class _ConstantSpeed(_Table):
         return said
 
 
-class _Ros1(_Table):
-    master: str = "http://127.0.0.1:11311"
-    host: str = "127.0.0.1"
-    node: Annotated[str, Field(pattern=r"^(/[A-Za-z][A-Za-z0-9_]*)?$", max_length=100)] = ""
-
-    @field_validator("host")
-    @classmethod
-    def _one_address(cls, host: str) -> str:
-        return _own_address(host)
-
-    @model_validator(mode="after")
-    def _reachable(self) -> Self:
-        return _checked_reach(self, self.host, [urlsplit(self.master).hostname or ""])
-
-
 class _Ros2(_Table):
     domain: Annotated[int, Field(ge=0, le=232)] = 0
     host: str = "127.0.0.1"
@@ -143,7 +104,13 @@ class _Ros2(_Table):
     @field_validator("host")
     @classmethod
     def _one_address(cls, host: str) -> str:
-        return _own_address(host)
+        try:
+            address = ipaddress.IPv4Address(host)
+        except ValueError as error:
+            raise ValueError("give one IPv4 address of this machine, e.g. 127.0.0.1") from error
+        if address.is_unspecified or address.is_multicast:
+            raise ValueError(f"{host} stands for every address; name the one that faces the vehicle")
+        return host
 
     @field_validator("peers")
     @classmethod
@@ -157,7 +124,12 @@ class _Ros2(_Table):
 
     @model_validator(mode="after")
     def _reachable(self) -> Self:
-        return _checked_reach(self, self.host, self.peers)
+        elsewhere = [peer for peer in self.peers if not peer.startswith("127.")]
+        if elsewhere and self.host.startswith("127."):
+            raise ValueError(
+                f"{elsewhere[0]} cannot reach {self.host}; give this machine's address that it can reach as host"
+            )
+        return self
 
 
 class _Rosbridge(_Table):
@@ -171,15 +143,23 @@ class _File(_Table):
     messages: Package = "autoware_internal_planning_msgs"
     replanner: _Replanner | None = None
     constant_speed: _ConstantSpeed | None = None
-    ros1: _Ros1 = _Ros1()
     ros2: _Ros2 = _Ros2()
     rosbridge: _Rosbridge = _Rosbridge()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _not_ros1(cls, said: dict[str, object]) -> dict[str, object]:
+        if said.get("interface") == "ros1" or "ros1" in said:
+            raise ValueError(
+                'a ROS 1 vehicle is reached through a rosbridge server: write interface = "rosbridge", '
+                'stack = "autoware.ai" and [rosbridge] with url = "ws://HOST:9090", and take [ros1] out'
+            )
+        return said
+
     @model_validator(mode="after")
     def _together(self) -> Self:
-        natural = {"ros1": "autoware.ai", "ros2": "autoware"}
-        if self.interface in natural and self.stack not in (None, natural[self.interface]):
-            raise ValueError(f"over {self.interface} the stack is {natural[self.interface]}")
+        if self.interface == "ros2" and self.stack == "autoware.ai":
+            raise ValueError("over ros2 the stack is autoware")
         if self.interface == "rosbridge" and self.stack is None:
             raise ValueError('behind rosbridge, say stack = "autoware.ai" (ROS 1) or "autoware" (ROS 2)')
         if self.is_autoware and (self.replanner or self.constant_speed):
@@ -198,12 +178,11 @@ class VehicleSettings:
     Attributes:
         interface: The way to it.
         stack: What is said to it.
-        ros1, ros2, rosbridge: Where it is; the one of the interface counts.
+        ros2, rosbridge: Where it is; the one of the interface counts.
     """
 
     interface: Interface
     stack: AutowareAi | Autoware
-    ros1: Ros1Settings
     ros2: Ros2Settings
     rosbridge: RosbridgeSettings
 
@@ -241,7 +220,6 @@ def parse_settings(text: str, name: str = "vehicle.toml", today: datetime.date |
     return VehicleSettings(
         file.interface,
         Autoware(limits, file.messages) if file.is_autoware else _autoware_ai(file, limits, name, today),
-        Ros1Settings(**file.ros1.model_dump()),
         Ros2Settings(**file.ros2.model_dump()),
         RosbridgeSettings(**file.rosbridge.model_dump()),
     )

@@ -68,23 +68,17 @@ class StackSetpoints:
         with self._lock:
             return self._publish(self._stack.released(self._last))
 
-    def end(self, why: str) -> bool:
-        """Publish the stack's last messages, and nothing after them; False if it was the end already."""
+    def end(self, why: str) -> None:
+        """Publish the stack's last messages, and nothing after them."""
         with self._lock:
             if self._over:
-                return False
+                return
             asked = self._stack.closing(self._last)
             try:
                 if asked[0]:
                     self._publish(asked)
             finally:
                 self._over = why
-        return True
-
-    def abandon(self, why: str) -> None:
-        """Publish nothing any more."""
-        with self._lock:
-            self._over = self._over or why
 
     def _publish(self, asked: Asked) -> Published:
         """Under the lock: of two callers at once, the later number is also what is sent last."""
