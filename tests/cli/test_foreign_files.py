@@ -79,9 +79,6 @@ FOLDERS: Final = (
     ("show policies {in}", ("policies.jsonl", "policies.json", "a.json", "index.json")),
     ("model policies describe {in} overtake words", ("policies.jsonl", "a.json")),
     ("model policies add {out} {in}", ("policies.jsonl", "a.json")),
-    ("study next {in}", ("study.json", "plan.json", "sessions.jsonl")),
-    ("study export {in} --out {out}", ("study.json", "plan.json", "sessions.jsonl")),
-    ("study unblind {in}", ("study.json", "plan.json", "sessions.jsonl")),
     ("maps show {in} --out {out}.png", ("pack.json", "map.xodr")),
 )  # fmt: skip
 

@@ -46,7 +46,6 @@ from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
 from chauffeur.cli.maps import maps_app
 from chauffeur.cli.me import me_app
 from chauffeur.cli.printable import PrintableFormatter
-from chauffeur.cli.study import study_app
 from chauffeur.cli.vehicle import vehicle_app
 
 EXAMPLES = """
@@ -157,7 +156,6 @@ show_app.command(epilog=unmasking.EXAMPLES)(unmasking.unmasking)
 show_app.command("speech", epilog=hear.EXAMPLES)(hear.hear)
 
 app.add_typer(bench_app, name="bench", rich_help_panel=MEASURE, epilog=BENCH_EXAMPLES)
-app.add_typer(study_app, name="study", rich_help_panel=MEASURE)
 bench_app.command(epilog=wheel.EXAMPLES)(wheel.human)
 bench_app.command(epilog=coach.EXAMPLES)(coach.coach)
 bench_app.command("coach-town", epilog=coach_town.EXAMPLES)(coach_town.coach_town)
