@@ -36,7 +36,6 @@ from chauffeur.cli import (
     talk,
     train,
     unmasking,
-    wheel,
 )
 from chauffeur.cli import quantise_vlm as quantising_vlm
 from chauffeur.cli.audit import audit_app
@@ -156,7 +155,6 @@ show_app.command(epilog=unmasking.EXAMPLES)(unmasking.unmasking)
 show_app.command("speech", epilog=hear.EXAMPLES)(hear.hear)
 
 app.add_typer(bench_app, name="bench", rich_help_panel=MEASURE, epilog=BENCH_EXAMPLES)
-bench_app.command(epilog=wheel.EXAMPLES)(wheel.human)
 bench_app.command(epilog=coach.EXAMPLES)(coach.coach)
 bench_app.command("coach-town", epilog=coach_town.EXAMPLES)(coach_town.coach_town)
 bench_app.command(epilog=bench_hostile.EXAMPLES)(bench_hostile.hostile)
