@@ -83,7 +83,6 @@ def test_one_door_to_the_actuator() -> None:
         "drive/conformance.py",
         "drive/episode.py",
         "drive/live/control.py",
-        "bench/chaos/judge.py",
         "bench/leaderboard/instructed.py",
         "bench/leaderboard/lessons.py",
         "bench/leaderboard/rollout.py",

@@ -63,7 +63,6 @@ FILES: Final = (
     "vehicle apply {in}.toml --speed 3 --dry-run",
     "vehicle release {in}.toml",
     "check world highway --config {in}.json",
-    "bench chaos --case {in}.json --out {out}",
     "drive Hello --planner replay/{in}",
 )
 FOLDERS: Final = (

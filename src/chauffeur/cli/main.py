@@ -19,7 +19,6 @@ from chauffeur.cli import (
     bench_openloop,
     bench_personalization,
     camera,
-    chaos,
     coach,
     coach_town,
     context,
@@ -163,7 +162,6 @@ bench_app.command(epilog=bench_leaderboard.EXAMPLES)(bench_leaderboard.leaderboa
 bench_app.command(epilog=bench_nuplanqa.EXAMPLES)(bench_nuplanqa.nuplanqa)
 bench_app.command(epilog=bench_openloop.EXAMPLES)(bench_openloop.openloop)
 bench_app.command(epilog=bench_personalization.EXAMPLES)(bench_personalization.personalization)
-bench_app.command(epilog=chaos.EXAMPLES)(chaos.chaos)
 scenes.scenes_app.command(epilog=bench_openloop.FRAMES_EXAMPLES)(bench_openloop.frames)
 bench_app.add_typer(scenes.scenes_app, name="scenes", epilog=scenes.GENERATE_EXAMPLES)
 

@@ -1,9 +1,7 @@
-"""A process that writes where it should not: into the shared memory of a drive, whoever else is writing there.
+"""A vandal who writes where it should not: into the shared memory of a drive, whoever else is writing there.
 
-`python -m chauffeur.bench.chaos.vandal FOLDER` reads one JSON object a line: `what` to do (a name in `DEEDS`), `draw`
-(a seed), `for_s` (how long). It answers each with a line when it is done. Whatever may write into that folder has the
-rights of the drive's own user; what is shown here is that control does not rely on any of it being well-formed, timely
-or true.
+Writing into that folder takes the rights of the drive's own user. Control must not rely on any of it being well-formed,
+timely or true.
 """
 
 from __future__ import annotations
@@ -12,7 +10,6 @@ import json
 import mmap
 import os
 import struct
-import sys
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -21,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from chauffeur.drive.live.messages import MessageError, MirroredInstant
-from chauffeur.drive.live.ring import Ring, RingMessage
+from chauffeur.drive.live.ring import Ring
 from chauffeur.drive.live.settings import SIZES, RingName, ring
 
 FORGED: Final = "forged"
@@ -36,13 +33,13 @@ class Vandal:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._rings: dict[RingName, Ring] = {name: ring(folder, name) for name in SIZES}
-        self._maps: dict[RingName, mmap.mmap] = {}
+        self.rings: dict[RingName, Ring] = {name: ring(folder, name) for name in SIZES}
+        self.maps: dict[RingName, mmap.mmap] = {}
         for name in SIZES:
             handle = os.open(folder / name, os.O_RDWR)
-            self._maps[name] = mmap.mmap(handle, 0)
+            self.maps[name] = mmap.mmap(handle, 0)
             os.close(handle)
-        self._kept: dict[RingName, list[bytes]] = {name: [] for name in ("setpoints", "orders")}
+        self.kept: dict[RingName, list[bytes]] = {name: [] for name in ("setpoints", "orders")}
 
     def do(self, what: str, draw: int, for_s: float) -> None:
         """One deed."""
@@ -50,15 +47,15 @@ class Vandal:
 
     def remember(self) -> None:
         """Keep real messages, to be played again later."""
-        for name, kept in self._kept.items():
-            message = self._rings[name].latest()
+        for name, kept in self.kept.items():
+            message = self.rings[name].latest()
             if message is not None and (not kept or kept[-1] != message.payload):
                 kept.append(message.payload)
                 del kept[:-20]
 
     def garbage(self, name: RingName, rng: np.random.Generator, for_s: float) -> None:
         """Random bytes at random places, number of the newest message and form of the ring included."""
-        memory = self._maps[name]
+        memory = self.maps[name]
         for _ in _meanwhile(for_s):
             length = int(rng.integers(1, 4096))
             at = int(rng.integers(0, len(memory) - length))
@@ -66,39 +63,18 @@ class Vandal:
             if rng.random() < 0.3:
                 struct.pack_into("=Q", memory, _HEAD_AT, int(rng.integers(0, 1 << 63)))
 
-    def tear(self, name: RingName, rng: np.random.Generator, for_s: float) -> None:
-        """Spoil the middle of the newest message."""
-        slots, size = SIZES[name]
-        stride = (24 + size + 7) // 8 * 8
-        memory = self._maps[name]
-        for _ in _meanwhile(for_s):
-            at = 128 + self._rings[name].head % slots * stride
-            memory[at + 30 : at + 40] = rng.bytes(10)
-
     def write(self, name: RingName, payloads: Callable[[], bytes | None], for_s: float, every_s: float) -> None:
         """Well-formed messages, numbered on from the newest."""
         for _ in _meanwhile(for_s, every_s):
             payload = payloads()
             if payload is not None and len(payload) <= SIZES[name][1]:
-                self._rings[name].renew()  # garbage of its own may have left no mark to open the ring by
+                self.rings[name].renew()  # garbage of its own may have left no mark to open the ring by
                 with Ring(self._folder / name, *SIZES[name]) as fresh:
                     fresh.write(payload)
 
-    def latest(self, name: RingName) -> RingMessage | None:
-        """The newest message."""
-        return self._rings[name].latest()
-
-    def kept(self, name: RingName) -> list[bytes]:
-        """Old messages."""
-        return self._kept[name]
-
-    def jump(self, name: RingName, by: int) -> None:
-        """Move the number of the newest message on: what stood between is dropped."""
-        struct.pack_into("=Q", self._maps[name], _HEAD_AT, self._rings[name].head + by)
-
     def now(self) -> tuple[int, int]:
         """Trip and control period that are shown."""
-        message = self._rings["observations"].latest()
+        message = self.rings["observations"].latest()
         if message is None:
             return 0, 0
         try:
@@ -124,7 +100,7 @@ def _wish(vandal: Vandal, **changes: Any) -> bytes | None:
         "state": "running", "line": 1, "speed": 20.0, "headway": 1.5, "lane": None, "turn": None, "served": [],
         "handovers": 0, "parameters": None,
     }  # fmt: skip
-    newest = vandal.latest("setpoints")
+    newest = vandal.rings["setpoints"].latest()
     if newest is not None:
         try:
             fields |= json.loads(newest.payload)
@@ -168,7 +144,7 @@ def _noise(vandal: Vandal, rng: np.random.Generator) -> bytes:
 
 def _again(name: RingName) -> Deed:
     def deed(vandal: Vandal, rng: np.random.Generator, for_s: float) -> None:
-        old = vandal.kept(name)
+        old = vandal.kept[name]
 
         def pick() -> bytes | None:
             return old[int(rng.integers(len(old)))] if old else None
@@ -178,61 +154,34 @@ def _again(name: RingName) -> Deed:
     return deed
 
 
-def _events(name: RingName, kinds: tuple[str, ...], every_s: float) -> Deed:
+def _flood(name: RingName, every_s: float = _EVERY_S, **fields: Any) -> Deed:
+    """Messages of wishes that were never asked; of a tuple of values one is drawn each time."""
+
     def deed(vandal: Vandal, rng: np.random.Generator, for_s: float) -> None:
         def make() -> bytes:
-            kind = kinds[int(rng.integers(len(kinds)))]
-            wish = f"x{int(rng.integers(99))}"
-            return json.dumps({"kind": kind, "wish": wish, "text": "x" * 99, "trip": 1, "tick": 0}).encode()
+            drawn = {k: v[int(rng.integers(len(v)))] if isinstance(v, tuple) else v for k, v in fields.items()}
+            return json.dumps({"wish": f"x{int(rng.integers(99))}", "text": "x" * 99} | drawn).encode()
 
         vandal.write(name, make, for_s, every_s)
 
     return deed
 
 
-def _requests_flood(vandal: Vandal, rng: np.random.Generator, for_s: float) -> None:
-    def make() -> bytes:
-        wish = f"x{int(rng.integers(99))}"
-        return json.dumps({"wish": wish, "text": "Do something else.", "person": "", "turn": 1}).encode()
-
-    vandal.write("requests", make, for_s, _EVERY_S)
-
-
 def _orders_nonsense(vandal: Vandal, rng: np.random.Generator, for_s: float) -> None:
-    """Real orders with something in them that cannot be, and things that are none."""
+    """Real orders with something in them that cannot be."""
 
     def make() -> bytes | None:
-        old = vandal.kept("orders")
-        if not old:
-            return b'{"wish": 5}'
-        order = json.loads(old[-1])
-        match int(rng.integers(6)):
-            case 0:
-                order["scene"]["trip"] = 1 << 40
-            case 1:
-                order["start_by_ns"] = order["expires_ns"] = 0
-            case 2:
-                order["plan"]["policy"] = {"kind": "program", "source": "import os", "library": ""}
-            case 3:
-                order["plan"]["policy"] = None
-            case 4:
-                order["plan"] = "go"
-            case _:
-                order["plan"]["policy"] = {"kind": "trajectory", "waypoints_m": [[1e308, 0]], "period_s": 0}
-        order["wish"] = FORGED
-        return json.dumps(order).encode()
+        old = vandal.kept["orders"]
+        order = json.loads(old[-1]) if old else {"plan": {}}
+        bad: list[dict[str, Any]] = [
+            {"scene": {"trip": 1 << 40}}, {"start_by_ns": 0, "expires_ns": 0}, {"plan": "go"},
+            {"plan": order["plan"] | {"policy": None}},
+            {"plan": order["plan"] | {"policy": {"kind": "program", "source": "import os", "library": ""}}},
+            {"plan": order["plan"] | {"policy": {"kind": "trajectory", "waypoints_m": [[1e308, 0]], "period_s": 0}}},
+        ]  # fmt: skip
+        return json.dumps(order | bad[int(rng.integers(len(bad)))] | {"wish": FORGED}).encode()
 
     vandal.write("orders", make, for_s, 0.01)
-
-
-def _orders_flood(vandal: Vandal, rng: np.random.Generator, for_s: float) -> None:
-    filler = rng.bytes(3000).hex()
-    vandal.write("orders", lambda: json.dumps({"wish": FORGED, "filler": filler}).encode(), for_s, _EVERY_S)
-
-
-def _dropped(vandal: Vandal, rng: np.random.Generator, for_s: float) -> None:
-    for _ in _meanwhile(for_s, 0.005):
-        vandal.jump("setpoints", int(rng.integers(1, 1 << 40)))
 
 
 def _frozen(vandal: Vandal, rng: np.random.Generator, for_s: float) -> None:
@@ -250,10 +199,10 @@ def _garbage(name: RingName) -> Deed:
 Deed = Callable[[Vandal, np.random.Generator, float], None]
 _SECOND: Final = 1_000_000_000
 _ENDS: Final = ("finished", "failed", "started", "said", "garbage", "resumed")
+_PLANNED: Final = ("planned", "unplanned", "declined", "planning")
 
 DEEDS: Final[dict[str, Deed]] = {
     "wishes-garbage": _garbage("setpoints"),
-    "wishes-torn": lambda vandal, rng, for_s: vandal.tear("setpoints", rng, for_s),
     "wishes-nonsense": _wishes(_nonsense),
     "wishes-other-trip": _wishes(lambda vandal, rng: _wish(vandal, trip=int(rng.integers(1000)))),
     "wishes-future-tick": _wishes(lambda vandal, rng: _wish(vandal, tick=vandal.now()[1] + int(rng.integers(2, 999)))),
@@ -266,40 +215,20 @@ DEEDS: Final[dict[str, Deed]] = {
             vandal, issued_ns=max(0, time.monotonic_ns() - int(rng.integers(_SECOND, 99 * _SECOND)))
         )
     ),
-    "wishes-dropped": _dropped,
     "wishes-flood": _wishes(_noise, 0.0005),
     "wishes-forged": _wishes(_forged, 0.01),
     "frozen-observation": _frozen,
     "orders-garbage": _garbage("orders"),
     "orders-nonsense": _orders_nonsense,
     "orders-replayed": _again("orders"),
-    "orders-flood": _orders_flood,
+    "orders-flood": _flood("orders", wish=FORGED, filler="x" * 6000),
     "requests-garbage": _garbage("requests"),
-    "requests-flood": _requests_flood,
+    "requests-flood": _flood("requests", person="", turn=1),
     "policy-events-garbage": _garbage("policy_events"),
-    "policy-events-flood": _events("policy_events", _ENDS, 0.0005),
+    "policy-events-flood": _flood("policy_events", 0.0005, kind=_ENDS, trip=1, tick=0),
     "planner-events-garbage": _garbage("planner_events"),
-    "planner-events-flood": _events("planner_events", ("planned", "unplanned", "declined", "planning"), 0.0005),
+    "planner-events-flood": _flood("planner_events", 0.0005, kind=_PLANNED, trip=1, tick=0),
     "checkpoints-garbage": _garbage("checkpoints"),
     "hand-garbage": _garbage("hand"),
 }
 """Deeds by name."""
-
-
-def main(folder: Path) -> None:
-    """Do what is asked for, a line each, until there is no more."""
-    vandal = Vandal(folder)
-    sys.stdout.write("ready\n")
-    sys.stdout.flush()
-    for line in sys.stdin:
-        asked = json.loads(line)
-        if asked["what"] == "remember":
-            vandal.remember()
-        else:
-            vandal.do(asked["what"], asked["draw"], asked["for_s"])
-        sys.stdout.write("done\n")
-        sys.stdout.flush()
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1]))
