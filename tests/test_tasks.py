@@ -21,7 +21,7 @@ from chauffeur.concept import Program
 from chauffeur.drive.recording import read_trip
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-WITHIN_S = 240.0
+WITHIN_S = 600
 SUITE = "chauffeur bench scenes generate --out suite --items 8 --extras 0"
 BLOCKS = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 

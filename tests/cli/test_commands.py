@@ -16,10 +16,11 @@ from pydantic import TypeAdapter
 from typer.testing import CliRunner, Result
 
 from chauffeur import __version__
-from chauffeur.cli.doctor import install_command, installed_parts
+from chauffeur.cli.doctor import installed_parts
 from chauffeur.cli.failures import show_crash
 from chauffeur.cli.main import app
 from chauffeur.concept import ChauffeurError, PlannerError, ScenarioError, Verdict
+from chauffeur.concept.extras import install_command
 from chauffeur.drive.recording import read_trip, write_trip
 
 WISH = "Overtake the car in front of you."
@@ -154,7 +155,7 @@ def test_a_command_that_stands_in_a_group_is_found() -> None:
 
 def test_the_module_is_the_command() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "chauffeur", "--version"], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-m", "chauffeur", "--version"], capture_output=True, text=True, timeout=600, check=False
     )
     assert (done.returncode, done.stdout.strip()) == (0, f"chauffeur {__version__}")
 

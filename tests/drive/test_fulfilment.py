@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from functools import cache
 
 import pytest
 
 from chauffeur.bench.referees import referee_for
 from chauffeur.cli.parts import planner_named
-from chauffeur.concept import Instruction, Limits, PersonId, Plan, PlanRequest, Program, Scenario, Thoughts, result_of
+from chauffeur.concept import (
+    Instruction,
+    Limits,
+    MissingExtraError,
+    PersonId,
+    Plan,
+    PlanRequest,
+    Program,
+    Scenario,
+    Thoughts,
+    result_of,
+)
 from chauffeur.drive.again import drive_again
 from chauffeur.drive.fulfilment import GAP_M, HELD_S, SPEED_MPS, asked_of
 from chauffeur.drive.recording import RecordedTrip
@@ -20,6 +32,7 @@ from chauffeur.memory.choice import open_memory
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.planners.base import Planner
 from chauffeur.worlds.highway import HighwayWorld
+from chauffeur.worlds.track.dynamics import parameters
 
 
 @cache
@@ -181,11 +194,27 @@ def test_a_lot_with_places_to_park_near_is_driven_by_who_knows_them() -> None:
 
 
 def test_a_wish_about_the_road_finds_a_car_that_looks_at_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("chauffeur.drive.scenarios.find_spec", lambda name: name)
-    assert suiting("I'm late, but it is slippery").id == "track-left-turn-sunny"
-    assert suiting("Overtake, though it is slippery.").id == "overtake"
-    monkeypatch.setattr("chauffeur.drive.scenarios.find_spec", lambda name: None)
-    assert suiting("I'm late, but it is slippery").id == "overtake"  # its parts are not installed
+    for parts in ("osqp", "vehiclemodels", "moderngl", "libsumo"):  # whatever is installed, it is the same road
+        assert suiting("Hurry, but it is icy out there").id == "track-left-turn-sunny"
+        assert suiting("Overtake, though it is slippery.").id == "overtake"
+        monkeypatch.setitem(sys.modules, parts, None)
+
+
+@pytest.mark.parametrize("scenario", BUILT_IN, ids=lambda one: one.id)
+def test_the_wish_that_a_scenario_is_listed_with_is_shown_there(scenario: Scenario) -> None:
+    assert suiting(scenario.wish) == scenario
+    assert suiting(scenario.wish.upper().rstrip(".") + "!") == scenario
+    assert suiting(scenario.wish.replace("I'm", "I am")) == scenario
+
+
+@pytest.mark.parametrize("wish", ["Turn left and stop near the crosswalk.", "Careful, there's ice in that bend."])
+def test_a_wish_whose_road_needs_what_is_not_installed_says_what(wish: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.startswith("vehiclemodels")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "vehiclemodels", None)
+    parameters.cache_clear()
+    with pytest.raises(MissingExtraError, match=r"-m pip install .*\[motion\]"):
+        driven(wish, suiting(wish))
 
 
 def test_roads_to_talk_on_keep_a_vehicle_to_overtake() -> None:

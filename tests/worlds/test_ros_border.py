@@ -328,6 +328,6 @@ def test_a_missing_library_is_named_with_what_installs_it(
     for name in [library, *(one for one in sys.modules if one.startswith(f"{library}."))]:
         monkeypatch.setitem(sys.modules, name, None)
     settings = parse_settings(f"{text}\n[limits]\nmax_speed_mps = 8.0\n")
-    with pytest.raises(MissingExtraError, match=r"pip install 'chauffeur\[ros\]'") as caught:
+    with pytest.raises(MissingExtraError, match=r"-m pip install .*\[ros\]") as caught:
         open_vehicle(settings)
     assert library in caught.value.message

@@ -367,7 +367,7 @@ def write_parquet(path: Path, rows: list[Row]) -> None:
         arrow: Any = importlib.import_module("pyarrow")
         tables: Any = importlib.import_module("pyarrow.parquet")
     except ImportError as error:
-        raise MissingExtraError("Parquet needs pyarrow.", hint="Run: pip install 'chauffeur[tables]'") from error
+        raise MissingExtraError("Parquet needs pyarrow.", extra="tables") from error
     schema = arrow.schema([(name, getattr(arrow, _COLUMN_TYPES.get(name, "string"))()) for name in COLUMNS])
     stream = io.BytesIO()
     tables.write_table(arrow.Table.from_pylist(rows, schema=schema), stream)

@@ -121,7 +121,7 @@ def _fitted(criteria: Sequence[str], found: Sequence[AskedCommand], strength: fl
         from threadpoolctl import threadpool_limits
     except ImportError as error:
         raise MissingExtraError(
-            "The linear baseline needs scikit-learn.", hint="Run: pip install 'chauffeur[models]'"
+            "The linear baseline needs scikit-learn.", extra="models"
         ) from error
     vectors = make_union(
         TfidfVectorizer(ngram_range=(1, 2), sublinear_tf=True, token_pattern=_WORD),
