@@ -15,13 +15,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from chauffeur.geometry.angles import wrap_to_pi
+from chauffeur.geometry.box import Box
 from chauffeur.geometry.polyline import Polyline
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from chauffeur.geometry.box import Box
     from chauffeur.geometry.ground import Ground
     from chauffeur.geometry.polyline import FloatArray
 
