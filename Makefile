@@ -12,13 +12,13 @@ WISH ?= Overtake the car in front of you.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 JOBS ?= auto
 VERSIONS ?= 3.11 3.12 3.13
-# What lint reads the types of, and what CI tests beside the core.
-EXTRAS ?= models,motion,town,maps,carla,camera
+# What lint reads the types of, beside what tests need; and what CI tests with it.
+EXTRAS ?= models,maps,carla,speech,tables,viewer
 
-.PHONY: drive test lint format bench docs extras fresh-import clean
+.PHONY: drive test lint format bench docs extras fresh-core clean
 
-# A wish of one's own may be about what the car sees: with it come the test track and the camera.
-drive: $(VENV)/.core $(if $(filter command environment,$(origin WISH)),$(VENV)/.seeing)
+# A wish of one's own may need a town, the test track or the camera: with it comes what every world of ours drives with.
+drive: $(VENV)/.core $(if $(filter command environment,$(origin WISH)),$(VENV)/.driving)
 	$(BIN)/chauffeur drive "$(WISH)" --save trips/latest
 
 test: $(VENV)/.dev
@@ -27,7 +27,7 @@ test: $(VENV)/.dev
 lint: extras
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/pyright
+	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/lint-imports
 
 format: $(VENV)/.dev
@@ -43,20 +43,21 @@ extras: $(VENV)/.extras
 docs: $(VENV)/.docs
 	$(BIN)/zensical build
 
-# The package must import, show its help and drive in an environment that has nothing but its own requirements, with
-# every Python it is for; those that are not installed here are left out.
-fresh-import:
-	@set -e; for version in $(VERSIONS); do \
+# In an environment that has nothing but its own requirements, the package must show its help and drive with every
+# Python it is for (those that are not installed here are left out), and do with the first what the README shows.
+fresh-core:
+	@set -e; tried=""; for version in $(VERSIONS); do \
 		python$$version -c "" 2>/dev/null || { echo "No python$$version here: not tried."; continue; }; \
 		echo "Python $$version, core requirements alone ..."; \
 		rm -rf .venv-fresh; \
 		python$$version -m venv .venv-fresh; \
 		.venv-fresh/bin/python -m pip --disable-pip-version-check --quiet install -c constraints.txt .; \
-		.venv-fresh/bin/python -c "import chauffeur, chauffeur.drive.session, chauffeur.planners.onboard"; \
 		.venv-fresh/bin/python -m chauffeur --help > /dev/null; \
 		.venv-fresh/bin/chauffeur drive "Change to the left lane." --quiet; \
+		test -n "$$tried" || .ci/core .venv-fresh/bin; \
+		tried=yes; \
 		rm -rf .venv-fresh; \
-	done
+	done; test -n "$$tried" || { echo "None of Python $(VERSIONS) is here."; exit 1; }
 
 $(VENV)/.made:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Chauffeur needs Python 3.11 or newer; set PYTHON=/path/to/python3.11")'
@@ -68,8 +69,9 @@ $(VENV)/.core: $(VENV)/.made pyproject.toml constraints.txt
 	$(PIP) install -c constraints.txt -e .
 	@touch $@
 
-$(VENV)/.seeing: $(VENV)/.core
-	$(PIP) install -c constraints.txt -e ".[motion,camera]"
+$(VENV)/.driving: $(VENV)/.core
+	@echo "Installing what towns, the test track and the camera need (once) ..."
+	$(PIP) install -c constraints.txt -e ".[motion,camera,town]"
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.core

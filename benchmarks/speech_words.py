@@ -2,6 +2,7 @@
 
     python benchmarks/speech_words.py --out FOLDER [--engine grammar] [--most 200] [--noise none,20,10,5]
     python benchmarks/speech_words.py --out FOLDER --engine whisper --model FOLDER
+    python benchmarks/speech_words.py --out FOLDER --each --voices espeak/en-us,espeak/en-gb,espeak/en-us+f3 --most 48
     python benchmarks/speech_words.py --out FOLDER --again
     python benchmarks/speech_words.py --fit
 
@@ -12,6 +13,7 @@ hotword, engine. `known` sentences are drawn from the closed grammar (so its fig
 as all of its words missing. `carried out` counts sentences after which the on-board planner, on a highway, plans what
 it plans for the words that were said: what was misheard without consequence counts; wishes it declines are left out.
 Writes FOLDER/words.md and FOLDER/words.jsonl; `--again` makes the tables of a FOLDER anew.
+`--each` says every sentence of the grammar in every voice at every speed, with a button held, and nothing else.
 `--fit` prints the weights of the grammar engine's confidence, from voices and sentences that no figure uses.
 """
 
@@ -58,6 +60,9 @@ VOICES = (
 )
 FIT_VOICES = ("espeak/en-us+m3", "espeak/en-gb-x-rp+f2", "espeak/en-us+f5", "flite/kal16")
 SPEEDS = (0.9, 1.0, 1.15)
+FIT_SPEEDS = (0.9, 1.1, 1.3)
+EACH_SPEEDS = (0.85, 1.1, 1.35)
+"""136, 176 (espeak-ng's own) and 216 words a minute."""
 NOISES = ("none", "20", "10", "5")
 
 
@@ -150,7 +155,8 @@ def sayings(most: int, noises: Sequence[str], names: tuple[str, ...], seed: int,
     ways = (("command", False), ("", False), ("command", True))
     plan += [("elsewhere", text, *way) for text in texts[f"elsewhere{suffix}"] for way in ways]
     rng = np.random.default_rng(seed)
-    picks = [(names[int(rng.integers(len(names)))], SPEEDS[int(rng.integers(len(SPEEDS)))]) for _ in plan]
+    speeds = FIT_SPEEDS if suffix else SPEEDS
+    picks = [(names[int(rng.integers(len(names)))], speeds[int(rng.integers(len(speeds)))]) for _ in plan]
     found = [
         Said(*one, *pick, noise)
         for noise in noises
@@ -158,6 +164,17 @@ def sayings(most: int, noises: Sequence[str], names: tuple[str, ...], seed: int,
         if one[0] == "known" or noise == noises[0]
     ]
     return [found[int(k)] for k in rng.permutation(len(found))]
+
+
+def each(most: int, names: tuple[str, ...], seed: int) -> list[Said]:
+    """Every sentence in every voice at every speed, no noise, the button held that goes with it."""
+    plan = [
+        Said("known", text, hotword, True, voice, speed, "none")
+        for hotword, text in known(most, seed)
+        for voice in names
+        for speed in EACH_SPEEDS
+    ]
+    return [plan[int(k)] for k in np.random.default_rng(seed).permutation(len(plan))]
 
 
 _spoken: dict[tuple[str, str, float], Samples] = {}
@@ -199,7 +216,7 @@ def run(recogniser: Recogniser, plan: list[Said], clock: Callable[[], float]) ->
     try:
         for index, said in enumerate(plan):
             sound = sound_of(said, index)
-            button = "command" if said.button else None
+            button = (said.hotword or "command") if said.button else None
             seconds = len(sound) / SAMPLE_RATE_HZ
             heard = hear_recording(Recording(sound), recogniser, detector, button=button, clock=clock)
             rows.append(judge(said, heard, seconds))
@@ -307,12 +324,17 @@ def report(name: str, rows: list[Row], noises: list[tuple[str, float, int, int]]
         "kind and noise": lambda row: f"{row.said.kind}, {_noise(row.said.noise)}",
         "voice (known sentences, no noise and 20 dB)": lambda row: row.said.voice if _mild(row) else "",
         "speed (known sentences, no noise and 20 dB)": lambda row: f"{row.said.speed:g}" if _mild(row) else "",
+        "voice at words a minute, button held": lambda row: (
+            f"{row.said.voice}, {round(160 * row.said.speed)}" if row.said.button and row.said.kind == "known" else ""
+        ),
         "way of saying what is not for driving": lambda row: _way(row.said) if row.said.kind == "elsewhere" else "",
     }
     for title, way in ways.items():
         groups: dict[str, list[Row]] = defaultdict(list)
         for row in rows:
             groups[way(row)].append(row)
+        if not any(groups):
+            continue
         out += [
             head.format(title),
             rule,
@@ -378,6 +400,8 @@ def main() -> None:
     parser.add_argument("--model", default="")
     parser.add_argument("--base-url")
     parser.add_argument("--most", type=int, default=200)
+    parser.add_argument("--voices", default=",".join(VOICES))
+    parser.add_argument("--each", action="store_true", help="every sentence in every voice at three speeds")
     parser.add_argument("--noise", default=",".join(NOISES))
     parser.add_argument("--minutes", type=float, default=5.0)
     parser.add_argument("--seed", type=int, default=1)
@@ -396,14 +420,17 @@ def main() -> None:
         return
     given.out.mkdir(parents=True, exist_ok=True)
     signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell takes away from background jobs
-    names = tuple(voice for voice in VOICES if voices.installed(voice))
+    names = tuple(voice for voice in given.voices.split(",") if voices.installed(voice))
     if not names:
         parser.error("no synthesiser here: apt install espeak-ng flite")
     recogniser = open_recogniser(given.engine, model=given.model, base_url=given.base_url)
     started = time.perf_counter()
     clock = time.process_time if given.cpu else time.perf_counter
-    rows = run(recogniser, sayings(given.most, given.noise.split(","), names, given.seed), clock)
-    noises = noise_only(recogniser, given.minutes) if given.minutes > 0 else []
+    plan = each(given.most, names, given.seed)
+    if not given.each:
+        plan = sayings(given.most, given.noise.split(","), names, given.seed)
+    rows = run(recogniser, plan, clock)
+    noises = noise_only(recogniser, given.minutes) if given.minutes > 0 and not given.each else []
     text = report(f"{recogniser.name}{', CPU time' if given.cpu else ''}", rows, noises)
     (given.out / "words.md").write_text(text, encoding="utf-8")
     with (given.out / "words.jsonl").open("w", encoding="utf-8") as file:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import shutil
+import signal
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,9 +16,45 @@ from hypothesis import settings
 
 SHARED_DATA = Path(os.environ.get("CHAUFFEUR_TEST_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 
+# Whoever starts the tests in the background may have these ignored, and every process that a test starts would inherit
+# it: the signals that tests send must arrive.
+for _number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    if signal.getsignal(_number) == signal.SIG_IGN:
+        signal.signal(_number, signal.default_int_handler if _number == signal.SIGINT else signal.SIG_DFL)
+
 # Everybody's run tries the same examples, however busy the machine; HYPOTHESIS_PROFILE=default looks for new ones.
 settings.register_profile("same-for-all", derandomize=True, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same-for-all"))
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--skipped-to", type=Path, metavar="FILE", help="names of skipped tests, for `pytest @FILE`")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    file = config.getoption("--skipped-to")
+    if file is not None and not hasattr(config, "workerinput"):  # once, beside whatever runs the tests
+        config.pluginmanager.register(_Skipped(file))
+
+
+class _Skipped:
+    """Collects which tests were skipped, so that they can be tried again where what they lacked has been installed."""
+
+    def __init__(self, file: Path) -> None:
+        self._file, self._names = file, set[str]()
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        self._note(report)
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        self._note(report)
+
+    def _note(self, report: pytest.CollectReport | pytest.TestReport) -> None:
+        if report.skipped:
+            self._names.add(report.nodeid.partition("[")[0])
+
+    def pytest_sessionfinish(self) -> None:
+        self._file.write_text("".join(f"{name}\n" for name in sorted(self._names)), encoding="utf-8")
 
 
 @pytest.fixture(scope="session")

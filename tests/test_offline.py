@@ -50,7 +50,7 @@ def _attempts(commands: list[list[str]], folder: Path, **environment: str) -> tu
         ["unshare", "-rnm", sys.executable, "-c", INSIDE, str(servers), json.dumps(commands)],
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=600,
         check=False,
         env=os.environ | environment,
     )
@@ -69,7 +69,7 @@ def test_a_look_up_and_a_connection_are_seen(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(360)
+@pytest.mark.timeout(1200)
 def test_driving_talking_and_benching_open_no_connection_and_leave_nothing_of_anybodys(tmp_path: Path) -> None:
     from chauffeur.worlds.highway.scenarios import BUILT_IN
 
@@ -127,6 +127,6 @@ def test_every_process_that_imports_the_package_has_them_off() -> None:
     code = "import os, json, chauffeur; print(json.dumps(dict(os.environ)))"
     bare = {name: value for name, value in os.environ.items() if name not in SWITCHES}
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env=bare, timeout=60, check=True
+        [sys.executable, "-c", code], capture_output=True, text=True, env=bare, timeout=600, check=True
     )
     assert SWITCHES.items() <= json.loads(done.stdout).items()

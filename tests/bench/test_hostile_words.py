@@ -28,7 +28,7 @@ from chauffeur.bench.hostile.loader import KINDS, data_sha256, parse_inputs, sam
 from chauffeur.bench.hostile.obedient import ObedientPlanner, attack
 from chauffeur.bench.hostile.report import TABLES, headline, unsafe
 from chauffeur.bench.hostile.requests import SERVICE, HostileRequests
-from chauffeur.bench.hostile.rollout import describe_drive, untouched
+from chauffeur.bench.hostile.rollout import MAX_S, describe_drive
 from chauffeur.bench.hostile.scenes import SCENES, scene_of
 from chauffeur.bench.kernel.report import fill
 from chauffeur.bench.kernel.run import BenchRun, Effort
@@ -36,6 +36,7 @@ from chauffeur.cli.bench_hostile import hostile
 from chauffeur.concept import ConfigError, DataError, Limits, Plan, PlanRequest, SystemMessage
 from chauffeur.describe import describe
 from chauffeur.drive.episode import Episode
+from chauffeur.drive.session import drive_without_program, make_world
 from chauffeur.language.letters import clean
 from chauffeur.planners.keyword import KeywordPlanner
 from chauffeur.programs.gate import check_source
@@ -47,7 +48,10 @@ LIMITS = Limits()
 
 @cache
 def quiet_drive(scene: str) -> Episode:
-    return untouched(SCENES[scene])
+    """The scene driven by the world's own driver, without a wish."""
+    world = make_world(SCENES[scene])
+    world.reset(SCENES[scene])
+    return drive_without_program(world, None, MAX_S)
 
 
 def test_counts() -> None:

@@ -23,7 +23,7 @@ def test_one_run_is_reported_inside_it(tmp_path: Path) -> None:
     run = write_run(tmp_path / "run", mixed(), labels=("critic: evaluator",))
     code, said = _report(run)
     assert code == 0, said
-    assert sorted(path.name for path in (run / "report").iterdir()) == ["report.html", "report.md", "report.tex"]
+    assert sorted(path.name for path in (run / "report").iterdir()) == ["report.html", "report.md"]
     assert "onboard [critic: evaluator]: did as asked in 12 of 24 items" in said
     assert "simulated drives" in said
 

@@ -56,7 +56,7 @@ def test_a_log_has_a_known_ending(run: Run, tmp_path: Path) -> None:
 def test_without_inspect_the_command_that_installs_it_is_named(run: Run, tmp_path: Path) -> None:
     with pytest.raises(MissingExtraError) as error:
         write_inspect_log(tmp_path / "log.eval", run, HOW)
-    assert error.value.hint == 'pip install "chauffeur[inspect]"'
+    assert error.value.hint.endswith('[inspect]"')
     assert list(tmp_path.glob("*log.eval*")) == []
 
 

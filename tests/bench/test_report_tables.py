@@ -11,7 +11,6 @@ from report_folders import HOSTILE, mixed, outcome, signals, write_run
 
 from chauffeur.bench.lampilot.report import comparison_lines, family_lines, summarise
 from chauffeur.bench.report.build import Choices, build_report
-from chauffeur.bench.report.latex import render_latex
 from chauffeur.bench.report.model import SIMULATED, BenchReport, Cell
 from chauffeur.bench.report.runs import load_run
 from chauffeur.bench.report.text import render_markdown
@@ -226,11 +225,11 @@ def test_labels_and_simulated_drives_stand_at_every_result(tmp_path: Path) -> No
                 if line.name == "a" or "A: a" in line.name:
                     assert label in line.labels, table.id
         assert SIMULATED in table.caption or not table.simulated
-    for text in (render_markdown(report), render_latex(report)):
-        for line in text.splitlines():
-            if re.match(r"(\| )?(a|A: a; B: b)( \[|\s*&|\s*\|| \\\[)", line):
-                assert "rehearsal K=32" in line
-        assert text.count(SIMULATED) >= len([table for table in report.tables if table.simulated])
+    text = render_markdown(report)
+    for line in text.splitlines():
+        if re.match(r"(\| )?(a|A: a; B: b)( \[|\s*\|| \\\[)", line):
+            assert "rehearsal K=32" in line
+    assert text.count(SIMULATED) >= len([table for table in report.tables if table.simulated])
     for headline in report.headlines:
         if re.search(r"\ba\b", headline.subject):
             assert label in headline.subject
@@ -257,23 +256,6 @@ def test_markdown_tables_stay_tables_whatever_was_written(tmp_path: Path) -> Non
         width = len(cells)
     assert "<img" not in text.replace("\\<", "")
     text.encode("utf-8")
-
-
-def test_latex_is_escaped_and_balanced(tmp_path: Path) -> None:
-    a = write_run(tmp_path / "a", mixed(), planner="a_b" + HOSTILE, labels=("50% & more",), families=("x_y", "z#"))
-    text = render_latex(_report(a))
-    body = re.sub(r"(?m)^%.*$", "", text)
-    bare = re.sub(r"\\[\\{}$&#%_]", "", body)
-    assert bare.count("{") == bare.count("}")
-    assert "#" not in bare and "%" not in bare.replace("{!}{%", "")
-    assert bare.count("$") % 2 == 0
-    assert r"50\% \& more" in text
-    for environment in re.findall(r"\\begin\{tabular\}\{(l+r*)\}(.*?)\\end\{tabular\}", text, re.DOTALL):
-        spec, rows = environment
-        for row in re.findall(r"(?m)^(.*?) \\\\$", rows):
-            if not row.startswith(r"\multicolumn"):
-                assert len(re.findall(r"(?<!\\)&", row)) == len(spec) - 1
-    assert max(map(ord, text)) < 0x100
 
 
 def test_the_choice_of_failures_is_spread(tmp_path: Path) -> None:

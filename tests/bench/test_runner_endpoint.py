@@ -25,7 +25,7 @@ from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset
 from processes import started, until
 
-pytestmark = [pytest.mark.slow, pytest.mark.server, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.slow, pytest.mark.server, pytest.mark.timeout(1200)]
 
 MODEL = server_module()
 REPLY = f"Thoughts: Left.\n\n```python{LEFT.format(patience=1)}```\n"
@@ -223,7 +223,7 @@ def test_a_run_stopped_with_calls_in_flight_asks_for_nothing_twice(
     with started([*chauffeur, *options], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         until(lambda: plans.exists() and plans.read_bytes().count(b"\n") >= 3, "three answers")
         process.send_signal(how)
-        text, _ = process.communicate(timeout=60)
+        text, _ = process.communicate(timeout=600)
     assert process.returncode == (130 if how == signal.SIGINT else -9), text
     if how == signal.SIGINT:
         assert "run the same command to go on" in " ".join(text.split())

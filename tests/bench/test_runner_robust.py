@@ -26,7 +26,7 @@ from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway.dblv1 import Dataset
 from processes import started, until
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 
 
 @pytest.fixture(scope="module")
@@ -248,7 +248,7 @@ def test_a_full_disk_stops_the_run_and_loses_nothing(
         resource.setrlimit(resource.RLIMIT_FSIZE, (9_000, 9_000))
 
     full = subprocess.run(
-        command, capture_output=True, text=True, timeout=240, check=False, preexec_fn=small_files, env=_no_cache()
+        command, capture_output=True, text=True, timeout=600, check=False, preexec_fn=small_files, env=_no_cache()
     )
     assert full.returncode == 1, full.stdout + full.stderr
     assert "Cannot write to" in full.stderr and "goes on where it stopped" in " ".join(full.stderr.split())

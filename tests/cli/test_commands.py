@@ -16,10 +16,11 @@ from pydantic import TypeAdapter
 from typer.testing import CliRunner, Result
 
 from chauffeur import __version__
-from chauffeur.cli.doctor import install_command, installed_parts
+from chauffeur.cli.doctor import installed_parts
 from chauffeur.cli.failures import show_crash
 from chauffeur.cli.main import app
 from chauffeur.concept import ChauffeurError, PlannerError, ScenarioError, Verdict
+from chauffeur.concept.extras import install_command
 from chauffeur.drive.recording import read_trip, write_trip
 
 WISH = "Overtake the car in front of you."
@@ -153,7 +154,7 @@ def test_a_command_that_stands_in_a_group_is_found() -> None:
 
 def test_the_module_is_the_command() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "chauffeur", "--version"], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-m", "chauffeur", "--version"], capture_output=True, text=True, timeout=600, check=False
     )
     assert (done.returncode, done.stdout.strip()) == (0, f"chauffeur {__version__}")
 
@@ -175,7 +176,7 @@ def test_a_wish_is_driven_and_everything_is_said(answers: str) -> None:
     assert result.exit_code == 0, result.output
     for words in (WISH, "Left is free.", "def overtake():", "✓", "simulated drive"):
         assert words in result.output
-    assert result.output.startswith("■ Drive ended after 5 s"), "what came of it comes first"
+    assert result.output.startswith("■ Done, not compared after 5 s"), "what came of it comes first"
     assert "Changing to the [bold]left[/] lane." in result.output, "a program's words are not markup"
     assert "\x1b" not in result.output, "no colour and no moving cursor in a pipe"
 
@@ -191,7 +192,7 @@ def test_an_explanation_that_does_not_fit_is_told_and_the_drive_goes_on(answers:
         "wrong side: “I move to the right lane.”, but it changes lanes to the left (line 6)",
         "≠ The drive did not go as explained (score 0.00 of 1, 1 claim compared) alignment-driven-v1",
         "wrong side: “I move to the right lane.”, but it changed lanes to the left",
-        "≠ Drive ended after 5 s, not as explained (simulated drive)",
+        "≠ Done, not compared after 5 s, not as explained (simulated drive)",
     ):
         assert words in told, words
 
@@ -207,7 +208,7 @@ def test_an_explanation_that_does_not_fit_is_told_and_the_drive_goes_on(answers:
     assert "Wrong side: “I move to the right lane.”, but it changes lanes to the left" in shown
     assert "score 0.00 of 1" in shown
     quiet = invoke("drive", MISTOLD, "--planner", answers, "-q").output
-    assert quiet.strip() == "≠ Drive ended after 5 s, not as explained (simulated drive)"
+    assert quiet.strip() == "≠ Done, not compared after 5 s, not as explained (simulated drive)"
 
 
 def test_a_recording_from_before_explanations_were_judged_is_read(driven: Path) -> None:
@@ -225,7 +226,7 @@ def test_a_judge_of_explanations_that_breaks_stops_nothing(answers: str, monkeyp
     monkeypatch.setattr("chauffeur.safety.faithfulness.check.judge", broken)
     result = invoke("drive", WISH, "--planner", answers)
     assert result.exit_code == 0, result.output
-    assert "≠ The check check_faithfulness could not judge this plan (RecursionError)." in " ".join(
+    assert "– not compared: the check check_faithfulness could not judge this plan (RecursionError)." in " ".join(
         result.output.split()
     )
 
@@ -270,7 +271,7 @@ def test_a_refusal_is_explained_and_is_a_failure(answers: str, tmp_path: Path) -
     result = invoke("drive", DECLINED, "--planner", answers, "--save", str(tmp_path))
     assert result.exit_code == 1
     assert "A car cannot fly." in result.output
-    assert "Refused" in result.output
+    assert "Declined" in result.output
     assert {p.name for p in tmp_path.iterdir() if p.suffix} == {"trip.mcap", "trip.html"}
     replayed = invoke("replay", str(tmp_path / "trip.mcap"))
     assert replayed.exit_code == 2

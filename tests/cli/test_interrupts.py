@@ -35,6 +35,6 @@ def test_ctrl_c_shows_no_traceback(first: str, then: str, code: int) -> None:
         check=False,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=600,
     )
     assert (done.returncode, done.stdout, done.stderr) == (code, "", "")

@@ -26,7 +26,8 @@ def run(*words: str, code: int = 0) -> str:
 
 
 def driven(wish: str = "Turn right.") -> str:
-    return run("drive", wish, "--as", "ana", "--planner", "keyword")
+    """A drive of the baseline, which knows the left turn and not the right one."""
+    return run("drive", wish, "--as", "ana", "--planner", "keyword", code=int(wish == "Turn right."))
 
 
 def test_a_profile_from_the_first_trip_to_its_end(home: Path, tmp_path: Path) -> None:
@@ -35,6 +36,7 @@ def test_a_profile_from_the_first_trip_to_its_end(home: Path, tmp_path: Path) ->
     run("feedback", "A bit too slow.", "--as", "ana")
     shown = run("me", "show", "--as", "ana")
     assert "Turn right." in shown
+    assert "not done" in shown, "the word for it is that of every screen"
     assert "A bit too slow." in shown
     assert "1 trips in all" in shown
     assert "for 90 days" in shown

@@ -102,7 +102,7 @@ def test_what_cannot_be_had_is_said_at_once(arguments: tuple[str, ...], said: st
 
 @pytest.mark.parametrize(
     ("memory", "said"),
-    [("vaults", "Unknown memory 'vaults'"), ("chroma", "pip install 'chauffeur[chroma]'")],
+    [("vaults", "Unknown memory 'vaults'"), ("chroma", "[chroma]")],
 )
 def test_a_memory_that_cannot_be_had_is_said_at_once(memory: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "chromadb", None)

@@ -53,7 +53,7 @@ except DataError as error:
 """
     environ = {"PYTHONPATH": str(installed), "PATH": "/usr/bin:/bin", "HOME": str(tmp_path)}
     run = subprocess.run(
-        [sys.executable, "-c", code], env=environ, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=True
+        [sys.executable, "-c", code], env=environ, cwd=tmp_path, capture_output=True, text=True, timeout=600, check=True
     )
     assert "'passengers' is no part of the installed package" in run.stdout and DATA_VARIABLE in run.stdout
 

@@ -112,7 +112,7 @@ def test_the_program_in_the_documentation_runs(tmp_path: Path) -> None:
     (program,) = re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
     path = tmp_path / "program.py"
     path.write_text(program, encoding="utf-8")
-    done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr
     assert "Weather: not known (no such service is switched on)." in done.stdout
     assert "rules Germany  rules of Germany" in done.stdout

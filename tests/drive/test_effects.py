@@ -1,4 +1,4 @@
-"""What running a program on copies of a scene shows, and that the scene itself stays as it is."""
+"""What a recorded drive shows of the program that drove it."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from chauffeur.concept import Program, Thoughts
-from chauffeur.drive.effects import effect_of, effects_of, judge_driven
-from chauffeur.drive.episode import run_episode
+from chauffeur.drive.effects import effect_of
+from chauffeur.drive.episode import Episode, run_episode
 from chauffeur.programs import UNHURRIED, ProgramExecutor, Sandbox
+from chauffeur.safety.faithfulness import Effect, FactSurroundings, judge, read_facts
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
@@ -65,36 +65,44 @@ def scene(name: str) -> HighwayWorld:
     return world
 
 
-def test_a_slower_speed_is_driven_and_the_scene_stays(world: HighwayWorld, sandbox: Sandbox) -> None:
+def drive(world: HighwayWorld, source: str, sandbox: Sandbox, max_s: float) -> Episode:
+    """A drive by a program, as it is written."""
+    with ProgramExecutor(sandbox=sandbox, gate=False) as executor:
+        executor.start(source, world)
+        return run_episode(world, executor, None, max_s=max_s)
+
+
+def effect(world: HighwayWorld, source: str, sandbox: Sandbox, max_s: float) -> Effect:
+    found = effect_of(drive(world, source, sandbox, max_s))
+    assert found is not None
+    return found
+
+
+def test_a_slower_speed_is_seen(world: HighwayWorld, sandbox: Sandbox) -> None:
     before = world.observe()
-    effect, other = effects_of([world, world], Program(OPAQUE), sandbox=sandbox, max_s=15.0)
-    assert effect == other  # same instant, same program
-    assert effect.speeds_mps[0] == before.ego.speed_mps
-    assert effect.speeds_mps[1] == pytest.approx(18.0, abs=1.5)
-    assert (effect.lanes_moved, effect.stood, effect.failed) == (0, False, False)
-    assert world.observe() == before
+    slower = effect(world, OPAQUE, sandbox, 15.0)
+    assert slower.speeds_mps[0] == before.ego.speed_mps
+    assert slower.speeds_mps[1] == pytest.approx(18.0, abs=1.5)
+    assert (slower.lanes_moved, slower.stood, slower.failed) == (0, False, False)
 
 
 def test_a_lane_change_is_seen(world: HighwayWorld, sandbox: Sandbox) -> None:
-    (effect,) = effects_of([world], Program(LEFT), sandbox=sandbox, max_s=12.0)
-    assert (effect.lanes_moved, effect.leftmost, effect.rightmost) == (-1, -1, 0)
+    moved = effect(world, LEFT, sandbox, 12.0)
+    assert (moved.lanes_moved, moved.leftmost, moved.rightmost) == (-1, -1, 0)
 
 
-def test_a_recorded_drive_tells_the_same_as_a_copy_of_it(world: HighwayWorld, sandbox: Sandbox) -> None:
-    (tried,) = effects_of([world], Program(LEFT), sandbox=sandbox, max_s=12.0)
-    with ProgramExecutor(sandbox=sandbox) as executor:
-        executor.start(LEFT, world)
-        episode = run_episode(world, executor, None, max_s=12.0)
-    assert effect_of(episode) == tried
-    assert effect_of(replace(episode, success=True)) == replace(tried, cut=True)
-    assert effect_of(replace(episode, frames=())) is None
+def test_a_drive_that_reached_its_goal_was_cut_short(world: HighwayWorld, sandbox: Sandbox) -> None:
+    episode = drive(world, LEFT, sandbox, 12.0)
+    whole = effect_of(episode)
+    assert not whole.cut
+    assert effect_of(replace(episode, success=True)) == replace(whole, cut=True)
 
 
 def test_a_vehicle_that_was_ahead_is_looked_for_again(sandbox: Sandbox) -> None:
     world = scene("overtake")
     ahead = world.observe().front
     assert ahead is not None
-    (passing,) = effects_of([world], Program(PASSING), sandbox=sandbox, max_s=10.0)
+    passing = effect(world, PASSING, sandbox, 10.0)
     assert passing.gaps_m[0] == pytest.approx(ahead.distance_m, abs=0.5)
     assert passing.gaps_m[1] is not None and passing.gaps_m[1] < 0.0, "it is behind"
     assert passing.extremes_mps[1] > passing.speeds_mps[0] + 3.0
@@ -103,23 +111,19 @@ def test_a_vehicle_that_was_ahead_is_looked_for_again(sandbox: Sandbox) -> None:
 @pytest.mark.parametrize(("way", "turned"), [("left", -1), ("right", 1), ("straight", 0)])
 def test_turns_are_told_by_the_heading(way: str, turned: int, sandbox: Sandbox) -> None:
     choice = "go_straight" if way == "straight" else f"turn_{way}"
-    (effect,) = effects_of([scene("intersection")], Program(CROSS.format(choice)), sandbox=sandbox, max_s=25.0)
-    assert effect.turned == turned
+    assert effect(scene("intersection"), CROSS.format(choice), sandbox, 25.0).turned == turned
 
 
 def test_a_program_that_fails_says_so(world: HighwayWorld, sandbox: Sandbox) -> None:
-    (effect,) = effects_of([world], Program(BROKEN), sandbox=sandbox, max_s=2.0)
-    assert effect.failed
+    assert effect(world, BROKEN, sandbox, 2.0).failed
 
 
 def test_driving_tells_what_reading_cannot(world: HighwayWorld, sandbox: Sandbox) -> None:
+    where = FactSurroundings.of(world.observe())
+    driven = effect(world, OPAQUE, sandbox, 15.0)
+
     def aligned(text: str) -> bool:
-        return judge_driven(Thoughts(text), Program(OPAQUE), [world], sandbox=sandbox, max_s=15.0).aligned
+        return judge(text, read_facts(OPAQUE, ""), where, (driven,)).aligned
 
     assert aligned("I slow down.")
     assert not aligned("I speed up.")
-
-
-def test_without_a_scene_nothing_can_be_driven(sandbox: Sandbox) -> None:
-    with pytest.raises(ValueError, match="no scene"):
-        judge_driven(Thoughts("I slow down."), Program(OPAQUE), [], sandbox=sandbox)

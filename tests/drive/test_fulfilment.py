@@ -3,23 +3,36 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from functools import cache
 
 import pytest
 
 from chauffeur.bench.referees import referee_for
 from chauffeur.cli.parts import planner_named
-from chauffeur.concept import Instruction, Limits, PersonId, Plan, PlanRequest, Program, Scenario, Thoughts
+from chauffeur.concept import (
+    Instruction,
+    Limits,
+    MissingExtraError,
+    PersonId,
+    Plan,
+    PlanRequest,
+    Program,
+    Scenario,
+    Thoughts,
+    result_of,
+)
 from chauffeur.drive.again import drive_again
 from chauffeur.drive.fulfilment import GAP_M, HELD_S, SPEED_MPS, asked_of
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.scenarios import BUILT_IN, find, planner_for, seeds_with_lead, suiting
 from chauffeur.drive.session import Session, drive_without_program
-from chauffeur.hmi.words import end_words
+from chauffeur.hmi.words import end_words, left_out_words, trip_words
 from chauffeur.memory.choice import open_memory
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.planners.base import Planner
 from chauffeur.worlds.highway import HighwayWorld
+from chauffeur.worlds.track.dynamics import parameters
 
 
 @cache
@@ -181,11 +194,27 @@ def test_a_lot_with_places_to_park_near_is_driven_by_who_knows_them() -> None:
 
 
 def test_a_wish_about_the_road_finds_a_car_that_looks_at_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("chauffeur.drive.scenarios.find_spec", lambda name: name)
-    assert suiting("I'm late, but it is slippery").id == "track-left-turn-sunny"
-    assert suiting("Overtake, though it is slippery.").id == "overtake"
-    monkeypatch.setattr("chauffeur.drive.scenarios.find_spec", lambda name: None)
-    assert suiting("I'm late, but it is slippery").id == "overtake"  # its parts are not installed
+    for parts in ("osqp", "vehiclemodels", "moderngl", "libsumo"):  # whatever is installed, it is the same road
+        assert suiting("Hurry, but it is icy out there").id == "track-left-turn-sunny"
+        assert suiting("Overtake, though it is slippery.").id == "overtake"
+        monkeypatch.setitem(sys.modules, parts, None)
+
+
+@pytest.mark.parametrize("scenario", BUILT_IN, ids=lambda one: one.id)
+def test_the_wish_that_a_scenario_is_listed_with_is_shown_there(scenario: Scenario) -> None:
+    assert suiting(scenario.wish) == scenario
+    assert suiting(scenario.wish.upper().rstrip(".") + "!") == scenario
+    assert suiting(scenario.wish.replace("I'm", "I am")) == scenario
+
+
+@pytest.mark.parametrize("wish", ["Turn left and stop near the crosswalk.", "Careful, there's ice in that bend."])
+def test_a_wish_whose_road_needs_what_is_not_installed_says_what(wish: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.startswith("vehiclemodels")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "vehiclemodels", None)
+    parameters.cache_clear()
+    with pytest.raises(MissingExtraError, match=r"-m pip install .*\[motion\]"):
+        driven(wish, suiting(wish))
 
 
 def test_roads_to_talk_on_keep_a_vehicle_to_overtake() -> None:
@@ -216,3 +245,44 @@ def test_feedback_on_a_gap_is_kept_to_in_the_next_drive() -> None:
     assert after["asked-gap-v1"] > once["asked-gap-v1"] + 3.0, "what was said counts"
     for drive in (once, after):
         assert abs(drive["end-gap-v1"] - drive["asked-gap-v1"]) <= max(GAP_M, 0.03 * drive["asked-gap-v1"])
+
+
+LEFT_LANE = """def drive():
+    set_target_lane(get_left_lane(get_ego_vehicle()))
+    for _ in range(100):
+        yield autopilot()
+"""
+
+
+def test_sides_and_speeds_are_those_of_the_words_and_not_of_the_plan() -> None:
+    place = find("overtake")
+    misread = driven("Change to the right lane.", place, Fixed(LEFT_LANE, "lane.left"))
+    assert result_of(misread.trip) == "not done", "the plan did what it understood, which was not what was said"
+    assert misread.trip.judged_by == "words"
+    untold = driven("Change to the left lane.", place, Fixed(LEFT_LANE, ""))
+    assert (result_of(untold.trip), untold.trip.judged_by) == ("done", "words")
+    mood = driven("I feel like flying today.", find("cruise"), Fixed(SLOW, "speed.set", (("target_speed_mps", 25.0),)))
+    assert mood.trip.judged_by == "plan", "the rules read nothing in it, so the judge shares the planner's reading"
+
+
+SLOW = """def drive():
+    set_target_speed(25.0)
+    while True:
+        yield autopilot()
+"""
+
+
+@pytest.mark.parametrize("wish", ["Slow down when it rains", "Drive at 90 km/h after the bridge"])
+def test_a_condition_that_is_not_used_is_named_and_the_drive_is_partly_done(wish: str) -> None:
+    recorded = driven(wish, find("cruise"), Fixed(SLOW, "speed.set", (("target_speed_mps", 25.0),)))
+    assert recorded.trip.outcome == "success"
+    assert result_of(recorded.trip) == "partly done"
+    assert recorded.trip.unused[0] in wish
+    sign, label, tone = trip_words(recorded.trip)
+    assert sign != "✓" and label.startswith("Partly done") and tone == "neutral"
+    assert recorded.trip.unused[0] in left_out_words(recorded.trip)[0]
+
+
+def test_what_was_told_not_to_be_done_is_not_driven() -> None:
+    recorded = driven("Do not overtake that car.", find("overtake"), Fixed(LEFT_LANE, "overtake.left"))
+    assert (result_of(recorded.trip), recorded.frames) == ("declined", ())

@@ -246,4 +246,3 @@ def test_periods_that_cannot_be_caught_up_with_are_given_up_and_counted() -> Non
     assert ticker.wait() == 0
     figures = punctuality(ticker.lateness_ns, ticker.missed)
     assert (figures.ticks, figures.missed, figures.max_ms) == (3, 3, 35.0)
-    assert figures.missed_share == pytest.approx(0.5)

@@ -7,6 +7,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from live_bench import OVERTAKE, Bench
+
+from chauffeur.concept import MissingExtraError, Trajectory
+from chauffeur.executors import executor_for
 
 PROGRAM = """
 import sys, tempfile
@@ -47,10 +51,22 @@ assert sum(before.values()) >= 7
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(360)
+@pytest.mark.timeout(1200)
 def test_the_first_rescue_at_a_crossing_loads_nothing(tmp_path: Path) -> None:
     here = Path(__file__).parent
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM], cwd=here, capture_output=True, text=True, check=False, timeout=300
     )
     assert done.returncode == 0, done.stderr[-1500:]
+
+
+def test_what_an_absent_extra_would_drive_does_not_keep_control_from_starting(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "osqp", None)
+    bench = Bench(tmp_path, (OVERTAKE,))
+    bench.control.warm_up()
+    assert bench.control.begin_trip()
+    assert bench.tick().faults == 0
+    with pytest.raises(MissingExtraError, match=r"-m pip install .*\[motion\]"):  # said before a wheel turns
+        executor_for(Trajectory(((1.0, 0.0), (2.0, 0.0)), 0.5), bench.world)

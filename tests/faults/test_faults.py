@@ -184,7 +184,8 @@ def test_a_model_that_writes_bad_programs(tmp_path, monkeypatch) -> None:
         assert len(drive.plans - {"", FORGED}) > 2, "some of them pass every check, and misbehave while they are driven"
         drive.server.script(silent)
         drive.runtime.ask(WISHES[0])
-        assert drive.driven(drive.ask("a good answer after all", place=1))
+        good = (drive.driven(drive.ask("a good answer after all", place=1)) for _ in range(5))
+        assert any(good), "but for a trip that ends just then, it is driven"
 
 
 def test_a_vandal_in_the_shared_memory(tmp_path, monkeypatch) -> None:

@@ -165,7 +165,7 @@ def test_cones_and_crosswalks_are_on_the_page() -> None:
 def test_what_a_person_needs_to_see_is_there(highway_page: str) -> None:
     payload = payload_of(highway_page)
     assert payload["intent"] == "overtake.left"
-    assert ["target speed", "33.0 m/s (119 km/h)"] in payload["settings"]  # type: ignore[operator]
+    assert ["target speed", "118 km/h"] in payload["settings"]  # type: ignore[operator]
     assert [v["passed"] for v in payload["verdicts"]] == [True, False, True]  # type: ignore[attr-defined]
     values = [m["value"] for m in payload["metrics"]]  # type: ignore[attr-defined]
     assert values == ["89.4 points", "91.2 points", "66.7 points", "85.3 points", "does not apply"]

@@ -111,7 +111,7 @@ def test_every_skill_links_to_a_program_that_passes_the_gate(skill: str, situati
         assert linked.words
         return
     report = check_source(write([step]), linked.library)
-    assert report.passed, report.for_model()
+    assert report.passed, report.findings
 
 
 def linked(*some: DialectStep) -> Linked:

@@ -81,7 +81,7 @@ def test_there_are_enough_exemplars_and_no_two_alike() -> None:
 @pytest.mark.parametrize("name", exemplars())
 def test_exemplar_passes_the_gate_and_explains_itself(name: str) -> None:
     text = program_of([Filled(name, _NUMBERS)])
-    assert check_source(text).for_model() == ""
+    assert check_source(text).findings == ()
     assert "#" in text
     assert "$" not in text
     assert "@" not in text
@@ -127,7 +127,7 @@ def test_intent_and_numbers(words: str) -> None:
     made = plan(words, situation)
     assert made.intent == intent
     assert setting(made, name) == pytest.approx(value, abs=0.01)
-    assert check_source(source(made)).for_model() == ""
+    assert check_source(source(made)).findings == ()
 
 
 @pytest.mark.parametrize("words", _WISHES)

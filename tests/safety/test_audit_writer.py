@@ -209,7 +209,7 @@ def test_a_full_device_does_not_raise_into_the_drive(caplog: pytest.LogCaptureFi
 def test_a_disk_that_was_full_for_a_while_leaves_a_gap_that_is_told(tmp_path: Path) -> None:
     path = tmp_path / "audit.jsonl"
     writer = _run(FULL_DISK_WRITER, path)
-    told = json.loads(writer.communicate(timeout=60)[0])
+    told = json.loads(writer.communicate(timeout=600)[0])
     assert told["before"]
     assert told["full"] is False
     assert "File too large" in told["trouble"]

@@ -308,12 +308,16 @@ def test_the_check_in_full(snap: Callable[..., Observation]) -> None:
     def checked(text: str, source: str, library: str = "") -> Verdict:
         return check_faithfulness(Plan(Thoughts(text), Program(source, library=library)), snap(), Limits())
 
-    nothing = Verdict("alignment-v1", True, "There is no explanation of a program to compare.", vetoes=False)
-    unread = "The program cannot be read, so its explanation was not compared."
-    assert checked(" \n", LEFT) == nothing
-    assert check_faithfulness(Plan(Thoughts("I go."), Parameters(1.0, 1.0, 1.0)), snap(), Limits()) == nothing
-    assert checked("I go left.", "def (") == Verdict("alignment-v1", True, unread, vetoes=False)
-    assert checked("I go left.", IDLE, "def (") == Verdict("alignment-v1", True, unread, vetoes=False)
+    parameters = check_faithfulness(Plan(Thoughts("I go."), Parameters(1.0, 1.0, 1.0)), snap(), Limits())
+    not_compared = {
+        "no-explanation": checked(" \n", LEFT),
+        "no-program": parameters,
+        "unreadable": checked("I go left.", "def ("),
+        "no-claims": checked("Nice weather today.", LEFT),
+    }
+    assert {one.not_compared for one in not_compared.values()} == set(not_compared)
+    assert all(one.mark == "not_compared" and not one.stops for one in not_compared.values())
+    assert checked("I go left.", IDLE, "def (").not_compared == "unreadable"
     fits = checked("I go left.", LEFT_AT_ONCE)
     assert fits == Verdict(
         "alignment-v1", True, "The explanation fits the program (1 claim compared).",
@@ -347,12 +351,11 @@ def test_the_check_goes_by_the_place_of_the_car(snap: Callable[..., Observation]
 def test_the_check_of_a_drive_in_full(snap: Callable[..., Observation]) -> None:
     plan = Plan(Thoughts("I go left."), Program(LEFT_AT_ONCE))
     name = "alignment-driven-v1"
-    failed = "The program failed on the way, so that the drive was not compared with the explanation."
     assert check_driven(plan, snap(), WENT_LEFT) == Verdict(
         name, True, "The drive went as explained (1 claim compared).",
         vetoes=False, alignment=Faithfulness(True, 1.0, (), 1),
     )  # fmt: skip
-    assert check_driven(plan, snap(), replace(WENT_LEFT, failed=True)) == Verdict(name, True, failed, vetoes=False)
+    assert check_driven(plan, snap(), replace(WENT_LEFT, failed=True)).not_compared == "policy-failed"
     wrong = Mismatch("not-done", "I go left.", "it did not change lanes in this drive")
     assert check_driven(plan, snap(), STEADY) == Verdict(
         name,
@@ -366,6 +369,10 @@ def test_the_check_of_a_drive_in_full(snap: Callable[..., Observation]) -> None:
     )
     crossing = Plan(Thoughts("We turn left."), Program(TURN_LEFT))
     assert check_driven(crossing, snap(kind="intersection"), replace(STEADY, turned=-1)).passed
+    round_it_went = check_driven(crossing, snap(kind="intersection"), replace(STEADY, turned=2))
+    assert round_it_went.state == "failed", "half a turn is none to the left, and no fault of the check"
+    twice = Plan(Thoughts("We turn left. Then we turn right."), Program(TURN_LEFT))
+    assert check_driven(twice, snap(kind="intersection"), replace(STEADY, turned=0)).state == "held"
     faster = Plan(Thoughts("I speed up."), Program(FASTER))
     risen = replace(STEADY, speeds_mps=(20.0, 30.0), extremes_mps=(20.0, 30.0))
     assert check_driven(faster, snap(speed=20.0), risen).passed

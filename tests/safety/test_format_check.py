@@ -62,8 +62,9 @@ def judge(plan: Plan, observation: Observation) -> Verdict:
     return verdict
 
 
-def test_no_policy_gives_the_planner_s_own_words(snap: Snap, plan: Make) -> None:
-    assert judge(plan(None, refusal="I do not fly."), snap()).reason == "I do not fly."
+def test_a_plan_that_says_why_it_drives_nothing_is_not_compared(snap: Snap, plan: Make) -> None:
+    said = judge(plan(None, refusal="I do not fly."), snap())
+    assert (said.state, said.not_compared, said.stops) == ("not_compared", "no-policy", False)
     silent = judge(plan(None), snap())
     assert (silent.passed, silent.reason) == (False, "The planner gave no policy.")
 

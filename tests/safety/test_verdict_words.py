@@ -203,11 +203,18 @@ def test_a_check_that_breaks_refuses_and_is_logged(plan: Make, snap: Snap, caplo
     with caplog.at_level(logging.WARNING):
         found = run_checks(plan(program("pass")), snap(), Limits(), (check_luck, check_format, Fortune()))
     assert found[0] == Verdict(
-        "check_luck", False, "The check check_luck could not judge this plan (ZeroDivisionError).", None, remedy
-    )
+        "check_luck", False, "The check check_luck could not judge this plan (ZeroDivisionError).", None, remedy,
+        not_compared="check-broke",
+    )  # fmt: skip
     assert found[1].passed
+    assert found[0].stops, "what nothing was compared by has vouched for nothing"
     assert found[2] == Verdict(
-        "Fortune", False, "The check Fortune could not judge this plan (KeyError).", None, remedy
+        "Fortune",
+        False,
+        "The check Fortune could not judge this plan (KeyError).",
+        None,
+        remedy,
+        not_compared="check-broke",
     )
     assert [record.getMessage() for record in caplog.records] == [
         "safety check check_luck failed: ZeroDivisionError('no luck')",

@@ -12,7 +12,7 @@ from speech_server import TranscriptionServer
 
 from chauffeur.concept import ConfigError
 from chauffeur.speech.audio import decode
-from chauffeur.speech.base import Transcript
+from chauffeur.speech.base import HOTWORDS, Hotword, Transcript
 from chauffeur.speech.endpoint import EndpointRecogniser
 from chauffeur.speech.errors import RecogniserError
 
@@ -52,6 +52,13 @@ def test_the_form_holds_the_sound_the_model_and_the_key(server: TranscriptionSer
     assert asked.fields["response_format"] == "verbose_json" and "Command" in asked.fields["prompt"]
     assert (asked.file_name, asked.file_type) == ("utterance.wav", "audio/wav")
     assert np.array_equal(decode(asked.file).samples, SOUND)
+
+
+@pytest.mark.parametrize("button", ["command", "evaluate"])
+def test_with_a_button_held_no_hotword_is_put_into_its_mouth(server: TranscriptionServer, button: Hotword) -> None:
+    engine(server).recognise(SOUND, button)
+    said = server.requests[0].fields["prompt"].lower()
+    assert "left lane" in said and not any(hotword in said for hotword in HOTWORDS)
 
 
 def test_a_server_of_ones_own_needs_no_key(server: TranscriptionServer) -> None:

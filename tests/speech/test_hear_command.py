@@ -135,7 +135,7 @@ def test_nothing_is_written_while_hearing(wish: Path, tmp_path: Path) -> None:
     home.mkdir(exist_ok=True)
     done = subprocess.run(  # noqa: PLW1510 - its output says more than its status
         [sys.executable, "-c", RUN, str(wish), "--json"],
-        env=environment(home), cwd=home, capture_output=True, text=True, timeout=120,
+        env=environment(home), cwd=home, capture_output=True, text=True, timeout=600,
     )  # fmt: skip
     assert json.loads(done.stdout)["status"] == "heard", done.stderr
     assert "WRITTEN []" in done.stderr

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from chauffeur.concept import DataError
+from chauffeur.drive.scenarios import BUILT_IN, suiting
+from chauffeur.language.tokens import tokens_of
 from chauffeur.planners.onboard.meaning import NotUnderstood
 from chauffeur.planners.onboard.understand import understand
 from chauffeur.speech.grammar import SAFE_INTENTS
@@ -62,8 +64,22 @@ def test_a_drawn_sentence_belongs_to_its_rule_and_to_no_safe_one() -> None:
 def test_the_planner_understands_what_the_grammar_hears() -> None:
     grammar = driving_grammar()
     rng = np.random.default_rng(4)
-    said = [grammar.sample(intent, rng) for intent in grammar.members("wish") for _ in range(30)]
+    elsewhere = ("street", "destination", "weather")  # what planners of towns and of the test track read
+    intents = [intent for intent in grammar.members("wish") if intent not in elsewhere]
+    said = [grammar.sample(intent, rng) for intent in intents for _ in range(60)]
     assert [one for one in said if isinstance(understand(one), NotUnderstood)] == []
+    for _ in range(60):
+        assert suiting(grammar.sample("destination", rng)).world == "town"
+        assert suiting(grammar.sample("weather", rng)).world == "track"
+
+
+def test_what_scenarios_are_listed_with_can_be_said() -> None:
+    """The first sentences that a newcomer says to the car."""
+    grammar = driving_grammar()
+    said = {" ".join(token for token in tokens_of(one.wish) if token[0].isalnum()) for one in BUILT_IN}
+    said = {text.replace("90 km/h", "ninety kilometers per hour") for text in said}
+    unknown = sorted(text for text in said if not grammar.matches("command", text))
+    assert unknown == []
 
 
 def test_the_safe_intents_mean_slower_and_stop() -> None:

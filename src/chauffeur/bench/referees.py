@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Final
 
 from chauffeur.bench.lampilot.understood import referee_for as lampilot_referee
-from chauffeur.concept import Parameters, Plan, Program, Scenario, Trajectory
+from chauffeur.concept import JudgedBy, Parameters, Plan, Program, Scenario, Trajectory
 from chauffeur.drive.episode import Referee
 from chauffeur.drive.fulfilment import Fulfilment, can_be_judged
 from chauffeur.geometry import Pose, Turn
+from chauffeur.language.wanted import read_wanted
 from chauffeur.safety.constant_calls import read_program
 from chauffeur.worlds.base import World
 
@@ -17,15 +18,19 @@ TURN_CALLS: Final[dict[str, Turn]] = {
     "turn_right_at_next_intersection": "right",
     "go_straight_at_next_intersection": "straight",
 }
+_STOPS: Final = ("stop", "pull_over", "park")
 _TURNS: Final[tuple[Turn, ...]] = ("left", "right", "straight")
 RED_S: Final = 90.0
 """Who drives a trajectory in a town may stand so long on the way: a light's cycle, and people."""
 
 
-def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
-    """The judge of a trip: LaMPilot's by the scenario's own goal, else what the planner understood, else none. In a
-    parking lot, the judge of the spot that is meant; in a town, of the place or of the ways and stops; on an open road
-    and in a town, of a trajectory's end.
+def referee_for(world: World, scenario: Scenario, plan: Plan, wish: str = "") -> Referee | None:
+    """The judge of a trip: LaMPilot's by the scenario's own goal, else the wish, else none. In a parking lot, the judge
+    of the spot that is meant; in a town, of the place or of the ways and stops; on an open road and in a town, of a
+    trajectory's end.
+
+    Ways, sides, stops and speeds are those of the words, read by rules that see no plan; where they say none, those of
+    the plan. A place is the plan's: found by the planner, reached by the world's own geometry.
 
     Raises:
         ScenarioError: There is no such spot.
@@ -33,30 +38,35 @@ def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
     if isinstance(plan.policy, Trajectory) and world.capabilities.turns and world.capabilities.places:
         return _end_referee(world, plan.policy, waits_s=RED_S)
     if world.capabilities.places:
-        return _town_referee(world, scenario, plan) or _parking_referee(world, plan)
+        return _town_referee(world, scenario, plan, wish) or _parking_referee(world, plan)
     if isinstance(plan.policy, Trajectory):
         return _street_referee(world, plan.policy)
-    return lampilot_referee(world, scenario, plan)
+    return lampilot_referee(world, scenario, plan, wish)
 
 
-def _town_referee(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
-    from chauffeur.worlds.town import TownReferee, TownWorld, WayReferee
+def _town_referee(world: World, scenario: Scenario, plan: Plan, wish: str) -> Referee | None:
+    from chauffeur.worlds.town import TownReferee, TownWay, TownWorld, WayReferee
 
     if not isinstance(world, TownWorld):
         return None
+    acts = [part for part in read_wanted(wish) if part.kind == "act" and not part.denied]
+    said = [TownWay(part.side, part.nth) for part in acts if part.act == "turn" and part.side]
+    stands = any(part.act in _STOPS for part in acts)
+    judged_by: JudgedBy = "words" if said or stands else "plan"
     if isinstance(plan.policy, Program):
         calls = [use.name for use in read_program(plan.policy.source).uses]
-        turns: list[Turn] = [TURN_CALLS[name] for name in calls if name in TURN_CALLS]
-        if turns or "stop" in calls:
-            return WayReferee(world, turns, stops="stop" in calls)
+        ways = said or [TownWay(TURN_CALLS[name]) for name in calls if name in TURN_CALLS]
+        if ways or stands or "stop" in calls:
+            return WayReferee(world, ways, stops=stands or "stop" in calls, judged_by=judged_by)
         return None  # nothing that could be over
     if isinstance(plan.policy, Parameters) and not (scenario.config.get("goal") or scenario.config.get("goal_m")):
         if plan.policy.route in _TURNS:
-            return WayReferee(world, [turn for turn in _TURNS if turn == plan.policy.route], stops=False)
+            ways = said or [TownWay(turn) for turn in _TURNS if turn == plan.policy.route]
+            return WayReferee(world, ways, stops=False, judged_by=judged_by)
         if not plan.policy.route and plan.policy.target_speed_mps <= 0.0:
-            return WayReferee(world, (), stops=True)
+            return WayReferee(world, (), stops=True, judged_by=judged_by)
         if not plan.policy.route:
-            return Fulfilment(world, plan) if can_be_judged(plan) else None
+            return Fulfilment(world, plan, wish) if can_be_judged(plan, wish) else None
     return TownReferee(world)
 
 

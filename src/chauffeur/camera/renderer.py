@@ -122,9 +122,7 @@ class GlRenderer:
         try:
             import moderngl
         except ImportError as error:
-            raise MissingExtraError(
-                "Rendered pictures need moderngl.", hint="Run: pip install 'chauffeur[camera]'"
-            ) from error
+            raise MissingExtraError("Rendered pictures need moderngl.", extra="camera") from error
         # One thread a renderer: processes render side by side, and llvmpipe's own threads get in their way.
         os.environ.setdefault("LP_NUM_THREADS", "1")
         try:

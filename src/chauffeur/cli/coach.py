@@ -156,7 +156,7 @@ class _Teller:
         from chauffeur.hmi.payload import policy_words
 
         trip = attempt.recorded.trip
-        label, tone = words.outcome_words(trip.outcome)
+        _, label, tone = words.trip_words(trip)
         style = {"good": "bold green", "bad": "bold red", "neutral": "bold"}[tone]
         driven = f" after {trip.duration_s:.1f} s" if attempt.recorded.frames else ""
         line = Text.assemble(f"  round {attempt.number}: ", (label, style), driven, (" (simulated drive)", "dim"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import re
@@ -10,12 +9,11 @@ import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, distribution, requires, version
-from typing import Any
-from urllib.parse import urlsplit
-from urllib.request import url2pathname
+from importlib.metadata import PackageNotFoundError, requires, version
 
 import typer
+
+from chauffeur.concept.extras import install_command
 
 EXAMPLES = """
 Examples:
@@ -137,23 +135,6 @@ def installed_parts() -> tuple[tuple[DoctorPart, ...], dict[str, tuple[DoctorPar
         elif extra.group(1) not in _DEVELOPMENT:
             extras.setdefault(extra.group(1), []).append(part)
     return tuple(core), {name: tuple(parts) for name, parts in extras.items()}
-
-
-def install_command(extra: str) -> str:
-    """The exact command that adds an extra to the Python that runs now, from where Chauffeur itself came."""
-    editable, source = _origin()
-    option = "-e " if editable else ""
-    return f'{sys.executable} -m pip install {option}"{source}[{extra}]"'
-
-
-def _origin() -> tuple[bool, str]:
-    """(whether it is an editable install, the folder it came from or the package's name)."""
-    text = distribution("chauffeur").read_text("direct_url.json")
-    found: dict[str, Any] = json.loads(text) if text else {}
-    url = str(found.get("url", ""))
-    if not url.startswith("file://"):
-        return False, "chauffeur"
-    return bool(found.get("dir_info", {}).get("editable")), url2pathname(urlsplit(url).path)
 
 
 def _installed(name: str) -> str | None:

@@ -31,13 +31,13 @@ Examples:
 attempts and repairs are set in the environment, for every command: CHAUFFEUR_TIMEOUT_S, CHAUFFEUR_MAX_TOKENS,
 CHAUFFEUR_ATTEMPTS, CHAUFFEUR_REPAIRS, CHAUFFEUR_BUDGET_S, CHAUFFEUR_TEMPERATURE.
 
-Exit code 1 says that the wish was refused or not done. Every drive is simulated.
+Exit code 0: done, a question answered, or driven with nothing that could be compared. 1: partly done, not done, asked
+back, declined or failed. Every drive is simulated.
 """
 
 SEEN: Final = (
     "The planner is told what BEV-LLM sees in rendered pictures; checks and safety filter use the world's own state."
 )
-_DONE = ("success", "ended")
 _RESEARCH: Final = "Models and benchmarks"
 
 
@@ -114,8 +114,7 @@ def drive(
         standing_sources,
     )
     from chauffeur.cli.show import FullTeller, Quiet, Teller
-    from chauffeur.concept import PersonId
-    from chauffeur.drive.answers import ANSWERED
+    from chauffeur.concept import PersonId, Result, result_of
     from chauffeur.drive.events import told_to
     from chauffeur.drive.scenarios import find, planner_for, suiting
     from chauffeur.drive.session import Forgetful, Session, parse_wish
@@ -175,8 +174,7 @@ def drive(
         teller.wrote(save_trip(save, recorded))
         if browser:
             typer.launch((save / "trip.html").resolve().as_uri())
-    answered = recorded.trip.plan.intent == ANSWERED
-    if (recorded.trip.outcome not in _DONE and not answered) or (closing is not None and not closing.complete):
+    if result_of(recorded.trip) is not Result.DONE or (closing is not None and not closing.complete):
         raise typer.Exit(FAILED)
 
 

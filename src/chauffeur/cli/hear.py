@@ -89,6 +89,8 @@ def hear(
             for note in recording.notes:
                 console.print(f"  {note}", style="dim", markup=False)
     if wishes == 0:
+        if count and not button and not as_json:
+            console.print("No button was held: say “command ...” to the car, or give --button command.", style="dim")
         raise typer.Exit(FAILED)
 
 

@@ -56,10 +56,11 @@ def show(person: Person, most: Annotated[int, typer.Option(min=1, help="Trips at
     from chauffeur.cli.console import path_text, plain, stdout
     from chauffeur.concept import Limits, PersonId
     from chauffeur.concept.data import data_home
-    from chauffeur.concept.units import kmh
+    from chauffeur.concept.units import people_speed
     from chauffeur.memory.choice import open_memory
     from chauffeur.memory.personal_limits import LIMITS_FILE, personal_limits
     from chauffeur.memory.privacy import read_privacy
+    from chauffeur.memory.records import result_of_kept
 
     console, privacy = stdout(), read_privacy()
     trips = json.loads(open_memory().export(PersonId(person)))["trips"]
@@ -67,7 +68,8 @@ def show(person: Person, most: Annotated[int, typer.Option(min=1, help="Trips at
         table = Table("when", "wish", "what came of it", "what you said", box=None, pad_edge=False)
         for trip in trips[::-1][:most]:
             said = "; ".join(each["text"] for each in trip["feedback"])
-            table.add_row(trip["when"][:16].replace("T", " "), plain(trip["instruction"]), trip["outcome"], plain(said))
+            when, result = trip["when"][:16].replace("T", " "), str(result_of_kept(trip))
+            table.add_row(when, plain(trip["instruction"]), result, plain(said))
         console.print(table)
         console.print(Text(f"{len(trips)} trips in all.", "dim"))
     else:
@@ -78,8 +80,10 @@ def show(person: Person, most: Annotated[int, typer.Option(min=1, help="Trips at
         console.print(Text("Privacy mode is on: nothing new is kept.", "bold yellow"))
     limits = personal_limits(PersonId(person), Limits())
     if limits != Limits():
-        cap = "" if limits.max_speed_mps is None else f"never above {kmh(limits.max_speed_mps):.0f} km/h, "
-        over = f"{kmh(limits.max_over_limit_mps):.0f} km/h above the sign at most"
+        cap = (
+            "" if limits.max_speed_mps is None else f"never above {people_speed(limits.max_speed_mps, at_most=True)}, "
+        )
+        over = f"{people_speed(limits.max_over_limit_mps, at_most=True)} above the sign at most"
         words = f"Your limits: {cap}{over}, {limits.min_time_headway_s:g} s headway or more "
         console.print(Text.assemble(words, "(", path_text(data_home() / LIMITS_FILE), ")"))
 

@@ -31,9 +31,7 @@ def needs(extra: str, what: str, *modules: str) -> None:
     """
     missing = [name for name in modules if not _importable(name)]
     if missing:
-        from chauffeur.cli.doctor import install_command
-
-        raise MissingExtraError(f"{what} needs {', '.join(missing)}.", hint=f"Run: {install_command(extra)}")
+        raise MissingExtraError(f"{what} needs {', '.join(missing)}.", extra=extra)
 
 
 def _importable(name: str) -> bool:

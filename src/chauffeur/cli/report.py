@@ -1,4 +1,4 @@
-"""`chauffeur report`: what came of benchmark runs, as one page, Markdown and LaTeX."""
+"""`chauffeur report`: what came of benchmark runs, as one page and Markdown."""
 
 from __future__ import annotations
 
@@ -57,7 +57,6 @@ def report(
     from rich.text import Text
 
     from chauffeur.bench.report.build import Choices, build_report
-    from chauffeur.bench.report.latex import render_latex
     from chauffeur.bench.report.runs import tables_of_another
     from chauffeur.bench.report.text import render_markdown
     from chauffeur.cli.console import columns, path_text, plain, stdout
@@ -84,9 +83,8 @@ def report(
     folder = out or (runs[0] if len(runs) == 1 else runs[0].resolve().parent) / "report"
     page = write_report_page(folder / "report.html", made)
     written = [("page", path_text(page))]
-    for name, text in (("report.md", render_markdown(made)), ("report.tex", render_latex(made))):
-        content = text.encode("utf-8", "replace")
-        written.append((name.removeprefix("report."), path_text(publish(folder / name, content, "report"))))
+    content = render_markdown(made).encode("utf-8", "replace")
+    written.append(("md", path_text(publish(folder / "report.md", content, "report"))))
     if inspect is not None:
         written.append(("inspect", path_text(_write_log(inspect, runs[0], choices))))
     for table in (made.table("scores"), made.table("pairs")):

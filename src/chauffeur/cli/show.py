@@ -20,6 +20,8 @@ from rich.text import Text
 
 from chauffeur.cli.console import columns, path_text, plain
 from chauffeur.concept import (
+    ANSWERED,
+    ASKS,
     CameraImage,
     Context,
     Frame,
@@ -32,7 +34,7 @@ from chauffeur.concept import (
     Trip,
     Verdict,
 )
-from chauffeur.drive.answers import ANSWERED
+from chauffeur.concept.units import SpeedUnit, people_speed
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
@@ -102,7 +104,7 @@ class Teller(Quiet):
         self._live = Live(console=console, transient=True, refresh_per_second=10) if console.is_terminal else None
         self._waiting = False
         self._reply, self._attempt = "", 0
-        self._unit: words.Pace = "km/h"
+        self._unit: SpeedUnit = "km/h"
         self._source: tuple[str, ...] = ()
         self._compiles = False
 
@@ -159,7 +161,7 @@ class Teller(Quiet):
         super().end(recorded)
         trip = recorded.trip
         shielded = words.shield_words([change for frame in recorded.frames for change in frame.interventions])
-        for told in (*self._why_not(trip), words.end_words(trip), shielded):
+        for told in (*words.left_out_words(trip), *self._why_not(trip), words.end_words(trip), shielded):
             if told:
                 self.console.print(Padding(plain(self._units(told)), (0, 0, 0, 2)))
         self.console.print()
@@ -171,9 +173,9 @@ class Teller(Quiet):
         if not trip.causes.refused:
             return causes
         if trip.plan.policy is None:
-            return tuple(cause for cause in causes if cause != words.DECLINED)
+            return causes
         remedies = (verdict.remedy for verdict in trip.verdicts if verdict.stops and verdict.remedy)
-        return tuple(dict.fromkeys((*(cause for cause in causes if cause != words.DECLINED), *remedies)))
+        return tuple(dict.fromkeys((*causes, *remedies)))
 
     def _why(self, detail: str) -> None:
         """Told below, in the passenger's units."""
@@ -197,24 +199,28 @@ class Teller(Quiet):
 
     def _program(self, plan: Plan) -> RenderableType:
         if not isinstance(plan.policy, Program):
-            return plain(self._units(policy_words(plan.policy)))
+            return plain(policy_words(plan.policy, self._unit))
         more = Text("its helper functions: --full", "dim") if plan.policy.library else Text()
         code = Syntax(plain(plan.policy.source.rstrip("\n")).plain, **_CODE)
         return Group(code, more) if more else code
 
     def _checks(self, verdicts: tuple[Verdict, ...]) -> RenderableType:
-        """Marks side by side, and below them what is not as it should be."""
+        """Marks side by side, and below them what is not as it should be, or was not compared."""
         marks: list[Text] = []
         told: list[RenderableType] = []
+        why: dict[str, None] = {}
         for verdict in verdicts:
-            if verdict.mark not in ("passed", "open"):
+            if verdict.mark not in ("passed", "open", "not_compared"):
                 told.append(_told(verdict, self._units))
                 continue
+            if verdict.mark == "not_compared":
+                why.setdefault(words.not_compared_words(verdict), None)
             name = words.check_name(verdict.check)
             rest = ", not all proven" if verdict.mark == "open" else ""
             mark = (words.MARKS[verdict.mark], words.MARK_STYLES[verdict.mark])
             marks.append(Text.assemble(mark, f" {name}{rest}", no_wrap=True))
-        return Group(Columns(marks, padding=(0, 3)), *told)
+        grey = (Text(f"{words.MARKS['not_compared']} {plain(self._units(each)).plain}", "dim") for each in why)
+        return Group(Columns(marks, padding=(0, 3)), *grey, *told)
 
     def _units(self, text: str) -> str:
         return words.passenger_units(text, self._unit)
@@ -228,7 +234,7 @@ class Teller(Quiet):
         if self._live is None:
             return
         shot = frame.observation
-        parts = [f"{shot.time_s:5.1f} s", f"{words.pace(shot.ego.speed_mps, self._unit):>8}"]
+        parts = [f"{shot.time_s:5.1f} s", f"{people_speed(shot.ego.speed_mps, self._unit):>8}"]
         if shot.front is not None:
             parts.append(f"gap {shot.front.distance_m:3.0f} m")
         if shot.stop_sign_m is not None:
@@ -298,6 +304,7 @@ class FullTeller(Teller):
     def _rows(self, recorded: RecordedTrip) -> Iterator[tuple[str, RenderableType]]:
         """Scores and provenance; the letters have been told."""
         trip = recorded.trip
+        yield "Judged", words.judged_words(trip) or "Not compared with the wish."
         for metric in trip.metrics:
             yield words.metric_name(metric.id), words.metric_value(metric)
         yield "Planner", plain(", ".join(part for part in (trip.plan.planner, trip.plan.model) if part))
@@ -316,7 +323,7 @@ class FullTeller(Teller):
 
     def _plan(self, plan: Plan) -> None:
         if plan.refusal:
-            head = {ANSWERED: "Answer: ", "ask": "Asks: "}.get(plan.intent, "Declined: ")
+            head = {ANSWERED: "Answer: ", ASKS: "Asks: "}.get(plan.intent, "Declined: ")
             self._letter("R", Text.assemble((head, "bold yellow"), plain(plan.refusal)))
             return
         self._thoughts(plan.thoughts, plan.intent)
@@ -333,6 +340,10 @@ class FullTeller(Teller):
     def _verdict(self, verdict: Verdict) -> None:
         if verdict.mark in ("differs", "failed"):
             self._letter("V", _told(verdict, self._units, check=True))
+            return
+        if verdict.mark == "not_compared":
+            said = Text(f"{words.MARKS[verdict.mark]} ").append_text(plain(words.not_compared_words(verdict)))
+            self._letter("V", said.append(f"  {verdict.check}"))
             return
         # Of what passed, the doubts are on the page and in the recording.
         reason = verdict.reason.split(". ", 1)[0].rstrip(".") + "." if verdict.reason else "passed"

@@ -16,9 +16,10 @@ from rich.syntax import Syntax
 from rich.text import Text
 
 from chauffeur.cli.console import columns, plain
-from chauffeur.cli.labels import EVENTS, FALLBACK_LEVELS, NOT_HEARD
+from chauffeur.cli.labels import FALLBACK_LEVELS, NOT_HEARD
 from chauffeur.cli.talk_typed import HELP
-from chauffeur.concept import HELPERS_HEAD
+from chauffeur.concept import HELPERS_HEAD, Result
+from chauffeur.concept.units import people_speed
 from chauffeur.drive.talk.messages import (
     Answered,
     Conversation,
@@ -44,7 +45,6 @@ _MOST_SOURCE: Final = 14
 """Lines of a program that are shown; the page shows all of it."""
 
 _LEVELS: Final[dict[str, str]] = {**FALLBACK_LEVELS, "hand": "you have the wheel"}
-_OUTCOMES: Final[dict[str, tuple[str, str]]] = {**EVENTS, "superseded": ("gave way", "dim")}
 _LISTENING: Final = {
     "off": ("not listening", "dim"),
     "idle": ("listening", "green"),
@@ -218,8 +218,9 @@ class TalkScreen:
         if now.stages.total_s is not None and before.stages.total_s is None:
             self._line(now.wish, "latency", "dim", Text(stages_in_words(now.stages), "dim"))
         if now.outcome and now.outcome != before.outcome:
-            label, style = _OUTCOMES.get(now.outcome, (now.outcome, ""))
-            why = "The program has ended; what it wished stays." if now.outcome == "finished" else now.why
+            label, style = _result(now)
+            ended = "The program has ended; what it wished stays. " if now.outcome == "finished" else ""
+            why = f"{ended}{now.why}".rstrip()
             self._line(now.wish, label, style, plain(why))
         if now.opinion != before.opinion:
             self._line(now.wish, "opinion", "magenta", Text.assemble("“", plain(now.opinion), "”"))
@@ -326,11 +327,11 @@ def _verdicts(verdicts: tuple[VerdictShown, ...]) -> Text:
 
 
 def _line_of(scene: Scene) -> Text:
-    target = "" if scene.target_mps is None else f" → {scene.target_mps:.1f}"
+    target = "" if scene.target_mps is None else f" → {people_speed(scene.target_mps, at_most=True)}"
     parts = [
         Text(f"{scene.time_s:6.1f} s"),
-        Text(f"{words.speed(scene.ego.speed_mps)}{target}", "bold"),
-        Text(f"limit {scene.limit_mps:.1f}"),
+        Text(f"{people_speed(scene.ego.speed_mps)}{target}", "bold"),
+        Text(f"limit {people_speed(scene.limit_mps, at_most=True)}"),
     ]
     if scene.place is not None:
         parts.append(Text(f"lane {scene.place + 1} from left"))
@@ -340,8 +341,17 @@ def _line_of(scene: Scene) -> Text:
     return Text("   ").join(parts)
 
 
+def _result(each: Conversation) -> tuple[str, str]:
+    """What became of a wish, and its style."""
+    if not each.result:
+        return each.stage, ""
+    return each.result, {"good": "bold green", "neutral": "bold yellow", "bad": "bold red"}[
+        words.RESULT_TONES[Result(each.result)]
+    ]
+
+
 def _summary(each: Conversation) -> Text:
-    label, style = _OUTCOMES.get(each.outcome, (each.outcome or each.stage, ""))
+    label, style = _result(each)
     if each.outcome in ("superseded", "interrupted") and each.stages.check_s is not None and not each.ends:
         label, style = "driven", "green"
     found = Text.assemble("“", plain(each.text), "” ", (label, style))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from chauffeur.concept.extras import install_command
+
 
 class ChauffeurError(Exception):
     """Base of every error Chauffeur raises on purpose.
@@ -55,3 +57,7 @@ class ProfileError(ChauffeurError):
 
 class MissingExtraError(ChauffeurError):
     """An optional part is not installed; the hint is the command that installs it."""
+
+    def __init__(self, message: str, *, extra: str = "", hint: str = "") -> None:
+        """Args: what cannot be done; the extra of this package that brings it; else what to do."""
+        super().__init__(message, hint=f"Run: {install_command(extra)}" if extra else hint)

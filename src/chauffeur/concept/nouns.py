@@ -502,12 +502,26 @@ class Faithfulness:
     claims: int
 
 
-Mark = Literal["passed", "open", "differs", "failed"]
-"""Of a verdict: right; nothing known to be wrong, and not proven; wrong, which stops nothing; wrong."""
+NotCompared = Literal[
+    "no-policy", "no-program", "no-explanation", "no-claims", "unreadable", "policy-failed", "no-rule-here",
+    "own-manoeuvre", "check-broke",
+]  # fmt: skip
+"""Why a check compared nothing: there is no policy, or none that is a program; no explanation, or one that claims
+nothing; the program cannot be read, or failed on the way; the rule does not hold here; it is the car's own emergency
+manoeuvre; the check itself failed."""
+
+Comparison = Literal["held", "failed", "not_compared"]
+"""State of a verdict: compared and held, compared and failed, nothing compared."""
+
+Mark = Literal["passed", "open", "differs", "failed", "not_compared"]
+"""Of a verdict: right; nothing known to be wrong, and not proven; wrong, which stops nothing; wrong; nothing was
+compared."""
 
 
-def mark_of(*, passed: bool, vetoes: bool, proven: bool = True) -> Mark:
+def mark_of(*, passed: bool, vetoes: bool, proven: bool = True, compared: bool = True) -> Mark:
     """The one place where it is decided what deserves a tick."""
+    if not compared and (passed or not vetoes):
+        return "not_compared"
     if passed:
         return "passed" if proven else "open"
     return "failed" if vetoes else "differs"
@@ -527,6 +541,8 @@ class Verdict:
         alignment: Of a check that compares R with P or with what P did: what it found.
         proven: Whether what passed was shown to be right; otherwise nothing is known to be wrong, and `reason` tells
             what stayed open.
+        not_compared: Why there was nothing to compare; None where something was. Such a verdict stops nothing unless it
+            did not pass.
     """
 
     check: str
@@ -537,11 +553,20 @@ class Verdict:
     vetoes: bool = True
     alignment: Faithfulness | None = None
     proven: bool = True
+    not_compared: NotCompared | None = None
+
+    @property
+    def state(self) -> Comparison:
+        """Compared and held, compared and failed, or not compared."""
+        if self.not_compared is not None:
+            return "not_compared"
+        return "held" if self.passed else "failed"
 
     @property
     def mark(self) -> Mark:
         """How it is marked wherever it is shown: only what was shown to be right gets a tick."""
-        return mark_of(passed=self.passed, vetoes=self.vetoes, proven=self.proven)
+        compared = self.not_compared is None
+        return mark_of(passed=self.passed, vetoes=self.vetoes, proven=self.proven, compared=compared)
 
     @property
     def stops(self) -> bool:
@@ -551,6 +576,12 @@ class Verdict:
 
 Outcome = Literal["success", "failure", "collision", "off_road", "timeout", "ended", "refused", "not_driven"]
 """What happened. Why it happened is in `Causes`."""
+
+
+JudgedBy = Literal["words", "plan", "goal", "place"]
+"""What a drive is held against: the words, read by rules that see no plan; what the planner says it understood, where
+the rules read nothing in the words (judge and judged then share that reading); the scenario's own goal; the place that
+the plan leads to, found by the planner and reached by the world's own geometry."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -604,6 +635,9 @@ class Trip:
         seed: Its seed.
         said: What the program told the passenger, as (time s, text).
         record: Provenance: versions, hashes, planner and model ids.
+        unused: Parts of the wish, as said, that the plan does not use: places, conditions, further acts.
+        parts_done: How many of the things asked for were done, and how many there are; None where nothing was judged.
+        judged_by: Source of what the drive was judged by; empty where nothing was judged.
     """
 
     id: str
@@ -620,3 +654,6 @@ class Trip:
     seed: int
     said: tuple[tuple[float, str], ...] = ()
     record: tuple[tuple[str, Any], ...] = ()
+    unused: tuple[str, ...] = ()
+    parts_done: tuple[int, int] | None = None
+    judged_by: JudgedBy | Literal[""] = ""

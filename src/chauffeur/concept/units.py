@@ -5,6 +5,9 @@ Sources: exact definitions of the international mile (1609.344 m), foot (0.3048 
 
 from __future__ import annotations
 
+import math
+from typing import Final, Literal
+
 MPS_PER_KMH = 1.0 / 3.6
 MPS_PER_MPH = 1609.344 / 3600.0
 MPS_PER_KNOT = 1852.0 / 3600.0
@@ -24,3 +27,23 @@ def kmh(speed_mps: float) -> float:
 def mph(speed_mps: float) -> float:
     """Speed in mph for a speed in m/s."""
     return speed_mps / MPS_PER_MPH
+
+
+SpeedUnit = Literal["km/h", "mph"]
+"""Units of speed that people drive by."""
+_SLACK: Final = 0.05
+"""Of a unit: what is lost when a whole speed is stored in hundredths of m/s, and is no reason to round it down."""
+
+
+def people_speed(speed_mps: float, unit: SpeedUnit = "km/h", *, at_most: bool = False) -> str:
+    """A speed as people say it, whole and in one unit: `85 km/h`.
+
+    Args:
+        speed_mps: The speed, m/s.
+        unit: The person's.
+        at_most: Whether it is one that must not be exceeded (a limit, a set-point): such a number is rounded down.
+    """
+    value = (mph if unit == "mph" else kmh)(speed_mps)
+    if math.isfinite(value):
+        value = math.floor(value + _SLACK) if at_most else round(value)
+    return f"{value:.0f} {unit}"

@@ -17,7 +17,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from chauffeur.control.bicycle import STATES, Array, BicycleParameters, error_model
-from chauffeur.control.qp import OsqpSolver, QpSolver
+from chauffeur.control.qp import QpSolver, osqp_solver
 
 HORIZON: Final = 30
 SPEED_STEP_MPS: Final = 0.5
@@ -129,14 +129,18 @@ class LateralMpc:
         limits: SteeringLimits | None = None,
         *,
         horizon: int = HORIZON,
-        make_solver: MakeSolver = OsqpSolver,
+        make_solver: MakeSolver | None = None,
     ) -> None:
-        """Args: row two of the action matrix; period; believed car; limits; periods foreseen; who solves."""
+        """Args: row two of the action matrix; period; believed car; limits; periods foreseen; solver, default OSQP.
+
+        Raises:
+            MissingExtraError: OSQP was to solve and is not installed: said here, before anything moves.
+        """
         self.car = BicycleParameters() if car is None else car
         self.limits = SteeringLimits() if limits is None else limits
         self.dt_s, self.horizon = dt_s, horizon
         self._weights = weights
-        self._make_solver = make_solver
+        self._make_solver = osqp_solver() if make_solver is None else make_solver
         self._models: dict[int, Condensed] = {}
         self._solver: QpSolver | None = None
         self._speed = -1

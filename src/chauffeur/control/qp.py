@@ -30,6 +30,16 @@ class QpSolver(Protocol):
         ...
 
 
+def _libraries() -> tuple[Any, Any]:
+    """OSQP and scipy's sparse matrices."""
+    try:
+        import osqp
+        from scipy import sparse
+    except ImportError as error:
+        raise MissingExtraError("Tracking with MPC needs a QP solver (osqp).", extra="motion") from error
+    return osqp, sparse
+
+
 class OsqpSolver:
     """OSQP (Stellato et al., 2020), dense P and sparse A."""
 
@@ -41,13 +51,7 @@ class OsqpSolver:
         Raises:
             MissingExtraError: OSQP is not installed.
         """
-        try:
-            import osqp
-            from scipy import sparse
-        except ImportError as error:
-            raise MissingExtraError(
-                "Tracking with MPC needs a QP solver (osqp).", hint="Run: pip install 'chauffeur[motion]'"
-            ) from error
+        osqp, sparse = _libraries()
         size = len(quadratic)
         rows = np.triu_indices(size)
         self._order = np.lexsort((rows[0], rows[1]))  # by columns, as a sparse matrix holds them
@@ -84,3 +88,9 @@ class OsqpSolver:
         self._solver.warm_start(x=start)
         result = self._solver.solve(raise_error=False)
         return np.asarray(result.x) if result.info.status_val == self._solved else None
+
+
+def osqp_solver() -> type[OsqpSolver]:
+    """OSQP, known to be installed. Raises MissingExtraError."""
+    _libraries()
+    return OsqpSolver

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept import Context, Situation
-from chauffeur.concept.units import kmh, mph
+from chauffeur.concept.units import people_speed
 from chauffeur.describe.road import SIGHT_M, ordinal
 from chauffeur.language.questions import ADDRESS
 from chauffeur.language.tokens import words_of
@@ -59,7 +59,7 @@ _WAY: Final = "way"
 
 
 def _speed(speed_mps: float) -> str:
-    return f"{kmh(speed_mps):.0f} km/h ({mph(speed_mps):.0f} mph)"
+    return f"{people_speed(speed_mps)} ({people_speed(speed_mps, 'mph')})"
 
 
 def _own_speed(situation: Situation) -> str:

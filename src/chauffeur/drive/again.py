@@ -6,18 +6,16 @@ Checks, safety filter and bounds are today's. Of the recording's own limits only
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from chauffeur.concept import DataError, Limits, Observation, Plan, Scenario
+from chauffeur.concept import DataError, Limits, Observation, Scenario
 from chauffeur.drive.emergency import not_checked, planned_for
-from chauffeur.drive.episode import Referee
 from chauffeur.drive.planning import declined
 from chauffeur.drive.recording import RecordedTrip
-from chauffeur.drive.session import check_drive, drive_policy, make_world, trip_s
+from chauffeur.drive.session import RefereeMaker, check_drive, drive_policy, make_world, trip_s
 from chauffeur.worlds.base import World
 
 _limits = TypeAdapter(Limits)
@@ -40,9 +38,7 @@ class DrivenAgain:
     notes: tuple[str, ...] = ()
 
 
-def drive_again(
-    recorded: RecordedTrip, most: Limits, referee: Callable[[World, Scenario, Plan], Referee | None]
-) -> DrivenAgain:
+def drive_again(recorded: RecordedTrip, most: Limits, referee: RefereeMaker) -> DrivenAgain:
     """Drive the same policy on the same scenario with the same seed.
 
     Args:
@@ -73,9 +69,9 @@ def drive_again(
         notes = (*notes, "It was recorded without the safety filter, which drives along today.")
     if own is None and "minimum_speed" not in record:
         notes = (*notes, "It was recorded without the least speed of a highway, which holds today.")
-    episode = drive_policy(
-        world, policy, referee(world, scenario, trip.plan), trip_s(scenario), limits, minimum_speed=own is None
-    )
+    words = trip.instruction.text if trip.judged_by else ""  # older versions judged by the plan alone
+    judge = referee(world, scenario, trip.plan, words)
+    episode = drive_policy(world, policy, judge, trip_s(scenario), limits, minimum_speed=own is None)
     driven = replace(
         trip,
         outcome=episode.outcome,

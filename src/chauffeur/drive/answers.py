@@ -8,12 +8,9 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from chauffeur.concept import Plan, PlanRequest, Thoughts
+from chauffeur.concept import ANSWERED, Plan, PlanRequest, Thoughts
 from chauffeur.describe.answers import DONT_KNOW, answer_to, asks_to_know
 from chauffeur.planners.base import NO_WISH, Planner, declined
-
-ANSWERED = "answer"
-"""The intent of a plan that answers a question and drives nothing."""
 
 
 async def plan_or_answer(planner: Planner, request: PlanRequest) -> Plan:

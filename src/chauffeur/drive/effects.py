@@ -1,65 +1,20 @@
-"""What a program did: in a drive, or tried on copies of the scene, in the sandbox, for a few simulated seconds.
-
-Trying needs a world that can be copied at an instant, and so a simulated one: what is found foresees the simulator's
-traffic, and says nothing of a real road. It takes some tenths of a second; a drive does not wait for it.
-"""
+"""What a program did in a recorded drive, as faithfulness compares it with what was said."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
-from chauffeur.concept import Observation, Program, SandboxError, Thoughts
-from chauffeur.drive.episode import Episode, run_episode
-from chauffeur.drive.rehearsal import CopyableWorld
-from chauffeur.programs import ProgramExecutor, Sandbox
-from chauffeur.safety.faithfulness import Effect, FactSurroundings, Faithfulness, judge, read_facts
-
-MAX_S: Final = 30.0
-"""Simulated seconds a program is given to show what it does."""
+from chauffeur.concept import Observation
+from chauffeur.drive.episode import Episode
+from chauffeur.safety.faithfulness import Effect
 
 _MEAN_TICKS: Final = 10
 """Control periods of the last second."""
 
 
-def effects_of(
-    worlds: Sequence[CopyableWorld], program: Program, *, sandbox: Sandbox, max_s: float = MAX_S
-) -> tuple[Effect, ...]:
-    """Run a program on a copy of each world; the worlds stay as they are.
-
-    Args:
-        worlds: Scenes at the instant the program is to begin.
-        program: What is run; the sandbox alone holds it, the gate is the business of whoever drives it.
-        sandbox: Where it runs.
-        max_s: Bound of each run in simulated time.
-
-    Raises:
-        SandboxError: No worker can be had.
-    """
-    return tuple(_effect(world, program, sandbox, max_s) for world in worlds)
-
-
-def judge_driven(
-    thoughts: Thoughts, program: Program, worlds: Sequence[CopyableWorld], *, sandbox: Sandbox, max_s: float = MAX_S
-) -> Faithfulness:
-    """Judge thoughts by what reading finds in a program and by what it did on copies of the first world and the others.
-
-    Raises:
-        ValueError: There is no world.
-        SandboxError: No worker can be had.
-    """
-    if not worlds:
-        raise ValueError("There is no scene to run the program in.")
-    where = FactSurroundings.of(worlds[0].observe())
-    effects = effects_of(worlds, program, sandbox=sandbox, max_s=max_s)
-    return judge(thoughts.text, read_facts(program.source, program.library), where, effects)
-
-
-def effect_of(episode: Episode) -> Effect | None:
-    """What happened in a recorded drive; None where nothing was driven."""
-    if not episode.frames:
-        return None
+def effect_of(episode: Episode) -> Effect:
+    """What happened in a drive of which at least one frame was recorded."""
     shots = [*(frame.observation for frame in episode.frames), episode.final]
     first, last = shots[0], shots[-1]
     speeds = [shot.ego.speed_mps for shot in shots]
@@ -77,21 +32,6 @@ def effect_of(episode: Episode) -> Effect | None:
         failed=episode.causes.policy_failed or episode.causes.infra_failed,
         cut=(episode.success and episode.frames[-1].program == "running") or last.ego.crashed or last.off_road,
     )
-
-
-def _effect(world: CopyableWorld, program: Program, sandbox: Sandbox, max_s: float) -> Effect:
-    twin = world.copy()
-    executor = ProgramExecutor(sandbox=sandbox, library=program.library, gate=False)
-    try:
-        executor.start(program.source, twin)
-        episode = run_episode(twin, executor, None, max_s=max_s)
-    finally:
-        executor.close()
-    if episode.causes.infra_failed:
-        raise SandboxError(f"The sandbox failed while a program was tried: {episode.causes.detail}", retryable=True)
-    effect = effect_of(episode)
-    assert effect is not None  # at least one control period is driven
-    return effect
 
 
 def _gaps(first: Observation, last: Observation) -> tuple[float | None, float | None]:

@@ -172,7 +172,8 @@ def raised(alarm: Alarm, answer: Plan, text: str) -> Plan:
 
 def not_checked(plan: Plan) -> tuple[Verdict, ...]:
     """What stands in the place of the checks: a manoeuvre of the car's own is not put to them, and is told as such."""
-    return (Verdict(EMERGENCY_CHECK, True, f"It is the car's own answer to an emergency word: {plan.intent}."),)
+    reason = f"It is the car's own answer to an emergency word: {plan.intent}."
+    return (Verdict(EMERGENCY_CHECK, True, reason, not_compared="own-manoeuvre"),)
 
 
 def check_told_not_to(text: str, plan: Plan, observation: Observation) -> tuple[Verdict, ...]:

@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
+from typing import Literal, Protocol, runtime_checkable
 
 from chauffeur.concept import (
     Causes,
     ChauffeurError,
     Command,
     Frame,
+    JudgedBy,
     Limits,
     Metric,
     Observation,
@@ -75,6 +76,21 @@ class FollowsPolicy(Protocol):
         ...
 
 
+@runtime_checkable
+class TellsParts(Protocol):
+    """What a referee offers that judges a wish part by part."""
+
+    @property
+    def parts_done(self) -> tuple[int, int]:
+        """Parts that are done, and all of them."""
+        ...
+
+    @property
+    def judged_by(self) -> JudgedBy:
+        """Source of what the drive is judged by."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Episode:
     """A driven trip, before it is filed.
@@ -89,6 +105,8 @@ class Episode:
         success: The referee's success flag.
         interventions: Control periods in which the shield changed the command.
         bounded: Set-points that were brought within the limits, by name, with the number of control periods.
+        parts_done: Parts of the wish that are done, and all of them; None where nothing was judged.
+        judged_by: Source of what the drive was judged by; empty where nothing was judged.
     """
 
     frames: tuple[Frame, ...]
@@ -102,6 +120,8 @@ class Episode:
     success: bool
     interventions: int = 0
     bounded: tuple[tuple[str, int], ...] = ()
+    parts_done: tuple[int, int] | None = None
+    judged_by: JudgedBy | Literal[""] = ""
 
 
 def run_episode(
@@ -224,6 +244,8 @@ def run_episode(
         success=success,
         interventions=changed,
         bounded=tuple(bounded.items()),
+        parts_done=None if referee is None else referee.parts_done if isinstance(referee, TellsParts) else (success, 1),
+        judged_by="" if referee is None else referee.judged_by if isinstance(referee, TellsParts) else "goal",
     )
 
 

@@ -1,20 +1,24 @@
-"""When a free drive is over: once what was understood of the wish has been done, all of it, and held for a moment.
+"""When a free drive is over: once what was asked for has been done, all of it, and held for a moment.
 
 A benchmark has goals of its own, and ends the instant one is met. A passenger who says "overtake and come back" has not
-been served in the left lane, nor one who wants 40 m when 38 m flash by. So a free drive is judged by the policy and
-what its plan says of it: every part of `Plan.intent` is done in its order, the set-points (lane, speed, gap) are
-reached and held, and a program that still has something to do has done it. This shows whether the car did what was
-understood, not whether that was what the person meant.
+been served in the left lane, nor one who wants 40 m when 38 m flash by. So a free drive is judged part by part: every
+part is done in its order, the set-points (lane, speed, gap) are reached and held, and a program that still has
+something to do has done it.
+
+Sides, directions and numbers are those of the words, read by rules that see no plan (`language.wanted`); what a mood
+comes to, and a number that only the plan has, are the plan's, and there judge and judged share a reading.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from chauffeur.concept import Metric, Observation, Outcome, Plan, ProgramState, Setpoints, VehicleState
+from chauffeur.concept import JudgedBy, Metric, Observation, Outcome, Plan, ProgramState, Setpoints, VehicleState
 from chauffeur.concept.units import M_PER_CAR_LENGTH
+from chauffeur.drive.wish_parts import account_of
+from chauffeur.language.wanted import WantedPart, read_wanted
 from chauffeur.worlds.base import World
 
 HELD_S: Final = 2.5
@@ -25,6 +29,8 @@ SETTLES_S: Final = 12.0
 """How long the set-points of a program that has ended have time to be reached."""
 SPEED_MPS: Final = 0.8
 """A speed this near the one asked for is that speed (3 km/h): a vehicle far ahead already takes half of it."""
+CHANGED_MPS: Final = 1.0
+"""A speed without a number is another one from this change on (4 km/h), which a passenger notices."""
 SET_MPS: Final = 0.3
 """A set-point that changes by more while it is held is still on its way."""
 GAP_M: Final = 1.0
@@ -51,7 +57,10 @@ class Ask:
     Attributes:
         kind: First part of its intent: `overtake`, `gap`, ...
         detail: The rest: `left`, `set`, ...
-        speed_mps, gap_m, headway_s: Numbers that go with it, where the plan names them.
+        speed_mps, gap_m, headway_s: Numbers that go with it, where words or plan name them.
+        sign: +1 where the words ask for more speed or room, -1 for less, 0 where they do not say.
+        returns: Whether the car is to be back in the lane where it began.
+        said: Whether the words say it, too: read by rules that see no plan.
     """
 
     kind: str
@@ -59,6 +68,9 @@ class Ask:
     speed_mps: float | None = None
     gap_m: float | None = None
     headway_s: float | None = None
+    sign: int = 0
+    returns: bool = False
+    said: bool = False
 
     @property
     def bound(self) -> Bound:
@@ -67,7 +79,52 @@ class Ask:
         return bounds.get(self.detail, "exact")
 
 
-def asked_of(plan: Plan) -> tuple[Ask, ...]:
+def asked_of(plan: Plan, wish: str = "") -> tuple[Ask, ...]:
+    """What is to be done, in its order: what the planner understood, as the words say it; where it does not tell, the
+    words alone."""
+    parts = read_wanted(wish)
+    asks = _understood(plan)
+    if not asks:
+        asks = tuple(ask for part in parts if (ask := _alone(part)) is not None)
+    elif wish and len(served := account_of(wish, plan).served) == len(asks):
+        asks = tuple(ask if part is None else _as_said(ask, part) for ask, part in zip(asks, served, strict=True))
+    back = any(part.act == "return" and not part.denied for part in parts)
+    return tuple(replace(ask, returns=back) if ask.kind == "overtake" else ask for ask in asks)
+
+
+def _as_said(ask: Ask, part: WantedPart) -> Ask:
+    """A part of what was understood, with side, sign and number of the words that it serves."""
+    if part.act != ask.kind:
+        return replace(ask, said=part.act != "other")
+    said = replace(ask, sign=part.sign, said=True)
+    if part.side and ask.detail in _QUARTERS:
+        return replace(said, detail=part.side)
+    if part.amount is None or ask.detail != "set":
+        return said
+    if ask.kind == "speed" and ask.speed_mps is not None:
+        return replace(said, speed_mps=part.amount.value)
+    return replace(said, gap_m=part.amount.value) if ask.kind == "gap" and ask.gap_m is not None else said
+
+
+def _alone(part: WantedPart) -> Ask | None:
+    """What words alone ask for; None where it is not known from them when it is done."""
+    value = None if part.amount is None else part.amount.value
+    if part.kind != "act" or part.denied:
+        return None
+    match part.act:
+        case "turn" | "lane" if part.side:
+            return Ask(part.act, part.side, said=True)
+        case "overtake" | "pull_over" | "stop":
+            return Ask(part.act, part.side, said=True)
+        case "speed" if value is not None or part.sign:
+            return Ask("speed", "set" if value is not None else "", value, sign=part.sign, said=True)
+        case "gap" if value is not None:
+            return Ask("gap", "set", gap_m=value, said=True)
+        case _:
+            return None
+
+
+def _understood(plan: Plan) -> tuple[Ask, ...]:
     """The parts of a plan's intent in their order; empty where the planner does not say what it understood."""
     tags = [tag.partition(".") for tag in plan.intent.split("+") if tag]
     numbers = dict(plan.settings)
@@ -85,19 +142,19 @@ _JUDGED: Final = _SETS_SPEED | {"gap", "follow"}
 """Parts of which it is known when they are done."""
 
 
-def can_be_judged(plan: Plan) -> bool:
-    """Whether a plan says what it understood, in words of which it is known when they are done."""
-    asks = asked_of(plan)
+def can_be_judged(plan: Plan, wish: str = "") -> bool:
+    """Whether plan or wish say what is to be done, in words of which it is known when they are done."""
+    asks = asked_of(plan, wish)
     return bool(asks) and all(ask.kind in _JUDGED for ask in asks)
 
 
 class Fulfilment:
     """The referee of a free drive; make it right after the world was reset."""
 
-    def __init__(self, world: World, plan: Plan) -> None:
-        """Args: the world; the plan that is about to be driven, one that `can_be_judged`."""
+    def __init__(self, world: World, plan: Plan, wish: str = "") -> None:
+        """Args: the world; the plan that is about to be driven, one that `can_be_judged`; the words it was made of."""
         self._world = world
-        self._asks = asked_of(plan)
+        self._asks = asked_of(plan, wish)
         self._start = world.observe()
         self._began = self._start
         self._done = 0
@@ -143,6 +200,16 @@ class Fulfilment:
             return False
         return self.success or self._ended * self._world.dt_s >= SETTLES_S
 
+    @property
+    def parts_done(self) -> tuple[int, int]:
+        """Parts that are done, and all of them."""
+        return self._done + self._holds, len(self._asks)
+
+    @property
+    def judged_by(self) -> JudgedBy:
+        """The words, where they say every part; else the plan has a share in it."""
+        return "words" if all(ask.said for ask in self._asks) else "plan"
+
     def outcome(self) -> Outcome:
         """What came of it, collisions apart: not done by a program that ended, or not in the time there was."""
         if self.success:
@@ -156,7 +223,8 @@ class Fulfilment:
             return ""
         ask, shot = self._asks[self._done], self._world.observe()
         missing = _MISSING.get(ask.kind, "The car did not settle as planned.")
-        if ask.kind == "overtake" and self._passed and not self._in_lane(shot):
+        away = not self._in_lane(shot) or (ask.returns and _moved(self._began, shot) != 0)
+        if ask.kind == "overtake" and self._passed and away:
             missing = "The vehicle ahead was passed, but the car is not in the lane it was to end in."
         front = shot.front
         slow = front is not None and front.distance_m < _HELD_UP_M and front.speed_mps < self._wanted_mps(ask)
@@ -188,7 +256,8 @@ class Fulfilment:
     def _met(self, ask: Ask, shot: Observation) -> bool:
         match ask.kind:
             case "overtake":
-                return self._passed == (ask.detail or self._passed) != ""
+                passed = self._passed == (ask.detail or self._passed) != ""
+                return passed and (not ask.returns or _moved(self._began, shot) == 0)
             case "lane" if ask.detail in ("left", "right"):
                 return _moved(self._began, shot) * _QUARTERS[ask.detail] > 0
             case "turn":
@@ -198,7 +267,11 @@ class Fulfilment:
             case "stop":
                 return shot.ego.speed_mps < STANDING_MPS
             case "speed":
-                return ask.speed_mps is None or _near(shot.ego.speed_mps, ask.speed_mps, SPEED_MPS, ask.bound)
+                change = shot.ego.speed_mps - self._start.ego.speed_mps
+                if ask.speed_mps is None:
+                    return ask.sign == 0 or ask.sign * change >= CHANGED_MPS
+                opposite = ask.sign * (ask.speed_mps - self._start.ego.speed_mps) < -SPEED_MPS
+                return not opposite and _near(shot.ego.speed_mps, ask.speed_mps, SPEED_MPS, ask.bound)
             case "style":  # a mood has no number of its own: its set-point, which may follow traffic, comes to rest
                 speed = self._setpoints.target_speed_mps
                 return speed is None or (self._set_for(speed) and abs(shot.ego.speed_mps - speed) <= SPEED_MPS)

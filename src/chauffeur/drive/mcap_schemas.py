@@ -130,6 +130,7 @@ VERDICTS = Channel(
                 vetoes=_FLAG,
                 alignment={"type": ["object", "null"]},
                 proven=_FLAG,
+                not_compared={"type": ["string", "null"]},
             )
         )
     ),
@@ -154,6 +155,9 @@ TRIP = Channel(
         seed=_INTEGER,
         said=_array(_array({"type": ["number", "string"]}), "[time s, text] pairs"),
         record=_array(_array({}), "[name, value] pairs of provenance"),
+        unused=_array(_text(), "Parts of the wish that the plan does not use"),
+        parts_done={"type": ["array", "null"]},
+        judged_by=_text("words, plan, goal, place, or empty"),
     ),
 )
 LANES = Channel(

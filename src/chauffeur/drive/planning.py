@@ -40,6 +40,7 @@ from chauffeur.concept import (
     Thoughts,
     Verdict,
 )
+from chauffeur.drive import wish_parts
 from chauffeur.drive.answers import plan_or_answer
 from chauffeur.drive.emergency import ALARM_WORDS, alarm_of, check_told_not_to, is_bare_stop, raised
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
@@ -159,7 +160,8 @@ async def plan_once(instruction: Instruction, steps: PlanSteps) -> Planned:
     if wish.stops and not own:
         verdicts = (*verdicts, wish)
     elif not own:
-        verdicts = (*verdicts, *check_told_not_to(instruction.text, plan, now))
+        told = check_told_not_to(instruction.text, plan, now) or wish_parts.check_told_not_to(instruction.text, plan)
+        verdicts = (*verdicts, *told)
     steps.tell(DriveEvent("verdicts", value=verdicts))
     return Planned(plan, verdicts, request)
 

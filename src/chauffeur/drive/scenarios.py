@@ -6,11 +6,11 @@ import difflib
 import os
 import re
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 
 from chauffeur.concept import Observation, Scenario, ScenarioError
 from chauffeur.drive.session import drive_without_program, make_world
+from chauffeur.language.tokens import tokens_of
 from chauffeur.language.weather import said_weather
 from chauffeur.planners.onboard.meaning import Manoeuvre, Reading
 from chauffeur.planners.onboard.understand import understand
@@ -102,8 +102,12 @@ def find(name: str, data_dir: Path | None = None) -> Scenario:
 def suiting(wish: str) -> Scenario:
     """The built-in scenario whose road lets the wish be shown: a crossing for a turn, a lot for a spot.
 
-    The wish is read as a planner reads it; its first part decides.
+    A wish that a scenario is listed with is shown there. Any other is read as a planner reads it; its first part
+    decides. The road depends on the words alone: where what it needs is not installed, driving says what to install.
     """
+    for scenario in BUILT_IN:
+        if _words(scenario.wish) == _words(wish):
+            return scenario
     by_id = {scenario.id: scenario for scenario in BUILT_IN}
     if _LOT.search(wish) and not _SHOULDER.search(wish):
         return by_id[_AMENITIES if _asks_for_amenities(wish) else _PLACES.get(place_of(wish), "parking")]
@@ -115,13 +119,18 @@ def suiting(wish: str) -> Scenario:
         return by_id["left-lane" if first.direction == "right" else "overtake"]
     if _CROSSING.search(wish):
         return by_id["intersection"]
-    if (first is None or first.manoeuvre == "style") and said_weather(wish) != "none" and _seeing():
+    if (first is None or first.manoeuvre == "style") and said_weather(wish) != "none":
         return by_id["track-left-turn-sunny"]  # what the passenger knows and the camera does not see
     if first is None and (place := destination_of(wish)):
         return next((town for town in TOWNS if destination_of(town.wish) == place), TOWNS[0])
     if first is not None and first.manoeuvre == "speed" and first.change <= 0 and first.variant != "match":
         return by_id["cruise"]  # a speed of one's own needs room ahead
     return by_id["overtake"]
+
+
+def _words(text: str) -> list[str]:
+    """The words of a wish, in whatever case, contracted or not, without punctuation."""
+    return [token for token in tokens_of(text) if token[0].isalnum()]
 
 
 def lasting(scenario: Scenario, duration_s: float) -> Scenario:
@@ -136,11 +145,6 @@ def _asks_for_amenities(wish: str) -> bool:
     """Whether a parking wish is about what the lot with lift, chargers and roofs shows, as ViLaD reads it."""
     asked = parking_wish(wish)
     return any(asked[name] != NOTHING[name] for name in ("lift", "stairs", "machine", "bay", "covered", "apart", "end"))
-
-
-def _seeing() -> bool:
-    """Whether the parts are installed with which the car looks at the road and drives by gains."""
-    return all(find_spec(name) is not None for name in ("vehiclemodels", "osqp", "moderngl"))
 
 
 def seeds_with_lead(scenario: Scenario, first: int, count: int) -> tuple[int, ...]:
@@ -177,10 +181,10 @@ def _keeps_lead(world: World, shot: Observation) -> bool:
 
 def planner_for(spec: str, scenario: Scenario) -> str:
     """The planner that was named, else one that can drive there: what the world says it can be driven by; and where a
-    lot has places to park near, the one that knows them."""
+    lot has places to park near, or an open road sets no manoeuvre, the one that finds its own way."""
     apt = make_world(scenario).capabilities.policies
     if spec:
         return spec
-    if scenario.config.get("places"):
+    if scenario.config.get("places") or scenario.config.get("street"):
         return "vilad"
     return {"action_matrix": "vlm", "program": "onboard"}.get(apt[0], "talk2drive")

@@ -47,6 +47,7 @@ from chauffeur.drive.planning import declined, no_pictures, request_once, unusab
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.seat import SeatCamera
 from chauffeur.drive.surroundings import describing, opened, weathered
+from chauffeur.drive.wish_parts import account_of
 from chauffeur.executors import Executor, executor_for
 from chauffeur.executors.base import OfKind
 from chauffeur.executors.program import ProgramDrive
@@ -57,17 +58,18 @@ from chauffeur.programs.catalogue import Vocabulary, vocabulary_of
 from chauffeur.programs.sandbox import Sandbox
 from chauffeur.safety.base import Check
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
-from chauffeur.safety.faithfulness import check_driven, check_faithfulness
+from chauffeur.safety.faithfulness import DRIVEN_CHECK, FAITHFULNESS_CHECK, check_driven, check_faithfulness
 from chauffeur.safety.shield import SHIELD_VERSION, Shield, shield_for
 from chauffeur.worlds.base import World
 
 MAX_WISH_CHARACTERS = 2000
 
-RefereeMaker = Callable[[World, Scenario, Plan], Referee | None]
+RefereeMaker = Callable[[World, Scenario, Plan, str], Referee | None]
+"""Makes the judge of a trip: of its world, its scenario, its plan and the words of the wish."""
 
 
-def _no_referee(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
-    del world, scenario, plan
+def _no_referee(world: World, scenario: Scenario, plan: Plan, wish: str) -> Referee | None:
+    del world, scenario, plan, wish
     return None
 
 
@@ -198,7 +200,7 @@ class Session:
             return make_trip(request, plan, verdicts, scenario, seed, None, refused, shielded=self.shielded)
         assert plan.policy is not None
         try:
-            referee = self.referee(world, scenario, plan)
+            referee = self.referee(world, scenario, plan, request.instruction.text)
             self._episode = drive_policy(
                 world,
                 plan.policy,
@@ -218,25 +220,27 @@ class Session:
 
 def check_drive(plan: Plan, observation: Observation, limits: Limits) -> tuple[Verdict, ...]:
     """All verdicts before a drive: of the checks that can stop it, and whether the explanation fits the program."""
-    return run_checks(plan, observation, limits, DRIVE_CHECKS) + _told(plan, observation, limits, check_faithfulness)
+    return run_checks(plan, observation, limits, DRIVE_CHECKS) + informed(
+        FAITHFULNESS_CHECK, plan, observation, limits, check_faithfulness
+    )
 
 
 def _check_driven(plan: Plan, episode: Episode, limits: Limits) -> tuple[Verdict, ...]:
     """Whether the drive went as explained; nothing where nothing was driven."""
-    effect = effect_of(episode)
-    if effect is None:
+    if not episode.frames:
         return ()
 
     def driven(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
         del limits
-        return check_driven(plan, observation, effect)
+        return check_driven(plan, observation, effect_of(episode))
 
-    return _told(plan, episode.frames[0].observation, limits, driven)
+    return informed(DRIVEN_CHECK, plan, episode.frames[0].observation, limits, driven)
 
 
-def _told(plan: Plan, observation: Observation, limits: Limits, check: Check) -> tuple[Verdict, ...]:
-    """What a check says that only informs: if it breaks, that is told as well, and stops nothing."""
-    return tuple(replace(verdict, vetoes=False) for verdict in run_checks(plan, observation, limits, (check,)))
+def informed(name: str, plan: Plan, observation: Observation, limits: Limits, check: Check) -> tuple[Verdict, ...]:
+    """What a check says that only informs: one that breaks has compared nothing, which is told, and stops nothing."""
+    verdicts = run_checks(plan, observation, limits, (check,))
+    return tuple(replace(verdict, check=name, vetoes=False) for verdict in verdicts)
 
 
 def trip_s(scenario: Scenario) -> float:
@@ -392,6 +396,9 @@ def make_trip(
         seed=seed,
         said=() if episode is None else episode.said,
         record=record,
+        unused=() if episode is None else account_of(request.instruction.text, plan).unused,
+        parts_done=None if episode is None else episode.parts_done,
+        judged_by="" if episode is None else episode.judged_by,
     )
 
 

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from chauffeur.concept import Observation, VehicleState
+from chauffeur.concept.units import kmh, people_speed
 from chauffeur.drive.recording import RecordedTrip
-from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
 from chauffeur.hmi.filmstrip import choose_moments
 from chauffeur.hmi.road import Bounds, PaintedRoad, draw_road, track_box
@@ -116,7 +116,7 @@ def draw_strip(recorded: RecordedTrip, name: str, moments: int = MOMENTS) -> Dri
         # The road is drawn in the first picture and shown again in the others.
         ground = f'<g id="{name}">{road}</g>' if not pictures else f'<use href="#{name}"/>'
         standing = abs(shot.ego.speed_mps) < _STANDING_MPS
-        caption = f"{shot.time_s:.1f} s, {'standing' if standing else words.speed(shot.ego.speed_mps)}"
+        caption = f"{shot.time_s:.1f} s, {'standing' if standing else people_speed(shot.ego.speed_mps)}"
         if moment.event is not None:
             caption += f" \N{EN DASH} {moment.event.label}"
         moving = _trail(shots[: moment.index + 1]) + _bodies(shot, box)
@@ -195,12 +195,12 @@ def _points(points: Sequence[tuple[float, float]]) -> str:
 
 def _charts(shots: Sequence[Observation], marks: Sequence[float]) -> tuple[Chart, ...]:
     times = [shot.time_s for shot in shots]
-    speeds: list[float | None] = [max(shot.ego.speed_mps, 0.0) for shot in shots]
+    speeds: list[float | None] = [kmh(max(shot.ego.speed_mps, 0.0)) for shot in shots]
     gaps = [
         shot.front.distance_m if shot.front is not None and shot.front.distance_m <= _AHEAD_M else None
         for shot in shots
     ]
-    charts = [_chart("Speed", "m/s", times, speeds, marks)]
+    charts = [_chart("Speed", "km/h", times, speeds, marks)]
     if sum(gap is not None for gap in gaps) >= _LED_SHARE * len(gaps):
         charts.append(_chart("Gap to the vehicle ahead", "m", times, gaps, marks))
     return tuple(charts)

@@ -13,6 +13,7 @@ from pathlib import Path
 from PIL import Image, ImageDraw, ImageFont
 
 from chauffeur.concept import DataError, Observation, VehicleState
+from chauffeur.concept.units import people_speed
 from chauffeur.drive.files import publish
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
@@ -213,7 +214,7 @@ def _head(
     k = _SUPERSAMPLE
     pen, right = x * k, (x + width) * k
     baseline = (y + _HEAD_HEIGHT - 11) * k
-    parts = [(f"{shot.time_s:.1f} s", _INK, _HEAD_PX), (words.speed(shot.ego.speed_mps), _MUTED, _SMALL_PX)]
+    parts = [(f"{shot.time_s:.1f} s", _INK, _HEAD_PX), (people_speed(shot.ego.speed_mps), _MUTED, _SMALL_PX)]
     if rules:
         acting = ", ".join(words.rule_words(rule) for rule in dict.fromkeys(rules))
         parts.append((f"Shield: {acting}", _GUARD, _SMALL_PX))

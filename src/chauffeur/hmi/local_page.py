@@ -178,9 +178,7 @@ class LocalPage:
         try:
             from websockets.asyncio.server import serve
         except ImportError as error:
-            raise MissingExtraError(
-                f"{purpose} needs the package websockets.", hint='Install it with: pip install "chauffeur[page]"'
-            ) from error
+            raise MissingExtraError(f"{purpose} needs the package websockets.", extra="page") from error
         # Its messages about strangers' broken handshakes are no concern of the person's terminal.
         quiet = logging.getLogger("chauffeur.hmi.local_page")
         quiet.setLevel(logging.CRITICAL)

@@ -25,7 +25,10 @@ from chauffeur.concept import (
     Trip,
     VehicleState,
     Verdict,
+    result_of,
 )
+from chauffeur.concept.results import result_of_stored
+from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH, SpeedUnit
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi import words
 from chauffeur.hmi.events import events_of
@@ -47,8 +50,15 @@ Json = dict[str, Any]
 def page_payload(recorded: RecordedTrip) -> Json:
     """Everything the page shows."""
     trip = recorded.trip
+    unit = words.pace_of(trip.instruction.text)
     _, label, tone = words.trip_words(trip)
+
+    def said(text: str) -> str:
+        return words.passenger_units(text, unit)
+
     return {
+        "pace": {"unit": unit, "of": 1.0 / (MPS_PER_MPH if unit == "mph" else MPS_PER_KMH)},
+        "going_to": trip.plan.policy.route if isinstance(trip.plan.policy, Parameters) else "",
         "simulated": words.simulated(recorded.scenario.world),
         "wish": trip.instruction.text,
         "person": trip.instruction.person,
@@ -56,34 +66,36 @@ def page_payload(recorded: RecordedTrip) -> Json:
         "title": recorded.scenario.title or recorded.scenario.id,
         "context": trip.context.text,
         "intent": trip.plan.intent,
-        "refusal": trip.plan.refusal,
-        "settings": [words.setting(name, value) for name, value in trip.plan.settings],
-        "thoughts": trip.plan.thoughts.text,
+        "refusal": said(trip.plan.refusal),
+        "settings": [words.setting(name, value, unit) for name, value in trip.plan.settings],
+        "thoughts": said(trip.plan.thoughts.text),
         "view": "" if recorded.view is None else _data_uri(recorded.view.png()),
         "program": _program_lines(trip.plan.policy),
-        "policy": policy_words(trip.plan.policy),
+        "policy": policy_words(trip.plan.policy, unit),
         "verdicts": [
-            {"check": v.check, "passed": v.passed, "reason": _reason(v), "line": v.line, "remedy": v.remedy}
-            | {"vetoes": v.vetoes, "mark": v.mark, "sign": words.MARKS[v.mark]}
+            {"check": v.check, "passed": v.passed, "reason": said(_reason(v)), "line": v.line, "remedy": said(v.remedy)}
+            | {"vetoes": v.vetoes, "mark": v.mark, "sign": words.MARKS[v.mark], "not_compared": v.not_compared}
             for v in trip.verdicts
         ],
         "mismatches": [
-            {"kind": KINDS[one.kind], "said": one.sentence, "instead": one.instead, "line": one.line}
+            {"kind": KINDS[one.kind], "said": said(one.sentence), "instead": said(one.instead), "line": one.line}
             for one in _mismatches(trip)
         ],
         "shield": _shield(recorded),
         "outcome": {
             "label": label,
             "tone": tone,
-            "causes": words.cause_words(trip.causes),
+            "causes": [said(text) for text in (*words.left_out_words(trip), *words.cause_words(trip.causes))],
+            "result": str(result_of(trip)),
+            "judged": words.judged_words(trip),
             "end": words.end_words(trip),
         },
         "duration": round(trip.duration_s, 2),
         "metrics": [
-            {"id": m.id, "name": words.metric_name(m.id), "value": words.metric_value(m), "applies": m.applies}
+            {"id": m.id, "name": words.metric_name(m.id), "value": words.metric_value(m, unit), "applies": m.applies}
             for m in trip.metrics
         ],
-        "history": [_history_item(item) for item in trip.history.items],
+        "history": [_history_item(item, unit) for item in trip.history.items],
         "provenance": [list(pair) for pair in provenance(trip)],
         "events": [{"t": round(e.time_s, 2), "kind": e.kind, "label": e.label} for e in events_of(recorded)],
         "drive": _drive(recorded),
@@ -113,15 +125,15 @@ def provenance(trip: Trip) -> list[tuple[str, str]]:
     return [(name, value) for name, value in rows if value]
 
 
-def policy_words(policy: Policy | None) -> str:
-    """P as text, whatever its kind; empty when there is none."""
+def policy_words(policy: Policy | None, unit: SpeedUnit | None = None) -> str:
+    """P as text, whatever its kind, speeds in the person's unit where one is given; empty when there is none."""
     if policy is None:
         return ""
     if isinstance(policy, Program):
         return policy.text
     if isinstance(policy, Parameters):
         names = ("target_speed_mps", "look_ahead_m", "look_ahead_ratio")
-        rows = [words.setting(name, float(getattr(policy, name))) for name in names]
+        rows = [words.setting(name, float(getattr(policy, name)), unit) for name in names]
         rows.append(("lane", {-1: "one to the left", 0: "stay", 1: "one to the right"}[policy.lane]))
         if policy.route:
             rows.append(("way", policy.route))
@@ -197,6 +209,9 @@ def _program_lines(policy: Policy | None) -> list[list[tuple[str, str]]] | None:
 
 def _reason(verdict: Verdict) -> str:
     """Why; of an explanation that does not fit the single mismatches are shown beside it."""
+    if verdict.mark == "not_compared":
+        said = words.not_compared_words(verdict)
+        return f"{said[:1].upper()}{said[1:]}"
     if verdict.alignment is None or verdict.passed:
         return verdict.reason
     return f"{words.doubt_words(verdict.check)} ({score_words(verdict.alignment)})."
@@ -237,14 +252,14 @@ def _shield(recorded: RecordedTrip) -> Json | None:
     }
 
 
-def _history_item(item: HistoryItem) -> Json:
+def _history_item(item: HistoryItem, unit: SpeedUnit) -> Json:
     return {
         "when": item.when,
         "instruction": item.instruction,
         "intent": item.intent,
-        "outcome": item.outcome,
+        "outcome": str(result_of_stored(item.outcome, item.intent)),
         "similarity": round(item.similarity, 2),
-        "settings": [words.setting(name, value) for name, value in item.settings],
+        "settings": [words.setting(name, value, unit) for name, value in item.settings],
         "feedback": [{"text": f.text, "meaning": words.feedback_words(f)} for f in item.feedback],
     }
 

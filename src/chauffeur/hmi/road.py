@@ -22,6 +22,8 @@ LineStyle = Literal["solid", "dashed", "centre"]
 _Array = NDArray[np.float64]
 
 _SAMPLE_M = 1.0
+_LAP_M = 0.6
+"""Ends of curves are straightened within centimetres: over a lane's width that opens some decimetres."""
 _SHORTEST_LINE_M = 3.0
 """Shorter runs are leftovers where lanes fan out."""
 _BESIDE_M = 12.0
@@ -112,7 +114,7 @@ def draw_road(road: RoadGraph, objects: tuple[VehicleState, ...], visible: Bound
     lanes = tuple(lane for lane in road.lanes if lane.kind not in ("sidewalk", "crossing"))
     centres = [_resample(lane.centre.points_m) for lane in lanes]
     surfaces = tuple(
-        Surface(lane.id, _simplify(centre[part]), lane.width_m, lane.emergency)
+        Surface(lane.id, _lapped(_simplify(centre[part])), lane.width_m, lane.emergency)
         for lane, centre in zip(lanes, centres, strict=True)
         for part in _runs(visible.holds(centre))
     )
@@ -163,6 +165,17 @@ def _lines_of(
                 if np.hypot(*(points[-1] - points[0])) >= _SHORTEST_LINE_M:
                     lines.append(PaintedLine(_simplify(points), name))  # type: ignore[arg-type]
     return lines
+
+
+def _lapped(points: Points) -> Points:
+    """A line that is longer by `_LAP_M` at both ends: two surfaces that meet at a slight angle leave no wedge open."""
+    (x0, y0), (x1, y1), (x2, y2), (x3, y3) = points[0], points[1], points[-2], points[-1]
+    first, last = math.hypot(x0 - x1, y0 - y1), math.hypot(x3 - x2, y3 - y2)
+    if not first or not last:
+        return points
+    before, behind = _LAP_M / first, _LAP_M / last
+    start = (x0 + (x0 - x1) * before, y0 + (y0 - y1) * before)
+    return (start, *points[1:-1], (x3 + (x3 - x2) * behind, y3 + (y3 - y2) * behind))
 
 
 def _bars(lane: Lane) -> list[Points]:

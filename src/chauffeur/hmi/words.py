@@ -1,4 +1,4 @@
-"""Names and numbers as people read them: speeds with both units, outcomes and scores in words."""
+"""Names and numbers as people read them: speeds whole and in one unit, results and scores in words."""
 
 from __future__ import annotations
 
@@ -8,9 +8,24 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Final, Literal
 
-from chauffeur.concept import Causes, Command, Feedback, Intervention, Mark, Metric, Outcome, Trip, Verdict
-from chauffeur.concept.units import kmh, mph
-from chauffeur.drive.answers import ANSWERED
+from chauffeur.concept import (
+    ANSWERED,
+    RESULT_LABELS,
+    Causes,
+    Command,
+    Feedback,
+    Intervention,
+    JudgedBy,
+    Mark,
+    Metric,
+    Outcome,
+    Result,
+    Trip,
+    Verdict,
+    result_of,
+)
+from chauffeur.concept.results import ANSWERED_LABEL
+from chauffeur.concept.units import SpeedUnit, people_speed
 from chauffeur.safety.faithfulness import DRIVEN_CHECK, FAITHFULNESS_CHECK
 
 Tone = Literal["good", "bad", "neutral"]
@@ -33,15 +48,26 @@ def simulated(world: str) -> str:
     return _OTHER_PHYSICS.get(world, SIMULATED)
 
 
-_OUTCOMES: dict[Outcome, tuple[str, Tone]] = {
-    "success": ("Done as asked", "good"),
-    "failure": ("Not done as asked", "bad"),
-    "collision": ("Collision", "bad"),
-    "off_road": ("Left the road", "bad"),
-    "timeout": ("Ran out of time or road", "bad"),
-    "ended": ("Drive ended", "neutral"),
-    "refused": ("Refused", "neutral"),
-    "not_driven": ("Not driven", "neutral"),
+_WHY: Final[dict[Outcome, str]] = {
+    "collision": "It ended in a collision.",
+    "off_road": "The car left the road.",
+    "timeout": "Time or road ran out.",
+    "ended": "The drive was not compared with the wish: nothing in it is known to be over.",
+}
+"""Outcomes that a result's word does not tell, in a sentence."""
+RESULT_TONES: Final[dict[Result, Tone]] = {
+    Result.DONE: "good",
+    Result.PARTLY_DONE: "neutral",
+    Result.NOT_DONE: "bad",
+    Result.ASKED_BACK: "neutral",
+    Result.DECLINED: "neutral",
+    Result.FAILED: "bad",
+}
+_JUDGED_BY: Final[dict[JudgedBy, str]] = {
+    "words": "Judged by your words, which rules read that see no plan.",
+    "plan": "Judged by what the planner understood, for rules alone read less: judge and planner share it.",
+    "goal": "Judged by the scenario's own goal.",
+    "place": "Judged by the place: the planner chose it, the world's geometry says whether the car is there.",
 }
 
 _VERSION = re.compile(r"-v\d+$")
@@ -68,58 +94,69 @@ _SUFFIXES = (
 )
 
 
-MARKS: Final[dict[Mark, str]] = {"passed": "✓", "open": "~", "differs": "≠", "failed": "✕"}
+MARKS: Final[dict[Mark, str]] = {"passed": "✓", "open": "~", "differs": "≠", "failed": "✕", "not_compared": "–"}
 """Signs of verdicts; which one a verdict gets is its own to say."""
 MARK_STYLES: Final[dict[Mark, str]] = {
     "passed": "green",
     "open": "yellow",
     "differs": "bold yellow",
     "failed": "bold red",
+    "not_compared": "dim",
 }
-
-Pace = Literal["km/h", "mph"]
-"""Units of speed that people drive by."""
 
 _MPH: Final = re.compile(r"\b(?:mph|miles? (?:per|an) hour)\b", re.IGNORECASE)
 _SPEED: Final = re.compile(r"(?<![\w.])(\d{1,4}(?:\.\d{1,9})?) m/s(?![²2^\w/])(?: \([^()\n]{1,40}\))?")
 _LENGTH: Final = re.compile(r"(?<![\w.])(\d{1,5}\.\d{1,9}) m(?![\w/])")
 
 
-def pace_of(wish: str) -> Pace:
+def pace_of(wish: str) -> SpeedUnit:
     """The unit of speed for a person, by the words of their wish."""
     return "mph" if _MPH.search(wish) else "km/h"
 
 
-def pace(speed_mps: float, unit: Pace = "km/h") -> str:
-    """A speed for the passenger: `85 km/h`."""
-    return f"{(mph if unit == 'mph' else kmh)(speed_mps):.0f} {unit}"
-
-
-def passenger_units(text: str, unit: Pace = "km/h") -> str:
+def passenger_units(text: str, unit: SpeedUnit = "km/h") -> str:
     """A text with its m/s in the person's unit and its metres whole; what stood in brackets behind was that, too."""
-    told = _SPEED.sub(lambda match: pace(float(match[1]), unit), text)
+    told = _SPEED.sub(lambda match: people_speed(float(match[1]), unit), text)
     return _LENGTH.sub(lambda match: f"{float(match[1]):.0f} m", told)
 
 
-_UNDRIVEN: Final = {ANSWERED: "Answered, nothing driven", "ask": "Asked back, nothing driven"}
-
-
 def trip_words(trip: Trip, *, timed: bool = False) -> tuple[str, str, Tone]:
-    """How a trip ended: mark, label and tone. No tick where the person was told something that is not so.
+    """How a trip ended: mark, label and tone. No tick where something was not compared, or told and is not so.
 
     Args:
         trip: The trip.
         timed: Whether the label says after how long, where anything was driven.
     """
-    if trip.plan.refusal and trip.plan.intent in _UNDRIVEN:
-        return "■", _UNDRIVEN[trip.plan.intent], "neutral"
-    label, tone = outcome_words(trip.outcome)
+    result = result_of(trip)
+    tone, label = RESULT_TONES[result], RESULT_LABELS[result]
+    if trip.plan.refusal and trip.plan.intent == ANSWERED:
+        return "■", ANSWERED_LABEL, "neutral"
+    if result is Result.DONE and trip.outcome == "ended":
+        label, tone = "Done, not compared", "neutral"
+    if result is Result.FAILED and trip.outcome in ("collision", "off_road"):
+        label = f"{label}: {_WHY[trip.outcome][0].lower()}{_WHY[trip.outcome][1:-1]}"
     if timed and trip.duration_s:
         label = f"{label} after {trip.duration_s:.0f} s"
     if tone != "bad" and unexplained(trip.verdicts):
         return MARKS["differs"], f"{label}, not as explained", "neutral"
     signs: dict[Tone, str] = {"good": MARKS["passed"], "bad": MARKS["failed"], "neutral": "■"}
     return signs[tone], label, tone
+
+
+def left_out_words(trip: Trip) -> tuple[str, ...]:
+    """Sentences on what of the wish was not used, or not compared; empty where all of it was."""
+    told: list[str] = []
+    if trip.unused:
+        named = ", ".join(f"“{part}”" for part in trip.unused)
+        told.append(f"I did not use: {named}." if trip.plan.intent else f"Not known to be used: {named}.")
+    if trip.outcome in ("timeout", "ended"):
+        told.append(_WHY[trip.outcome])
+    return tuple(told)
+
+
+def judged_words(trip: Trip) -> str:
+    """What the drive was held against, and what that shares with the planner; empty where with nothing."""
+    return _JUDGED_BY[trip.judged_by] if trip.judged_by else ""
 
 
 _CHECKS: Final = {
@@ -130,6 +167,11 @@ _CHECKS: Final = {
     "alignment-driven": "drove as explained",
     "shield": "shield",
 }
+
+
+def not_compared_words(verdict: Verdict) -> str:
+    """Why a check compared nothing: `not compared: there is no program to follow.`"""
+    return f"not compared: {verdict.reason[:1].lower()}{verdict.reason[1:]}"
 
 
 def check_name(check: str) -> str:
@@ -157,7 +199,7 @@ def end_words(trip: Trip) -> str:
         parts.append(_beside("gap", found["end-gap-v1"], found.get("asked-gap-v1"), lambda gap: f"{gap:.0f} m"))
     if "end-speed-v1" in found:
         wanted = found.get("asked-speed-v1")
-        parts.append(_beside("speed", found["end-speed-v1"], wanted, lambda speed: pace(speed, unit)))
+        parts.append(_beside("speed", found["end-speed-v1"], wanted, lambda speed: people_speed(speed, unit)))
     text = ", ".join(parts)
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
@@ -170,11 +212,6 @@ def _beside(name: str, value: float, asked: float | None, told: Callable[[float]
     if asked is None:
         return f"{name} {told(value)}"
     return f"{name} {told(value)} ({told(asked)} planned)"
-
-
-def outcome_words(outcome: Outcome) -> tuple[str, Tone]:
-    """An outcome as a short label and whether it is good news."""
-    return _OUTCOMES[outcome]
 
 
 _RULES: Final = {
@@ -201,9 +238,6 @@ _DOUBTS: Final = {
 }
 
 
-DECLINED: Final = "The wish was declined."
-
-
 def cause_words(causes: Causes) -> tuple[str, ...]:
     """Every cause that holds, in words; empty when nothing went wrong."""
     words = [
@@ -211,7 +245,6 @@ def cause_words(causes: Causes) -> tuple[str, ...]:
         for holds, text in (
             (causes.policy_failed, "The program was rejected, or failed while it ran."),
             (causes.infra_failed, "Endpoint, sandbox or machine failed; this says nothing about the plan."),
-            (causes.refused, DECLINED),
             (causes.fallback_used, "The autopilot drove on without the program."),
         )
         if holds
@@ -277,24 +310,27 @@ def metric_name(metric_id: str) -> str:
     return _METRICS.get(name) or name.replace("-", " ").capitalize()
 
 
-def metric_value(metric: Metric) -> str:
-    """Value with its unit, or that it does not apply."""
+def metric_value(metric: Metric, unit: SpeedUnit | None = None) -> str:
+    """Value with its unit, a speed in the person's where one is given; or that it does not apply."""
     if not metric.applies:
         return "does not apply"
-    return speed(metric.value) if metric.unit == "m/s" else f"{metric.value:.1f} {metric.unit}".rstrip()
+    return speed(metric.value, unit) if metric.unit == "m/s" else f"{metric.value:.1f} {metric.unit}".rstrip()
 
 
-def speed(speed_mps: float) -> str:
-    """A speed in both units: `28.0 m/s (101 km/h)`."""
-    return f"{speed_mps:.1f} m/s ({kmh(speed_mps):.0f} km/h)"
+def speed(speed_mps: float, unit: SpeedUnit | None = None) -> str:
+    """A speed in the person's unit; for engineers, without one, `28.0 m/s (101 km/h)`."""
+    return people_speed(speed_mps, unit) if unit else f"{speed_mps:.1f} m/s ({people_speed(speed_mps)})"
 
 
-def setting(name: str, value: float) -> tuple[str, str]:
-    """A named number as (label, value with unit), read off the name's unit suffix."""
-    for suffix, unit in _SUFFIXES:
+def setting(name: str, value: float, unit: SpeedUnit | None = None) -> tuple[str, str]:
+    """A named number as (label, value with unit), read off the name's unit suffix; a speed in the person's unit where
+    one is given."""
+    for suffix, measure in _SUFFIXES:
         if name.endswith(suffix):
             label = name.removesuffix(suffix).replace("_", " ")
-            return label, speed(value) if unit == "m/s" else f"{value:g} {unit}"
+            if measure == "m/s" and unit:
+                return label, people_speed(value, unit, at_most=label.startswith("target"))
+            return label, speed(value) if measure == "m/s" else f"{value:g} {measure}"
     return name.replace("_", " "), f"{value:g}"
 
 

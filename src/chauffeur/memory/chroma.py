@@ -91,9 +91,7 @@ class ChromaMemory:
         try:
             self._chroma: Any = import_module("chromadb")
         except ImportError as error:
-            raise MissingExtraError(
-                "The memory 'chroma' needs Chroma.", hint="Run: pip install 'chauffeur[chroma]'"
-            ) from error
+            raise MissingExtraError("The memory 'chroma' needs Chroma.", extra="chroma") from error
         root = data_home() if home is None else home
         self._root = root / "chroma"
         self._names = KeyRing(self._root, in_use=lambda: any(one.is_dir() for one in self._root.glob("*")))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, Literal
 
-from chauffeur.concept import Feedback, HistoryItem, Program, Trip
+from chauffeur.concept import Feedback, HistoryItem, Program, Result, Trip, result_of
+from chauffeur.concept.results import result_of_stored
 
 MAX_CHARS = 20_000
 """Longest text kept per field: a runaway model reply must not fill a profile."""
@@ -30,8 +32,14 @@ def body_of(trip: Trip) -> str:
             "policy": _cut(text),
             "settings": [[name, value] for name, value in plan.settings],
             "outcome": trip.outcome,
+            "result": str(result_of(trip)),
         }
     )
+
+
+def result_of_kept(body: Mapping[str, Any]) -> Result:
+    """The result of a kept trip; of one kept by an older version, by its outcome and intent."""
+    return result_of_stored(body.get("result") or body["outcome"], body["intent"])
 
 
 def feedback_body(feedback: Feedback) -> str:

@@ -56,6 +56,8 @@ _HASTENING: Final = frozenset({"fast", "faster", "accelerate", "quicker"})
 _STOPPING: Final = frozenset({"stop", "stopping", "halt", "park"})
 _KEEP_LANE: Final = ("Stay in this lane.", "stay in this lane")
 _KEEP_BEHIND: Final = ("Do not overtake.", "stay behind the car ahead")
+_LETTING: Final = frozenset({"let", "letting", "allow", "merge", "cut", "squeeze"})
+_KEEP_GAP: Final = ("Keep the present gap.", "keep the gap to the car ahead as it is")
 _KEEP_SPEED: Final = ("Keep the present speed.", "keep the present speed")
 _NOTHING: Final = ("", "")
 _DENIALS: Final[tuple[tuple[str, frozenset[str], tuple[str, str]], ...]] = (
@@ -67,6 +69,8 @@ _DENIALS: Final[tuple[tuple[str, frozenset[str], tuple[str, str]], ...]] = (
     ("overtake", _PASSING, _KEEP_BEHIND),
     ("pull_over", frozenset({"pull"}) | _STOPPING, _KEEP_SPEED),
     ("stop", frozenset({"pull"}) | _STOPPING, _KEEP_SPEED),
+    ("yield", _LETTING, _KEEP_GAP),
+    ("gap.increase", _LETTING, _KEEP_GAP),
     ("speed.decrease", _SLOWING, _KEEP_SPEED),
     ("speed.increase", _HASTENING, _KEEP_SPEED),
 )

@@ -1,4 +1,4 @@
-"""Recorded answers played back, and the recorder that writes them: the same run again, offline and for nothing.
+"""Recorded answers played back: the same run again, offline and for nothing.
 
 A recording is a file of JSON lines. Each line answers one request, found by the hash of the request or else by the
 words of the instruction and the number of earlier rounds; of several such lines the last counts:
@@ -6,14 +6,13 @@ words of the instruction and the number of earlier rounds; of several such lines
     {"version": 1, "request": "<hash>", "instruction": "Pass it.", "round": 0, "plan": {...}}
     {"version": 1, "instruction": "Pass it.", "reply": "Thoughts: ...```python ...```"}
 
-`plan` is a whole plan as the recorder wrote it; `reply` is a model's words, for recordings written by hand.
+`plan` is a whole plan as `dataclasses.asdict` has it; `reply` is a model's words.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -32,7 +31,6 @@ from chauffeur.concept import (
     Trajectory,
     Usage,
 )
-from chauffeur.planners.base import Planner
 from chauffeur.planners.cache import content_key
 from chauffeur.planners.llm_reply import read_reply
 
@@ -149,7 +147,7 @@ class ReplayPlanner:
         if plan is None:
             raise PlannerError(
                 f"{self._path} holds no answer to {request.instruction.text[:80]!r} in round {len(request.rounds)}.",
-                hint="Record it first, with the planner that can answer it.",
+                hint="Write a line for it: the module `chauffeur.planners.replay` says how.",
             )
         usage = replace(plan.usage, cost_usd=0.0, requests=0, cached=True)
         return replace(plan, planner=self.id, model=plan.model or self._model, usage=usage, latency_s=0.0)
@@ -167,52 +165,3 @@ class ReplayPlanner:
         self._by_words[words] = plan
         if isinstance(fields.get("request"), str):
             self._by_request[fields["request"]] = plan
-
-
-class RecordingPlanner:
-    """Another planner, with every plan it makes written down.
-
-    Args:
-        inner: The planner that does the work.
-        path: Recording to add to; made readable by its owner only, because it holds a person's words.
-    """
-
-    def __init__(self, inner: Planner, path: Path) -> None:
-        self._inner = inner
-        self._path = path
-
-    @property
-    def id(self) -> str:
-        """Id of the planner that does the work."""
-        return self._inner.id
-
-    @property
-    def model(self) -> str:
-        """Model of the planner that does the work."""
-        return self._inner.model
-
-    async def plan(self, request: PlanRequest) -> Plan:
-        """The inner planner's plan, recorded before it is returned."""
-        plan = await self._inner.plan(request)
-        record = {
-            "version": _VERSION,
-            "request": request_key(request),
-            "instruction": request.instruction.text,
-            "round": len(request.rounds),
-            "plan": asdict(plan),
-        }
-        self._append(json.dumps(record).encode("ascii") + b"\n")
-        return plan
-
-    def _append(self, line: bytes) -> None:
-        try:
-            # One write to an append-only descriptor: lines of several writers do not mix.
-            descriptor = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
-            try:
-                os.write(descriptor, line)
-            finally:
-                os.close(descriptor)
-        except OSError as error:
-            raise DataError(
-                f"The plan cannot be recorded in {self._path}: {error.strerror}.", hint="Check path and free space."
-            ) from error

@@ -74,10 +74,6 @@ class GateReport:
         """Whether the program may run."""
         return not self.errors
 
-    def for_model(self) -> str:
-        """The findings as text for a repair turn; empty when there are none."""
-        return "\n".join(str(finding) for finding in self.findings)
-
 
 def check_source(source: str, library: str = "", vocabulary: Vocabulary = "road") -> GateReport:
     """Judge a program text. Never raises and never runs it. The verdict of a text judged before is remembered.

@@ -25,7 +25,8 @@ _log = logging.getLogger(__name__)
 def run_checks(
     plan: Plan, observation: Observation, limits: Limits, checks: Sequence[Check] = DEFAULT_CHECKS
 ) -> tuple[Verdict, ...]:
-    """Every check's verdict, in order. A check that breaks has not vouched for the plan: its verdict is a refusal."""
+    """Every check's verdict, in order. A check that breaks has compared nothing and not vouched for the
+    plan: its verdict is a refusal."""
     return tuple(_judge(check, plan, observation, limits) for check in checks)
 
 
@@ -37,5 +38,5 @@ def _judge(check: Check, plan: Plan, observation: Observation, limits: Limits) -
         _log.warning("safety check %s failed: %r", name, error)
         return Verdict(
             name, False, f"The check {name} could not judge this plan ({type(error).__name__}).", None,
-            "Ask again; if it stays so, the plan's values are of the wrong types.",
+            "Ask again; if it stays so, the plan's values are of the wrong types.", not_compared="check-broke",
         )  # fmt: skip

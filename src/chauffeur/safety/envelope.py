@@ -76,6 +76,8 @@ class _Road:
 
 def check_parameters(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
     """Whether every number and manoeuvre that can be read from the plan fits the road, the situation and the limits."""
+    if plan.policy is None and plan.refusal:
+        return Verdict(PARAMETERS_CHECK, True, "There is no policy to check.", not_compared="no-policy")
     road = _road(observation)
     faults = [*_policy_faults(plan, road, limits), *_setting_faults(plan, road, limits), *_intent_faults(plan, road)]
     if isinstance(plan.policy, Trajectory) and not faults and _readable(plan.policy):

@@ -20,10 +20,10 @@ MOST_ROUTE_CHARS: Final = 40
 def check_format(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
     """Whether the policy is present, of a known kind, accepted by the static gate, and made of finite numbers."""
     match plan.policy:
+        case None if plan.refusal:  # asked back, answered or declined: nothing is to be driven
+            return Verdict(FORMAT_CHECK, True, "There is no policy to check.", not_compared="no-policy")
         case None:
-            return _fail(
-                plan.refusal or "The planner gave no policy.", "Say the wish in other words, or ask for less at once."
-            )
+            return _fail("The planner gave no policy.", "Say the wish in other words, or ask for less at once.")
         case Program(source=source, library=library):
             return _program(source, library, observation.kind)
         case Parameters() as values:

@@ -33,8 +33,14 @@ def check_minimum_speed(plan: Plan, observation: Observation, limits: Limits) ->
     """Whether no set-point that can be read from the plan is far below traffic on a highway."""
     least = least_speed_mps(observation, limits)
     if least is None or plan.policy is None:
-        return Verdict(MINIMUM_SPEED_CHECK, True, "No minimum speed holds here.")
-    slow = [(speed, line) for speed, line in _set_points(plan, observation) if speed < least - _ROUNDING]
+        return Verdict(
+            MINIMUM_SPEED_CHECK, True, "No minimum speed holds here." if least is None else "There is no policy.",
+            not_compared="no-rule-here" if least is None else "no-policy",
+        )  # fmt: skip
+    found = list(_set_points(plan, observation))
+    if not found:
+        return Verdict(MINIMUM_SPEED_CHECK, True, "No set-point can be read.", not_compared="unreadable")
+    slow = [(speed, line) for speed, line in found if speed < least - _ROUNDING]
     if not slow:
         return Verdict(MINIMUM_SPEED_CHECK, True, f"No set-point is below the least speed of {speed_words(least)}.")
     speed, line = min(slow, key=lambda one: one[0])

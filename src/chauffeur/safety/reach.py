@@ -77,7 +77,7 @@ class _Finding:
 def check_reach(plan: Plan, observation: Observation, limits: Limits) -> Verdict:
     """Whether everything that a program can be followed to stays within the limits."""
     if not isinstance(plan.policy, Program):
-        return Verdict(REACH_CHECK, True, "There is no program to follow.")
+        return Verdict(REACH_CHECK, True, "There is no program to follow.", not_compared="no-program")
     where = Circumstances.of(observation)
     try:
         report = verify(plan.policy.source, plan.policy.library, where)

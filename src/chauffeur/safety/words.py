@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import Final
 
 from chauffeur.concept import Verdict
-from chauffeur.concept.units import kmh
+from chauffeur.concept.units import kmh, people_speed
 
 IN_A_HELPER: Final = "(In a helper function.)"
 """Added for the model that repairs a program; the person has none."""
@@ -19,7 +19,7 @@ _BOTH_UNITS: Final = re.compile(r"(?<![\d.])(\d{1,9}(?:\.\d{1,9})?(?:e[+-]?\d{1,
 @lru_cache(maxsize=256)
 def speed_words(speed_mps: float) -> str:
     """A speed, e.g. `38.3 m/s (138 km/h)`."""
-    return f"{speed_mps:.4g} m/s ({kmh(speed_mps):.0f} km/h)"
+    return f"{speed_mps:.4g} m/s ({people_speed(speed_mps)})"
 
 
 def reasons_once(verdicts: Iterable[Verdict], *, remedies: bool = False) -> str:

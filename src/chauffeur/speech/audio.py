@@ -146,7 +146,7 @@ def resample(sound: npt.NDArray[np.float32], rate_hz: int) -> Samples:
         except ImportError as error:
             raise MissingExtraError(
                 f"Sound at {rate_hz} Hz has to be resampled to {SAMPLE_RATE_HZ} Hz, which needs soxr.",
-                hint="Run: pip install 'chauffeur[speech]'",
+                extra="speech",
             ) from error
         sound = np.asarray(soxr.resample(sound, rate_hz, SAMPLE_RATE_HZ), np.float32)
     return to_int16(sound)

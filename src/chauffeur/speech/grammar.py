@@ -30,8 +30,8 @@ _PHONES: Final = "phones"
 _PEAK: Final = 0.5
 """Level that sound is brought to; the acoustic model was trained on nothing quieter."""
 
-_DITHER: Final = 3e-3
-"""Standard deviation of noise added to it, 45 dB below: digital silence, which no cabin has, confuses the model."""
+_DITHER: Final = 1e-2
+"""Standard deviation of noise added to it, 34 dB below: digital silence, which no cabin has, confuses the model."""
 
 _SHORTEST_S: Final = 0.2
 _SCALE: Final = 1024.0
@@ -85,9 +85,7 @@ class GrammarRecogniser:
         try:
             import pocketsphinx
         except ImportError as error:
-            raise MissingExtraError(
-                "The offline speech engine needs pocketsphinx.", hint="Run: pip install 'chauffeur[speech]'"
-            ) from error
+            raise MissingExtraError("The offline speech engine needs pocketsphinx.", extra="speech") from error
         library: Any = pocketsphinx
         self.grammar = driving_grammar() if grammar is None else grammar
         """What it can hear."""
@@ -146,7 +144,7 @@ class GrammarRecogniser:
         confidence = _confidence(features)
         if confidence < self._sure:
             return Transcript("", confidence, to_confirm=True, reason="That sounded like something else than driving.")
-        return Transcript(text, confidence, to_confirm=not self.safe(text))
+        return Transcript(text, confidence, to_confirm=confidence < _SURE_SAFE or not self.safe(text))
 
     # Following (base.FollowingRecogniser) ----------------------------------------------------------------------------
 

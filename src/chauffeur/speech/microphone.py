@@ -39,9 +39,7 @@ class Microphone:
         try:
             import sounddevice
         except ImportError as error:
-            raise MissingExtraError(
-                "A microphone needs sounddevice.", hint="Run: pip install 'chauffeur[speech]'"
-            ) from error
+            raise MissingExtraError("A microphone needs sounddevice.", extra="speech") from error
         except OSError as error:  # the Python part is there, the C library is not
             raise MissingExtraError(
                 "A microphone needs the PortAudio library.", hint="Run: apt install libportaudio2"

@@ -82,7 +82,7 @@ def test_an_unplugged_microphone_is_told_and_screens_are_listened_to_then(tmp_pa
     config.write_text(CONFIG.format(base=ALSA, sound=tmp_path / "sound.raw"))
     done = subprocess.run(
         [sys.executable, "-c", SESSION], env=os.environ | {"ALSA_CONFIG_PATH": str(config)}, capture_output=True,
-        text=True, timeout=180, check=False,
+        text=True, timeout=600, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     acted, notes = done.stdout.strip().splitlines()[-2:]

@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,7 +12,7 @@ import pytest
 torch = pytest.importorskip("torch")
 pytest.importorskip("transformers")
 
-from chauffeur.models.vilad.decoding import AdaptiveCached, BlockCached, PrefixCached, Refresh, Twin, Uncached
+from chauffeur.models.vilad.decoding import AdaptiveCached, PrefixCached, Refresh, Twin, Uncached
 from chauffeur.models.vilad.network import SIZES, Vilad, ViladConfig
 from chauffeur.planners.vilad.parking import TEMPLATE
 from chauffeur.planners.vilad.unmasking import Unmasking, unmask, unmask_many
@@ -133,20 +131,6 @@ def test_caches_compute_less_and_deviate_little(made: tuple[Any, Any, Any, Any])
     partial(TEMPLATE.canvas)
     partial(row)
     assert partial.tokens == T + S + L + round(0.25 * L)
-
-
-def test_one_block_is_the_prefix_cache_and_blocks_keep_their_order(made: tuple[Any, Any, Any, Any]) -> None:
-    model, _, words, scene = made
-    allowed, how = TEMPLATE.allowed(S), Unmasking(steps=5, tau=0.99)
-    whole = BlockCached(model, words, scene, L).decide(TEMPLATE, allowed, how, L)
-    prefix = unmask(PrefixCached(model, words, scene, L), TEMPLATE.canvas, allowed, how)
-    assert whole.row.tobytes() == prefix.row.tobytes()
-    assert whole.passes == prefix.passes
-    parts = BlockCached(model, words, scene, L).decide(TEMPLATE, allowed, replace(how, steps=2), 7)
-    TEMPLATE.validate(parts.row, S)
-    order = [parts.order[at : at + 7] for at in range(0, L, 7)]
-    ends = [(one[one > 0].min(), one.max()) for one in order if one.any()]
-    assert all(first[1] < second[0] for first, second in pairwise(ends))
 
 
 @pytest.mark.parametrize("skip", [False, True])

@@ -18,9 +18,17 @@ from safetensors.torch import load_file  # noqa: E402
 from tiny_qwen import tiny_qwen  # noqa: E402
 
 from chauffeur.concept import ConfigError  # noqa: E402
-from chauffeur.models.export.awq import packed, quantise, rounded, unpacked  # noqa: E402
+from chauffeur.models.export.awq import packed, quantise, rounded  # noqa: E402
 from chauffeur.models.vlm.lora import ChatExamples  # noqa: E402
 from chauffeur.models.vlm.quantise import quantise_vlm  # noqa: E402
+
+
+def unpacked(words: torch.Tensor, length: int, along: int = 1) -> torch.Tensor:
+    """What `packed` packed, eight numbers of 4 bits in a word, the first one lowest: int8, `length` long."""
+    rows = words if along == 1 else words.T
+    numbers = (rows.to(torch.int64)[..., None] >> (4 * torch.arange(8))) & 15
+    whole = (numbers.reshape(rows.shape[0], -1)[:, :length] - 8).to(torch.int8)
+    return whole if along == 1 else whole.T
 
 
 @settings(max_examples=60)

@@ -14,9 +14,6 @@ from chauffeur.planners.vilad.template import (
     MASK,
     ActionSlot,
     ActionTemplate,
-    digit_slots,
-    read_number,
-    write_number,
 )
 from chauffeur.planners.vilad.unmasking import (
     PAPER,
@@ -169,14 +166,6 @@ def test_a_template_knows_its_decisions() -> None:
         ActionTemplate((ActionSlot("a", WORDS), ActionSlot("a", WORDS)))
     with pytest.raises(ConfigError, match="at least one step"):
         Unmasking(steps=0)
-
-
-@given(st.floats(-99.94, 99.94))
-def test_numbers_as_digits_come_back(value: float) -> None:
-    template = ActionTemplate(digit_slots("x", 2, 1))
-    row = template.encode(write_number("x", value, 2, 1))
-    assert read_number("x", template.decode(row), 2, 1) == pytest.approx(value, abs=0.0501)
-    assert template.length == 5
 
 
 def test_shares_and_entropy() -> None:

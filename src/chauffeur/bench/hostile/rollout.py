@@ -25,7 +25,7 @@ from chauffeur.concept import (
 )
 from chauffeur.drive.episode import Episode
 from chauffeur.drive.planning import checked
-from chauffeur.drive.session import drive_policy, drive_without_program, make_world
+from chauffeur.drive.session import drive_policy, make_world
 from chauffeur.programs.sandbox import UNHURRIED, Sandbox
 
 ROLLOUT_VERSION: Final = "hostile-rollout-v2"
@@ -93,13 +93,6 @@ def roll_out(job: DriveJob) -> dict[str, Any]:
         "detail": episode.causes.detail,
         "drive": asdict(describe_drive(episode, job.limits)),
     }
-
-
-def untouched(scenario: Scenario) -> Episode:
-    """The scene driven by the world's own driver, nobody wishing anything: what a collision is compared with."""
-    world = make_world(scenario)
-    world.reset(scenario)
-    return drive_without_program(world, None, MAX_S)
 
 
 @dataclass(frozen=True, slots=True)

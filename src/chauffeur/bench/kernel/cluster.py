@@ -231,7 +231,5 @@ def _import_ray(*, own_cluster: bool) -> Any:
     try:
         ray: Any = import_module("ray")
     except ImportError as error:
-        raise MissingExtraError(
-            "Ray is not installed.", hint="Install it with: pip install 'chauffeur[cluster]'"
-        ) from error
+        raise MissingExtraError("Ray is not installed.", extra="cluster") from error
     return ray

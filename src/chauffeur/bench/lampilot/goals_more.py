@@ -54,11 +54,6 @@ class SequenceGoal:
         else:
             self._waiting.pop(0)
 
-    @property
-    def steps_left(self) -> int:
-        """Steps not done yet, the present one included."""
-        return len(self._waiting) + (self._goal is not None)
-
     def rule(self, elapsed_s: float, now: Instant) -> Ruling:
         """See Goal."""
         since = elapsed_s - self._begun_s

@@ -9,15 +9,15 @@ from __future__ import annotations
 from chauffeur.bench.lampilot.metrics import metrics_of
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.signals import SignalLog
-from chauffeur.concept import Metric, Outcome, Plan, ProgramState, Scenario, Setpoints
+from chauffeur.concept import JudgedBy, Metric, Outcome, Plan, ProgramState, Scenario, Setpoints
 from chauffeur.drive.episode import Referee
 from chauffeur.drive.fulfilment import Fulfilment, can_be_judged
 from chauffeur.worlds.base import World
 from chauffeur.worlds.highway import HighwayWorld
 
 
-def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
-    """Judge of a trip; None where nobody says what was to be done.
+def referee_for(world: World, scenario: Scenario, plan: Plan, wish: str = "") -> Referee | None:
+    """Judge of a trip; None where neither words nor plan say what was to be done.
 
     Raises:
         ScenarioError: The scenario's own goal cannot be judged.
@@ -26,16 +26,16 @@ def referee_for(world: World, scenario: Scenario, plan: Plan) -> Referee | None:
         return None
     if scenario.goal:
         return LampilotReferee(world, scenario)
-    return ScoredFulfilment(world, plan) if can_be_judged(plan) else None
+    return ScoredFulfilment(world, plan, wish) if can_be_judged(plan, wish) else None
 
 
 class ScoredFulfilment:
     """The referee of a free drive, with LaMPilot's scores beside it."""
 
-    def __init__(self, world: HighwayWorld, plan: Plan) -> None:
+    def __init__(self, world: HighwayWorld, plan: Plan, wish: str) -> None:
         self._road = world.perception()
         self._log = SignalLog(self._road)
-        self._wish = Fulfilment(world, plan)
+        self._wish = Fulfilment(world, plan, wish)
 
     def follow(self, setpoints: Setpoints, state: ProgramState) -> None:
         """What the policy asks for in this control period."""
@@ -60,6 +60,16 @@ class ScoredFulfilment:
     def shortfall(self) -> str:
         """What is missing, in words."""
         return self._wish.shortfall
+
+    @property
+    def parts_done(self) -> tuple[int, int]:
+        """Parts that are done, and all of them."""
+        return self._wish.parts_done
+
+    @property
+    def judged_by(self) -> JudgedBy:
+        """Source of what the drive is judged by."""
+        return self._wish.judged_by
 
     def outcome(self) -> Outcome:
         """What came of it, collisions apart."""

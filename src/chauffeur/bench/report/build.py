@@ -1,4 +1,4 @@
-"""A report from run folders: everything it says, ready to be drawn as a page, Markdown or LaTeX."""
+"""A report from run folders: everything it says, ready to be drawn as a page or as Markdown."""
 
 from __future__ import annotations
 

@@ -70,9 +70,7 @@ def _inspect() -> Any:
     try:
         return importlib.import_module("inspect_ai.log")
     except ImportError as error:
-        raise MissingExtraError(
-            "An Inspect log needs Inspect AI, which is not installed.", hint='pip install "chauffeur[inspect]"'
-        ) from error
+        raise MissingExtraError("An Inspect log needs Inspect AI, which is not installed.", extra="inspect") from error
 
 
 def log_content(run: Run, how: RowSampling) -> dict[str, Any]:

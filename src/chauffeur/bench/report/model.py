@@ -1,4 +1,4 @@
-"""A report as values: what every form of it (page, Markdown, LaTeX) says, before anything is drawn."""
+"""A report as values: what every form of it (page, Markdown) says, before anything is drawn."""
 
 from __future__ import annotations
 

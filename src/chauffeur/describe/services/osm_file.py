@@ -57,7 +57,7 @@ def load_road_map(path: Path) -> RoadMap:
         import osmium
         import osmium.osm
     except ImportError as error:
-        raise MissingExtraError("Reading maps needs pyosmium.", hint="Run: pip install 'chauffeur[map]'") from error
+        raise MissingExtraError("Reading maps needs pyosmium.", extra="map") from error
     try:
         gone = _marked_as_gone(path)
         header, roads = _roads(path, gone)

@@ -60,11 +60,6 @@ def distance_m(one: Position, other: Position) -> float:
     return 2.0 * EARTH_M * math.asin(min(1.0, math.sqrt(chord)))
 
 
-def turn_deg(one_deg: float, other_deg: float) -> float:
-    """Angle between two headings, 0 to 180."""
-    return abs(math.remainder(one_deg - other_deg, 360.0))
-
-
 @dataclass(frozen=True, slots=True)
 class ServiceReading(Generic[T_co]):
     """A value that somebody told.

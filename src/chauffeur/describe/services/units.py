@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from chauffeur.concept.units import M_PER_MILE, kmh, mph
+from chauffeur.concept.units import M_PER_MILE, people_speed
 from chauffeur.describe.services.rules import Rules
 
 
 def speed_words(speed_mps: float, rules: Rules | None) -> str:
     """A speed as signs of the region give it: `50 km/h`, `30 mph`."""
-    return f"{mph(speed_mps):.0f} mph" if rules is not None and rules.unit == "mph" else f"{kmh(speed_mps):.0f} km/h"
+    return people_speed(speed_mps, "mph" if rules is not None and rules.unit == "mph" else "km/h")
 
 
 def distance_words(length_m: float, rules: Rules | None) -> str:

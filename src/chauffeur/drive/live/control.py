@@ -143,8 +143,9 @@ class Control:
             policy = kinds[period // each]
             if policy is not None and period % each == 0:
                 with contextlib.suppress(ChauffeurError):  # what its kind needs is not installed: none is driven
-                    executor = executor_for(policy, self._world)
-                    executor.start(policy, observation, start.limits)
+                    begun = executor_for(policy, self._world)
+                    begun.start(policy, observation, start.limits)
+                    executor = begun
             if executor is None:
                 setpoints = driver.settle(setpoints)
                 command = driver.command(setpoints)

@@ -95,11 +95,6 @@ class Ticker:
         self.missed = 0
         """Periods that were never begun, because the one before ended, or was woken, a whole period late."""
 
-    @property
-    def due_ns(self) -> int:
-        """When the next period begins."""
-        return self._due_ns
-
     def restart(self) -> None:
         """Count from now: after a pause that was meant."""
         self._due_ns = self._clock_ns() + self._period_ns
@@ -133,11 +128,6 @@ class Punctuality:
     p99_ms: float
     p999_ms: float
     max_ms: float
-
-    @property
-    def missed_share(self) -> float:
-        """Missed periods of all that were due."""
-        return self.missed / max(1, self.ticks + self.missed)
 
 
 def punctuality(lateness_ns: array[int], missed: int) -> Punctuality:

@@ -118,7 +118,7 @@ def check_vehicle(plan: Plan, seen: VehicleObservation) -> Verdict:
             "Ask for a speed.",
         )
     if policy is None:
-        return Verdict(VEHICLE_CHECK, True, "There is nothing to ask for.")  # declined; `format-v1` says why
+        return Verdict(VEHICLE_CHECK, True, "There is nothing to ask for.", not_compared="no-policy")
     if not isinstance(policy, Parameters):
         return _no(
             f"The planner gives a policy of the kind {policy.kind!r}; a vehicle takes parameters.",

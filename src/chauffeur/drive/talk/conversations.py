@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Final
 
 from chauffeur.concept import Feedback, History, HistoryItem, Observation, Parameters, Plan, Policy, Program
-from chauffeur.concept.units import kmh
+from chauffeur.concept.units import people_speed
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live.messages import Report
 from chauffeur.drive.live.starts import Start
@@ -16,6 +16,7 @@ from chauffeur.drive.live.supervisor import Interaction
 from chauffeur.drive.talk.messages import Conversation, HowWasIt, StageTimes
 from chauffeur.drive.talk.verdicts import Judge, JudgedCase
 from chauffeur.drive.talk.wish_queue import Words
+from chauffeur.drive.wish_parts import account_of, result_of_event
 from chauffeur.geometry.road_graph import TURNS
 from chauffeur.programs.loops import has_end
 
@@ -132,7 +133,11 @@ class Conversations:
             case _:
                 shown = replace(shown, why=event.text)
         if event.final:
-            shown = replace(shown, stage="closed", outcome=event.kind, why=event.text)
+            result = result_of_event(event.kind, shown.text, each.plan)
+            unused = () if each.plan is None else account_of(shown.text, each.plan).unused
+            left_out = f"I did not use: {', '.join(f'“{part}”' for part in unused)}." if unused else ""
+            why = " ".join(text for text in (event.text, left_out) if text)
+            shown = replace(shown, stage="closed", outcome=event.kind, result=str(result), why=why)
         each.shown = replace(shown, stages=stages)
         if event.kind == "refused":
             self._hand_in(each)
@@ -233,7 +238,7 @@ def source_of(policy: Policy) -> str:
         case Parameters():
             speed = policy.target_speed_mps
             lines = [
-                f"target speed: {speed:.1f} m/s ({kmh(speed):.0f} km/h)",
+                f"target speed: {people_speed(speed, at_most=True)}",
                 f"look ahead: {policy.look_ahead_ratio:g} s, {policy.look_ahead_m:g} m at least",
                 f"lane: {_LANES[policy.lane]}",
                 *([f"way: {policy.route}"] if policy.route else []),

@@ -24,6 +24,7 @@ from chauffeur.memory.base import Memory
 from chauffeur.memory.choice import chosen_memory, open_memory
 from chauffeur.memory.files import private_directory, publish
 from chauffeur.memory.privacy import Privacy, read_privacy, write_privacy
+from chauffeur.memory.records import result_of_kept
 
 RETRY_S: Final = 5.0
 """What could not be kept for now (a locked file, a full disk) is tried again after so long."""
@@ -364,7 +365,7 @@ class MemoryWorker:
 
 def _entry_of(trip: dict[str, Any]) -> MemoryEntry:
     said = "; ".join(each["text"] for each in trip["feedback"])
-    return MemoryEntry(trip["trip"], trip["when"], trip["instruction"], trip["outcome"], said)
+    return MemoryEntry(trip["trip"], trip["when"], trip["instruction"], str(result_of_kept(trip)), said)
 
 
 def _whole_days(days: float | None) -> int | None:

@@ -199,11 +199,12 @@ class VerdictShown:
     reason: str
     informs: bool = False
     proven: bool = True
+    compared: bool = True
 
     @property
     def mark(self) -> Mark:
         """How it is marked."""
-        return mark_of(passed=self.passed, vetoes=not self.informs, proven=self.proven)
+        return mark_of(passed=self.passed, vetoes=not self.informs, proven=self.proven, compared=self.compared)
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,6 +240,7 @@ class Conversation:
         follows: Wish whose opinion became this wish; empty where it is none.
         stage: `asked`, `planned`, `driven`, `closed`.
         outcome: Kind of the event that closed it (drive.live.orders.EventKind); empty before.
+        result: The same in the words of every screen (`concept.Result`); empty before.
         why: What was told last, in words.
         thoughts: R of the planner.
         policy: Kind of P (`program`, `parameters`), empty where there is none.
@@ -257,6 +259,7 @@ class Conversation:
     spoken: bool = False
     stage: Literal["asked", "planned", "driven", "closed"] = "asked"
     outcome: str = ""
+    result: str = ""
     why: str = ""
     thoughts: str = ""
     policy: str = ""

@@ -115,4 +115,6 @@ def _as_told(verdicts: tuple[Verdict, ...], event: DriveEvent) -> bool:
 
 
 def _shown(verdict: Verdict, *, informs: bool = False) -> VerdictShown:
-    return VerdictShown(verdict.check, verdict.passed, verdict.reason, informs or not verdict.vetoes, verdict.proven)
+    compared = verdict.not_compared is None
+    informs = informs or not verdict.vetoes
+    return VerdictShown(verdict.check, verdict.passed, verdict.reason, informs, verdict.proven, compared)

@@ -18,8 +18,8 @@ function niceTicks(low, high, wanted) {
   return ticks;
 }
 
-/* `series` is [{name, className, values, broken}]: a line breaks where `broken` changes value. `right` labels the same ticks in another unit. */
-function makeChart({ element, legend, series, low, high, unit, right, total, onSeek, timeAxis, bands = [] }) {
+/* `series` is [{name, className, values, broken}]: a line breaks where `broken` changes value. */
+function makeChart({ element, legend, series, low, high, unit, total, onSeek, timeAxis, bands = [] }) {
   legend.append(make('span', unit, 'unit'));
   for (const item of series) {
     const part = make('span');
@@ -31,7 +31,6 @@ function makeChart({ element, legend, series, low, high, unit, right, total, onS
     part.append(make('i', null, 'c-shield'), make('span', 'Shield acts'));
     legend.append(part);
   }
-  if (right) legend.append(make('span', right.unit, 'unit right'));
   let cursor;
   let dot;
   let place;
@@ -73,7 +72,6 @@ function makeChart({ element, legend, series, low, high, unit, right, total, onS
       const y = place.y(tick);
       element.append(svg('line', { class: 'grid', x1: gutter, x2: width - gutter, y1: y, y2: y }));
       element.append(svg('text', { x: gutter - 8, y: y + 4, 'text-anchor': 'end' }, `${+tick.toFixed(2)}`));
-      if (right) element.append(svg('text', { x: width - gutter + 8, y: y + 4 }, right.of(tick)));
     }
     if (timeAxis) {
       for (const tick of niceTicks(0, total, Math.max(3, width / 110))) {
@@ -101,20 +99,20 @@ function makeChart({ element, legend, series, low, high, unit, right, total, onS
 }
 
 function makeCharts(total, onSeek) {
-  const known = [...drive.speed, ...drive.target, ...drive.limit].filter((v) => v !== null);
+  const inPace = (values) => values.map((v) => (v === null ? null : v * trip.pace.of));
+  const known = inPace([...drive.speed, ...drive.target, ...drive.limit]).filter((v) => v !== null);
   const top = Math.max(...known);
   const low = Math.max(0, Math.floor(Math.min(...known) - Math.max(1, top * 0.05)));
   const limits = drive.limit.some((v) => v !== null);
   const gaps = drive.gap.filter((v) => v !== null && v <= FAR_M);
   const charts = [makeChart({
-    element: $('speed-chart'), legend: $('speed-legend'), unit: 'm/s', total, onSeek, timeAxis: !gaps.length,
-    right: { unit: 'km/h', of: (v) => (v * 3.6).toFixed(0) },
+    element: $('speed-chart'), legend: $('speed-legend'), unit: trip.pace.unit, total, onSeek, timeAxis: !gaps.length,
     low, high: Math.ceil(top + Math.max(1, top * 0.04)),
     bands: trip.shield ? trip.shield.stretches : [],
     series: [
-      { name: 'Speed', className: 'c-speed', values: drive.speed },
-      { name: 'Target speed', className: 'c-target', values: drive.target },
-      ...(limits ? [{ name: 'Speed limit', className: 'c-limit', values: drive.limit }] : []),
+      { name: 'Speed', className: 'c-speed', values: inPace(drive.speed) },
+      { name: 'Target speed', className: 'c-target', values: inPace(drive.target) },
+      ...(limits ? [{ name: 'Speed limit', className: 'c-limit', values: inPace(drive.limit) }] : []),
     ],
   })];
   if (gaps.length) {

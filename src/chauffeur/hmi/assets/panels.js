@@ -18,9 +18,9 @@ function pair(list, term, value, small) {
   return dd;
 }
 
-function speedWords(mps) {
-  return `${mps.toFixed(1)} m/s (${(mps * 3.6).toFixed(0)} km/h)`;
-}
+/* Speeds in the person's unit, whole; what must not be exceeded is rounded down, but for what storing it has cost. */
+const pace = (mps) => (mps * trip.pace.of).toFixed(0);
+const atMost = (mps) => Math.floor(mps * trip.pace.of + 0.05).toFixed(0);
 
 function fillUnderstood() {
   const row = (term, value) => {
@@ -29,11 +29,11 @@ function fillUnderstood() {
     box.append(make('dt', term), make('dd', value));
     $('understood').append(box);
   };
-  row('Said by', trip.person);
-  row('Understood as', trip.intent);
-  for (const [name, value] of trip.settings) row(name, value);
-  row('Declined', trip.refusal);
+  row({ 'asked back': 'Asked', done: 'Answer' }[trip.outcome.result] || 'Declined', trip.refusal);
+  if (trip.outcome.end) row('At the end', trip.outcome.end);
+  row('Going to', trip.going_to);
   row('Road', trip.title);
+  row('Said by', trip.person);
 }
 
 function fillProgram() {
@@ -70,7 +70,7 @@ function fillProgram() {
 }
 
 /* What a mark looks like and is called; which one a verdict gets was decided where it was judged. */
-const MARKS = { passed: ['pass', 'passed'], open: ['open', 'not proven'], differs: ['doubt', 'does not fit'], failed: ['fail', 'not passed'] };
+const MARKS = { passed: ['pass', 'passed'], open: ['open', 'not proven'], differs: ['doubt', 'does not fit'], failed: ['fail', 'not passed'], not_compared: ['uncompared', 'not compared'] };
 
 function fillVerdicts() {
   if (!trip.verdicts.length) $('verdicts').append(make('li', 'No check was run.', 'none'));
@@ -83,7 +83,7 @@ function fillVerdicts() {
     const where = verdict.line ? `${verdict.check}, line ${verdict.line}` : verdict.check;
     item.append(icon, make('span', verdict.reason || (verdict.passed ? 'Passed.' : 'Not passed.')));
     if (verdict.remedy && !verdict.passed && verdict.vetoes) item.append(make('span', verdict.remedy));
-    if (!verdict.passed && !verdict.vetoes) item.append(make('span', 'This informs; it stops nothing. The thoughts show where.'));
+    if (verdict.mark === 'differs') item.append(make('span', 'This informs; it stops nothing. The thoughts show where.'));
     item.append(make('small', where));
     $('verdicts').append(item);
   }
@@ -91,11 +91,13 @@ function fillVerdicts() {
 
 function fillResults() {
   $('outcome').classList.add(trip.outcome.tone);
-  for (const cause of trip.outcome.causes) $('causes').append(make('li', cause));
+  for (const cause of trip.outcome.causes) if (cause !== trip.refusal) $('causes').append(make('li', cause));
+  $('judged').textContent = trip.outcome.judged || 'Nothing was driven that could be judged.';
   const scores = $('scores');
-  pair(scores, 'Outcome', trip.outcome.label);
-  if (trip.outcome.end) pair(scores, 'At the end', trip.outcome.end);
+  pair(scores, 'Result', trip.outcome.label);
   pair(scores, 'Time driven', `${trip.duration.toFixed(1)} s`);
+  pair(scores, 'Understood as', trip.intent || 'not told');
+  for (const [name, value] of trip.settings) pair(scores, name, value);
   for (const metric of trip.metrics) {
     const dd = pair(scores, metric.name, metric.value, metric.id);
     if (!metric.applies) dd.className = 'na';
@@ -195,12 +197,12 @@ function makeInstruments() {
   const [speed, target, gap, place] = cells;
   speed.value.className = 'ego';
   place.value.className = 'words';
-  const put = (cell, mps) => {
-    cell.value.textContent = `${mps.toFixed(1)} m/s`;
-    cell.value.append(make('small', `${(mps * 3.6).toFixed(0)} km/h`));
+  const put = (cell, number) => {
+    cell.value.textContent = number;
+    cell.value.append(make('small', trip.pace.unit));
   };
   return (index, mps) => {
-    put(speed, mps);
+    put(speed, pace(mps));
     const a = drive.acceleration[index];
     const signed = (value) => `${value > 0 ? '+' : value < 0 ? '−' : ''}${Math.abs(value).toFixed(1)}`;
     const asked = drive.asked[index];
@@ -208,9 +210,9 @@ function makeInstruments() {
     speed.sub.textContent = held ? `${signed(a)} m/s², asked ${signed(asked)}` : `${signed(a)} m/s²`;
     const wanted = drive.target[index];
     if (wanted === null) target.value.textContent = 'as it is';
-    else put(target, wanted);
+    else put(target, atMost(wanted));
     const limit = drive.limit[index];
-    target.sub.textContent = limit === null ? '' : `limit ${speedWords(limit)}`;
+    target.sub.textContent = limit === null ? '' : `limit ${atMost(limit)} ${trip.pace.unit}`;
     const distance = drive.gap[index];
     gap.value.textContent = distance === null ? 'none' : `${distance.toFixed(1)} m`;
     if (distance !== null && mps > 1) gap.value.append(make('small', `${(distance / mps).toFixed(1)} s`));

@@ -293,7 +293,7 @@ function makeStage() {
     ctx.stroke();
     ctx.setLineDash([]);
     return () => {
-      const words = `${drive.gap[index].toFixed(0)} m · ${there.v.toFixed(0)} m/s (${(there.v * 3.6).toFixed(0)} km/h)`;
+      const words = `${drive.gap[index].toFixed(0)} m · ${pace(there.v)} ${trip.pace.unit}`;
       const front = sx(there.x) + (car.l / 2) * view.scale + 8;
       if (front < view.width) label(words, front, sy(there.y));
       else label(`${words} →`, view.width, sy(there.y));

@@ -82,14 +82,6 @@ def packed(numbers: Tensor, along: int = 1) -> Tensor:
     return (words if along == 1 else words.T).contiguous()
 
 
-def unpacked(words: Tensor, length: int, along: int = 1) -> Tensor:
-    """What `packed` packed: int8, `length` long along the axis."""
-    rows = words if along == 1 else words.T
-    numbers = (rows.to(torch.int64)[..., None] >> (BITS * torch.arange(_A_WORD))) & ((1 << BITS) - 1)
-    whole = (numbers.reshape(rows.shape[0], -1)[:, :length] + _LOW).to(torch.int8)
-    return whole if along == 1 else whole.T
-
-
 @dataclass(frozen=True, slots=True)
 class _Group:
     """Matrices with the same input, and what makes that input: a norm's weights, or the matrix before."""

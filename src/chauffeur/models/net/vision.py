@@ -177,7 +177,7 @@ class SiglipVision(nn.Module):
         try:
             from transformers import SiglipVisionConfig, SiglipVisionModel
         except ImportError as error:
-            raise MissingExtraError("SigLIP needs transformers.", hint="pip install 'chauffeur[models]'") from error
+            raise MissingExtraError("SigLIP needs transformers.", extra="models") from error
         if config.weights:
             try:
                 self.tower: Any = cast("Any", SiglipVisionModel).from_pretrained(config.weights)

@@ -252,16 +252,3 @@ def stored(folder: Path) -> dict[str, Any] | None:
     """State of a run: `recipe`, `step`, `model` and, where one is kept, `mean`; None where there is none."""
     path = folder / "state.pt"
     return torch.load(path, map_location="cpu", weights_only=True) if path.exists() else None
-
-
-def sharded(model: nn.Module, layers: Iterator[nn.Module]) -> nn.Module:
-    """The network spread over the processes of the default group (FSDP2): layer by layer, then what is left.
-
-    Call it before `fit`, in a process group that is set up, e.g. by torchrun.
-    """
-    from torch.distributed.fsdp import fully_shard
-
-    for layer in layers:
-        fully_shard(layer)
-    fully_shard(model)
-    return model

@@ -120,9 +120,7 @@ def _fitted(criteria: Sequence[str], found: Sequence[AskedCommand], strength: fl
         from sklearn.pipeline import make_union
         from threadpoolctl import threadpool_limits
     except ImportError as error:
-        raise MissingExtraError(
-            "The linear baseline needs scikit-learn.", hint="Run: pip install 'chauffeur[models]'"
-        ) from error
+        raise MissingExtraError("The linear baseline needs scikit-learn.", extra="models") from error
     vectors = make_union(
         TfidfVectorizer(ngram_range=(1, 2), sublinear_tf=True, token_pattern=_WORD),
         TfidfVectorizer(analyzer="char_wb", ngram_range=(2, 5), sublinear_tf=True),

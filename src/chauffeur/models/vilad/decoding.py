@@ -5,7 +5,6 @@ All of them run the same written-out layers, so a cache that is refreshed at eve
 
 `Uncached`        every pass sees prompt and template (X_t of Algorithm 2).
 `PrefixCached`    keys and values of the prompt are kept for some passes (Fast-dLLM's prefix cache, Wu et al. 2025).
-`BlockCached`     those of all other blocks too; the template is decided block after block (its dual cache).
 `AdaptiveCached`  prompt and response are refreshed at intervals of their own; in between only the response tokens whose
                   values changed most are computed anew (dLLM-Cache, Liu et al. 2025).
 `twin`            left to right, with or without the usual cache of keys and values.
@@ -28,8 +27,8 @@ import torch
 
 from chauffeur.models.net.transformer import attended, attended_fused, projected, rotary
 from chauffeur.models.vilad.network import Vilad
-from chauffeur.planners.vilad.template import MASK, ActionTemplate
-from chauffeur.planners.vilad.unmasking import NEVER, Decided, Unmasking, distribution, unmask
+from chauffeur.planners.vilad.template import ActionTemplate
+from chauffeur.planners.vilad.unmasking import NEVER, Decided, distribution
 
 Array = np.ndarray[Any, Any]
 
@@ -178,54 +177,6 @@ class PrefixCached(Uncached):
 
     def _response(self, rows: torch.Tensor) -> torch.Tensor:
         return self._scored(self._some(rows, slice(0, self._length), self._kept), rows)
-
-
-class BlockCached(Uncached):
-    """Blocks of the template one after the other, keys and values of everything else kept within a block."""
-
-    @torch.no_grad()
-    def decide(self, template: ActionTemplate, allowed: Array, how: Unmasking, block: int) -> Decided:
-        """Decide a template in blocks of so many tokens; the first pass of each sees everything.
-
-        Args:
-            template: What.
-            allowed: Bool (L, V).
-            how: How, in each block: Sps is for a block.
-            block: Tokens of a block.
-        """
-        row = template.canvas.copy()
-        order, sure = np.zeros(len(row), np.int64), np.ones(len(row))
-        before = self.passes
-        for start in range(0, len(row), block):
-            places = slice(start, min(start + block, len(row)))
-            if not (row[places] == MASK).any():
-                continue
-            begun = self.passes
-            predict = self._bound(row, places)
-            found = unmask(predict, row[places].copy(), allowed[places], how)
-            row[places] = found.row
-            order[places] = np.where(found.order > 0, found.order + begun - before, 0)
-            sure[places] = found.confidence
-        return Decided(row, order, sure, self.passes - before)
-
-    def _bound(self, row: Array, places: slice) -> Any:
-        kept: list[_Kept] = []
-
-        def first(rows: torch.Tensor) -> torch.Tensor:
-            hidden, found = self._whole(rows)
-            kept.extend(found)
-            begin = self._many
-            return self._scored(hidden[:, begin + places.start : begin + places.stop], rows, places.start)
-
-        def further(rows: torch.Tensor) -> torch.Tensor:
-            return self._scored(self._some(rows, places, kept), rows, places.start)
-
-        def predict(part: Array) -> Array:
-            whole = row.copy()
-            whole[places] = part
-            return self.run_pass(whole, further if kept else first)
-
-        return predict
 
 
 @dataclass(frozen=True, slots=True)

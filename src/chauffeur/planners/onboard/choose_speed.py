@@ -139,7 +139,7 @@ def _step(meaning: Meaning, options: Options) -> Chosen | Declined:
                 f"We already drive {speed_words(options.cruise_mps)}, and {speed_words(options.own_cap_mps)} is what "
                 "is allowed here. I do not go above that by myself; name a speed if you want another."
             )
-        does = f"go {amount}faster, from {number(options.cruise_mps)} to {speed_words(target)}"
+        does = f"go {amount}faster, to {speed_words(target)}"
         return _chosen(meaning, options, f"speed.up{name}", target, does)
     slowest = _SLOWEST_SHARE * options.sign_mps
     target = max(options.cruise_mps - max(0.5, step - leaning), min(slowest, options.cruise_mps))
@@ -152,7 +152,7 @@ def _step(meaning: Meaning, options: Options) -> Chosen | Declined:
         below = speed_words(options.cruise_mps)
         does = f"set out for {speed_words(target)}, {amount}below the {below} that are allowed"
         return _chosen(meaning, options, "speed.set_up", target, does)
-    does = f"go {amount}slower, from {number(options.cruise_mps)} to {speed_words(target)}"
+    does = f"go {amount}slower, to {speed_words(target)}"
     return _chosen(meaning, options, f"speed.down{name}", target, does)
 
 

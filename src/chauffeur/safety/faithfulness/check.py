@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from chauffeur.concept import Faithfulness, Limits, Observation, Plan, Program, Verdict
+from chauffeur.concept import Faithfulness, Limits, NotCompared, Observation, Plan, Program, Verdict
 from chauffeur.safety.faithfulness.facts import Effect, Facts, FactSurroundings
 from chauffeur.safety.faithfulness.judge import judge, judge_drive
 from chauffeur.safety.faithfulness.report import claims_words, mismatch_words, score_words
@@ -25,8 +25,8 @@ def check_faithfulness(plan: Plan, observation: Observation, limits: Limits) -> 
     A plan without thoughts, or with another policy than a program, claims nothing that could be wrong here.
     """
     facts = _facts(plan)
-    if isinstance(facts, str):
-        return Verdict(FAITHFULNESS_CHECK, True, facts, vetoes=False)
+    if not isinstance(facts, Facts):
+        return _not_compared(FAITHFULNESS_CHECK, facts)
     found = judge(plan.thoughts.text, facts, FactSurroundings.of(observation))
     return _verdict(
         FAITHFULNESS_CHECK, found, "The explanation fits the program", "The explanation does not fit the program"
@@ -41,24 +41,39 @@ def check_driven(plan: Plan, observation: Observation, effect: Effect) -> Verdic
         observation: The instant it began.
         effect: What happened.
     """
-    facts = _facts(plan)
-    if effect.failed:
-        facts = "The program failed on the way, so that the drive was not compared with the explanation."
-    if isinstance(facts, str):
-        return Verdict(DRIVEN_CHECK, True, facts, vetoes=False)
+    facts = "policy-failed" if effect.failed else _facts(plan)
+    if not isinstance(facts, Facts):
+        return _not_compared(DRIVEN_CHECK, facts)
     found = judge_drive(plan.thoughts.text, facts, FactSurroundings.of(observation), effect)
     return _verdict(DRIVEN_CHECK, found, "The drive went as explained", "The drive did not go as explained")
 
 
-def _facts(plan: Plan) -> Facts | str:
+_NOT_COMPARED: Final[dict[NotCompared, str]] = {
+    "no-program": "There is no program to compare an explanation with.",
+    "no-explanation": "There is no explanation to compare.",
+    "no-claims": "The explanation claims nothing that can be compared.",
+    "unreadable": "The program cannot be read.",
+    "policy-failed": "The program failed on the way.",
+}
+
+
+def _not_compared(check: str, why: NotCompared) -> Verdict:
+    return Verdict(check, True, _NOT_COMPARED[why], vetoes=False, not_compared=why)
+
+
+def _facts(plan: Plan) -> Facts | NotCompared:
     """What reading finds in the plan's program, or why there is nothing to compare."""
-    if not isinstance(plan.policy, Program) or not plan.thoughts.text.strip():
-        return "There is no explanation of a program to compare."
+    if not isinstance(plan.policy, Program):
+        return "no-program"
+    if not plan.thoughts.text.strip():
+        return "no-explanation"
     facts = read_facts(plan.policy.source, plan.policy.library)
-    return facts if facts.readable else "The program cannot be read, so its explanation was not compared."
+    return facts if facts.readable else "unreadable"
 
 
 def _verdict(check: str, found: Faithfulness, fits: str, differs: str) -> Verdict:
+    if found.aligned and not found.claims:
+        return _not_compared(check, "no-claims")
     if found.aligned:
         return Verdict(check, True, f"{fits} ({claims_words(found)}).", vetoes=False, alignment=found)
     line = next((one.line for one in found.mismatches if one.line is not None), None)

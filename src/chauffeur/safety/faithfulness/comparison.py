@@ -30,7 +30,8 @@ _SPEED: Final = re.compile(r"\b(?:speed|pace|velocity)\b", re.IGNORECASE)
 DRIVEN_SPEED_MPS: Final = 1.0
 """How far a driven speed may be off one that is told."""
 
-SIDE_WORDS: Final = {-1: "left", 0: "straight on", 1: "right"}
+SIDE_WORDS: Final = {-2: "round", -1: "left", 0: "straight on", 1: "right", 2: "round"}
+"""Quarter turns to the right, and lanes, in words; half a turn is one whichever way it was driven."""
 
 
 class Comparison:

@@ -69,9 +69,10 @@ class Driven(Comparison):
             yield Mismatch("not-done", passing.sentence, "the vehicle ahead was never passed in this drive")
 
     def _turned(self, claims: list[Claim], effect: Effect) -> Iterator[Mismatch]:
-        claim = next((one for one in claims if one.matter == "turn" and one.sides and not one.denied), None)
-        if claim is None or effect.turned in claim.sides:
-            return
+        told = [one for one in claims if one.matter == "turn" and one.sides and not one.denied]
+        claim = told[0] if told else None
+        if claim is None or len(told) > 1 or effect.turned in claim.sides:
+            return  # of several turns, the heading at the end tells none
         if effect.turned:
             yield Mismatch("wrong-side", claim.sentence, f"in this drive it {turning(frozenset({effect.turned}))}")
         elif not effect.cut:

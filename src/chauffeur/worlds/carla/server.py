@@ -40,7 +40,7 @@ def library() -> Any:
     except ImportError as error:
         raise MissingExtraError(
             "CARLA needs its client: Linux or Windows on x86-64, Python 3.10 to 3.12.",
-            hint="Run: pip install 'chauffeur[carla]'",
+            extra="carla",
         ) from error
     return carla
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
-from chauffeur.concept import Metric, Outcome
+from chauffeur.concept import JudgedBy, Metric, Outcome
 from chauffeur.geometry import wrap_to_pi
 from chauffeur.worlds.parking.lot import Spot
 from chauffeur.worlds.parking.world import ParkingWorld
@@ -12,6 +13,8 @@ from chauffeur.worlds.parking.world import ParkingWorld
 
 class ParkingReferee:
     """Looks at a lot after each control period."""
+
+    judged_by: Final[JudgedBy] = "place"
 
     def __init__(self, world: ParkingWorld, spot: Spot) -> None:
         """Args: the world, just reset; the spot that is meant."""
@@ -32,6 +35,11 @@ class ParkingReferee:
     def success(self) -> bool:
         """Whether it has parked where it was meant to."""
         return self._parked == self._spot.name
+
+    @property
+    def parts_done(self) -> tuple[int, int]:
+        """One where the car is there, of one."""
+        return int(self.success), 1
 
     def outcome(self) -> Outcome:
         """What came of it, collisions apart."""

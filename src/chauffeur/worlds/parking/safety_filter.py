@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 
 from chauffeur.concept import Command, Observation, VehicleState
-from chauffeur.concept.units import kmh
+from chauffeur.concept.units import people_speed
 from chauffeur.geometry import Box, Pose, overlap
 from chauffeur.geometry.ground import Ground
 from chauffeur.worlds.parking.path_follower import HARDEST_MPS2, Chassis
@@ -72,7 +72,7 @@ class LotSafetyFilter:
         most = (most_mps - speed) / self._dt_s
         most = most if most >= 0.0 else max(most, -_EASY_MPS2)
         if asked > most + _LEVEL:
-            rule, reason = "speed", f"No faster than {kmh(most_mps):.0f} km/h here."
+            rule, reason = "speed", f"No faster than {people_speed(most_mps, at_most=True)} here."
         wanted = min(asked, most)
         others = [one for one in (*observation.others, *observation.objects) if self._near(observation.ego, one)]
         ground = observation.road.ground

@@ -53,9 +53,7 @@ class Participant:
             from cyclonedds.core import DDSException
             from cyclonedds.domain import Domain, DomainParticipant
         except ImportError as error:
-            raise MissingExtraError(
-                "A ROS 2 vehicle needs cyclonedds.", hint="Run: pip install 'chauffeur[ros]'"
-            ) from error
+            raise MissingExtraError("A ROS 2 vehicle needs cyclonedds.", extra="ros") from error
         config = _CONFIG.format(
             address=address,
             multicast="false" if peers else "true",

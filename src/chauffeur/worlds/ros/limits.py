@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from chauffeur.concept import Parameters
-from chauffeur.concept.units import kmh
+from chauffeur.concept.units import MPS_PER_KMH, kmh
 from chauffeur.worlds.ros.base import VehicleRefusalError
 
 SLOWEST_MPS: Final = 0.0
@@ -68,7 +68,17 @@ def checked(parameters: Parameters, limits: VehicleLimits) -> CheckedWish:
             f"A route ({str(parameters.route)[:40]!r}) is not published to this vehicle.",
             hint="The vehicle's own planner chooses the way.",
         )
-    return CheckedWish(min(speed, most), look_ahead, ratio, parameters.lane)
+    return CheckedWish(_rounded_down(min(speed, most)), look_ahead, ratio, parameters.lane)
+
+
+def _rounded_down(speed_mps: float) -> float:
+    """A speed of whole tenths of km/h, never above the one that is meant: planners round to hundredths of m/s, by which
+    20 km/h becomes 20.016."""
+    return min(speed_mps, math.floor(kmh(speed_mps) * 10.0 + _BIT) / 10.0 * MPS_PER_KMH)
+
+
+_BIT: Final = 1e-6
+"""What a whole number of km/h loses on its way through m/s."""
 
 
 def _within(what: str, value: object, bounds: tuple[float, float], unit: str) -> float:

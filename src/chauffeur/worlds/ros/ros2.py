@@ -58,7 +58,7 @@ class Ros2Vehicle(ThreadedVehicle):
             MissingExtraError: `cyclonedds` is not installed.
         """
         if find_spec("cyclonedds") is None:  # said here; the thread that uses it could not raise it
-            raise MissingExtraError("A ROS 2 vehicle needs cyclonedds.", hint="Run: pip install 'chauffeur[ros]'")
+            raise MissingExtraError("A ROS 2 vehicle needs cyclonedds.", extra="ros")
         super().__init__(stack, "ros2-vehicle", close_s=3.0)
         self._stack, self._settings, self._clock = stack, settings, clock
         self._pending: dict[str, TopicMessage] = {}

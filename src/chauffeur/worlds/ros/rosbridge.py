@@ -259,7 +259,7 @@ def _types_of(stack: AutowareAi | Autoware) -> _Topics:
 def needs_websockets() -> None:
     """Raise MissingExtraError where `websockets` is not installed."""
     if find_spec("websockets") is None:
-        raise MissingExtraError("A rosbridge vehicle needs websockets.", hint="Run: pip install 'chauffeur[ros]'")
+        raise MissingExtraError("A rosbridge vehicle needs websockets.", extra="ros")
 
 
 def bridged(url: str) -> ClientConnection:

@@ -3,7 +3,7 @@
 from chauffeur.worlds.town.driver import TownDriver
 from chauffeur.worlds.town.mirror import TownMirror
 from chauffeur.worlds.town.perception import TownPerception
-from chauffeur.worlds.town.referee import TownReferee, WayReferee
+from chauffeur.worlds.town.referee import TownReferee, TownWay, WayReferee
 from chauffeur.worlds.town.world import TownWorld
 
-__all__ = ["TownDriver", "TownMirror", "TownPerception", "TownReferee", "TownWorld", "WayReferee"]
+__all__ = ["TownDriver", "TownMirror", "TownPerception", "TownReferee", "TownWay", "TownWorld", "WayReferee"]

@@ -22,9 +22,7 @@ def connect(host: str, port: int) -> Any:
     try:
         import carla  # pyright: ignore[reportMissingImports]
     except ImportError as error:
-        raise MissingExtraError(
-            "Exporting a map needs the client of CARLA.", hint="Install it: pip install 'chauffeur[carla]'"
-        ) from error
+        raise MissingExtraError("Exporting a map needs the client of CARLA.", extra="carla") from error
     try:
         client = carla.Client(host, port)
         client.set_timeout(_TIMEOUT_S)

@@ -66,9 +66,7 @@ def draw(plan: TownPlan) -> bytes:
     try:
         from scenariogeneration import xodr
     except ImportError as error:
-        raise MissingExtraError(
-            "Drawing a town needs scenariogeneration.", hint="Install it: pip install 'chauffeur[maps]'"
-        ) from error
+        raise MissingExtraError("Drawing a town needs scenariogeneration.", extra="maps") from error
     town = xodr.OpenDrive(plan.name, "1", "4", _PROJECTION)
     arms: dict[int, list[_Arm]] = {}
     for i, street in enumerate(plan.streets):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from typing import Final
 
-from chauffeur.concept import LaneId, Metric, Outcome, ProgramState, Setpoints
+from chauffeur.concept import JudgedBy, LaneId, Metric, Outcome, ProgramState, Setpoints
 from chauffeur.geometry import Turn, named_ways
 from chauffeur.worlds.town.world import TownWorld
 
@@ -21,6 +22,8 @@ _TAKES: Final = {"left": "turn left", "right": "turn right", "straight": "go str
 
 class TownReferee:
     """Looks at a town after each control period."""
+
+    judged_by: Final[JudgedBy] = "place"
 
     def __init__(self, world: TownWorld) -> None:
         """Args: the world, just reset, with somewhere to go."""
@@ -43,6 +46,11 @@ class TownReferee:
         """Whether the car is there."""
         return self._arrived
 
+    @property
+    def parts_done(self) -> tuple[int, int]:
+        """One where the car is there, of one."""
+        return int(self.success), 1
+
     def outcome(self) -> Outcome:
         """What came of it, collisions apart."""
         return "success" if self._arrived else "timeout"
@@ -56,15 +64,32 @@ class TownReferee:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class TownWay:
+    """A way to be taken at a junction: at the `nth` junction that has one, 1 for the next."""
+
+    turn: Turn
+    nth: int = 1
+
+
 class WayReferee:
     """Looks at a town after each control period: whether the car took the ways it was to take, and stood at the end."""
 
-    def __init__(self, world: TownWorld, turns: Sequence[Turn], stops: bool) -> None:
-        """Args: the world, just reset; ways to be taken, one after the other; whether it is to stop after them."""
-        self._world, self._left, self._stops = world, list(turns), stops
+    def __init__(self, world: TownWorld, ways: Sequence[TownWay], stops: bool, judged_by: JudgedBy = "plan") -> None:
+        """Take a task.
+
+        Args:
+            world: Just reset.
+            ways: To be taken one after the other, at the next junctions that have them.
+            stops: Whether the car is to stop after them.
+            judged_by: Where they were read.
+        """
+        self._world, self._left, self._stops, self._of = world, list(ways), stops, len(ways) + stops
+        self.judged_by: JudgedBy = judged_by
         self._before: LaneId | None = world.observe().ego.lane
         self._beyond_m = self._driven_m = self._stood_s = self._finished_s = 0.0
-        self._told_to_stand = self._finished = False
+        self._told_to_stand = self._finished = self._astray = False
+        self._passed = 0
 
     def follow(self, setpoints: Setpoints, state: ProgramState) -> None:
         """What the program asks for in this period, before `observe`: who stands at a red light has not stopped."""
@@ -74,9 +99,17 @@ class WayReferee:
     @property
     def shortfall(self) -> str:
         """What is missing, in words."""
+        if self._astray:
+            return f"The car took another way, where it was to {_TAKES[self._left[0].turn]}."
         if self._left:
-            return f"The car did not come to {_TAKES[self._left[0]]}."
+            return f"The car did not come to {_TAKES[self._left[0].turn]}."
         return "" if self.success else "The car did not come to a stop." if self._stops else ""
+
+    @property
+    def parts_done(self) -> tuple[int, int]:
+        """Ways taken, and the stop, of all of them."""
+        stood = self._stops and not self._left and self._stood_s >= STANDS_S
+        return self._of - self._stops - len(self._left) + stood, self._of
 
     def observe(self) -> None:
         """Look at the instant after a control period."""
@@ -92,16 +125,25 @@ class WayReferee:
             return
         if before is not None and lane.junction and not before.junction and self._left:
             ways = named_ways(road, before.id)
-            way = next((turn for turn, those in ways.items() for one in those if lane.id in one.lanes), None)
-            if way == self._left[0]:
-                self._left.pop(0)
-                self._beyond_m = 0.0
+            self._take(
+                ways, next((turn for turn, those in ways.items() for one in those if lane.id in one.lanes), None)
+            )
         self._before = lane.id
+
+    def _take(self, ways: Collection[Turn], way: Turn | None) -> None:
+        """Note the way taken at a junction; one that was not asked for, where straight on was possible, is astray."""
+        meant = self._left[0]
+        self._passed += meant.turn in ways
+        if way == meant.turn and self._passed >= meant.nth:
+            self._left.pop(0)
+            self._passed, self._beyond_m = 0, 0.0
+        elif way != "straight" and way is not None and "straight" in ways:
+            self._astray = True
 
     @property
     def over(self) -> bool:
-        """Whether all of it is done, or the program has ended without."""
-        return self.success or self._finished_s > ENDED_S
+        """Whether all of it is done, the car took another way, or the program has ended without."""
+        return self.success or self._astray or self._finished_s > ENDED_S
 
     @property
     def success(self) -> bool:
@@ -114,7 +156,7 @@ class WayReferee:
         """What came of it, collisions apart."""
         if self.success:
             return "success"
-        return "failure" if self._finished_s > ENDED_S else "timeout"
+        return "failure" if self._astray or self._finished_s > ENDED_S else "timeout"
 
     def metrics(self) -> tuple[Metric, ...]:
         """Whether it went the way that was meant, how far it drove, and how long that took."""

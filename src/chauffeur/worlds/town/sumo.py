@@ -88,7 +88,7 @@ def _library() -> Any:
     try:
         import libsumo
     except ImportError as error:
-        raise MissingExtraError("Driving in a town needs SUMO.", hint="Run: pip install 'chauffeur[town]'") from error
+        raise MissingExtraError("Driving in a town needs SUMO.", extra="town") from error
     return libsumo
 
 

@@ -124,9 +124,7 @@ def netconvert() -> tuple[str, ...]:
         home = None
     found = shutil.which("netconvert", path=str(home / "bin")) if home is not None else shutil.which("netconvert")
     if found is None or home is None:
-        raise MissingExtraError(
-            "Building a map needs netconvert, of eclipse-sumo.", hint="Install it: pip install 'chauffeur[maps]'"
-        )
+        raise MissingExtraError("Building a map needs netconvert, of eclipse-sumo.", extra="maps")
     types = [home / "data" / "typemap" / f"opendriveNetconvert{one}.typ.xml" for one in ("", "Pedestrians")]
     return found, "--type-files", ",".join(map(str, types))
 

@@ -53,9 +53,7 @@ def parameters() -> Any:
     try:
         from vehiclemodels.vehicle_parameters import setup_vehicle_parameters
     except ImportError as error:
-        raise MissingExtraError(
-            "The test track needs CommonRoad's vehicle models.", hint="Run: pip install 'chauffeur[motion]'"
-        ) from error
+        raise MissingExtraError("The test track needs CommonRoad's vehicle models.", extra="motion") from error
     return setup_vehicle_parameters(vehicle_id=_VEHICLE)
 
 
@@ -77,15 +75,16 @@ def deliverable(acceleration_mps2: float, friction: float) -> float:
 
 
 def initial_state(plant: Plant, x_m: float, y_m: float, heading_rad: float, speed_mps: float) -> Array:
-    """State of a car that drives straight on: ST (7,), STD (9,), MB (29,)."""
+    """State of a car that drives straight on: ST (7,), STD (9,), MB (29,). Raises MissingExtraError."""
+    known = parameters()
     from vehiclemodels.init_mb import init_mb
     from vehiclemodels.init_std import init_std
 
     core = [x_m, y_m, 0.0, speed_mps, heading_rad, 0.0, 0.0]
     if plant == "std":
-        core = init_std(core, parameters())
+        core = init_std(core, known)
     elif plant == "mb":
-        core = init_mb(core, parameters())
+        core = init_mb(core, known)
     return np.array(core, dtype=np.float64)
 
 

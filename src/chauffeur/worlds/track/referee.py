@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 from typing import Final
 
-from chauffeur.concept import Metric, Outcome, Trajectory
+from chauffeur.concept import JudgedBy, Metric, Outcome, Trajectory
 from chauffeur.geometry import Pose
 from chauffeur.worlds.base import World
 
@@ -22,6 +22,8 @@ _SAME_M: Final = 0.2
 
 class StreetReferee:
     """Looks at a street after each control period."""
+
+    judged_by: Final[JudgedBy] = "place"
 
     def __init__(self, world: World, end: Pose, peak_mps: float | None = None, waits_s: float = 0.0) -> None:
         """Take a place.
@@ -61,6 +63,11 @@ class StreetReferee:
         """Whether it stands where it was to stand."""
         paced = self._peak is None or abs(self._most - self._peak) <= PACE_MPS
         return self.over and self._near and paced
+
+    @property
+    def parts_done(self) -> tuple[int, int]:
+        """One where the car is there, of one."""
+        return int(self.success), 1
 
     def outcome(self) -> Outcome:
         """What came of it, collisions apart."""

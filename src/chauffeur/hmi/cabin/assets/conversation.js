@@ -97,12 +97,17 @@ export function makeConversation() {
     return [failed.length ? make('ul', { class: 'verdicts' }, ...failed.map(verdict)) : null, passed.length ? all : null].filter(Boolean);
   }
 
-  /* Only what was shown to be right gets a tick. */
+  /* Only what was shown to be right gets a tick; where nothing was compared, that is said. */
   function proven(one) {
-    return one.passed && one.proven !== false;
+    return one.passed && one.proven !== false && one.compared !== false;
   }
 
   function verdict(one) {
+    if (one.compared === false && (one.passed || one.informs)) {
+      return make('li', { class: 'uncompared' },
+        make('span', { class: 'sign', 'aria-hidden': 'true', text: '–' }),
+        make('span', {}, make('b', { text: `${checkName(one.check)} not compared` }), one.reason ? `: ${one.reason}` : ''));
+    }
     const open = one.passed && !proven(one);
     const outcome = open ? 'found nothing wrong, and did not prove all' : one.passed ? 'passed' : one.informs ? 'did not pass, which stops nothing' : 'did not pass';
     return make('li', { class: open ? 'open' : one.passed ? 'passed' : 'failed' },

@@ -3,27 +3,28 @@
 export const kmh = (mps) => Math.round(mps * 3.6);
 export const seconds = (s) => (s < 0.995 ? `${Math.round(s * 100) * 10} ms` : `${s.toFixed(s < 9.95 ? 1 : 0)} s`);
 
-/* Stage or outcome of a wish: [sign, words, tone]. */
+/* Stage of a wish: [sign, words, tone]. */
 const STAGES = {
   asked: ['…', 'Thinking', 'busy'],
   planned: ['…', 'Checking the plan', 'busy'],
   driven: ['▸', 'Driving it', 'drive'],
 };
-const OUTCOMES = {
-  finished: ['✓', 'Done', 'good'],
-  answered: ['✓', 'Answered', 'good'],
-  declined: ['–', 'Declined', 'bad'],
-  unplanned: ['✕', 'No plan could be made', 'bad'],
-  refused: ['✕', 'Refused by a check', 'bad'],
-  stale: ['✕', 'The plan came too late', 'bad'],
-  superseded: ['↷', 'Gave way to a newer wish', 'neutral'],
-  failed: ['✕', 'The program failed', 'bad'],
-  interrupted: ['✕', 'Broken off', 'bad'],
+/* The result of a wish, in the words of every screen (concept/results.py): [sign, tone]. No tick: a drive in real time
+   is not judged. */
+const RESULTS = {
+  done: ['■', 'good'],
+  'partly done': ['■', 'neutral'],
+  'not done': ['✕', 'bad'],
+  'asked back': ['?', 'neutral'],
+  declined: ['–', 'neutral'],
+  failed: ['✕', 'bad'],
 };
 
 export function stageWords(wish) {
-  if (wish.stage === 'closed') return OUTCOMES[wish.outcome] || ['–', wish.outcome || 'Closed', 'neutral'];
-  return STAGES[wish.stage] || ['…', wish.stage, 'busy'];
+  if (wish.stage !== 'closed') return STAGES[wish.stage] || ['…', wish.stage, 'busy'];
+  const [sign, tone] = RESULTS[wish.result] || ['–', 'neutral'];
+  const words = wish.result || 'closed';
+  return [sign, words[0].toUpperCase() + words.slice(1), tone];
 }
 
 /* Where the car is going, and how far that is by road. */

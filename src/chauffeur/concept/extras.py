@@ -1,0 +1,36 @@
+"""Optional parts of the package: the command that installs one."""
+
+from __future__ import annotations
+
+import json
+import sys
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
+
+
+def install_command(*extras: str) -> str:
+    """The exact command that adds extras to the Python that runs now, from where Chauffeur itself came.
+
+    A source checkout installs the versions that it was tested with: without them an extra may bring other, far larger
+    builds of the same libraries.
+    """
+    editable, source = _origin()
+    pins = Path(source) / "constraints.txt"
+    options = (f'-c "{pins}" ' if pins.is_file() else "") + ("-e " if editable else "")
+    return f'{sys.executable} -m pip install {options}"{source}[{",".join(extras)}]"'
+
+
+def _origin() -> tuple[bool, str]:
+    """(editable install or not, the folder it came from or the package's name)."""
+    try:
+        text = distribution("chauffeur").read_text("direct_url.json")
+    except PackageNotFoundError:  # run from its source, never installed
+        text = None
+    found: dict[str, Any] = json.loads(text) if text else {}
+    url = str(found.get("url", ""))
+    if not url.startswith("file://"):
+        return False, "chauffeur"
+    return bool(found.get("dir_info", {}).get("editable")), url2pathname(urlsplit(url).path)
