@@ -33,7 +33,7 @@ PROGRAM = """def overtake():
     for _ in range(20):
         yield autopilot()
 """
-DECLINED = "Fly over them."
+DECLINED = "Fly a loop."
 MISTOLD = "Change lanes."
 
 

@@ -61,7 +61,7 @@ Examples:
 
     chauffeur show scenarios
 
-Every drive is simulated. Exit codes: 0 done, 1 refused or failed, 2 bad input, 130 stopped with Ctrl-C.
+Every drive is simulated. Exit codes: 0 done, 1 anything less, 2 bad input, 130 stopped with Ctrl-C.
 """
 
 SHOW_EXAMPLES = """
