@@ -57,6 +57,20 @@ class MeaningParser(nn.Module):
         """Memory of texts, (batch, tokens, width)."""
         return self.encoder(input_ids=ids, attention_mask=mask).last_hidden_state
 
+    def _layers(self, hidden: Tensor, memory: Tensor, later: Tensor, padded: Tensor) -> Tensor:
+        """The decoder's layers one by one: the module's own loop looks at the mask's values, which no graph can."""
+        for layer in self.decoder.layers:
+            held: Any = layer
+            inner = held.norm1(hidden)
+            hidden = hidden + held.dropout1(held.self_attn(inner, inner, inner, attn_mask=later, need_weights=False)[0])
+            inner = held.norm2(hidden)
+            hidden = hidden + held.dropout2(
+                held.multihead_attn(inner, memory, memory, key_padding_mask=padded, need_weights=False)[0]
+            )
+            inner = held.linear2(held.dropout(held.activation(held.linear1(held.norm3(hidden)))))
+            hidden = hidden + held.dropout3(inner)
+        return self.decoder.norm(hidden)  # type: ignore[misc]
+
     def decode(self, written: Tensor, positions: Tensor, memory: Tensor, mask: Tensor) -> Tensor:
         """Scores of what comes next, (batch, length, symbols + tokens).
 
@@ -70,7 +84,7 @@ class MeaningParser(nn.Module):
         pointed = self.pointed(memory.gather(1, at)) * (written == INDEX[POINTER]).unsqueeze(-1)
         hidden = self.symbols(written) + pointed + self.places.weight[:length]
         later = torch.ones(length, length, dtype=torch.bool, device=written.device).triu(1)
-        hidden = self.decoder(hidden, memory, tgt_mask=later, memory_key_padding_mask=mask == 0)
+        hidden = self._layers(hidden, memory, later, mask == 0)
         pointers = self.point_from(hidden) @ self.point_to(memory).transpose(1, 2) / width**0.5
         pointers = pointers.masked_fill((mask == 0).unsqueeze(1), -1e4)
         return torch.cat([self.out(hidden), pointers.to(hidden.dtype)], -1)
