@@ -50,6 +50,19 @@ def carla_data() -> Path:
 
 
 @pytest.fixture(scope="session")
+def case_folder() -> Callable[[str], Path]:
+    """Gives the folder of an input from the field by its name; skips where it is absent."""
+
+    def folder(name: str) -> Path:
+        found = SHARED_DATA / "cases" / name
+        if not found.is_dir():
+            pytest.skip(f"The case {name} is not at {found}; set CHAUFFEUR_TEST_DATA to the folder that holds cases/")
+        return found
+
+    return folder
+
+
+@pytest.fixture(scope="session")
 def _homes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Names of home folders that do not exist until something is written there: most tests write nothing."""
     parent = tmp_path_factory.mktemp("homes")

@@ -228,3 +228,19 @@ def test_the_headline_of_the_model_is_the_row_of_its_table() -> None:
             re.sub(r" \[.*?\]", "", line).split(" | ") for line in table.splitlines() if line.startswith(f"| {label}")
         ]
         assert (cells[3], cells[2], cells[-1].rstrip(" |")) == (done, collided, score), label
+
+
+# Judges -----------------------------------------------------------------------------------------------------------
+
+
+def test_every_table_of_the_results_names_its_judge() -> None:
+    """Nobody judges themselves: what decides a figure, and what it shares with what it decides on, stands beside it."""
+    results = (ROOT / "benchmarks" / "RESULTS.md").read_text(encoding="utf-8")
+    sections = re.split(r"^(?=##+ )", results, flags=re.MULTILINE)
+    judged = [one for one in sections if re.search(r"^\|", one, re.MULTILINE)]
+    assert len(judged) > 25
+    silent = [one.partition("\n")[0] for one in judged if not re.search(r"^Judge: ", one, re.MULTILINE)]
+    assert not silent
+    shown = (ROOT / "README.md").read_text(encoding="utf-8").partition("## What works today")[2].partition("\n## ")[0]
+    tables = len(re.findall(r"^\|-* ?-+:? ?\|", shown, re.MULTILINE))
+    assert tables == 2 and len(re.findall(r"\bJudge: ", shown)) == tables

@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import asyncio
 import importlib
+import re
+import shlex
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -14,7 +17,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from chauffeur.cli.main import app
 from chauffeur.concept import (
     CameraImage,
     Instruction,
@@ -50,14 +55,19 @@ right-of-way = right_of_way:RightOfWay
 PLACE = Scenario("road", "one-lane", {}, 3)
 
 
+def installed(folder: Path, monkeypatch: pytest.MonkeyPatch, points: str) -> None:
+    """Make a folder a place where a package with these entry points is installed."""
+    meta = folder / "toys-1.0.dist-info"
+    meta.mkdir()
+    (meta / "METADATA").write_text("Metadata-Version: 2.1\nName: toys\nVersion: 1.0\n")
+    (meta / "entry_points.txt").write_text(points)
+    monkeypatch.syspath_prepend(str(folder))
+
+
 @pytest.fixture
 def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """The examples, installed as a package of somebody else's; the policy kind's module."""
-    meta = tmp_path / "toys-1.0.dist-info"
-    meta.mkdir()
-    (meta / "METADATA").write_text("Metadata-Version: 2.1\nName: toys\nVersion: 1.0\n")
-    (meta / "entry_points.txt").write_text(POINTS)
-    monkeypatch.syspath_prepend(str(tmp_path))
+    installed(tmp_path, monkeypatch, POINTS)
     monkeypatch.syspath_prepend(str(EXAMPLES))
     return importlib.import_module("speed_profile")
 
@@ -144,3 +154,20 @@ def test_a_planner_that_looks_is_given_pictures_and_drives_by_them(
     trip = asyncio.run(drive(Instruction("Drive as the light allows."), PLACE, 3, Limits(), stages))
     assert dict(trip.plan.settings)["target_speed_mps"] == pytest.approx(speed, abs=0.01)
     assert trip.outcome == "ended"
+
+
+def test_the_planner_of_the_page_is_checked_and_drives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (EXAMPLES.parent / "docs" / "your-planner.md").read_text(encoding="utf-8")
+    blocks = {text.partition("\n")[0]: text for text in re.findall(r"```\w+\n(# .*?)```", page, re.DOTALL)}
+    (tmp_path / "my_planner.py").write_text(blocks["# my_planner.py"], encoding="utf-8")
+    points = tomllib.loads(blocks["# pyproject.toml"])["project"]["entry-points"]["chauffeur.planners"]
+    listed = "".join(f"{name} = {value}\n" for name, value in points.items())
+    installed(tmp_path, monkeypatch, f"[chauffeur.planners]\n{listed}")
+    for name in ("my_planner:MyPlanner", "my_planner:MyPlanner/22", "mine", "mine/22"):
+        result = CliRunner().invoke(app, ["check", "planner", name])
+        assert result.exit_code == 0, result.output
+    (line,) = re.findall(r"^chauffeur (drive .*)$", page, re.MULTILINE)
+    words = shlex.split(line.replace("trips/mine", str(tmp_path / "trips")))
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    assert "79" in result.output, "22 m/s are 79 km/h"

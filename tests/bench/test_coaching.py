@@ -18,14 +18,13 @@ from chauffeur.bench.lampilot.coaching import DEMO_ITEMS, Coach, items_named, sp
 from chauffeur.bench.lampilot.critic import Attempt, EvaluatorCritic, PersonCritic
 from chauffeur.bench.lampilot.description import usable_description
 from chauffeur.bench.lampilot.policy_aid import PolicyAid, aid_for
-from chauffeur.bench.lampilot.rollout import MAX_EPISODE_S
 from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
 from chauffeur.bench.lampilot.understood import referee_for
-from chauffeur.cli.replay import drive_again
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, DataError, Program
 from chauffeur.describe import describe
+from chauffeur.drive.again import drive_again
 from chauffeur.drive.recording import RecordedTrip, compare_trips, read_trip, write_trip
-from chauffeur.drive.session import declined, drive_program, make_trip, make_world
+from chauffeur.drive.session import declined, drive_policy, make_trip, make_world, trip_s
 from chauffeur.hmi.payload import policy_words
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.registry import make_planner
@@ -135,16 +134,17 @@ def test_a_frozen_repository_serves_a_run_and_its_programs_travel_with_the_plan(
     verdicts = run_checks(plan, observation, LAMPILOT_LIMITS)
     assert declined(plan, verdicts) == ""
     referee = referee_for(world, item.scenario, plan)
-    episode = drive_program(world, USE_IT, referee, MAX_EPISODE_S, library=plan.policy.library)
+    episode = drive_policy(world, plan.policy, referee, trip_s(item.scenario), LAMPILOT_LIMITS, minimum_speed=True)
     assert episode.success and episode.outcome == "success"
     assert episode.said[0][1] == "Here we go." and "is_safe_enter" in {c.name for f in episode.frames for c in f.calls}
     # It is recorded and shown with its helper, and the recording drives the same again.
-    trip = make_trip(request, plan, verdicts, item.scenario, item.scenario.seed, episode, "")
+    trip = make_trip(request, plan, verdicts, item.scenario, item.scenario.seed, episode, "", shielded=True)
     recorded = RecordedTrip(trip, episode.frames, item.scenario, request.system, episode.final)
     write_trip(tmp_path / "trip.mcap", trip, episode.frames, item.scenario, system=request.system, final=episode.final)
     read = read_trip(tmp_path / "trip.mcap")
     assert read.trip.plan.policy == plan.policy and read.system == request.system
-    assert compare_trips(recorded, drive_again(read)) is None
+    again = drive_again(read, LAMPILOT_LIMITS, referee_for).trip
+    assert again is not None and compare_trips(recorded, again) is None
     assert "def go_left():" in policy_words(plan.policy)
     alone = replace(plan, policy=Program(USE_IT))
     assert make_trip(request, alone, (), item.scenario, item.scenario.seed, episode, "").id != trip.id

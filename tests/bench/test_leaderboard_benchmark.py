@@ -168,7 +168,26 @@ def test_jobs_differ_by_all_that_decides_them() -> None:
 
 
 @pytest.mark.parametrize(
-    "options", [{"driver": "nobody"}, {"scenarios": "eleven"}, {"seeds": 0}, {"towns": "Atlantis"}, {"scoring": "lb9"}]
+    ("given", "seeds"), [(2, [0, 1]), ("2", [0, 1]), ("11,12", [11, 12]), ("11,", [11]), (" 7, 3 ", [7, 3])]
+)
+def test_seeds_are_counted_or_named(given: int | str, seeds: list[int]) -> None:
+    bench = LeaderboardBenchmark("own", seeds=given, limit=1)
+    assert [item.seed for item in bench.items()] == seeds
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"driver": "nobody"},
+        {"scenarios": "eleven"},
+        {"seeds": 0},
+        {"seeds": "11,11"},
+        {"seeds": "-1"},
+        {"seeds": "a,b"},
+        {"seeds": ""},
+        {"towns": "Atlantis"},
+        {"scoring": "lb9"},
+    ],
 )
 def test_options_that_cannot_be_are_refused(options: dict[str, Any]) -> None:
     with pytest.raises(ConfigError):

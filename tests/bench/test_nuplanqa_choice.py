@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from chauffeur.bench.nuplanqa.choice import read_choice
 
@@ -34,16 +37,17 @@ OPTIONS = {
     ),
     "count": ("There is one lane.", "There are two lanes.", "There are three lanes.", "There are four lanes."),
 }
-ANSWERS = [
-    line.split("\t", 2)
-    for line in (Path(__file__).parent / "nuplanqa_answers.tsv").read_text(encoding="utf-8").splitlines()
-]
+ANSWERS, MANNERS = (
+    [line.split("\t", 2) for line in (Path(__file__).parent / name).read_text(encoding="utf-8").splitlines()]
+    for name in ("nuplanqa_answers.tsv", "nuplanqa_manners.tsv")
+)
+"""Answers as they were read by hand; and manners of answering: objects, verdicts, corrections, made-up turns."""
 
 
 def test_every_hand_checked_answer_is_read_as_the_person_read_it() -> None:
     assert len(ANSWERS) >= 300
     wrong: list[str] = []
-    for name, expected, answer in ANSWERS:
+    for name, expected, answer in [*ANSWERS, *MANNERS]:
         found = read_choice(answer.replace("\\n", "\n") if "boxed" not in answer else answer, OPTIONS[name])
         letter = "-" if found.index is None else "abcd"[found.index]
         if letter != expected:
@@ -66,3 +70,42 @@ def test_every_hand_checked_answer_is_read_as_the_person_read_it() -> None:
 )
 def test_why_nothing_was_chosen_is_told(answer: str, how: str) -> None:
     assert read_choice(answer, OPTIONS["light"]).how == how
+
+
+VERDICTS = ("The light is red.", "A cyclist is crossing.", "The lane is clear.", "It is raining.")
+
+
+@pytest.mark.parametrize(("file", "index"), [("reply.txt", 2), ("reply2.txt", 1)])
+def test_recorded_verdicts_on_every_option_choose_the_right_one(
+    case_folder: Callable[[str], Path], file: str, index: int
+) -> None:
+    answer = (case_folder("choice-per-option-verdicts") / file).read_text(encoding="utf-8")
+    assert read_choice(answer, VERDICTS).index == index
+
+
+PIECES = (
+    "a",
+    "(b)",
+    "C",
+    " or ",
+    "not ",
+    "yes",
+    "no",
+    ": ",
+    "\n",
+    "{",
+    "}",
+    '"answer": ',
+    "[",
+    "]",
+    "wait, ",
+    "<think>",
+    "✓",
+    ", ",
+)
+
+
+@settings(max_examples=300)
+@given(st.text(max_size=120) | st.lists(st.sampled_from(PIECES), max_size=20).map("".join))
+def test_no_answer_makes_reading_fail(answer: str) -> None:
+    assert read_choice(answer, OPTIONS["light"]).index in (None, 0, 1, 2, 3)

@@ -14,6 +14,7 @@ import pytest
 from chauffeur.bench.nuplanqa import NuPlanQaBenchmark
 from chauffeur.bench.nuplanqa.blind import blind_guesses
 from chauffeur.bench.nuplanqa.questions import SUBTASKS, VqaItem, load_questions
+from chauffeur.bench.nuplanqa.scenes import making
 from chauffeur.bench.nuplanqa.scenes.facts import FAMILIES, facts_of, sighted
 from chauffeur.bench.nuplanqa.scenes.gate import gate
 from chauffeur.bench.nuplanqa.scenes.making import QaConfig, make_set, make_split
@@ -133,6 +134,26 @@ def test_a_set_without_pictures_is_made_and_continued(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "train" / "pairs.json").read_text())[0]["QA"][0]["a"]
     with pytest.raises(ConfigError, match="another configuration"):
         make_set(tmp_path, replace(config, seed=1), 1, lambda *at: None)
+
+
+def test_ctrl_c_keeps_every_scene_that_was_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = QaConfig(scenes=20, pictures=False, pairs=1)
+    make_set(tmp_path / "at once", config, 1, lambda *at: None)
+    made: list[int] = []
+    stage_one = making._stage
+    monkeypatch.setattr(making, "_stage", lambda *given: made.append(given[2]) or stage_one(*given))
+
+    def interrupted(at: int, of: int) -> None:
+        if at in (7, 22):  # in the training split, then in the next one
+            raise KeyboardInterrupt
+
+    for stop in (7, 22):
+        with pytest.raises(KeyboardInterrupt):
+            make_set(tmp_path / "in parts", config, 1, lambda at, _, stop=stop: interrupted(at if at == stop else 0, 0))
+    make_set(tmp_path / "in parts", config, 1, lambda *at: None)
+    assert len(made) == 28, "none is staged twice"
+    for path in sorted((tmp_path / "at once").rglob("*.json")):
+        assert (tmp_path / "in parts" / path.relative_to(tmp_path / "at once")).read_bytes() == path.read_bytes()
 
 
 def test_pictures_are_rendered_where_the_metadata_say(tmp_path: Path) -> None:

@@ -49,7 +49,8 @@ def test_what_breaks_it_is_said_and_the_exit_code_is_1(tmp_path: Path, monkeypat
     ("words", "says"),
     [
         (("no_such_module",), "cannot be loaded"),
-        (("math:sin",), "has no class 'sin'"),
+        (("math:cosine",), "has no 'cosine'"),
+        (("math:pi",), "is a float, and makes no world"),
         (("math",), "has 0 worlds"),
         (("highway", "--scenario", "moon"), "Unknown scenario 'moon'"),
         (("highway", "--config", "{"), "no JSON"),
@@ -97,6 +98,105 @@ def somebodys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "deaf_executor.py").write_text(DEAF, encoding="utf-8")
     monkeypatch.syspath_prepend(str(EXAMPLES))
     monkeypatch.syspath_prepend(str(tmp_path))
+
+
+FORMS = """
+from chauffeur.concept import Plan, Thoughts
+from one_lane import OneLane
+from right_of_way import RightOfWay
+from speed_profile import SpeedProfile, SpeedProfileExecutor
+
+
+class Plain:
+    id = model = "plain"
+
+    async def plan(self, request):
+        return Plan(Thoughts("No."), None, refusal="No.", planner=self.id, model=self.model)
+
+
+class Needy(Plain):
+    def __init__(self, town):
+        self.town = town
+
+
+class Choosy(Plain):
+    @classmethod
+    def from_spec(cls, argument, *, speed_mps=25.0):
+        float(argument)
+        return cls()
+
+
+def factory():
+    return Plain()
+
+
+def broken():
+    raise OSError("no weights here")
+
+
+def executor(world):
+    return SpeedProfileExecutor(world)
+
+
+executor.fault = SpeedProfileExecutor.fault
+instance, benchmark = Plain(), RightOfWay()
+
+
+def world():
+    return OneLane()
+
+
+def profile():
+    return SpeedProfile((20.0,), 3.0)
+
+"""
+POLICY = ("--policy", "speed_profile:EXAMPLE")
+
+
+@pytest.fixture
+def forms(somebodys: None, tmp_path: Path) -> None:
+    (tmp_path / "forms.py").write_text(FORMS, encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("planner", "forms:Plain"),
+        ("planner", "forms:instance"),
+        ("planner", "forms:factory"),
+        ("planner", "forms:Choosy/3"),
+        ("executor", "forms:executor", *POLICY),
+        ("executor", "forms:executor", "--policy", "forms:profile"),
+        ("world", "forms:world"),
+        ("benchmark", "forms:benchmark"),
+    ],
+)
+def test_what_is_to_be_checked_may_be_a_class_an_instance_or_a_factory(forms: None, words: tuple[str, ...]) -> None:
+    code, said = kit(*words)
+    assert code == 0, said
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("planner", "forms:Choosy/fast"), "could not be made: ValueError"),
+        (("planner", "forms:Choosy/3", "--base-url", "http://x"), "It takes: speed_mps"),
+        (("planner", "forms:Plain/3"), "takes no argument"),
+        (("planner", "forms:Needy"), "It takes: town"),
+        (("planner", "forms:broken"), "no weights here"),
+        (("planner", "forms:POLICY"), "has no 'POLICY'"),
+        (("planner", "math:pi"), "is a float, and makes no planner"),
+        (("executor", "math:pi", *POLICY), "is a float, and makes no executor"),
+        (("executor", "forms:executor", "--policy", "math:pi"), "is a float, and makes no policy"),
+        (("world", "forms:benchmark"), "makes no world"),
+        (("benchmark", "forms:benchmark", "-o", "a=1"), "takes no options"),
+        (("benchmark", "right_of_way:RightOfWay", "-o", "a=1"), "unexpected keyword argument 'a'"),
+    ],
+)
+def test_what_cannot_be_made_is_told_in_words(forms: None, words: tuple[str, ...], says: str) -> None:
+    code, said = kit(*words)
+    assert code == 2, said
+    assert says in said
 
 
 @pytest.mark.parametrize(

@@ -209,6 +209,30 @@ def test_lines_of_a_pipe_are_driven_one_after_the_other(answers: str, tmp_path: 
     assert [each["text"] for each in trip["feedback"]] == ["that was good"]
 
 
+@pytest.mark.slow
+def test_a_line_waits_until_the_wish_before_it_is_done(tmp_path: Path) -> None:
+    """However long that takes; and a trip that was cut short was not driven."""
+    pytest.importorskip("libsumo", reason="needs the extra `town`")
+    log = tmp_path / "talk.jsonl"
+    command = [*COMMAND, "--scenario", "town", "--time-scale", "8", "--no-realtime", "--audit", str(log)]
+    lines = "Take me to the station.\nWhy are we standing?\nquit\nTurn left.\n"
+    done = subprocess.run(
+        command, input=lines, capture_output=True, text=True, timeout=WITHIN_S, check=False,
+    )  # fmt: skip
+    said = " ".join(done.stdout.split())
+    assert "Here we are: station" in said, done.stdout
+    assert said.index("Here we are: station") < said.index("w2 asked"), "the question, too, in its turn"
+    assert "w2 answers" in said
+    assert "You end the session" in said
+    assert "Not asked: “Turn left.”" in said or "“Turn left.” is not asked" in said
+    cut = subprocess.run(
+        [*command[:-2], "--duration", "20"], input="Take me to the station.\n", capture_output=True, text=True,
+        timeout=WITHIN_S, check=False,
+    )  # fmt: skip
+    assert "The time of this drive is over" in cut.stdout
+    assert cut.returncode == 1, "the wish was not driven to its end"
+
+
 def test_at_a_terminal_it_is_typed_and_ctrl_c_brings_the_car_to_a_stand(answers: str) -> None:
     with at_a_terminal([*COMMAND, "--planner", answers]) as (process, screen):
         until(process, screen, "no plan")

@@ -104,6 +104,20 @@ def test_lines_of_a_file_are_taken_in_their_turn(file: Path) -> None:
     assert float(caps[0]) > float(caps[1]) > float(caps[2]) == 0.0
 
 
+@pytest.mark.parametrize("leave", ["quit", "Exit.", "ok, bye!"])
+def test_questions_and_leave_taking_ask_nothing_of_the_vehicle(file: Path, leave: str) -> None:
+    lines = f"Drive at 20 km/h.\nWhy so slow?\nare we there yet?\nnever mind\n{leave}\nDrive at 30 km/h.\n"
+    command = [sys.executable, "-c", "from chauffeur.cli.vehicle import vehicle_app; vehicle_app()", "drive", str(file)]
+    typed = subprocess.run([*command, "--dry-run"], input=lines, capture_output=True, text=True, check=False)
+    given = invoke(file, *lines.splitlines(), "--dry-run")
+    for code, said in ((typed.returncode, typed.stdout), (given.exit_code, given.output)):
+        assert len(re.findall(r"velocity_max: ([\d.]+)", said)) == 1, said
+        assert "You end the session." in said
+        assert "“are we there yet?” answered" in " ".join(said.split())
+        assert "“Drive at 30 km/h.”" not in said
+        assert code == 1, "“Why so slow?” was asked back, and not done"
+
+
 def test_without_a_vehicle_it_is_said(file: Path) -> None:
     pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'chauffeur[ros]'")
     result = invoke(file, "Drive at 20 km/h.", "--wait", 0.5)

@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chauffeur.bench.passengers import load_wishes
-from chauffeur.concept import Lead, Situation
-from chauffeur.describe.answers import answer_to, asks_to_know
+from chauffeur.concept import Context, Lead, Situation
+from chauffeur.describe.answers import answer_to, asks_to_know, with_way
+from chauffeur.worlds.places import Destination
 
 ROAD = Situation("highway", 28.0, 31.2928, 4, 1, True, Lead(2, 40.0, 24.0), None)
 WET = replace(ROAD, scene=(("weather", "Weather: rain 2.0 mm/h."), ("road", "Road: A 7.")))
@@ -37,6 +38,44 @@ WET = replace(ROAD, scene=(("weather", "Weather: rain 2.0 mm/h."), ("road", "Roa
 )
 def test_what_c_holds_is_told(question: str, holds: str) -> None:
     assert holds in answer_to(question, WET)
+
+
+SEEN = "There is no car ahead of me in my lane within 100 m. The traffic light 24 m ahead is {}. We go on."
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        "Why are we standing?",
+        "why did you stop here",
+        "Why aren't we moving?",
+        "Why are you braking?",
+        "why have we stopped",
+    ],
+)
+def test_why_the_car_stands_is_read_off_what_is_ahead(question: str) -> None:
+    assert "traffic light 24 m ahead is red" in answer_to(question, ROAD, SEEN.format("red"))
+    assert "40 m" not in answer_to(question, ROAD, SEEN.format("green"))
+    assert "12 m" in answer_to(question, replace(ROAD, front=Lead(2, 12.0, 0.0)), SEEN.format("green"))
+    assert "no light" in answer_to(question, replace(ROAD, front=None), SEEN.format("green"))
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        "Are we there yet?",
+        "how long until we get there",
+        "When do we arrive?",
+        "Are we nearly there?",
+        "How much longer?",
+    ],
+)
+def test_how_far_it_is_is_told_while_the_car_goes_somewhere(question: str) -> None:
+    context = Context("", ROAD)
+    going = with_way(context, Destination("Old Library", 0.0, 0.0, 1240.0))
+    assert answer_to(question, going.situation) == "It is about 1.2 km by road to Old Library."
+    assert with_way(context, None) is context
+    assert answer_to(question, ROAD) == ""
 
 
 def test_what_c_does_not_hold_is_not_made_up() -> None:

@@ -9,8 +9,8 @@ import pytest
 
 from chauffeur.bench.referees import referee_for
 from chauffeur.cli.parts import planner_named
-from chauffeur.cli.replay import drive_again
 from chauffeur.concept import Instruction, Limits, PersonId, Plan, PlanRequest, Program, Scenario, Thoughts
+from chauffeur.drive.again import drive_again
 from chauffeur.drive.fulfilment import GAP_M, HELD_S, SPEED_MPS, asked_of
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.scenarios import BUILT_IN, find, planner_for, seeds_with_lead, suiting
@@ -60,7 +60,8 @@ def test_overtaking_with_a_return_ends_back_in_the_lane() -> None:
     lead = next(other for other in last.others if other.id == first.front.vehicle)
     assert lead.x_m < last.ego.x_m, "and past it"
     assert "back in the lane" in end_words(recorded.trip)
-    assert drive_again(recorded).trip == recorded.trip
+    again = drive_again(recorded, Limits(), referee_for).trip
+    assert again is not None and again.trip == recorded.trip
 
 
 def test_a_gap_is_reached_and_held() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from live_bench import OVERTAKE, Bench
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
 from chauffeur.describe import describe_with_traffic
-from chauffeur.drive.events import DriveEvent
+from chauffeur.drive.events import FINAL, DriveEvent
 from chauffeur.drive.live import planning as module
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.plan_messages import PlanMessage, Request, encode, read_brief, read_event, read_order
@@ -156,6 +157,44 @@ def test_a_newer_wish_ends_the_work_on_an_older_one_and_all_are_answered(rig: Ri
         ("planning", "w4"),
         ("planned", "w4"),
     ]
+
+
+@pytest.mark.parametrize("aside", ["Why are we standing?", "are we there yet", "Is that a church?", "ok", "Thank you!"])
+def test_what_is_said_aside_ends_no_work_on_a_wish(rig: Rig, aside: str) -> None:
+    async def drive() -> None:
+        rig.ask("wait")
+        await rig.planning.look()
+        await asyncio.sleep(0.02)
+        rig.requests.write(encode(Request("w2", aside, runs=True)))
+        await rig.planning.look()
+        until_s = time.monotonic() + 20.0
+        while not any(wish == "w2" and kind in (*FINAL, "planned") for kind, wish in rig.kinds()):
+            assert time.monotonic() < until_s
+            await asyncio.sleep(0.01)
+        assert ("superseded", "w1") not in rig.kinds()
+        rig.requests.write(encode(Request("w3", "go")))
+        await rig.planning.look()
+        await rig.planning.finish()
+
+    asyncio.run(drive())
+    assert rig.kinds()[-3:] == [("superseded", "w1"), ("planning", "w3"), ("planned", "w3")]
+
+
+@pytest.mark.parametrize(
+    ("request_", "kind"),
+    [
+        (Request("w1", "Why so slow, go?", runs=True), "planned"),
+        (Request("w1", "Do we go faster now?", runs=True), "declined"),
+        (Request("w1", "Do we go faster now?", confirmed="Did you mean it?", runs=True), "planned"),
+        (Request("w1", "Do we go faster now?"), "planned"),
+        (Request("w1", "Could you go faster?", runs=True), "planned"),
+    ],
+    ids=["wish after it", "while one runs", "confirmed", "nothing runs", "request"],
+)
+def test_a_question_ends_what_runs_only_after_a_yes(rig: Rig, request_: Request, kind: str) -> None:
+    rig.requests.write(encode(request_))
+    assert asyncio.run(rig.answered())[-1] == (kind, "w1")
+    assert rig.told()[-1].offer == (request_.text if kind == "declined" else "")
 
 
 def test_garbage_among_the_wishes_is_told_of(rig: Rig) -> None:

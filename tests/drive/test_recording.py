@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -328,10 +329,52 @@ def test_rerun_draws_road_road_users_and_frames_without_help(tmp_path: Path) -> 
 def test_damage_is_told_in_words(tmp_path: Path) -> None:
     path = save(tmp_path / "trip.mcap", a_drive())
     whole = path.read_bytes()
-    for damaged in (b"", b"hello", whole[:20], whole[: len(whole) // 2], whole[:-9], whole[:200] + whole[300:]):
+    for damaged in (b"", b"hello", whole[:200] + whole[300:], b"\x00" * 5000, b"{}"):
         path.write_bytes(damaged)
         with pytest.raises(DataError, match="not a usable recording"):
             read_trip(path)
+
+
+def test_of_a_file_that_was_cut_off_what_stands_in_it_is_read(tmp_path: Path) -> None:
+    """At every place: never other values, never fewer for more bytes, and all of it once the data are whole."""
+    drive = a_drive(60, 1)
+    path = save(tmp_path / "trip.mcap", drive)
+    whole, held = path.read_bytes(), -1
+    counts: list[int] = []
+    for size in (*range(0, len(whole), 97), len(whole) - 9, len(whole) - 1, len(whole)):
+        path.write_bytes(whole[:size])
+        try:
+            back = read_trip(path)
+        except DataError as error:
+            assert "cut off" in error.message or not size, error.message
+            counts.append(0)
+            continue
+        assert bits(back.frames) == bits(drive.frames[: len(back.frames)])
+        assert len(back.frames) >= held
+        held = len(back.frames)
+        counts.append(held)
+        if back.cut_off:
+            assert back.final is None and "can be read" in back.note
+        else:
+            assert bits(back.frames) == bits(drive.frames) and back.final == drive.final and not back.note
+    assert counts[0] == 0 and counts[-1] == 60
+    assert len({*counts}) > 2, "a part of a chunk gives the part of the drive that stands in it"
+
+
+def test_of_a_drive_of_many_chunks_the_whole_ones_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("chauffeur.drive.recording._CHUNK_BYTES", 20_000)
+    drive = a_drive(400, 1)
+    path = save(tmp_path / "trip.mcap", drive)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    back = read_trip(path)
+    assert back.cut_off and 5 < len(back.frames) < 400
+    assert compare_trips(back, drive) is None, "the frames that it holds are the same"
+    assert compare_trips(back, a_drive(400, 2)) is not None
+
+
+def test_a_cut_file_from_the_field_is_read(case_folder: Callable[[str], Path]) -> None:
+    back = read_trip(case_folder("mcap-cut-off") / "trip.mcap")
+    assert len(back.frames) == 26 and back.final is not None and back.trip.outcome == "success"
 
 
 @given(st.data())

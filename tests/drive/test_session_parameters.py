@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from chauffeur.bench.referees import referee_for
-from chauffeur.cli.replay import drive_again
 from chauffeur.concept import ChauffeurError, Instruction, Limits, Parameters, Plan, PlanRequest, Thoughts
 from chauffeur.drive import recording
+from chauffeur.drive.again import drive_again
 from chauffeur.drive.recording import RecordedTrip, write_trip
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import Session
@@ -35,8 +35,8 @@ def test_a_spoken_spot_is_parked_in_and_the_trip_replays(planner: Planner) -> No
     recorded = driven(planner, "Park near the stadium.", "parking-stadium")
     assert recorded.trip.outcome == "success"
     assert isinstance(recorded.trip.plan.policy, Parameters)
-    again = drive_again(recorded)
-    assert again.trip == recorded.trip
+    again = drive_again(recorded, Limits(), referee_for).trip
+    assert again is not None and again.trip == recorded.trip
     assert again.frames == recorded.frames
 
 

@@ -25,7 +25,6 @@ FENCED = f"```python\n{PROGRAM}```"
         (PROGRAM, ""),
         (f"Hold it.\n```\n{PROGRAM}```", "Hold it."),
         (f"<think>```python\ndef draft():\n    yield 1\n```</think>Hold it.\n{FENCED}", "Hold it."),
-        (f"First try:\n```python\ndef old():\n    yield autopilot()\n```\nBetter:\n{FENCED}", "First try:\n\nBetter:"),
         (f"Hold it.\n```python\n{PROGRAM}", "Hold it."),
     ],
 )

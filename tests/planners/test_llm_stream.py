@@ -9,24 +9,24 @@ import pytest
 from server import DONE, PROGRAM, REPLY, Exchange, ModelServer, body, chunk, events, stream
 
 from chauffeur.concept import Program
-from chauffeur.planners.llm_endpoint import _Events
 from chauffeur.planners.llm_errors import EndpointError
 
 pytestmark = pytest.mark.server
 
 WIRE = (
-    b": hello\r\nevent: message\r\ndata: one\r\n\r\n"
-    b"id: 7\rdata:two\rdata: three\r\r\n\n"
-    b"data\n\ndata: four\n\ndata: torn"
+    b": hello\r\nevent: message\r\nid: 7\r\n"
+    + chunk(REPLY[:40]).replace(b"\n", b"\r")
+    + b"data\n\n: more\n"
+    + chunk(REPLY[40:], finish="stop").replace(b"data: ", b"data:").replace(b'"created"', b'\ndata: "created"')
+    + DONE
+    + b"data: torn"
 )
-HELD = [b"one", b"two\nthree", b"", b"four"]
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 5, 1000])
-def test_events_are_the_same_however_they_are_cut(size: int) -> None:
-    decoder = _Events()
-    pieces = [WIRE[i : i + size] for i in range(0, len(WIRE), size)]
-    assert [data for piece in pieces for data in decoder.feed(piece)] == HELD
+def test_events_are_the_same_however_they_are_cut(server: ModelServer, bench, size: int) -> None:
+    server.script(events(*(WIRE[i : i + size] for i in range(0, len(WIRE), size))))
+    assert bench.plan().policy == Program(PROGRAM)
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])

@@ -280,9 +280,10 @@ def test_numbers_that_json_does_not_have_are_a_problem() -> None:
     assert read_answer('{"a":' * 100_000).problem
 
 
-def test_the_last_whole_object_counts() -> None:
+def test_two_different_objects_are_no_answer_and_the_same_twice_is_one() -> None:
     draft, final = json.dumps(SAID | {"velocity_kmh": 90}), json.dumps(SAID)
-    answer = read_answer(f"First I thought {draft}, but: {final} {{and so on")
+    assert "different" in read_answer(f"First I thought {draft}, but: {final}").problem
+    answer = read_answer(f"{final} That is: {final} {{and so on")
     assert answer.parameters == Parameters(10.0, 12.0, 2.0, 0)
 
 

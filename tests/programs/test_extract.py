@@ -23,7 +23,6 @@ PROGRAM = "def main():\n    yield autopilot()\n"
         (f"```Python\r\n{PROGRAM}```".replace("\n", "\r\n"), ""),
         ("  ```python\n  def main():\n      yield autopilot()\n  ```", ""),
         (f"Plan:\n```text\nfollow\n```\nCode:\n```python\n{PROGRAM}```", "Plan:\n```text\nfollow\n```\nCode:"),
-        (f"First try:\n```python\ndef old():\n    yield\n```\nBetter:\n```python\n{PROGRAM}```", None),
         (f"Cut off:\n```python\n{PROGRAM}", "Cut off:"),
         (f"Plan: follow.\nCode:\n{PROGRAM}\nThis follows the road.", "Plan: follow.\nCode:\n\nThis follows the road."),
         (f'```json\n{{"a": 1}}\n```\n```python title="x"\n{PROGRAM}```', None),

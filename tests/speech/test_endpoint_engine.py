@@ -125,7 +125,7 @@ def test_refusals_say_what_to_do(
         (b"[" * 60_000, "not JSON"),
         (b"[]", "without a text"),
         (b'{"text": 3}', "without a text"),
-        (b'{"text": "' + b"a" * 70_000 + b'"}', "more than 64 KiB"),
+        (b'{"text": "' + b"a" * 70_000 + b'"}', "more than 65,536 bytes"),
     ],
 )
 def test_nonsense_is_said_to_be_nonsense(server: TranscriptionServer, body: bytes, words: str) -> None:

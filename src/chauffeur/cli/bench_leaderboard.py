@@ -42,7 +42,7 @@ def leaderboard(
     routes: Annotated[str, typer.Option(help="Route file (XML), or `own`.")] = "own",
     scenarios: Annotated[str, typer.Option(help="`public`, `ten` or `none`.")] = "public",
     triggers: Annotated[str, typer.Option(help="Trigger file or folder, where it is elsewhere.")] = "",
-    seeds: Annotated[int, typer.Option(min=1, help="How often each route is driven.")] = 3,
+    seeds: Annotated[str, typer.Option(help="How many a route, from 0 on; or which: `11,12`.")] = "3",
     density: Annotated[float, typer.Option(min=0.0, help="Factor of the background traffic.")] = 1.0,
     people: Annotated[int, typer.Option(min=0, help="People on foot; the rules know none.")] = 0,
     scoring: Annotated[str, typer.Option(help="`lb1.0` or `lb2.1`.")] = "lb1.0",

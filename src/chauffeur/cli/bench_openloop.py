@@ -77,13 +77,13 @@ def openloop(
         str | None, typer.Option(help="USD per million tokens, IN/OUT, where it is not known.", rich_help_panel=ASKING)
     ] = None,
 ) -> None:
-    """Waypoints over three seconds from a front picture and own motion, under three conventions (paper Tab. XII)."""
+    """Waypoints over three seconds from a front picture and own motion, under five averagings (paper Tab. XII)."""
     from chauffeur.bench.kernel.report import markdown, tables
     from chauffeur.bench.kernel.run import BenchRun, write_results
     from chauffeur.bench.openloop import OpenLoopBenchmark
     from chauffeur.bench.openloop.frames import SIMULATED
     from chauffeur.bench.openloop.requests import training_lines
-    from chauffeur.bench.openloop.table12 import HEADER, LEARNING, our_line, paper_lines
+    from chauffeur.bench.openloop.table12 import HEADER, LEARNING, our_lines, paper_lines
     from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
     from chauffeur.cli.console import stdout
     from chauffeur.cli.tables import show_table
@@ -110,16 +110,17 @@ def openloop(
     show_tables(console, tables(bench.tables, rows))
     on = "our frames" if bench.own else "nuScenes"
     shown_as = "" if shown == "pictures" else ", grey pictures"
-    compared = [our_line(f"{who.id}{shown_as} ({on})", LEARNING[setting], rows)]
-    compared += [our_line(f"{name} ({on})", "", held) for name, held in _others(beside or [])]
-    compared.append(our_line(f"constant velocity ({on})", "none", rows, "cv"))
+    compared = our_lines(f"{who.id}{shown_as} ({on})", LEARNING[setting], rows)
+    for name, held in _others(beside or []):
+        compared += our_lines(f"{name} ({on})", "", held)
+    compared += our_lines(f"constant velocity ({on})", "none", rows, "cv")
     try:
         compared += paper_lines()
     except DataError as error:
         console.print(f"Without the paper's rows: {error.message}", soft_wrap=True)
-    title = "Beside the paper's Tab. XII (OpenEMMA's convention, failures left out of the means)"
+    title = "Beside the paper's Tab. XII (failures left out of the means)"
     show_table(console, title, HEADER, compared)
-    write_results(run.folder, {"table12.md": f"# {title}\n\n{markdown(HEADER, compared, 2)}\n"})
+    write_results(run.folder, {"table12.md": f"# {title}\n\n{markdown(HEADER, compared, 3)}\n"})
     if bench.own:
         console.print(SIMULATED, soft_wrap=True)
     else:
@@ -138,9 +139,15 @@ def _others(folders: list[Path]) -> list[tuple[str, list[Mapping[str, Any]]]]:
     for folder in folders:
         try:
             lines = (folder / "results.jsonl").read_text(encoding="utf-8").splitlines()
-            found.append((folder.name.removeprefix("openloop-"), [json.loads(line) for line in lines]))
+            rows: list[Mapping[str, Any]] = [json.loads(line) for line in lines]
         except (OSError, ValueError) as error:
             raise DataError(f"{folder} holds no results of a run: {error}.") from error
+        if any(not isinstance(row, dict) or "lagged_05" not in row for row in rows):
+            raise DataError(
+                f"{folder} was measured by an earlier version of this benchmark.",
+                hint="Run it again, into another folder.",
+            )
+        found.append((folder.name.removeprefix("openloop-"), rows))
     return found
 
 

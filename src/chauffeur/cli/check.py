@@ -20,7 +20,7 @@ Examples:
 
     chauffeur check world parking --config '{"aisles": 2}'
 
-    chauffeur check planner my_package.my_planner:MyPlanner
+    chauffeur check planner my_package.my_planner:MyPlanner/22
 
     chauffeur check executor speed_profile:SpeedProfileExecutor --policy speed_profile:EXAMPLE
 
@@ -42,7 +42,9 @@ def check() -> None:
 
 @check_app.command(epilog=EXAMPLES)
 def world(
-    name: Annotated[str, typer.Argument(metavar="MODULE[:CLASS]", help="The world's class, or a registered name.")],
+    name: Annotated[
+        str, typer.Argument(metavar="MODULE[:NAME]", help="The world's class or factory, or a registered name.")
+    ],
     scenario: Annotated[str, typer.Option(help="A built-in scenario to check it on.")] = "",
     config: Annotated[str, typer.Option(help="Configuration of the scenario, as JSON.")] = "{}",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the scenario.")] = 0,
@@ -58,7 +60,9 @@ def world(
 
 @check_app.command(epilog=EXAMPLES)
 def planner(
-    name: Annotated[str, typer.Argument(metavar="PLANNER", help="A registered planner, or MODULE:CLASS.")],
+    name: Annotated[
+        str, typer.Argument(metavar="PLANNER", help="A registered planner, or MODULE:NAME; then /ARGUMENT.")
+    ],
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
 ) -> None:
     """Ask a planner usual and strange things: who it is, plans that can be driven, no surprises.
@@ -67,15 +71,20 @@ def planner(
     """
     from chauffeur.cli.bench_run import planner_options
     from chauffeur.drive.conformance import check_planner
-    from chauffeur.planners.registry import make_planner
+    from chauffeur.planners.registry import make_planner, planner_from
 
-    asked = _named(name)() if ":" in name else make_planner(name, **planner_options(name, base_url))
+    options = planner_options(name, base_url)
+    module, _, argument = name.partition("/")
+    if ":" in module:
+        asked = planner_from(_named(module), module, argument, **options)
+    else:
+        asked = make_planner(name, **options)
     _tell(check_planner(asked))
 
 
 @check_app.command(epilog=EXAMPLES)
 def executor(
-    name: Annotated[str, typer.Argument(metavar="MODULE:CLASS", help="The executor's class.")],
+    name: Annotated[str, typer.Argument(metavar="MODULE:NAME", help="The executor's class or factory.")],
     policy: Annotated[str, typer.Option(metavar="MODULE:NAME", help="A policy of its kind to try it with.")],
     scenario: Annotated[str, typer.Option(help="A built-in scenario to drive it on.")] = "cruise",
 ) -> None:
@@ -83,14 +92,17 @@ def executor(
 
     Exit code 1 where a check finds something.
     """
+    from chauffeur.concept.registry import made
     from chauffeur.drive.conformance import check_executor
 
-    _tell(check_executor(_named(name), _named(policy), _scenario("", scenario, "{}", 0)))
+    tried = _named(policy)
+    tried = made("policy", policy, tried) if isinstance(tried, type) or not hasattr(tried, "kind") else tried
+    _tell(check_executor(_maker("executor", name), tried, _scenario("", scenario, "{}", 0)))
 
 
 @check_app.command(epilog=EXAMPLES)
 def benchmark(
-    name: Annotated[str, typer.Argument(metavar="BENCHMARK", help="A registered benchmark, or MODULE:CLASS.")],
+    name: Annotated[str, typer.Argument(metavar="BENCHMARK", help="A registered benchmark, or MODULE:NAME.")],
     option: Annotated[
         list[str] | None, typer.Option("--option", "-o", help="An option of the benchmark, NAME=VALUE; may come again.")
     ] = None,
@@ -99,12 +111,13 @@ def benchmark(
 
     Exit code 1 where a check finds something.
     """
-    from chauffeur.bench.kernel.benchmark import make_benchmark
+    from chauffeur.bench.kernel.benchmark import benchmark_from, make_benchmark
     from chauffeur.bench.kernel.conformance import check_benchmark
     from chauffeur.cli.bench_plugin import options_of
 
     given = options_of(option or [])
-    _tell(check_benchmark(_named(name)(**given) if ":" in name else make_benchmark(name, **given)))
+    own = ":" in name
+    _tell(check_benchmark(benchmark_from(_named(name), name, **given) if own else make_benchmark(name, **given)))
 
 
 def _tell(findings: Sequence[ConformanceFinding]) -> None:
@@ -153,20 +166,27 @@ def _named(name: str) -> Any:
     return getattr(module, own)
 
 
+def _maker(kind: str, name: str) -> Callable[..., Any]:
+    """The class or function at `module:NAME`: a check makes several of its kind. Raises ConfigError."""
+    from chauffeur.concept import ConfigError
+
+    found = _named(name)
+    if not callable(found):
+        raise ConfigError(f"{name!r} is a {type(found).__name__}, and makes no {kind}.", hint="Name its class.")
+    return found
+
+
 def _world_class(name: str) -> Callable[[], Any]:
-    """The class at `module:Class`, the only world of a module, or a registered one. Raises ConfigError."""
+    """What makes the world at `module:NAME`, the only one of a module, or a registered one. Raises ConfigError."""
     from chauffeur.concept import ConfigError
     from chauffeur.concept.registry import load_plugin, plugin_names
 
     module_name, _, class_name = name.partition(":")
     if not class_name and module_name in plugin_names("chauffeur.worlds"):
         return load_plugin("chauffeur.worlds", module_name)
-    module = _module(module_name)
     if class_name:
-        found = getattr(module, class_name, None)
-        if not isinstance(found, type):
-            raise ConfigError(f"{module_name} has no class {class_name!r}.", hint="Say module:Class.")
-        return found
+        return _maker("world", name)
+    module = _module(module_name)
     own = [
         one
         for one in vars(module).values()

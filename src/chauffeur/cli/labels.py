@@ -21,6 +21,7 @@ FALLBACK_LEVELS: Final[dict[FallbackLevel, str]] = {
 EVENTS: Final[dict[EventKind, tuple[str, str]]] = {
     "planned": ("thinks", "cyan"),
     "declined": ("declined", "bold yellow"),
+    "answered": ("answers", "cyan"),
     "unplanned": ("no plan", "bold yellow"),
     "superseded": ("superseded", "dim"),
     "started": ("drives", "green"),

@@ -29,6 +29,8 @@ def page(
     from chauffeur.hmi.page import write_page
 
     trip = read_trip(recording)
+    if trip.note:
+        stdout().print(trip.note, style="yellow")
     written = [("page", path_text(write_page(out or recording.with_suffix(".html"), trip)))]
     if filmstrip is not None:
         from chauffeur.hmi.filmstrip import write_filmstrip

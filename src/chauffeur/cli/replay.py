@@ -19,25 +19,42 @@ Examples:
 
 def replay(
     recording: Annotated[Path, typer.Argument(metavar="TRIP.mcap", help="The recorded trip.")],
+    limits: Annotated[str, typer.Option(help="Bounds it may not cross, as of `chauffeur drive`.")] = "default",
 ) -> None:
     """Drive a recorded trip again, from its program and seed, and compare every instant.
 
-    No planner is asked. Exit code 1 says that the drive came out differently.
+    No planner is asked. The program passes today's checks, and is driven with today's safety filter and within today's
+    limits. Exit code 1 says that it was refused, or that the drive came out differently.
     """
     from rich.text import Text
 
+    from chauffeur.bench.referees import referee_for
     from chauffeur.cli.console import plain, stdout
     from chauffeur.cli.failures import FAILED
+    from chauffeur.cli.parts import limits_named
+    from chauffeur.drive.again import drive_again
     from chauffeur.drive.recording import compare_trips, read_trip
+    from chauffeur.memory.personal_limits import personal_limits
 
     console = stdout()
     recorded = read_trip(recording)
     trip = recorded.trip
     console.print(Text.assemble("Replaying “", plain(trip.instruction.text), f"” ({trip.scenario}, seed {trip.seed})"))
-    again = drive_again(recorded)
-    difference = compare_trips(recorded, again)
+    if recorded.note:
+        console.print(recorded.note, style="yellow")
+    done = drive_again(recorded, personal_limits(trip.instruction.person, limits_named(limits)), referee_for)
+    for note in done.notes:
+        console.print(plain(note), style="yellow")
+    if done.trip is None:
+        console.print(Text.assemble(("Not driven: ", "bold red"), plain(done.refusal)))
+        raise typer.Exit(FAILED)
+    difference = compare_trips(recorded, done.trip)
     if difference is None:
-        periods = f"{len(again.frames)} control periods, {trip.duration_s:.1f} s, outcome {trip.outcome}"
+        again = done.trip
+        seconds, held = again.trip.duration_s, len(recorded.frames)
+        periods = f"{held} control periods, {seconds:.1f} s, outcome {again.trip.outcome}"
+        if recorded.cut_off:
+            periods = f"the {held} control periods that can be read; the drive took {seconds:.1f} s"
         console.print(Text.assemble(("The same, bit for bit: ", "bold green"), f"{periods}."))
         return
     console.print(Text("Not the same. The first difference, recorded against now:", "bold red"))
@@ -45,43 +62,6 @@ def replay(
     for line in other_versions(recorded):
         console.print(Text("  ") + plain(line))
     raise typer.Exit(FAILED)
-
-
-def drive_again(recorded: RecordedTrip) -> RecordedTrip:
-    """The same program on the same scenario with the same seed. Raises DataError if the recording holds no drive."""
-    from dataclasses import replace
-
-    from chauffeur.bench.referees import referee_for
-    from chauffeur.concept import DataError, Limits
-    from chauffeur.drive.session import drive_policy, make_world, trip_s
-
-    trip, scenario = recorded.trip, recorded.scenario
-    policy = trip.plan.policy
-    if not recorded.frames or policy is None:
-        raise DataError(f"The recording holds no drive: its outcome is {trip.outcome}.", hint="Replay a driven trip.")
-    world = make_world(scenario)
-    world.reset(scenario, trip.seed)
-    referee = referee_for(world, scenario, trip.plan)
-    record = dict(trip.record)
-    limits = Limits(**record["limits"])
-    episode = drive_policy(
-        world,
-        policy,
-        referee,
-        trip_s(scenario),
-        limits,
-        shielded="shield" in record,
-        minimum_speed="minimum_speed" in record,
-    )
-    driven = replace(
-        trip,
-        outcome=episode.outcome,
-        causes=episode.causes,
-        metrics=episode.metrics,
-        duration_s=episode.duration_s,
-        said=episode.said,
-    )
-    return replace(recorded, trip=driven, frames=episode.frames, final=episode.final)
 
 
 def other_versions(recorded: RecordedTrip) -> list[str]:

@@ -63,7 +63,7 @@ def talk(
     every: Annotated[
         float | None,
         typer.Option(
-            min=0.0, help="Seconds from one given wish to the next; default when it is done, or driven for 10 s."
+            min=0.0, help="Seconds from one given wish to the next; default when it is done; 10 s if it has no end."
         ),
     ] = None,
     time_scale: Annotated[float, typer.Option(min=0.1, max=20.0, help="Seconds of the car's time in a second.")] = 1.0,
@@ -110,7 +110,7 @@ def talk(
     from chauffeur.drive.live.recorder import LiveRecorder, unanswered
     from chauffeur.drive.live.settings import Settings
     from chauffeur.drive.live.starts import Start
-    from chauffeur.drive.scenarios import find, planner_for, seeds_with_lead, suiting
+    from chauffeur.drive.scenarios import find, lasting, planner_for, seeds_with_lead, suiting
     from chauffeur.drive.session import make_world, parse_wish
     from chauffeur.drive.surroundings import services_file
     from chauffeur.drive.talk.session import WELL, Talk
@@ -125,6 +125,7 @@ def talk(
     planner = planner_for(planner, place)
     bounds = personal_limits(who, limits_named(limits))
     trips = math.ceil(duration / _TRIP_S)
+    place = lasting(place, duration)
     seeds = seeds_with_lead(place, place.seed if seed is None else seed, trips)
     first = seeds[0] if seed is None else seed  # a seed that was asked for is driven, whoever is on the road
     settings = Settings(

@@ -11,16 +11,18 @@ from chauffeur.cli.interrupts import Interrupts
 from chauffeur.cli.lines import Lines
 from chauffeur.cli.talk_screen import TalkScreen
 from chauffeur.cli.talk_typed import read_line
+from chauffeur.drive.live.plan_messages import TOOK_OVER
 from chauffeur.drive.talk.messages import Conversation, Said, Say, Stop
 from chauffeur.drive.talk.session import Talk
 from chauffeur.language.emergency import read_emergency
+from chauffeur.language.questions import ends_session
 
 if TYPE_CHECKING:
     from chauffeur.hmi.cabin import Cabin
 
 LOOK_EVERY_S: Final = 0.01
 DRIVEN_FOR_S: Final = 10.0
-"""So long a wish of a file is driven, in the car's time, before the next line is taken."""
+"""So long a wish of a file that has no end of its own is driven, in the car's time, before the next line is taken."""
 _MOST_AT_ONCE: Final = 100
 """Messages of the page that are taken before the drive is looked at again."""
 _MOST_WAITING: Final = 64
@@ -110,20 +112,20 @@ class TalkDrive:
             session.take(Stop())
 
     def _in_turn(self) -> bool:
-        """Whether the line before has been driven for a while, or is done."""
-        last = next(reversed(self._screen.conversations), None)
-        if last is None:
-            return True
-        if self._every_s is not None and self._given:
-            return self._screen.time_s - self._last_s >= self._every_s
-        if last.stage == "driven":
-            return not 0.0 <= self._screen.time_s - self._last_s < DRIVEN_FOR_S
-        return last.stage == "closed"
+        """Whether the lines before are done, or have been driven for a while where they have no end of their own."""
+        going = [each for each in self._screen.conversations if each.stage != "closed"]
+        since_s = self._screen.time_s - self._last_s
+        if self._every_s is not None and self._given and self._screen.conversations:
+            return since_s >= self._every_s
+        if any(each.stage != "driven" or each.ends for each in going):
+            return False
+        return not going or not 0.0 <= since_s < DRIVEN_FOR_S
 
     def _hand_on(self, session: Talk) -> None:
         line = self._given.pop(0)
         told = read_line(line, taken_over=session.taken_over)
-        self._handed_on += isinstance(told, Say) and read_emergency(told.text) is None  # those are answered at once
+        at_once = not isinstance(told, Say) or read_emergency(told.text) is not None or ends_session(told.text)
+        self._handed_on += not at_once
         self._line(session, line)
 
     def _give_up(self, session: Talk) -> None:
@@ -142,7 +144,9 @@ class TalkDrive:
 
 
 def _driven(each: Conversation) -> bool:
-    """Whether a wish was driven, or gave way."""
+    """Whether a wish was driven, to its end where it has one, or gave way."""
     if each.outcome in _UNDRIVEN or not each.outcome:
         return False
-    return each.outcome != "interrupted" or each.stages.check_s is not None
+    if each.outcome != "interrupted" or each.why == TOOK_OVER:
+        return True
+    return each.stages.check_s is not None and not each.ends

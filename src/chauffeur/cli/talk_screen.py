@@ -342,7 +342,7 @@ def _line_of(scene: Scene) -> Text:
 
 def _summary(each: Conversation) -> Text:
     label, style = _OUTCOMES.get(each.outcome, (each.outcome or each.stage, ""))
-    if each.outcome in ("superseded", "interrupted") and each.stages.check_s is not None:
+    if each.outcome in ("superseded", "interrupted") and each.stages.check_s is not None and not each.ends:
         label, style = "driven", "green"
     found = Text.assemble("“", plain(each.text), "” ", (label, style))
     if each.opinion:

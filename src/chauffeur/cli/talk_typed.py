@@ -15,7 +15,7 @@ HELP: Final = (
     ("me retention 30", "days that trips are kept, or forever"),
     ("me private, public", "keep nothing new, or keep trips again"),
     ("me erase sure", "erase everything, for good"),
-    ("stop", "come to a stand and end"),
+    ("stop, quit", "come to a stand and end"),
 )
 """What can be typed, and what it means."""
 

@@ -17,10 +17,11 @@ from chauffeur.drive.talk.attention import Attention
 from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.voice import Voice
 from chauffeur.drive.talk.wish_queue import Words
+from chauffeur.language.questions import ends_session
 from chauffeur.speech.answers import answer_in
 
 _EVALUATE: Final = "evaluate"
-_END: Final = ("end", "quit", "exit")
+_LEAVING: Final = "You end the session."
 _LISTEN_S: Final = 0.2
 
 
@@ -31,6 +32,7 @@ class Desk:
         self._road, self._screen = road, screen
         self._running: set[asyncio.Task[None]] = set()
         self._attention: Attention | None = None
+        self.left = False
 
     @contextlib.asynccontextmanager
     async def open(self, engine: AsrEngine | None, sound: Sound | None, voice: Voice | None) -> AsyncGenerator[Desk]:
@@ -44,7 +46,11 @@ class Desk:
             await asyncio.gather(*self._running)
 
     async def take(self, line: str, spoken: Words | None = None) -> None:
-        """One line: a wish, or what the person says of the drive."""
+        """One line: a wish, what the person says of the drive, or that they leave."""
+        if ends_session(line):
+            self.left = True
+            self._screen.say(_LEAVING)
+            return
         first, _, rest = line.strip().partition(" ")
         if first.lower().rstrip(":,") == _EVALUATE:
             self._screen.answer(await self._road.evaluate(rest), spoken)
@@ -58,14 +64,12 @@ class Desk:
         with Lines(standard_input()) as lines:
             if lines.terminal:
                 self._screen.say("Type a wish and press Enter. `stop`, `evaluate ...`, `end`.", style="dim")
-            while lines.open or (self._attention is not None and not lines.terminal):
+            while not self.left and (lines.open or (self._attention is not None and not lines.terminal)):
                 for line in await asyncio.to_thread(lines.read, _LISTEN_S):
-                    if line.strip().lower() in _END:
-                        return
-                    if not line.strip() or self._answered(line):
+                    if self.left or not line.strip() or self._answered(line):
                         continue
                     task = self._start(self.take(line))
-                    if not lines.terminal:
+                    if not lines.terminal or ends_session(line):
                         await task
 
     def _deaf(self, why: str) -> None:

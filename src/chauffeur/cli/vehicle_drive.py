@@ -122,8 +122,9 @@ def drive(
                 await road.reached(wait)
                 async with Desk(road, screen).open(ear, sound, voice) as desk:
                     for wish in wishes or ():
-                        await desk.take(wish)
-                    if ear is not None or not wishes:
+                        if not desk.left:
+                            await desk.take(wish)
+                    if not desk.left and (ear is not None or not wishes):
                         await desk.read()
 
         interrupted = False

@@ -28,6 +28,7 @@ class KinematicBicycle:
         steering_rate_radps: How fast they turn.
         most_acceleration_mps2, most_braking_mps2: Of the pedals, both positive.
         grip_mps2: Lateral acceleration that the tyres hold; asked for more, the car understeers.
+        lag_s: How much later than asked pedals and wheel answer; who plans a stop counts on it, `advanced` does not.
     """
 
     length_m: float
@@ -39,6 +40,7 @@ class KinematicBicycle:
     most_acceleration_mps2: float
     most_braking_mps2: float
     grip_mps2: float = 8.0
+    lag_s: float = 0.0
 
 
 LINCOLN_MKZ: Final = KinematicBicycle(4.902, 2.128, 2.85, 1.425, 0.61, 1.2, 3.5, 8.0)

@@ -7,23 +7,40 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept import Situation
+from chauffeur.concept import Context, Situation
 from chauffeur.concept.units import kmh, mph
 from chauffeur.describe.road import SIGHT_M, ordinal
+from chauffeur.language.questions import ADDRESS
 from chauffeur.language.tokens import words_of
+from chauffeur.worlds.places import Destination
 
 DONT_KNOW: Final = "I don't know that. I can tell our speed, the limit, our lane and who is ahead."
+
+_US: Final = r"(?:i|we|you|it|he|the car)"
+_WHY_STANDING: Final = re.compile(
+    rf"{ADDRESS}why (?:(?:are|did|do|have|is|has) {_US} (?:just |now |still |all )?"
+    r"(?:stand\w*|stop\w*|wait\w*|brak\w*|slow(?:ed|ing)|still)|"
+    rf"(?:are|is) (?:not {_US}|{_US} (?:still )?not) (?:moving|driving|going))"
+    r"(?: (?:here|now|there|down|still|for|at all|anywhere))*$"
+)
+"""Why the car stands or brakes; not a complaint that it is slow, which is a wish."""
+_IN_THE_WAY: Final = re.compile(r"light [^.]{0,40}(?:red|yellow)|on foot|stop sign")
+_SENTENCE_ENDS: Final = re.compile(r"(?<=[a-z])\. ")
+_STANDS_BEHIND_M: Final = 25.0
+"""A car this near ahead, centre to centre, may be why one brakes or waits."""
+_NO_REASON: Final = "I see no light, sign, car or person ahead that would hold us up."
 
 _MAY: Final = r"(?:may|can|could|should|must)"
 _WE: Final = r"(?:i|we|you|one)"
 _ASKS: Final = re.compile(
-    r"^(?:(?:please|hey|ok|so|and|well|excuse me|sorry) ?,? ?)*"
+    rf"{ADDRESS}"
     r"(?:(?:can|could|would|will) you (?:please )?tell (?:me|us) |(?:do|did) you (?:happen to )?know |"
     r"tell (?:me|us) |i wonder )?"
     r"(?:whats?|which|how (?:fast|far|many|much|long|old|big|tall|close|late)|where|when|who|whose|"
-    r"is there|are there|is it)\b"
+    r"is there|are there|is it|are we (?:nearly |almost |soon |about )?there|will we (?:arrive|be there) soon)\b"
 )
 """How a question begins that wants to know something; not one that asks for something, complains or proposes."""
 _PROPOSES: Final = re.compile(
@@ -35,6 +52,10 @@ _THEIRS: Final = (
     r"(?:the|that|this) (?:\w+ )?(?:car|vehicle|truck|van|lorry|bus|one|guy|driver|front|lead)\b.*)"
 )
 _AHEAD: Final = r"(?:ahead|in front|before us|front|lead)"
+
+
+_WAY: Final = "way"
+"""Name of the fact how far it is to where the car is going."""
 
 
 def _speed(speed_mps: float) -> str:
@@ -77,6 +98,16 @@ def _turns(situation: Situation) -> str:
     return f"At the next junction we can go {' or '.join(situation.turns)}."
 
 
+def with_way(context: Context, there: Destination | None) -> Context:
+    """C that knows how far it is to where the car is going; as it was where that is nowhere."""
+    if there is None:
+        return context
+    left = f"{there.left_m / 1000.0:.1f} km" if there.left_m >= 1000.0 else f"{max(10.0, round(there.left_m, -1)):.0f} m"
+    words = f"It is about {left} by road to {there.name or 'where we are going'}."
+    situation = replace(context.situation, scene=(*context.situation.scene, (_WAY, words)))
+    return replace(context, situation=situation)
+
+
 def _of_scene(name: str) -> Callable[[Situation], str]:
     return lambda situation: dict(situation.scene).get(name, "")
 
@@ -84,6 +115,15 @@ def _of_scene(name: str) -> Callable[[Situation], str]:
 _TOPICS: Final[tuple[tuple[re.Pattern[str], Callable[[Situation], str]], ...]] = tuple(
     (re.compile("|".join(patterns)), answer)
     for patterns, answer in (
+        (
+            (
+                r"\b(?:are|were) we (?:\w+ )?there\b|\bwhen (?:do|will|are) we (?:arrive|get there|be there|there)\b",
+                r"\bhow (?:far|long(?! (?:ha|is|was|did))|much longer|many minutes|soon)\b"
+                r"(?!.*\b(?:ahead|front|away|behind)\b)",
+                r"\bwhere (?:are we (?:going|heading)|are you taking)\b|\bwill we (?:arrive|be there) soon\b",
+            ),
+            _of_scene(_WAY),
+        ),
         ((r"\b(?:weather|raining|rain|snowing|foggy|forecast)\b(?! tomorrow)",), _of_scene("weather")),
         ((r"\btraffic (?:like|ahead|rules?)\b|\btraffic$",), _of_scene("traffic")),
         (
@@ -128,15 +168,33 @@ _TOPICS: Final[tuple[tuple[re.Pattern[str], Callable[[Situation], str]], ...]] =
 )
 
 
+def _held_up(situation: Situation, seen: str) -> str:
+    """What C holds that may be why the car stands or brakes."""
+    front = situation.front
+    found = [one.rstrip(". ") for one in _SENTENCE_ENDS.split(seen) if _IN_THE_WAY.search(one) and "no stop" not in one]
+    if front is not None and front.distance_m < _STANDS_BEHIND_M:
+        found.append(_front(situation).rstrip("."))
+    told = ". ".join(re.sub(r"\bmy\b", "our", re.sub(r"\bme\b", "us", one)) for one in found)
+    return f"{told}." if told else _NO_REASON
+
+
 def asks_to_know(text: str) -> bool:
     """Whether words ask for knowledge and for nothing to be done."""
     words = words_of(text).rstrip(" ?.!")
     return _ASKS.match(words) is not None and _PROPOSES.search(words) is None and not re.search(r"[.,;!?]", words)
 
 
-def answer_to(text: str, situation: Situation) -> str:
-    """What C says to a question about it; empty where it is no such question, or C does not hold the answer."""
+def answer_to(text: str, situation: Situation, seen: str = "") -> str:
+    """What C says to a question about it; empty where it is no such question, or C does not hold the answer.
+
+    Args:
+        text: The person's words.
+        situation: C as numbers.
+        seen: C in words.
+    """
+    words = words_of(text).rstrip(" ?.!")
+    if _WHY_STANDING.match(words):
+        return _held_up(situation, seen)
     if not asks_to_know(text):
         return ""
-    words = words_of(text).rstrip(" ?.!")
     return next((said for pattern, answer in _TOPICS if pattern.search(words) and (said := answer(situation))), "")

@@ -24,10 +24,11 @@ async def plan_or_answer(planner: Planner, request: PlanRequest) -> Plan:
     """
     begun = time.perf_counter()
     words = request.instruction.text
-    said = answer_to(words, request.context.situation)
+    said = answer_to(words, request.context.situation, request.context.text)
     if said:
         return declined(planner, said, begun, intent=ANSWERED)
     plan = await planner.plan(request)
-    if plan.policy is None and not plan.offer and plan.intent != NO_WISH and asks_to_know(words):
-        return replace(plan, thoughts=Thoughts(DONT_KNOW), refusal=DONT_KNOW, intent=ANSWERED)
+    open_ = not plan.offer and plan.intent != NO_WISH
+    if (plan.policy is not None or open_) and not request.instruction.confirmed and asks_to_know(words):
+        return replace(plan, policy=None, thoughts=Thoughts(DONT_KNOW), refusal=DONT_KNOW, intent=ANSWERED)
     return plan

@@ -142,11 +142,11 @@ def check_executor(make: MakeExecutor, policy: OfKind, scenario: Scenario) -> tu
         policy: One of its kind that can be driven in the scenario.
         scenario: Where it is tried.
     """
-    once = _broken_or(lambda: _driven(make, policy, scenario, held=False))
-    if isinstance(once, str):
-        return (ConformanceFinding("drives", (once,)),)
-    again = _driven(make, policy, scenario, held=False)
-    held = _driven(make, policy, scenario, held=True)
+    try:
+        once, again = (_driven(make, policy, scenario, held=False) for _ in range(2))
+        held = _driven(make, policy, scenario, held=True)
+    except Exception as error:  # noqa: BLE001 - a third party's executor may raise anything
+        return (ConformanceFinding("drives", (f"It raised {type(error).__name__}: {error}",)),)
     repeats = () if once == again else ("The same policy, scenario and seed gave another drive the second time.",)
     return (
         ConformanceFinding("vouches", tuple(_vouches(make, policy, scenario))),
@@ -154,13 +154,6 @@ def check_executor(make: MakeExecutor, policy: OfKind, scenario: Scenario) -> tu
         ConformanceFinding("repeats", repeats),
         ConformanceFinding("is held back", tuple(_held_back(held))),
     )
-
-
-def _broken_or(work: Callable[[], _Driven]) -> _Driven | str:
-    try:
-        return work()
-    except Exception as error:  # noqa: BLE001 - a third party's executor may raise anything
-        return f"It raised {type(error).__name__}: {error}"
 
 
 def _vouches(make: MakeExecutor, policy: OfKind, scenario: Scenario) -> Iterator[str]:

@@ -39,11 +39,11 @@ Letter = Literal["wish", "context", "history", "system", "view", "plan", "verdic
 
 WishEventKind = Literal[
     "planning", "planned", "declined", "unplanned", "superseded", "started", "refused", "stale", "finished", "failed",
-    "interrupted", "resumed", "said", "garbage",
+    "interrupted", "resumed", "said", "garbage", "answered",
 ]  # fmt: skip
 """What becomes of a wish in real time, in about this order. `declined`: the planner says no, in words; `unplanned`: it
 could not; `refused`: a check says no; `stale`: the plan came too late; `interrupted`: the process that ran it is gone,
-or the person has taken over."""
+or the person has taken over; `answered`: it was a question, and what was driven is driven on."""
 
 VehicleEventKind = Literal["link", "asking", "asked", "applied", "late", "answer", "feedback"]
 """Of a real vehicle. `link`: the way to it changed; `asking`: it is about to be asked, `asked`: messages are handed to
@@ -55,7 +55,7 @@ EventKind = Literal[Letter, WishEventKind, VehicleEventKind, "period", "trip", "
 something besides the wish failed (memory, audit log); `over`: the session ended."""
 
 FINAL: Final[frozenset[WishEventKind]] = frozenset(
-    {"declined", "unplanned", "superseded", "refused", "stale", "finished", "failed", "interrupted"}
+    {"declined", "unplanned", "superseded", "refused", "stale", "finished", "failed", "interrupted", "answered"}
 )
 """Events after which nothing more becomes of a wish, unless it is asked again."""
 

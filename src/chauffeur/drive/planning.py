@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import re
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -40,6 +41,7 @@ from chauffeur.concept import (
 from chauffeur.drive.answers import plan_or_answer
 from chauffeur.drive.emergency import check_told_not_to
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
+from chauffeur.language.questions import is_question
 from chauffeur.planners.base import Planner
 from chauffeur.safety.base import Check
 from chauffeur.safety.checks import DEFAULT_CHECKS, run_checks
@@ -87,6 +89,7 @@ class PlanSteps:
         fit: What the vehicle takes of a plan, whose maker knows no vehicle.
         tell: Hears each letter as it comes.
         within_s: Time of the clock after which the planner is given up on.
+        runs: Whether an earlier wish is driven, or on its way: a question does not end it without a yes.
     """
 
     planner: Planner
@@ -101,6 +104,7 @@ class PlanSteps:
     fit: Callable[[Plan], Plan] = _as_it_is
     tell: Listener = nobody_listens
     within_s: float = math.inf
+    runs: bool = False
 
 
 @dataclass(frozen=True)
@@ -146,7 +150,8 @@ async def plan_once(instruction: Instruction, steps: PlanSteps) -> Planned:
     request = await request_once(instruction, steps)
     own = steps.own(instruction.text)
     if own is None:
-        plan = await _worth_asking(steps.fit(await _planned(request, steps)), request, steps)
+        plan = steps.fit(await _planned(request, steps))
+        plan = await _worth_asking(_meant(plan, instruction) if steps.runs else plan, request, steps)
     else:
         plan = steps.fit(own)
     steps.tell(DriveEvent("plan", text=plan.thoughts.text, value=plan))
@@ -205,6 +210,19 @@ async def _planned(request: PlanRequest, steps: PlanSteps) -> Plan:
     if isinstance(error, ChauffeurError) or not isinstance(error, Exception):
         raise error
     raise PlannerError(f"The planner failed: {type(error).__name__}: {error}", retryable=True) from error
+
+
+def _meant(plan: Plan, instruction: Instruction) -> Plan:
+    """The plan; of words that have the form of a question, the question whether it is to be driven."""
+    if plan.policy is None or instruction.confirmed or not is_question(instruction.text):
+        return plan
+    does = _FIRST_SENTENCE.match(plan.thoughts.text)
+    as_read = "" if does is None or instruction.text in does[0] else f" As I read it: {does[0]}"
+    words = f"I take that for a question, and go on as we are. Shall I act on it?{as_read}"
+    return replace(plan, policy=None, thoughts=Thoughts(words), refusal=words, offer=instruction.text, intent="ask")
+
+
+_FIRST_SENTENCE: Final = re.compile(r"[^.:!?]{0,200}(?:[:] [^.!?]{0,200})?[.!?]?")
 
 
 async def _worth_asking(plan: Plan, request: PlanRequest, steps: PlanSteps) -> Plan:

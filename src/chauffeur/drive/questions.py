@@ -14,6 +14,8 @@ from chauffeur.speech.answers import answer_in
 ANSWER_WITHIN_S: Final = 20.0
 """So long a yes is taken for an answer."""
 NOT_MEANT: Final = "Then I do not."
+NOTHING_ASKED: Final = "I have asked nothing, and go on as we are. Say what I am to do instead, or: “Stop!”"
+"""To a no that answers nothing."""
 
 
 class OpenQuestion:

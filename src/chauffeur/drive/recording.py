@@ -21,7 +21,7 @@ from typing import Any, cast
 import zstandard
 from google.protobuf.message import Message as Drawing
 from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, Header, McapRecord, Message, Metadata
+from mcap.records import Channel, Chunk, DataEnd, Header, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.schema import register_schema
@@ -40,6 +40,7 @@ from chauffeur.concept import (
 )
 from chauffeur.drive import foxglove
 from chauffeur.drive import mcap_schemas as channels
+from chauffeur.drive.cut_off import CutFile, cut_file, whole_records
 from chauffeur.drive.files import publish
 from chauffeur.geometry import Polyline, RoadGraph
 
@@ -99,6 +100,7 @@ class RecordedTrip:
         system: S as the planner got it, where it is kept.
         final: The instant after the last command, where a collision first shows.
         view: What the front camera showed when the drive was planned, where the planner looked; not in the recording.
+        cut_off: Whether it was read from a file that ends before the drive does: `frames` are those that stand in it.
     """
 
     trip: Trip
@@ -107,6 +109,15 @@ class RecordedTrip:
     system: SystemMessage | None = None
     final: Observation | None = field(default=None, repr=False)
     view: CameraImage | None = field(default=None, repr=False)
+    cut_off: bool = False
+
+    @property
+    def note(self) -> str:
+        """What the reader has to know of the file, in words; empty for a whole one."""
+        if not self.cut_off:
+            return ""
+        first, last = (self.frames[at].observation.time_s for at in (0, -1))
+        return f"The recording was cut off; {last - first:.1f} s of {self.trip.duration_s:.1f} s can be read."
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,13 +174,14 @@ def write_trip(
 
 
 def read_trip(path: Path) -> RecordedTrip:
-    """Read a recording.
+    """Read a recording; of one that was cut off, what stands in it.
 
     Raises:
-        DataError: The file is missing, damaged, not a recorded trip, or of a newer format.
+        DataError: The file is missing, damaged, cut off before the drive, not a recorded trip, or of a newer format.
     """
     try:
-        return _read(path, _content(path))
+        content = _content(path)
+        return _read(path, content, cut_file(content))
     except DataError:
         raise
     except _UNREADABLE as error:
@@ -180,8 +192,13 @@ def compare_trips(first: RecordedTrip, second: RecordedTrip) -> Difference | Non
     """The first difference between two drives, or None if they are the same bit for bit.
 
     Compared are the frames, the final instant, outcome, metrics and what was said. Latencies, versions and other
-    provenance may differ between equal drives.
+    provenance may differ between equal drives. Of a recording that was cut off, the frames that it holds are compared.
     """
+    if first.cut_off or second.cut_off:
+        held = min(len(first.frames), len(second.frames))
+        pairs_held = zip(first.frames[:held], second.frames[:held], strict=True)
+        found = ((index, _difference(one, other)) for index, (one, other) in enumerate(pairs_held))
+        return next((Difference(index, *difference) for index, difference in found if difference), None)
     for index, (one, other) in enumerate(zip(first.frames, second.frames, strict=False)):
         if (found := _difference(one, other)) is not None:
             return Difference(index, *found)
@@ -210,6 +227,8 @@ def _write(
     final: Observation | None,
 ) -> None:
     writer.start(profile=_PROFILE)
+    # Counts let a reader tell a whole recording from one whose tail was lost and re-indexed by a repair tool.
+    writer.add_metadata(_METADATA, {"format": str(FORMAT), "frames": str(len(frames)), "final": str(final is not None)})
     ids: dict[str, int] = {}
     for channel in channels.CHANNELS:
         schema = writer.register_schema(channel.schema_name, "jsonschema", json.dumps(channel.schema).encode())
@@ -265,8 +284,10 @@ def _write(
         draw("/scene", foxglove.scene_update(observation, with_road=new_road), time, index)
         draw("/vehicles", foxglove.vehicle_points(observation), time, index)
         draw("/tf", foxglove.ego_transform(observation), time, index)
-    for index, frame in enumerate(frames):
-        time = foxglove.nanoseconds(frame.observation.time_s)
+        if index == len(frames):
+            continue
+        # What was done at an instant stands behind it: of a file that is cut off, the drive up to there can be read.
+        frame = frames[index]
         parts = _storable(_frame.dump_python(frame, mode="json", exclude={"observation"}))
         parts["setpoints"]["served_stops"].sort()
         put(channels.WISHES, parts["setpoints"], time, index)
@@ -275,9 +296,7 @@ def _write(
         put(channels.PROGRAM, program, time, index)
         for text in frame.said:
             put(channels.SAID, {"text": text}, time, index)
-            draw("/log", foxglove.said(text, frame.observation.time_s), time, index)
-    # Counts let a reader tell a whole recording from one whose tail was lost and re-indexed by a repair tool.
-    writer.add_metadata(_METADATA, {"format": str(FORMAT), "frames": str(len(frames)), "final": str(final is not None)})
+            draw("/log", foxglove.said(text, observation.time_s), time, index)
     writer.finish()
 
 
@@ -294,12 +313,12 @@ def _storable(value: Any) -> Any:
     return value
 
 
-def _read(path: Path, stream: io.BytesIO) -> RecordedTrip:
+def _read(path: Path, content: bytes, cut: CutFile | None) -> RecordedTrip:
     messages: dict[str, list[tuple[int, Any]]] = {channel.topic: [] for channel in channels.CHANNELS}
     topics: dict[int, str] = {}
     facts: dict[str, str] = {}
     budget = _Budget()
-    for record in _records(path, stream, budget):
+    for record in _records(path, content, cut, budget):
         match record:
             case Channel():
                 topics[record.id] = record.topic
@@ -310,8 +329,11 @@ def _read(path: Path, stream: io.BytesIO) -> RecordedTrip:
                 facts = record.metadata
             case _:
                 pass
-    if not facts:
+    if not facts and cut is None:
         raise _damaged(path, "its closing record is missing")
+    if not facts:
+        sides = any("mirrored" in payload for _, payload in messages[channels.LANES.topic])
+        facts = {"format": str(_WITH_SIDES if sides else FORMAT)}
     if (found := int(facts["format"])) not in (FORMAT, _WITH_SIDES):
         raise DataError(
             f"{path} has recording format {found}; this Chauffeur reads formats {_WITH_SIDES} and {FORMAT}.",
@@ -322,6 +344,8 @@ def _read(path: Path, stream: io.BytesIO) -> RecordedTrip:
 
     def single(channel: channels.Channel) -> Any:
         found = messages[channel.topic]
+        if not found and cut is not None:
+            raise _cut_early(path)
         if len(found) != 1:
             raise _damaged(path, f"{channel.topic} has {len(found)} messages, expected 1")
         return found[0][1]
@@ -339,8 +363,16 @@ def _read(path: Path, stream: io.BytesIO) -> RecordedTrip:
     if found == _WITH_SIDES:
         _turn_sides(messages)
     observations = _read_observations(messages)
-    count, has_final = int(facts["frames"]), facts["final"] == "True"
     parts = (channels.WISHES, channels.COMMAND, channels.PROGRAM)
+    if cut is not None:
+        held = min(len(observations), *(len(messages[part.topic]) for part in parts))
+        if not held:
+            raise _cut_early(path)
+        facts = {"frames": str(held), "final": "False"}
+        observations = observations[:held]
+        for part in parts:
+            del messages[part.topic][held:]
+    count, has_final = int(facts["frames"]), facts["final"] == "True"
     if len(observations) != count + has_final or any(len(messages[c.topic]) != count for c in parts):
         raise _damaged(path, f"it should hold {count} control periods and does not")
     system = [_system.validate_python(payload) for _, payload in messages[channels.SYSTEM.topic]]
@@ -350,13 +382,20 @@ def _read(path: Path, stream: io.BytesIO) -> RecordedTrip:
         scenario=_scenario.validate_python(single(channels.SCENARIO)),
         system=system[0] if system else None,
         final=observations[count] if has_final else None,
+        cut_off=cut is not None,
     )
 
 
-def _records(path: Path, stream: io.BytesIO, budget: _Budget) -> Iterator[McapRecord]:
-    """Every record from front to back, chunks unpacked. An index is not followed: it could lead to a chunk twice."""
-    records = StreamReader(stream, emit_chunks=True, validate_crcs=True).records
+def _records(path: Path, content: bytes, cut: CutFile | None, budget: _Budget) -> Iterator[McapRecord]:
+    """Every record of the data from front to back, chunks unpacked.
+
+    The index behind the data is not followed: it could lead to a chunk twice, and a file that was cut off has none.
+    """
+    stream = io.BytesIO(content if cut is None else cut.whole)
+    records = StreamReader(stream, emit_chunks=True, validate_crcs=cut is None).records
     header = next(records)
+    if cut is not None and isinstance(header, DataEnd):
+        raise _cut_early(path)
     if not isinstance(header, Header) or header.profile != _PROFILE:
         raise DataError(
             f"{path} is an MCAP file, but not a recorded trip of Chauffeur.",
@@ -365,8 +404,13 @@ def _records(path: Path, stream: io.BytesIO, budget: _Budget) -> Iterator[McapRe
     for record in records:
         if isinstance(record, Chunk):
             yield from breakup_chunk(budget.unpack(record), validate_crc=True)
+        elif isinstance(record, DataEnd):
+            break
         else:
             yield record
+    if cut is not None and cut.chunk is not None:
+        part = budget.unpack(cut.chunk, cut_off=True)
+        yield from breakup_chunk(replace(part, data=whole_records(part.data)), validate_crc=False)
 
 
 class _Budget:
@@ -375,8 +419,13 @@ class _Budget:
     def __init__(self) -> None:
         self._bytes, self._values = _MAX_UNPACKED_BYTES, _MAX_VALUES
 
-    def unpack(self, chunk: Chunk) -> Chunk:
-        """The chunk without compression. Raises ValueError: it is too large, or its declared size is not true."""
+    def unpack(self, chunk: Chunk, *, cut_off: bool = False) -> Chunk:
+        """The chunk without compression. Raises ValueError: it is too large, or its declared size is not true.
+
+        Args:
+            chunk: As it stands in the file.
+            cut_off: Whether its end is missing: what unpacks of it is given.
+        """
         size = chunk.uncompressed_size
         if size > _MAX_CHUNK_BYTES:
             raise ValueError(f"a chunk would unpack to {size} bytes; {_MAX_CHUNK_BYTES} are the most one may have")
@@ -391,7 +440,7 @@ class _Budget:
             data = unpacker.stream_reader(chunk.data, read_across_frames=True).read(size + 1)
         else:
             raise ValueError(f"a chunk is compressed with {chunk.compression[:20]!r}; a recording's are with 'zstd'")
-        if len(data) != size:
+        if len(data) > size or (len(data) < size and not cut_off):
             raise ValueError(f"a chunk does not unpack to the {size} bytes that it declares")
         return replace(chunk, compression="", data=data)
 
@@ -410,16 +459,19 @@ class _Budget:
             raise ValueError(f"it has more than {_MAX_UNPACKED_BYTES} bytes")
 
 
-def _content(path: Path) -> io.BytesIO:
+def _content(path: Path) -> bytes:
     """The whole file: a damaged length field then meets the end of the data, not a gigantic allocation."""
     try:
         if path.stat().st_size > _MAX_BYTES:
             raise _damaged(path, f"it is larger than {_MAX_BYTES} bytes")
-        return io.BytesIO(path.read_bytes())
+        content = path.read_bytes()
     except FileNotFoundError as error:
         raise DataError(f"There is no recording at {path}.", hint="Check the path.") from error
     except OSError as error:
         raise DataError(f"{path} cannot be read: {error.strerror or error}.") from error
+    if not content:
+        raise _damaged(path, "it is empty")
+    return content
 
 
 def _stored(lane: Lane) -> dict[str, Any]:
@@ -520,6 +572,12 @@ def _read_frames(messages: dict[str, list[tuple[int, Any]]], observations: list[
 
 def _damaged(path: Path, why: str) -> DataError:
     return DataError(f"{path} is not a usable recording: {why}.", hint="Record the trip again.")
+
+
+def _cut_early(path: Path) -> DataError:
+    return DataError(
+        f"{path} was cut off too early: no instant of the drive stands whole in it.", hint="Copy or record it again."
+    )
 
 
 def _first_line(error: Exception) -> str:

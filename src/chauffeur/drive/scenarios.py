@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 import re
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -47,6 +48,8 @@ IN_REACH_M = 100.0
 """So far ahead a vehicle counts as one to follow or to overtake."""
 _CLOSES_MPS = 2.0
 """Faster than the vehicle ahead by this much, the car comes up to it and stays behind it."""
+_LONGEST_LOT_S = 3600.0
+"""A trip in a lot may have no more (worlds.parking)."""
 _TRIES = 60
 STAYS_S = 40.0
 """How long a vehicle ahead stays in reach at least, on roads that keep one."""
@@ -112,6 +115,14 @@ def suiting(wish: str) -> Scenario:
     if first is not None and first.manoeuvre == "speed" and first.change <= 0 and first.variant != "match":
         return by_id["cruise"]  # a speed of one's own needs room ahead
     return by_id["overtake"]
+
+
+def lasting(scenario: Scenario, duration_s: float) -> Scenario:
+    """A built-in scenario of a town or a lot with time for a session of that long; any other as it is."""
+    if scenario not in LOTS + TOWNS:
+        return scenario
+    most_s = _LONGEST_LOT_S if scenario in LOTS else duration_s + 1.0
+    return replace(scenario, config={**scenario.config, "duration_s": min(duration_s + 1.0, most_s)})
 
 
 def _asks_for_amenities(wish: str) -> bool:

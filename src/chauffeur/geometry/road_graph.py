@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from chauffeur.geometry.box import Box
+    from chauffeur.geometry.ground import Ground
     from chauffeur.geometry.polyline import FloatArray
 
 LaneId = str
@@ -133,9 +135,11 @@ class RoadGraph:
 
     Attributes:
         lanes: All of them.
+        paved: Ground on which a car may be anywhere, as in a parking lot; None where lanes alone count.
     """
 
     lanes: tuple[Lane, ...]
+    paved: Box | None = None
 
     def __eq__(self, other: object) -> bool:
         """Same lanes in the same order."""
@@ -450,6 +454,13 @@ class RoadGraph:
         offset = legs.ux[best] * (y_m - legs.y[best]) - legs.uy[best] * (x_m - legs.x[best])
         lane = self.lanes[int(legs.lane[best])].id
         return LanePlace(lane, float(legs.station[best] + along[best]), float(offset)), float(away[best])
+
+    @cached_property
+    def ground(self) -> Ground:
+        """Where a car may be: which lanes, in which direction, with its whole outline."""
+        from chauffeur.geometry.ground import Ground
+
+        return Ground(self)
 
     # Across -----------------------------------------------------------------------------------------------------------
 

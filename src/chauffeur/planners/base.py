@@ -100,12 +100,14 @@ class Prose:
         whole: Whether the model came to its end by itself.
         model: Model as the endpoint names it.
         usage: Cost.
+        declined: Whether the endpoint marks the words as a refusal, or as what its filter left.
     """
 
     text: str
     whole: bool
     model: str
     usage: Usage
+    declined: bool = False
 
 
 @runtime_checkable

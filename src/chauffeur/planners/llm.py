@@ -11,7 +11,7 @@ from typing import Literal
 from chauffeur.concept import ConfigError, InstructionError, Plan, PlanRequest, Program, Thoughts
 from chauffeur.planners.base import OnText, Prompt, Prose
 from chauffeur.planners.cache import Completion
-from chauffeur.planners.llm_model import CUT, ChatBill, ChatModel
+from chauffeur.planners.llm_model import ChatBill, ChatModel, declines, was_cut
 from chauffeur.planners.llm_reply import Reply, read_reply
 from chauffeur.planners.llm_settings import settings_from
 from chauffeur.planners.prompts import Message, build_messages, repair_turns
@@ -166,15 +166,20 @@ class LlmPlanner:
             if not findings:
                 break
             _log.info("%s: asking for a repair: %s", self.id, "; ".join(findings))
-            messages = [*messages, *repair_turns(completion.text, findings)]
+            refused = completion.text
+            messages = [*messages, *repair_turns(refused, findings)]
             completion, reply, findings = await self._answer(messages, request, bill)
+            if completion.text == refused:  # it would say the same again
+                break
         return completion, reply
 
     async def _answer(
         self, messages: list[Message], request: PlanRequest, bill: ChatBill
     ) -> tuple[Completion, Reply, list[str]]:
         completion = await self._chat.complete(messages, bill)
-        reply = read_reply(completion.text, cut=completion.finish in CUT)
+        if declines(completion):
+            return completion, Reply("", refusal=completion.text), []
+        reply = read_reply(completion.text, cut=was_cut(completion))
         if reply.problem:
             return completion, reply, [reply.problem]
         return completion, reply, self._findings(reply.source, request) if reply.source is not None else []

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 from chauffeur import __version__
 from chauffeur.concept.addresses import Address, read_key
+from chauffeur.foreign.complaints import server_words
 from chauffeur.planners.cache import Completion
 from chauffeur.planners.llm_address import PLACEHOLDER_KEY
 from chauffeur.planners.llm_context import LEAST_ANSWER_TOKENS, shortage_in, too_small, was_cut
@@ -30,6 +31,7 @@ from chauffeur.planners.llm_errors import (
     truncated,
 )
 from chauffeur.planners.prompts import Message, pictures_in
+from chauffeur.planners.prompts.turns import TextPart, words_of
 
 if TYPE_CHECKING:
     import httpx
@@ -37,14 +39,23 @@ if TYPE_CHECKING:
 _log = logging.getLogger(__name__)
 
 _CONNECT_S = 10.0
+_SAID_CHARS = 2_000
 _MODEL_CHARS = 200
 _MAX_BODY_BYTES = 64_000_000
 """Longest reply read, in one piece or streamed."""
-_MAX_REFUSAL_BYTES = 64_000
-_DRAIN_S = 0.1
-"""For the end of a stream behind its last event: a connection whose answer was read to its end serves again."""
 _DISLIKES = frozenset({400, 422})
 """How servers answer a parameter that they do not take; 501 where it is streaming."""
+_NO_SYSTEM: Final = re.compile(
+    r"(?=.{0,200}\b(?:system|developer)\b)(?=.{0,200}\b(?:roles?|messages?|prompts?|instructions?)\b)"
+    r".{0,200}\b(?:not|only|unsupported|unknown|unexpected|unrecogni[sz]ed|invalid|must)\b"
+    r"|roles? must alternate|\brole\b.{0,120}\buser\b.{0,20}\bassistant\b|only user and assistant roles",
+    re.IGNORECASE | re.DOTALL,
+)
+"""How servers whose template knows no system turn say so: Gemma's and Mistral's, behind vLLM, llama.cpp and TGI."""
+_NO_SYSTEM_STATUS: Final = frozenset({400, 404, 422, 500, 501})
+_DRAIN_S = 0.1
+"""For the end of a stream behind its last event: a connection whose answer was read to its end serves again."""
+_FILTERED: Final = "The endpoint's content filter held the reply back (content_filter)."
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +110,7 @@ class Endpoint:
         self._client: tuple[asyncio.AbstractEventLoop, httpx.AsyncClient] | None = None
         self._renamed: dict[str, str | None] = {}
         self._turned = False
+        self._folded = False
         self._told: set[str] = set()
 
     async def complete(self, messages: list[Message], sampling: Sampling, on_text: Callable[[str], None]) -> Completion:
@@ -174,15 +186,19 @@ class Endpoint:
             raise missing_key(self._address.url)
         import httpx
 
+        from chauffeur.foreign.bodies import UNPACKED, bounding
+
         client = httpx.AsyncClient(
             headers={
                 "Authorization": f"Bearer {found[0] if found else PLACEHOLDER_KEY}",
                 "Content-Type": "application/json",
                 "User-Agent": f"chauffeur/{__version__}",
+                **UNPACKED,
             },
             timeout=httpx.Timeout(self._timeout_s, connect=min(_CONNECT_S, self._timeout_s)),
             limits=httpx.Limits(max_connections=1000, max_keepalive_connections=100),
             follow_redirects=True,  # httpx takes the key out where one leads to another host
+            event_hooks={"response": [bounding(_MAX_BODY_BYTES)]},
         )
         # Connections belong to the event loop that opened them; a caller with a new loop gets new ones.
         self._client = (loop, client)
@@ -197,11 +213,12 @@ class Endpoint:
 
     def _scrub(self, text: str) -> str:
         found = self._found_key()
-        return text.replace(found[0], "***") if found else text
+        return re.sub(rf"(?<!\w){re.escape(found[0])}(?!\w)", "***", text) if found else text
 
     def body(self, messages: list[Message], sampling: Sampling) -> dict[str, Any]:
         """What is sent for a conversation, key and headers aside."""
-        body: dict[str, Any] = {"model": self._model, "messages": messages, **sampling.parameters()}
+        turns = _without_system(messages) if self._folded else messages
+        body: dict[str, Any] = {"model": self._model, "messages": turns, **sampling.parameters()}
         if self._stream:
             body |= {"stream": True, "stream_options": {"include_usage": True}}
         for name, other in self._renamed.items():
@@ -237,6 +254,10 @@ class Endpoint:
             self._stream = not self._stream
             self._tell_once(f"{self._address.url} {'streams only' if self._stream else 'does not stream'}")
             return True
+        if status in _NO_SYSTEM_STATUS and not self._folded and _NO_SYSTEM.search(error.message[:_SAID_CHARS]):
+            self._folded = True
+            self._tell_once(f"{self._address.url} takes no system turn; its text goes in front of the first user turn")
+            return True
         return False
 
     def _check_read(self, messages: list[Message], completion: Completion) -> None:
@@ -255,41 +276,53 @@ class Endpoint:
     async def _exchange(
         self, client: httpx.AsyncClient, body: dict[str, Any], on_text: Callable[[str], None]
     ) -> Completion:
-        # Escaped to ASCII: a lone surrogate in somebody's words must not keep them from being sent.
+        """Ask, and read what comes by what it is, whatever it is called: an object, or events."""
+        # Escaped to ASCII: a lone surrogate in a passenger's words must not keep them from being sent.
         content = json.dumps(body).encode("ascii")
+        tally = _Tally(self._max_chars)
         async with client.stream("POST", f"{self._address.url}/chat/completions", content=content) as response:
             if not response.is_success:
-                raise RefusedError.of(response.status_code, response.headers, await self._refusal(response))
-            if response.headers.get("content-type", "").startswith("text/event-stream"):
-                return await self._read_stream(response, on_text)
-            return await self._read_whole(response, on_text)
+                raise RefusedError(response.status_code, _parsed(await response.aread()), response.headers)
+            pieces, said = response.aiter_bytes(), response.headers.get("content-type", "")
+            head = await _head(pieces)
+            if head[:1] in (b"{", b"["):
+                on_text(tally.add(json.loads(head + b"".join([piece async for piece in pieces]))))
+            elif _EVENT.match(head) or (not head and self._stream) or said.lower().startswith("text/event-stream"):
+                await self._read_stream(head, pieces, tally, on_text)
+            elif head and "json" not in said.lower():
+                raise not_an_api(self._address.url, said)
+        if not tally.seen:
+            raise (
+                RefusedError(None, tally.complaint)
+                if tally.complaint
+                else garbage(self._address.url, "no choices in it")
+            )
+        # JSON can carry lone surrogates, which no file or terminal takes.
+        text = "".join(tally.parts).encode("utf-8", "replace").decode("utf-8")
+        return Completion(
+            text=text,
+            finish="refusal" if tally.declined else tally.finish or "stop",
+            prompt_tokens=tally.prompt_tokens,
+            completion_tokens=tally.completion_tokens,
+            model=tally.model[:_MODEL_CHARS],
+        )
 
-    async def _refusal(self, response: httpx.Response) -> bytes:
-        data = bytearray()
-        async for piece in response.aiter_bytes():
-            data += piece
-            if len(data) > _MAX_REFUSAL_BYTES:
-                break
-        return bytes(data[:_MAX_REFUSAL_BYTES])
-
-    async def _read_stream(self, response: httpx.Response, on_text: Callable[[str], None]) -> Completion:
-        tally, events = _Tally(self._max_chars), _Events()
-        room = _MAX_BODY_BYTES
-        pieces = response.aiter_bytes()
-        async for piece in pieces:
-            room -= len(piece)
-            if room < 0:
-                raise self._too_long()
-            if self._take(events.feed(piece), tally, on_text):
-                await self._drain(pieces)
-                break
-            if tally.full:
-                break
-        if not tally.chunks:
-            raise _EmptyStreamError
-        if not tally.finish:
+    async def _read_stream(
+        self, head: bytes, pieces: AsyncIterator[bytes], tally: _Tally, on_text: Callable[[str], None]
+    ) -> None:
+        events = _Events()
+        done = self._take(events.feed(head), tally, on_text)
+        while not done and not tally.full and (piece := await anext(pieces, None)) is not None:
+            done = self._take(events.feed(piece), tally, on_text)
+        if done:
+            await self._drain(pieces)
+        if not tally.seen:
+            if not tally.complaint:
+                raise _EmptyStreamError
+        elif not tally.finish and done and tally.parts:
+            self._tell_once(f"{self._address.url} says [DONE] without a finish_reason; its replies count as whole")
+        elif not tally.finish:
             raise truncated(self._address.url)
-        return self._finished(tally)
 
     @staticmethod
     def _take(events: Iterator[bytes], tally: _Tally, on_text: Callable[[str], None]) -> bool:
@@ -311,41 +344,48 @@ class Endpoint:
                 async for _ in pieces:
                     pass
 
-    async def _read_whole(self, response: httpx.Response, on_text: Callable[[str], None]) -> Completion:
-        data = bytearray()
-        async for piece in response.aiter_bytes():
-            data += piece
-            if len(data) > _MAX_BODY_BYTES:
-                raise self._too_long()
-        content_type = response.headers.get("content-type", "")
-        if "json" not in content_type and not data.lstrip().startswith(b"{"):
-            raise not_an_api(self._address.url, content_type)
-        answer = json.loads(data)
-        if not isinstance(answer, dict):
-            raise garbage(self._address.url, "no object")
-        tally = _Tally(self._max_chars)
-        on_text(tally.add(answer))
-        if not tally.chunks:
-            raise garbage(self._address.url, "no choices in it")
-        return self._finished(tally)
-
-    def _too_long(self) -> EndpointError:
-        return garbage(self._address.url, f"more than {_MAX_BODY_BYTES // 1_000_000} MB")
-
-    def _finished(self, tally: _Tally) -> Completion:
-        # JSON can carry lone surrogates, which no file or terminal takes.
-        text = "".join(tally.parts).encode("utf-8", "replace").decode("utf-8")
-        return Completion(
-            text=self._scrub(text),
-            finish=tally.finish or "stop",
-            prompt_tokens=tally.prompt_tokens,
-            completion_tokens=tally.completion_tokens,
-            model=self._scrub(tally.model)[:_MODEL_CHARS],
-        )
-
 
 class _EmptyStreamError(Exception):
     """A stream that ended before its first piece."""
+
+
+_BOM: Final = b"\xef\xbb\xbf"
+_EVENT: Final = re.compile(rb"(?:data|event|id|retry)?:")
+"""How a stream of events begins."""
+
+
+async def _head(pieces: AsyncIterator[bytes]) -> bytes:
+    """The beginning of a body, without blanks and a byte order mark; empty where there is nothing else."""
+    head = b""
+    async for piece in pieces:
+        head = (head + piece).removeprefix(_BOM).lstrip()
+        if head and not _BOM.startswith(head):
+            break
+    return head
+
+
+def _parsed(content: bytes) -> object:
+    """What an answer that is no success holds: JSON, or text."""
+    try:
+        return json.loads(content)
+    except (ValueError, RecursionError):
+        return content.decode("utf-8", "replace")
+
+
+def _without_system(messages: list[Message]) -> list[Message]:
+    """A conversation whose system turns stand in front of the first user turn."""
+    system = "\n\n".join(words_of(message) for message in messages if message["role"] == "system")
+    turns: list[Message] = []
+    for message in messages:
+        if message["role"] == "system":
+            continue
+        content = message["content"]
+        if message["role"] == "user" and system:
+            mine: TextPart = {"type": "text", "text": system}
+            content = f"{system}\n\n{content}" if isinstance(content, str) else [mine, *content]
+            system = ""
+        turns.append({"role": message["role"], "content": content})
+    return turns
 
 
 class _Events:
@@ -375,8 +415,9 @@ class _Events:
         name, _, value = line.partition(b":")
         if name == b"data":
             self._data.append(value.removeprefix(b" "))
-        elif not line and self._data:
-            yield b"\n".join(self._data)
+        elif not line:
+            if data := b"\n".join(self._data):  # an event without data is none
+                yield data
             self._data.clear()
 
 
@@ -385,7 +426,11 @@ class _Tally:
 
     def __init__(self, max_chars: int) -> None:
         self.parts: list[str] = []
-        self.chunks = 0
+        self.seen = False
+        """Whether anything came that is of the protocol."""
+        self.complaint: object = None
+        """What came that is not of the protocol and has words."""
+        self.declined = False
         self.finish = ""
         self.model = ""
         self.prompt_tokens = 0
@@ -402,32 +447,56 @@ class _Tally:
         Raises:
             RefusedError: It says what went wrong instead.
         """
-        if error := _field(chunk, "error"):
-            raise RefusedError(None, error)
+        if isinstance(chunk, list) and chunk:
+            chunk = cast("list[object]", chunk)[0]
+        choices, error = _field(chunk, "choices"), _field(chunk, "error")
+        if error or _field(chunk, "object") == "error":
+            raise RefusedError(None, chunk)
         model = _field(chunk, "model")
         self.model = model if isinstance(model, str) else self.model
         usage = _field(chunk, "usage")
         # The last count stands: servers send it once, or a running total with every piece.
         self.prompt_tokens = _count(usage, "prompt_tokens") or self.prompt_tokens
         self.completion_tokens = _count(usage, "completion_tokens") or self.completion_tokens
-        choices = _field(chunk, "choices")
         if not isinstance(choices, list):
+            self.complaint = chunk if isinstance(chunk, dict) and server_words(chunk) else self.complaint
             return ""
-        self.chunks += 1
-        if not choices:
-            return ""
-        choice = cast("list[object]", choices)[0]
-        finish = _field(choice, "finish_reason")
-        self.finish = finish if isinstance(finish, str) else self.finish
-        text = _field(_field(choice, "delta") or _field(choice, "message"), "content")
-        if not isinstance(text, str) or not text:
-            return ""
+        self.seen = True
+        return self._choice(cast("list[object]", choices)[0]) if choices else ""
+
+    def _choice(self, choice: object) -> str:
+        if error := _field(choice, "error"):
+            raise RefusedError(None, error)
+        message = _field(choice, "delta") or _field(choice, "message")
+        refusal = _field(message, "refusal")
+        if isinstance(refusal, str) and refusal and not self.declined:
+            self.declined = True
+            self.parts.clear()
+        text = _words(refusal if self.declined else _field(message, "content"))
         kept = text[: self._room]
         self._room -= len(kept)
-        if self.full:
+        if kept:
+            self.parts.append(kept)
+        finish = _field(choice, "finish_reason")
+        self.finish = finish if isinstance(finish, str) else self.finish
+        if self.finish == "content_filter":
+            self.parts = [_FILTERED]
+        elif self.full:
             self.finish = "capped"
-        self.parts.append(kept)
         return kept
+
+
+def _words(content: object) -> str:
+    """The words of a content: text, or parts of which those that are text count, and none that are reasoning."""
+    if isinstance(content, str):
+        return content
+    parts = cast("list[object]", content) if isinstance(content, list) else []
+    return "".join(part if isinstance(part, str) else _text_of(part) for part in parts)
+
+
+def _text_of(part: object) -> str:
+    text = _field(part, "text") if _field(part, "type") in ("text", "output_text", None) else None
+    return text if isinstance(text, str) else ""
 
 
 def _field(value: object, name: str) -> object:

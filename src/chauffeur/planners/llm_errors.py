@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 import socket
 from collections.abc import Callable, Mapping
 from email.utils import parsedate_to_datetime
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
 from chauffeur.concept import PlannerError
+from chauffeur.foreign.complaints import ForeignBodyError, server_words
 from chauffeur.planners.prompts.blocks import cap, clean
 
 Kind = Literal[
@@ -32,6 +32,9 @@ Kind = Literal[
     "garbage",
     "not_an_api",
 ]
+
+_TELLS = re.compile(r"[\w\"'(]")
+"""How a server's own words begin; a page of a proxy in between is looked through, and shown to no one."""
 
 KEY_VARIABLES = ("CHAUFFEUR_API_KEY", "OPENAI_API_KEY")
 TIMEOUT_VARIABLE = "CHAUFFEUR_TIMEOUT_S"
@@ -74,33 +77,28 @@ class RefusedError(Exception):
     """A server's own words instead of a completion: an answer that is no success, or an error inside a reply.
 
     Attributes:
-        status: HTTP status; None for an error inside a reply.
-        error: What it says is wrong: an object, or text.
+        status: HTTP status, or the one that an error inside a reply names; None where it names none.
+        error: What it says is wrong, as it came.
         headers: Of the answer.
         message, code, param: As the object has them; empty where it has none.
     """
 
     def __init__(self, status: int | None, error: object, headers: Mapping[str, str] | None = None) -> None:
-        self.status = status
+        found = error
+        while isinstance(found, list) and found:
+            found = cast("list[object]", found)[0]
+        fields = cast("Mapping[str, object]", found) if isinstance(found, Mapping) else {}
+        inner = fields.get("error")
+        fields = cast("Mapping[str, object]", inner) if isinstance(inner, Mapping) else fields
+        code = fields.get("code")
+        named = isinstance(code, int) and not isinstance(code, bool) and 400 <= code < 600
+        self.status = cast("int", code) if status is None and named else status
         self.error = error
         self.headers: Mapping[str, str] = headers or {}
-        fields = cast("Mapping[str, object]", error) if isinstance(error, Mapping) else {"message": error}
-        message = fields.get("message")
-        self.message = message.strip() if isinstance(message, str) else ""
-        self.code, self.param = str(fields.get("code") or ""), str(fields.get("param") or "")
+        words = server_words(error)
+        self.message = words if _TELLS.match(words) else ""
+        self.code, self.param = str(code or ""), str(fields.get("param") or "")
         super().__init__(self.message or "an error without words")
-
-    @classmethod
-    def of(cls, status: int, headers: Mapping[str, str], body: bytes) -> RefusedError:
-        """The refusal that an answer holds: `{"error": {...}}`, `{"error": "..."}`, the bare object, or no JSON."""
-        try:
-            found: Any = json.loads(body)
-        except (ValueError, RecursionError):
-            found = None
-        if isinstance(found, dict):
-            found = cast("dict[str, Any]", found).get("error", cast("dict[str, Any]", found))
-        # A page of a proxy in between is looked through for a context too small, and shown to nobody.
-        return cls(status, {"page": body.decode("utf-8", "replace")} if found is None else found, headers)
 
 
 def missing_key(url: str) -> EndpointError:
@@ -141,7 +139,7 @@ def not_an_api(url: str, content_type: str) -> EndpointError:
 
 def garbage(url: str, detail: str) -> EndpointError:
     """A reply in the right envelope whose content is not what the protocol says."""
-    return EndpointError("garbage", f"The reply from {url} cannot be read ({detail}).", retryable=True)
+    return EndpointError("garbage", f"The reply from {url} cannot be read ({detail.rstrip('.')}).", retryable=True)
 
 
 _ABOUT_PICTURES = re.compile(
@@ -177,8 +175,13 @@ def failure_of(
         key_variable: Environment variable the key came from; None when none was used.
         scrub: Takes the key out of text the server sent.
     """
-    if isinstance(error, RefusedError) and error.status is not None:
-        return _from_status(error.status, error, url, model, key_variable, scrub)
+    if isinstance(error, RefusedError):
+        if error.status is not None:
+            return _from_status(error.status, error, url, model, key_variable, scrub)
+        said = cap(clean(scrub(str(error))), _MESSAGE_CHARS).rstrip(".")
+        return EndpointError("server", f"{url} broke off its reply: {said}.", hint="Try later.", retryable=True)
+    if isinstance(error, ForeignBodyError):
+        return garbage(url, error.message)
     if isinstance(error, ValueError | TypeError | RecursionError):
         return garbage(url, type(error).__name__)
     return _from_transport(error, url, scrub)

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Final, Self, TypeVar
 
 from chauffeur.concept import Usage
 from chauffeur.concept.addresses import Address
+from chauffeur.foreign.model_text import MAX_REPLY_CHARS, read_model_text
 from chauffeur.planners.base import OnText, Prompt, Prose
 from chauffeur.planners.cache import Completion, ReplyCache, default_cache_dir, endpoint_key
 from chauffeur.planners.llm_address import parse_address
 from chauffeur.planners.llm_endpoint import Endpoint, Sampling
 from chauffeur.planners.llm_errors import EndpointError, timed_out
-from chauffeur.planners.llm_reply import MAX_REPLY_CHARS, without_thinking
 from chauffeur.planners.llm_retry import RetryPolicy, with_retries
 from chauffeur.planners.llm_settings import LlmSettings
 from chauffeur.planners.pricing import cost_usd
@@ -33,8 +33,21 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-CUT: Final = frozenset({"length", "capped"})
-"""How a reply ends that its model did not end."""
+_WHOLE: Final = frozenset(
+    {"stop", "eos", "eos_token", "end_turn", "stop_sequence", "complete", "tool_calls", "function_call"}
+)
+_DECLINED: Final = frozenset({"refusal", "content_filter"})
+
+
+def was_cut(completion: Completion) -> bool:
+    """Whether a reply ended otherwise than by its model's own will; a word that is not known counts as such."""
+    return completion.finish.lower() not in _WHOLE
+
+
+def declines(completion: Completion) -> bool:
+    """Whether the endpoint marks a reply as a refusal, or its filter held it back."""
+    return completion.finish in _DECLINED
+
 
 T = TypeVar("T")
 
@@ -159,9 +172,9 @@ class ChatModel:
         """
         bill = ChatBill()
         completion = await self.within_budget(self.complete(list(messages), bill))
-        text = without_thinking(completion.text[:MAX_REPLY_CHARS]).strip()
-        whole = completion.finish not in CUT
-        return Prose(text, whole, completion.model or self.model, self.usage(bill))
+        said = read_model_text(completion.text, cut=was_cut(completion))
+        model, usage = completion.model or self.model, self.usage(bill)
+        return Prose(said.answer.strip(), not said.cut, model, usage, declined=declines(completion))
 
     async def within_budget(self, work: Awaitable[T]) -> T:
         """What a whole plan's asking comes to. Raises EndpointError when it takes longer than it may."""

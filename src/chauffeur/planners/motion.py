@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import time
@@ -10,17 +9,22 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from chauffeur.concept import ActionMatrix, ConfigError, InstructionError, Plan, PlanRequest, Thoughts, Usage
-from chauffeur.planners.base import Answerer
+from chauffeur.foreign.model_text import read_model_text
+from chauffeur.foreign.numbers import numbers_in, plain_signs
+from chauffeur.planners.base import Answerer, Prose
 from chauffeur.planners.llm import INTENT_DECLINED, INTENT_UNUSABLE
 from chauffeur.planners.llm_model import ChatModel
-from chauffeur.planners.llm_reply import Reply, read_reply, without_thinking
+from chauffeur.planners.llm_reply import Reply, refusal_in, tidy
 from chauffeur.planners.llm_settings import settings_from
 from chauffeur.planners.prompts.motion import ASK, MODERATE, matrix_words, motion_messages
 from chauffeur.planners.prompts.turns import repair_turns
 from chauffeur.safety.envelope import policy_findings
 from chauffeur.safety.gain_box import GAIN_NAMES
 
-_MATRIX: Final = re.compile(r"\[\s*\[[^\[\]]{1,200}\]\s*,\s*\[[^\[\]]{1,200}\]\s*\]")
+_MATRIX: Final = re.compile(r"\[\s{0,40}\[([^\[\]]{1,200})\]\s{0,40}[,;]?\s{0,40}\[([^\[\]]{1,200})\],?\s{0,40}\]")
+_NAMED: Final = re.compile(r"\bP[\s*_`]{0,8}[=:][\s*_`]{0,8}\Z")
+_NAMED_CHARS: Final = 24
+_ROW: Final = 3
 _INTENT: Final = "motion.gains"
 _IN_PROCESS: Final = "transformers/"
 MAX_TOKENS: Final = 256
@@ -32,24 +36,42 @@ def settings_of(policy: ActionMatrix) -> tuple[tuple[str, float], ...]:
     return tuple(zip((name.lower() for name in GAIN_NAMES), (*policy.pid, *policy.mpc), strict=True))
 
 
-def read_matrix(text: str) -> tuple[ActionMatrix | None, Reply]:
-    """(the last action matrix of a reply, its thoughts or refusal or what is wrong). Never raises."""
-    visible = without_thinking(text)
-    found = _MATRIX.findall(visible)
-    words = _MATRIX.sub("", visible)
-    reply = read_reply(words)
-    thoughts = re.sub(r"[\s*`]{0,8}\bP\s{0,3}=\s{0,8}\Z", "", reply.thoughts or words.strip()).strip()
-    thoughts = re.sub(r"\A[\s*_#]*Thoughts?[*_ \t]*:\s*", "", thoughts)
-    if reply.refusal:
-        return None, reply
-    if not found:
+def read_matrix(text: str, *, whole: bool = True) -> tuple[ActionMatrix | None, Reply]:
+    """(the action matrix of a reply, its thoughts or refusal or what is wrong). Never raises.
+
+    What is named P counts before what thoughts compare it with; two different ones are none. A reply that was cut
+    counts where its matrix is named P.
+
+    Args:
+        text: The reply.
+        whole: Whether the model came to its end by itself.
+    """
+    said = read_model_text(text, cut=not whole)
+    answer = plain_signs(said.answer)
+    found = [(_is_named(answer, one.start()), one) for one in _MATRIX.finditer(answer)]
+    named = [one for is_named, one in found if is_named]
+    words = _MATRIX.sub("", answer)
+    reason = refusal_in(words, beside=bool(found))
+    thoughts = tidy(re.sub(r"\bP[\s*`]{0,8}=[\s*`]{0,8}\Z", "", words.rstrip(" \n\t*`").removesuffix("```")))
+    if reason is not None:
+        return None, Reply(thoughts, refusal=reason or "The model declined without giving a reason.")
+    if said.cut and not named:
+        return None, Reply(thoughts, problem="the answer was cut off before its action matrix; answer more briefly")
+    meant = {tuple(tuple(numbers_in(row)) for row in one.groups()) for one in named or [one for _, one in found]}
+    if not meant:
         return None, Reply(thoughts, problem="the answer holds no action matrix; give P = [[Kp, Ki, Kd], [Wl, Wh, Ws]]")
-    try:
-        rows: Any = json.loads(found[-1])
-        (kp, ki, kd), (wl, wh, ws) = ([float(value) for value in row] for row in rows)
-    except (ValueError, TypeError):
+    if len(meant) > 1:
+        return None, Reply(
+            thoughts, problem="the answer holds different action matrices; give one, as P = [[...], [...]]"
+        )
+    pid, mpc = meant.pop()
+    if len(pid) != len(mpc) or len(pid) != _ROW:
         return None, Reply(thoughts, problem="the action matrix is no two rows of three numbers")
-    return ActionMatrix((kp, ki, kd), (wl, wh, ws)), Reply(thoughts)
+    return ActionMatrix((pid[0], pid[1], pid[2]), (mpc[0], mpc[1], mpc[2])), Reply(thoughts)
+
+
+def _is_named(text: str, at: int) -> bool:
+    return _NAMED.search(text[max(0, at - _NAMED_CHARS) : at]) is not None
 
 
 class MotionPlanner:
@@ -106,14 +128,14 @@ class MotionPlanner:
         messages = motion_messages(request)
         prose = await self._writer.write(messages)
         usage = [prose.usage]
-        policy, reply = read_matrix(prose.text)
+        policy, reply = _read(prose)
         findings = [reply.problem] if reply.problem else []
         if policy is not None:
             findings = policy_findings(policy, request.context.situation, request.limits)
         if findings:
             prose = await self._writer.write([*messages, *repair_turns(prose.text, findings, ask=ASK)])
             usage.append(prose.usage)
-            policy, reply = read_matrix(prose.text)
+            policy, reply = _read(prose)
         unusable = f"The model gave no usable gains: {reply.problem}." if reply.problem else ""
         return Plan(
             thoughts=Thoughts(reply.thoughts),
@@ -161,6 +183,10 @@ class FixedGainsPlanner:
             model=self.model,
             raw=matrix_words(MODERATE),
         )
+
+
+def _read(prose: Prose) -> tuple[ActionMatrix | None, Reply]:
+    return (None, Reply("", refusal=prose.text)) if prose.declined else read_matrix(prose.text, whole=prose.whole)
 
 
 def _summed(parts: list[Usage]) -> Usage:

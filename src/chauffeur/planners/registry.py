@@ -17,7 +17,7 @@ import inspect
 from collections.abc import Callable
 
 from chauffeur.concept import ConfigError
-from chauffeur.concept.registry import load_plugin, plugin_names
+from chauffeur.concept.registry import load_plugin, made, plugin_names
 from chauffeur.planners.base import Answerer, Planner
 
 GROUP = "chauffeur.planners"
@@ -38,9 +38,37 @@ def make_planner(spec: str, **options: object) -> Planner:
     Raises:
         ConfigError: Unknown name or setting, a setting the planner refuses, or a planner that cannot be imported.
     """
-    planner = _make(spec, options)
-    if not isinstance(planner, Planner):
-        raise ConfigError(f"What the entry point {spec!r} builds is not a planner ({type(planner).__name__}).")
+    return _checked(spec, _make(spec, options))
+
+
+def planner_from(found: object, name: str, argument: str = "", **options: object) -> Planner:
+    """The planner that an object of a module is or makes.
+
+    Args:
+        found: A planner, a class or function that makes one without arguments, or anything that has `from_spec`.
+        name: What it is called, for messages.
+        argument: For `from_spec`.
+        **options: For `from_spec`.
+
+    Raises:
+        ConfigError: It is none and makes none, or takes no such argument or option.
+    """
+    build = getattr(found, "from_spec", None)
+    if callable(build):
+        return _checked(name, _built(name, build, argument, options))
+    if argument:
+        raise ConfigError(f"Planner {name!r} takes no argument ({argument!r}).", hint="Give it a from_spec(argument).")
+    if isinstance(found, Planner) and not isinstance(found, type):
+        return found
+    return _checked(name, made("planner", name, found, **options))
+
+
+def _checked(name: str, planner: object) -> Planner:
+    if not isinstance(planner, Planner) or isinstance(planner, type):
+        raise ConfigError(
+            f"{name!r} is not a planner, and makes none ({type(planner).__name__}).",
+            hint="A planner has id, model, and an async method plan(request).",
+        )
     return planner
 
 
@@ -58,9 +86,12 @@ def make_answerer(spec: str, **options: object) -> Answerer:
 
 def _make(spec: str, options: dict[str, object]) -> object:
     name, _, argument = spec.strip().partition("/")
-    build = _builder(name)
+    return _built(name, _builder(name), argument, options)
+
+
+def _built(name: str, build: Callable[..., object], argument: str, options: dict[str, object]) -> object:
     _check_options(name, build, argument, options)
-    return build(argument, **options)
+    return made("planner", name, build, argument, **options)
 
 
 def takes_option(spec: str, option: str) -> bool:

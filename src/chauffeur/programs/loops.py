@@ -30,6 +30,18 @@ def loop_findings(tree: ast.Module) -> list[Finding]:
     return findings
 
 
+def has_end(tree: ast.Module) -> bool:
+    """Whether a program may end by itself: one with `while True` that nothing leaves goes on until another wish."""
+    return not any(
+        isinstance(node, ast.While) and isinstance(node.test, ast.Constant) and node.test.value and not _may_leave(node)
+        for node in all_nodes(tree)
+    )
+
+
+def _may_leave(loop: ast.While) -> bool:
+    return any(isinstance(node, ast.Break | ast.Return | ast.Raise) for node in _loop_nodes(loop))
+
+
 def _while_findings(loop: ast.While) -> list[Finding]:
     if isinstance(loop.test, ast.Constant) and not loop.test.value:
         return []
@@ -155,7 +167,7 @@ def _visibly_ends(loop: ast.While) -> bool:
     tests: list[ast.AST] = [loop.test]
     tests += [node.test for node in _loop_nodes(loop) if isinstance(node, ast.If) and _leaves(node)]
     asked = {inner.id for test in tests for inner in ast.walk(test) if isinstance(inner, ast.Name)}
-    leaves = any(isinstance(node, ast.Break | ast.Return | ast.Raise) for node in _loop_nodes(loop))
+    leaves = _may_leave(loop)
     endless = isinstance(loop.test, ast.Constant)
     if endless and not leaves:
         return False

@@ -25,5 +25,12 @@ def answer_in(text: str) -> bool | None:
     return False if words in _EVEN_NO else None
 
 
+def takes_back(text: str) -> bool:
+    """Whether words say no to something and nothing else; "don't!" may be meant for what the car does."""
+    return answer_in(text) is False and not _DONT.match(text.strip().lower())
+
+
+_DONT: Final = re.compile(r"(?:no,? )?do(?:n['’]?t| not)\b")
+
 _EVEN_YES: Final = frozenset(word.replace("'", "") for word in _YES)
 _EVEN_NO: Final = frozenset(word.replace("'", "") for word in _NO)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shutil
+import struct
 import subprocess
 import wave
 from dataclasses import dataclass
@@ -31,9 +32,14 @@ _MOST_VALUES: Final = 50_000_000
 
 _RATES_HZ: Final = (4_000, 384_000)
 _UNKNOWN_LENGTH_BYTES: Final = 0x7FFF_0000
-"""Programs that write WAV into a pipe put a length around this, or above, into the header."""
+"""Programs that write WAV into a pipe put a length around this, or above, into the header, or none (0)."""
+_PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
+"""Formats of WAV: whole numbers, floating-point ones, one that is named further behind."""
+_MOST_CHANNELS: Final = 64
 
 _FFMPEG_S: Final = 30.0
+_MOST_SAMPLE: Final = 16.0
+"""24 dB above full scale: of recordings with floating-point samples that were mixed too loud."""
 _SILENT_PEAK: Final = 16
 _QUIET_PEAK: Final = 650
 """-34 dB of full scale: speech this low is lost in the noise of most microphones."""
@@ -108,6 +114,11 @@ def decode(data: bytes, name: str = "The recording", *, longest_s: float = LONGE
         raise DataError(f"{name} has a header and no sound.")
     if channels.shape[0] > longest_s * rate_hz:
         raise DataError(f"{name} is longer than {longest_s:g} s.", hint="Give one utterance, not a drive.")
+    odd = int(np.count_nonzero(~np.isfinite(channels)))
+    if odd:
+        notes = (*notes, f"{odd} of its {channels.size} samples are no numbers: they are taken for silence.")
+    # Before anything is mixed or resampled: one that is no number would spread.
+    channels = np.clip(np.nan_to_num(channels, nan=0.0, posinf=0.0, neginf=0.0), -_MOST_SAMPLE, _MOST_SAMPLE)
     if rate_hz < SAMPLE_RATE_HZ:
         notes = (*notes, f"Sampled at {rate_hz} Hz only: consonants are missing, words will be misheard more often.")
     samples = resample(mixed(channels), rate_hz)
@@ -183,32 +194,81 @@ _Found = tuple[npt.NDArray[np.float32], int, tuple[str, ...]]
 """(sound (n, channels) or (n,), rate in Hz, notes)."""
 
 
+@dataclass(frozen=True, slots=True)
+class _WaveFormat:
+    """How the samples of a WAV file are written."""
+
+    kind: int
+    channels: int
+    rate_hz: int
+    bits: int
+
+    @property
+    def frame_bytes(self) -> int:
+        """Size of one sample of all channels."""
+        return self.channels * (self.bits // 8)
+
+
 def _wave(data: bytes, name: str) -> _Found | None:
-    """Integer WAV; None for everything else."""
-    try:
-        with wave.open(io.BytesIO(data)) as file:
-            width, count, rate_hz = file.getsampwidth(), file.getnchannels(), file.getframerate()
-            promised = file.getnframes()
-            # A header may promise terabytes; there is never more than the file.
-            raw = file.readframes(min(promised, len(data) // max(1, width * count) + 1))
-    except (wave.Error, EOFError):
+    """WAV of numbers, whatever length its header states; None for everything else."""
+    found = _wave_parts(data)
+    if found is None:
         return None
-    if width not in (1, 2, 3, 4) or rate_hz == 0:
-        return None
-    frames = len(raw) // (width * count)
-    raw = raw[: frames * width * count]
+    form, content, promised = found
+    frames = len(content) // form.frame_bytes
     notes: tuple[str, ...] = ()
-    if frames < promised and promised * width * count < _UNKNOWN_LENGTH_BYTES:
-        notes = (f"{name} breaks off: it holds {frames / rate_hz:.1f} s of {promised / rate_hz:.1f} s.",)
-    if width == 1:  # the only unsigned one
+    if len(content) < promised < _UNKNOWN_LENGTH_BYTES:
+        held, whole = frames / form.rate_hz, promised / form.frame_bytes / form.rate_hz
+        notes = (f"{name} breaks off: it holds {held:.1f} s of {whole:.1f} s.",)
+    raw, sound = content[: frames * form.frame_bytes], None
+    if form.kind == _FLOAT:
+        with np.errstate(over="ignore", invalid="ignore"):
+            sound = np.frombuffer(raw, f"<f{form.bits // 8}").astype(np.float32)
+    elif form.bits == 8:  # the only unsigned one
         sound = (np.frombuffer(raw, np.uint8).astype(np.float32) - 128.0) / 128.0
-    elif width == 3:
-        padded = np.zeros((frames * count, 4), np.uint8)
+    elif form.bits == 24:
+        padded = np.zeros((frames * form.channels, 4), np.uint8)
         padded[:, 1:] = np.frombuffer(raw, np.uint8).reshape(-1, 3)
         sound = padded.view("<i4")[:, 0].astype(np.float32) / np.float32(2**31)
     else:
-        sound = np.frombuffer(raw, f"<i{width}").astype(np.float32) / np.float32(2 ** (8 * width - 1))
-    return sound.reshape(-1, count), rate_hz, notes
+        sound = np.frombuffer(raw, f"<i{form.bits // 8}").astype(np.float32) / np.float32(2 ** (form.bits - 1))
+    return sound.reshape(-1, form.channels), form.rate_hz, notes
+
+
+def _wave_parts(data: bytes) -> tuple[_WaveFormat, bytes, int] | None:
+    """(format, sound, bytes of sound that the header promises); None where it is no WAV that can be read here."""
+    if data[:4] not in (b"RIFF", b"RF64", b"BW64") or data[8:12] != b"WAVE":
+        return None
+    form, at = None, 12
+    while at + 8 <= len(data):
+        name, size = data[at : at + 4], int.from_bytes(data[at + 4 : at + 8], "little")
+        at += 8
+        if name == b"fmt ":
+            form = _wave_format(data[at : at + size])
+        elif name == b"data":
+            if form is None:
+                return None
+            unknown = size >= _UNKNOWN_LENGTH_BYTES or (size == 0 and not _is_chunk(data[at:]))
+            return form, data[at:] if unknown else data[at : at + size], size
+        at += size + size % 2
+    return None
+
+
+def _wave_format(head: bytes) -> _WaveFormat | None:
+    if len(head) < 16:
+        return None
+    kind, channels, rate_hz, _, _, bits = struct.unpack_from("<HHIIHH", head)
+    if kind == _EXTENSIBLE and len(head) >= 26:
+        kind = int.from_bytes(head[24:26], "little")
+    usual = {_PCM: (8, 16, 24, 32), _FLOAT: (32, 64)}.get(kind, ())
+    if bits not in usual or not 1 <= channels <= _MOST_CHANNELS or not rate_hz:
+        return None
+    return _WaveFormat(kind, channels, rate_hz, bits)
+
+
+def _is_chunk(rest: bytes) -> bool:
+    """Whether what stands behind an empty sound is a further part of the file, and not the sound."""
+    return rest[:4].isalnum() and int.from_bytes(rest[4:8], "little") + 8 <= len(rest)
 
 
 def _soundfile(data: bytes, longest_s: float) -> _Found | None:

@@ -14,6 +14,8 @@ import httpx
 
 from chauffeur.concept import ConfigError
 from chauffeur.concept.addresses import http_address, read_key
+from chauffeur.foreign.bodies import UNPACKED, bounding
+from chauffeur.foreign.complaints import ForeignBodyError, server_words
 from chauffeur.language.letters import clean
 from chauffeur.speech.audio import Samples, wave_bytes
 from chauffeur.speech.base import Expect, Transcript
@@ -106,6 +108,8 @@ class EndpointRecogniser:
             raise RecogniserError(
                 f"{self._url} gave no transcript within {self._timeout_s:g} s.", hint="Say it again.", retryable=True
             ) from error
+        except ForeignBodyError as error:
+            raise RecogniserError(f"{self._url} gave no transcript: {error}") from error
         except (httpx.HTTPError, httpx.InvalidURL) as error:
             raise RecogniserError(
                 f"{self._url} cannot be reached: {self._scrub(str(error)) or type(error).__name__}.",
@@ -125,17 +129,17 @@ class EndpointRecogniser:
         timeout = httpx.Timeout(self._timeout_s, connect=min(_CONNECT_S, self._timeout_s))
         # No redirects: a key does not follow them to another host.
         async with (
-            httpx.AsyncClient(timeout=timeout, follow_redirects=False) as client,
+            httpx.AsyncClient(
+                timeout=timeout,
+                follow_redirects=False,
+                headers=UNPACKED,
+                event_hooks={"response": [bounding(_MOST_BYTES)]},
+            ) as client,
             client.stream(
                 "POST", f"{self._url}/audio/transcriptions", data=form, files=files, headers=headers
             ) as reply,
         ):
-            body = b""
-            async for piece in reply.aiter_bytes():
-                body += piece
-                if len(body) > _MOST_BYTES:
-                    raise RecogniserError(f"{self._url} answered with more than {_MOST_BYTES >> 10} KiB.")
-            return reply.status_code, body, reply.headers.get("retry-after", "")
+            return reply.status_code, await reply.aread(), reply.headers.get("retry-after", "")
 
     def _refused(self, status: int, body: bytes, retry_after: str) -> RecogniserError:
         said = self._scrub(_message(body))
@@ -201,12 +205,8 @@ def _segments(found: Any) -> list[tuple[str, float, float]]:
 
 
 def _message(body: bytes) -> str:
-    """The server's own words about an error, in any of the usual envelopes."""
+    """The server's own words about an error."""
     try:
-        found: Any = json.loads(body)
+        return server_words(json.loads(body))
     except (ValueError, RecursionError):
         return ""
-    for name in ("error", "message", "detail"):
-        if isinstance(found, dict):
-            found = cast("dict[str, Any]", found).get(name, cast("dict[str, Any]", found))
-    return found if isinstance(found, str) else ""

@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from chauffeur.geometry import Box
 from chauffeur.worlds.parking.lot import Spot
 from chauffeur.worlds.parking.path_follower import Chassis
 from chauffeur.worlds.parking.routes import Way
+
+
+@dataclass(frozen=True, slots=True)
+class Destination:
+    """Where a way through a town leads.
+
+    Attributes:
+        name: Of the place; empty where it has none.
+        x_m, y_m: Where one stops.
+        left_m: Distance by road, m.
+    """
+
+    name: str
+    x_m: float
+    y_m: float
+    left_m: float
 
 
 @runtime_checkable
@@ -65,4 +82,8 @@ class TownPlaces(Protocol):
 
     def reached(self) -> str | None:
         """The place that was set out for, while the car stands there."""
+        ...
+
+    def destination(self) -> Destination | None:
+        """Where the car is going; None where it goes nowhere, or is there."""
         ...

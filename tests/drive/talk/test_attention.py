@@ -12,11 +12,14 @@ from typing import cast
 import pytest
 
 from chauffeur.concept import MissingExtraError
+from chauffeur.drive.questions import NOT_MEANT
+from chauffeur.drive.talk import attention as module
 from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.attention import Attention
-from chauffeur.drive.talk.messages import Listening, Note, Said
+from chauffeur.drive.talk.messages import Answered, HeardWords, Listening, Note, Said
 from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.voice import Voice
+from chauffeur.drive.talk.wish_queue import Words
 from chauffeur.speech.say import can_speak
 
 ALSA = Path("/usr/share/alsa/alsa.conf")
@@ -122,3 +125,66 @@ def test_the_car_speaks_beside_everything_else() -> None:
     while voice.speaking:
         assert time.monotonic() < end_s
         time.sleep(0.01)
+
+
+# One question at a time, whoever asks ---------------------------------------------------------------------------------
+
+ASKED = ("Did you mean 100 km/h?", "Drive at 100 km/h.")
+
+
+class Asking:
+    """An attention that nobody speaks to, and what it says and does."""
+
+    def __init__(self) -> None:
+        self.said: list[Said] = []
+        self.acted: list[tuple[str, str, str, bool]] = []
+        self.attention = Attention(None, None, None, self.said.append, self._act)
+
+    def _act(self, hotword: str, words: Words) -> None:
+        self.acted.append((hotword, words.text, words.confirmed, words.spoken))
+
+    @property
+    def notes(self) -> list[str]:
+        return [each.text for each in self.said if isinstance(each, Note)]
+
+    @property
+    def answered(self) -> int:
+        return sum(isinstance(each, Answered) for each in self.said)
+
+
+def test_a_yes_to_the_cars_question_is_the_wish_it_offers() -> None:
+    one = Asking()
+    one.attention.offer(*ASKED)
+    (shown,) = one.said
+    assert isinstance(shown, HeardWords) and shown.to_confirm
+    assert (shown.reason, shown.text, shown.engine) == (*ASKED, "")
+    one.attention.confirm(True, Words("yes"))
+    assert one.acted == [("command", ASKED[1], ASKED[0], False)]
+    assert one.answered == 1 and one.attention.question is None
+    one.attention.confirm(True, Words("yes"))
+    assert len(one.acted) == 1, "a second yes answers nothing"
+
+
+def test_a_no_drives_nothing() -> None:
+    one = Asking()
+    one.attention.offer(*ASKED)
+    one.attention.confirm(False, Words("no"))
+    assert (one.acted, one.notes, one.answered) == ([], [NOT_MEANT], 1)
+
+
+def test_a_newer_question_takes_the_place_of_an_older_one() -> None:
+    one = Asking()
+    one.attention.offer(*ASKED)
+    one.attention.offer("Shall I stop?", "Stop here.")
+    one.attention.confirm(True, Words("yes"))
+    assert one.acted == [("command", "Stop here.", "Shall I stop?", False)]
+
+
+def test_a_question_is_not_open_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "ANSWER_WITHIN_S", -1.0)
+    one = Asking()
+    one.attention.offer(*ASKED)
+    one.attention.poll()
+    one.attention.confirm(True, Words("yes"))
+    assert (one.acted, one.answered) == ([], 1)
+    assert NOT_MEANT in one.notes[0]

@@ -12,6 +12,7 @@ import pytest
 from chauffeur.concept import PersonId
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
+from chauffeur.drive.questions import NOTHING_ASKED
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.messages import (
@@ -33,7 +34,7 @@ from chauffeur.drive.talk.messages import (
     Stop,
     TakeOver,
 )
-from chauffeur.drive.talk.session import Talk
+from chauffeur.drive.talk.session import LEAVING, Talk
 
 ANA = PersonId("ana")
 PLACE = find("left-lane")
@@ -137,6 +138,36 @@ def test_wish_opinion_memory_wheel_and_stop() -> None:
     assert remembered.count == 3 and {each.text for each in remembered.newest} >= {"Slow down to 70 km/h."}
     ended = [note for note in person.all(Note) if "The road has ended" in note.text]  # pyright: ignore
     assert len(person.all(Road)) == 1 + len(ended)
+
+
+def test_what_is_said_beside_a_wish_does_not_end_it_and_quit_is_no_wish() -> None:
+    person = Person()
+    with person.talk as talk:
+        talk.take(Say("Slow down to 70 km/h."))
+        person.until(lambda: person.driven("w1"))
+        beside = ("Why are we standing?", "what's the limit here?", "are we there yet?", "Is that a school?", "thanks")
+        for number, text in enumerate(beside, 2):
+            talk.take(Say(text))
+            person.until(lambda n=number: (found := person.conversation(f"w{n}")) and found.stage == "closed")
+            said = person.conversation(f"w{number}")
+            assert said is not None and (said.outcome, bool(said.why)) == ("answered", True), said
+        talk.take(Say("never mind"))
+        assert person.all(Note)[-1].text == NOTHING_ASKED  # pyright: ignore
+        seen = len(person.all(Scene))
+        person.until(lambda: len(person.all(Scene)) > seen + 2)
+        assert person.all(Scene)[-1].wish == "w1"  # pyright: ignore
+        assert person.conversation("w1").outcome == ""  # pyright: ignore
+        talk.take(Evaluate("too slow"))  # the newest wish is still the one that is driven
+        person.until(lambda: (found := person.conversation("w7")) and found.follows == "w1")
+        talk.take(Say("Quit, please."))
+        assert talk.stopping
+        assert LEAVING in [note.text for note in person.all(Note)]  # pyright: ignore
+        assert person.conversation("w8") is None
+        end_s = time.monotonic() + WITHIN_S
+        while talk.driving and time.monotonic() < end_s:
+            talk.poll()
+            time.sleep(0.005)
+    assert talk.outcome == "stopped"
 
 
 def test_what_goes_wrong_is_told_and_the_drive_goes_on() -> None:

@@ -1,12 +1,10 @@
-"""A yes to the car's question is the wish it asked about; anything else is a wish of its own."""
+"""Words become wishes in their order."""
 
 from __future__ import annotations
 
 import pytest
 
-from chauffeur.concept import PersonId
-from chauffeur.drive import questions
-from chauffeur.drive.questions import NOT_MEANT
+from chauffeur.concept import InstructionError, PersonId
 from chauffeur.drive.talk.wish_queue import WishQueue, Words
 
 
@@ -31,33 +29,13 @@ def _handed_on(put: WishQueue) -> list[tuple[str, str]]:
     return runtime.wishes
 
 
-def _offering() -> WishQueue:
+def test_a_wish_to_which_a_question_led_is_handed_on_with_it() -> None:
     put = WishQueue(PersonId("ana"))
-    put.offer("Did you mean 100 km/h?", "Drive at 100 km/h.")
-    return put
+    put.put(Words("Drive at 100 km/h.", confirmed="Did you mean 100 km/h?"))
+    put.put(Words("  yes "))
+    assert _handed_on(put) == [("Drive at 100 km/h.", "Did you mean 100 km/h?"), ("yes", "")]
 
 
-def test_a_yes_is_the_wish_that_was_asked_about() -> None:
-    put = _offering()
-    assert put.put(Words("Yes, please!")) == ""
-    assert _handed_on(put) == [("Drive at 100 km/h.", "Did you mean 100 km/h?")]
-
-
-def test_a_no_is_no_wish() -> None:
-    put = _offering()
-    assert put.put(Words("no")) == NOT_MEANT
-    assert _handed_on(put) == []
-
-
-def test_another_wish_takes_the_place_of_the_question() -> None:
-    put = _offering()
-    put.put(Words("Drive at 90 km/h."))
-    put.put(Words("yes"))
-    assert _handed_on(put) == [("Drive at 90 km/h.", ""), ("yes", "")]
-
-
-def test_a_question_is_not_answered_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(questions, "ANSWER_WITHIN_S", -1.0)
-    put = _offering()
-    put.put(Words("yes"))
-    assert _handed_on(put) == [("yes", "")]
+def test_what_is_no_wish_is_refused() -> None:
+    with pytest.raises(InstructionError):
+        WishQueue(PersonId("ana")).put(Words(" "))

@@ -63,11 +63,11 @@ class Drive:
 
 
 @contextmanager
-def driving(scenario: str = "cruise", *, engine: str = "") -> Generator[Drive]:
+def driving(scenario: str = "cruise", *, engine: str = "", planner: str = "retrieval") -> Generator[Drive]:
     """A drive with its page, from the first scene on; it ends with the context, the car standing or not."""
     # A road is a minute long: at less than real time, and with others after it, it outlasts the tests.
     starts = tuple(Start(find(scenario), 5 + number, most_s=120.0) for number in range(8))
-    settings = Settings(starts=starts, planner="retrieval", speed=0.4, realtime=False)
+    settings = Settings(starts=starts, planner=planner, speed=0.4, realtime=False)
     over = threading.Event()
     failed: list[BaseException] = []
     with Cabin() as cabin:
@@ -84,7 +84,8 @@ def driving(scenario: str = "cruise", *, engine: str = "") -> Generator[Drive]:
                                 drive.told.append(told)
                             talk.take(told)
                         talk.poll()
-                    talk.abort()
+                    if talk.driving:
+                        talk.abort()
             except BaseException as error:
                 failed.append(error)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from cabin_desk import SAID, SAID_MPS, Desk
-from cabin_drive import Drive
+from cabin_drive import Drive, driving
 from chromium import CHROMIUM, PHONE, TABLET, Tab, browser
 
 from chauffeur.drive.talk.messages import (
@@ -247,6 +247,81 @@ def test_a_page_that_is_closed_changes_nothing_for_the_drive(desk: Desk, drive: 
         assert "Drive at 80 km/h." in await tab.value("document.querySelector('.wish').innerText")
 
     desk.run(check())
+
+
+async def sent(tab: Tab, words: str) -> None:
+    await tab.press("/")
+    await tab.type(words)
+    await tab.press("Enter")
+
+
+async def asked(tab: Tab, words: str) -> None:
+    """Say something that the planner is unsure of, and wait until the page asks."""
+    await sent(tab, words)
+    await tab.until("document.getElementById('yes').checkVisibility()")
+    assert "Shall I" in await text(tab, "heard-words")
+    assert "Shall I" in await text(tab, "told"), "a screen reader is told"
+
+
+def test_every_question_has_a_yes_and_a_no_and_what_runs_goes_on(desk: Desk) -> None:
+    """A planner's own question, the one after a question of the person, and the one after distress."""
+
+    async def check(drive: Drive) -> None:
+        tab = desk.tab
+        await tab.open(drive.url)
+        await tab.until("document.getElementById('speed').textContent !== '–'")
+        await sent(tab, "Keep 60 m to the car ahead.")
+        await asyncio.to_thread(drive.until, "the wish", lambda: drive.scene.wish == "w1")
+
+        for unsure, no in (("That was close.", "n"), ("Do you always drive so slowly?", ""), ("I feel sick.", "n")):
+            await asked(tab, unsure)
+            if no:
+                await tab.press(no)
+            else:  # by Tab and Enter, from what has the focus after typing
+                await tab.value("document.getElementById('no').focus()")
+                await tab.press("Enter")
+            await tab.until("document.getElementById('confirm').hidden")
+            await tab.until("document.getElementById('notes').textContent.includes('Then I do not.')")
+        assert [told.yes for told in drive.told if isinstance(told, Confirm)] == [False] * 3
+
+        await sent(tab, "Why did you brake?")
+        await tab.until("document.querySelector('.wish .state').textContent.includes('Answered')")
+        assert await tab.value("document.getElementById('confirm').hidden")
+        assert drive.scene.wish == "w1", "no question has ended what runs"
+
+        await asked(tab, "That was close.")
+        question = drive.said("conversation")[-1].wish
+        await tab.click("#yes")
+        await asyncio.to_thread(drive.until, "what was offered", lambda: drive.scene.wish not in ("", "w1", question))
+
+        await tab.press("t")
+        await tab.until("!document.getElementById('pad').hidden")
+        await tab.press("t")
+        await tab.until("document.getElementById('pad').hidden")
+        await sent(tab, "Quit, please!")
+        await tab.until("document.getElementById('notes').textContent.includes('You end the session')")
+        await tab.until("document.getElementById('link').textContent === 'Drive over'")
+        assert drive.said("ended")[-1].outcome == "stopped"
+        assert not [each for each in drive.said("conversation") if "Quit" in each.text], "it is no wish"
+        assert not tab.troubles
+
+    with driving("following", planner="onboard") as drive:
+        desk.run(check(drive))
+
+
+def test_the_stop_button_stops_whatever_is_asked(desk: Desk) -> None:
+    async def check(drive: Drive) -> None:
+        tab = desk.tab
+        await tab.open(drive.url)
+        await tab.until("document.getElementById('speed').textContent !== '–'")
+        await asked(tab, "That was close.")
+        await tab.click("#stop")
+        await tab.until("document.getElementById('confirm').hidden")
+        await tab.until("document.getElementById('link').textContent === 'Drive over'")
+        assert drive.said("ended")[-1].outcome == "stopped"
+
+    with driving("following", planner="onboard") as drive:
+        desk.run(check(drive))
 
 
 SESSION = SessionState("cruise", "A road", 3, "retrieval", "grammar/test", False, "ada", "simulated", 0.1, ("a limit",))

@@ -58,10 +58,19 @@ def test_a_copy_sees_and_answers_as_the_town_does(world: TownWorld, mirror: Town
             assert there.gap_ahead() == here.gap_ahead()
             assert there.light_ahead() == here.light_ahead()
             assert there.junction_ahead() == here.junction_ahead()
+            assert mirror.destination() == world.destination()
             assert there.place_ahead("church") == here.place_ahead("church")
             wish = world.driver().initial_setpoints()
             assert mirror.driver().settle(wish) == world.driver().settle(wish)
         step(world)
+    left_m = [(end := world.destination()) and end.left_m]
+    for _ in range(100):
+        step(world)
+    going = world.destination()
+    assert going is not None and going.name == "St. Mary's Church"
+    assert going.left_m < (left_m[0] or 0.0), "it comes nearer"
+    world.leave()
+    assert world.destination() is None
 
 
 def test_a_copy_may_try_a_way_and_is_back_with_the_next_instant(world: TownWorld, mirror: TownMirror) -> None:

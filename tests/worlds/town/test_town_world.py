@@ -16,9 +16,10 @@ from chauffeur.worlds.base import Driver, Perception, Stage, World
 pytest.importorskip("libsumo")
 pytest.importorskip("sumo")
 
-from chauffeur.worlds.town import TownWorld, WayReferee
+from chauffeur.worlds.town import TownReferee, TownWorld, WayReferee
 from chauffeur.worlds.town.build import build, sources_of
 from chauffeur.worlds.town.pack import MapPack, Place
+from chauffeur.worlds.town.scene import STANDS_S
 
 
 @pytest.fixture(scope="module")
@@ -145,9 +146,32 @@ def test_it_drives_to_a_place_by_its_name(world: TownWorld) -> None:
         driven(world, 1)
         if world.ended:
             break
+        if world.arrived:
+            break
     assert world.arrived
+    assert world.observe().ego.speed_mps < 0.1, "nobody can get out of a car that rolls"
     with pytest.raises(ScenarioError, match="Central Station"):
         world.head_for("the moon")
+
+
+@pytest.mark.parametrize("scenario_goal", [True, False], ids=["of the scenario", "wished for"])
+def test_a_trip_to_a_place_ends_at_a_stand_that_lasts(world: TownWorld, scenario_goal: bool) -> None:
+    """Whatever brings the car there: one that rolls past the place has not arrived."""
+    goal = {"goal": "station"} if scenario_goal else {}
+    world.reset(scenario(vehicles=0, **goal), 3)
+    if not scenario_goal:
+        world.head_for("the station")
+    referee = TownReferee(world)
+    stood = 0
+    for _ in range(8000):
+        if referee.over or world.ended:
+            break
+        driven(world, 1)
+        referee.observe()
+        stood = stood + 1 if world.observe().ego.speed_mps < 0.1 else 0
+    assert referee.success
+    assert world.ended == scenario_goal
+    assert stood * world.dt_s >= STANDS_S
 
 
 def test_a_trip_is_done_when_the_way_is_taken_and_a_stop_only_when_it_was_asked_for(world: TownWorld) -> None:

@@ -7,7 +7,6 @@ registered as an entry point in the group `chauffeur.benchmarks`; `chauffeur ben
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Generic, Literal, Protocol, TypeVar, runtime_checkable
@@ -16,7 +15,7 @@ from chauffeur.bench.kernel.calls import Request
 from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.store import Row
 from chauffeur.concept import ConfigError, Context, Plan, Scenario
-from chauffeur.concept.registry import load_plugin
+from chauffeur.concept.registry import load_plugin, made
 from chauffeur.planners.base import Prose
 
 GROUP: Final = "chauffeur.benchmarks"
@@ -46,7 +45,8 @@ class BenchJob(Protocol):
         ...
 
     def run(self) -> Row:
-        """The result: JSON, with `key`, and `infra_failed` where only the machine is to blame."""
+        """The result: JSON, with `key`, `infra_failed` (whether only the machine is to blame) and, where the item's own
+        data forbid to do it at all, `undriven`."""
         ...
 
     def spoiled(self, detail: str) -> Row:
@@ -89,6 +89,16 @@ class ItemOutcome(Generic[T]):
     def failed(self) -> bool:
         """Whether it was tried in vain: no answer came, or the machine failed."""
         return bool(self.error and self.answer is None) or bool(self.result and self.result["infra_failed"])
+
+    @property
+    def undriven(self) -> bool:
+        """Whether it could not be done at all: tried in vain, or its own data forbid it."""
+        return self.failed or bool(self.result and self.result.get("undriven"))
+
+    @property
+    def why(self) -> str:
+        """What stood in the way, where something did."""
+        return self.error or str((self.result or {}).get("detail") or "")
 
 
 Asks = Literal["plans", "words", ""]
@@ -166,10 +176,17 @@ def make_benchmark(name: str, **options: Any) -> Benchmark[Any]:
     Raises:
         ConfigError: No such name, or an option it does not take.
     """
-    factory = load_plugin(GROUP, name)
-    try:
-        inspect.signature(factory).bind(**options)
-    except TypeError as error:
-        takes = ", ".join(inspect.signature(factory).parameters) or "nothing"
-        raise ConfigError(f"Benchmark {name!r}: {error}.", hint=f"It takes: {takes}.") from error
-    return factory(**options)
+    return benchmark_from(load_plugin(GROUP, name), name, **options)
+
+
+def benchmark_from(found: Any, name: str, **options: Any) -> Benchmark[Any]:
+    """The benchmark that an object of a module is, or makes of options: a class or a function.
+
+    Raises:
+        ConfigError: It takes no such option, or broke.
+    """
+    if isinstance(found, type) or not hasattr(found, "items"):
+        return made("benchmark", name, found, **options)
+    if options:
+        raise ConfigError(f"The benchmark {name!r} is made already, and takes no options.", hint="Name its class.")
+    return found

@@ -10,16 +10,17 @@ from __future__ import annotations
 import asyncio
 import json
 import os
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, is_dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import numpy as np
 
 from chauffeur import __version__
-from chauffeur.bench.kernel.benchmark import Benchmark, ComparesRows
+from chauffeur.bench.kernel.benchmark import Benchmark, ComparesRows, ItemOutcome
 from chauffeur.bench.kernel.budget import Bill, Price, Spending, SpendingBudget
 from chauffeur.bench.kernel.calls import Caller, Halt, Patience
 from chauffeur.bench.kernel.engine import LocalEngine, WorkEngine, first_error
@@ -32,6 +33,13 @@ from chauffeur.bench.kernel.store import Row, Scribe, sole_writer
 from chauffeur.concept import ChauffeurError, ConfigError
 from chauffeur.drive.files import publish
 from chauffeur.planners.base import Answerer, Planner
+
+_REASONS: Final = 3
+"""Reasons that are named of a run's items that were not driven."""
+
+
+class BenchError(ChauffeurError):
+    """A run came to nothing: not a single item could be driven."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +153,7 @@ class BenchRun:
 
         Raises:
             ConfigError: Another process works in this folder.
+            BenchError: Not a single item could be driven.
             ChauffeurError: The disk is full, or no worker can be had. What was stored stays.
         """
         with sole_writer(self.folder):
@@ -158,7 +167,24 @@ class BenchRun:
             finally:
                 for store in self.stages.stores:
                     store.close()
-            return self.score()
+            rows = self.score()
+        vain = self._undriven()
+        if self.halt is None and self.manifest.shard == WHOLE and self._all(vain):
+            raise BenchError(
+                f"None of the {len(self.items)} items could be driven or asked, so there is no score. {_reasons(vain)}",
+                hint="The same command tries again."
+                if all(one.failed for one in vain)
+                else f"Is it the right file for this benchmark? Every item's reason is in {self.folder}.",
+            )
+        return rows
+
+    def _undriven(self) -> list[ItemOutcome[Any]]:
+        """Of the items that are accounted for, those of which nothing came for no fault of an answer."""
+        outcomes = (self.stages.outcome(item) for item in self.items if self.stages.asked(item))
+        return [one for one in outcomes if one.undriven]
+
+    def _all(self, outcomes: Sequence[ItemOutcome[Any]]) -> bool:
+        return 0 < len(outcomes) == sum(map(self.stages.asked, self.items))
 
     async def _work(self, watch: Watch, effort: Effort) -> None:
         loop = asyncio.get_running_loop()
@@ -223,11 +249,15 @@ class BenchRun:
             found = [dict(row) for row in self.benchmark.together(found)]
         lines = [json.dumps(row, ensure_ascii=True) for row in found]
         rows: list[Row] = [json.loads(line) for line in lines]  # as they are read again: tuples become lists
-        filled = tables(self.benchmark.tables, rows)
+        undriven = self._undriven()
+        filled = () if self._all(undriven) else tables(self.benchmark.tables, rows)
         asked = sum(map(self.stages.asked, self.items))
         notes = [*self.manifest.labels]
         if asked < len(self.items):
             notes.append(f"Partial: {asked} of {len(self.items)} items.")
+        if undriven:
+            share = 100.0 * len(undriven) / asked
+            notes.append(f"Not driven: {len(undriven)} of {asked} items ({share:.0f} %). {_reasons(undriven)}")
         write_results(
             self.folder,
             {
@@ -238,6 +268,12 @@ class BenchRun:
             },
         )
         return rows
+
+
+def _reasons(outcomes: Sequence[ItemOutcome[Any]]) -> str:
+    """The most frequent reasons why nothing came of items, in words."""
+    counts = Counter(one.why or "no reason is stored" for one in outcomes).most_common(_REASONS)
+    return " ".join(f"{times} times: {why.rstrip('.')}." for why, times in counts)
 
 
 def as_json(value: Any) -> str:

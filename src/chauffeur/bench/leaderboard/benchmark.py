@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -29,6 +30,9 @@ from chauffeur.safety.shield import SHIELD_VERSION
 from chauffeur.worlds.town.pack import load
 
 BENCH: Final = "leaderboard-1.0-v1"
+
+
+_SEEDS: Final = re.compile(r"[0-9]{1,4}|(?: ?[0-9]{1,9} ?,){1,999}(?: ?[0-9]{1,9} ?)?", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +111,7 @@ class LeaderboardBenchmark(Unasked):
         scenarios: str = "public",
         triggers: str = "",
         driver: str = "expert",
-        seeds: int = 3,
+        seeds: int | str = 3,
         density: float = 1.0,
         people: int = 0,
         scoring: Scoring = "lb1.0",
@@ -127,7 +131,8 @@ class LeaderboardBenchmark(Unasked):
             triggers: Trigger file, or folder of them. By default looked for beside the route file, in
                 `../scenarios`; the own towns bring theirs.
             driver: expert, reckless or standing; else a planner of the registry, which is told instructions.
-            seeds: How often each route is driven.
+            seeds: How often each route is driven, with seeds from 0 on; or the seeds themselves, with commas between
+                (`11,12`; `11,` for one).
             density: Factor of the background traffic.
             people: On foot in the background; Leaderboard 1.0 has none.
             scoring: lb1.0 or lb2.1.
@@ -146,11 +151,12 @@ class LeaderboardBenchmark(Unasked):
         planner = None if driver in DRIVERS else _planner_spec(driver, setting, repository, latency_s, base_url)
         if scenarios not in ("public", "ten", "none"):
             raise ConfigError(f"There are no scenarios {scenarios!r}.", hint="Take public, ten or none.")
-        if seeds < 1 or density < 0.0:
-            raise ConfigError(f"{seeds} seeds and density {density} make no run.", hint="Take at least one seed.")
+        self._seeds = _seeds(seeds)
+        if density < 0.0:
+            raise ConfigError(f"A density of {density} makes no run.", hint="Take 0 or more.")
         penalty((), scoring)
         self._file, found = _files(routes, scenarios, triggers)
-        self._driver, self._seeds, self._density, self._people = driver, seeds, density, people
+        self._driver, self._density, self._people = driver, density, people
         self._scoring: Scoring = scoring
         self._scenarios, self._shield = scenarios, shield
         self._planner = planner
@@ -172,7 +178,7 @@ class LeaderboardBenchmark(Unasked):
             "scenarios": scenarios,
             "triggers_sha256": found.sha256,
             "driver": driver,
-            "seeds": seeds,
+            "seeds": list(self._seeds),
             "density": density,
             "people": people,
             "scoring": scoring,
@@ -193,7 +199,7 @@ class LeaderboardBenchmark(Unasked):
         return tuple(
             RouteItem(f"{route.id}-s{seed}", route.id, route.town, seed)
             for route in self._routes.values()
-            for seed in range(self._seeds)
+            for seed in self._seeds
         )
 
     def items(self) -> Sequence[RouteItem]:
@@ -272,6 +278,20 @@ class LeaderboardBenchmark(Unasked):
             "detail": found["detail"],
         }
         return (row,)
+
+
+def _seeds(given: int | str) -> tuple[int, ...]:
+    """How many seeds from 0 on, or a list of them with commas between. Raises ConfigError: neither."""
+    said = str(given).strip()
+    found: tuple[int, ...] = ()
+    if _SEEDS.fullmatch(said):
+        listed = tuple(int(part) for part in said.split(",") if part.strip())
+        found = listed if "," in said else tuple(range(listed[0]))
+    if not found or len(set(found)) < len(found):
+        raise ConfigError(
+            f"{given!r} are no seeds.", hint="Give how many (3), or different ones with commas between (11,12)."
+        )
+    return found
 
 
 def _planner_spec(name: str, setting: str, repository: str, latency_s: float | None, base_url: str) -> PlannerSpec:

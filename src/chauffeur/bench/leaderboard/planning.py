@@ -36,22 +36,22 @@ def plan_official(town: MapPack, route: LeaderboardRoute) -> PlannedRoute:
         ScenarioError: As of `plan_keypoints`.
     """
     if not route.heights_m:
-        return plan_keypoints(town.road, route.keypoints)
+        return plan_keypoints(town.road, route.keypoints, headed=route.headed)
     levels = town.opendrive
     places = [
-        levels.places(one.x_m, one.y_m, height_m, one.heading_rad, ("driving",))
+        levels.places(one.x_m, one.y_m, height_m, one.heading_rad if route.headed else None, ("driving",))
         for one, height_m in zip(route.keypoints, route.heights_m, strict=True)
     ]
     return _planned(town.road, route.keypoints, places)
 
 
-def plan_keypoints(road: RoadGraph, keypoints: Sequence[Pose]) -> PlannedRoute:
-    """The way through key points in the plane.
+def plan_keypoints(road: RoadGraph, keypoints: Sequence[Pose], *, headed: bool = True) -> PlannedRoute:
+    """The way through key points in the plane; where they are not headed, the shortest past lanes of any direction.
 
     Raises:
         ScenarioError: A key point is on no lane, or no way leads past all of them.
     """
-    places = [road.places(one.x_m, one.y_m, one.heading_rad, ("driving",)) for one in keypoints]
+    places = [road.places(one.x_m, one.y_m, one.heading_rad if headed else None, ("driving",)) for one in keypoints]
     return _planned(road, keypoints, places)
 
 

@@ -220,6 +220,7 @@ def _result(job: RouteJob, *, failure: str = "", **values: Any) -> dict[str, Any
         "key": job.key,
         "version": ROUTE_VERSION,
         "infra_failed": False,
+        "undriven": bool(failure) and not values.get("simulated_s"),
         "completed": False,
         "completion": 0.0,
         "infractions": [],

@@ -1,22 +1,25 @@
 """Which option an answer in free words chooses, or why it chooses none.
 
-Read in this order, the first that decides stands: a ticked letter, a stated answer ("the answer is (b)"), a
-conclusion ("so d"), a letter in front, the only letter in brackets, the text of exactly one option, an ordinal ("the
-second one"), what is left when three are ruled out. What names two options, refuses, or says "none" chooses nothing,
-and how it failed is counted.
+Read in this order, the first that decides stands: an object's field (`{"answer": "b"}`, counted from 1 where it is a
+number), a ticked letter, a verdict on each option, a correction ("a... wait, b"), a stated answer ("the answer is
+(b)"), a conclusion ("so d"), a letter in front, the only letter in brackets, the text of exactly one option, an ordinal
+("the second one"), what is left when three are ruled out. What names two options, refuses, or says "none" chooses
+nothing, and how it failed is counted. Reasoning, and turns that the model made up, are left out before.
 """
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, cast
 
 from chauffeur.bench.nuplanqa.questions import LETTERS
+from chauffeur.foreign.fields import objects_in
+from chauffeur.foreign.model_text import read_model_text
 
-EXTRACTION: Final = "choice-v2"
+EXTRACTION: Final = "choice-v3"
 
 How = Literal["letter", "text", "ordinal", "none", "refused", "several", "unclear", "empty"]
 
@@ -54,7 +57,9 @@ _FRONT: Final = re.compile(
 )
 _ALONE: Final = re.compile(r"^[\W_]{0,12}([a-dA-D])[\W_]{0,12}$")
 _BRACKETED: Final = re.compile(r"[\(\[]\s{0,3}([a-dA-D])\s{0,3}[\)\]]|(?<![\w(])([a-dA-D])\)")
-_BARE: Final = re.compile(r"(?<![\w'’])([b-dB-D]|A(?!\s{1,3}[a-z])|a(?=\s{1,3}(?:or|and)\s{1,3}[b-d]\b))(?![\w'’])")
+_BARE: Final = re.compile(
+    r"(?<![\w'’])([b-dB-D]|A(?!\s{1,3}(?!(?:or|and)\b)[a-z])|a(?=\s{1,3}(?:or|and)\s{1,3}[b-d]\b))(?![\w'’])"
+)
 """A letter by itself; an A before a word, and a small one, is the article."""
 _TICKED: Final = re.compile(
     rf"\[[xX✓✔]\]\s{{0,3}}{_L}{_END}|\|\s{{0,3}}{_L}\s{{0,3}}\|\s{{0,3}}(?:yes|correct|right|true|✓|✔)", re.IGNORECASE
@@ -67,8 +72,9 @@ _CONCLUDED: Final = re.compile(
 )
 _LIST: Final = rf"{_L}(?:\s{{0,3}},\s{{0,3}}{_L})?\s{{0,3}},?\s{{0,3}}(?:and|or|nor)\s{{1,3}}{_L}{_END}"
 _LISTED_OUT: Final = re.compile(
-    rf"(?:options?\s{{1,3}})?{_LIST}\s{{1,3}}(?:can be|are|could be)\s{{1,3}}(?:all\s{{1,3}})?"
-    rf"(?:excluded|ruled out|eliminated|wrong|incorrect|false)|\b(?:cannot|can't|can’t|not)\s{{1,3}}be\s{{1,3}}{_LIST}",
+    rf"(?:options?\s{{1,3}})?{_LIST}\s{{1,3}}(?:(?:do|are) not\b|don't\b|aren't\b|(?:can be|are|could be)\s{{1,3}}"
+    rf"(?:all\s{{1,3}})?(?:excluded|ruled out|eliminated|wrong|incorrect|false))"
+    rf"|\b(?:(?:cannot|can't|can’t)\s{{1,3}}be|not(?:\s{{1,3}}be)?(?:\s{{1,3}}either)?)\s{{1,3}}{_LIST}",
     re.IGNORECASE,
 )
 """Several letters that are ruled out in one breath."""
@@ -102,6 +108,47 @@ _NONE: Final = re.compile(
 _ALL: Final = re.compile(
     r"\b(?:all of (?:the above|them|these)|(?:both|all) (?:options|answers|are)|any of them)\b", re.IGNORECASE
 )
+_LISTED: Final = re.compile(r"\[\s{0,3}[\"']([a-dA-D])[\"']\s{0,3}\]")
+_FIELDS: Final = re.compile(
+    r"(?:final|correct|selected|chosen|best|my|predicted)?[ _-]?"
+    r"(?:answer|choice|option|letter|selection|prediction|label)(?:[ _-]?(?:letter|key|id|choice|option))?"
+    r"|selected|chosen|correct|final|result|response",
+    re.IGNORECASE,
+)
+"""Fields of an object in which an answer stands."""
+_RIGHT: Final = r"yes|true|correct|right|holds|[✓✔✅☑]"
+_FALSE: Final = r"no|not true|not correct|false|incorrect|wrong|[✗✘❌☒✖]"
+_VERDICT: Final = re.compile(
+    r"(?:^|[\s,;])(?:(?:option|choice|answer)\s{1,3})?[\(\[*_]{0,4}([a-dA-D1-4])(?:[\)\].:,?*_=–—-]|\s){1,6}"
+    rf"(?:[^\n.;:]{{0,120}}?[\s:?–—=-]{{1,4}})??(?:is\s{{1,3}})?[\(\[*_]{{0,4}}(?:({_RIGHT})|({_FALSE}))(?![\w'’])"
+    r"(?!\s{1,3}(?:one|of|lane|car|light|pedestrian|cyclist|vehicle|traffic|rain|turn)\b)",
+    re.IGNORECASE | re.MULTILINE,
+)
+"""A letter or number with what is said of it."""
+_SIGNED: Final = re.compile(r"(?:([✓✔✅☑])|([✗✘❌☒✖]))\s{0,3}[\(\[*_]{0,4}([a-dA-D])(?![\w'’])")
+"""A letter behind its sign."""
+_DENIED: Final = re.compile(r"\bnot\b|n['’]t\b|\bnever\b|\bhardly\b", re.IGNORECASE)
+_UNDECIDED: Final = re.compile(
+    rf"\b(?:either|between|maybe|perhaps|possibly|both)\s{{1,3}}{_L}\s{{0,3}},?\s{{0,3}}(?:(?:and|or)\s{{1,3}})?"
+    rf"(?:(?:else|maybe|perhaps|possibly)\s{{1,3}})?{_L}{_END}",
+    re.IGNORECASE,
+)
+_LEAST_VERDICTS: Final = 3
+_SHORT: Final = 3
+"""Characters of an option that is too short to be told from other words."""
+_SAID: Final = {"True": "yes", "False": "no"}
+_ONCE_MORE: Final = (
+    r"wait|actually|no|hold on|on second thoughts?|on reflection|correction|scratch that|sorry|i mean|i meant|make that"
+    r"|rather|(?:i|let me) (?:take that back|correct myself|change my (?:mind|answer))"
+)
+_CORRECTED: Final = re.compile(
+    rf"\b(?:{_ONCE_MORE})\b[\s,.:;!–—-]{{1,6}}(?:(?:{_ONCE_MORE}|then)\b[\s,.:;!–—-]{{1,6}}){{0,2}}"
+    rf"(?:(?:it(?:'s|’s| is| must be| should be)|that(?:'s| is)|i (?:choose|say|pick)|to)\s{{1,3}})?"
+    rf"(?:(?:option|choice)\s{{1,3}})?{_L}{_END}(?!\s{{1,3}}(?:or|and)\b)"
+    rf"(?=\s{{0,3}}(?:[.!;,)]|it is\b|is (?:right|correct)|$))",
+    re.IGNORECASE | re.MULTILINE,
+)
+"""What a model that takes back its answer says instead."""
 _ORDINALS: Final = (
     "first|1st|one|1|i",
     "second|2nd|two|2|ii",
@@ -125,10 +172,53 @@ def read_choice(answer: str, options: Sequence[str]) -> OptionChoice:
     """The option an answer chooses.
 
     Args:
-        answer: What the model wrote, its thinking taken out.
+        answer: What the model wrote.
         options: Texts of the options, in the order in which they were lettered.
     """
-    text = unicodedata.normalize("NFKC", answer).rpartition("</think>")[2].strip()
+    said = read_model_text(answer)
+    if said.unfinished:
+        return OptionChoice(None, "unclear")
+    if (written := _written(said.answer, options)) is not None:
+        return written
+    return _read(said.answer, options)
+
+
+def _written(answer: str, options: Sequence[str]) -> OptionChoice | None:
+    """What the field of an object, or a list of one, says; None where there is neither."""
+    objects = objects_in(answer)
+    judged = [one for one in objects if len(one) >= _LEAST_VERDICTS and {*LETTERS}.issuperset(map(str.lower, one))]
+    if judged:
+        return _judged("\n".join(f"{name}: {_SAID.get(str(value), value)}" for name, value in judged[-1].items()), ())
+    found = [
+        choice
+        for one in objects
+        for name, value in one.items()
+        if _FIELDS.fullmatch(name) and (choice := _valued(value, options)) is not None
+    ]
+    listed = _LISTED.fullmatch(answer.strip())
+    if not found and listed is not None:
+        return _letter(listed[1])
+    if not found:
+        return None
+    return found[0] if len({one.index for one in found}) == 1 else OptionChoice(None, "several")
+
+
+def _valued(value: object, options: Sequence[str]) -> OptionChoice | None:
+    if isinstance(value, Mapping):
+        inner = [_valued(one, options) for one in cast("Mapping[str, object]", value).values()]
+        return next((one for one in inner if one is not None and one.index is not None), None)
+    if isinstance(value, list):
+        several = cast("list[object]", value)
+        return _valued(several[0], options) if len(several) == 1 else OptionChoice(None, "several")
+    if isinstance(value, bool) or value is None:
+        return None
+    if isinstance(value, int):
+        return OptionChoice(value - 1, "ordinal") if 1 <= value <= len(LETTERS) else OptionChoice(None, "unclear")
+    return _read(value, options) if isinstance(value, str) else None
+
+
+def _read(answer: str, options: Sequence[str]) -> OptionChoice:
+    text = unicodedata.normalize("NFKC", answer).strip()
     text = _MARKUP.sub(r"\2", text)
     if not text:
         return OptionChoice(None, "empty")
@@ -142,8 +232,19 @@ def read_choice(answer: str, options: Sequence[str]) -> OptionChoice:
     for pattern in (_BOXED, _TAGGED, _TICKED):
         if found := _letters(pattern.findall(kept)):
             return _letter(found[-1])  # a model that corrects itself ends with what it means
+    if (judged := _judged(text, options)) is not None:
+        return judged
+    if corrected := _letters(_CORRECTED.findall(kept)):
+        return _letter(corrected[-1])
     if (stated := _stated(kept)) is not None:
         return stated
+    undecided = _UNDECIDED.search(kept)
+    if (
+        undecided is not None
+        and undecided[1].lower() != undecided[2].lower()
+        and not _CONCLUDED.search(kept, undecided.end())
+    ):
+        return OptionChoice(None, "several")
     if concluded := _letters(_CONCLUDED.findall(kept)):
         return _letter(concluded[-1])
     front = _FRONT.match(kept)
@@ -158,6 +259,38 @@ def read_choice(answer: str, options: Sequence[str]) -> OptionChoice:
     found = _rest(kept, bracketed, named)
     left = _left_over(text) if found.index is None and not bracketed else None
     return found if left is None else _letter(left)
+
+
+def _judged(text: str, options: Sequence[str]) -> OptionChoice | None:
+    """The one option that is called right, or left, where each is judged; None where an answer is stated besides."""
+    for index, option in enumerate(options):  # an option named by its text is named
+        if len(option) > _SHORT:
+            name = re.escape(option.rstrip("."))
+            text = re.sub(
+                rf"(?<!\w){name}(?=\s{{0,3}}[:=?–—-])", f" {LETTERS[index].upper()} ", text, flags=re.IGNORECASE
+            )
+    first, sign = _VERDICT.search(text), _SIGNED.search(text)
+    if sign is not None and (first is None or sign.start() < first.start()):
+        found = [(one[3].lower(), one[1] is not None, one.end()) for one in _SIGNED.finditer(text)]
+    else:
+        found = [
+            (_lettered(one[1]), one[2] is not None and _DENIED.search(one.group()) is None, one.end())
+            for one in _VERDICT.finditer(text)
+        ]
+    verdicts = {letter: is_right for letter, is_right, _ in found}
+    if len(verdicts) < _LEAST_VERDICTS or len(found) != len(verdicts) or _STATED.search(text, found[-1][2]):
+        return None
+    right = [letter for letter, is_right in verdicts.items() if is_right]
+    if len(right) > 1:
+        return OptionChoice(None, "several")
+    if right:
+        return _letter(right[0])
+    left = [letter for letter in LETTERS if letter not in verdicts]
+    return _letter(left[0]) if left else OptionChoice(None, "none")
+
+
+def _lettered(mark: str) -> str:
+    return LETTERS[int(mark) - 1] if mark.isdecimal() else mark.lower()
 
 
 def _rest(kept: str, bracketed: Sequence[str], named: Sequence[int]) -> OptionChoice:
@@ -255,6 +388,6 @@ def _named(text: str, options: Sequence[str]) -> list[int]:
 def _without_options(text: str, options: Sequence[str]) -> str:
     """An answer without the options' own words, which may hold single letters and ordinals ("the first car")."""
     for option in sorted(options, key=len, reverse=True):
-        if len(option) > 3:
+        if len(option) > _SHORT:
             text = re.sub(re.escape(option.rstrip(".")), " ", text, flags=re.IGNORECASE)
     return text

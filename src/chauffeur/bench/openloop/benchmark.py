@@ -18,7 +18,16 @@ from chauffeur.bench.kernel.benchmark import BenchJob, ItemOutcome, RequestDesk
 from chauffeur.bench.kernel.calls import Request
 from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, mean, share
 from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.openloop.conventions import Convention, L2Errors, distances, fails, standing
+from chauffeur.bench.openloop.conventions import (
+    Convention,
+    L2Errors,
+    averaged,
+    distances,
+    fails,
+    known,
+    lagging,
+    standing,
+)
 from chauffeur.bench.openloop.extrapolation import constant_velocity
 from chauffeur.bench.openloop.nuscenes import FUTURE, NuScenesTables, PlanningSample
 from chauffeur.bench.openloop.requests import ASKING, THOUGHTS, OpenLoopSetting, Shown, opening, question
@@ -33,10 +42,12 @@ if TYPE_CHECKING:
 
     FloatArray = NDArray[np.float64]
 
-BENCH: Final = "openloop-v1"
+BENCH: Final = "openloop-v2"
 OpenLoopStatus = Literal["answered", "unreadable", "no answer"]
 _AWAY: Final = tuple(f"l2_{5 * (i + 1):02}" for i in range(FUTURE))
 """Columns: distance of each waypoint, named by tenths of seconds."""
+_LAGGED: Final = tuple(f"lagged_{5 * (i + 1):02}" for i in range(FUTURE))
+"""Columns: distance of each true waypoint from the predicted position half a second before it (`conventions`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +64,9 @@ class OpenLoopRow:
         failed: More than 10 m off within the first second, or unreadable; None without an answer.
         l2_05 ... l2_30: Distance of each waypoint from the true one, m; of an unreadable answer those of a car that
             stays; None where the log had ended.
-        shifted: OpenEMMA's first second (`conventions`), m.
-        cv_05 ... cv_30, cv_shifted, cv_failed: The same of constant velocity.
+        lagged_05 ... lagged_30: Distance of each true waypoint from the position predicted for half a second earlier,
+            m: what OpenEMMA's published code compares at 2 and 3 s.
+        cv_05 ... cv_30, cv_lagged_05 ... cv_lagged_30, cv_failed: The same of constant velocity.
         answer: The model's words.
     """
 
@@ -73,7 +85,12 @@ class OpenLoopRow:
     l2_20: float | None
     l2_25: float | None
     l2_30: float | None
-    shifted: float | None
+    lagged_05: float | None
+    lagged_10: float | None
+    lagged_15: float | None
+    lagged_20: float | None
+    lagged_25: float | None
+    lagged_30: float | None
     cv_failed: bool
     cv_05: float | None
     cv_10: float | None
@@ -81,7 +98,12 @@ class OpenLoopRow:
     cv_20: float | None
     cv_25: float | None
     cv_30: float | None
-    cv_shifted: float | None
+    cv_lagged_05: float | None
+    cv_lagged_10: float | None
+    cv_lagged_15: float | None
+    cv_lagged_20: float | None
+    cv_lagged_25: float | None
+    cv_lagged_30: float | None
     answer: str
 
 
@@ -90,15 +112,18 @@ Whose = Literal["l2", "cv"]
 
 def errors_of(row: AnyRow, convention: Convention, whose: Whose = "l2") -> L2Errors:
     """The columns of a convention out of a stored row: of the model, or of constant velocity."""
-    away: list[float | None] = [row[name.replace("l2", whose)] for name in _AWAY]
-    if convention == "uniad":
-        return L2Errors(away[1], away[3], away[5])
-    known = [one for one in away if one is not None]
-    if len(known) < FUTURE:
+    if failed_of(row, whose) is None:
         return L2Errors(None, None, None)
-    first, second, third = (sum(known[:i]) / i for i in (2, 4, 6))
-    shifted = row["shifted" if whose == "l2" else "cv_shifted"]
-    return L2Errors(shifted if convention == "openemma" else first, second, third)
+    return averaged(
+        [row[_column(name, whose)] for name in _AWAY], [row[_column(name, whose)] for name in _LAGGED], convention
+    )
+
+
+def _column(name: str, whose: Whose) -> str:
+    """A column of the model's, or the same one of constant velocity."""
+    if whose == "l2":
+        return name
+    return name.replace("l2", "cv") if name.startswith("l2") else f"cv_{name}"
 
 
 def failed_of(row: AnyRow, whose: Whose = "l2") -> bool | None:
@@ -114,7 +139,7 @@ def _measures(convention: Convention, *, failures: bool) -> tuple[Measure, ...]:
 
     tail = "all" if failures else "kept"
     return tuple(
-        mean(f"openloop-{convention}-{tail}-{short}-v1", f"L2 {short}", "m", lambda row, name=name: of(row, name), 2)
+        mean(f"openloop-{convention}-{tail}-{short}-v2", f"L2 {short}", "m", lambda row, name=name: of(row, name), 2)
         for name, short in (("at_1s", "1s"), ("at_2s", "2s"), ("at_3s", "3s"), ("average", "avg"))
     )
 
@@ -127,37 +152,47 @@ UNREADABLE: Final = share(
     2,
 )
 _TITLES: Final[Mapping[Convention, str]] = {
-    "openemma": "OpenEMMA's convention (the paper's Tab. XII)",
-    "stp3": "ST-P3's convention (means up to the second)",
-    "uniad": "UniAD's convention (at the second)",
+    "openemma-code": "openemma-code: OpenEMMA's published lines, a step late at 2 and 3 s (the paper's Tab. XII)",
+    "openemma": "openemma: OpenEMMA's means up to the second, each waypoint at its own time",
+    "stp3": "stp3: ST-P3's and VAD's means up to the second",
+    "uniad": "uniad: at the second, where it is known",
+    "uniad-published": "uniad-published: at the second, what is not known as 0, divided by all samples",
 }
+
+
+_TABLES: Final[tuple[tuple[Convention, bool], ...]] = (
+    ("openemma-code", False),
+    ("openemma-code", True),
+    ("openemma", False),
+    ("stp3", True),
+    ("uniad", False),
+    ("uniad", True),
+    ("uniad-published", False),
+    ("uniad-published", True),
+)
+"""(averaging, failures counted) of each table; `openemma` and `stp3` are the same frame by frame and share a pair."""
 
 
 def _tables() -> tuple[TableSpec, ...]:
     found: list[TableSpec] = []
-    order: tuple[Convention, ...] = ("openemma", "stp3", "uniad")
-    for convention in order:
-        for failures in (False, True):
-            what = "failures counted" if failures else "failures left out"
-            measures = (*_measures(convention, failures=failures), FAILURE, UNREADABLE)
-            title = f"{_TITLES[convention]}, {what}"
-            found.append(TableSpec(title, measures, "kind", cluster="scene", heads=("next", "frames")))
+    for convention, failures in _TABLES:
+        what = "failures counted" if failures else "failures left out"
+        measures = (*_measures(convention, failures=failures), FAILURE, UNREADABLE)
+        title = f"{_TITLES[convention]}, {what}"
+        found.append(TableSpec(title, measures, "kind", cluster="scene", heads=("next", "frames")))
     return tuple(found)
 
 
 def distance_columns(predicted: FloatArray | None, truth: FloatArray, whose: Whose = "l2") -> dict[str, Any]:
     """What a row stores of a prediction (6, 2), None for an unreadable one."""
     found = standing() if predicted is None else predicted
-    away = distances(found, truth)
-    shifted = np.hypot(*(found[1:3] - truth[:2]).T)
-    columns: dict[str, Any] = {name.replace("l2", whose): _rounded(v) for name, v in zip(_AWAY, away, strict=True)}
-    columns["shifted" if whose == "l2" else "cv_shifted"] = _rounded(float(shifted.mean()))
+    names = [_column(name, whose) for name in (*_AWAY, *_LAGGED)]
+    values = known(np.concatenate([distances(found, truth), lagging(found, truth)]))
+    columns: dict[str, Any] = {
+        name: None if value is None else round(value, 4) for name, value in zip(names, values, strict=True)
+    }
     columns["failed" if whose == "l2" else "cv_failed"] = fails(predicted, truth)
     return columns
-
-
-def _rounded(value: float) -> float | None:
-    return round(float(value), 4) if np.isfinite(value) else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,16 @@
-"""L2 error of waypoints under the three conventions in use. They differ by a factor of two on the same trajectories.
+"""L2 error of waypoints under the averagings in use. They differ by a factor of two on the same trajectories.
 
-stp3      "L2 at T s" is the mean of all steps up to T; a sample counts only where all six true waypoints are known
-          (ST-P3, Hu et al. 2022, and VAD).
-uniad     L2 of the step at T itself; each step counts where its true waypoint is known (UniAD, Hu et al. 2023).
-openemma  as stp3, except that over the first second the predictions one step later are compared with the truth
-          (`prediction[1:3]` with `truth[0:2]`), as the published code of OpenEMMA does (Xing et al. 2025). The paper's
-          Tab. XII follows it.
+stp3             "L2 at T s" is the mean of all steps up to T; a sample counts only where all six true waypoints are
+                 known (ST-P3, Hu et al. 2022, and VAD, Jiang et al. 2023).
+uniad            L2 of the step T itself, over the samples in which that step is known.
+uniad-published  the same as UniAD's code publishes it (Hu et al. 2023, `planning_metrics.py`): a step that is not known
+                 counts as an error of 0, and the sum is divided by all samples. Never above `uniad`.
+openemma         OpenEMMA's means up to T with each waypoint compared at its own time: frame by frame the figures of
+                 `stp3`. A perfect prediction scores 0.
+openemma-code    the lines that OpenEMMA published (Xing et al. 2025, `main.py`). Its trajectory begins with the present
+                 position, which is skipped for "1 s" (`pred_traj[1:3]` beside `truth[0:2]`) and not for "2 s" and "3 s"
+                 (`pred_traj[:4]` beside `truth[:4]`): there each waypoint is compared with the truth half a second
+                 later. A perfect prediction at 8 m/s scores 0.00 / 4.00 / 4.00.
 
 A failure is a prediction that is more than 10 m off within the first second (OpenEMMA; paper, caption of Fig. 17), or
 an answer without waypoints. OpenEMMA leaves failures out of the means, which makes a model that fails look better; so
@@ -14,9 +19,9 @@ every mean is given twice, and where failures count, an answer without waypoints
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, get_args
 
 import numpy as np
 
@@ -27,8 +32,8 @@ if TYPE_CHECKING:
 
     FloatArray = NDArray[np.float64]
 
-Convention = Literal["stp3", "uniad", "openemma"]
-CONVENTIONS: Final[tuple[Convention, ...]] = ("stp3", "uniad", "openemma")
+Convention = Literal["stp3", "uniad", "uniad-published", "openemma", "openemma-code"]
+CONVENTIONS: Final[tuple[Convention, ...]] = get_args(Convention)
 FAILS_M: Final = 10.0
 _STEPS: Final = (2, 4, 6)
 """Waypoints up to 1, 2 and 3 s."""
@@ -64,17 +69,41 @@ def distances(predicted: FloatArray, truth: FloatArray) -> FloatArray:
     return np.hypot(*(predicted - truth).T)
 
 
+def lagging(predicted: FloatArray, truth: FloatArray) -> FloatArray:
+    """Distance of each true waypoint from the predicted position half a second before it, (6,), m; arguments as in
+    `distances`. The first is compared with the present position, the origin of the ego frame."""
+    return distances(np.vstack([np.zeros((1, 2)), predicted[:-1]]), truth)
+
+
+def averaged(away: Sequence[float | None], lagged: Sequence[float | None], convention: Convention) -> L2Errors:
+    """The three columns of a convention.
+
+    Args:
+        away: `distances` of a sample, m; None where the truth is not known.
+        lagged: `lagging` of the same sample, m.
+        convention: Which averaging.
+    """
+    if convention in ("uniad", "uniad-published"):
+        unknown = 0.0 if convention == "uniad-published" else None
+        return L2Errors(*(unknown if away[i - 1] is None else away[i - 1] for i in _STEPS))
+    own = [one for one in away if one is not None]
+    late = [one for one in lagged if one is not None]
+    if len(own) < FUTURE or len(late) < FUTURE:
+        return L2Errors(None, None, None)
+    first, second, third = (sum(own[:i]) / i for i in _STEPS)
+    if convention == "openemma-code":
+        second, third = (sum(late[:i]) / i for i in _STEPS[1:])
+    return L2Errors(first, second, third)
+
+
+def known(values: FloatArray) -> list[float | None]:
+    """Distances as `averaged` takes them: None in place of NaN."""
+    return [float(one) if np.isfinite(one) else None for one in values]
+
+
 def errors(predicted: FloatArray, truth: FloatArray, convention: Convention) -> L2Errors:
     """L2 of a prediction (6, 2) under a convention; the truth as in `distances`."""
-    away = distances(predicted, truth)
-    if convention == "uniad":
-        return L2Errors(*(None if np.isnan(away[i - 1]) else float(away[i - 1]) for i in _STEPS))
-    if np.isnan(away).any():
-        return L2Errors(None, None, None)
-    first, second, third = (float(away[:i].mean()) for i in _STEPS)
-    if convention == "openemma":
-        first = float(np.hypot(*(predicted[1:3] - truth[:2]).T).mean())
-    return L2Errors(first, second, third)
+    return averaged(known(distances(predicted, truth)), known(lagging(predicted, truth)), convention)
 
 
 def fails(predicted: FloatArray | None, truth: FloatArray) -> bool:
@@ -87,9 +116,3 @@ def fails(predicted: FloatArray | None, truth: FloatArray) -> bool:
 def standing() -> FloatArray:
     """A car that stays where it is, (6, 2): what an answer without waypoints counts as."""
     return np.zeros((FUTURE, 2))
-
-
-def scored(predicted: FloatArray | None, truth: FloatArray) -> Mapping[Convention, L2Errors]:
-    """All conventions."""
-    found = standing() if predicted is None else predicted
-    return {one: errors(found, truth, one) for one in CONVENTIONS}

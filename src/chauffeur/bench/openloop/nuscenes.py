@@ -3,9 +3,11 @@
     ROOT/v1.0-mini/scene.json ...     tables: scene, sample, sample_data, ego_pose, calibrated_sensor, sensor
     ROOT/samples/CAM_FRONT/*.jpg      pictures, as `sample_data.filename` names them
 
-Samples are key frames at 2 Hz. Poses are of the rear axle's middle in the map's frame (x east, y north, m; quaternion
-w, x, y, z); time stamps are microseconds. Everything that leaves this module is in the ego's own frame at the present
-instant: x ahead, y left, m. nuScenes' data are under CC BY-NC-SA 4.0; none of them are in this package.
+Samples are key frames at 2 Hz, as their time stamps say; sets with more are thinned to that by them, and what lies on
+the two sides of a gap is not taken for one drive. Poses are of the rear axle's middle in the map's frame (x east,
+y north, m; quaternion w, x, y, z); time stamps are microseconds. Everything that leaves this module is in the ego's own
+frame at the present instant: x ahead, y left, m. nuScenes' data are under CC BY-NC-SA 4.0; none of them are in this
+package.
 
 A set of our own has a further table beside them, `openloop.json`: which samples are asked about, what the navigation
 says there, and what happens (`OpenLoopMark`).
@@ -16,13 +18,14 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, TypeGuard, cast
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from chauffeur.concept import DataError
 
@@ -37,7 +40,17 @@ HISTORY: Final = 4
 """Samples before the present one: 2 s."""
 FUTURE: Final = 6
 """Waypoints: 3 s."""
+MOST_OFF_S: Final = 0.2
+"""nuScenes' key frames are the LIDAR sweeps (20 Hz) closest to every half second, and sweeps are lost at times."""
+THINNED_OFF_S: Final = 0.06
+"""Half a period of 10 Hz, and a little: sets of more than 2 Hz have a sample so close to every half second."""
 CAMERA: Final = "CAM_FRONT"
+_ROTATION_OFF: Final = 0.01
+"""A quaternion of another length than one is none."""
+_MOST_STAMP: Final = 1e17
+"""Microseconds until the year 5138; float NaN and infinity are not below it."""
+_MOST_BYTES: Final = 4_000_000_000
+"""The largest table of the whole of nuScenes (`sample_annotation`, which is not read) has 1.5 GB."""
 MARKS: Final = "openloop.json"
 ASIDE_M: Final = 2.0
 """ST-P3's and UniAD's high-level command: left or right where the car is so far aside after 3 s."""
@@ -143,49 +156,120 @@ class NuScenesTables:
             content = marks.read_bytes()
             digest.update(content)
             try:
-                self.marks = tuple(OpenLoopMark(**one) for one in json.loads(content))
-            except (ValueError, TypeError) as error:
+                self.marks = TypeAdapter(tuple[OpenLoopMark, ...]).validate_json(content)
+            except ValueError as error:
                 raise DataError(f"{marks} is malformed: {error}.") from error
         self.sha256 = digest.hexdigest()
 
     def _read(self, name: str, digest: Any) -> dict[str, Row]:
         path = self.folder / f"{name}.json"
         try:
+            if path.stat().st_size > _MOST_BYTES:
+                raise DataError(f"{path} is no table of nuScenes: it has more than {_MOST_BYTES / 1e9:g} GB.")
             content = path.read_bytes()
-            rows = cast("list[Row]", json.loads(content))
-            table = {str(row["token"]): row for row in rows}
+            rows: Any = json.loads(content)
         except OSError as error:
             raise DataError(
                 f"The table {path} cannot be read: {error.strerror}.", hint="Unpack nuScenes' metadata there."
             ) from error
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, RecursionError) as error:
             raise DataError(f"{path} is no table of nuScenes: {type(error).__name__} {error}.") from error
+        if not isinstance(rows, list):
+            raise DataError(f"{path} is no table of nuScenes: it is no list of rows.")
+        table: dict[str, Row] = {}
+        for number, row in enumerate(cast("list[Any]", rows)):
+            token = cast("Row", row).get("token") if isinstance(row, dict) else None
+            if not isinstance(token, str) or not token:
+                raise DataError(f"{path} is no table of nuScenes: row {number} has no token.")
+            table[token] = row
         digest.update(name.encode() + content)
         return table
 
+    def _text(self, table: str, token: str, field: str, *, empty: bool = False) -> str:
+        """A field that is a text. Raises DataError."""
+        value = self._row(table, token).get(field)
+        if not isinstance(value, str) or not (value or empty):
+            raise self._wrong(table, token, field, value, "a text")
+        return value
+
+    def _numbers(self, table: str, token: str, field: str, count: int) -> tuple[float, ...]:
+        """A field that is so many numbers. Raises DataError."""
+        value = self._row(table, token).get(field)
+        numbers = cast("list[Any]", value) if isinstance(value, list) else []
+        if len(numbers) != count or not all(_is_number(one) for one in numbers):
+            raise self._wrong(table, token, field, value, f"{count} numbers")
+        return tuple(float(one) for one in numbers)
+
+    def _row(self, table: str, token: str) -> Row:
+        """A row by its token. Raises DataError."""
+        row = self._tables[table].get(token)
+        if row is None:
+            raise DataError(f"{self.folder / table}.json has no row {token!r}, which another table names.")
+        return row
+
+    def _wrong(self, table: str, token: str, field: str, value: object, right: str) -> DataError:
+        said = "is missing" if value is None else f"is {repr(value)[:80]}"
+        return DataError(
+            f"{self.folder / table}.json, row {token!r}: {field!r} {said}; {right} is right.",
+            hint="Is the set converted by nuScenes' scheme?",
+        )
+
     @cached_property
-    def _frames(self) -> dict[str, Row]:
-        """Key frames of the front camera, by sample."""
-        channels = {token: str(row["channel"]) for token, row in self._tables["sensor"].items()}
+    def _frames(self) -> dict[str, str]:
+        """Tokens of the key frames of the front camera in `sample_data`, by sample."""
         own = {
-            token for token, row in self._tables["calibrated_sensor"].items() if channels[row["sensor_token"]] == CAMERA
+            token
+            for token in self._tables["calibrated_sensor"]
+            if self._text("sensor", self._text("calibrated_sensor", token, "sensor_token"), "channel") == CAMERA
         }
         return {
-            str(row["sample_token"]): row
-            for row in self._tables["sample_data"].values()
-            if row["is_key_frame"] and row["calibrated_sensor_token"] in own
+            self._text("sample_data", token, "sample_token"): token
+            for token, row in self._tables["sample_data"].items()
+            if row.get("is_key_frame") is not False
+            and self._text("sample_data", token, "calibrated_sensor_token") in own
+            and self._is_key(token, row)
         }
 
-    def _chain(self, scene: Row) -> list[str]:
+    def _is_key(self, token: str, row: Row) -> bool:
+        if not isinstance(row.get("is_key_frame"), bool):
+            raise self._wrong("sample_data", token, "is_key_frame", row.get("is_key_frame"), "true or false")
+        return bool(row["is_key_frame"])
+
+    def _chain(self, scene: str) -> list[str]:
         """Samples of a scene in order."""
-        samples, found = self._tables["sample"], list[str]()
-        at = str(scene["first_sample_token"])
+        found, seen = list[str](), set[str]()
+        at = self._text("scene", scene, "first_sample_token")
         while at:
-            if at not in samples or len(found) > len(samples):
-                raise DataError(f"Scene {scene['name']} of {self.folder} links to no sample {at!r}.")
+            if at in seen:
+                raise DataError(f"{self.folder}/sample.json leads in a circle: {at!r} comes twice in scene {scene!r}.")
             found.append(at)
-            at = str(samples[at]["next"])
+            seen.add(at)
+            at = self._text("sample", at, "next", empty=True)
         return found
+
+    def _drives(self, scene: str) -> list[list[str]]:
+        """Stretches of a scene's samples at 2 Hz: with more than that the ones closest to every half second."""
+        chain = self._chain(scene)
+        at_s = [self._time_s(token) for token in chain]
+        steps = np.diff(at_s)
+        if (steps <= 0.0).any():
+            late = int(np.argmax(steps <= 0.0)) + 1
+            raise self._wrong("sample", chain[late], "timestamp", at_s[late] * 1e6, "a later time than before it")
+        usual = float(np.median(steps)) if len(steps) else STEP_S
+        cut = _thinned(at_s) if usual < STEP_S - MOST_OFF_S else _stretches(at_s)
+        if len(chain) > HISTORY and all(len(one) == 1 for one in cut):
+            raise DataError(
+                f"The samples of scene {self._text('scene', scene, 'name')!r} in {self.folder} lie {usual:.3g} s apart "
+                f"by their time stamps (microseconds); one every {STEP_S:g} s is needed.",
+                hint="Take key frames every half second, or all of them.",
+            )
+        return [[chain[i] for i in one] for one in cut]
+
+    def _time_s(self, sample: str) -> float:
+        value = self._row("sample", sample).get("timestamp")
+        if not _is_number(value):
+            raise self._wrong("sample", sample, "timestamp", value, "a time in microseconds")
+        return float(value) * 1e-6
 
     def samples(self, scenes: frozenset[str] | None = None) -> list[PlanningSample]:
         """Every sample with 2 s before it and at least one after; of a marked set the marked ones.
@@ -198,24 +282,28 @@ class NuScenesTables:
         """
         marks = None if self.marks is None else {one.sample: one for one in self.marks}
         found: list[PlanningSample] = []
-        for scene in self._tables["scene"].values():
-            name = str(scene["name"])
-            if scenes is not None and name not in scenes:
-                continue
-            chain = self._chain(scene)
-            poses, files = self._driven(chain)
-            for at in range(HISTORY, len(chain) - 1):
-                mark = None if marks is None else marks.get(chain[at])
-                if marks is not None and mark is None:
-                    continue
-                history = in_frame(poses[at - HISTORY : at + 1], poses[at])
-                future = np.full((FUTURE, 2), np.nan)
-                after = in_frame(poses[at + 1 : at + 1 + FUTURE], poses[at])[:, :2]
-                future[: len(after)] = after
-                said = future_command(future) if mark is None else mark.command
-                kind, place = ("", "") if mark is None else (mark.kind, mark.place)
-                found.append(PlanningSample(chain[at], name, self.root / files[at], history, future, said, kind, place))
+        for scene in self._tables["scene"]:
+            name = self._text("scene", scene, "name")
+            if scenes is None or name in scenes:
+                for drive in self._drives(scene):
+                    found += self._samples_of(name, drive, marks)
         return found
+
+    def _samples_of(
+        self, scene: str, drive: Sequence[str], marks: Mapping[str, OpenLoopMark] | None
+    ) -> Iterator[PlanningSample]:
+        poses, files = self._driven(drive)
+        for at in range(HISTORY, len(drive) - 1):
+            mark = None if marks is None else marks.get(drive[at])
+            if marks is not None and mark is None:
+                continue
+            history = in_frame(poses[at - HISTORY : at + 1], poses[at])
+            future = np.full((FUTURE, 2), np.nan)
+            after = in_frame(poses[at + 1 : at + 1 + FUTURE], poses[at])[:, :2]
+            future[: len(after)] = after
+            said = future_command(future) if mark is None else mark.command
+            kind, place = ("", "") if mark is None else (mark.kind, mark.place)
+            yield PlanningSample(drive[at], scene, self.root / files[at], history, future, said, kind, place)
 
     def _driven(self, chain: Sequence[str]) -> tuple[FloatArray, list[str]]:
         """Poses (n, 3) and picture files of samples."""
@@ -223,9 +311,46 @@ class NuScenesTables:
         files: list[str] = []
         for i, token in enumerate(chain):
             frame = self._frames.get(token)
-            pose = None if frame is None else self._tables["ego_pose"].get(str(frame["ego_pose_token"]))
-            if frame is None or pose is None:
-                raise DataError(f"Sample {token} of {self.folder} has no {CAMERA} frame with a pose.")
-            poses[i] = (*pose["translation"][:2], yaw_of(pose["rotation"]))
-            files.append(str(frame["filename"]))
+            if frame is None:
+                raise DataError(f"Sample {token!r} of {self.folder} has no {CAMERA} key frame in sample_data.json.")
+            pose = self._text("sample_data", frame, "ego_pose_token")
+            rotation = self._numbers("ego_pose", pose, "rotation", 4)
+            if abs(math.hypot(*rotation) - 1.0) > _ROTATION_OFF:
+                raise self._wrong("ego_pose", pose, "rotation", list(rotation), "a quaternion of length 1")
+            poses[i] = (*self._numbers("ego_pose", pose, "translation", 3)[:2], yaw_of(rotation))
+            file = self._text("sample_data", frame, "filename")
+            if Path(file).is_absolute() or ".." in Path(file).parts:
+                raise self._wrong("sample_data", frame, "filename", file, "a file below the set's folder")
+            files.append(file)
         return poses, files
+
+
+def _stretches(at_s: Sequence[float]) -> list[list[int]]:
+    """Places of samples, cut where one is missing or too many."""
+    found = [[0]]
+    for i in range(1, len(at_s)):
+        if abs(at_s[i] - at_s[i - 1] - STEP_S) > MOST_OFF_S:
+            found.append([])
+        found[-1].append(i)
+    return found
+
+
+def _thinned(at_s: Sequence[float]) -> list[list[int]]:
+    """Places of the samples closest to every half second from the start of a stretch; a new one where none is."""
+    times, found = np.array(at_s), [[0]]
+    while found[-1][-1] + 1 < len(times):
+        first, last = found[-1][0], found[-1][-1]
+        target = times[first] + STEP_S * len(found[-1])
+        nearest = last + 1 + int(np.argmin(np.abs(times[last + 1 :] - target)))
+        if abs(times[nearest] - target) <= THINNED_OFF_S:
+            found[-1].append(nearest)
+        elif times[-1] < target:
+            break
+        else:
+            found.append([last + 1])
+    return found
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    """Whether a JSON value is a number that makes sense as a place or a time."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _MOST_STAMP

@@ -8,45 +8,93 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from chauffeur.bench.openloop.nuscenes import FUTURE, STEP_S
+from chauffeur.foreign.model_text import answer_in
+from chauffeur.foreign.numbers import NUMBER, numbers_in, plain_signs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     FloatArray = NDArray[np.float64]
 
-READING: Final = "read-v1"
+Pair = tuple[float, float, float | None]
+"""x and y, m, and the time, s, where it is told."""
+
+READING: Final = "read-v2"
 """Id of the rules below; figures belong to them."""
-_GROUP: Final = re.compile(r"[(\[{]([^()\[\]{}]{1,120})[)\]}]")
-_NUMBER: Final = re.compile(r"[-+]?(?:\d{1,9}\.?\d{0,12}|\.\d{1,12})(?:e[-+]?\d{1,3})?")
+_GROUP: Final = re.compile(r"[(\[{]([^()\[\]{}]{1,200})[)\]}]")
+_LINE_CHARS: Final = 200
+_COUNT: Final = re.compile(r"\A\s{0,9}\d{1,2}[.):]\s{1,9}(?=\S)")
+_SIDE: Final = re.compile(r"\b(?:right|behind|back)\b", re.IGNORECASE)
+"""A side in words, whose sign would have to be guessed."""
+_BREAK: Final = re.compile(
+    r"\n\s{0,9}\n|[.!?]\s{1,9}[A-Z]|\b(?:from|relative|origin|was|were|instead|or|better)\b|[\])}][^\[({]*\Z",
+    re.IGNORECASE,
+)
+"""What parts two lists of points: a sentence or paragraph that ends, a word that compares, the end of a list."""
+_GAP_CHARS: Final = 80
+_X, _Y = (re.compile(rf"\b{name}\b[\"'\s]{{0,4}}[:=]\s{{0,4}}({NUMBER.pattern})", re.IGNORECASE) for name in "xy")
 _TIMES: Final = tuple(STEP_S * (i + 1) for i in range(FUTURE))
-_MOST_CHARS: Final = 50_000
 _MOST_M: Final = 500.0
-"""Nobody gets farther in three seconds."""
+"""No vehicle gets farther in three seconds."""
 
 
 def read_waypoints(words: str) -> FloatArray | None:
     """Six waypoints (6, 2), m, of an answer; None where it has none that can be meant.
 
     Read are brackets of any kind that hold two numbers, with or without names (`(1, 0.2)`, `[1, 0.2]`, `{"x": 1, "y":
-    0.2}`), or three of which the first is the time; else lines with two numbers. Of more than six in a row the last six
-    count: models repeat the question first. Fewer are no answer.
+    0.2}`), or three of which the first is the time; else lines with two numbers. Points that follow each other are one
+    list, whose last six count: models go on from the past that they were told. What stands beside a list of six is no
+    part of it; two different lists of six are no answer, and neither are fewer.
     """
-    text = words[-_MOST_CHARS:].replace("\u2212", "-")
-    pairs = [pair for group in _GROUP.findall(text) if (pair := _pair(group))]
-    if len(pairs) < FUTURE:
-        pairs = [pair for line in text.splitlines() if (pair := _pair(line))]
-    timed = [pair for pair in pairs if pair[2] is not None][-FUTURE:]
-    said = [pair[2] for pair in timed]
-    pairs = timed if said == list(_TIMES) else [pair for pair in pairs if pair[2] is None]
-    if len(pairs) < FUTURE:
+    text = plain_signs(answer_in(words))
+    pairs, ends = list[Pair](), list[int]()
+    lists: list[list[Pair]] = []
+    for one in _GROUP.finditer(text):
+        if (pair := _pair(one[1])) is not None:
+            gap = text[ends[-1] : one.start()] if ends else ""
+            if not ends or len(gap) > _GAP_CHARS or _BREAK.search(gap):
+                lists.append([])
+            lists[-1].append(pair)
+            pairs.append(pair)
+            ends.append(one.end())
+    found = {points for one in lists if (points := _points(one))}
+    if not found and len(pairs) == FUTURE:  # a sentence each
+        found = {points for points in (_points(pairs),) if points}
+    if not found:
+        found = {points for one in _lines(text) if (points := _points(one))}
+    if len(found) != 1:
         return None
-    found = np.array([pair[:2] for pair in pairs[-FUTURE:]], np.float64)
-    return found if np.isfinite(found).all() and float(np.abs(found).max()) < _MOST_M else None
+    meant = np.array(found.pop(), np.float64)
+    return meant if np.isfinite(meant).all() and float(np.abs(meant).max()) < _MOST_M else None
 
 
-def _pair(text: str) -> tuple[float, float, float | None] | None:
+def _points(pairs: list[Pair]) -> tuple[tuple[float, float], ...]:
+    """The six waypoints of a list; nothing where it has fewer."""
+    timed = [pair for pair in pairs if pair[2] is not None][-FUTURE:]
+    meant = timed if [pair[2] for pair in timed] == list(_TIMES) else [pair for pair in pairs if pair[2] is None]
+    return tuple(pair[:2] for pair in meant[-FUTURE:]) if len(meant) >= FUTURE else ()
+
+
+def _lines(text: str) -> list[list[Pair]]:
+    """Pairs of lines that follow each other."""
+    lists: list[list[Pair]] = [[]]
+    for line in text.splitlines():
+        pair = _pair(_COUNT.sub("", line)) if len(line) <= _LINE_CHARS else None
+        if pair is not None:
+            lists[-1].append(pair)
+        elif line.strip():
+            lists.append([])
+    return lists
+
+
+def _pair(text: str) -> Pair | None:
     """(x, y, time or None) of a bracket or line; None where it holds no pair."""
-    numbers = [float(one) for one in _NUMBER.findall(text.lower())]
+    if _SIDE.search(text):
+        return None
+    x, y = _X.search(text), _Y.search(text)
+    if x is not None and y is not None:
+        return float(x[1]), float(y[1]), None
+    numbers = numbers_in(text)
     if len(numbers) == 2:
         return numbers[0], numbers[1], None
     if len(numbers) == 3 and numbers[0] in _TIMES:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Final, Literal
 from urllib.request import getproxies, proxy_bypass
 
 from chauffeur.concept import ChauffeurError
+from chauffeur.foreign.complaints import ForeignBodyError
 
 if TYPE_CHECKING:
     import httpx
@@ -92,9 +93,11 @@ class ServiceCaller:
             ):
                 if response.status_code != 200:
                     raise self._refused(response.status_code, response.headers)
-                return await self._body(response)
+                return await response.aread()
         except ServiceError:
             raise
+        except ForeignBodyError as error:
+            failure = ServiceError(error.message.rstrip("."), "garbage")
         except (TimeoutError, httpx.TimeoutException):
             message = f"the service did not answer within {self._patience_s:g} s"
             failure = ServiceError(message, "timeout")
@@ -104,19 +107,6 @@ class ServiceCaller:
             failure = ServiceError("the connection to the service broke", "broken")
         # Raised outside of the handlers: what the client raised is no part of it.
         raise failure
-
-    async def _body(self, response: httpx.Response) -> bytes:
-        if response.headers.get("content-encoding", "identity").lower() not in ("", "identity"):
-            # Not asked for; a small packed answer may unpack to any size.
-            raise ServiceError("the answer of the service is packed", "garbage")
-        parts: list[bytes] = []
-        room = self._max_bytes
-        async for part in response.aiter_raw():
-            room -= len(part)
-            if room < 0:
-                raise ServiceError("the answer of the service is too long", "garbage")
-            parts.append(part)
-        return b"".join(parts)
 
     def _refused(self, status: int, headers: httpx.Headers) -> ServiceError:
         wait_s = retry_after_s(headers)
@@ -131,6 +121,8 @@ class ServiceCaller:
 
     def _connect(self) -> httpx.AsyncClient:
         import httpx
+
+        from chauffeur.foreign.bodies import UNPACKED, bounding
 
         loop = asyncio.get_running_loop()
         if self._client is not None and self._client[0] is loop:
@@ -157,7 +149,8 @@ class ServiceCaller:
 
         client = httpx.AsyncClient(
             transport=Keyed(verify=self._tls, proxy=proxy),
-            headers={"User-Agent": _user_agent(), "Accept-Encoding": "identity", "Accept": "application/json"},
+            headers={"User-Agent": _user_agent(), "Accept": "application/json", **UNPACKED},
+            event_hooks={"response": [bounding(self._max_bytes)]},
             timeout=self._patience_s,
             follow_redirects=False,  # the key must not follow a redirect to somebody else
             trust_env=False,  # proxies are the transport's; netrc files are nobody's

@@ -11,6 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from chauffeur.concept import NOBODY, Context, History, Instruction, LaneId, Observation, Plan
 from chauffeur.drive.events import DriveEvent, WishEventKind
 from chauffeur.drive.live.messages import MessageError
+from chauffeur.language.questions import said_aside
 
 TOOK_OVER: Final = "You took over."
 """What is told of a wish that ended because the person took the wheel."""
@@ -28,6 +29,7 @@ class Request:
         person: Who says it.
         turn: Counts how often it was asked for; more than once where a plan was stale or the planner died.
         confirmed: The car's question to which these words are the person's yes; empty for none.
+        runs: Whether another wish is driven, or on its way, which a question must not end.
     """
 
     wish: str
@@ -35,6 +37,12 @@ class Request:
     person: str = NOBODY
     turn: int = 1
     confirmed: str = ""
+    runs: bool = False
+
+    @property
+    def aside(self) -> bool:
+        """Whether it is said beside the other wishes, and takes the place of none that is still being planned."""
+        return not self.confirmed and said_aside(self.text)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import CameraImage, ChauffeurError, Context, History, Instruction, Observation, PersonId, Plan
+from chauffeur.describe.answers import with_way
 from chauffeur.describe.services.sources import Sources, SourceSettings
 from chauffeur.drive.emergency import NO_SHOULDER, planned_for
 from chauffeur.drive.events import DriveEvent, WishEventKind
@@ -39,10 +40,12 @@ from chauffeur.planners.base import Planner, looks
 from chauffeur.planners.prompts import Setting, build_system_message
 from chauffeur.programs.catalogue import vocabulary_of
 from chauffeur.safety.checks import DRIVE_CHECKS, run_checks
+from chauffeur.worlds.places import TownPlaces
 
 FOLLOW_FOR_S: Final = 600.0
 """Vehicle time for which a plan may be followed."""
 LOOK_EVERY_S: Final = 0.02
+_NEWER: Final = {False: "A newer wish came.", True: "Something newer was said."}
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +59,7 @@ class PlanningRings:
 
 
 class Planning:
-    """Answers wishes, one at a time; a newer one ends the work on an older one."""
+    """Answers wishes, one at a time; a newer one ends the work on an older one. A question is answered beside it."""
 
     def __init__(
         self,
@@ -77,8 +80,8 @@ class Planning:
         self._setting: Setting = setting
         self._speed, self._clock_ns = speed, clock_ns
         self._asked = Reader(rings.requests)
-        self._at_work: asyncio.Task[None] | None = None
-        self._request: Request | None = None
+        self._at_work: dict[bool, tuple[asyncio.Task[None], Request]] = {}
+        """The wish (False), and what was said aside (True), that were taken up last."""
 
     async def run(self, over: Callable[[], bool]) -> None:
         """Answer wishes until it is over."""
@@ -86,10 +89,11 @@ class Planning:
             while not over():
                 await self.look()
                 await asyncio.sleep(LOOK_EVERY_S)
-            await self._give_up("The drive is over.")
+            for aside in (False, True):
+                await self._give_up(aside, "The drive is over.")
 
     async def look(self) -> None:
-        """Take up the newest wish, if there is a new one; whatever was worked on is given up."""
+        """Take up the newest wish, and the newest thing said aside; older work of the same kind ends."""
         messages, _ = self._asked.news()
         requests: list[Request] = []
         for message in messages:
@@ -97,22 +101,21 @@ class Planning:
                 requests.append(read_request(message.payload))
             except MessageError as error:
                 self._tell("garbage", "", f"Malformed wish: {error}.")
-        if not requests:
-            return
-        await self._give_up("A newer wish came.")
-        for passed_over in requests[:-1]:
-            self._tell("superseded", passed_over.wish, "A newer wish came.")
-        self._request = requests[-1]
-        self._at_work = asyncio.create_task(self._answer(requests[-1]))
+        for aside in (False, True):
+            *passed_over, newest = [None, *(one for one in requests if one.aside == aside)]
+            if newest is None:
+                continue
+            await self._give_up(aside, _NEWER[aside])
+            for request in filter(None, passed_over):
+                self._tell("superseded", request.wish, _NEWER[aside])
+            self._at_work[aside] = asyncio.create_task(self._answer(newest)), newest
 
     async def finish(self) -> None:
         """Wait for the work at hand."""
-        if self._at_work is not None:
-            await self._at_work
+        await asyncio.gather(*(task for task, _ in self._at_work.values()))
 
-    async def _give_up(self, why: str) -> None:
-        task, request = self._at_work, self._request
-        self._at_work = self._request = None
+    async def _give_up(self, aside: bool, why: str) -> None:
+        task, request = self._at_work.pop(aside, (None, None))
         if task is None or request is None or task.done():
             return
         task.cancel()
@@ -131,7 +134,8 @@ class Planning:
             return
         if order.plan.refusal or order.plan.policy is None:
             words = order.plan.refusal or "The planner gave no program."
-            self._tell("declined", request.wish, words, offer=order.plan.offer)
+            answered = request.aside and not order.plan.offer
+            self._tell("answered" if answered else "declined", request.wish, words, offer=order.plan.offer)
             return
         try:
             self._rings.orders.write(encode(order))
@@ -145,10 +149,12 @@ class Planning:
         self._mirror.follow()
         observation, limits = self._mirror.world.observe(), self._mirror.limits
         scene = PlannedScene.of(self._mirror.trip, observation)
+        world = self._mirror.world
+        there = world.destination() if isinstance(world, TownPlaces) else None
         instruction = replace(parse_wish(request.text, PersonId(request.person)), confirmed=request.confirmed)
 
         async def describe() -> Context:
-            return (await describing(self._sources))(observation)
+            return with_way((await describing(self._sources))(observation), there)
 
         async def recall(instruction: Instruction, context: Context) -> History:
             return self._memory.recall(instruction.person, instruction, context, RECALLED)
@@ -175,6 +181,7 @@ class Planning:
             check_yes=now,
             see=lambda: self._see(observation),
             within_s=PLAN_WITHIN_S,
+            runs=request.runs,
         )
         planned = await plan_once(instruction, steps)
         context, history, plan = planned.request.context, planned.request.history, planned.plan
@@ -206,7 +213,8 @@ class Planning:
                 return
 
     def _say(self, text: str) -> None:
-        self._tell("said", "" if self._request is None else self._request.wish, text)
+        _, request = self._at_work.get(False, (None, None))
+        self._tell("said", "" if request is None else request.wish, text)
 
     def _tell(self, kind: WishEventKind, wish: str, text: str, *, again: bool = True, offer: str = "") -> None:
         offer = offer if len(text) + len(offer) <= MOST_SAID else ""  # half a wish is none

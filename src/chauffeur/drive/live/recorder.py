@@ -194,7 +194,7 @@ class LiveRecorder:
     def _became(self, event: DriveEvent) -> None:
         at = {"wish": event.wish, "tick": self._tick}
         match event.kind:
-            case "planned" | "declined":
+            case "planned" | "declined" | "answered":
                 pass  # the plan itself has been written down, with its refusal
             case "started":
                 self._verdict(event, "")

@@ -163,7 +163,7 @@ class Runtime:
             confirmed: The car's question to which they are the yes.
         """
         wish = self.next_wish
-        request = Request(wish, text, person, confirmed=confirmed)
+        request = Request(wish, text, person, confirmed=confirmed, runs=bool(self.open_wishes))
         interaction = self.interactions[wish] = Interaction(request, since_s=time.monotonic())
         if stop_wanted(read_emergency(text)):
             self.halt()
@@ -385,15 +385,14 @@ class Runtime:
         """Ask for a plan again, or give up with the last answer."""
         request = interaction.request
         newer = any(
-            other.request.wish != request.wish and int(other.request.wish[1:]) > int(request.wish[1:])
-            for other in self.open_wishes
+            int(other.request.wish[1:]) > int(request.wish[1:]) for other in self.open_wishes if not other.request.aside
         )
         if newer:
             self._close(interaction, DriveEvent("superseded", request.wish, "A newer wish came."))
         elif request.turn >= MOST_TURNS or self._stopping or not self.driving:
             self._close(interaction, DriveEvent(kind, request.wish, why))
         else:
-            interaction.request = Request(request.wish, request.text, request.person, request.turn + 1)
+            interaction.request = replace(request, turn=request.turn + 1)
             self._send(interaction)
 
     def _look_after_wishes(self, now_s: float) -> None:

@@ -23,6 +23,7 @@ _OUTCOMES: Final[dict[EventKind, Outcome]] = {
     "interrupted": "ended",
     "failed": "failure",
     "declined": "refused",
+    "answered": "refused",
     "refused": "refused",
 }
 

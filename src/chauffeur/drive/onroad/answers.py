@@ -9,15 +9,24 @@ from chauffeur.concept import Feedback, Parameters, Plan, Verdict
 from chauffeur.worlds.ros.base import Published, RosVehicleState
 
 Status = Literal[
-    "delivered", "dry-run", "unconfirmed", "unreachable", "refused", "declined", "failed", "superseded", "taken"
+    "delivered",
+    "dry-run",
+    "unconfirmed",
+    "unreachable",
+    "refused",
+    "declined",
+    "failed",
+    "superseded",
+    "taken",
+    "answered",
 ]
 """What became of a wish. `delivered`: every receiver was handed it. `dry-run`: it would have been published.
 `unconfirmed`: it was published, and nobody was seen to take all of it. `unreachable`: there is no way to the vehicle,
 nothing was published. `refused`: a check, or the vehicle's own limits. `declined`: the planner, or it is no wish for
 parameters. `failed`: no plan could be had. `superseded`: a newer wish came before anything was published.
-`taken`: feedback, kept."""
+`taken`: feedback, kept. `answered`: it was a question, and what is in force stays."""
 
-DONE: Final[frozenset[Status]] = frozenset({"delivered", "dry-run", "taken"})
+DONE: Final[frozenset[Status]] = frozenset({"delivered", "dry-run", "taken", "answered"})
 """What a person wished was done, as far as can be known here."""
 
 

@@ -65,9 +65,10 @@ from chauffeur.drive.planning import (
     PlanSteps,
     plan_once,
 )
-from chauffeur.drive.questions import NOT_MEANT, OpenQuestion
+from chauffeur.drive.questions import NOT_MEANT, NOTHING_ASKED, OpenQuestion
 from chauffeur.drive.session import MAX_WISH_CHARACTERS
 from chauffeur.drive.session_recorder import FLUSH_TIMEOUT_S
+from chauffeur.language.questions import said_aside
 from chauffeur.memory.base import Memory
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.memory.personal_limits import personal_limits
@@ -76,6 +77,7 @@ from chauffeur.planners.talk2drive.planner import system_text
 from chauffeur.planners.talk2drive.style import LOOK_AHEAD
 from chauffeur.safety.audit.writer import utc_now
 from chauffeur.safety.words import reasons_once
+from chauffeur.speech.answers import takes_back
 from chauffeur.worlds.ros import Published, RosVehicleState, VehicleError, VehicleInterface
 from chauffeur.worlds.ros.autoware_ai import AutowareAi, PlannedSpeed
 from chauffeur.worlds.ros.settings import VehicleSettings
@@ -214,7 +216,8 @@ class VehicleSession:
         return words
 
     async def ask(self, text: str, *, source: Literal["text", "speech"] = "text") -> OnRoadAnswer:
-        """Answer one wish. A newer call takes the place of an older one that has not reached the vehicle.
+        """Answer one wish. A newer call takes the place of an older one that has not reached the vehicle; a question
+        waits for it, and takes the place of none.
 
         Args:
             text: The words.
@@ -225,10 +228,13 @@ class VehicleSession:
         """
         begun = time.perf_counter()
         self._count += 1
-        number = self._newest = self._count
+        number = self._count
+        aside = said_aside(text) and not self._question.open
+        if not aside:
+            self._newest = number
         if self._over:
             return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "failed", "The session is over.")
-        if self._making is not None:
+        if self._making is not None and not aside:
             self._making.cancel()
         request: PlanRequest | None = None
         try:
@@ -280,6 +286,8 @@ class VehicleSession:
         self, number: int, text: str, source: Literal["text", "speech"]
     ) -> tuple[OnRoadAnswer, PlanRequest | None]:
         """The answer, and what was planned for, if anything was."""
+        if takes_back(text) and not self._question.open:
+            return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "answered", NOTHING_ASKED), None
         try:
             meant = self._question.settle(text, self._person)
         except InstructionError as error:
@@ -313,7 +321,7 @@ class VehicleSession:
     async def _made(self, number: int, instruction: Instruction) -> _Made:
         """What the wish comes to, unless a newer one comes first. A stop gives way to nothing."""
         stopping = is_stop(instruction.text)
-        if number != self._newest and not stopping:
+        if number < self._newest and not stopping:
             return _SUPERSEDED
         task = asyncio.get_running_loop().create_task(self._make(number, instruction, stopping=stopping))
         self._making = None if stopping else task
@@ -322,7 +330,7 @@ class VehicleSession:
         finally:
             task.cancel()
             self._making = None
-        if task.cancelled() or (number != self._newest and not stopping):
+        if task.cancelled() or (number < self._newest and not stopping):
             return _SUPERSEDED
         return task.result()
 
@@ -358,6 +366,7 @@ class VehicleSession:
             fit=lambda plan: fitted(plan, self._settings.stack.limits, before.cap_mps),
             tell=tell,
             within_s=PLAN_WITHIN_S,
+            runs=self._asked is not None,
         )
         try:
             planned = await plan_once(instruction, steps)
@@ -376,7 +385,8 @@ class VehicleSession:
         self._question.ask(plan.refusal, plan.offer)
         if plan.policy is None and not verdicts[0].stops:
             words = plan.refusal or "The planner gave no parameters."
-            return replace(made, status="declined", words=f"{words} {counted_from(seen)}".rstrip())
+            status = "answered" if said_aside(request.instruction.text) and not plan.offer else "declined"
+            return replace(made, status=status, words=f"{words} {counted_from(seen)}".rstrip())
         if reasons := _reasons(verdicts):
             return replace(made, status="refused", words=reasons)
         if took_s > START_WITHIN_S:
@@ -418,7 +428,7 @@ class VehicleSession:
                 if not slows:
                     return replace(answer, status="failed", words=f"{why} Nothing was published.")
                 self._say("trouble", f"{why} A lower speed is asked for all the same.", number)
-        if number != self._newest and not is_stop(answer.text):
+        if number < self._newest and not is_stop(answer.text):
             return replace(answer, status="superseded", words=_SUPERSEDED.words)
         try:
             published = self._vehicle.apply(parameters)
@@ -444,7 +454,7 @@ class VehicleSession:
             words = f"{published.words} {self._taken_words()}"
             return replace(answer, status="delivered", words=words, confirmed_s=confirmed_s)
         state = self._vehicle.state()
-        if number != self._newest:
+        if number < self._newest:
             self._unconfirmed = (number, published)
             words = f"{published.words} A newer wish came before it was known who took it."
             return replace(answer, status="unconfirmed", words=words)
@@ -465,7 +475,7 @@ class VehicleSession:
         most often it takes a millisecond."""
         end, pause = time.perf_counter() + self._confirm_within_s, _FASTEST_LOOK_S
         while not self._vehicle.state().delivered:
-            if time.perf_counter() > end or number != self._newest:
+            if time.perf_counter() > end or number < self._newest:
                 return False
             await asyncio.sleep(pause)
             pause = min(2.0 * pause, _SLOWEST_LOOK_S)

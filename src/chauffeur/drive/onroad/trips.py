@@ -17,7 +17,12 @@ NO_METRICS: Final = (
     "The vehicle tells its speed and nothing of gaps, lanes or others: no time to collision, comfort or efficiency is "
     "given. How long it drove so is not known: the parameters stay in force until others are asked for."
 )
-_OUTCOMES: Final[dict[Status, Outcome]] = {"delivered": "ended", "refused": "refused", "declined": "refused"}
+_OUTCOMES: Final[dict[Status, Outcome]] = {
+    "delivered": "ended",
+    "refused": "refused",
+    "declined": "refused",
+    "answered": "refused",
+}
 
 
 def make_trip(

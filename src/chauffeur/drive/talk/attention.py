@@ -1,7 +1,7 @@
 """What the session listens to, and what it makes of it: words to act on, or a question whether they are meant.
 
 Sound of this machine's microphone, or of a screen, goes to the ear. What the speech engine is not sure of is asked
-back, and is acted on only after a yes: said, typed or pressed.
+back, and so is what a planner doubts: acted on only after a yes, said, typed or pressed. One question at a time.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from chauffeur.concept import MissingExtraError
 from chauffeur.drive.emergency import stop_wanted
-from chauffeur.drive.questions import ANSWER_WITHIN_S
+from chauffeur.drive.questions import ANSWER_WITHIN_S, NOT_MEANT
 from chauffeur.drive.talk.asr_client import AsrClient, AsrListener, HeardAt, Trouble
 from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.messages import Answered, Button, HeardWords, Listening, Note, Said
@@ -26,15 +26,22 @@ from chauffeur.speech.base import Heard
 
 @dataclass(frozen=True, slots=True)
 class _Question:
-    """Something that was heard, and is driven only when the person says that they meant it."""
+    """Something that was heard, or that the car offers, and is driven only when the person says that they mean it."""
 
     shown: HeardWords
     heard: Heard
     until_s: float
 
     @property
+    def own(self) -> bool:
+        """Whether the car asks of its own accord."""
+        return not self.shown.engine
+
+    @property
     def dropped(self) -> str:
         """That it was not meant, in words."""
+        if self.own:
+            return NOT_MEANT
         return f"“{self.heard.text}” is not {'kept' if self.heard.hotword == 'evaluate' else 'driven'}."
 
 
@@ -64,16 +71,11 @@ class Attention:
         self._button = ""
         self._missing = ""
         self._refused_sound = self._muted = False
-        self._expects_until_s = -1.0
 
     @property
     def question(self) -> HeardWords | None:
         """What the person is asked about; None where nothing is."""
         return None if self._question is None else self._question.shown
-
-    @property
-    def _asks(self) -> bool:
-        return self._question is not None or time.monotonic() <= self._expects_until_s
 
     @property
     def engine(self) -> tuple[str, bool]:
@@ -141,12 +143,9 @@ class Attention:
                     self._say(Note(news.text, trouble=True))
                 case HeardAt():
                     self._understand(news)
-        if self._question is None and 0.0 < self._expects_until_s < time.monotonic():
-            self._expects_until_s = -1.0
-            self._ear.expect_answer(False)
 
     def confirm(self, yes: bool, answer: Words) -> None:
-        """Yes or no to what was heard; nothing where nothing was asked.
+        """Yes or no to what was asked; nothing where nothing was.
 
         Args:
             yes: Whether it is meant.
@@ -157,14 +156,10 @@ class Attention:
             return
         self.withdraw("" if yes else question.dropped)
         if yes:
-            words = replace(answer, text=question.heard.text, spoken=True)
+            asked = question.shown.reason if question.own else ""
+            spoken = answer.spoken or not question.own
+            words = replace(answer, text=question.heard.text, spoken=spoken, confirmed=asked)
             self._act(question.heard.hotword or "command", words)
-
-    def expect(self, within_s: float) -> None:
-        """For so long a yes or no may come without a hotword: the car has asked something, and acts on it itself."""
-        if self._ear is not None:
-            self._expects_until_s = time.monotonic() + within_s
-            self._ear.expect_answer(True)
 
     def offer(self, question: str, wish: str) -> None:
         """The car's own question: a yes wishes what it offers.
@@ -186,7 +181,7 @@ class Attention:
             self._ear.expect_answer(True)
 
     def withdraw(self, why: str = "") -> None:
-        """Ask no more whether something was heard rightly, and say why."""
+        """Ask no more, and say why."""
         if self._question is None:
             return
         self._question = None
@@ -224,7 +219,7 @@ class Attention:
         words = Words(heard.text, True, at.ended_s, wait_s, heard.timing.recognise_s)
         understood = heard.status == "heard"
         # With a button held, yes comes as a command.
-        answers = understood and (heard.hotword is None or (self._asks and heard.hotword == "command"))
+        answers = understood and (heard.hotword is None or (self._question is not None and heard.hotword == "command"))
         answer = answer_in(heard.text) if answers else None
         at_once = stop_wanted(read_emergency(heard.text)) if understood else False  # a stop is not asked back
         asks = understood and heard.to_confirm and answer is None and not at_once
@@ -241,9 +236,7 @@ class Attention:
         if answer is None and (understood or heard.again):
             self.withdraw()  # something newer was said, or what was asked about was a part of this
         self._say(shown)
-        if answer is not None and self._question is None and self._asks:
-            self._act("command", words)
-        elif answer is not None:
+        if answer is not None:
             self.confirm(answer, words)
         elif asks:
             self._ask_back(shown, heard)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from typing import Final
@@ -15,6 +16,8 @@ from chauffeur.drive.live.supervisor import Interaction
 from chauffeur.drive.talk.messages import Conversation, HowWasIt, StageTimes
 from chauffeur.drive.talk.verdicts import Judge, JudgedCase
 from chauffeur.drive.talk.wish_queue import Words
+from chauffeur.geometry.road_graph import TURNS
+from chauffeur.programs.loops import has_end
 
 JUDGED_WITHIN_S: Final = 1.0
 """Verdicts are worked out when the set-point has changed, or so long after the start: nothing waits for them."""
@@ -83,8 +86,9 @@ class Conversations:
         return next((name for name in reversed(self._wishes) if self._wishes[name].felt_from_s is not None), "")
 
     def newest(self, wish: str) -> bool:
-        """Whether no wish came after this one."""
-        return next(reversed(self._wishes), "") == wish
+        """Whether no wish came after this one but such as ended before they were driven."""
+        later = list(self._wishes.values())[list(self._wishes).index(wish) + 1 :]
+        return all(each.shown.stage == "closed" and each.started_s is None for each in later)
 
     def asked(self, wish: str, words: Words) -> Conversation:
         """A wish was handed on."""
@@ -145,7 +149,8 @@ class Conversations:
             return None
         self._wishes[wish].plan = plan
         kind, source = ("", "") if plan.policy is None else (plan.policy.kind, source_of(plan.policy))
-        return self.change(wish, thoughts=plan.thoughts.text, policy=kind, source=source, verdicts=())
+        ends = plan.policy is not None and may_end(plan.policy)
+        return self.change(wish, thoughts=plan.thoughts.text, policy=kind, source=source, verdicts=(), ends=ends)
 
     def report(self, report: Report) -> Conversation | None:
         """A control period: the first one that follows a wish is where its set-point changed."""
@@ -204,6 +209,20 @@ def _most(said: tuple[str, ...]) -> tuple[str, ...]:
     if len(said) <= MOST_SAID_SHOWN:
         return said
     return (_EARLIER, *said[1 - MOST_SAID_SHOWN :])
+
+
+def may_end(policy: Policy) -> bool:
+    """Whether a policy may end by itself: parameters do where they lead to a place."""
+    match policy:
+        case Program(source=source):
+            try:
+                return has_end(ast.parse(source))
+            except SyntaxError:  # it is refused by a check
+                return False
+        case Parameters(route=route):
+            return bool(route) and route not in TURNS
+        case _:
+            return True
 
 
 def source_of(policy: Policy) -> str:

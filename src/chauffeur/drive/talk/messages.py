@@ -96,6 +96,16 @@ class ShownLight:
 
 
 @dataclass(frozen=True, slots=True)
+class ShownGoal:
+    """Where the car is going: its name, empty for none; where one stops; how far it is by road, m."""
+
+    name: str
+    x_m: float
+    y_m: float
+    left_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Scene:
     """An instant of the drive.
 
@@ -114,6 +124,7 @@ class Scene:
         missed: Control periods never begun, since the start.
         lights: Traffic lights around.
         street: Name of the street, where it has one.
+        goal: Where the car is going, where that is a place.
     """
 
     time_s: float
@@ -134,6 +145,7 @@ class Scene:
     missed: int
     lights: tuple[ShownLight, ...] = ()
     street: str = ""
+    goal: ShownGoal | None = None
     kind: Literal["scene"] = "scene"
 
 
@@ -237,6 +249,7 @@ class Conversation:
         opinion: What the person said of it afterwards.
         remembered: Where it stands in the memory, in words; empty where it is not remembered (yet).
         stages: Latency.
+        ends: Whether the plan may end by itself, as a turn or a way to a place; not one that holds a speed.
     """
 
     wish: str
@@ -255,6 +268,7 @@ class Conversation:
     remembered: str = ""
     stages: StageTimes = StageTimes()
     follows: str = ""
+    ends: bool = False
     kind: Literal["conversation"] = "conversation"
 
 

@@ -24,7 +24,7 @@ from chauffeur.drive.live.recorder import LiveRecorder
 from chauffeur.drive.live.settings import Settings, ring
 from chauffeur.drive.live.supervisor import Interaction, Runtime
 from chauffeur.drive.live.trip_memory import trip_of
-from chauffeur.drive.questions import ANSWER_WITHIN_S
+from chauffeur.drive.questions import NOTHING_ASKED
 from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.attention import Attention
 from chauffeur.drive.talk.conversations import Conversations
@@ -56,14 +56,16 @@ from chauffeur.drive.talk.view import View
 from chauffeur.drive.talk.voice import Voice
 from chauffeur.drive.talk.wish_queue import OVER, WishQueue, Words
 from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency
+from chauffeur.language.questions import ends_session
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.safety.bounds import shoulder_at_right
-from chauffeur.speech.answers import answer_in
+from chauffeur.speech.answers import answer_in, takes_back
 
 ASK_AFTER_S: Final = 15.0
 """So long a wish is driven, in the car's time, before the car asks how it is: many have no end of their own."""
 OPINION_WITHIN_S: Final = 2.0
 """An opinion that becomes a wish waits so long for its place in the memory, so that the planner finds it there."""
+LEAVING: Final = "You end the session. The car comes to a stand, and the drive is over."
 ABORTED_WITHIN_S: Final = 2.0
 """So long an end at once waits for the memory."""
 
@@ -309,6 +311,15 @@ class Talk:
     def _wish(self, words: Words) -> None:
         if self._emergency(words):
             return
+        if ends_session(words.text) and not self._stopping:
+            self._asking.pass_over(words.text, "answered", LEAVING)
+            self._say(Note(LEAVING))
+            self._stop()
+            return
+        if takes_back(words.text) and not self._on_its_way:
+            self._asking.pass_over(words.text, "answered", NOTHING_ASKED)
+            self._say(Note(NOTHING_ASKED))
+            return
         if self._stopping:
             self._say(Note(f"The car is stopping; “{words.text}” is not asked."))
             self._asking.pass_over(words.text, "not_asked", OVER)
@@ -316,8 +327,14 @@ class Talk:
         if self._runtime is not None and self._runtime.taken_over:
             self._say(Note(f"You have the wheel; give it back before you wish for something: “{words.text}”."))
             return
-        if note := self._asking.put(words):
-            self._say(Note(note))
+        self._asking.put(words)
+
+    @property
+    def _on_its_way(self) -> bool:
+        """Whether a wish has no plan yet, which a newer one takes back."""
+        return self.busy or (
+            self._runtime is not None and any(one.stage == "asked" for one in self._runtime.open_wishes)
+        )
 
     def _act_on(self, hotword: str, words: Words) -> None:
         """What was heard and is meant."""
@@ -453,11 +470,10 @@ class Talk:
         if conversation is None:
             return
         self._say(conversation)
-        if event.kind in ("said", "declined", "refused"):
+        if event.offer and not self._stopping:
+            self._attention.offer(event.text, event.offer)
+        elif event.kind in ("said", "declined", "refused", "answered"):
             self._speak(event.text)
-        if event.offer:
-            self._asking.offer(event.text, event.offer)
-            self._attention.expect(ANSWER_WITHIN_S)
         if interaction is not None and event.final:
             self._closed(interaction)
 

@@ -11,8 +11,9 @@ from chauffeur.drive.live.messages import MessageError, MirroredInstant, Report
 from chauffeur.drive.live.mirror import mirror_of
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import Settings
-from chauffeur.drive.talk.messages import Road, RoadLane, Scene, ShownBody, ShownLight
+from chauffeur.drive.talk.messages import Road, RoadLane, Scene, ShownBody, ShownGoal, ShownLight
 from chauffeur.drive.talk.seat_view import SeatWindow
+from chauffeur.worlds.places import TownPlaces
 
 _INSTANTS: Final = 100
 """Instants that are kept, 5 to 10 s of them: plans are judged a moment after they were seen."""
@@ -107,7 +108,12 @@ class View:
             missed=0 if told is None else told.missed,
             lights=tuple(ShownLight(light.state, light.stop_line_m) for light in observation.signals),
             street=_street(observation),
+            goal=self._goal(),
         )
+
+    def _goal(self) -> ShownGoal | None:
+        there = self._world.destination() if isinstance(self._world, TownPlaces) else None
+        return None if there is None else ShownGoal(there.name, there.x_m, there.y_m, round(there.left_m, 1))
 
 
 def _body(state: VehicleState) -> ShownBody:

@@ -9,8 +9,7 @@ from typing import Final
 from chauffeur.concept import Instruction, InstructionError, PersonId
 from chauffeur.drive.live.recorder import LiveRecorder
 from chauffeur.drive.live.supervisor import Runtime
-from chauffeur.drive.questions import NOT_MEANT, OpenQuestion
-from chauffeur.drive.session import MAX_WISH_CHARACTERS
+from chauffeur.drive.session import MAX_WISH_CHARACTERS, parse_wish
 
 OVER: Final = "The drive was over before it came to this."
 UNKEPT: Final = "The audit log could not be written in time; the wish is asked all the same."
@@ -26,6 +25,7 @@ class Words:
         ended_s: When the person had finished saying it, or pressed Enter, by the monotonic clock.
         wait_s, recognise_s: Of speech; 0 for typed words.
         follows: Wish whose opinion this is, empty where it is none.
+        confirmed: The car's question to which they are the yes; empty for none.
     """
 
     text: str
@@ -34,6 +34,7 @@ class Words:
     wait_s: float = 0.0
     recognise_s: float = 0.0
     follows: str = ""
+    confirmed: str = ""
 
 
 class WishQueue:
@@ -44,37 +45,26 @@ class WishQueue:
         self._person, self._books = person, books
         self._waiting: list[tuple[Words, Instruction]] = []
         self._keeping: tuple[Words, Instruction, Future[bool]] | None = None
-        self._question = OpenQuestion()
 
     @property
     def busy(self) -> bool:
         """Whether a wish waits to be handed on."""
         return self._keeping is not None or bool(self._waiting)
 
-    def offer(self, question: str, wish: str) -> None:
-        """The car has asked; a yes that comes in time is this wish."""
-        self._question.ask(question, wish)
-
-    def put(self, words: Words) -> str:
-        """A wish, or the answer to the car's question, to be handed on when it is its turn.
-
-        Returns:
-            What there is to tell: that what was asked about is not done; else nothing.
+    def put(self, words: Words) -> None:
+        """A wish, to be handed on when it is its turn.
 
         Raises:
             InstructionError: It is none. It stands in the books all the same.
         """
         try:
-            instruction = self._question.settle(words.text, self._person)
+            instruction = parse_wish(words.text, self._person)
         except InstructionError as error:
             self.pass_over(words.text, "refused", str(error))
             raise
-        if instruction is None:
-            self.pass_over(words.text, "not_asked", NOT_MEANT)
-            return NOT_MEANT
         source = "speech" if words.spoken else "text"
-        self._waiting.append((replace(words, text=instruction.text), replace(instruction, source=source)))
-        return ""
+        instruction = replace(instruction, source=source, confirmed=words.confirmed)
+        self._waiting.append((replace(words, text=instruction.text), instruction))
 
     def look(self, runtime: Runtime) -> tuple[tuple[str, Words] | None, str]:
         """Hand the next wish on, if it may be: its id and words, and what there is to tell."""

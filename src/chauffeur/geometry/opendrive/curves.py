@@ -25,6 +25,11 @@ class Cubics:
         self._starts, self._factors = table[:, 0], table[:, 1:]
 
     @property
+    def known(self) -> bool:
+        """Whether there is a piece at all."""
+        return bool(len(self._starts))
+
+    @property
     def straight(self) -> bool:
         """Whether it is the same everywhere."""
         return not self._factors[:, 1:].any() and len({*self._factors[:, 0].tolist()}) <= 1

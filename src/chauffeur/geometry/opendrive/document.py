@@ -2,21 +2,43 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from chauffeur.geometry.opendrive.curves import Cubics, Piece, ReferenceLine
+from chauffeur.geometry.opendrive.sections import Section, Speeds, cubics, known, sections_of
+from chauffeur.geometry.opendrive.values import (
+    MOST_ROAD_M,
+    OpenDriveError,
+    Remarks,
+    lane_id,
+    number,
+    quoted,
+    speed_of,
+)
 
-_MPS: Final = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704, "": 1.0}
-
-
-class OpenDriveError(ValueError):
-    """The file is no OpenDRIVE, or says something that cannot be read; the message says where."""
+MAX_BYTES: Final = 200_000_000
+"""A larger file is not read: the largest of CARLA's towns has 3.4 MB, a motorway network some tens."""
+_MOST_LANES_KM: Final = 5_000.0
+"""Lanes of a large city; each is sampled every half metre."""
+_ROAD_PARTS: Final = frozenset({
+    "link", "type", "planView", "elevationProfile", "lateralProfile", "lanes", "objects", "signals", "surface",
+    "railroad", "userData", "dataQuality",
+})  # fmt: skip
+_MINOR: Final = 8
+"""The newest minor version whose elements are known here."""
+_OFF_M: Final = 1.0
+"""A plan view may differ so much, or by a hundredth, from the length that its road states."""
+_STEEP_RAD: Final = 0.2
+"""Superelevation from which lanes are more than 2 % narrower in the plane than along the slope."""
+_MOST_CURVATURE: Final = 100.0
+"""1/m: a bend of a centimetre's radius, as editors make where kerbs meet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,40 +48,6 @@ class RoadEnd:
     element: str
     id: str
     at_start: bool
-
-
-@dataclass(frozen=True)
-class LaneRecord:
-    """A lane of a lane section.
-
-    Attributes:
-        id: Positive to the left of the reference line, negative to its right.
-        type: As written: driving, shoulder, sidewalk ...
-        widths: Width as function of the distance from the section's start.
-        before, after: Lane of the previous and the next section (or road) along the reference line.
-        speed_mps: Its own speed record, None without one.
-        inwards, outwards: Whether the marking on its outer side lets one change over it: towards smaller ids (in size),
-            towards larger ones.
-    """
-
-    id: int
-    type: str
-    widths: Cubics
-    before: int | None
-    after: int | None
-    speed_mps: float | None
-    inwards: bool
-    outwards: bool
-
-
-@dataclass(frozen=True)
-class Section:
-    """A lane section: between two stations, lanes by id, from the reference line outwards on each side."""
-
-    start_m: float
-    end_m: float
-    left: tuple[LaneRecord, ...]
-    right: tuple[LaneRecord, ...]
 
 
 @dataclass(frozen=True)
@@ -77,20 +65,12 @@ class OpenDriveRoad:
     sections: tuple[Section, ...]
     before: RoadEnd | None
     after: RoadEnd | None
-    speeds: tuple[tuple[float, float | None], ...]
+    speeds: Speeds
     node: ET.Element
 
     def heading_rad(self, station_m: float) -> float:
         """Heading of the reference line at a station."""
         return float(self.line(np.array([station_m]))[2][0])
-
-    def speed_mps(self, station_m: float) -> float | None:
-        """Speed limit of the road type at a station, None where none is written."""
-        found: float | None = None
-        for start_m, speed in self.speeds:
-            if start_m <= station_m + 1e-6:
-                found = speed
-        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +86,7 @@ class Connection:
 
 @dataclass(frozen=True)
 class Document:
-    """Everything of a file that the network is made of."""
+    """Everything of a file that the network is made of; `remarks` holds what could not be taken as written."""
 
     name: str
     geo_reference: str
@@ -115,45 +95,59 @@ class Document:
     junctions: dict[str, str]
     controllers: dict[str, tuple[str, ...]]
     junction_controllers: dict[str, tuple[str, ...]]
+    remarks: Remarks = field(compare=False)
+    root: ET.Element = field(compare=False)
 
-
-def number(node: ET.Element, key: str, default: float | None = None) -> float:
-    """A finite number of an attribute. Raises OpenDriveError where it is missing or none."""
-    text = node.get(key)
-    if text is None:
-        if default is None:
-            raise OpenDriveError(f"<{node.tag}> has no {key!r}.")
-        return default
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise OpenDriveError(f"<{node.tag}> has {key}={text!r}, which is no number.")
-    return value
+    def plain(self) -> ET.Element:
+        """The file without what was left out, with usual spellings: for programs that take less. The caller's own."""
+        root = copy.deepcopy(self.root)
+        originals, copies = self.root.iter(), root.iter()
+        twins = dict(zip(originals, copies, strict=True))
+        parents = {child: parent for parent in root.iter() for child in parent}
+        for node in map(twins.__getitem__, self.remarks.dropped):
+            if node in parents[node]:
+                parents[node].remove(node)
+        return root
 
 
 def parse(text: str | bytes) -> Document:
     """The records of a file's text. Raises OpenDriveError."""
+    if len(text) > MAX_BYTES:
+        raise OpenDriveError(f"It has {len(text) / 1e6:.0f} MB; at most {MAX_BYTES / 1e6:.0f} MB are read.")
     try:
         root = ET.fromstring(text)  # noqa: S314 - expat refuses entity bombs since 2.4.1; no external entity is loaded
-    except ET.ParseError as error:
+    except (ET.ParseError, ValueError, LookupError) as error:  # a encoding that it names and Python does not know
         raise OpenDriveError(f"No XML: {error}.") from error
     for node in root.iter():
         if "}" in node.tag:  # 1.8 has a namespace
             node.tag = node.tag.rpartition("}")[2]
     if root.tag != "OpenDRIVE":
         raise OpenDriveError(f"No OpenDRIVE: the root element is <{root.tag}>.")
+    remarks = Remarks()
     header = root.find("header")
-    roads = {road.id: road for road in (_road(node) for node in root.findall("road"))}
+    _look_at_version(header, remarks)
+    if root.find(".//include") is not None:
+        raise OpenDriveError("It includes another file (<include>), which is not read: put it into this one.")
+    roads: dict[str, OpenDriveRoad] = {}
+    for node in root.findall("road"):
+        road = _road(node, remarks)
+        if road.id in roads:
+            raise OpenDriveError(f"Two roads have the id {road.id!r}.")
+        roads[road.id] = road
     if not roads:
         raise OpenDriveError("An OpenDRIVE file without a road.")
+    lanes_km = sum((one.end_m - one.start_m) * len(one.records) for road in roads.values() for one in road.sections)
+    if lanes_km / 1000.0 > _MOST_LANES_KM:
+        raise OpenDriveError(f"It has {lanes_km / 1000.0:.0f} km of lanes; at most {_MOST_LANES_KM:.0f} are read.")
+    left_hand = [road.id for road in roads.values() if road.left_hand]
+    if left_hand and len(left_hand) < len(roads):
+        remarks.add("some roads keep left and others right", f"left: {len(left_hand)} of {len(roads)} roads")
     junctions, owners = root.findall("junction"), root.findall("controller")
     return Document(
         name="" if header is None else header.get("name", ""),
         geo_reference="" if header is None else (header.findtext("geoReference") or "").strip(),
         roads=roads,
-        connections=tuple(one for node in junctions for one in _connections(node)),
+        connections=tuple(one for node in junctions for one in _connections(node, roads, remarks)),
         junctions={node.get("id", ""): node.get("name", "") for node in junctions},
         controllers={
             node.get("id", ""): tuple(dict.fromkeys(one.get("signalId", "") for one in node.findall("control")))
@@ -162,54 +156,122 @@ def parse(text: str | bytes) -> Document:
         junction_controllers={
             node.get("id", ""): tuple(one.get("id", "") for one in node.findall("controller")) for node in junctions
         },
+        remarks=remarks,
+        root=root,
     )
 
 
-def _road(node: ET.Element) -> OpenDriveRoad:
+def _look_at_version(header: ET.Element | None, remarks: Remarks) -> None:
+    major, minor = ("", "") if header is None else (header.get("revMajor", ""), header.get("revMinor", ""))
+    if major.strip().isdecimal() and int(major[:9]) != 1:
+        raise OpenDriveError(f"It is of OpenDRIVE {quoted(major)}; versions 1.0 to 1.{_MINOR} are read.")
+    if minor.strip().isdecimal() and int(minor[:9]) > _MINOR:
+        remarks.add(f"a version newer than 1.{_MINOR} may say what is not known here", f"OpenDRIVE 1.{minor[:9]}")
+
+
+def _road(node: ET.Element, remarks: Remarks) -> OpenDriveRoad:
     name = node.get("id", "")
     try:
-        return _read_road(node, name)
+        return _read_road(node, name, remarks)
     except OpenDriveError as error:
-        raise OpenDriveError(f"Road {name!r}: {error}") from error
+        raise OpenDriveError(f"Road {quoted(name)}: {error}") from error
 
 
-def _read_road(node: ET.Element, name: str) -> OpenDriveRoad:
-    length = number(node, "length")
-    pieces = tuple(sorted((_piece(one) for one in node.findall("planView/geometry")), key=lambda one: one.start_m))
-    if not pieces:
-        raise OpenDriveError("it has no plan view.")
-    starts = sorted(node.findall("lanes/laneSection"), key=lambda one: number(one, "s"))
-    ends = [number(one, "s") for one in starts[1:]] + [length]
+def _read_road(node: ET.Element, name: str, remarks: Remarks) -> OpenDriveRoad:
+    where = f"road {quoted(name)}"
+    for part in node:
+        if part.tag not in _ROAD_PARTS:
+            remarks.add(f"a <{part.tag}> is not known and not read", where)
+    if (rails := node.find("railroad")) is not None and len(rails):
+        remarks.add("rails are left out: no train drives there", where)
+    length = number(node, "length", low=0.0, high=MOST_ROAD_M)
+    rule = node.get("rule", "RHT").strip().upper()
+    if rule not in ("RHT", "LHT"):
+        raise OpenDriveError(f"it keeps to the side {quoted(rule)}, which is neither RHT nor LHT.")
+    plan, lanes = node.find("planView"), node.find("lanes")
+    if plan is not None:
+        known(plan, ("geometry", "userData", "dataQuality"))
+    speeds = tuple(sorted(_limits(node, where, remarks), key=lambda one: one[0]))
+    _look_at_slope(node, where, remarks)
     return OpenDriveRoad(
         id=name,
         name=node.get("name", ""),
         junction="" if node.get("junction", "-1") == "-1" else node.get("junction", ""),
         length_m=length,
-        left_hand=node.get("rule", "RHT") == "LHT",
-        line=ReferenceLine(pieces),
-        offset=_cubics(node.findall("lanes/laneOffset"), "s"),
-        elevation=_cubics(node.findall("elevationProfile/elevation"), "s"),
-        sections=tuple(_section(one, end) for one, end in zip(starts, ends, strict=True)),
-        before=_end(node.find("link/predecessor")),
-        after=_end(node.find("link/successor")),
-        speeds=tuple(sorted((number(one, "s", 0.0), _speed(one.find("speed"))) for one in node.findall("type"))),
+        left_hand=rule == "LHT",
+        line=ReferenceLine(_plan(plan, length)),
+        offset=cubics(node.findall("lanes/laneOffset"), "s"),
+        elevation=_heights(node, where, remarks),
+        sections=() if lanes is None else sections_of(lanes, length, speeds, name, remarks),
+        before=_end(node.find("link/predecessor"), where, remarks),
+        after=_end(node.find("link/successor"), where, remarks),
+        speeds=speeds,
         node=node,
     )
+
+
+def _limits(node: ET.Element, where: str, remarks: Remarks) -> Iterator[tuple[float, float | None]]:
+    for one in node.findall("type"):
+        at = remarks.tried(where, lambda one=one: number(one, "s", 0.0), one)
+        if at is not None:
+            yield at, speed_of(one.find("speed"), where, remarks)
+
+
+def _heights(node: ET.Element, where: str, remarks: Remarks) -> Cubics:
+    """Elevation tells roads over one another apart and nothing else: an odd record costs itself."""
+    kept = [
+        one
+        for one in node.findall("elevationProfile/elevation")
+        if remarks.tried(where, lambda one=one: cubics([one], "s"), one) is not None
+    ]
+    return cubics(kept, "s")
+
+
+def _look_at_slope(node: ET.Element, where: str, remarks: Remarks) -> None:
+    for one in node.findall("lateralProfile/superelevation"):
+        slope = remarks.tried(where, lambda one=one: number(one, "a", 0.0), one)
+        if slope is not None and abs(slope) > _STEEP_RAD:
+            remarks.add("superelevation is not read: lanes are as wide in the plane as along the slope", where)
+
+
+# Plan view ------------------------------------------------------------------------------------------------------------
+
+
+def _plan(plan: ET.Element | None, length_m: float) -> tuple[Piece, ...]:
+    pieces = tuple(sorted(() if plan is None else map(_piece, plan.findall("geometry")), key=lambda one: one.start_m))
+    if not pieces:
+        raise OpenDriveError("it has no plan view.")
+    ends = [one.start_m for one in pieces[1:]] + [length_m]
+    off = max(_OFF_M, length_m / 100.0)
+    for piece, end_m in zip(pieces, ends, strict=True):
+        if abs(piece.start_m + piece.length_m - end_m) > off:
+            raise OpenDriveError(
+                f"its geometry at s={piece.start_m:g} is {piece.length_m:g} m long, and goes on to s={end_m:g}."
+            )
+    if pieces[0].start_m > off:
+        raise OpenDriveError(f"its plan view begins at s={pieces[0].start_m:g}.")
+    return pieces
 
 
 def _piece(node: ET.Element) -> Piece:
     shape = next((one for one in node if one.tag in _SHAPES), None)
     if shape is None:
-        raise OpenDriveError(f"a geometry of unknown shape at s={node.get('s')}.")
+        strange = next((one.tag for one in node if one.tag != "userData"), "none")
+        raise OpenDriveError(f"a geometry of unknown shape <{strange}> at s={node.get('s')}.")
+    known(node, (shape.tag, "userData", "dataQuality"))
+    spread = shape.get("pRange", "normalized").strip().casefold()
+    if shape.tag == "paramPoly3" and spread not in ("normalized", "arclength"):
+        raise OpenDriveError(f"<paramPoly3> has pRange={quoted(spread)}, which is neither normalized nor arcLength.")
+    most = _MOST_CURVATURE if shape.tag in ("arc", "spiral") else math.inf
     return Piece(
-        start_m=number(node, "s"),
+        start_m=number(node, "s", low=-1.0, high=MOST_ROAD_M),
         x_m=number(node, "x"),
         y_m=number(node, "y"),
         heading_rad=number(node, "hdg"),
-        length_m=number(node, "length"),
+        length_m=number(node, "length", low=0.0, high=MOST_ROAD_M),
         kind=shape.tag,
-        factors=tuple(number(shape, key) for key in _SHAPES[shape.tag]),
-        normalised=shape.get("pRange", "normalized") == "normalized",
+        factors=tuple(number(shape, key, low=-most, high=most) for key in _SHAPES[shape.tag]),
+        normalised=spread == "normalized",
     )
 
 
@@ -222,62 +284,62 @@ _SHAPES: Final[dict[str, tuple[str, ...]]] = {
 }
 
 
-def _cubics(nodes: list[ET.Element], key: str) -> Cubics:
-    return Cubics([(number(one, key), *(number(one, name) for name in "abcd")) for one in nodes])  # type: ignore[misc]
+# Links ----------------------------------------------------------------------------------------------------------------
 
 
-def _section(node: ET.Element, end_m: float) -> Section:
-    sides = {side: sorted(_lanes(node, side), key=lambda one: abs(one.id)) for side in ("left", "right")}
-    return Section(number(node, "s"), end_m, tuple(sides["left"]), tuple(sides["right"]))
-
-
-def _lanes(section: ET.Element, side: str) -> Iterator[LaneRecord]:
-    for node in section.findall(f"{side}/lane"):
-        before, after = node.find("link/predecessor"), node.find("link/successor")
-        allowed = {way for mark in node.findall("roadMark") for way in _crossed(mark)}
-        inwards, outwards = ("decrease", "increase") if side == "left" else ("increase", "decrease")
-        yield LaneRecord(
-            id=int(number(node, "id")),
-            type=node.get("type", "none"),
-            widths=_cubics(node.findall("width"), "sOffset"),
-            before=None if before is None else int(number(before, "id")),
-            after=None if after is None else int(number(after, "id")),
-            speed_mps=_speed(node.find("speed")),
-            inwards=inwards in allowed,
-            outwards=outwards in allowed,
-        )
-
-
-def _crossed(mark: ET.Element) -> tuple[str, ...]:
-    """Directions of lane ids in which a marking may be crossed; where it does not say, solid lines may not."""
-    written = mark.get("laneChange")
-    if written is None:
-        written = "none" if "solid" in mark.get("type", "") or mark.get("type") == "curb" else "both"
-    return ("increase", "decrease") if written == "both" else (written,)
-
-
-def _end(node: ET.Element | None) -> RoadEnd | None:
+def _end(node: ET.Element | None, where: str, remarks: Remarks) -> RoadEnd | None:
     if node is None:
         return None
-    return RoadEnd(node.get("elementType", "road"), node.get("elementId", ""), node.get("contactPoint") != "end")
+    element, contact = node.get("elementType", "road"), node.get("contactPoint")
+    name = node.get("elementId", "")
+    if name.strip() and element == "junction":
+        return RoadEnd(element, name, contact != "end")
+    if name.strip() and element == "road" and contact in ("start", "end"):
+        return RoadEnd(element, name, contact == "start")
+    remarks.dropped.append(node)
+    if name.strip():
+        # With elementS it leads into the middle of a road.
+        what = f"a link to a {quoted(element)}" if element != "road" else "a link to neither start nor end of a road"
+        remarks.add(f"{what} is left out", where)
+    return None
 
 
-def _speed(node: ET.Element | None) -> float | None:
-    if node is None or node.get("max") in (None, "no limit", "undefined"):
-        return None
-    unit = node.get("unit", "")
-    if unit not in _MPS:
-        raise OpenDriveError(f"a speed in {unit!r}.")
-    speed = number(node, "max") * _MPS[unit]
-    return speed if speed > 0.0 else None
-
-
-def _connections(node: ET.Element) -> Iterator[Connection]:
+def _connections(node: ET.Element, roads: dict[str, OpenDriveRoad], remarks: Remarks) -> Iterator[Connection]:
+    name, kind = node.get("id", ""), node.get("type", "default")
+    where = f"junction {quoted(name)}"
+    if kind == "virtual" and node.find("connection") is not None:
+        # Its ways leave a road that is not cut there.
+        remarks.add("virtual junctions are not read: the ways that branch off there lead nowhere", where)
+        remarks.dropped.append(node)
+        return
     for one in node.findall("connection"):
-        yield Connection(
-            junction=node.get("id", ""),
-            incoming=one.get("incomingRoad", ""),
-            connecting=one.get("connectingRoad", ""),
-            at_start=one.get("contactPoint") != "end",
-            lanes=tuple((int(number(link, "from")), int(number(link, "to"))) for link in one.findall("laneLink")),
-        )
+        contact = one.get("contactPoint")
+        direct = one.get("connectingRoad") is None and one.get("linkedRoad") is not None
+        incoming, onto = one.get("incomingRoad", ""), one.get("linkedRoad" if direct else "connectingRoad", "")
+        if incoming not in roads or onto not in roads or contact not in ("start", "end", None):
+            remarks.add("a connection without known roads is left out", f"{where}, connection {one.get('id')}")
+            remarks.dropped.append(one)
+            continue
+        at_start = contact != "end"
+        links = (_lane_link(link, where, remarks) for link in one.findall("laneLink"))
+        lanes = tuple(link for link in links if link is not None) or tuple(_told_by_lanes(roads[onto], at_start))
+        yield Connection(name, incoming, onto, at_start, lanes)
+        if direct:
+            # Where a road ends in several without a way between, each leads into the other.
+            before = roads[incoming].before
+            starts = before is not None and before.element == "junction" and before.id == name
+            yield Connection(name, onto, incoming, starts, tuple((two, one) for one, two in lanes))
+
+
+def _lane_link(node: ET.Element, where: str, remarks: Remarks) -> tuple[int, int] | None:
+    return remarks.tried(where, lambda: (lane_id(node, "from"), lane_id(node, "to")), node)
+
+
+def _told_by_lanes(road: OpenDriveRoad, at_start: bool) -> Iterator[tuple[int, int]]:
+    """Lane links that a connection leaves to the lanes of its road."""
+    if road.sections:
+        section = road.sections[0 if at_start else -1]
+        for record in section.records:
+            came_from: int | None = record.before if at_start else record.after
+            if came_from is not None:
+                yield came_from, record.id

@@ -11,16 +11,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from chauffeur.geometry.opendrive.document import (
-    Connection,
-    Document,
-    LaneRecord,
-    OpenDriveRoad,
-    RoadEnd,
-    Section,
-    parse,
-)
+from chauffeur.geometry.opendrive.document import MAX_BYTES, Connection, Document, OpenDriveRoad, RoadEnd, parse
 from chauffeur.geometry.opendrive.roadside import RoadObject, RoadSignal, objects_of, signals_of
+from chauffeur.geometry.opendrive.sections import CLOSED, LaneRecord, Section, limit_mps
+from chauffeur.geometry.opendrive.values import MOST_M, OpenDriveError
 from chauffeur.geometry.polyline import SAME_M, Polyline
 from chauffeur.geometry.road_graph import Lane, LaneId, LaneKind, LanePlace, RoadGraph, turn_of
 
@@ -37,23 +31,17 @@ _CHORD_M: Final = 0.02
 _LEAST_M: Final = 1e-3
 """A lane shorter than this is passed over."""
 _EDGE_M: Final = 1e-6
+_MOST_WIDTH_M: Final = 200.0
+"""Wider than any lane: parking grounds are drawn as lanes of some tens of metres."""
 _LEVEL_M: Final = 3.0
 """Roads farther apart in height lie over one another."""
 
-_KINDS: Final[Mapping[str, LaneKind]] = {
-    "driving": "driving", "entry": "driving", "exit": "driving", "onRamp": "driving", "offRamp": "driving",
-    "connectingRamp": "driving", "slipLane": "driving", "bus": "driving", "taxi": "driving", "HOV": "driving",
-    "bidirectional": "aisle", "shoulder": "emergency", "stop": "emergency", "parking": "parking",
-    "biking": "bicycle", "sidewalk": "sidewalk", "walking": "sidewalk",
-}  # fmt: skip
-"""Lane types that are lanes; all others (none, border, median, curb, rail ...) are no part of the graph."""
-_CLOSED: Final = frozenset({"emergency", "parking", "sidewalk", "bicycle", "aisle"})
 _UNNAMED: Final = re.compile(r"\s*(road\s*[-\d]*|\d*)\s*", re.IGNORECASE)
 """Names that editors give to roads of no name."""
 
 
-def lane_name(road: str, section: int, lane: int) -> LaneId:
-    """Name of a lane in the graph: road id, number of the lane section, lane id."""
+def lane_name(road: str, section: int | str, lane: int) -> LaneId:
+    """Name of a lane in the graph: road id, number of the lane section (`0.1`: its second piece), lane id."""
     return f"{road}:{section}:{lane}"
 
 
@@ -69,6 +57,7 @@ class OpenDriveMap:
         objects: Crosswalks, stop lines, buildings.
         controllers: Signals that each controller switches.
         junction_controllers: Controllers of each junction.
+        remarks: What was left out, or read otherwise than written, for people.
     """
 
     name: str
@@ -79,14 +68,15 @@ class OpenDriveMap:
     controllers: Mapping[str, tuple[str, ...]]
     junction_controllers: Mapping[str, tuple[str, ...]]
     document: Document
+    remarks: tuple[str, ...] = ()
 
     @cached_property
     def _spans(self) -> Mapping[LaneId, tuple[OpenDriveRoad, Section, bool]]:
         return {
-            lane_name(road.id, i, record.id): (road, section, _forward(road, record))
+            lane_name(road.id, section.name, record.id): (road, section, _forward(road, record))
             for road in self.document.roads.values()
-            for i, section in enumerate(road.sections)
-            for record in (*section.left, *section.right)
+            for section in road.sections
+            for record in section.records
         }
 
     def road_station(self, lane: LaneId, station_m: float) -> float:
@@ -110,7 +100,8 @@ class OpenDriveMap:
 
 def read_opendrive(path: str | Path) -> OpenDriveMap:
     """The network of a file. Raises OpenDriveError, OSError."""
-    return parse_opendrive(Path(path).read_bytes())
+    with Path(path).open("rb") as file:
+        return parse_opendrive(file.read(MAX_BYTES + 1))
 
 
 def parse_opendrive(text: str | bytes) -> OpenDriveMap:
@@ -125,6 +116,7 @@ def parse_opendrive(text: str | bytes) -> OpenDriveMap:
         document.controllers,
         document.junction_controllers,
         document,
+        document.remarks.told(),
     )
 
 
@@ -174,7 +166,7 @@ def _resolved(
 
 def _lanes(road: OpenDriveRoad) -> Iterator[Lane]:
     street = "" if road.junction or _UNNAMED.fullmatch(road.name) else road.name
-    for i, section in enumerate(road.sections):
+    for section in road.sections:
         length = section.end_m - section.start_m
         if length <= 0.0:
             continue
@@ -184,33 +176,40 @@ def _lanes(road: OpenDriveRoad) -> Iterator[Lane]:
         # Editors let offset and widths jump where a section ends: this section's value counts on both its edges.
         inside = np.clip(stations, section.start_m + _EDGE_M, max(section.end_m - _EDGE_M, section.start_m + _EDGE_M))
         offset = road.offset(inside)
+        # Rules that change nearer to an end than the section is cut for count from there.
+        within = section.start_m + length / 2.0
         for records, side in ((section.left, 1.0), (section.right, -1.0)):
             inner = offset
-            leftmost = next((k for k, one in enumerate(records) if one.type in _KINDS), 0)
+            leftmost = next((k for k, one in enumerate(records) if one.kind is not None), 0)
             for k, record in enumerate(records):
-                width = np.maximum(record.widths(inside - section.start_m), 0.0)
+                width = record.width_m(inside, inner, offset)
                 middle = inner + side * width / 2.0
                 inner = inner + side * width
-                kind = _KINDS.get(record.type)
+                kind = record.kind
                 if kind is None:
                     continue
+                name = lane_name(road.id, section.name, record.id)
+                if not width.max() <= _MOST_WIDTH_M:
+                    raise OpenDriveError(f"Lane {name} would be {width.max():g} m wide; at most {_MOST_WIDTH_M:g}.")
                 points = np.column_stack((x + middle * nx, y + middle * ny))
+                if not (np.abs(points) <= MOST_M).all():
+                    raise OpenDriveError(f"Lane {name} leads to where no road is: {points[-1].tolist()}.")
                 forward = _forward(road, record)
                 line = _polyline(points if forward else points[::-1])
                 if line is None:
                     continue
                 # The marking towards the middle of the road is the outer one of the lane there.
-                leftward, rightward = k > 0 and records[k - 1].inwards, record.outwards
-                own = record.speed_mps if record.speed_mps is not None else road.speed_mps(section.start_m)
+                leftward, rightward = k > 0 and records[k - 1].crossed(within)[0], record.crossed(within)[1]
+                limit = limit_mps(record, road.speeds, within)
                 yield Lane(
-                    id=lane_name(road.id, i, record.id),
+                    id=name,
                     centre=line,
                     width_m=float(width.mean()),
-                    speed_limit_mps=own if own is not None else math.nan,
+                    speed_limit_mps=limit if limit is not None else math.nan,
                     kind=kind,
-                    road=f"{road.id}:{i}:{'+' if side < 0.0 else '-'}",
+                    road=f"{road.id}:{section.name}:{'+' if side < 0.0 else '-'}",
                     index=k - leftmost if not road.left_hand else len(records) - 1 - k,
-                    closed=kind in _CLOSED,
+                    closed=kind in CLOSED,
                     change_left=rightward if road.left_hand else leftward,
                     change_right=leftward if road.left_hand else rightward,
                     junction=road.junction,
@@ -270,10 +269,10 @@ class _Links:
     def onward(self) -> dict[LaneId, tuple[LaneId, ...]]:
         """Lanes that each lane leads into, in its driving direction."""
         return {
-            lane_name(road.id, i, record.id): tuple(dict.fromkeys(self._after(road, i, record)))
+            lane_name(road.id, section.name, record.id): tuple(dict.fromkeys(self._after(road, i, record)))
             for road in self._roads.values()
             for i, section in enumerate(road.sections)
-            for record in (*section.left, *section.right)
+            for record in section.records
         }
 
     def _after(self, road: OpenDriveRoad, i: int, record: LaneRecord) -> Iterator[LaneId]:
@@ -282,7 +281,7 @@ class _Links:
         beyond = i + (1 if forward else -1)
         if 0 <= beyond < len(road.sections):
             if target is not None:
-                yield lane_name(road.id, beyond, target)
+                yield lane_name(road.id, road.sections[beyond].name, target)
             return
         end = road.after if forward else road.before
         if end is None:
@@ -298,7 +297,7 @@ class _Links:
     def _entered(self, end: RoadEnd, lane: int) -> Iterator[LaneId]:
         road = self._roads.get(end.id)
         if road is not None and road.sections:
-            yield lane_name(road.id, 0 if end.at_start else len(road.sections) - 1, lane)
+            yield lane_name(road.id, road.sections[0 if end.at_start else -1].name, lane)
 
 
 def _speeds(lanes: Mapping[LaneId, Lane], onward: Mapping[LaneId, tuple[LaneId, ...]]) -> dict[LaneId, float]:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TypeVar
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from chauffeur.geometry.opendrive.document import Document, OpenDriveRoad, number
+from chauffeur.geometry.opendrive.document import Document, OpenDriveRoad
+from chauffeur.geometry.opendrive.values import OpenDriveError, Remarks, lane_id, number, quoted, speed_mps
+
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +50,14 @@ class RoadSignal:
     lanes: tuple[tuple[int, int], ...]
     reference: bool
 
+    @property
+    def speed_mps(self) -> float | None:
+        """The speed that its value says, km/h where no unit stands there; None where it says none."""
+        try:
+            return None if self.value is None else speed_mps(str(self.value), self.unit or "km/h")
+        except OpenDriveError:
+            return None
+
     def rules(self, lane: int) -> bool:
         """Whether it is for a lane of its road, driven on the right."""
         if (self.orientation == "+" and lane > 0) or (self.orientation == "-" and lane < 0):
@@ -79,12 +91,26 @@ class RoadObject:
 
 def signals_of(document: Document) -> tuple[RoadSignal, ...]:
     """All signals and references of a file, in its order."""
-    return tuple(one for road in document.roads.values() for one in _signals(road))
+    return tuple(_kept(document, "signals/*", ("signal", "signalReference"), _signal))
 
 
 def objects_of(document: Document) -> tuple[RoadObject, ...]:
     """All objects of a file, in its order."""
-    return tuple(one for road in document.roads.values() for one in _objects(road))
+    return tuple(_kept(document, "objects/*", ("object",), _object))
+
+
+def _kept(
+    document: Document, path: str, tags: tuple[str, ...], read: Callable[[OpenDriveRoad, ET.Element, Remarks], _T]
+) -> Iterator[_T]:
+    """What stands at the roads; a record that cannot be read is left out, with a remark."""
+    remarks = document.remarks
+    for road in document.roads.values():
+        for node in road.node.findall(path):
+            if node.tag in tags:
+                where = f"{node.tag} {quoted(node.get('id', ''))} of road {quoted(road.id)}"
+                found = remarks.tried(where, lambda node=node, road=road: read(road, node, remarks), node)
+                if found is not None:
+                    yield found
 
 
 def _place(road: OpenDriveRoad, station_m: float, offset_m: float) -> tuple[float, float, float]:
@@ -92,57 +118,59 @@ def _place(road: OpenDriveRoad, station_m: float, offset_m: float) -> tuple[floa
     return x - offset_m * math.sin(heading), y + offset_m * math.cos(heading), heading
 
 
-def _signals(road: OpenDriveRoad) -> Iterator[RoadSignal]:
-    for node in road.node.findall("signals/*"):
-        if node.tag not in ("signal", "signalReference"):
-            continue
-        station, offset = number(node, "s"), number(node, "t")
-        x, y, heading = _place(road, station, offset)
-        orientation = node.get("orientation", "none")
-        against = orientation == "-" if not road.left_hand else orientation == "+"
-        value = node.get("value")
-        yield RoadSignal(
-            id=node.get("id", ""),
-            road=road.id,
-            station_m=station,
-            offset_m=offset,
-            x_m=x,
-            y_m=y,
-            heading_rad=heading + (math.pi if against else 0.0),
-            type=node.get("type", ""),
-            subtype=node.get("subtype", ""),
-            value=number(node, "value") if value not in (None, "") else None,
-            unit=node.get("unit", ""),
-            name=node.get("name", ""),
-            dynamic=node.get("dynamic") == "yes",
-            orientation=orientation,
-            lanes=tuple((int(number(one, "fromLane")), int(number(one, "toLane"))) for one in node.findall("validity")),
-            reference=node.tag == "signalReference",
-        )
+def _signal(road: OpenDriveRoad, node: ET.Element, remarks: Remarks) -> RoadSignal:
+    station, offset = number(node, "s"), number(node, "t")
+    x, y, heading = _place(road, station, offset)
+    orientation = node.get("orientation", "none")
+    against = orientation == "-" if not road.left_hand else orientation == "+"
+    where = f"{node.tag} {quoted(node.get('id', ''))} of road {quoted(road.id)}"
+    spans = [remarks.tried(where, lambda one=one: _span(one)) for one in node.findall("validity")]
+    return RoadSignal(
+        id=node.get("id", ""),
+        road=road.id,
+        station_m=station,
+        offset_m=offset,
+        x_m=x,
+        y_m=y,
+        heading_rad=heading + (math.pi if against else 0.0),
+        type=node.get("type", ""),
+        subtype=node.get("subtype", ""),
+        value=remarks.tried(f"value of {where}", lambda: number(node, "value")) if node.get("value") else None,
+        unit=node.get("unit", ""),
+        name=node.get("name", ""),
+        dynamic=node.get("dynamic") == "yes",
+        orientation=orientation,
+        lanes=tuple(one for one in spans if one is not None),
+        reference=node.tag == "signalReference",
+    )
 
 
-def _objects(road: OpenDriveRoad) -> Iterator[RoadObject]:
-    for node in road.node.findall("objects/object"):
-        station, offset = number(node, "s"), number(node, "t")
-        x, y, heading = _place(road, station, offset)
-        heading += number(node, "hdg", 0.0)
-        length, width = number(node, "length", 0.0), number(node, "width", 0.0)
-        yield RoadObject(
-            id=node.get("id", ""),
-            road=road.id,
-            type=node.get("type", ""),
-            subtype=node.get("subtype", ""),
-            name=node.get("name", ""),
-            station_m=station,
-            offset_m=offset,
-            x_m=x,
-            y_m=y,
-            heading_rad=heading,
-            length_m=length,
-            width_m=width,
-            orientation=node.get("orientation", "none"),
-            outline_m=tuple(_outline(node, road, x, y, heading, length, width)),
-        )
+def _span(node: ET.Element) -> tuple[int, int]:
+    return lane_id(node, "fromLane"), lane_id(node, "toLane")
+
+
+def _object(road: OpenDriveRoad, node: ET.Element, remarks: Remarks) -> RoadObject:
+    del remarks
+    station, offset = number(node, "s"), number(node, "t")
+    x, y, heading = _place(road, station, offset)
+    heading += number(node, "hdg", 0.0)
+    length, width = number(node, "length", 0.0), number(node, "width", 0.0)
+    return RoadObject(
+        id=node.get("id", ""),
+        road=road.id,
+        type=node.get("type", ""),
+        subtype=node.get("subtype", ""),
+        name=node.get("name", ""),
+        station_m=station,
+        offset_m=offset,
+        x_m=x,
+        y_m=y,
+        heading_rad=heading,
+        length_m=length,
+        width_m=width,
+        orientation=node.get("orientation", "none"),
+        outline_m=tuple(_outline(node, road, x, y, heading, length, width)),
+    )
 
 
 def _outline(

@@ -8,9 +8,11 @@ same weights as one that was not. A recipe says what to learn from (`batches`) a
 from __future__ import annotations
 
 import json
+import signal
+import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -128,8 +130,11 @@ def fit(
         low = bool(state.get("bfloat16", low))  # a run keeps its precision, whatever a probe says today
     model.train()
     feed = batches(first)
-    saved = time.monotonic()
-    with (folder / "log.jsonl").open("a", encoding="utf-8") as log:
+    saved, done = time.monotonic(), first
+    with (
+        (folder / "log.jsonl").open("a", encoding="utf-8") as log,
+        _kept_at_interrupt(lambda: done > first and _save(state_path, recipe, model, optimiser, mean, done, low)),
+    ):
         for step in range(first, steps):
             begun = time.perf_counter()
             for group in optimiser.param_groups:
@@ -141,9 +146,11 @@ def fit(
                     value = loss(batch)
                 value.backward()
             torch.nn.utils.clip_grad_norm_(model.parameters(), how.clip)
-            optimiser.step()
-            if mean is not None:
-                mean.take(model, step)
+            with _uninterrupted():
+                optimiser.step()
+                if mean is not None:
+                    mean.take(model, step)
+                done = step + 1
             if watch is not None:
                 watch(step, float(value.detach()), time.perf_counter() - begun)
             last = step + 1 == steps
@@ -159,6 +166,32 @@ def fit(
                 _save(state_path, recipe, model, optimiser, mean, step + 1, low)
                 saved = time.monotonic()
     return None if mean is None else mean.model
+
+
+@contextmanager
+def _kept_at_interrupt(save: Callable[[], object]) -> Generator[None]:
+    """Save what is done when Ctrl-C comes, and go on with it."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        save()
+        raise
+
+
+@contextmanager
+def _uninterrupted() -> Generator[None]:
+    """Put Ctrl-C off for as long as the weights are between two steps; elsewhere than in the main thread none comes."""
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is None:
+        yield
+        return
+    came: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if came:
+        signal.raise_signal(signal.SIGINT)
 
 
 class _Mean:

@@ -57,9 +57,9 @@ class DrivingTask:
     width: int = driving.WIDTH
     criteria: Sequence[str] = CRITERIA
 
-    def command(self, rng: np.random.Generator) -> DriveCommand:
-        """See ViladTask."""
-        return drive_command(rng, "train")
+    def command(self, rng: np.random.Generator, split: Split = "train") -> DriveCommand:
+        """See ViladTask and LearnableTask."""
+        return drive_command(rng, split)
 
     def answered(self, rng: np.random.Generator, said: Sequence[DriveCommand]) -> tuple[Array, Array]:
         """See ViladTask. Scenes are filled up with candidates that are nothing."""

@@ -56,7 +56,7 @@ def drive_command(rng: np.random.Generator, split: Split) -> DriveCommand:
     """One command of a split."""
     while True:
         asked = _draw_asked(rng)
-        if split in ("train", "seen") and held_back(asked, NOTHING):
+        if split in ("train", "fit", "tune", "seen") and held_back(asked, NOTHING):
             continue
         if split == "composition" and not held_back(asked, NOTHING):
             continue

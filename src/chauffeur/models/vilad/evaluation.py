@@ -69,6 +69,8 @@ class ViladFigures:
         count: Commands.
         success: The network's own answer is what was meant.
         verified: The answer that is driven is: made to agree with what it says it understood.
+        solved: The exact solver's answer to what the network says it understood is: what its pointers and waypoints add
+            is the difference to `verified`.
         understood: Every criterion is as meant.
         consistent: The parts of the network's own answer fit together.
         faithful: The network's own answer does what it says it understood.
@@ -80,6 +82,7 @@ class ViladFigures:
     count: int
     success: float
     verified: float
+    solved: float
     understood: float
     consistent: float
     faithful: float
@@ -88,10 +91,18 @@ class ViladFigures:
     latency_ms: float
 
 
-def figures(engine: ViladEngine, found: Sequence[ViladCase], how: Unmasking) -> ViladFigures:
-    """Of the network on commands."""
+def figures(engine: ViladEngine, found: Sequence[ViladCase], how: Unmasking, criteria: Sequence[str]) -> ViladFigures:
+    """Of the network on commands.
+
+    Args:
+        engine: The network.
+        found: The commands.
+        how: How it is unmasked.
+        criteria: Slots that say what was understood.
+    """
     alone: list[Judged] = []
     driven: list[Judged] = []
+    read: list[bool] = []
     passes: list[int] = []
     seconds: list[float] = []
     for one in found:
@@ -102,12 +113,15 @@ def figures(engine: ViladEngine, found: Sequence[ViladCase], how: Unmasking) -> 
         decided = one.verified(predict, raw)
         seconds.append(time.perf_counter() - begun)
         passes.append(decided.passes)
-        alone.append(one.judged(one.template.decode(raw.row)))
+        said = one.template.decode(raw.row)
+        read.append(one.solved({name: str(said[name]) for name in criteria}))
+        alone.append(one.judged(said))
         driven.append(one.judged(one.template.decode(decided.row)))
     return ViladFigures(
         len(found),
         _share([one.success for one in alone]),
         _share([one.success for one in driven]),
+        _share(read),
         _share([one.understood for one in alone]),
         _share([one.consistent for one in alone]),
         _share([one.faithful for one in alone]),
@@ -121,10 +135,10 @@ def _share(found: Sequence[bool]) -> float:
     return 100.0 * sum(found) / len(found)
 
 
-def solved(read: Callable[[str], dict[str, str]], found: Sequence[ViladCase]) -> tuple[float, float]:
+def solved(read: Callable[[str], Mapping[str, str]], found: Sequence[ViladCase]) -> tuple[float, float]:
     """(success, understood) of a reader with the exact solver behind it, percent."""
     asked = [read(one.text) for one in found]
     return (
         _share([one.solved(own) for one, own in zip(found, asked, strict=True)]),
-        _share([own == dict(one.asked) for one, own in zip(found, asked, strict=True)]),
+        _share([dict(own) == dict(one.asked) for one, own in zip(found, asked, strict=True)]),
     )

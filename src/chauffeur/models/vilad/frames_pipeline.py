@@ -31,7 +31,7 @@ Told = Callable[[str, int, int], None]
 """Is told (stage, done, of how many)."""
 
 FIGURES_HEAD: Final = (
-    "method", "1 s (ST-P3)", "2 s", "3 s", "avg.", "avg. (UniAD)", "avg. (OpenEMMA)", "failures %", "passes",
+    "method", "1 s (ST-P3)", "2 s", "3 s", "avg.", "avg. (UniAD)", "failures %", "passes",
 )  # fmt: skip
 
 
@@ -162,7 +162,7 @@ def line_of(name: str, found: Array, truth: Array, passes: float) -> FramesLine:
 
 def cells_of(one: FramesLine) -> tuple[str, ...]:
     """A line under `FIGURES_HEAD`."""
-    values = (*one.l2["stp3"], one.l2["uniad"][3], one.l2["openemma"][3], one.failures)
+    values = (*one.l2["stp3"], one.l2["uniad"][3], one.failures)
     return (one.method, *(f"{value:.2f}" for value in values), f"{one.passes:.1f}" if one.passes else "")
 
 

@@ -28,9 +28,9 @@ class ParkingTask:
     width: int = parking.WIDTH
     criteria: Sequence[str] = CRITERIA
 
-    def command(self, rng: np.random.Generator) -> ParkingCommand:
-        """See ViladTask."""
-        return wish(rng, "train")
+    def command(self, rng: np.random.Generator, split: Split = "train") -> ParkingCommand:
+        """See ViladTask and LearnableTask."""
+        return wish(rng, split)
 
     def answered(self, rng: np.random.Generator, said: Sequence[ParkingCommand]) -> tuple[Array, Array]:
         """See ViladTask."""

@@ -74,7 +74,7 @@ def wish(rng: np.random.Generator, split: Split) -> ParkingCommand:
         for section, landmark in chosen:
             name, value = (landmark, section) if landmark else _SLOTS[section]
             asked[name] = value
-        if split in ("train", "seen") and held_back(asked, NOTHING):
+        if split in ("train", "fit", "tune", "seen") and held_back(asked, NOTHING):
             continue
         if split == "composition" and not held_back(asked, NOTHING):
             continue

@@ -14,14 +14,23 @@ import numpy as np
 from chauffeur.concept import DataError
 from chauffeur.concept.data import read_data
 
-Split = Literal["train", "seen", "composition", "phrasing", "vocabulary"]
-"""`seen`: phrases and combinations of training; `composition`: combinations that training does not have; `phrasing`:
-phrases of other writers in words that training has; `vocabulary`: phrases with a word that training does not have. The
-last two have any combination."""
+Split = Literal["train", "fit", "tune", "seen", "composition", "phrasing", "vocabulary"]
+"""`fit`, `tune`: training's combinations in the phrases of some of its writers and of its others, to choose what has
+to hold for writers never met; `seen`: phrases and combinations of training; `composition`: combinations that training
+does not have; `phrasing`: phrases of other writers in words that training has; `vocabulary`: phrases with a word that
+training does not have. The last two have any combination."""
 TESTS: Final[tuple[Split, ...]] = ("seen", "composition", "phrasing", "vocabulary")
 OPENERS: Final = ("", "", "", "Please ", "Could you ", "Can you ", "I would like you to ", "Hey, ", "Now ", "OK, ")
 
 _TRAINED: Final = frozenset("abcdef")
+_WRITERS: Final[Mapping[Split, frozenset[str]]] = {
+    "train": _TRAINED,
+    "seen": _TRAINED,
+    "composition": _TRAINED,
+    "fit": frozenset("abcd"),
+    "tune": frozenset("ef"),
+}
+"""Whose phrases a split may use; the others have those of writers that are held out."""
 _HELD_BACK_OF: Final = 5
 """One combination of so many is kept from training."""
 _WORD: Final = re.compile(r"[a-z']+")
@@ -78,8 +87,8 @@ class PhraseBank:
         key = section, kinds, split
         if key not in self._found:
             own = [one for one in self.lines if one.section == section and one.kind in kinds]
-            if split in ("train", "seen", "composition"):
-                texts = [one.text for one in own if one.writer in _TRAINED]
+            if split in _WRITERS:
+                texts = [one.text for one in own if one.writer in _WRITERS[split]]
             else:
                 held = [one.text for one in own if one.writer not in _TRAINED]
                 texts = [text for text in held if bool(self.unheard(text)) == (split == "vocabulary")]

@@ -164,7 +164,7 @@ def measured(
     baseline: dict[Split, tuple[float, float]] = {}
     for done, split in enumerate(TESTS, start=1):
         tests = model.cases(split, count, seed)
-        found[split], baseline[split] = figures(engine, tests, model.how), solved(read, tests)
+        found[split], baseline[split] = figures(engine, tests, model.how, model.task.criteria), solved(read, tests)
         told("tests", done, len(TESTS))
     return found, baseline
 
@@ -180,7 +180,8 @@ def model_card(model: ViladModel, about: dict[str, Any], size: int) -> str:
     recipe: dict[str, Any] = about["recipe"]
     what, given, success = model.card
     rows = "".join(
-        f"| {split} | {one['success']:.1f} | {one['verified']:.1f} | {one['understood']:.1f} | {one['faithful']:.1f} | "
+        f"| {split} | {one['success']:.1f} | {one['verified']:.1f} | {one['solved']:.1f} | "
+        f"{one['understood']:.1f} | {one['faithful']:.1f} | "
         f"{one['consistent']:.1f} | {one['driven_consistent']:.1f} | {one['passes']:.1f} | {one['latency_ms']:.0f} | "
         f"{about['linear_reader_and_solver'][split][0]:.1f} |\n"
         for split, one in about["figures"].items()
@@ -202,11 +203,12 @@ def model_card(model: ViladModel, about: dict[str, Any], size: int) -> str:
   simulated. See the data card there for how writers are held apart.
 - **Figures**, {TEST_COMMANDS} commands a split, percent; success: {success};
   alone: the network's own answer; driven: made to agree with what it says it understood; faithful and consistent: the
-  network's own answer does what it says it understood, and its parts fit together; the last column is a linear reader
-  trained on {COMMANDS:,} commands with the exact solver:
+  network's own answer does what it says it understood, and its parts fit together; "read + solver": the exact solver on
+  what the network says it understood, its pointers and waypoints unused; the last column is a linear reader trained on
+  {COMMANDS:,} commands with the exact solver. **The judge is that solver too**, so success measures how words are read:
 
-| split | success, alone | success, driven | understood | faithful | consistent | both, driven | passes | ms | reader |
-|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|
+| split | alone | driven | read + solver | understood | faithful | consistent | both, driven | passes | ms | reader |
+|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|
 {rows}
 - **Not for** anything else: checks and shield stand between it and the car.
 """

@@ -58,6 +58,9 @@ MAX_ROUNDS = 6
 MAX_FINDINGS = 12
 """Findings of the gate shown in a repair turn."""
 
+REFUSED_BY_CHECKS = "The checks refused this answer:"
+"""How a repair turn begins."""
+
 _FORGED = re.compile(r"^(wish|situation|settings used|outcome|passenger said afterwards|program) ?:", re.I | re.M)
 
 _ASK = "Write the program for the instruction above, in the answer format."
@@ -181,5 +184,5 @@ def repair_turns(reply: str, findings: list[str], *, ask: str = _ASK_AGAIN) -> l
     listed = data_block("findings", "\n".join(f"- {finding}" for finding in shown), FEEDBACK_CHARS)
     return [
         {"role": "assistant", "content": defuse(clean(cap(reply, PROGRAM_CHARS))) or "(empty)"},
-        {"role": "user", "content": f"The checks refused this answer:\n{listed}\n\n{ask}"},
+        {"role": "user", "content": f"{REFUSED_BY_CHECKS}\n{listed}\n\n{ask}"},
     ]

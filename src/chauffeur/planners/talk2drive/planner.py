@@ -102,14 +102,14 @@ class Talk2DrivePlanner:
         begun = time.perf_counter()
         messages = messages_for(request)
         prose = await self._writer.write(messages)
-        usage, answer = prose.usage, read_answer(prose.text, whole=prose.whole)
+        usage, answer = prose.usage, _read(prose)
         for _ in range(self._repairs):
             findings = _findings(answer, request)
             if not findings:
                 break
             messages = [*messages, *repair_turns(prose.text, findings, ask=_ASK_AGAIN)]
             prose = await self._writer.write(messages)
-            usage, answer = _sum(usage, prose.usage), read_answer(prose.text, whole=prose.whole)
+            usage, answer = _sum(usage, prose.usage), _read(prose)
         return self._plan(request, answer, prose, usage, begun)
 
     def prompt(self, request: PlanRequest) -> Prompt:
@@ -140,6 +140,10 @@ class Talk2DrivePlanner:
             usage=usage,
             raw=prose.text,
         )
+
+
+def _read(prose: Prose) -> ParametersAnswer:
+    return ParametersAnswer("", refusal=prose.text) if prose.declined else read_answer(prose.text, whole=prose.whole)
 
 
 def _findings(answer: ParametersAnswer, request: PlanRequest) -> list[str]:

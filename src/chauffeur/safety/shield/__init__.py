@@ -2,8 +2,8 @@
 
 from chauffeur.safety.shield.ground import GroundShield, shield_for
 from chauffeur.safety.shield.shield import FilterResult, Shield
+from chauffeur.safety.shield.street import StreetShield
 from chauffeur.safety.shield.table import LAMPILOT_SHIELD, SHIELD_VERSION, ShieldParameters
-from chauffeur.safety.shield.town import TownShield
 
 __all__ = [
     "LAMPILOT_SHIELD",
@@ -12,6 +12,6 @@ __all__ = [
     "GroundShield",
     "Shield",
     "ShieldParameters",
-    "TownShield",
+    "StreetShield",
     "shield_for",
 ]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation
 from chauffeur.safety.shield.shield import FilterResult, Shield
-from chauffeur.safety.shield.town import TownShield
+from chauffeur.safety.shield.street import StreetShield
 from chauffeur.worlds.base import World
 from chauffeur.worlds.parking.lot import LIMIT_MPS
 from chauffeur.worlds.parking.safety_filter import LotSafetyFilter
@@ -49,5 +49,5 @@ def shield_for(world: World, limits: Limits | None = None) -> Shield:
     if isinstance(world, PavedGround):
         return GroundShield(world, world.dt_s, limits, world.perception().speed_limit)
     if isinstance(world, TownPlaces):
-        return TownShield(world.dt_s, limits)
+        return StreetShield(world.dt_s, limits)
     return Shield(world.dt_s, limits)

@@ -141,13 +141,20 @@ def _build(sources: MapSources, name: str, folder: Path, source_hash: str) -> No
         parsed = read_opendrive(sources.xodr)
     except OpenDriveError as error:
         raise DataError(f"{sources.xodr} is no OpenDRIVE file that can be read: {error}") from error
+    left = sum(one.left_hand for one in parsed.document.roads.values())
+    if left:
+        raise DataError(
+            f"{sources.xodr} has {left} roads that keep left (rule LHT).",
+            hint="A town's traffic and driver keep right; `parse_opendrive` reads such roads.",
+        )
     road = parsed.road
     crossings = crossings_of(parsed)
     groups, signs, boxes, notes = _lights_and_signs(sources, parsed, crossings)
+    notes = (*notes, *parsed.remarks)
     net = folder / "map.net.xml"
     # A group may stand at two junctions, where a street is crossed in two steps.
     lit = {junction_of(road, head.lanes) for group in groups for head in group.heads}
-    convert(sources.xodr, net, sorted(lit & road.junctions.keys()))
+    convert(sources.xodr, parsed, net, sorted(lit & road.junctions.keys()))
     made = reshape(net, road)
     links = _light(made, road, groups)
     if groups and (inside := sum(head.id not in links for group in groups for head in group.heads)):

@@ -24,7 +24,7 @@ from chauffeur.worlds.town.levels import Levels
 Point = tuple[float, float]
 Line = tuple[Point, Point]
 
-BUILDER_VERSION: Final = "maps-v4"
+BUILDER_VERSION: Final = "maps-v5"
 """Changes with whatever would build another pack from the same sources. Another builder's pack is refused."""
 PACK_FILE: Final = "pack.json"
 OWN_TOWNS: Final = Path(__file__).with_name("towns")

@@ -50,6 +50,8 @@ class Walker:
     aside_m: float
     speed_mps: float = 0.0
     waited_s: float = 0.0
+    over: Polyline | None = None
+    """The way over to the start of the walk, while it is walked."""
 
 
 class People:
@@ -87,6 +89,11 @@ class People:
         """
         for walker in self.walkers:
             walk = self._walks[walker.walk]
+            if walker.over is not None:
+                walker.speed_mps, walker.at_m = walker.pace_mps, walker.at_m + walker.pace_mps * dt_s
+                if walker.at_m >= walker.over.length_m:
+                    walker.over, walker.at_m = None, 0.0
+                continue
             crossing = walk.crossing
             if crossing is not None and walker.at_m == 0.0 and not self._may_cross(walker, crossing, lights, vehicles):
                 walker.speed_mps, walker.waited_s = 0.0, walker.waited_s + dt_s
@@ -102,17 +109,22 @@ class People:
 
     def state(self, walker: Walker) -> VehicleState:
         """Somebody as others see them."""
-        walk = self._walks[walker.walk]
-        length = walk.line.length_m
-        at = min(walker.at_m, length)
-        pose = walk.line.at(at if walker.forwards else length - at)
+        over = walker.over
+        pose = self._on_walk(walker) if over is None else over.at(min(walker.at_m, over.length_m))
+        x, y, heading = pose.x_m, pose.y_m, pose.heading_rad
+        return VehicleState(walker.id, "pedestrian", x, y, heading, walker.speed_mps, WIDE_M, WIDE_M, None)
+
+    def _on_walk(self, walker: Walker) -> Pose:
+        line = self._walks[walker.walk].line
+        at = min(walker.at_m, line.length_m)
+        pose = line.at(at if walker.forwards else line.length_m - at)
         heading = pose.heading_rad if walker.forwards else pose.heading_rad + math.pi
         x, y = Pose(pose.x_m, pose.y_m, heading).place(0.0, walker.aside_m)
-        return VehicleState(walker.id, "pedestrian", x, y, heading, walker.speed_mps, WIDE_M, WIDE_M, None)
+        return Pose(x, y, heading)
 
     def crosses(self, walker: Walker) -> bool:
         """Whether somebody is on the carriageway."""
-        return self._walks[walker.walk].crossing is not None and walker.at_m > 0.0
+        return self._walks[walker.walk].crossing is not None and walker.at_m > 0.0 and walker.over is None
 
     def _in_the_way(self, walker: Walker, vehicles: Sequence[VehicleState]) -> bool:
         """Whether a vehicle that stands has the next step: nobody walks into the side of a car."""
@@ -129,11 +141,15 @@ class People:
 
     def _next(self, walker: Walker, walk: _Walk) -> None:
         ways = walk.at_end if walker.forwards else walk.at_start
+        end = self._on_walk(walker)
         if ways:
             walker.walk, walker.forwards = ways[int(self._rng.integers(len(ways)))]
         else:
             walker.forwards = not walker.forwards
         walker.at_m = 0.0
+        start = self._on_walk(walker)
+        if math.dist((end.x_m, end.y_m), (start.x_m, start.y_m)) > _STEP_M:
+            walker.over = Polyline.of(((end.x_m, end.y_m), (start.x_m, start.y_m)))
 
     def _may_cross(
         self,

@@ -131,7 +131,9 @@ def pull(town: str, folder: Path, *, host: str = HOST, told: Callable[[str], Non
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with httpx.Client(timeout=_TIMEOUT_S, follow_redirects=False) as client:
+        with httpx.Client(
+            timeout=_TIMEOUT_S, follow_redirects=False, headers={"Accept-Encoding": "identity"}
+        ) as client:
             for file in files:
                 here = folder / file.name
                 if here.is_file() and hashlib.sha256(here.read_bytes()).hexdigest() == file.sha256:
@@ -160,7 +162,7 @@ def _fetched(client: httpx.Client, url: str) -> bytes:
             if reply.status_code != 200:
                 raise DataError(f"{url} answers {reply.status_code}.", hint="Build from a file: chauffeur maps build.")
             content = bytearray()
-            for chunk in reply.iter_bytes():
+            for chunk in reply.iter_raw():  # asked for unpacked; what comes packed is another file
                 content += chunk
                 if len(content) > _MOST_BYTES:
                     raise DataError(f"{url} is larger than {_MOST_BYTES} bytes.")

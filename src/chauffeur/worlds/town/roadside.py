@@ -27,7 +27,6 @@ GREEN_S, YELLOW_S, ALL_RED_S = 15.0, 5.0, 2.0
 """Of a cycle that no table gives: as most of CARLA's own."""
 _SPEED_OBJECT: Final = re.compile(r"Speed_(\d+)")
 """Signs that CARLA's maps hold as objects; km/h, as CARLA shows them."""
-_UNITS: Final = {"km/h": 1.0 / 3.6, "mph": 0.44704, "m/s": 1.0, "": 1.0 / 3.6}
 _TOGETHER_RAD: Final = math.radians(45.0)
 _NEAR_M: Final = 30.0
 _SAME_JUNCTION_M: Final = 15.0
@@ -157,8 +156,8 @@ def signs_of(town: OpenDriveMap) -> tuple[tuple[Sign, ...], dict[str, tuple[Poin
         if not lanes:
             continue
         if kind == "speed_limit":
-            value = (signal.value or 0.0) * _UNITS.get(signal.unit, 1.0 / 3.6)
-            signs.append(Sign(signal.id, kind, lanes, signal.x_m, signal.y_m, value=value))
+            if signal.speed_mps is not None:
+                signs.append(Sign(signal.id, kind, lanes, signal.x_m, signal.y_m, value=signal.speed_mps))
             continue
         line, (x, y), heading, width = _line_for(town, signal, lanes)
         signs.append(Sign(signal.id, kind, lanes, signal.x_m, signal.y_m, line))

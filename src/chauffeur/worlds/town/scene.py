@@ -9,9 +9,10 @@ from chauffeur.concept import Observation, Scenario, ScenarioError, Signal, Sign
 from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ
 from chauffeur.geometry import LaneId, LanePlace, Route, plan_route
 from chauffeur.worlds.parking.path_follower import Chassis
+from chauffeur.worlds.places import Destination
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
 from chauffeur.worlds.town.instant import TownInstant
-from chauffeur.worlds.town.pack import MapPack, SignalGroup
+from chauffeur.worlds.town.pack import MapPack, SignalGroup, places_called
 from chauffeur.worlds.town.perception import TownPerception
 from chauffeur.worlds.town.sumo import engine_name
 from chauffeur.worlds.town.trip import TownConfig, TownTrip, goal_in
@@ -24,6 +25,8 @@ _SLOWING_MPS2: Final = 1.5
 _ROOM_M: Final = 4.0
 _AT_GOAL_M: Final = 3.0
 _STANDS_MPS: Final = 0.1
+STANDS_S: Final = 1.0
+"""A car has stopped at a place once it has been slower than 0.1 m/s for so long: a passenger can get out."""
 _LEFT_M: Final = 8.0
 """A place has been left when the car is so far from where it stood."""
 
@@ -50,6 +53,8 @@ class TownScene:
         """The place that was set out for."""
         self._stood: tuple[str, float, float] | None = None
         """The place that was reached, and where the car stood."""
+        self._still_s = 0.0
+        """How long the car has stood, s."""
 
     @property
     def engine(self) -> str:
@@ -114,26 +119,43 @@ class TownScene:
         """The place that was set out for, while the car stands there."""
         return None if self._stood is None else self._stood[0]
 
+    def destination(self) -> Destination | None:
+        """Where the car is going; None where it goes nowhere, or is there."""
+        driver, road = self._driver, self.town.road
+        if driver is None or not driver.has_goal or self._stood is not None:
+            return None
+        route = driver.route
+        end = road[route.lanes[-1]].centre.at(route.goal_m)
+        here = next((i for i, lane in enumerate(route.lanes) if lane == self._lane), None)
+        if here is not None:
+            route = Route(route.lanes[here:], self._ego_station, route.goal_m)
+        named = places_called(self.town.places, self._place) if self._place else ()
+        return Destination(named[0].name if named else "", end.x_m, end.y_m, max(0.0, route.length_m(road)))
+
     @property
     def arrived(self) -> bool:
-        """Whether the ego is at its goal."""
+        """Whether the ego has come to a stand at its goal."""
+        return self._stood is not None or (self._still_s >= STANDS_S and self._at_goal)
+
+    @property
+    def _at_goal(self) -> bool:
+        """Whether the ego is at the end of its way to a goal, moving or not."""
         driver = self._driver
-        if self._stood is not None:
-            return True
         if driver is None or self._route is None or not driver.has_goal or not driver.stretch.goal:
             return False
         return driver.station_m + LINCOLN_MKZ.rear_to_middle_m > driver.stretch.end_m - _AT_GOAL_M
 
     def _mind_the_place(self, ego: VehicleState) -> None:
-        """Note when the car stands at the place that was set out for, and when it has left."""
+        """Note when the car has come to a stand at the place that was set out for, and when it has left."""
         driver = self.driver()
+        self._still_s = self._still_s + DT_S if ego.speed_mps < _STANDS_MPS else 0.0
         if self._stood is not None:
             _, x, y = self._stood
             if abs(ego.x_m - x) + abs(ego.y_m - y) > _LEFT_M:
                 self._stood = None
         elif self._place and not driver.has_goal:
             self._place = ""  # another way was wished since
-        elif self._place and self.arrived and ego.speed_mps < _STANDS_MPS:
+        elif self._place and self.arrived:
             self._stood, self._place = (self._place, ego.x_m, ego.y_m), ""
 
     def _way_to(self, goal: LanePlace, name: str) -> Route:
@@ -172,6 +194,7 @@ class TownScene:
         self._lane, self._ego_station = trip.start.lane, trip.start.station_m
         self._tick, self._others, self._forced, self._shown = 0, (), {}, None
         self._place, self._stood, self._driver = "", None, None
+        self._still_s = 0.0
         self._signal_places = [_middle(group) for group in trip.town.signals]
         return trip
 

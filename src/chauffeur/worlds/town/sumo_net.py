@@ -16,6 +16,7 @@ from xml.etree import ElementTree as ET
 
 from chauffeur.concept import ChauffeurError, DataError, MissingExtraError
 from chauffeur.geometry import LaneId, Polyline, RoadGraph, joined
+from chauffeur.geometry.opendrive import OpenDriveMap
 
 _LEAST_M: Final = 0.1
 """Shortest lane that SUMO takes."""
@@ -52,15 +53,15 @@ class ReshapedNet:
     unmatched: list[str] = field(default_factory=list[str])
 
 
-def convert(xodr: Path, net: Path, junctions: Iterable[str]) -> None:
-    """Make a SUMO network of an OpenDRIVE file, with traffic lights at the junctions named.
+def convert(xodr: Path, town: OpenDriveMap, net: Path, junctions: Iterable[str]) -> None:
+    """Make a SUMO network of an OpenDRIVE file as it was read, with traffic lights at the junctions named.
 
     Raises:
         MissingExtraError: netconvert is not installed.
         DataError: It refuses the file.
     """
     bare = net.with_suffix(".xodr")
-    bare.write_bytes(_prepared(xodr.read_bytes()))
+    bare.write_bytes(_prepared(town.document.plain()))
     command = [*netconvert(), "--opendrive-files", str(bare), "--output-file", str(net), *_OPTIONS]
     if lit := ",".join(junctions):
         command += ["--tls.set", lit]
@@ -75,13 +76,12 @@ def convert(xodr: Path, net: Path, junctions: Iterable[str]) -> None:
         raise DataError(f"netconvert refuses {xodr}: {' '.join(lines)}")
 
 
-def _prepared(text: bytes) -> bytes:
+def _prepared(root: ET.Element) -> bytes:
     """The file as netconvert takes it best.
 
     Without its signals: netconvert makes lights of them at seams, and stumbles over those it is told of. And without
     roads of next to no length, which it leaves without a way on.
     """
-    root = ET.fromstring(text)  # noqa: S314 - read before by the OpenDRIVE reader
     for road in root.findall("road"):
         for signals in road.findall("signals"):
             road.remove(signals)
@@ -138,7 +138,7 @@ def reshape(net: Path, road: RoadGraph) -> ReshapedNet:
     edges = {edge.get("id", ""): edge for edge in made.root.findall("edge")}
     by_road: dict[str, list[LaneId]] = {}
     for lane in road.lanes:
-        name, _, number = lane.id.split(":")
+        name, _, number = lane.id.rsplit(":", 2)
         by_road.setdefault(f"{name}_{number}", []).append(lane.id)
     for edge in edges.values():
         if edge.get("function") != "internal":

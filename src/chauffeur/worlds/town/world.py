@@ -298,7 +298,8 @@ class TownWorld(TownScene):
         config = self._config
         assert config is not None
         late = self._tick * DT_S >= config.duration_s
-        at_goal = (config.goal is not None or bool(config.lanes)) and not self._heads_elsewhere and self.arrived
+        there = self._at_goal if config.lanes else config.goal is not None and self.arrived
+        at_goal = there and not self._heads_elsewhere
         return self._stopped or self._off_road or late or at_goal
 
     def _locate(self) -> None:

@@ -2,7 +2,8 @@
 
 Layout of each split's folder: `questions.json` (the published format), `metadata.json` (the keys of the published
 metadata: pictures, camera calibration, ego pose, `prev`), `truth.json` (classes of all families and who is where: for
-training, never shown to a model), `part_0/*.jpg`, and `pairs.json` with free question-answer pairs where asked for.
+training, never shown to a model), `part_0/*.jpg`, `scenes.jsonl` (what is made so far, scene by scene), and
+`pairs.json` with free question-answer pairs where asked for.
 Everything is simulated and rendered, and says so.
 """
 
@@ -19,7 +20,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
+from pydantic import TypeAdapter
 
+from chauffeur.bench.kernel.store import Row, RowStore
 from chauffeur.bench.nuplanqa.frames import CAMERAS, FRAMES
 from chauffeur.bench.nuplanqa.questions import SUBTASKS, VqaItem
 from chauffeur.bench.nuplanqa.scenes.facts import Fact, Seen, facts_of, sighted
@@ -123,11 +126,12 @@ class QaConfig:
         return (0, SAMPLES - 1) if self.frames == 2 else tuple(range(SAMPLES - self.frames, SAMPLES))
 
 
+_items: Final = TypeAdapter(tuple[VqaItem, ...])
 Watch = Callable[[int, int], None]
 
 
 def make_split(folder: Path, split: Split, config: QaConfig, watch: Watch) -> tuple[VqaItem, ...]:
-    """Make a split, or what is missing of it: scenes whose pictures are there are not rendered again.
+    """Make a split, or what is missing of it: scenes that are made, or whose pictures are there, are not made again.
 
     Args:
         folder: Folder of the set; the split gets one below it.
@@ -153,20 +157,36 @@ def make_split(folder: Path, split: Split, config: QaConfig, watch: Watch) -> tu
     truth: dict[str, Any] = {}
     pairs: list[dict[str, Any]] = []
     count = config.count(split)
+    store = RowStore(own / "scenes.jsonl", "scene")
     try:
         for number in range(count):
-            scene, rng = _stage(config, split, number)
-            seen = glimpsed = sighted(scene)
-            if renderer is not None:
-                seen, glimpsed = _shoot(own, scene, rig, look, renderer, config.instants)
-            metadata |= metadata_of(scene, rig, config.instants)
-            facts = list(facts_of(scene, seen))
-            truth[scene.token] = truth_of(scene, seen, glimpsed, rig)
-            previous = instant_token(scene.token, config.instants[-2]) if config.frames > 1 else ""
-            items += writer.write(scene, facts, previous, rng)
-            pairs += _pairs(scene, facts, config.pairs if split == "train" else 0, rng)
+            token = _token(config.seed, split, number)
+            row: Row | None = store.rows.get(token)
+            if row is None:
+                scene, rng = _stage(config, split, number)
+                seen = glimpsed = sighted(scene)
+                if renderer is not None:
+                    seen, glimpsed = _shoot(own, scene, rig, look, renderer, config.instants)
+                facts = list(facts_of(scene, seen))
+                previous = instant_token(scene.token, config.instants[-2]) if config.frames > 1 else ""
+                row = {
+                    "scene": token,
+                    "metadata": metadata_of(scene, rig, config.instants),
+                    "truth": truth_of(scene, seen, glimpsed, rig),
+                    "items": _items.dump_python(tuple(writer.write(scene, facts, previous, rng)), mode="json"),
+                    "pairs": list(_pairs(scene, facts, config.pairs if split == "train" else 0, rng)),
+                    "asked": writer.asked,
+                }
+                store.append(row)
+            else:
+                writer.go_on(row["asked"])
+            metadata |= row["metadata"]
+            truth[token] = row["truth"]
+            items += _items.validate_python(row["items"])
+            pairs += row["pairs"]
             watch(number + 1, count)
     finally:
+        store.close()
         if renderer is not None:
             renderer.close()
     write_json(own / "questions.json", [item.json() for item in items])
@@ -185,6 +205,8 @@ def shoot_part(folder: Path, split: Split, config: QaConfig, part: int, parts: i
     numbers = range(count * part // parts, count * (part + 1) // parts)  # neighbours may be of one trip
     try:
         for number in numbers:
+            if _seen(folder / split, _token(config.seed, split, number)).is_file():
+                continue
             scene, _ = _stage(config, split, number)
             _shoot(folder / split, scene, rig, look, renderer, config.instants)
     finally:
@@ -300,7 +322,7 @@ def _shoot(
 ) -> tuple[Seen, Seen]:
     """Render what is not there yet. Who can be made out at the present instant, and who is glimpsed at least, is stored
     beside the pictures."""
-    record = own / "seen" / f"{scene.token}.json"
+    record = _seen(own, scene.token)
     if record.is_file():
         held: dict[str, list[int | str]] = json.loads(record.read_text(encoding="utf-8"))
         return frozenset(held["seen"]), frozenset(held["glimpsed"])
@@ -319,6 +341,10 @@ def _shoot(
     told = {"seen": sorted(seen, key=str), "glimpsed": sorted(glimpsed, key=str)}
     publish(record, json.dumps(told).encode(), "record of who is seen")
     return seen, glimpsed
+
+
+def _seen(own: Path, token: str) -> Path:
+    return own / "seen" / f"{token}.json"
 
 
 def _pairs(scene: QaScene, facts: list[Fact], each: int, rng: np.random.Generator) -> Iterator[dict[str, Any]]:

@@ -105,6 +105,18 @@ class QuestionWriter:
             if self._wanted(scene, fact):
                 yield self._item(scene, fact, previous, rng)
 
+    @property
+    def asked(self) -> list[list[Any]]:
+        """How often each class was asked about, as JSON: what `go_on` takes."""
+        return [[*group, dict(count)] for group, count in self._asked.items()]
+
+    def go_on(self, asked: Sequence[Sequence[Any]]) -> None:
+        """Take over what was asked about before."""
+        self._asked = {
+            (str(family), str(side), str(motion), bool(fast)): Counter(count)
+            for family, side, motion, fast, count in asked
+        }
+
     def _wanted(self, scene: QaScene, fact: Fact) -> bool:
         """Whether the fact's class is not yet ahead of others, among scenes whose speeds tell the same."""
         bank = word_bank().families[fact.family]

@@ -57,7 +57,7 @@ export function makeConversation() {
     return [
       wish.why && make('p', { class: 'why', text: wish.why }),
       ...wish.said.map((line) => make('p', { class: 'car-said' }, make('b', { text: 'The car says ' }), `“${line}”`)),
-      wish.thoughts && section('It thinks', make('p', { class: 'thoughts', text: wish.thoughts })),
+      wish.thoughts && wish.thoughts !== wish.why && section('It thinks', make('p', { class: 'thoughts', text: wish.thoughts })),
       wish.source && section(wish.policy === 'parameters' ? 'It sets' : 'It drives by', code(wish, entry)),
       wish.verdicts.length && section('Checks', ...checks(wish, entry)),
       shielded.length && section('The shield stepped in', make('ul', { class: 'plain shielded' }, ...shielded.map((text) => make('li', { text })))),

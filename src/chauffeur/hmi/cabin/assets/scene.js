@@ -1,6 +1,6 @@
 /* The road from above, in metres; y grows to the right of +x, as on a canvas. The car stands near the middle. */
 
-import { kmh } from './words.js';
+import { goalWords, kmh } from './words.js';
 
 const LONGEST_GLIDE_MS = 300;
 const JUMP_M = 30;
@@ -414,6 +414,27 @@ export function makeScene(canvas) {
     return () => label(words, x - 30, y - 14, colour['label-back'], colour['label-ink']);
   }
 
+  /* Where the car is going: a pin, or at the edge of the picture the direction of it. */
+  function drawDestination(at) {
+    const { goal } = scene;
+    if (!goal) return;
+    const [x, y] = toScreen(at, goal.x_m, -goal.y_m);
+    const [px, py] = [Math.min(Math.max(x, 24), size.width - 24), Math.min(Math.max(y, 64), size.height - 72)];
+    ctx.beginPath();
+    ctx.arc(px, py, 8, 0, 7);
+    ctx.fillStyle = colour['ego-fill'];
+    ctx.fill();
+    ctx.lineWidth = 3;
+    ctx.strokeStyle = colour['label-back'];
+    ctx.stroke();
+    if (px === x && py === y) return;
+    const turn = Math.atan2(y - py, x - px);
+    ctx.beginPath();
+    for (const [far, aside] of [[20, 0], [12, -0.6], [12, 0.6]]) ctx.lineTo(px + far * Math.cos(turn + aside), py + far * Math.sin(turn + aside));
+    ctx.fillStyle = colour['label-back'];
+    ctx.fill();
+  }
+
   function draw(now) {
     if (!road || !scene || !size.width) return;
     glide(now);
@@ -429,12 +450,14 @@ export function makeScene(canvas) {
     drawBody(scene.ego, true);
     enterScreen();
     if (nameLead) nameLead();
+    drawDestination(at);
   }
 
   /* What is to be seen, in words. */
   function words() {
     if (!scene || !road) return '';
     const parts = [`At ${kmh(scene.ego.speed_mps)} km/h${scene.street ? ` on ${scene.street}` : ''}.`];
+    if (scene.goal) parts.push(`${goalWords(scene.goal)}.`);
     const lane = laneOf(scene.ego.x_m, scene.ego.y_m, scene.ego.heading_rad);
     const abreast = lane && lane.road ? road.lanes.filter((other) => other.road === lane.road && (!other.e || lane.e)) : [];
     if (abreast.length > 1) {

@@ -11,6 +11,7 @@ const STAGES = {
 };
 const OUTCOMES = {
   finished: ['✓', 'Done', 'good'],
+  answered: ['✓', 'Answered', 'good'],
   declined: ['–', 'Declined', 'bad'],
   unplanned: ['✕', 'No plan could be made', 'bad'],
   refused: ['✕', 'Refused by a check', 'bad'],
@@ -25,8 +26,14 @@ export function stageWords(wish) {
   return STAGES[wish.stage] || ['…', wish.stage, 'busy'];
 }
 
+/* Where the car is going, and how far that is by road. */
+export function goalWords({ name, left_m: left }) {
+  return `To ${name || 'the destination'}, ${left < 1000 ? `${Math.round(left / 10) * 10} m` : `${(left / 1000).toFixed(1)} km`}`;
+}
+
 export function levelWords(scene) {
   if (scene.taken_over) return 'You drive. The shield stays on.';
+  if (scene.level === 'follow' && scene.wish && scene.goal) return goalWords(scene.goal);
   if (scene.level === 'follow') return scene.wish ? 'Follows your wish' : 'Keeps its lane and distance';
   const levels = {
     hold: 'Holds the last wish', keep: 'Keeps lane, no faster', slow: 'Slows down, nobody tells it where to go', stop: 'Stops',

@@ -10,7 +10,7 @@ import pytest
 from chauffeur.concept import Command, Observation, Sign, Signal, SignalState, VehicleState
 from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, BicycleState, advanced
 from chauffeur.geometry import Lane, Polyline, Pose, RoadGraph
-from chauffeur.safety.shield import TownShield
+from chauffeur.safety.shield import StreetShield
 
 DT = 0.05
 LINE = ((80.0, -2.0), (80.0, 2.0))
@@ -33,7 +33,7 @@ def instant(state: BicycleState, tick: int, *others: VehicleState, **more: objec
 
 def floored(periods: int, speed: float = 10.0, others: object = None, **more: object) -> list[Observation]:
     """Full throttle under the shield; `others` gives everybody else at a time."""
-    shield, state = TownShield(DT), BicycleState(Pose(10.0, 0.0, 0.0), speed)
+    shield, state = StreetShield(DT), BicycleState(Pose(10.0, 0.0, 0.0), speed)
     seen: list[Observation] = []
     for tick in range(periods):
         around = () if others is None else others(tick * DT)  # type: ignore[operator]
@@ -56,7 +56,7 @@ def test_lights(state: SignalState, over: bool) -> None:
 
 @pytest.mark.parametrize(("front_over_m", "goes_on"), [(0.5, False), (2.5, False), (5.5, True)])
 def test_who_stands_astride_a_line_waits_for_green_with_its_tail_before_it(front_over_m: float, goes_on: bool) -> None:
-    shield = TownShield(DT)
+    shield = StreetShield(DT)
     rear = 80.0 + front_over_m - LINCOLN_MKZ.rear_to_middle_m - LINCOLN_MKZ.length_m / 2.0
     state, red = BicycleState(Pose(rear, 0.0, 0.0), 0.0), (Signal("s", "red", ("a",), LINE),)
     for tick in range(100):
@@ -100,6 +100,6 @@ def test_it_stops_behind_a_car_that_brakes_to_a_stand() -> None:
 
 def test_no_number_stops_the_car() -> None:
     seen = instant(BicycleState(Pose(10.0, 0.0, 0.0), 5.0), 0)
-    guarded = TownShield(DT).filter(seen, Command(math.nan, 0.0))
+    guarded = StreetShield(DT).filter(seen, Command(math.nan, 0.0))
     assert guarded.command.acceleration_mps2 < 0.0
     assert guarded.interventions[0].rule == "finite"

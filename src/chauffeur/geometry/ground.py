@@ -1,0 +1,270 @@
+"""The one answer to "may this body be here?": how far an outline reaches beyond the ground that a car may be on.
+
+A car may be on lanes made for cars that lead its way: driving lanes, and where it comes to a stand shoulders and
+parking lanes. It may be on aisles and parking lanes in either direction, and anywhere on a paved lot. Pavements,
+bicycle lanes and crossings are nobody's to drive on: a crossing is passed on the driving lane under it. A lane that
+leads the other way is none of a car's own, so an outline over the centre line is as far out as one over the kerb.
+
+The answer is a distance, not a yes or no: who asks states what it allows, and a car that is out already can be told
+whether it gets farther out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final, Literal
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from chauffeur.geometry.road_graph import RoadGraph
+
+Array = NDArray[np.float64]
+
+EDGE_M: Final = 0.3
+"""What an outline may reach over an edge: lanes are known by their mean width and by points up to 2 m apart, which in
+the tightest bends of a town (6 m) are 0.1 m inside the arc; the rest is half a kerbstone."""
+FAR_M: Final = 7.0
+"""A point farther than this from all ground is that far beyond it."""
+_ONWARD_M: Final = 100.0
+"""Where a map ends its lanes go on: as far as is planned ahead."""
+_JOINT_M: Final = 0.3
+"""Legs overlap by so much, for there are slits where lines bend and where lanes follow one another."""
+_CELL_M: Final = 8.0
+_SPACING_M: Final = 1.3
+"""Between two points of an outline: less than any kerb's corner sticks out between them."""
+_SWEEP_M: Final = 0.5
+"""Between two looks at a body on its way."""
+_ALONG_COS: Final = math.cos(math.radians(95.0))
+"""What is turned by more against a lane does not go its way."""
+_JUNCTION_COS: Final = math.cos(math.radians(120.0))
+"""In a junction lanes of all directions share the ground: only against the traffic is against a lane."""
+_ANY_COS: Final = -2.0
+
+GroundFaultKind = Literal["off_road", "oncoming", "sidewalk", "bicycle", "emergency", "parking"]
+
+
+@dataclass(frozen=True, slots=True)
+class GroundFault:
+    """Where a body may not be.
+
+    Attributes:
+        index: Which of the poses.
+        kind: What lies under the outline's farthest point: nothing, an oncoming lane, or a lane that is for others.
+        beyond_m: How far that point is beyond the ground the body may be on, `FAR_M` at most.
+    """
+
+    index: int
+    kind: GroundFaultKind
+    beyond_m: float
+
+
+class Ground:
+    """The ground of a road network. Immutable; made by `RoadGraph.ground`."""
+
+    def __init__(self, road: RoadGraph) -> None:
+        """Args: the lanes, and what is paved around them."""
+        self._road = road
+        self._lanes, self._legs = _table(road)
+        self._keys, self._starts, self._order = _grid(self._legs)
+        box = road.paved
+        self._paved = (
+            np.array([math.inf, 0.0, 1.0, 0.0, 0.0, 0.0])
+            if box is None
+            else np.array(
+                [
+                    box.x_m, box.y_m, math.cos(box.heading_rad), math.sin(box.heading_rad),
+                    box.length_m / 2.0, box.width_m / 2.0,
+                ]
+            )
+        )  # fmt: skip
+
+    def beyond_m(
+        self, poses: Array, length_m: float, width_m: float, *, stops: bool = False, either_way: bool = False
+    ) -> Array:
+        """How far the outline of a body reaches beyond the ground it may be on, m, (n,); 0 where all of it is on it.
+
+        Args:
+            poses: (n, 3): x and y of the body's middle, m, and heading, rad.
+            length_m, width_m: Of the body; 0 for a point.
+            stops: Whether it comes to a stand there, or stands: shoulders and parking lanes are then its to use.
+            either_way: Whether lanes of the other direction count as well: what is left is where cars cannot drive.
+        """
+        return self._asked(poses, length_m, width_m, stops=stops, either_way=either_way)[:, 0]
+
+    def fault(
+        self, poses: Array, length_m: float, width_m: float, *, stops: bool = False, edge_m: float = EDGE_M
+    ) -> GroundFault | None:
+        """The first of some poses at which a body is farther than `edge_m` beyond its ground; None without."""
+        found = self._asked(poses, length_m, width_m, stops=stops)
+        out = np.flatnonzero(found[:, 0] > edge_m)
+        if not len(out):
+            return None
+        index = int(out[0])
+        beyond, x, y = found[index].tolist()
+        return GroundFault(index, self._kind(x, y), beyond)
+
+    def off_m(self, x_m: float, y_m: float) -> float:
+        """How far a place is beyond all ground that cars drive or stand on, whatever their direction, m."""
+        return float(self.beyond_m(np.array([[x_m, y_m, 0.0]]), 0.0, 0.0, stops=True, either_way=True)[0])
+
+    def _asked(
+        self, poses: Array, length_m: float, width_m: float, *, stops: bool, either_way: bool = False
+    ) -> Array:
+        """(n, 3): how far, and x and y of the outline's farthest point."""
+        rows = np.ascontiguousarray(poses, dtype=np.float64)
+        outline = _outline(length_m, width_m)
+        return beyond(rows, outline, stops, either_way, self._legs, self._keys, self._starts, self._order, self._paved)
+
+    def _kind(self, x_m: float, y_m: float) -> GroundFaultKind:
+        kinds: tuple[GroundFaultKind, ...] = ("sidewalk", "bicycle", "emergency", "parking")
+        for place in self._road.places(x_m, y_m, within_m=FAR_M, within_rad=math.pi):
+            lane = self._road[place.lane]
+            if abs(lane.centre.project(x_m, y_m)[1]) > lane.width_m / 2.0:
+                continue
+            if lane.kind in ("driving", "aisle"):
+                return "oncoming"
+            if lane.kind in kinds:
+                return lane.kind
+        return "off_road"
+
+    @cached_property
+    def lanes(self) -> int:
+        """How many lanes a car may be on, in whatever case."""
+        return self._lanes
+
+
+def swept(poses: Array) -> Array:
+    """Poses with others between them, (n, 3) -> (m, 3), so that no part of a car leaps over a kerb or a car."""
+    turned = np.diff(np.unwrap(poses[:, 2]))
+    moved = np.hypot(np.diff(poses[:, 0]), np.diff(poses[:, 1])) + 2.5 * np.abs(turned)
+    counts = np.maximum(1, np.ceil(moved / _SWEEP_M)).astype(np.int64)
+    at = np.concatenate([[0.0], *(i + np.arange(1, n + 1) / n for i, n in enumerate(counts.tolist()))])
+    rows = np.arange(len(poses), dtype=np.float64)
+    heading = np.concatenate([poses[:1, 2], poses[0, 2] + np.cumsum(turned)])
+    return np.stack([np.interp(at, rows, one) for one in (poses[:, 0], poses[:, 1], heading)], axis=1)
+
+
+def _outline(length_m: float, width_m: float) -> Array:
+    """Points round a body, (k, 2): ahead of its middle and left of it, m."""
+    a, b = length_m / 2.0, width_m / 2.0
+    if a == b == 0.0:
+        return np.zeros((1, 2))
+    long = np.linspace(-a, a, math.ceil(length_m / _SPACING_M) + 1)
+    wide = np.linspace(-b, b, math.ceil(width_m / _SPACING_M) + 1)[1:-1]
+    sides = [(u, v) for v in (b, -b) for u in long[::-1].tolist()]  # front corners first: they are out soonest
+    return np.array([*sides, *((u, v) for u in (a, -a) for v in wide.tolist())])
+
+
+_MOVING, _STOPPING = 0.0, 1.0
+
+
+def _table(road: RoadGraph) -> tuple[int, Array]:
+    """Legs of all lanes for cars, (n, 10): x, y, ux, uy, least and most way along it, half width, least cosine of the
+    angle to it, and whether only for who stops."""
+    rows: list[tuple[float, ...]] = []
+    count = 0
+    led = {one for lane in road.lanes for one in lane.successors}
+    for lane in road.lanes:
+        if lane.kind not in ("driving", "aisle", "emergency", "parking"):
+            continue
+        count += 1
+        either = lane.kind in ("aisle", "parking")
+        cosine = _ANY_COS if either else _JUNCTION_COS if lane.junction else _ALONG_COS
+        when = _STOPPING if lane.kind in ("emergency", "parking") else _MOVING
+        points = lane.centre.points_m
+        for i, ((ax, ay), (bx, by)) in enumerate(pairwise(points)):
+            length = math.dist((ax, ay), (bx, by))
+            low = -_ONWARD_M if i == 0 and lane.id not in led else -_JOINT_M
+            high = length + (_ONWARD_M if i == len(points) - 2 and not lane.successors else _JOINT_M)
+            rows.append((ax, ay, (bx - ax) / length, (by - ay) / length, low, high, lane.width_m / 2.0, cosine, when))
+    return count, np.array(rows, dtype=np.float64).reshape(len(rows), 9)
+
+
+def _grid(legs: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """(cells, where the legs of each begin, legs): those within `FAR_M` of a square of the plane, sorted by square."""
+    pairs: list[NDArray[np.int64]] = []
+    for row, (x, y, ux, uy, low, high, half) in enumerate(legs[:, :7].tolist()):
+        at = np.append(np.arange(low, high, _CELL_M / 2.0), high)
+        reach = math.ceil((FAR_M + half) / _CELL_M)
+        cells = {
+            (cx + dx, cy + dy)
+            for cx, cy in zip(
+                np.floor((x + at * ux) / _CELL_M).astype(int).tolist(),
+                np.floor((y + at * uy) / _CELL_M).astype(int).tolist(),
+                strict=True,
+            )
+            for dx in range(-reach, reach + 1)
+            for dy in range(-reach, reach + 1)
+        }
+        pairs.append(np.array([(_key(cx, cy), row) for cx, cy in sorted(cells)], dtype=np.int64))
+    if not pairs:
+        empty = np.zeros(0, dtype=np.int64)
+        return empty, np.zeros(1, dtype=np.int64), empty
+    table = np.concatenate(pairs)
+    table = table[np.lexsort((table[:, 1], table[:, 0]))]
+    keys, starts = np.unique(table[:, 0], return_index=True)
+    return keys, np.append(starts, len(table)).astype(np.int64), np.ascontiguousarray(table[:, 1])
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _key(cx: int, cy: int) -> int:
+    return cx * 4_294_967_296 + cy
+
+
+@numba.njit(cache=True, error_model="numpy")
+def beyond(poses, outline, stops, free, legs, keys, starts, order, paved):  # type: ignore[no-untyped-def]
+    """See `Ground._asked`."""
+    n = poses.shape[0]
+    out = np.zeros((n, 3))
+    last = -1
+    for i in range(n):
+        x, y, heading = poses[i, 0], poses[i, 1], poses[i, 2]
+        c, s = math.cos(heading), math.sin(heading)
+        out[i, 1], out[i, 2] = x, y
+        for j in range(outline.shape[0]):
+            px = x + c * outline[j, 0] - s * outline[j, 1]
+            py = y + s * outline[j, 0] + c * outline[j, 1]
+            if last >= 0 and _off(legs[last], px, py, c, s, stops, free) <= 0.0:
+                continue
+            best = FAR_M
+            if paved[0] < math.inf:
+                dx, dy = px - paved[0], py - paved[1]
+                along = abs(paved[2] * dx + paved[3] * dy) - paved[4]
+                across = abs(paved[2] * dy - paved[3] * dx) - paved[5]
+                if along <= 0.0 and across <= 0.0:
+                    continue
+                best = min(best, math.hypot(max(along, 0.0), max(across, 0.0)))
+            key = _key(math.floor(px / _CELL_M), math.floor(py / _CELL_M))
+            cell = np.searchsorted(keys, key)
+            if cell < len(keys) and keys[cell] == key:
+                for k in range(starts[cell], starts[cell + 1]):
+                    off = _off(legs[order[k]], px, py, c, s, stops, free)
+                    if off < best:
+                        best = off
+                        if off <= 0.0:
+                            last = order[k]
+                            break
+            if best > out[i, 0]:
+                out[i, 0], out[i, 1], out[i, 2] = best, px, py
+    return out
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _off(leg, px, py, c, s, stops, free):  # type: ignore[no-untyped-def]
+    """How far a place is beside a leg's lane; far where a body that is turned so may not be on it."""
+    if leg[8] > 0.0 and not stops:
+        return FAR_M
+    if not free and c * leg[2] + s * leg[3] < leg[7]:
+        return FAR_M
+    dx, dy = px - leg[0], py - leg[1]
+    along, across = dx * leg[2] + dy * leg[3], abs(dy * leg[2] - dx * leg[3]) - leg[6]
+    past = max(leg[4] - along, along - leg[5])
+    if past <= 0.0:
+        return across
+    return math.hypot(past, max(across, 0.0))
