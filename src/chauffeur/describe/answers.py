@@ -102,7 +102,9 @@ def with_way(context: Context, there: Destination | None) -> Context:
     """C that knows how far it is to where the car is going; as it was where that is nowhere."""
     if there is None:
         return context
-    left = f"{there.left_m / 1000.0:.1f} km" if there.left_m >= 1000.0 else f"{max(10.0, round(there.left_m, -1)):.0f} m"
+    left = (
+        f"{there.left_m / 1000.0:.1f} km" if there.left_m >= 1000.0 else f"{max(10.0, round(there.left_m, -1)):.0f} m"
+    )
     words = f"It is about {left} by road to {there.name or 'where we are going'}."
     situation = replace(context.situation, scene=(*context.situation.scene, (_WAY, words)))
     return replace(context, situation=situation)

@@ -113,9 +113,7 @@ class Ground:
         """How far a place is beyond all ground that cars drive or stand on, whatever their direction, m."""
         return float(self.beyond_m(np.array([[x_m, y_m, 0.0]]), 0.0, 0.0, stops=True, either_way=True)[0])
 
-    def _asked(
-        self, poses: Array, length_m: float, width_m: float, *, stops: bool, either_way: bool = False
-    ) -> Array:
+    def _asked(self, poses: Array, length_m: float, width_m: float, *, stops: bool, either_way: bool = False) -> Array:
         """(n, 3): how far, and x and y of the outline's farthest point."""
         rows = np.ascontiguousarray(poses, dtype=np.float64)
         outline = _outline(length_m, width_m)

@@ -26,8 +26,8 @@ from chauffeur.language.meaning.symbols import (
     START,
     SYMBOLS,
     Grammar,
-    WrittenAct,
     Written,
+    WrittenAct,
     parse,
 )
 

@@ -73,8 +73,10 @@ _EVENTS: Final = _values("E", Event)
 
 SYMBOLS: Final[tuple[str, ...]] = tuple(
     dict.fromkeys(
-        (PAD, START, END, POINTER, *_ADDRESS, *_VERBS, *_KINDS, *_EVENTS)
-        + tuple(one for group in (*_ACT_FIELDS, *_REFERENCE_FIELDS) for one in group)
+        (
+            *(PAD, START, END, POINTER, *_ADDRESS, *_VERBS, *_KINDS, *_EVENTS),
+            *(one for group in (*_ACT_FIELDS, *_REFERENCE_FIELDS) for one in group),
+        )
     )
 )
 """The vocabulary; a symbol's index is its id in every trained parser, so its order is part of a model."""

@@ -16,16 +16,18 @@ from pathlib import Path
 from typing import Final
 
 from chauffeur.concept import DataError
+from chauffeur.concept.data import data_folder
 
 _HEAD: Final = re.compile(r"==\s{1,3}(\S[^\n]*)")
 _WEIGHT: Final = re.compile(r"\*(\d{1,3}) ")
 _CHOICE: Final = re.compile(r"\[([^\[\]]*)\]")
 _SLOT: Final = re.compile(r"\{([a-z_]+)\??\}")
 
-SLOTS: Final = frozenset(
-    "side to ref of target place at before after behind in_front_of beside near opposite on into next here manner "
-    "speed gap a b x who n they".split()
+_SLOTS_WORDS: Final = (
+    "side to ref of target place at before after behind in_front_of beside near opposite on into next here "
+    "manner speed gap a b x who n they"
 )
+SLOTS: Final = frozenset(_SLOTS_WORDS.split())
 """Names that may stand in braces."""
 
 
@@ -113,3 +115,15 @@ def chosen(text: str, uniform: Callable[[], float]) -> str:
         options = choice[1].split("|")
         text = text[: choice.start()] + options[int(uniform() * len(options))] + text[choice.end() :]
     return text
+
+
+def banks(held_out: Sequence[str] = ()) -> list[Bank]:
+    """The writers' banks, in the order of their names.
+
+    Raises:
+        DataError: A writer held out has no bank, or a bank is damaged.
+    """
+    found = [read_bank(path) for path in sorted(data_folder("meaning").glob("*.txt"))]
+    if missing := set(held_out) - {bank.name for bank in found}:
+        raise DataError(f"No bank of phrases is called {', '.join(sorted(missing))}.")
+    return [bank for bank in found if bank.name not in held_out]

@@ -39,7 +39,7 @@ def example_of(sentence: Composed, pieces: WordPieces) -> Example | None:
     return None if len(symbols) > MOST_SYMBOLS else (list(split.ids), symbols, tokens)
 
 
-class Sentences(IterableDataset[Example]):
+class Sentences(IterableDataset[tuple[Tensor, ...]]):
     """Examples without end; each worker has a seed of its own."""
 
     def __init__(self, banks: Sequence[Bank], vocabulary: Path, seed: int, batch: int) -> None:

@@ -30,6 +30,7 @@ from chauffeur.concept.utterance import (
     Verb,
 )
 from chauffeur.language.meaning.symbols import WrittenAct
+from chauffeur.language.quantities import ONES, TENS
 from chauffeur.models.meaning.banks import Bank, chosen
 
 Weights = Mapping[str, float]
@@ -42,9 +43,15 @@ VERBS: Final[Weights] = {
 """About the shares of verbs in commands for a car in traffic, the rare ones raised so that they are learned."""
 PLACED: Final[Mapping[str, tuple[float, Weights]]] = {
     "turn": (0.5, {"at": 26, "here": 5, "into": 7, "next": 6, "after": 6, "before": 2, "near": 1}),
-    "stop": (0.9, {"at": 10, "beside": 13, "near": 7, "behind": 7, "before": 6, "here": 4, "in_front_of": 3, "after": 1, "opposite": 1, "next": 1}),
-    "park": (0.95, {"near": 11, "beside": 11, "behind": 9, "in_front_of": 6, "at": 1, "after": 1.5, "here": 2, "into": 2, "on": 1, "opposite": 1}),
-    "pull_over": (0.6, {"near": 3, "beside": 4, "before": 2, "behind": 3, "in_front_of": 2, "here": 3, "after": 2, "at": 2, "next": 1}),
+    "stop": (0.9,
+        {"at": 10, "beside": 13, "near": 7, "behind": 7, "before": 6, "here": 4, "in_front_of": 3, "after": 1,
+        "opposite": 1, "next": 1}),
+    "park": (0.95,
+        {"near": 11, "beside": 11, "behind": 9, "in_front_of": 6, "at": 1, "after": 1.5, "here": 2, "into": 2,
+        "on": 1, "opposite": 1}),
+    "pull_over": (0.6,
+        {"near": 3, "beside": 4, "before": 2, "behind": 3, "in_front_of": 2, "here": 3, "after": 2, "at": 2,
+        "next": 1}),
     "lane": (0.08, {"beside": 1, "in_front_of": 2, "behind": 2, "before": 2, "after": 2, "at": 1}),
     "speed": (0.3, {"near": 6, "at": 4, "behind": 3, "before": 3, "after": 1, "beside": 1}),
     "straight": (0.2, {"at": 8, "on": 2}),
@@ -65,10 +72,15 @@ _THINGS: Final[Weights] = {
     "animal": 0.5,
 }  # fmt: skip
 TARGETS: Final[Mapping[str, Weights]] = {
-    "follow": {"car": 18, "bus": 3, "vehicle": 5, "van": 4, "truck": 5, "bicycle": 2, "motorcycle": 2, "vehicles": 1, "traffic": 1, "pedestrian": 1},
-    "avoid": {"obstacle": 7, "car": 5, "vehicle": 4, "bus": 2, "truck": 3, "pedestrian": 5, "pedestrians": 2, "cone": 3, "barrier": 2, "bicycle": 2, "vehicles": 2, "traffic": 1, "motorcycle": 1, "van": 1, "other": 2, "animal": 1},
-    "yield": {"pedestrians": 6, "pedestrian": 6, "car": 5, "truck": 3, "traffic": 3, "van": 2, "bus": 3, "vehicle": 3, "vehicles": 2, "bicycle": 3, "motorcycle": 1, "animal": 1},
-    "pass": {"car": 6, "truck": 5, "bus": 3, "van": 3, "vehicle": 3, "bicycle": 4, "other": 1, "motorcycle": 2, "vehicles": 1, "obstacle": 1, "building": 1},
+    "follow": {"car": 18, "bus": 3, "vehicle": 5, "van": 4, "truck": 5, "bicycle": 2, "motorcycle": 2,
+        "vehicles": 1, "traffic": 1, "pedestrian": 1},
+    "avoid": {"obstacle": 7, "car": 5, "vehicle": 4, "bus": 2, "truck": 3, "pedestrian": 5, "pedestrians": 2,
+        "cone": 3, "barrier": 2, "bicycle": 2, "vehicles": 2, "traffic": 1, "motorcycle": 1, "van": 1,
+        "other": 2, "animal": 1},
+    "yield": {"pedestrians": 6, "pedestrian": 6, "car": 5, "truck": 3, "traffic": 3, "van": 2, "bus": 3,
+        "vehicle": 3, "vehicles": 2, "bicycle": 3, "motorcycle": 1, "animal": 1},
+    "pass": {"car": 6, "truck": 5, "bus": 3, "van": 3, "vehicle": 3, "bicycle": 4, "other": 1, "motorcycle": 2,
+        "vehicles": 1, "obstacle": 1, "building": 1},
     "enter": {"roundabout": 5, "lot": 5, "driveway": 4, "road": 3, "lane": 1, "building": 1, "gate": 1},
     "exit": {"roundabout": 4, "lot": 4, "road": 3, "driveway": 1},
     "goto": {"building": 6, "landmark": 5, "road": 1, "other": 1},
@@ -76,8 +88,10 @@ TARGETS: Final[Mapping[str, Weights]] = {
 }  # fmt: skip
 """What each verb is about."""
 _PLACE_KINDS: Final[Mapping[str, Weights]] = {
-    "at": _WAYS, "next": {"junction": 8, "road": 3, "light": 3, "roundabout": 1, "driveway": 1, "crosswalk": 1, "stop_sign": 1, "building": 1},
-    "into": {"road": 7, "lot": 3, "driveway": 3, "building": 0.5, "parking_space": 1}, "on": {"road": 4, "sidewalk": 0.3},
+    "at": _WAYS, "next": {"junction": 8, "road": 3, "light": 3, "roundabout": 1, "driveway": 1, "crosswalk": 1,
+        "stop_sign": 1, "building": 1},
+    "into": {"road": 7, "lot": 3, "driveway": 3, "building": 0.5, "parking_space": 1}, "on": {"road": 4,
+        "sidewalk": 0.3},
 }  # fmt: skip
 CONDITIONS: Final[Mapping[str, float]] = {
     "once clear": 18, "once gone": 20, "once passed": 9, "until gone": 6, "once green": 6, "once near": 3,
@@ -88,23 +102,29 @@ CONDITIONS: Final[Mapping[str, float]] = {
 }  # fmt: skip
 _EVENT_KINDS: Final[Mapping[str, Weights]] = {
     "green": {"light": 1}, "red": {"light": 1},
-    "clear": {"": 9, "road": 3, "vehicles": 2, "traffic": 3, "pedestrians": 2, "junction": 1, "lane": 1, "crosswalk": 1},
-    "gone": {"vehicles": 7, "car": 6, "pedestrians": 4, "pedestrian": 4, "traffic": 2, "motorcycle": 3, "truck": 4, "bus": 4, "vehicle": 3, "van": 2, "cone": 0.7, "obstacle": 0.7, "bicycle": 3, "animal": 1},
-    "passed": {"junction": 7, "obstacle": 3, "car": 2, "truck": 3, "bus": 2, "building": 2, "light": 2, "crosswalk": 1, "landmark": 2, "cone": 1, "van": 1, "sign": 1, "roundabout": 1, "vehicles": 1},
-    "near": {"junction": 3, "light": 2, "vehicle": 2, "car": 2, "building": 2, "roundabout": 1, "obstacle": 2, "crosswalk": 1, "landmark": 1, "sign": 1},
+    "clear": {"": 9, "road": 3, "vehicles": 2, "traffic": 3, "pedestrians": 2, "junction": 1, "lane": 1,
+        "crosswalk": 1},
+    "gone": {"vehicles": 7, "car": 6, "pedestrians": 4, "pedestrian": 4, "traffic": 2, "motorcycle": 3,
+        "truck": 4, "bus": 4, "vehicle": 3, "van": 2, "cone": 0.7, "obstacle": 0.7, "bicycle": 3, "animal": 1},
+    "passed": {"junction": 7, "obstacle": 3, "car": 2, "truck": 3, "bus": 2, "building": 2, "light": 2,
+        "crosswalk": 1, "landmark": 2, "cone": 1, "van": 1, "sign": 1, "roundabout": 1, "vehicles": 1},
+    "near": {"junction": 3, "light": 2, "vehicle": 2, "car": 2, "building": 2, "roundabout": 1, "obstacle": 2,
+        "crosswalk": 1, "landmark": 1, "sign": 1},
     "stopped": {"car": 4, "vehicle": 2, "bus": 2, "truck": 2, "traffic": 1, "van": 1},
     "moves": {"car": 5, "vehicle": 2, "truck": 2, "bus": 2, "traffic": 2, "van": 1, "vehicles": 1},
     "opens": {"gate": 1, "barrier": 0.2},
     "arrives": {"pedestrian": 4, "bus": 1, "car": 1},
     "told": {"": 1}, "other": {"": 1},
 }  # fmt: skip
-_WAITS: Final = frozenset("turn lane go straight stop avoid keep enter u_turn park pass speed move follow pull_over exit".split())
+_WAITS: Final = frozenset(
+    ("turn lane go straight stop avoid keep enter u_turn park pass speed move follow pull_over exit").split()  # noqa: SIM905
+)
 """Acts that a condition is said with."""
 COLOURS: Final[Weights] = {
     "white": 12, "black": 10, "grey": 5, "red": 8, "yellow": 4, "silver": 4, "orange": 3, "blue": 7, "green": 4,
     "dark": 1, "brown": 1.5, "pink": 1, "purple": 1, "beige": 0.7,
 }  # fmt: skip
-_PAINTED: Final = frozenset("car truck bus van motorcycle bicycle vehicle".split())
+_PAINTED: Final = frozenset(["car", "truck", "bus", "van", "motorcycle", "bicycle", "vehicle"])
 _PEOPLE: Final = frozenset({"pedestrian", "pedestrians"})
 _PLURAL: Final = frozenset({"vehicles", "pedestrians"})
 _MASS: Final = frozenset({"traffic", "end_of_road", "me_here"})
@@ -113,6 +133,27 @@ _STATES: Final[Mapping[str, Weights]] = {
     "vehicle": {"parked": 6, "moving": 2, "turning": 2, "oncoming": 3, "stopped": 2},
     "people": {"walking": 4, "standing": 3, "crossing": 4},
 }
+HINTED: Final[Weights] = {"speed": 5, "gap": 2, "stop": 1.5, "pull_over": 1, "wait": 0.5, "goto": 0.5, "go": 0.5}
+"""Acts that whole sentences hint at ("I'm late")."""
+_WAITED: Final[Weights] = {
+    "until gone": 8, "until green": 3, "until clear": 4, "until arrives": 3, "until told": 3, "until opens": 1.5,
+    "until moves": 1, "until other": 1,
+}  # fmt: skip
+"""What a `wait` waits for."""
+_POINTED: Final[Weights] = {
+    "stop": 9, "park": 4, "pull_over": 2, "follow": 7, "pass": 2, "avoid": 3, "yield": 4, "turn": 1, "speed": 1,
+}  # fmt: skip
+"""Acts about what the sentence before pointed at."""
+_DENIED: Final[Weights] = {
+    "turn": 4, "lane": 3, "stop": 4, "pass": 4, "follow": 2, "speed": 2, "park": 3, "yield": 1.5, "go": 1,
+    "pull_over": 1, "enter": 1,
+}  # fmt: skip
+"""Acts that are told not to be done."""
+_IT: Final[Mapping[bool, Weights]] = {
+    True: {"him": 4, "her": 3, "them": 2},
+    False: {"it": 5, "them": 2, "him": 1.5, "that one": 1},
+}
+"""Pronouns of people and of vehicles."""
 _MOST_CHARS: Final = 300
 _SPACE: Final = re.compile(r"\s+")
 _SLOT: Final = re.compile(r"\{([a-z_]+)(\??)\}")
@@ -200,7 +241,10 @@ class Composer:
         elif kind == "negated":
             acts, text = self._negated()
         elif kind == "said":
-            act, text = self._act_of(self._draw({"speed": 5, "gap": 2, "stop": 1.5, "pull_over": 1, "wait": 0.5, "goto": 0.5, "go": 0.5}), "say")
+            act, text = self._act_of(
+                self._draw({"speed": 5, "gap": 2, "stop": 1.5, "pull_over": 1, "wait": 0.5, "goto": 0.5, "go": 0.5}),
+                "say",
+            )
             acts = [act]
             text = self._marked(text, 0)
         else:
@@ -319,7 +363,9 @@ class Composer:
             raise LookupError(verb)
         sizes = {name: float(len(self._bank.sections[name].texts)) ** 0.7 for name in names}
         section = self._draw(sizes)
-        fields = {name: value.replace("_", " ") for name, _, value in (part.partition("=") for part in section.split()[2:])}
+        fields = {
+            name: value.replace("_", " ") for name, _, value in (part.partition("=") for part in section.split()[2:])
+        }
         act = Act(cast("Verb", verb), **cast("Any", fields))
         return self._filled(act, self._say(section))
 
@@ -330,7 +376,9 @@ class Composer:
             name, optional = slot[1], bool(slot[2])
             if name in ("a", "b", "x", "who", "n", "they"):
                 continue
-            share = PLACED.get(act.act, (0.5, {}))[0] if name == "place" else {"manner": 0.12, "side": 0.4}.get(name, 0.5)
+            share = (
+                PLACED.get(act.act, (0.5, {}))[0] if name == "place" else {"manner": 0.12, "side": 0.4}.get(name, 0.5)
+            )
             said = ""
             if not optional or self._often(share):
                 act, said, number = self._slot(act, name)
@@ -420,7 +468,7 @@ class Composer:
 
     def _waiting(self) -> tuple[list[WrittenAct], str]:
         """`wait` with what it waits for, alone or after a stop."""
-        drawn = self._draw({"until gone": 8, "until green": 3, "until clear": 4, "until arrives": 3, "until told": 3, "until opens": 1.5, "until moves": 1, "until other": 1})  # fmt: skip
+        drawn = self._draw(_WAITED)
         said = self._say(f"wait {drawn}")
         kind, event = drawn.split()
         act = Act("wait")
@@ -471,8 +519,8 @@ class Composer:
             gerund = gerund_of(rest) if self._often(0.06) else ""
             if gerund:
                 text = f"{text} before {head} {gerund}"
-            elif "{b}" in join and "{a}" in join:
-                text = join.replace("{a}", text).replace("{b}", said)
+            elif "{b}" in join:
+                text = (join if "{a}" in join else f"{{a}} {join}").replace("{a}", text).replace("{b}", said)
             else:
                 text = f"{text}{'' if join[0] in ',.;' else ' '}{join} {said}"
             acts = [*acts, *more]
@@ -505,18 +553,23 @@ class Composer:
                 extra: list[str] = []
                 if self._often(0.5):
                     ref = self._detailed(ref, [], extra, 1) if self._often(0.5) else ref
-                    if ref.state and not extra or ref.colour and not extra or ref.side and not extra or ref.ordinal:
+                    if (
+                        (ref.state and not extra)
+                        or (ref.colour and not extra)
+                        or (ref.side and not extra)
+                        or ref.ordinal
+                    ):
                         ref = Reference("pedestrian", name=ref.name)
                         extra = []
                 said = " ".join((said, *extra))
         ref = replace(ref, deictic=True)
         opened = self._say(f"point {'pedestrian' if kind == 'pedestrian' else 'vehicle'}").replace("{who}", said)
-        verb = self._draw({"stop": 9, "park": 4, "pull_over": 2, "follow": 7, "pass": 2, "avoid": 3, "yield": 4, "turn": 1, "speed": 1})  # fmt: skip
+        verb = self._draw(_POINTED)
         if kind == "pedestrian" and verb in ("follow", "pass"):
             verb = "stop"
         if kind != "pedestrian" and verb == "turn":
             verb = "follow"
-        it = self._draw({"him": 4, "her": 3, "them": 2} if kind == "pedestrian" else {"it": 5, "them": 2, "him": 1.5, "that one": 1})
+        it = self._draw(_IT[kind == "pedestrian"])
         form = f"pronoun {verb}" if self._has(f"pronoun {verb}") else ""
         if form:
             phrase, act = self._say(form), Act(cast("Verb", verb))
@@ -532,7 +585,9 @@ class Composer:
         else:
             raise LookupError(verb)
         # A name was said in the first sentence: its pointer goes there.
-        return [held], f"{opened}{self._draw({'.': 6, ',': 4, '': 1, '!': 1, ' so': 1, ' and': 0.7, ';': 0.5})} <0 {phrase} 0>"
+        return [
+            held
+        ], f"{opened}{self._draw({'.': 6, ',': 4, '': 1, '!': 1, ' so': 1, ' and': 0.7, ';': 0.5})} <0 {phrase} 0>"
 
     def _corrected(self) -> tuple[list[WrittenAct], str]:
         """Something said and taken back; what is said last counts."""
@@ -546,7 +601,7 @@ class Composer:
 
     def _negated(self) -> tuple[list[WrittenAct], str]:
         """An act that is not to be done, alone or beside one that is."""
-        verb = self._draw({"turn": 4, "lane": 3, "stop": 4, "pass": 4, "follow": 2, "speed": 2, "park": 3, "yield": 1.5, "go": 1, "pull_over": 1, "enter": 1})
+        verb = self._draw(_DENIED)
         act, phrase = self._act_of(verb)
         text = self._say("negation").replace("{a}", phrase)
         acts = [replace(act, act=replace(act.act, negated=True))]
@@ -607,7 +662,9 @@ class Composer:
             own = [name for name in names if low <= name[0] <= high] or names
             if asked > len(own) or (one.value is not None and len(inside) != 1):
                 return None
-            done.append(WrittenAct(one.act, (low, high), inside[0] if one.value is not None else None, tuple(own[:asked])))
+            done.append(
+                WrittenAct(one.act, (low, high), inside[0] if one.value is not None else None, tuple(own[:asked]))
+            )
         return Composed(tuple(words), tuple(done))
 
 
@@ -626,13 +683,16 @@ def _shifted(text: str, by: int) -> str:
     return re.sub(r" (\d+)>", lambda found: f" {int(found[1]) + by}>", text)
 
 
-_DOUBLED: Final = frozenset("stop get let drop hit swap cut set put hop slip spin sit run flip skip bus jam rip tip".split())
-_GERUNDS: Final = {"make": "making", "take": "taking", "u-turn": "making a u-turn", "lie": "lying", "be": "being"}
-_OPENERS: Final = frozenset(
-    "turn take make stop pull come park find follow stay keep avoid go drive steer swerve get move let yield give allow "
-    "pass overtake wait remain continue proceed head change switch merge shift slide cross slow reduce decelerate "
-    "speed accelerate increase enter leave exit drop pick hold brake set start begin".split()
+_DOUBLED: Final = frozenset(
+    ("stop get let drop hit swap cut set put hop slip spin sit run flip skip bus jam rip tip").split()  # noqa: SIM905
 )
+_GERUNDS: Final = {"make": "making", "take": "taking", "u-turn": "making a u-turn", "lie": "lying", "be": "being"}
+_OPENERS_WORDS: Final = (
+    "turn take make stop pull come park find follow stay keep avoid go drive steer swerve get move let yield "
+    "give allow pass overtake wait remain continue proceed head change switch merge shift slide cross slow "
+    "reduce decelerate speed accelerate increase enter leave exit drop pick hold brake set start begin"
+)
+_OPENERS: Final = frozenset(_OPENERS_WORDS.split())
 """Verbs whose gerund is made; a phrase that opens with another word has none."""
 
 
@@ -647,19 +707,12 @@ def gerund_of(phrase: str) -> str:
     return f"{made} {rest}".strip()
 
 
-_ONES: Final = (
-    "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen seventeen "
-    "eighteen nineteen"
-).split()
-_TENS: Final = "twenty thirty forty fifty sixty seventy eighty ninety".split()
-
-
 def in_words(value: int) -> str:
     """A whole number up to 199 in words."""
     if value >= 100:
         rest = value - 100
         return "a hundred" if rest == 0 else f"a hundred and {in_words(rest)}"
     if value < 20:
-        return _ONES[value]
+        return ONES[value]
     ten, one = divmod(value, 10)
-    return _TENS[ten - 2] if one == 0 else f"{_TENS[ten - 2]}{' ' if value % 2 else '-'}{_ONES[one]}"
+    return TENS[ten - 2] if one == 0 else f"{TENS[ten - 2]}{' ' if value % 2 else '-'}{ONES[one]}"

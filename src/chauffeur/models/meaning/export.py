@@ -67,8 +67,15 @@ def export_parser(network: MeaningParser, vocabulary: Path, folder: Path) -> Non
     decoder = _Decoder(network)
     example = (torch.ones((1, 7), dtype=torch.long), torch.zeros((1, 7), dtype=torch.long), torch.zeros((1, 9, width)))
     write_graph(
-        decoder, example, ["written", "positions", "memory"], ["scores"], ({1: length}, {1: length}, {1: tokens}), folder / DECODER
+        decoder,
+        example,
+        ["written", "positions", "memory"],
+        ["scores"],
+        ({1: length}, {1: length}, {1: tokens}),
+        folder / DECODER,
     )
     encoder = _Encoder(network)
-    write_graph(encoder, (torch.zeros((1, 9), dtype=torch.long),), ["ids"], ["memory"], ({1: tokens},), folder / ENCODER)
+    write_graph(
+        encoder, (torch.zeros((1, 9), dtype=torch.long),), ["ids"], ["memory"], ({1: tokens},), folder / ENCODER
+    )
     shutil.copyfile(vocabulary, folder / PIECES)

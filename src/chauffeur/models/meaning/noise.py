@@ -14,10 +14,11 @@ import numpy as np
 from chauffeur.language.meaning.symbols import WrittenAct
 from chauffeur.models.meaning.composer import Composed
 
-_KEPT: Final = frozenset(
-    "left right not don't dont never no until till before after once while unless if faster slower more less red green "
-    "leftmost rightmost middle behind first second third last".split()
+_KEPT_WORDS: Final = (
+    "left right not don't dont never no until till before after once while unless if faster slower more less "
+    "red green leftmost rightmost middle behind first second third last"
 )
+_KEPT: Final = frozenset(_KEPT_WORDS.split())
 _ARTICLES: Final = frozenset({"the", "a", "an"})
 _NEAR: Final = {
     "a": "sq", "b": "vn", "c": "xv", "d": "sf", "e": "wr", "f": "dg", "g": "fh", "h": "gj", "i": "uo", "k": "jl",
@@ -26,7 +27,8 @@ _NEAR: Final = {
 }  # fmt: skip
 """Keys beside a key."""
 _HEARD: Final = {
-    "brake": "break", "their": "there", "there": "their", "you're": "your", "its": "it's", "it's": "its", "lane": "line",
+    "brake": "break", "their": "there", "there": "their", "you're": "your", "its": "it's", "it's": "its",
+    "lane": "line",
     "to": "too", "too": "to", "right": "write", "straight": "strait", "pull": "pool", "gap": "cap", "buy": "by",
     "by": "buy", "turn": "tern", "park": "bark", "car": "cart", "the": "da", "for": "four", "wait": "weight",
     "past": "passed", "passed": "past", "road": "rode", "merge": "marge", "curb": "curve", "cone": "corn",
@@ -79,7 +81,9 @@ def _without_articles(
     words: Sequence[str], acts: tuple[WrittenAct, ...], share: float, rng: np.random.Generator
 ) -> tuple[list[str], tuple[WrittenAct, ...]]:
     held = {act.span[0] for act in acts} | {act.span[1] for act in acts}
-    held |= {at for act in acts for name in act.names for at in name} | {act.value for act in acts if act.value is not None}
+    held |= {at for act in acts for name in act.names for at in name} | {
+        act.value for act in acts if act.value is not None
+    }
     gone = [i for i, word in enumerate(words) if word in _ARTICLES and i not in held and rng.random() < share]
     moved = np.arange(len(words)) - np.searchsorted(gone, np.arange(len(words)))
     kept = [word for i, word in enumerate(words) if i not in set(gone)]

@@ -15,10 +15,9 @@ from torch import Tensor, nn
 from torch.utils.data import DataLoader
 
 from chauffeur.concept import DataError
-from chauffeur.concept.data import data_folder
 from chauffeur.language.meaning.pieces import WordPieces, read_vocabulary
 from chauffeur.language.meaning.symbols import END, INDEX, MOST_SYMBOLS, PAD, POINTER, START, SYMBOLS, Written
-from chauffeur.models.meaning.banks import Bank, merged, read_bank
+from chauffeur.models.meaning.banks import banks, merged
 from chauffeur.models.meaning.batches import Sentences, tensors
 from chauffeur.models.meaning.network import MeaningParser, ParserConfig
 
@@ -61,19 +60,9 @@ class MeaningRecipe:
     network: ParserConfig = field(default_factory=ParserConfig)
 
 
-def banks(held_out: Sequence[str] = ()) -> list[Bank]:
-    """The writers' banks, each completed by the plain one where it has nothing of its own to say.
-
-    Raises:
-        DataError: A writer held out has no bank, or a bank is damaged.
-    """
-    found = [read_bank(path) for path in sorted(data_folder("meaning").glob("*.txt"))]
-    if missing := set(held_out) - {bank.name for bank in found}:
-        raise DataError(f"No bank of phrases is called {', '.join(sorted(missing))}.")
-    return [bank for bank in found if bank.name not in held_out]
-
-
-def fit(recipe: MeaningRecipe, tell: Callable[[str], None], look: Callable[[MeaningParser, int], None] | None = None) -> MeaningParser:
+def fit(
+    recipe: MeaningRecipe, tell: Callable[[str], None], look: Callable[[MeaningParser, int], None] | None = None
+) -> MeaningParser:
     """Train a parser and write its weights.
 
     Args:
@@ -91,8 +80,15 @@ def fit(recipe: MeaningRecipe, tell: Callable[[str], None], look: Callable[[Mean
     writers = banks(recipe.held_out)
     whole = merged(writers)
     vocabulary = Path(recipe.encoder) / VOCABULARY
-    stream = Sentences([whole, *(merged([whole, *[writer] * len(writers)], writer.name) for writer in writers)], vocabulary, recipe.seed, recipe.batch)
-    loader = DataLoader(stream, batch_size=None, num_workers=recipe.workers, prefetch_factor=8 if recipe.workers else None)
+    stream = Sentences(
+        [whole, *(merged([whole, *[writer] * len(writers)], writer.name) for writer in writers)],
+        vocabulary,
+        recipe.seed,
+        recipe.batch,
+    )
+    loader = DataLoader(
+        stream, batch_size=None, num_workers=recipe.workers, prefetch_factor=8 if recipe.workers else None
+    )
     parts = [one for one in network.encoder.parameters() if one.requires_grad]
     own = {id(one) for one in parts}
     rest = [one for one in network.parameters() if one.requires_grad and id(one) not in own]
@@ -118,14 +114,17 @@ def fit(recipe: MeaningRecipe, tell: Callable[[str], None], look: Callable[[Mean
         step += 1
         if step % 100 == 0:
             total = float(loss.detach())
-            tell(f"step {step}  loss {total:.4f}  {step * recipe.batch / max(passed, 1e-9):.0f} sentences/s  {passed:.0f} s")
+            tell(f"step {step}  loss {total:.4f}  {step * recipe.batch / max(passed, 1e-9):.0f}/s  {passed:.0f} s")
         if look is not None and step % 2000 == 0:
             start = time.monotonic()
             look(network, step)
             looked += time.monotonic() - start
     folder = Path(recipe.out)
     folder.mkdir(parents=True, exist_ok=True)
-    torch.save({name: value.half() if value.is_floating_point() else value for name, value in network.state_dict().items()}, folder / WEIGHTS)
+    torch.save(
+        {name: value.half() if value.is_floating_point() else value for name, value in network.state_dict().items()},
+        folder / WEIGHTS,
+    )
     held = asdict(recipe) | {"trained_steps": step, "loss": total, "banks": [bank.name for bank in writers]}
     (folder / CONFIG).write_text(json.dumps(held, indent=1))
     return network
@@ -185,5 +184,10 @@ def load(folder: Path, encoder: str, device: str = "cpu") -> tuple[MeaningParser
     config: dict[str, Any] = json.loads((folder / CONFIG).read_text())
     bare = AutoModel.from_config(AutoConfig.from_pretrained(encoder), add_pooling_layer=False)
     network = MeaningParser(bare, ParserConfig(**config["network"]))
-    network.load_state_dict({name: value.float() if value.is_floating_point() else value for name, value in torch.load(folder / WEIGHTS, weights_only=True).items()})
+    network.load_state_dict(
+        {
+            name: value.float() if value.is_floating_point() else value
+            for name, value in torch.load(folder / WEIGHTS, weights_only=True).items()
+        }
+    )
     return network.to(device).eval(), WordPieces(read_vocabulary(Path(encoder) / VOCABULARY))
