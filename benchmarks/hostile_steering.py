@@ -33,6 +33,7 @@ from chauffeur.drive.actuate import actuate
 from chauffeur.geometry import Lane, Polyline, Pose, RoadGraph, wrap_to_pi
 from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.base import World
+from chauffeur.worlds.track.manoeuvres import WEATHERS
 from chauffeur.worlds.track.scenarios import street_scenario
 from chauffeur.worlds.track.street import draw_street
 
@@ -156,6 +157,7 @@ class Judge:
     """Looks at a trip after each period; `row` says what came of it."""
 
     def __init__(self, road: RoadGraph) -> None:
+        self._road = road
         self._asphalt = asphalt(road)
         shapely.prepare(self._asphalt)
         self._lanes = [
@@ -189,6 +191,15 @@ class Judge:
         self._seen.append(seen)
         while self._seen[0].time_s < seen.time_s - BEHIND_S:
             self._seen.popleft()
+
+    def own_ground(self, heading_rad: float) -> Any:
+        """What cars drive on, without the lanes that lead the other way."""
+        against = [
+            one
+            for lane, one in self._lanes
+            if math.cos(lane.centre.at(lane.length_m / 2.0).heading_rad - heading_rad) < -0.5
+        ]
+        return shapely.difference(asphalt(self._road, ("driving", "aisle")), shapely.union_all(against))
 
     def _against(self, ego: VehicleState) -> bool:
         middle = shapely.points(ego.x_m, ego.y_m)
@@ -236,13 +247,10 @@ class Judge:
         }
 
 
-def asphalt(road: RoadGraph) -> Any:
+def asphalt(road: RoadGraph, kinds: tuple[str, ...] = ("driving", "aisle", "emergency", "parking")) -> Any:
     """The union of all lanes for cars, whatever their direction, gaps between them and islands of a few m2 closed."""
-    kinds = ("driving", "aisle", "emergency", "parking")
     led = {one for lane in road.lanes for one in lane.successors}
-    united = shapely.union_all(
-        [strip(_drawn_out(one, led), one.width_m) for one in road.lanes if one.kind in kinds]
-    )
+    united = shapely.union_all([strip(_drawn_out(one, led), one.width_m) for one in road.lanes if one.kind in kinds])
     closed = united.buffer(JOINT_M).buffer(-JOINT_M)
     parts = [closed] if isinstance(closed, Polygon) else list(closed.geoms)
     kept = [
@@ -279,7 +287,8 @@ def scenario(place: Place, seed: int, towns: tuple[str, ...] = TOWNS) -> Scenari
     """Where a trip begins."""
     rng = np.random.default_rng([seed, 5])
     if place == "open-road":
-        return street_scenario("hostile", draw_street(rng), "", "", seed)
+        scene = street_scenario("hostile", draw_street(rng), "", "", seed)
+        return replace(scene, config={**scene.config, "weather": WEATHERS[int(rng.integers(len(WEATHERS)))]})
     config = {
         "town": towns[seed % len(towns)],
         "vehicles": int(rng.integers(15, 60)),

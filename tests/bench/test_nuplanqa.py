@@ -16,9 +16,9 @@ from small_run import Inline, quiet
 from chauffeur.bench.kernel.benchmark import ItemOutcome
 from chauffeur.bench.kernel.calls import Patience
 from chauffeur.bench.kernel.conformance import faults
-from chauffeur.bench.kernel.run import BenchRun, Effort
+from chauffeur.bench.kernel.run import BenchError, BenchRun, Effort
 from chauffeur.bench.nuplanqa import NuPlanQaBenchmark
-from chauffeur.bench.nuplanqa.frames import CAMERAS
+from chauffeur.bench.nuplanqa.frames import CAMERAS, FrameSource
 from chauffeur.bench.nuplanqa.metadata import load_metadata
 from chauffeur.bench.nuplanqa.questions import SKILLS, SUBTASKS, load_questions
 from chauffeur.bench.nuplanqa.table6 import HEADER, our_lines, paper_lines, strict_accuracy
@@ -160,9 +160,11 @@ def test_an_endpoint_without_vision_is_told_of_every_item(tmp_path: Path, status
     failure = blind(RefusedError(status, {"message": words}), "http://x/v1", "m", str)
     assert failure is not None
     assert failure.kind == "no_vision" and not failure.retryable
-    done, rows = run(tmp_path, Oracle(error=failure))
+    with pytest.raises(BenchError, match=r"None of the 9 items.*9 times: .*takes no pictures"):
+        run(tmp_path, Oracle(error=failure))
+    (folder,) = tmp_path.glob("run-*")
+    rows = [json.loads(line) for line in (folder / "results.jsonl").read_text().splitlines()]
     assert [row["status"] for row in rows] == ["no vision"] * 9
-    assert done.halt is None
 
 
 def test_an_answer_that_chooses_nothing_counts_as_wrong(tmp_path: Path) -> None:
@@ -217,3 +219,31 @@ def test_the_papers_rows_stand_beside_ours() -> None:
 
 def test_cameras_of_the_published_metadata() -> None:
     assert CAMERAS == ("CAM_F0", "CAM_L0", "CAM_R0", "CAM_L2", "CAM_R2", "CAM_B0")
+
+
+@pytest.mark.parametrize(
+    ("odd", "says"),
+    [
+        ({"cams": None}, "Missing view"),
+        ({"cams": ["CAM_F0"]}, "Missing view"),
+        ({"cams": dict.fromkeys(CAMERAS, "file.jpg")}, "Missing view"),
+        ({"cams": {one: {"data_path": 3} for one in CAMERAS}}, "Missing view"),
+        ({"cams": {one: {"data_path": "../../x.jpg"} for one in CAMERAS}}, "outside of the set"),
+        ({"cams": {one: {"data_path": "/etc/passwd"} for one in CAMERAS}}, "outside of the set"),
+    ],
+)
+def test_metadata_of_another_shape_are_named(tmp_path: Path, odd: dict[str, Any], says: str) -> None:
+    source = FrameSource(tmp_path, {"t": odd})
+    with pytest.raises(DataError, match=says):
+        source.paths("t")
+
+
+@pytest.mark.parametrize(
+    "stamps", [(5, "noon"), (5, 5), (9, 5), ([], 5), (float("nan"), 5), (10**400, 5)], ids=lambda one: str(one)[:12]
+)
+def test_frames_that_are_not_before_one_another_are_named(tmp_path: Path, stamps: tuple[Any, Any]) -> None:
+    cams = {one: {"data_path": "x.jpg"} for one in CAMERAS}
+    before, now = stamps
+    rows = {"a": {"cams": cams, "timestamp": before}, "b": {"cams": cams, "timestamp": now, "prev": "a"}}
+    with pytest.raises(DataError, match="time stamps"):
+        FrameSource(tmp_path, rows).paths("b")

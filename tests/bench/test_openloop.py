@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from chauffeur.bench.kernel.calls import Patience
 from chauffeur.bench.kernel.conformance import faults
-from chauffeur.bench.kernel.run import BenchRun, Effort
+from chauffeur.bench.kernel.run import BenchError, BenchRun, Effort
 from chauffeur.bench.openloop import OpenLoopBenchmark
 from chauffeur.bench.openloop.benchmark import errors_of
 from chauffeur.bench.openloop.conventions import CONVENTIONS, L2Errors, errors, fails, standing
@@ -326,7 +326,11 @@ def test_an_endpoint_that_gives_nothing_counts_nowhere(tmp_path: Path) -> None:
     def refuse(text: str) -> str:
         raise DataError("down")
 
-    _, rows = run(write_nuscenes(tmp_path), Scripted(refuse), limit=3)
+    with pytest.raises(BenchError, match="3 times: down"):
+        run(write_nuscenes(tmp_path), Scripted(refuse), limit=3)
+    (folder,) = tmp_path.glob("run-*")
+    rows = [json.loads(line) for line in (folder / "results.jsonl").read_text().splitlines()]
+    assert len(rows) == 3 and json.loads((folder / "report.json").read_text())["tables"] == []
     assert all(row["status"] == "no answer" and row["failed"] is None for row in rows)
     assert our_line("us", "", rows)[3:] == ("n/a",) * 5
     assert all(errors_of(row, name) == L2Errors(None, None, None) for row in rows for name in CONVENTIONS)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
 
 import pytest
 from report_folders import mixed, write_run
+from small_run import Inline, quiet
 from typer.testing import CliRunner
 
+from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.cli.main import app
 
 
@@ -31,6 +34,23 @@ def test_several_runs_are_reported_beside_them_or_where_asked(tmp_path: Path) ->
     assert (tmp_path / "report" / "report.html").is_file()
     assert _report(*runs, "--out", tmp_path / "here", "--metrics", "paper")[0] == 0
     assert "lampilot-paper-v1" in (tmp_path / "here" / "report.md").read_text()
+
+
+def test_of_a_run_of_another_benchmark_its_tables_are_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "examples"))
+    right_of_way = importlib.import_module("right_of_way")
+    folder, mixed_in = tmp_path / "run", write_run(tmp_path / "lampilot", mixed())
+    BenchRun(folder, right_of_way.RightOfWay(), right_of_way.Polite()).run(quiet, Effort(engine=Inline))
+    code, said = _report(folder)
+    assert code == 0, said
+    for line in (folder / "table.md").read_text(encoding="utf-8").splitlines():
+        assert " ".join(line.split()) in said
+    assert "report.json" in said
+    assert "LaMPilot-Bench alone" in said
+    assert not (folder / "report").exists()
+    code, said = _report(folder, mixed_in)
+    assert code == 2, "they cannot be compared"
+    assert "right-of-way-v1" in said
 
 
 @pytest.mark.parametrize(

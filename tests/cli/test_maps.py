@@ -9,6 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from chauffeur.cli.main import app
+from chauffeur.drive.scenarios import find
+from chauffeur.drive.session import make_world
 
 run = CliRunner()
 
@@ -36,6 +38,15 @@ def test_a_town_is_built_and_found_by_name(tmp_path: Path, monkeypatch: pytest.M
     assert said.exit_code == 0, said.output
     assert "seed 3" in said.output
     assert "Ringstead-3" in run.invoke(app, ["maps", "list"]).output
+    assert "--scenario Ringstead-3" in " ".join(said.output.split())
+    monkeypatch.chdir(tmp_path)
+    for name in ("Ringstead-3", str(tmp_path / "maps" / "Ringstead-3")):
+        place = find(name)
+        assert make_world(place).reset(place).kind == "town"
+    driven = run.invoke(app, ["drive", "Turn right at the next junction.", "--scenario", "Ringstead-3", "--quiet"])
+    assert driven.exit_code == 0, driven.output
+    near = run.invoke(app, ["drive", "Turn right.", "--scenario", "Ringstead-4"])
+    assert "Ringstead-3" in near.output
 
 
 def test_what_is_no_town_is_said(tmp_path: Path) -> None:
@@ -50,3 +61,41 @@ def test_what_is_no_town_is_said(tmp_path: Path) -> None:
         said = run.invoke(app, ["maps", *arguments])
         assert said.exit_code != 0
         assert says in "".join(said.output.split("\n")) or says in str(said.exception)
+
+
+def test_a_file_with_odd_records_is_built_and_they_are_listed(tmp_path: Path) -> None:
+    """What this reader leaves out, netconvert does not meet either."""
+    pytest.importorskip("sumo", reason="needs the extra `maps`")
+    lanes = "".join(
+        f'<lane id="{number}" type="driving"><link><predecessor/><successor id="none"/></link>'
+        f'<border sOffset="0" a="{3.5 * number}" b="0" c="0" d="0"/>'
+        '<roadMark sOffset="0" type="broken" laneChange="perhaps"/></lane>'
+        for number in (-1, -2)
+    )
+    path = tmp_path / "odd.xodr"
+    path.write_text(
+        '<OpenDRIVE xmlns="http://code.asam.net/simulation/standard/opendrive_schema">'
+        '<header revMajor="1" revMinor="8"/>'
+        '<road id="1" length="200" junction="-1"><link><predecessor/></link>'
+        '<type s="0" type="town"><speed max="50" unit="KPH"/></type><type s="9" type="town"><speed max="a lot"/></type>'
+        '<planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>'
+        '<lanes><laneSection s="0"><center><lane id="0" type="none"/></center>'
+        f"<right>{lanes}</right></laneSection></lanes>"
+        '<signals><signal s="5" t="-9" id="7" type="274" value="none"/></signals></road></OpenDRIVE>'
+    )
+    result = run.invoke(app, ["maps", "build", str(path), "--out", str(tmp_path / "pack")])
+    assert result.exit_code == 0, result.output
+    said = " ".join(result.output.split())
+    assert "signal '7'" in said and "'a lot'" in said and "'perhaps'" in said and "'none'" in said
+
+
+def test_traffic_on_the_left_is_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "left.xodr"
+    path.write_text(
+        '<OpenDRIVE><header/><road id="1" length="90" rule="LHT"><planView>'
+        '<geometry s="0" x="0" y="0" hdg="0" length="90"><line/></geometry></planView>'
+        '<lanes><laneSection s="0"><left><lane id="1" type="driving">'
+        '<width sOffset="0" a="3" b="0" c="0" d="0"/></lane></left></laneSection></lanes></road></OpenDRIVE>'
+    )
+    result = run.invoke(app, ["maps", "build", str(path), "--out", str(tmp_path / "pack")])
+    assert result.exit_code == 2 and "keep left" in result.output

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.language.emergency import MOST_CHARACTERS, SAFE_STOP_WISH, read_emergency
+from chauffeur.language.emergency import SAFE_STOP_WISH, read_emergency, tells_of_alarm
+from chauffeur.language.plain_line import MOST_CHARACTERS
 
 BEFORE = (
     "",
@@ -192,3 +194,35 @@ def _spent_s(text: str) -> float:
     begun = time.process_time()
     read_emergency(text)
     return time.process_time() - begun
+
+
+# In many manners, with what only sounds alike ------------------------------------------------------------------------
+
+_FITS = {"stop": {"stop"}, "ask": {"stop", "safe_stop", "ask"}, "none": {"", "no_stop"}}
+"""What may be read of a call to stop, of distress, and of words that are neither."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "text"),
+    [line.split("\t") for line in Path(__file__).with_name("alarms.tsv").read_text("utf-8").splitlines()],
+)
+def test_calls_and_distress_are_told_from_what_sounds_like_them(kind: str, text: str) -> None:
+    found = read_emergency(text)
+    assert ("" if found is None else found.kind) in _FITS[kind]
+
+
+@pytest.mark.parametrize(
+    ("thoughts", "alarm"),
+    [
+        ("The passenger wants me to stop the car immediately. I cannot stop on a motorway.", True),
+        ("The user is asking for a sudden stop.", True),
+        ("This sounds like a medical emergency; I cannot call for help.", True),
+        ("They say that somebody on board is unconscious.", True),
+        ("I keep out of the emergency lane.", False),
+        ("This is not an emergency, and the sign says 50.", False),
+        ("They want to overtake, and there is no gap.", False),
+        ("They want to stop at the bakery, which I do not know.", False),
+    ],
+)
+def test_a_models_words_tell_of_an_alarm(thoughts: str, alarm: bool) -> None:
+    assert tells_of_alarm(thoughts) is alarm

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from parameters_asked import LEFT, plan
 
-from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.doubts import foreign
 from chauffeur.planners.onboard.draft import draft
 from chauffeur.planners.registry import make_planner
+from chauffeur.safety.dangers import danger
 
 DANGEROUS = (
     "Ram that car!",

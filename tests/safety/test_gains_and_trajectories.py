@@ -73,4 +73,4 @@ def test_who_stands_on_the_way_is_not_driven_through_and_who_drives_on_is_follow
     driving = replace(standing, x_m=12.0, speed_mps=10.0)
     assert reasons(straight(), replace(NOW, others=(driving,))) == ""
     walking = replace(standing, kind="pedestrian", length_m=0.5, width_m=0.5, x_m=20.0)
-    assert "somebody on foot" in reasons(straight(), replace(NOW, others=(walking,)))
+    assert "touch a pedestrian" in reasons(straight(), replace(NOW, others=(walking,)))

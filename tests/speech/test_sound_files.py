@@ -7,6 +7,7 @@ import shutil
 import struct
 import subprocess
 import wave
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -103,6 +104,92 @@ def test_a_piped_header_promises_terabytes_and_nothing_is_said() -> None:
     struct.pack_into("<I", whole, 40, 0x7FFF_F000)
     found = decode(bytes(whole))
     assert found.notes == () and len(found.samples) == 8000
+
+
+def riff(*parts: tuple[bytes, bytes, int | None], kind: bytes = b"RIFF", size: int = 0) -> bytes:
+    """A RIFF file of (name, content, length that its header states; None for the true one)."""
+    body = b"".join(
+        name + struct.pack("<I", len(content) if length is None else length) + content + b"\0" * (len(content) % 2)
+        for name, content, length in parts
+    )
+    return kind + struct.pack("<I", size) + b"WAVE" + body
+
+
+def head(kind: int = 1, channels: int = 1, rate_hz: int = SAMPLE_RATE_HZ, bits: int = 16, more: bytes = b"") -> bytes:
+    frame = channels * bits // 8
+    return struct.pack("<HHIIHH", kind, channels, rate_hz, rate_hz * frame, frame, bits) + more
+
+
+PCM = (np.clip(tone(), -1.0, 1.0) * 32767).astype("<i2").tobytes()
+FLOATS = tone().astype("<f4").tobytes()
+EXTENSIBLE = struct.pack("<HHI", 22, 16, 0) + struct.pack("<H", 1) + bytes(14)
+LIST = (b"LIST", b"INFOsoft", None)
+
+
+@pytest.mark.parametrize("length", [None, 0, 0xFFFF_FFFF, 0x7FFF_FFFF, 0x8000_0000, 0xFFFF_FFFE, 0x7FFF_F000])
+@pytest.mark.parametrize("size", [0, 0xFFFF_FFFF, 36])
+@pytest.mark.parametrize("before", [(), (LIST,), ((b"fact", bytes(4), None), (b"JUNK", bytes(27), None))])
+def test_whatever_length_a_pipe_wrote_it_is_read_to_its_end(
+    length: int | None, size: int, before: tuple[tuple[bytes, bytes, int | None], ...]
+) -> None:
+    found = decode(riff((b"fmt ", head(), None), *before, (b"data", PCM, length), size=size))
+    assert len(found.samples) == 8000 and not found.notes
+
+
+@pytest.mark.parametrize(
+    ("data", "most"),
+    [
+        (riff((b"fmt ", head(0xFFFE, more=EXTENSIBLE), None), (b"data", PCM, 0)), 8000),
+        (riff((b"fmt ", head(3, bits=32), None), (b"data", FLOATS, 0)), 8000),
+        (riff((b"fmt ", head(3, bits=64), None), (b"data", tone().astype("<f8").tobytes(), None)), 8000),
+        (riff((b"ds64", bytes(28), None), (b"fmt ", head(), None), (b"data", PCM, 0xFFFF_FFFF), kind=b"RF64"), 8000),
+        (riff((b"fmt ", head(), None), (b"data", PCM, None), LIST), 8000),
+        (riff((b"fmt ", head(channels=2), None), (b"data", PCM + b"\1", 0)), 4000),
+        (riff((b"fmt ", head(bits=24), None), (b"data", b"\0\0\x40" * 8000, 0)), 8000),
+    ],
+)
+def test_odd_headers_are_read(data: bytes, most: int) -> None:
+    assert len(decode(data).samples) == most
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        riff((b"fmt ", head(), None), (b"data", b"", 0), LIST),
+        riff((b"fmt ", head(), None), (b"data", b"", 0)),
+        riff((b"fmt ", head(channels=0), None), (b"data", PCM, None)),
+        riff((b"fmt ", head(rate_hz=0), None), (b"data", PCM, None)),
+        riff((b"fmt ", head(bits=0), None), (b"data", PCM, None)),
+        riff((b"fmt ", b"short", None), (b"data", PCM, None)),
+        riff((b"data", PCM, None)),
+        riff((b"fmt ", head(), 0xFFFF_FFFF)),
+    ],
+)
+def test_headers_without_sound_are_refused_in_words(data: bytes) -> None:
+    with pytest.raises(DataError):
+        decode(data)
+
+
+@pytest.mark.parametrize("odd", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("rate_hz", [SAMPLE_RATE_HZ, 44_100])
+@pytest.mark.parametrize("channels", [1, 2])
+def test_samples_that_are_no_numbers_are_silence_and_spread_nowhere(odd: float, rate_hz: int, channels: int) -> None:
+    if rate_hz != SAMPLE_RATE_HZ:
+        pytest.importorskip("soxr", reason="needs the extra `speech`")
+    sound = np.repeat(tone(rate_hz=rate_hz)[:, None], channels, axis=1).astype("<f4")
+    whole = decode(riff((b"fmt ", head(3, channels, rate_hz, 32), None), (b"data", sound.tobytes(), None)))
+    sound[500::1000, 0] = odd
+    found = decode(riff((b"fmt ", head(3, channels, rate_hz, 32), None), (b"data", sound.tobytes(), None)))
+    off = np.abs(to_float(found.samples) - to_float(whole.samples))
+    assert np.median(off) < 0.001 and np.abs(to_float(found.samples)).max() < 1.0
+    assert any("no numbers" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("case", ["wav-length-zero", "wav-nan-samples"])
+def test_sound_from_the_field_is_heard(case: str, case_folder: Callable[[str], Path]) -> None:
+    pytest.importorskip("soxr", reason="needs the extra `speech`")
+    found = read_recording(case_folder(case) / "wish.wav")
+    assert found.duration_s > 1.5 and np.abs(to_float(found.samples)).max() > 0.1
 
 
 @pytest.mark.parametrize(

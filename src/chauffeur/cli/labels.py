@@ -33,6 +33,7 @@ EVENTS: Final[dict[EventKind, tuple[str, str]]] = {
     "resumed": ("goes on", "yellow"),
     "said": ("says", "magenta"),
     "garbage": ("garbage", "red"),
+    "halt": ("stops", "bold red"),
 }
 """Label and style of what becomes of a wish."""
 

@@ -163,7 +163,10 @@ def _said(folder: Path, name: str, notes: tuple[str, ...]) -> None:
     from rich.text import Text
 
     from chauffeur.cli.console import path_text, plain, stdout
+    from chauffeur.worlds.town.pack import packs
 
     stdout().print(Text.assemble(plain(name), " is in ", path_text(folder), "."))
     for note in notes:
         stdout().print(plain(note))
+    known = name if packs().get(name) == folder else str(folder)
+    stdout().print(Text(f'Drive there: chauffeur drive "Turn left." --scenario {known}'))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -27,9 +27,14 @@ Examples:
 Several runs are compared on the items that all of them have. Every figure is of simulated drives.
 """
 
+_TABLES_ONLY: Final = "A page with comparisons and failures is made of runs of LaMPilot-Bench alone; of others, tables."
+
 
 def report(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN", help="Run folders of chauffeur bench lampilot.")],
+    runs: Annotated[
+        list[Path],
+        typer.Argument(metavar="RUN", help="Run folders of chauffeur bench; of others than lampilot, their tables."),
+    ],
     out: Annotated[
         Path | None, typer.Option(help="Folder of the report; default `report` in the run, or beside several runs.")
     ] = None,
@@ -47,12 +52,13 @@ def report(
     ] = None,
     browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = False,
 ) -> None:
-    """Report runs of LaMPilot-Bench: scores with intervals, comparisons, costs, and a gallery of failures."""
+    """Report runs of LaMPilot-Bench: scores with intervals, comparisons, costs, failures; of others, their tables."""
     from rich.padding import Padding
     from rich.text import Text
 
     from chauffeur.bench.report.build import Choices, build_report
     from chauffeur.bench.report.latex import render_latex
+    from chauffeur.bench.report.runs import tables_of_another
     from chauffeur.bench.report.text import render_markdown
     from chauffeur.cli.console import columns, path_text, plain, stdout
     from chauffeur.cli.parts import needs
@@ -65,6 +71,13 @@ def report(
     if inspect is not None:
         needs("inspect", "An Inspect log", "inspect_ai")
     console = stdout()
+    others = {run: text for run in runs if (text := tables_of_another(run))}
+    if len(others) == len(runs) and inspect is None:
+        for run, text in others.items():
+            console.print(plain(text), soft_wrap=True)
+            console.print(Text.assemble("Figures with intervals: ", path_text(run / "report.json")))
+        console.print(plain(_TABLES_ONLY))
+        return
     choices = Choices(metrics or "", data, gallery)
     with _progress(console) as show:
         made = build_report(runs, choices, show)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from chauffeur.concept.errors import DataError
 
@@ -63,3 +64,11 @@ def read_data(name: str, file: str) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise DataError(f"Cannot read {path}: {error.strerror}.", hint="Restore it: git checkout -- data") from error
+
+
+def parse_json(content: str | bytes) -> Any:
+    """A JSON value of a file that may come from anywhere. Raises ValueError, also where it is nested too deeply."""
+    try:
+        return json.loads(content)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None

@@ -421,6 +421,11 @@ class Usage:
     cached: bool = False
 
 
+Alarm = Literal["", "stop", "distress"]
+"""What a planner took words for that is no wish to be weighed: a call to stop at once; a person or the car in distress.
+The car's emergency manoeuvre answers it, whatever the planner would have done."""
+
+
 @dataclass(frozen=True, slots=True)
 class Plan:
     """(R, P) and how they came about.
@@ -438,6 +443,7 @@ class Plan:
         latency_s: Wish in, plan out.
         raw: The reply as it came, for the record.
         scene: C as the planner itself saw it in pictures, in words; memory keeps it (Eq. 23). Empty without pictures.
+        alarm: Where the words were understood as an alarm; empty where they were not.
     """
 
     thoughts: Thoughts
@@ -452,6 +458,7 @@ class Plan:
     latency_s: float = 0.0
     raw: str = ""
     scene: str = ""
+    alarm: Alarm = ""
 
 
 MismatchKind = Literal[

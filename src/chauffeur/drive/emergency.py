@@ -1,4 +1,8 @@
-"""What the car does about emergency words, before any planner is asked: the plans are fixed, and no model decides.
+"""What the car does about emergency words: the plans are fixed, and no model decides.
+
+Words that are read as such ask no planner. What a planner then understands as a call to stop or as distress gets the
+same answer as if it had been said in so many words: it marks its plan (`Plan.alarm`), and a language model, which
+marks nothing, is taken at its own stop and its own words.
 
 The minimal-risk manoeuvre keeps the lane and brakes evenly, at no more than 4 m/s2 unless the lead vehicle asks for
 more, with hazard lights on (UN Regulation No. 157, 5.5). A simulated car has no lamps: that they are on is said in
@@ -7,11 +11,12 @@ words.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept import Observation, Parameters, Plan, Program, Thoughts, Verdict
+from chauffeur.concept import Alarm, Observation, Parameters, Plan, Program, Thoughts, Verdict
 from chauffeur.drive.fallback import MINIMAL_RISK_BRAKING_MPS2
-from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency
+from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency, tells_of_alarm
 from chauffeur.safety.bounds import least_speed_mps, shoulder_at_right
 from chauffeur.safety.constant_calls import read_program
 
@@ -24,6 +29,9 @@ NO_SHOULDER: Final = "There is no shoulder here. To stop in this lane at once, s
 QUESTION: Final = "Shall I stop at the next safe place?"
 ASKED: Final = f"I cannot call anybody. {QUESTION} If so, say: “{SAFE_STOP_WISH}” To stop at once, say: “Stop!”"
 """The question where nobody waits for a yes."""
+
+ALARM_WORDS: Final[dict[Alarm, str]] = {"stop": "Stop the car!", "distress": "This is an emergency."}
+"""What an alarm stands for, in words that are always read as `stop` and `ask`."""
 
 _STOPPED_MPS: Final = 0.1
 _SLACK_MPS: Final = 0.5
@@ -111,6 +119,55 @@ def planned_for(text: str, observation: Observation) -> Plan | None:
 def _plan(thoughts: str, source: str, intent: str, speed_mps: float) -> Plan:
     settings = (("target_speed_mps", speed_mps),)
     return Plan(Thoughts(thoughts), Program(source), intent=intent, settings=settings, planner=EMERGENCY_PLANNER)
+
+
+def forbids_stop(text: str) -> bool:
+    """Whether words forbid stopping, braking or pulling over."""
+    found = read_emergency(text)
+    return found is not None and found.kind == "no_stop"
+
+
+def alarm_of(plan: Plan, text: str) -> Alarm:
+    """What a planner understood as an alarm: its mark, or what a model that declines says of the person.
+
+    Args:
+        plan: The planner's.
+        text: What the person said; a person who forbids a stop is not stopped.
+    """
+    if forbids_stop(text):
+        return ""
+    declines = plan.policy is None and plan.intent == "declined"
+    told = declines and tells_of_alarm(f"{plan.thoughts.text} . {plan.refusal}")
+    return plan.alarm or ("distress" if told else "")
+
+
+def is_bare_stop(plan: Plan, text: str) -> bool:
+    """Whether a plan does nothing but stop, at once and in its lane, as far as can be read of it, and may.
+
+    Args:
+        plan: The planner's.
+        text: As of `alarm_of`.
+    """
+    if forbids_stop(text):
+        return False
+    match plan.policy:
+        case Parameters(target_speed_mps=speed, lane=0, route=""):
+            return 0.0 <= speed <= _STOPPED_MPS
+        case Program(source=source):
+            uses = read_program(source).uses
+            speeds = [use.values for use in uses if use.name == "set_target_speed"]
+            still = bool(speeds) and all(
+                values and 0.0 <= min(values) <= max(values) <= _STOPPED_MPS for values in speeds
+            )
+            return still and not any("lane" in use.name and use.name.startswith("set") for use in uses)
+        case _:
+            return False
+
+
+def raised(alarm: Alarm, answer: Plan, text: str) -> Plan:
+    """The car's own answer to an alarm that a planner understood, marked and told as such."""
+    taken = "I take “{}” for a call to stop." if alarm == "stop" else "“{}” may be a call for help, or to stop."
+    return replace(answer, thoughts=Thoughts(f"{taken.format(text)} {answer.thoughts.text}"), alarm=alarm)
 
 
 def not_checked(plan: Plan) -> tuple[Verdict, ...]:

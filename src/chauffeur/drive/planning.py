@@ -3,7 +3,8 @@
 What really differs between drives is handed in as `PlanSteps`; the order, and what no drive may leave out, stands here:
 
     I C H S   gathered, and screened: words are data, whoever wrote them
-    R P       the car's own answer to emergency words, else an answer from C to a question, else the planner's; one that
+    R P       the car's own answer to emergency words; nothing for a wish that is unsafe whoever plans; an answer from C
+              to a question; else the planner's, of which an alarm goes back to the car's own answer. A planner that
               hangs or breaks ends in an error with words
     ?         a question of the car is asked only where a yes to it could be driven
     V         the checks, and what the person forbade in words
@@ -18,6 +19,7 @@ from __future__ import annotations
 import asyncio
 import math
 import re
+import time
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -39,12 +41,14 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.drive.answers import plan_or_answer
-from chauffeur.drive.emergency import check_told_not_to
+from chauffeur.drive.emergency import ALARM_WORDS, alarm_of, check_told_not_to, is_bare_stop, raised
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
 from chauffeur.language.questions import is_question
 from chauffeur.planners.base import Planner
+from chauffeur.planners.base import declined as declined_by
 from chauffeur.safety.base import Check
 from chauffeur.safety.checks import DEFAULT_CHECKS, run_checks
+from chauffeur.safety.dangers import check_wish
 from chauffeur.safety.screening import screen_request
 from chauffeur.safety.words import reasons_once
 
@@ -148,15 +152,13 @@ async def plan_once(instruction: Instruction, steps: PlanSteps) -> Planned:
         ChauffeurError: No plan could be had.
     """
     request = await request_once(instruction, steps)
-    own = steps.own(instruction.text)
-    if own is None:
-        plan = steps.fit(await _planned(request, steps))
-        plan = await _worth_asking(_meant(plan, instruction) if steps.runs else plan, request, steps)
-    else:
-        plan = steps.fit(own)
+    wish = check_wish(instruction.text)
+    own, plan = await _answered(request, wish, steps)
     steps.tell(DriveEvent("plan", text=plan.thoughts.text, value=plan))
-    verdicts, now = await steps.check(plan, own is not None)
-    if own is None:
+    verdicts, now = await steps.check(plan, own)
+    if wish.stops and not own:
+        verdicts = (*verdicts, wish)
+    elif not own:
         verdicts = (*verdicts, *check_told_not_to(instruction.text, plan, now))
     steps.tell(DriveEvent("verdicts", value=verdicts))
     return Planned(plan, verdicts, request)
@@ -210,6 +212,25 @@ async def _planned(request: PlanRequest, steps: PlanSteps) -> Plan:
     if isinstance(error, ChauffeurError) or not isinstance(error, Exception):
         raise error
     raise PlannerError(f"The planner failed: {type(error).__name__}: {error}", retryable=True) from error
+
+
+async def _answered(request: PlanRequest, wish: Verdict, steps: PlanSteps) -> tuple[bool, Plan]:
+    """(whether it is the car's own answer, R and P): an unsafe wish reaches no planner, and a planner that understands
+    an alarm is not left to answer it."""
+    text = request.instruction.text
+    own = steps.own(text)
+    if own is not None:
+        return True, steps.fit(own)
+    if wish.stops:
+        return False, declined_by(steps.planner, wish.reason, time.perf_counter(), intent="refuse")
+    plan = steps.fit(await _planned(request, steps))
+    plan = await _worth_asking(_meant(plan, request.instruction) if steps.runs else plan, request, steps)
+    alarm = alarm_of(plan, text)
+    if not alarm and is_bare_stop(plan, text):
+        verdicts, _ = await (steps.check if steps.check_yes is None else steps.check_yes)(plan, False)
+        alarm = "stop" if any(one.stops for one in verdicts) else ""
+    answer = steps.own(ALARM_WORDS[alarm]) if alarm else None
+    return (False, plan) if answer is None else (True, steps.fit(raised(alarm, answer, text)))
 
 
 def _meant(plan: Plan, instruction: Instruction) -> Plan:

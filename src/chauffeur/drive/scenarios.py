@@ -21,7 +21,9 @@ from chauffeur.worlds.base import World
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 from chauffeur.worlds.highway.scenarios import BUILT_IN as ROADS
 from chauffeur.worlds.parking.scenarios import BUILT_IN as LOTS
+from chauffeur.worlds.town.pack import packs
 from chauffeur.worlds.town.scenarios import BUILT_IN as TOWNS
+from chauffeur.worlds.town.scenarios import in_pack
 from chauffeur.worlds.track.scenarios import BUILT_IN as TRACKS
 
 BUILT_IN = ROADS + LOTS + TRACKS + TOWNS
@@ -71,7 +73,8 @@ def list_scenarios(data_dir: Path | None = None) -> tuple[Scenario, ...]:
 
 
 def find(name: str, data_dir: Path | None = None) -> Scenario:
-    """A scenario by name or official id (`left_overtake_s0`; an item id such as `left_overtake_s0_c3` works too).
+    """A scenario by name or official id (`left_overtake_s0`; an item id such as `left_overtake_s0_c3` works too), or a
+    town by the name or the folder of its map pack.
 
     Raises:
         ScenarioError: No such scenario; says which come close, and how to reach the official ones.
@@ -84,10 +87,14 @@ def find(name: str, data_dir: Path | None = None) -> Scenario:
         scenario = dataset.scenario(name)
         if scenario is not None:
             return scenario
-    known = [s.id for s in list_scenarios(data_dir)]
+    if (town := in_pack(name)) is not None:
+        return town
+    known = [*(s.id for s in list_scenarios(data_dir)), *packs()]
     near = difflib.get_close_matches(name, known, n=3)
     hint = f"Did you mean {' or '.join(near)}?" if near else "Run `chauffeur show scenarios` for the list."
-    if dataset is None and re.search(r"_s\d+", name):
+    if name.endswith(".xodr"):
+        hint = f"Build the town first: chauffeur maps build {name}; then name it."
+    elif dataset is None and re.search(r"_s\d+", name):
         hint = f"Official LaMPilot samples need their folder: --data DIR, or {DATA_VARIABLE} in the environment."
     raise ScenarioError(f"Unknown scenario {name!r}.", hint=hint)
 
@@ -118,10 +125,10 @@ def suiting(wish: str) -> Scenario:
 
 
 def lasting(scenario: Scenario, duration_s: float) -> Scenario:
-    """A built-in scenario of a town or a lot with time for a session of that long; any other as it is."""
-    if scenario not in LOTS + TOWNS:
+    """A scenario in a town or a lot with time for a session of that long; any other as it is."""
+    if scenario.world not in ("town", "parking"):
         return scenario
-    most_s = _LONGEST_LOT_S if scenario in LOTS else duration_s + 1.0
+    most_s = _LONGEST_LOT_S if scenario.world == "parking" else duration_s + 1.0
     return replace(scenario, config={**scenario.config, "duration_s": min(duration_s + 1.0, most_s)})
 
 

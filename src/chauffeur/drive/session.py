@@ -46,7 +46,7 @@ from chauffeur.drive.loop import LoopMemory, Stages, drive, steps_of
 from chauffeur.drive.planning import declined, no_pictures, request_once, unusable
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.seat import SeatCamera
-from chauffeur.drive.surroundings import describing, opened
+from chauffeur.drive.surroundings import describing, opened, weathered
 from chauffeur.executors import Executor, executor_for
 from chauffeur.executors.base import OfKind
 from chauffeur.executors.program import ProgramDrive
@@ -162,7 +162,7 @@ class Session:
     async def _stages(self, world: World, seed: int) -> Stages:
         return Stages(
             world=world,
-            describe=await self._describing(),
+            describe=weathered(world, await self._describing()),
             memory=TolerantMemory(self.memory, lambda text: self.tell(DriveEvent("trouble", text=text))),
             system=partial(self._build_system, vocabulary_of(world.capabilities.roads[0])),
             planner=self.planner,

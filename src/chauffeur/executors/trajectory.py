@@ -18,6 +18,7 @@ from chauffeur.executors.base import ExecutorBase
 from chauffeur.executors.reference import Reference
 from chauffeur.executors.tracking import DEFAULT_GAINS, PathTracker
 from chauffeur.geometry import Polyline, Pose, joined
+from chauffeur.geometry.polyline import smooth
 from chauffeur.worlds.base import World
 
 _STAND_MPS: Final = 0.1
@@ -130,7 +131,7 @@ def reference_of(policy: Trajectory, start: Pose, speed_mps: float) -> Reference
     # The speed of a leg is that at its middle.
     speeds = [max(speed_mps, 0.0), *((one + two) / 2.0 for one, two in pairwise(legs)), legs[-1]]
     speeds = [0.0 if place in stands else speed for place, speed in enumerate(speeds)]
-    x, y = _smooth(np.array(kept)).T
+    x, y = smooth(np.array(kept)).T
     points = [start.place(float(px), float(py)) for px, py in zip(x, y, strict=True)]
     try:
         path = Polyline.of(points)
@@ -174,18 +175,3 @@ def rebased(policy: Trajectory, there: Pose, here: Pose) -> Trajectory:
         (ax, ay), (bx, by) = places[index], places[index + 1]
         ahead.append(here.sees(ax + (at - index) * (bx - ax), ay + (at - index) * (by - ay)))
     return Trajectory(tuple(ahead), policy.period_s)
-
-
-def _smooth(points: np.ndarray) -> np.ndarray:
-    """Catmull-Rom through the waypoints, (n, 2) -> (m, 2): continuous headings, through every waypoint."""
-    if len(points) == 2:
-        return points
-    padded = np.vstack([2.0 * points[0] - points[1], points, 2.0 * points[-1] - points[-2]])
-    t = np.linspace(0.0, 1.0, 8, endpoint=False)[:, None]
-    parts = []
-    for a, b, c, d in zip(padded[:-3], padded[1:-2], padded[2:-1], padded[3:], strict=True):
-        parts.append(
-            0.5
-            * (2.0 * b + (c - a) * t + (2.0 * a - 5.0 * b + 4.0 * c - d) * t**2 + (3.0 * b - a - 3.0 * c + d) * t**3)
-        )
-    return np.vstack([*parts, points[-1:]])

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, Literal
 
@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from chauffeur.geometry.road_graph import RoadGraph
+    from chauffeur.geometry.road_graph import Lane, RoadGraph
 
 Array = NDArray[np.float64]
 
@@ -31,6 +31,9 @@ EDGE_M: Final = 0.3
 the tightest bends of a town (6 m) are 0.1 m inside the arc; the rest is half a kerbstone."""
 FAR_M: Final = 7.0
 """A point farther than this from all ground is that far beyond it."""
+OFF_ROAD_M: Final = 1.0
+"""A car whose middle is farther than this beyond every lane is off the road: both wheels of a side are, by then, and
+tapers, of which the mean width is known, end up to 0.9 m before or after that."""
 _ONWARD_M: Final = 100.0
 """Where a map ends its lanes go on: as far as is planned ahead."""
 _JOINT_M: Final = 0.3
@@ -70,7 +73,7 @@ class Ground:
     def __init__(self, road: RoadGraph) -> None:
         """Args: the lanes, and what is paved around them."""
         self._road = road
-        self._lanes, self._legs = _table(road)
+        self._legs = _table(road)
         self._keys, self._starts, self._order = _grid(self._legs)
         box = road.paved
         self._paved = (
@@ -109,6 +112,10 @@ class Ground:
         beyond, x, y = found[index].tolist()
         return GroundFault(index, self._kind(x, y), beyond)
 
+    def off_road(self, x_m: float, y_m: float) -> bool:
+        """Whether a car whose middle is at a place has left all that cars drive or stand on, in whatever direction."""
+        return self.off_m(x_m, y_m) > OFF_ROAD_M
+
     def off_m(self, x_m: float, y_m: float) -> float:
         """How far a place is beyond all ground that cars drive or stand on, whatever their direction, m."""
         return float(self.beyond_m(np.array([[x_m, y_m, 0.0]]), 0.0, 0.0, stops=True, either_way=True)[0])
@@ -131,23 +138,26 @@ class Ground:
                 return lane.kind
         return "off_road"
 
-    @cached_property
-    def lanes(self) -> int:
-        """How many lanes a car may be on, in whatever case."""
-        return self._lanes
 
+def swept(poses: Array) -> tuple[Array, Array]:
+    """Poses with others between them, so that no part of a car leaps over a kerb or a car.
 
-def swept(poses: Array) -> Array:
-    """Poses with others between them, (n, 3) -> (m, 3), so that no part of a car leaps over a kerb or a car."""
+    Args:
+        poses: (n, 3): x, y, heading.
+
+    Returns:
+        (m, 3) poses, and (m,) where each lies between the given ones, 0 to n - 1.
+    """
     turned = np.diff(np.unwrap(poses[:, 2]))
     moved = np.hypot(np.diff(poses[:, 0]), np.diff(poses[:, 1])) + 2.5 * np.abs(turned)
     counts = np.maximum(1, np.ceil(moved / _SWEEP_M)).astype(np.int64)
     at = np.concatenate([[0.0], *(i + np.arange(1, n + 1) / n for i, n in enumerate(counts.tolist()))])
     rows = np.arange(len(poses), dtype=np.float64)
     heading = np.concatenate([poses[:1, 2], poses[0, 2] + np.cumsum(turned)])
-    return np.stack([np.interp(at, rows, one) for one in (poses[:, 0], poses[:, 1], heading)], axis=1)
+    return np.stack([np.interp(at, rows, one) for one in (poses[:, 0], poses[:, 1], heading)], axis=1), at
 
 
+@lru_cache(maxsize=64)
 def _outline(length_m: float, width_m: float) -> Array:
     """Points round a body, (k, 2): ahead of its middle and left of it, m."""
     a, b = length_m / 2.0, width_m / 2.0
@@ -162,34 +172,47 @@ def _outline(length_m: float, width_m: float) -> Array:
 _MOVING, _STOPPING = 0.0, 1.0
 
 
-def _table(road: RoadGraph) -> tuple[int, Array]:
-    """Legs of all lanes for cars, (n, 10): x, y, ux, uy, least and most way along it, half width, least cosine of the
-    angle to it, and whether only for who stops."""
+def _table(road: RoadGraph) -> Array:
+    """Legs of all lanes for cars, a row each: x, y, ux, uy, least and most way along it, how far the lane reaches to
+    its left and to its right, least cosine of the angle to it, and whether it is only for who stops.
+
+    Where a lot is paved, what is paved is all the ground.
+    """
     rows: list[tuple[float, ...]] = []
-    count = 0
     led = {one for lane in road.lanes for one in lane.successors}
     for lane in road.lanes:
-        if lane.kind not in ("driving", "aisle", "emergency", "parking"):
+        if lane.kind not in ("driving", "aisle", "emergency", "parking") or road.paved is not None:
             continue
-        count += 1
         either = lane.kind in ("aisle", "parking")
         cosine = _ANY_COS if either else _JUNCTION_COS if lane.junction else _ALONG_COS
         when = _STOPPING if lane.kind in ("emergency", "parking") else _MOVING
         points = lane.centre.points_m
+        beside = [road.get(road.neighbour(lane.id, side)) for side in (-1, 1)]
         for i, ((ax, ay), (bx, by)) in enumerate(pairwise(points)):
             length = math.dist((ax, ay), (bx, by))
             low = -_ONWARD_M if i == 0 and lane.id not in led else -_JOINT_M
             high = length + (_ONWARD_M if i == len(points) - 2 and not lane.successors else _JOINT_M)
-            rows.append((ax, ay, (bx - ax) / length, (by - ay) / length, low, high, lane.width_m / 2.0, cosine, when))
-    return count, np.array(rows, dtype=np.float64).reshape(len(rows), 9)
+            middle = (ax + bx) / 2.0, (ay + by) / 2.0
+            left, right = (_half_m(lane, one, *middle) for one in beside)
+            rows.append((ax, ay, (bx - ax) / length, (by - ay) / length, low, high, left, right, cosine, when))
+    return np.array(rows, dtype=np.float64).reshape(len(rows), 10)
+
+
+def _half_m(lane: Lane, beside: Lane | None, x_m: float, y_m: float) -> float:
+    """How far a lane reaches to one side, m: to the edge of the lane beside, where mean widths leave a slit between."""
+    half = lane.width_m / 2.0
+    if beside is None or beside.kind not in ("driving", "emergency", "parking"):
+        return half
+    apart = abs(beside.centre.project(x_m, y_m)[1])
+    return max(half, min(apart - beside.width_m / 2.0, half + 1.0))
 
 
 def _grid(legs: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """(cells, where the legs of each begin, legs): those within `FAR_M` of a square of the plane, sorted by square."""
     pairs: list[NDArray[np.int64]] = []
-    for row, (x, y, ux, uy, low, high, half) in enumerate(legs[:, :7].tolist()):
+    for row, (x, y, ux, uy, low, high, *halves) in enumerate(legs[:, :8].tolist()):
         at = np.append(np.arange(low, high, _CELL_M / 2.0), high)
-        reach = math.ceil((FAR_M + half) / _CELL_M)
+        reach = math.ceil((FAR_M + max(halves)) / _CELL_M)
         cells = {
             (cx + dx, cy + dy)
             for cx, cy in zip(
@@ -256,12 +279,13 @@ def beyond(poses, outline, stops, free, legs, keys, starts, order, paved):  # ty
 @numba.njit(cache=True, error_model="numpy")
 def _off(leg, px, py, c, s, stops, free):  # type: ignore[no-untyped-def]
     """How far a place is beside a leg's lane; far where a body that is turned so may not be on it."""
-    if leg[8] > 0.0 and not stops:
+    if leg[9] > 0.0 and not stops:
         return FAR_M
-    if not free and c * leg[2] + s * leg[3] < leg[7]:
+    if not free and c * leg[2] + s * leg[3] < leg[8]:
         return FAR_M
     dx, dy = px - leg[0], py - leg[1]
-    along, across = dx * leg[2] + dy * leg[3], abs(dy * leg[2] - dx * leg[3]) - leg[6]
+    along, left = dx * leg[2] + dy * leg[3], dy * leg[2] - dx * leg[3]
+    across = max(left - leg[6], -left - leg[7])
     past = max(leg[4] - along, along - leg[5])
     if past <= 0.0:
         return across

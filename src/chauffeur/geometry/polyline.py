@@ -211,3 +211,18 @@ class Polyline:
 def joined(lines: Sequence[Polyline]) -> Polyline:
     """Polylines one after the other as one. Raises ValueError for none."""
     return Polyline.of(point for line in lines for point in line.points_m)
+
+
+def smooth(points: FloatArray, parts: int = 8) -> FloatArray:
+    """Catmull-Rom through points, (n, 2) -> (m, 2): continuous headings, through every point, `parts` to a leg."""
+    import numpy as np
+
+    if len(points) == 2:
+        return points
+    padded = np.vstack([2.0 * points[0] - points[1], points, 2.0 * points[-1] - points[-2]])
+    t = np.linspace(0.0, 1.0, parts, endpoint=False)[:, None]
+    legs = [
+        0.5 * (2.0 * b + (c - a) * t + (2.0 * a - 5.0 * b + 4.0 * c - d) * t**2 + (3.0 * b - a - 3.0 * c + d) * t**3)
+        for a, b, c, d in zip(padded[:-3], padded[1:-2], padded[2:-1], padded[3:], strict=True)
+    ]
+    return np.vstack([*legs, points[-1:]])

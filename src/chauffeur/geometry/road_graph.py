@@ -186,6 +186,11 @@ class RoadGraph:
         return not self.junctions and all(lane.kind in ("driving", "emergency") for lane in self.lanes)
 
     @cached_property
+    def has_shape(self) -> bool:
+        """Whether it is known where its lanes are: a vehicle may know no more of a road than its speed limit."""
+        return self.paved is not None or any(lane.width_m > 0.0 for lane in self.lanes)
+
+    @cached_property
     def has_parking(self) -> bool:
         """Whether there are spots to park in."""
         return any(lane.kind == "parking" for lane in self.lanes)

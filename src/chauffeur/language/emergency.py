@@ -15,16 +15,14 @@ import re
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from chauffeur.language.letters import clean
-from chauffeur.language.tokens import plain
+from chauffeur.language.distress import distress_in, is_only_told, safe_stop_in
+from chauffeur.language.hazards import called_out, hazard_in
+from chauffeur.language.plain_line import COURTESY, line_of, pieces_of, sentences_of
 
 Kind = Literal["stop", "safe_stop", "ask", "no_stop"]
 """`stop`: the minimal-risk manoeuvre at once. `safe_stop`: a stop at the next safe place, asked for in so many words.
 `ask`: a person or the car is in distress, and the car offers that stop in one question. `no_stop`: the person says that
 the car is not to stop, brake or pull over."""
-
-MOST_CHARACTERS: Final = 2_000
-"""As many as a wish may have."""
 
 SAFE_STOP_WISH: Final = "Stop at the next safe place."
 """The sentence that is always read as `safe_stop`: what a yes to the question stands for."""
@@ -49,7 +47,7 @@ class Emergency:
 
 def read_emergency(text: str) -> Emergency | None:
     """What an utterance has of an emergency; None where it has nothing."""
-    line = _line(text)
+    line = line_of(text)
     refusals = [match for match in _NEGATED.finditer(line) if not _MEANT_OTHERWISE.match(line, match.end())]
     masked = line
     for match in refusals:
@@ -64,31 +62,9 @@ def read_emergency(text: str) -> Emergency | None:
     if last_no is not None:
         slower = any(match["slow"] is not None for match in refusals)
         return Emergency("no_stop", last_no[1].strip(), alone=_is_filler(masked), slower=slower)
+    if called := called_out(line):
+        return Emergency("stop", called)
     return _distress_in(line)
-
-
-# From text to a line of plain words ----------------------------------------------------------------------------------
-
-_SENTENCE_END: Final = re.compile(r"[.!?;:\n]+")
-_OTHER_SIGNS: Final = re.compile(r"[^a-z0-9., ]+")
-_DRAWN_OUT: Final = re.compile(r"([a-z])\1{2,}")
-_TORN: Final = re.compile(r"\b(do|does|did|ca|wo|should|would|could|must|need) ?n ?t\b")
-_SLIPS: Final = re.compile(r"\b(?:stopp|stpo|sotp|sstop|stio|stoip)\b")
-_GAPS: Final = re.compile(r"\s+")
-
-
-def _line(text: str) -> str:
-    """Plain words with `.` between sentences and `,` within them, one space around everything."""
-    line = plain(clean(text[:MOST_CHARACTERS]))
-    line = _SENTENCE_END.sub(" . ", line).replace(",", " , ")
-    line = _DRAWN_OUT.sub(r"\1", _OTHER_SIGNS.sub(" ", line))
-    line = _TORN.sub(r"\1 not", _GAPS.sub(" ", line)).replace("ca not", "can not").replace("wo not", "will not")
-    return f" {_SLIPS.sub('stop', line).strip()} "
-
-
-def _pieces(line: str) -> list[tuple[str, int]]:
-    """Stretches between signs, each with where it begins."""
-    return [(match[0], match.start()) for match in re.finditer(r"[^.,]+", line)]
 
 
 # Stop ----------------------------------------------------------------------------------------------------------------
@@ -96,36 +72,45 @@ def _pieces(line: str) -> list[tuple[str, int]]:
 _CAR: Final = (
     r"(?:(?:the|this|your|our|my|that) )?(?:damn(?:ed)? |bloody |fucking )?(?:car|vehicle|thing|taxi|cab|van|truck)"
 )
-_BRAKES: Final = r"(?:the |your |those )?(?:emergency )?(?:brakes?|breaks?|hand ?brake)"
+_BRAKES: Final = (
+    r"(?:the |your |those )?(?:emergency |parking |park |hand )?(?:brake pedal|brakes?|breaks?|hand ?brake|anchors?)"
+)
+_ENGINE: Final = r"(?:(?:the|this|your|our|that) )?(?:engine|motor|ignition|power|car|vehicle)"
+_STEP: Final = (
+    r"(?:one|another|one more|a single) (?:inch|centimetre|metre|meter|foot|yard|step)(?: (?:further|farther|more))?"
+)
 _STOP: Final = (
     rf"(?:(?:do |make |perform )?(?:an )?emergency (?:stop|halt|brake|braking)|full braking"
     rf"|cease driving|(?:stop|halt)(?: (?:{_CAR}|driving|moving|rolling|going|everything))?(?! sign\b| light\b)"
-    rf"|brake(?: {_CAR})?|(?:slam|stand|step|jam|get|put|hit|press|apply|pull|use)(?: on)? {_BRAKES}(?: on)?"
-    rf"|bring {_CAR} to a (?:\w+ )?(?:stop|halt|stand|standstill)"
+    rf"|brake(?: {_CAR})?|(?:slam|stand|step|jam|bang|whack|get|put|hit|press|apply|pull|use)(?: on)? {_BRAKES}(?: on)?"
+    rf"|(?:slam|jam|bang|whack) (?:them|em) on"
+    rf"|bring (?:{_CAR}|it|her|us|this) to a (?:\w+ )?(?:stop|halt|stand|standstill)"
     rf"|come to a (?:\w+ )?(?:stop|halt|stand|standstill)|stand still"
-    rf"|make (?:it|this|{_CAR}) stop|get {_CAR} stopped)"
+    rf"|make (?:it|this|{_CAR}) stop|get {_CAR} stopped"
+    rf"|(?:cease|quit)(?: all)? (?:driving|movement|motion|moving)"
+    rf"|(?:kill|cut|stop|switch off|turn off|shut off|shut down|power down) {_ENGINE}"
+    rf"|(?:switch|turn|shut) {_ENGINE} (?:off|down))"
 )
-_COURTESY: Final = (
-    r"(?:please|kindly|just|oh|ah|aah|argh|hey|hi|hello|ok|now|no|yes|yeah|car|chauffeur|computer|driver|sir|mate|man"
-    r"|dude|buddy|bro|quick|quickly|hurry|god|my god|jesus|christ|hell|shit|fuck|damn|damn it|fucking|bloody hell"
-    r"|(?:for )?(?:gods?|heavens?|christs?|goodness|petes?)(?: s)? sake|for the love of god|listen|look|look out"
-    r"|watch out|careful|help|help me|wait|hold on|emergency|danger|attention|alert|i am begging you|i beg you|i said"
-    r"|i say|i repeat|really|simply|immediately|at once|right now|right away|everybody|excuse me|whoa|woah|ouch|uh|um"
-    r"|er)"
+_SHARP: Final = (
+    rf"(?:freeze|(?:abort|terminate)(?: (?:the|this|our) (?:drive|ride|trip|journey|mission))?|hold it right there"
+    rf"|shut (?:it|everything) (?:all )?down|brakes? on|(?:emergency|parking|park|hand) ?brake(?= now| on| please)"
+    rf"|(?:drop|throw out) (?:the )?anchors?|anchors? (?:on|out|down)|not {_STEP}"
+    rf"|(?:do not|never) (?:move|go|drive|roll)(?: {_CAR})? (?:any (?:further|farther)|{_STEP}))"
 )
+"""A call for a stop whose words mean something else where more follows: "freeze the gap where it is"."""
 _ASKING: Final = (
     r"(?:(?:can|could|will|would|wo not) you|you (?:really )?(?:must|should|have to|need to|had better|better|ought to)"
     r"|i (?:want|need|order|command|beg|ask|am telling|am ordering|would like|told) you to|i demand that you|lets"
     r"|would you mind and|do)"
 )
-_LEAD: Final = rf"(?:(?:{_COURTESY}|{_ASKING}) )*+"
+_LEAD: Final = rf"(?:(?:{COURTESY}|{_ASKING}) )*+"
 _TRAIL: Final = (
-    rf"(?: (?:{_COURTESY}|here|right here|right there|there(?! (?:is|are|was|has)\b)|right|this (?:very )?(?:instant"
+    rf"(?: (?:{COURTESY}|here|right here|right there|there(?! (?:is|are|was|has)\b)|right|this (?:very )?(?:instant"
     rf"|second"
     r"|minute|moment)|instantly|straight away|directly|asap|fast|hard|as hard as you can|on the spot|where you are"
     r"|already|ok"
     r"|completely|dead|for me|will you|would you|can you|could you|thank you|thanks|you (?:idiot|fool|moron)|i mean it"
-    rf"|do it|do you hear(?: me)?|{_CAR}|stop|halt|brake|break)(?= |$))*+"
+    rf"|do it|do you hear(?: me)?|{_CAR}|stop|halt|brake|break|freeze|abort)(?= |$))*+"
 )
 _REASON: Final = (
     r"(?: (?:because|cause|as (?:i|he|she|they|there))\b| before (?:we|you|i|it|he|she|they|some(?:one|body"
@@ -136,15 +121,16 @@ _REASON: Final = (
     r"|have|was|feels?|hurts?|ran|runs?|running|jumped|fell|stopped|crossing)\b| (?:child|kid|children|kids|dog|deer"
     r"|man|woman"
     r"|person|people|fire|smoke)\b| or (?:we|you|i|else)\b| what (?:are|the|is)\b| and (?:let|get|wait|stay|stand"
-    r"|help|call|open)\b"
+    r"|help|call|open|stop|halt|pull|do not (?:move|go|drive))\b"
     r"| before\b(?= it is too late))"
 )
 _STOP_CLAUSE: Final = re.compile(rf"^ (?P<lead>{_LEAD})(?P<stop>{_STOP})(?P<trail>{_TRAIL})(?: ?$|(?={_REASON}))")
+_CALL: Final = re.compile(rf"^ (?:{COURTESY} )*?(?P<stop>{_SHARP}){_TRAIL} ?$")
 _HOMOPHONE: Final = re.compile(
-    rf"^ (?:{_COURTESY} )*+(?P<stop>break(?: break)*+)(?: (?:now|hard|please|break)(?= |$))*+ ?$"
+    rf"^ (?:{COURTESY} )*+(?P<stop>break(?: break)*+)(?: (?:now|hard|please|break)(?= |$))*+ ?$"
 )
 _NEED: Final = re.compile(
-    rf"^ (?:{_COURTESY} )*+(?:we|i) (?:really |just )?(?:must|should|have to|need to|have got to|got to|want to|better)"
+    rf"^ (?:{COURTESY} )*+(?:we|i) (?:really |just )?(?:must|should|have to|need to|have got to|got to|want to|better)"
     rf" (?P<stop>{_STOP})(?P<trail>{_TRAIL}) ?$"
 )
 _AT_ONCE: Final = re.compile(r"\b(?:now|immediately|at once|right away|instantly|straight away|this (?:very )?\w+)\b")
@@ -171,22 +157,26 @@ _TAKEN_BACK: Final = re.compile(
 
 
 _SUPPOSED: Final = re.compile(
-    rf"^(?: {_COURTESY})*+ (?:if|when|whenever|unless|in case|once|as soon as|should (?:there|you|we|i))\b"
+    rf"^(?: {COURTESY})*+ (?:if|when|whenever|unless|in case|once|as soon as|should (?:there|you|we|i))\b"
 )
 
 
 def _stops_in(line: str) -> list[tuple[int, str]]:
     """Where a line asks for a stop; what a sentence only supposes ("if ..., brake") asks for none."""
     found: list[tuple[int, str] | None] = []
-    for sentence in re.finditer(r"[^.]+", line):
-        if _SUPPOSED.match(sentence[0]) is None:
-            found += [_stop_in(piece, sentence.start() + at) for piece, at in _pieces(sentence[0])]
+    for sentence, begin in sentences_of(line):
+        if _SUPPOSED.match(sentence) is not None:
+            continue
+        for piece, at in pieces_of(sentence):
+            found.append(_stop_in(piece, begin + at))
+            if found[-1] is None and (way := hazard_in(piece, sentence)) is not None:
+                found.append((begin + at + way.start(), way[0].strip()))
     return [one for one in found if one is not None]
 
 
 def _stop_in(piece: str, at: int) -> tuple[int, str] | None:
     """Where a stretch asks for a stop, and the words; None if it does not."""
-    found = _STOP_CLAUSE.match(piece) or _HOMOPHONE.match(piece)
+    found = _STOP_CLAUSE.match(piece) or _CALL.match(piece) or _HOMOPHONE.match(piece)
     if found is None:
         found = _NEED.match(piece)
         if found is not None and _AT_ONCE.search(found["trail"]) is None:
@@ -197,56 +187,7 @@ def _stop_in(piece: str, at: int) -> tuple[int, str] | None:
             return None
     if found is not None:
         return at + found.start("stop"), found["stop"]
-    return _ahead_in(piece, at)
-
-
-# Somebody or something in the way: no question could be asked in time ------------------------------------------------
-
-_SMALL: Final = (
-    r"(?:child(?:ren)?|kids?|toddler|baby|boys?|girls?|pedestrians?|dogs?|cats?|deer|moose|elk|horses?|cows?|animals?"
-    r"|boar|sheep"
-    r"|fox|rabbit)"
-)
-_GROWN: Final = r"(?:man|woman|men|women|person|people|somebody|someone|guy|lady|cyclist|body)"
-"""Whoever is ahead "in front of us" mostly sits in a car; on the road itself nobody does."""
-_ROAD: Final = (
-    r"(?:on|in|onto|into|across|over) (?:the|our|my|your) (?:middle of the )?(?:road|street|lane|way|path|highway"
-    r"|motorway|freeway)"
-)
-_FRONT: Final = (
-    rf"(?:{_ROAD}|in front of (?:us|you|the car|me)|ahead of us|(?:right|just|straight|directly) ahead|in the way"
-    rf"|under the car)"
-)
-_DOES: Final = (
-    r"(?: (?:is|are|just|right|directly|there|running|runs?|ran|walking|walks|lying|lies|standing|stands|sitting"
-    r"|crossing|crosses"
-    r"|jumped|jumping|stepp?ed|stepping|playing|coming|came|out|off|suddenly|wandering|crawling))"
-)
-_AHEAD: Final = re.compile(
-    rf"^ (?:(?:{_COURTESY}|there (?:is|are)|(?:i|we) (?:can )?see|(?:that|it|this) is|stop|a|an|the|some|two|three|my"
-    rf"|little|small"
-    rf"|young|old|big|another) )*+(?:{_SMALL}{_DOES}{{0,5}} {_FRONT}|{_GROWN}{_DOES}{{0,5}} {_ROAD}"
-    rf"|{_GROWN} (?:is )?(?:just |suddenly )?(?:lying|standing|walking|crossing|running|ran|jumped"
-    rf"|stepped)(?: \w+){{0,2}} {_FRONT}"
-    rf"|(?:{_SMALL}|{_GROWN}) (?:is |are )?(?:crossing|running out|ran out|jumped out|stepped out))\b"
-)
-_HITTING: Final = re.compile(
-    r"\b(?:you|we) (?:are )?(?:going|about) to (?:crash|hit|run (?:\w+ ){0,3}over|kill (?:him|her|them|that|a|the)\b)"
-)
-_ONLY_TOLD: Final = re.compile(
-    r"\b(?:if|when|whenever|until|unless|in case|might|may|could|would|was|were|had|saw|did|used to|yesterday|last"
-    r"|ago|once|story"
-    r"|film|movie|book|song|news|radio|imagine|suppose|is there|are there|watch for|look for|mind|beware|careful of"
-    r"|sometimes|often"
-    r"|always|never|(?:is|are) (?:no|not)|nobody|slower|slow|drive|driving|parked|car with|as there|like)\b|~"
-)
-
-
-def _ahead_in(piece: str, at: int) -> tuple[int, str] | None:
-    found = _AHEAD.search(piece) or _HITTING.search(piece)
-    if found is None or _ONLY_TOLD.search(piece) is not None:
-        return None
-    return at + found.start(), found[0].strip()
+    return None
 
 
 # No stop -------------------------------------------------------------------------------------------------------------
@@ -281,7 +222,7 @@ _MEANT_OTHERWISE: Final = re.compile(
 )
 """Behind the verb: another act ("don't stop accelerating"), or its manner ("don't brake so hard")."""
 _FILLER: Final = re.compile(
-    rf"^(?: (?:[.,~]+|{_COURTESY}|{_STOP}|driving|moving|going|rolling|never mind|cancel(?: that)?|forget it|can you"
+    rf"^(?: (?:[.,!~]+|{COURTESY}|{_STOP}|driving|moving|going|rolling|never mind|cancel(?: that)?|forget it|can you"
     rf"|could you|would you|here|yet|the car|car|at all|there|for (?:anything|anybody|anyone|him|her|them|me|us)"
     rf"|whatever happens"
     r"|whatever you do|no matter what|under any circumstances|on any account|again|anywhere|in this lane"
@@ -297,94 +238,35 @@ _FILLER: Final = re.compile(
 def _is_filler(masked: str) -> bool:
     """Whether nothing is left that a planner could be asked for."""
     rest = re.sub(r"~+", " ~ ", masked)
-    return _FILLER.match(_GAPS.sub(" ", f" {rest.strip()}")) is not None
-
-
-# Distress ------------------------------------------------------------------------------------------------------------
-
-_SAFE: Final = re.compile(
-    r"\b(?:stop|halt|pull (?:over|in|off)|park)(?: (?:the|this) car)?(?: please)?"
-    r" (?:(?:at|in|on|near) (?:the )?(?:next|nearest|first|a|any|some) safe (?:place|spot|point|location|area)"
-    r"|somewhere safe"
-    r"|(?:when|where|wherever|as soon as|once|whenever) (?:it is |you )?(?:safe(?:ly)?(?: (?:to do so|can|possible))?"
-    r"|safely can|can safely)"
-    r"|as soon as (?:you can|possible|you (?:can )?safely (?:can)?)|safely)\b"
-)
-_GRAVE: Final = re.compile(
-    r"\b(?:(?:there is|i (?:can )?(?:see|smell)|(?:see|smell)s?(?: like| of)?|is that|lots? of|so much|black|white"
-    r"|filling with|full of)"
-    r" (?:\w+ )?(?:smoke|flames|burning|(?:gas|petrol|fuel)(?! (?:stations?|pumps?|prices?)))"
-    r"|smoke (?:is|in|from|under|out|coming|everywhere|inside|behind)"
-    r"|(?:smell|smells|smelling|smelled) (?:of |like )?(?:\w+ )?(?:burning|burnt|smoke|fire|gas|petrol|fuel)"
-    r"|burning smell|smell of fire|flames (?:are|coming|from|out|in|under)"
-    r"|fire smell|on fire|caught fire|catching fire|(?:there is|a) fire (?:in|under|inside|here)|(?:something|engine"
-    r"|car|seat|battery) (?:is )?(?:burning|smoking|on fire|in flames|overheating)"
-    r"|(?:flat|burst|blown|punctured|bust|popped|lost) (?:out )?(?:(?:a|the|our|one of the|my) )?(?:\w+ )?(?:tyre"
-    r"|tire|wheel)s?|(?:have|got|have got) a flat(?! (?:in|on|near|share))|(?:tyre|tire|wheel)s? (?:\w+ )?(?:is |are "
-    r"|has |have |feels |just )*(?:flat|burst|blown|blew|punctured|popped"
-    r"|exploded|gone flat|gone|coming off|come off|falling off|fell off|losing air)|puncture|blow ?out"
-    r"|brakes (?:are |have |do |just )*(?:failed|failing|not work(?:ing)?|gone|fail)|brake failure|(?:something"
-    r"|anything) is (?:badly |really |very )?wrong with (?:the|this|our) (?:car|engine|brakes?|steering|tyres?|tires?"
-    r"|wheels?)|steering (?:wheel )?(?:is |does |has )?(?:shaking|locked|stuck|not work\w*|gone)|warning light"
-    r"|can not see (?:anything|a thing)|lost my sight|broken? (?:my|his|her) (?:arm|leg|neck|hand|foot|rib)s?"
-    r"|engine (?:has |is |just )*(?:died|dying|failed|failing|overheating)"
-    r"|heart attack|(?:having|has|had) a stroke|cardiac arrest|chest (?:pains?|hurts?|is (?:tight|hurting|aching)"
-    r"|feels tight|aches)"
-    r"|(?:pains?|tightness|pressure) in (?:my|his|her|the) chest|(?:can not|can barely|can hardly|hard to"
-    r"|struggling to|unable to|trouble|difficulty|could not) breath(?:e|ing)?"
-    r"|not breathing|unconscious|passed out|passing out|fainted|collapsed|choking|seizure|convuls\w+|bleeding"
-    r"|allergic (?:shock|reaction)|anaphyla\w+"
-    r"|in labou?r|(?:baby is coming|water(?:s)? (?:just )?broke)|(?:call|need|get|send for|fetch) (?:me |us |him "
-    r"|her )?(?:an? |the )?(?:ambulance|doctor|paramedics?|911|999|112|emergency services)"
-    r"|medical emergency|(?:it|this) is an emergency|(?:we|i) have an emergency|having an emergency|dying here"
-    r"|(?:my )?heart (?:is |has )?(?:racing|stopped|hurts?)"
-    r"|stabbing pain|terrible pain|(?:so|too) much pain|in (?:agony|severe pain|terrible pain)|hypoglyc\w+|insulin)\b"
-)
-_UNWELL: Final = re.compile(
-    r"\b(?:(?:i|we) (?:\w+ ){0,2}(?:feel|feeling|am|get|getting|going|think|start|starting)(?: \w+){0,3}?"
-    r" (?:sick(?! (?:and tired )?of\b)|faint|dizzy|nauseous|nauseated|queasy|ill|unwell|woozy|light ?headed|weak"
-    r"|carsick|giddy)"
-    r"|(?:going|about|need|have|got|want) to (?:throw up|vomit|be sick|puke|faint|pass out|black out|collapse|hurl)"
-    r"|(?:feel|feels|feeling|felt) (?:\w+ ){0,2}(?:sick(?! (?:and tired )?of\b)|faint|dizzy|nauseous|queasy|woozy"
-    r"|light ?headed)"
-    r"|(?:not|do not|does not) (?:feel|feeling)(?: \w+){0,2}? (?:well|good|great|right|ok)\b"
-    r"|throwing up|vomiting|blacking out|getting blurry|(?:everything|head|world) is spinning|makes? me (?:sick|dizzy"
-    r"|nauseous))\b"
-)
-_EMERGENCY_ALONE: Final = re.compile(
-    r"^ (?:please |quick |hey |car )?(?:(?:emergency|mayday|sos|help us|help me|(?:i |we )?(?:need )?help|smoke"
-    r"|fire)[., ]*+)++$"
-)
-_STOP_THAT: Final = re.compile(rf"^ (?:{_COURTESY} )*+(?:stop (?:it|that|this))(?: {_COURTESY}(?= |$))*+ ?$")
-_SAID_WHAT_TO_DO: Final = re.compile(
-    r"\b(?:hospital|clinic|doctor s|faster|hurry|speed up|step on it|quick(?:ly)? to|slow down|slower|slowly|ease"
-    r"|easy|gentl[ey]|gentler"
-    r"|smooth(?:er|ly)?|softer|careful(?:ly)?|calm(?:er|ly)?|overtake|pull over|lane|window|air|heating|less|more"
-    r"|shoulder|get me to|get us to|take me|take us)\b"
-)
-_NO_DISTRESS: Final = re.compile(
-    r"\b(?:if|unless|in case|yesterday|last (?:week|year|time|night|month|summer|winter)|ago|once had|used to|story"
-    r"|film|movie|book|song|news|radio|imagine|suppose|joke"
-    r"|no (?:smoke|fire|flames)|is there|never had|fire (?:engine|truck|brigade|department|station|fighters?)"
-    r"|no longer|anymore|any more"
-    r"|(?:no|not an?|without) (?:emergency|ambulance|doctor)|not (?:feel(?:ing)? )?(?:sick|dizzy|faint|ill|bleeding"
-    r"|hurt|in pain|on fire|an emergency)|he was|she was|in (?:that|the) game|(?:his|her|their|other|that"
-    r"|this) (?:car|truck|lorry|van|exhaust|engine|tyre|tire|bus)|car (?:ahead|in front|behind))\b"
-)
+    return _FILLER.match(re.sub(r"\s+", " ", f" {rest.strip()}")) is not None
 
 
 def _distress_in(line: str) -> Emergency | None:
-    safe = _SAFE.search(line)
+    safe = safe_stop_in(line)
     if (
         safe is not None
         and _NOT_TO_THE_CAR.search(line[: safe.start()].replace(" can ", " ").replace(" could ", " ")) is None
     ):
         return Emergency("safe_stop", safe[0])
-    need = next((found for piece, _ in _pieces(line) if (found := _NEED.match(piece))), None)
-    found = _GRAVE.search(line) or need or _EMERGENCY_ALONE.match(line) or _STOP_THAT.match(line)
-    if found is not None:
-        return None if _NO_DISTRESS.search(line) else Emergency("ask", found[0].strip())
-    found = _UNWELL.search(line)
-    if found is None or _NO_DISTRESS.search(line) or _SAID_WHAT_TO_DO.search(line):
-        return None
-    return Emergency("ask", found[0].strip())
+    if words := distress_in(line):
+        return Emergency("ask", words)
+    need = next((found for piece, _ in pieces_of(line) if (found := _NEED.match(piece))), None)
+    return None if need is None or is_only_told(line) else Emergency("ask", need[0].strip())
+
+
+# An alarm in the words of a model ------------------------------------------------------------------------------------
+
+_TOLD_OF: Final = re.compile(
+    r"\b(?:emergency|ambulance|distress|in danger|heart attack|unconscious|not breathing|medical (?:help|attention)"
+    r"|(?:wants?|wish(?:es)?|asks?|asked|asking|demands?|needs?|tells?|told|request(?:s|ed)?|orders?|call(?:s|ed)?)"
+    r"(?: \w+){0,4} (?:to|for an?) (?:immediate |emergency |sudden |full )*+(?:stop|halt|brake|freeze)"
+    r" ?(?:[.,!]|the (?:car|vehicle)\b|immediately\b|now\b|at once\b|here\b|because\b|$))"
+)
+_OF_NONE: Final = re.compile(
+    r"\bemergency (?:lane|vehicle|light)s?\b|\b(?:no|not an?|without an?|not|than) (?:\w+ )?emergency\b"
+)
+
+
+def tells_of_alarm(thoughts: str) -> bool:
+    """Whether a model's own words say that a person asks for a stop at once, or is in distress."""
+    return _TOLD_OF.search(_OF_NONE.sub(" ", line_of(thoughts))) is not None

@@ -7,10 +7,11 @@ like glass by that stop line"), so a learned sorter reads them (`chauffeur.langu
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Final, Literal
 
-from chauffeur.concept import Situation
+from chauffeur.concept import Context, Situation
 from chauffeur.language.denials import denied_words
 from chauffeur.language.text_classifier import TextClassifier, load_sorter
 from chauffeur.language.tokens import tokens_of
@@ -39,6 +40,7 @@ _KINDS: Final = (
 _NOT_KNOWN: Final = re.compile(r"\bnot known\b|\bunknown\b")
 _SENTENCE: Final = re.compile(r"\bWeather\b[^:.]{0,40}: (?P<words>.*?)(?:\.(?!\d)|$)", re.DOTALL)
 """The sentence about the weather among the words of a context."""
+_GAPS: Final = re.compile(r"\s{2,}")
 _CLAUSES: Final = re.compile(r"[,.;!?:]\s|\s-\s|\s(?:but|and|because|although|though|as|since|so)\s")
 
 
@@ -75,6 +77,28 @@ def said_weather(text: str, sorter: TextClassifier | None = None) -> SaidWeather
         likeliest = max(range(1, len(SAID_WEATHERS)), key=lambda place: shares[SAID_WEATHERS[place]])
         worst = SAID_WEATHERS[max(likeliest, SAID_WEATHERS.index(worst))]
     return worst
+
+
+def without_said_weather(text: str) -> str:
+    """What is left of a wish without the clauses that say something of the weather or the road; empty for nothing."""
+    parts, begin, kept = list[tuple[str, str]](), 0, list[str]()
+    for sign in _CLAUSES.finditer(text):
+        parts.append((text[begin : sign.start()], sign[0]))
+        begin = sign.end()
+    parts.append((text[begin:], ""))
+    for clause, sign in parts:
+        if said_weather(clause) == "none":
+            kept += [clause, sign]
+    rest = "".join(kept[:-1]).strip() if kept else ""
+    end = text.rstrip()[-1:]
+    return rest + end if rest and end in ".!?" and rest[-1] not in ".!?" else rest
+
+
+def without_told_weather(context: Context) -> Context:
+    """C without what the services tell of the weather."""
+    scene = tuple(one for one in context.situation.scene if one[0] != WEATHER_FACT)
+    text = _GAPS.sub(" ", _SENTENCE.sub(" ", context.text)).strip()
+    return replace(context, text=text, situation=replace(context.situation, scene=scene))
 
 
 def _kinds(words: str) -> int:

@@ -58,7 +58,7 @@ def personal_limits(person: PersonId, limits: Limits, path: Path | None = None) 
 def _tables(path: Path) -> dict[str, dict[str, float]]:
     try:
         content = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return {}
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(

@@ -44,7 +44,7 @@ def read_privacy(home: Path | None = None) -> Privacy:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
         days, keeps = found["retention_days"], found["keeps"]
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return Privacy()
     except (OSError, ValueError, TypeError, KeyError) as error:
         raise ConfigError(

@@ -251,9 +251,9 @@ class VaultMemory:
 
     def _ensure(self, person: PersonId) -> None:
         """Make the profile unless it is there. Key first: a profile without one is never on disk."""
-        private_directory(self._profiles)
-        private_directory(self._keys)
         with self._errors(person):
+            private_directory(self._profiles)
+            private_directory(self._keys)
             alias = self._ring.alias(person)
             path = self._path(alias)
             if path.exists():
@@ -272,7 +272,9 @@ class VaultMemory:
     @contextmanager
     def _reading(self, person: PersonId) -> Generator[Profile | None]:
         """The person's open profile, or None for nobody and for people of whom nothing is kept."""
-        if not _is_somebody(person) or not self._profiles.exists():
+        with self._errors(person):
+            kept = _is_somebody(person) and self._profiles.exists()
+        if not kept:
             yield None
             return
         with self._open(self._ring.alias(person), person) as profile:

@@ -8,11 +8,12 @@ that a yes answers.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Literal, Self
 
-from chauffeur.concept import Instruction, Limits, Plan, PlanRequest, Situation
+from chauffeur.concept import Alarm, Instruction, Limits, Plan, PlanRequest, Situation
 from chauffeur.language.corrections import last_said
 from chauffeur.language.denials import denied_words
 from chauffeur.language.slips import slip_in
@@ -31,6 +32,12 @@ the wishes of `bench passengers` in sight: their figures are no held-out check (
 
 SLOW_SHARE: Final = 0.5
 """Of the traffic's speed; whoever drives slower than that among others is asked whether they mean it."""
+_WHERE_OR_WHEN: Final = re.compile(
+    r"\b(?:at (?!once)|by|near|next|behind|before|after|in (?!this lane|the lane|our lane|an instant)|beside|opposite"
+    r"|for (?!(?:god|heaven|christ|goodness|pete)|me\b|us\b)|outside|on (?!the spot)|so that|when|(?<!at )once|if|until"
+    r"|to (?!a (?:\w+ )?(?:stop|halt|stand)|stop|halt)|somewhere|wait|sign|line|lights?)\b"
+)
+"""A place, a purpose or a time to come."""
 _TRAFFIC_MPS: Final = 14.0
 """Only from this speed of the traffic, about 50 km/h: in a lot, or up to a stop sign, a low speed endangers nobody."""
 _CREEP_MPS: Final = 5.0
@@ -132,6 +139,20 @@ def wary_of(text: str, intent: str) -> bool:
 def agreed(meanings: Sequence[Meaning], intent: str) -> bool:
     """Whether the rules read the same things to do, in the same order, as a network did."""
     return bool(meanings) and "+".join(m.family for m in meanings) == intent
+
+
+def alarm_in(text: str, reads: Sequence[str], meanings: Sequence[Meaning], sure: float = 0.0) -> Alarm:
+    """What a reading of words as a stop, and nothing else, is: a call to stop, or a call that is to be asked about.
+
+    Args:
+        text: The words; a stop at a place, for a purpose or at a time to come is a wish like others.
+        reads: What the planner read, in order.
+        meanings: What the rules read.
+        sure: Probability of the network's least sure choice; 0 where no network was asked.
+    """
+    if list(reads) != ["stop"] or _WHERE_OR_WHEN.search(text.casefold()) is not None:
+        return ""
+    return "stop" if agreed(meanings, "stop") or sure >= SURE else "distress"
 
 
 def question_about(

@@ -5,21 +5,44 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
-from chauffeur.concept import ActionMatrix, ConfigError, InstructionError, Plan, PlanRequest, Thoughts, Usage
+from chauffeur.concept import (
+    ActionMatrix,
+    CameraImage,
+    ConfigError,
+    InstructionError,
+    Plan,
+    PlanRequest,
+    Thoughts,
+    Usage,
+)
 from chauffeur.foreign.model_text import read_model_text
 from chauffeur.foreign.numbers import numbers_in, plain_signs
+from chauffeur.language.weather import (
+    FOG,
+    RAIN,
+    SNOW,
+    UNKNOWN,
+    SaidWeather,
+    said_weather,
+    weather_of,
+    without_said_weather,
+    without_told_weather,
+)
 from chauffeur.planners.base import Answerer, Prose
+from chauffeur.planners.camera_faults import camera_fault
 from chauffeur.planners.llm import INTENT_DECLINED, INTENT_UNUSABLE
+from chauffeur.planners.llm_errors import EndpointError
 from chauffeur.planners.llm_model import ChatModel
 from chauffeur.planners.llm_reply import Reply, refusal_in, tidy
 from chauffeur.planners.llm_settings import settings_from
 from chauffeur.planners.prompts.motion import ASK, MODERATE, matrix_words, motion_messages
-from chauffeur.planners.prompts.turns import repair_turns
+from chauffeur.planners.prompts.turns import Message, repair_turns, words_of
 from chauffeur.safety.envelope import policy_findings
-from chauffeur.safety.gain_box import GAIN_NAMES
+from chauffeur.safety.gain_box import GAIN_NAMES, care, most_careful
 
 _MATRIX: Final = re.compile(r"\[\s{0,40}\[([^\[\]]{1,200})\]\s{0,40}[,;]?\s{0,40}\[([^\[\]]{1,200})\],?\s{0,40}\]")
 _NAMED: Final = re.compile(r"\bP[\s*_`]{0,8}[=:][\s*_`]{0,8}\Z")
@@ -27,6 +50,8 @@ _NAMED_CHARS: Final = 24
 _ROW: Final = 3
 _INTENT: Final = "motion.gains"
 _IN_PROCESS: Final = "transformers/"
+_TOLD_AS: Final[Mapping[SaidWeather, int]] = {"rain": RAIN, "fog": FOG, "snow": SNOW, "slippery": RAIN | SNOW}
+_DOUBT: Final = "What is said and told of the weather leaves a doubt; I take the most careful of its readings."
 MAX_TOKENS: Final = 256
 """Of an answer of a model in this process: thoughts and a matrix."""
 
@@ -78,8 +103,9 @@ class MotionPlanner:
     """Asks a language model for gains; what the checks find is said once, for it to repair."""
 
     def __init__(self, model: Answerer, *, sees: bool = False) -> None:
-        """Args: who writes; whether pictures are taken for it."""
+        """Args: who writes; whether pictures are taken for it, until it turns out to take none."""
         self._writer, self.sees = model, sees
+        self._earlier: CameraImage | None = None
 
     @classmethod
     def from_spec(
@@ -103,7 +129,7 @@ class MotionPlanner:
             folder = argument.removeprefix(_IN_PROCESS)
             return cls(TransformersAnswerer.from_spec(folder, max_tokens=MAX_TOKENS), sees=True)
         how = settings_from(os.environ, {"temperature": temperature})
-        return cls(ChatModel.of(argument.strip(), how, base_url=base_url, cache=cache))
+        return cls(ChatModel.of(argument.strip(), how, base_url=base_url, cache=cache), sees=True)
 
     @property
     def id(self) -> str:
@@ -116,7 +142,8 @@ class MotionPlanner:
         return self._writer.model
 
     async def plan(self, request: PlanRequest) -> Plan:
-        """One plan.
+        """One plan. Where what is said and told of the weather contradicts, the model is asked about each reading, and
+        the most careful gains are driven; a camera that fails is answered without it, by the most careful gains.
 
         Raises:
             InstructionError: The wish is empty.
@@ -125,15 +152,58 @@ class MotionPlanner:
         if not request.instruction.text.strip():
             raise InstructionError("The instruction is empty.", hint="Say how you want to be driven.")
         begun = time.perf_counter()
+        fault = camera_fault(request.images, self._earlier) if request.images else ""
+        self._earlier = request.images[-1] if request.images else None
+        if fault:
+            return self._blind(fault, begun)
+        plans = [await self._asked(one) for one in readings_of(request)]
+        usable = [one for one in plans if one.policy is not None]
+        if plans[0].policy is None or not usable:
+            return plans[0]
+        chosen = max(usable, key=_care)
+        if len(plans) > 1:
+            thoughts = Thoughts(f"{_DOUBT} {chosen.thoughts.text}")
+            chosen = replace(chosen, thoughts=thoughts, usage=_summed([one.usage for one in plans]))
+        return replace(chosen, latency_s=time.perf_counter() - begun)
+
+    def _blind(self, fault: str, begun: float) -> Plan:
+        """What is driven without a picture to go by."""
+        policy, scene = most_careful(), f"{fault}: I cannot see road or weather."
+        return Plan(
+            Thoughts(f"{scene} I take my most careful gains until it shows something again."),
+            policy,
+            intent=_INTENT,
+            settings=settings_of(policy),
+            planner=self.id,
+            model=self.model,
+            latency_s=time.perf_counter() - begun,
+            raw=matrix_words(policy),
+            scene=scene,
+        )
+
+    async def _write(self, messages: Sequence[Message]) -> Prose:
+        """The model's words; of a model without eyes, to the words alone."""
+        if self.sees:
+            try:
+                return await self._writer.write(messages)
+            except EndpointError as error:
+                if error.kind != "no_vision":
+                    raise
+                self.sees = False
+        return await self._writer.write([{"role": one["role"], "content": words_of(one)} for one in messages])
+
+    async def _asked(self, request: PlanRequest) -> Plan:
+        """What the model makes of a reading of the situation; what the checks find is said once, for it to repair."""
+        begun = time.perf_counter()
         messages = motion_messages(request)
-        prose = await self._writer.write(messages)
+        prose = await self._write(messages)
         usage = [prose.usage]
         policy, reply = _read(prose)
         findings = [reply.problem] if reply.problem else []
         if policy is not None:
             findings = policy_findings(policy, request.context.situation, request.limits)
         if findings:
-            prose = await self._writer.write([*messages, *repair_turns(prose.text, findings, ask=ASK)])
+            prose = await self._write([*messages, *repair_turns(prose.text, findings, ask=ASK)])
             usage.append(prose.usage)
             policy, reply = _read(prose)
         unusable = f"The model gave no usable gains: {reply.problem}." if reply.problem else ""
@@ -155,6 +225,25 @@ class MotionPlanner:
         close: Any = getattr(self._writer, "close", None)
         if close is not None:
             await close()
+
+
+def readings_of(request: PlanRequest) -> list[PlanRequest]:
+    """The request, and as others would have it who doubt what is said of the weather: without those words, and where
+    the weather service says otherwise, without what it says. Whatever is left out of a request, the readings of the
+    rest are among its own: the most careful of them is never made less careful by a contradiction."""
+    text, found = request.instruction.text, [request]
+    heard, told = said_weather(text), weather_of(request.context.situation)
+    if heard == "none":
+        return found
+    if rest := without_said_weather(text):
+        found.append(replace(request, instruction=replace(request.instruction, text=rest)))
+    if told != UNKNOWN and heard in _TOLD_AS and not told & _TOLD_AS[heard]:
+        found += [replace(one, context=without_told_weather(one.context)) for one in found]
+    return found
+
+
+def _care(plan: Plan) -> float:
+    return care(plan.policy) if isinstance(plan.policy, ActionMatrix) else 0.0
 
 
 class FixedGainsPlanner:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -70,6 +70,18 @@ def values_of(policy: ActionMatrix) -> dict[str, float]:
 def care(policy: ActionMatrix) -> float:
     """How conservative gains are: 0 the most aggressive corner of the certified box, 1 the most conservative one."""
     return fmean(_care_shares(policy))
+
+
+def more_careful(policies: Iterable[ActionMatrix]) -> ActionMatrix:
+    """Of several gains, those of the most `care`; the first of equals."""
+    return max(policies, key=care)
+
+
+def most_careful() -> ActionMatrix:
+    """The most conservative corner of the certified box: no gains have more `care`."""
+    box = gain_box()
+    kp, ki, kd, wl, wh, ws = ((box.low if CAREFUL_WHEN_LOW[n.lower()] else box.high)[n] for n in GAIN_NAMES)
+    return ActionMatrix((kp, ki, kd), (wl, wh, ws))
 
 
 def moved(policy: ActionMatrix, by: float) -> ActionMatrix:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from chauffeur.control.kinematic_bicycle import KinematicBicycle
 from chauffeur.geometry import Box
 from chauffeur.worlds.parking.lot import Spot
 from chauffeur.worlds.parking.path_follower import Chassis
@@ -44,6 +45,16 @@ class PavedGround(Protocol):
     @property
     def steering_rate(self) -> float:
         """How fast the ego's wheel turns, rad/s."""
+        ...
+
+
+@runtime_checkable
+class StreetCar(Protocol):
+    """A world whose car drives on streets, and that states the car: its filter foresees how it brakes and steers."""
+
+    @property
+    def car(self) -> KinematicBicycle:
+        """The ego's size, axles, bounds, grip and lag, as they are on this trip."""
         ...
 
 

@@ -40,14 +40,14 @@ SESSION = """
 import time
 import chauffeur.speech.microphone as module
 from chauffeur.drive.talk.attention import Attention
-from chauffeur.drive.talk.asr_process import Engine
+from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.messages import Listening, Note
 from chauffeur.drive.talk.sound import Sound
 
 module.SILENT_S = 0.5
 said, acted = [], []
 with Sound() as sound:
-    attention = Attention(Engine(), sound, None, said.append, lambda hotword, words: acted.append(words.text))
+    attention = Attention(AsrEngine(), sound, None, said.append, lambda hotword, words: acted.append(words.text))
     attention.start()
     def until(holds):
         end = time.monotonic() + 60

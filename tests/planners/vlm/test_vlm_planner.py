@@ -27,10 +27,10 @@ from chauffeur.concept import (
     SystemMessage,
 )
 from chauffeur.planners.base import Planner, looks
+from chauffeur.planners.camera_faults import HEIGHT, WIDTH, camera_fault, small
 from chauffeur.planners.keyword import KeywordPlanner
 from chauffeur.planners.vlm import VlmPlanner
 from chauffeur.planners.vlm.engine import VlmEngine, VlmReading, shipped
-from chauffeur.planners.vlm.pictures import HEIGHT, WIDTH, fault_of, small
 from chauffeur.planners.vlm.planner import RECALL_SETTING, recalled, task_of
 from chauffeur.planners.vlm.taste import TASTE_SETTING, JudgedDrive, taste_of
 from chauffeur.planners.vlm.template import GAINS, LEVELS, STYLES, TEMPLATE, GainCodebook
@@ -155,7 +155,7 @@ def test_of_the_camera_and_what_the_passenger_says_the_worse_counts(seen: str, w
     engine = Sees(seen)
     plan = ask(VlmPlanner(engine), picture(), wish=wish)
     if taken is None:
-        assert len(engine.given) == 1 and "You say" not in plan.thoughts.text
+        assert not any("weather" in given for given in engine.given) and "You say" not in plan.thoughts.text
     else:
         assert (engine.given[-1]["weather"], engine.given[-1]["grade"]) == (taken, "heavy")
         assert "You say that" in plan.scene and "the worse of the two" in plan.thoughts.text
@@ -275,7 +275,7 @@ def test_the_codebook_stays_inside_the_certified_box_and_gives_its_values_back()
 def test_pictures_of_any_size_are_brought_down_and_sound_ones_have_no_fault() -> None:
     large = np.repeat(np.repeat(picture().pixels(), 4, axis=0), 4, axis=1)
     assert (small(large) == picture().pixels()).all()
-    assert fault_of((picture(),)) == ""
+    assert camera_fault((picture(),)) == ""
 
 
 def test_a_folder_without_a_model_is_refused(tmp_path: Any) -> None:

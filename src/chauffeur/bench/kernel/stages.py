@@ -15,6 +15,7 @@ from chauffeur.bench.kernel.benchmark import BenchItem, BenchJob, Benchmark, Ite
 from chauffeur.bench.kernel.shards import WHOLE, Shard
 from chauffeur.bench.kernel.store import Row, RowStore, freeze
 from chauffeur.concept import DataError
+from chauffeur.concept.data import parse_json
 
 T = TypeVar("T", bound=BenchItem)
 
@@ -119,7 +120,7 @@ class Manifest(Generic[T]):
 def parsed(path: Path, raw: bytes) -> dict[str, Any]:
     """A manifest's fields. Raises DataError when they are damaged."""
     try:
-        value = json.loads(raw)
+        value = parse_json(raw)
     except ValueError as error:
         raise DataError(
             f"{path} is damaged ({error}).",

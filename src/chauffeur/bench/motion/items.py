@@ -14,6 +14,7 @@ import numpy as np
 from chauffeur.concept import CameraImage, Context, DataError, Scenario
 from chauffeur.concept.data import read_data
 from chauffeur.drive.seat import SeatCamera
+from chauffeur.drive.surroundings import SKY
 from chauffeur.worlds.track import WEATHERS, TrackWorld, Weather, track_scenario
 from chauffeur.worlds.track.dynamics import Plant
 from chauffeur.worlds.track.manoeuvres import MANOEUVRES, ManoeuvreName
@@ -28,13 +29,6 @@ Shown = Literal["off", "on", "black", "other"]
 _PLACES: Final = 7 << 21
 """Where the places' seeds begin: none of them is one that a model of ours was trained on."""
 
-SKY: Final[dict[Weather, str]] = {
-    "sunny": "The sky is clear and sunny; the road is dry.",
-    "rain": "It is raining; the road is wet.",
-    "fog": "There is fog; I see about 60 m, and the road is damp.",
-    "snow": "It is snowing; the road is covered with snow.",
-    "night": "It is night; the sky is clear and the road is dry.",
-}
 TASK: Final[dict[ManoeuvreName, str]] = {
     "acceleration": "The manoeuvre is to accelerate to 50 km/h behind the vehicle ahead.",
     "lane_change": "The manoeuvre is to change to the left lane at 50 km/h, past the vehicle ahead.",

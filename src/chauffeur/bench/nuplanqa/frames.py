@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import io
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -97,18 +98,30 @@ class FrameSource:
             at = str(self.metadata[at].get("prev") or "")
         found: list[FramePath] = []
         for back, one in reversed(list(enumerate(chain))):
-            cams: Mapping[str, Any] = self.metadata[one].get("cams") or {}
+            cams: Any = self.metadata[one].get("cams")
             for camera in self.cameras:
-                if "data_path" not in cams.get(camera, {}):
+                named = cams.get(camera) if isinstance(cams, Mapping) else None
+                file = named.get("data_path") if isinstance(named, Mapping) else None
+                if not isinstance(file, str) or not file:
                     raise DataError(f"{MISSING}: the metadata of {one} have no {camera}.")
-                path = self.root / str(cams[camera]["data_path"])
+                if Path(file).is_absolute() or ".." in Path(file).parts:
+                    raise DataError(f"{MISSING}: the {camera} of {one} lies outside of the set: {file!r}.")
+                path = self.root / file
                 found.append(FramePath(camera, self._ago_s(token, one, back), path))
         return tuple(found)
 
     def _ago_s(self, token: str, before: str, back: int) -> float:
         """Time between two samples, by their time stamps (microseconds), else by their places."""
         then, now = (self.metadata[one].get("timestamp") for one in (before, token))
-        return back * STEP_S if then is None or now is None else round((now - then) * 1e-6, 2)
+        if then is None or now is None:
+            return back * STEP_S
+        try:
+            ago_s = (float(now) - float(then)) * 1e-6
+        except (TypeError, ValueError, OverflowError):
+            ago_s = math.nan
+        if not (ago_s > 0.0 if back else ago_s == 0.0):
+            raise DataError(f"{MISSING}: {before} is not before {token} by their time stamps, {then!r} and {now!r}.")
+        return round(ago_s, 2)
 
     def missing(self, tokens: Sequence[str]) -> tuple[Path, ...]:
         """Files that the samples need and that are not there, as far as the metadata name them."""

@@ -8,7 +8,6 @@ Source: Park et al., "NuPlanQA", arXiv 2503.12772, and the published evaluation 
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 from chauffeur.concept import DataError
+from chauffeur.concept.data import parse_json
 
 SKILLS: Final[Mapping[str, tuple[str, ...]]] = {
     "Road Environment Perception": ("Traffic Light", "Weather/Lighting Conditions", "Road Type/Conditions"),
@@ -145,7 +145,7 @@ def load_questions(path: Path) -> VqaFile:
     if content.startswith(b"version https://git-lfs"):
         raise DataError(f"{path} is a pointer of Git LFS, not the file.", hint="Fetch it: git lfs pull")
     try:
-        entries = json.loads(content)
+        entries = parse_json(content)
     except ValueError as error:
         raise DataError(f"{path} is no JSON: {error}.") from error
     if not isinstance(entries, list):

@@ -42,6 +42,8 @@ FUTURE: Final = 6
 """Waypoints: 3 s."""
 MOST_OFF_S: Final = 0.2
 """nuScenes' key frames are the LIDAR sweeps (20 Hz) closest to every half second, and sweeps are lost at times."""
+USUALLY_OFF_S: Final = 0.05
+"""How far the middle one of all steps of a scene at 2 Hz may be from half a second."""
 THINNED_OFF_S: Final = 0.06
 """Half a period of 10 Hz, and a little: sets of more than 2 Hz have a sample so close to every half second."""
 CAMERA: Final = "CAM_FRONT"
@@ -256,8 +258,8 @@ class NuScenesTables:
             late = int(np.argmax(steps <= 0.0)) + 1
             raise self._wrong("sample", chain[late], "timestamp", at_s[late] * 1e6, "a later time than before it")
         usual = float(np.median(steps)) if len(steps) else STEP_S
-        cut = _thinned(at_s) if usual < STEP_S - MOST_OFF_S else _stretches(at_s)
-        if len(chain) > HISTORY and all(len(one) == 1 for one in cut):
+        cut = _thinned(at_s) if usual < STEP_S - USUALLY_OFF_S else _stretches(at_s)
+        if len(chain) > HISTORY and (usual > STEP_S + USUALLY_OFF_S or all(len(one) == 1 for one in cut)):
             raise DataError(
                 f"The samples of scene {self._text('scene', scene, 'name')!r} in {self.folder} lie {usual:.3g} s apart "
                 f"by their time stamps (microseconds); one every {STEP_S:g} s is needed.",

@@ -30,6 +30,7 @@ from chauffeur.bench.personalization.protocol import (
     make_protocol,
 )
 from chauffeur.concept import ConfigError, DataError, MissingExtraError
+from chauffeur.concept.data import parse_json
 from chauffeur.drive.files import publish
 
 CONSENT: Final = """# Information and consent (edit this text before you use it)
@@ -391,7 +392,7 @@ def _sealed(protocol: Protocol, seed: int) -> bytes:
 
 def _read_json(path: Path) -> dict[str, Any]:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = parse_json(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise DataError(
             f"There is no study in {path.parent}: {error.strerror or error}.",

@@ -4,7 +4,6 @@ items before they are compared."""
 from __future__ import annotations
 
 import contextlib
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from chauffeur.bench.kernel.store import Row, unseal
 from chauffeur.bench.lampilot.benchmark import NOT_ASKED
 from chauffeur.bench.lampilot.metrics import ORIGIN
 from chauffeur.concept import ConfigError, DataError, Scenario
+from chauffeur.concept.data import parse_json
 
 NOTHING_DRIVEN = ("refused", "not_driven")
 """Outcomes of items without a drive; no ruler has anything to measure there."""
@@ -140,6 +140,19 @@ def _short(folder: Path, folders: Sequence[Path]) -> str:
 _LAMPILOT: Final = "lampilot-bench"
 
 
+def tables_of_another(folder: Path) -> str:
+    """The tables that a finished run of another benchmark wrote, as Markdown; empty for a run of LaMPilot-Bench.
+
+    Raises:
+        DataError: It is no run folder that can be read.
+    """
+    if not (folder / "plan.json").is_file():
+        return ""
+    bench = str(_json(folder / "plan.json").get("bench", _LAMPILOT))
+    table = folder / "table.md"
+    return "" if bench.startswith(_LAMPILOT) or not table.is_file() else _text(table)
+
+
 def load_run(folder: Path) -> Run:
     """Read one run folder of `chauffeur bench lampilot`.
 
@@ -207,7 +220,7 @@ def _rows(folder: Path, items: list[Any]) -> tuple[Row, ...]:
 
 def _row(path: Path, number: int, line: str) -> Row:
     try:
-        row: Any = json.loads(line)
+        row: Any = parse_json(line)
     except ValueError as error:
         raise DataError(
             f"{path}, line {number}, is not JSON: {error}.", hint="Score the run again to write the file anew."
@@ -266,7 +279,7 @@ def _text(path: Path) -> str:
 
 def _json(path: Path) -> Row:
     try:
-        value: Any = json.loads(_text(path))
+        value: Any = parse_json(_text(path))
     except ValueError as error:
         raise DataError(f"{path} is not JSON: {error}.", hint="Restore the file, or start in a new folder.") from error
     if not isinstance(value, dict):

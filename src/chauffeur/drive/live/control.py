@@ -29,7 +29,7 @@ from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.wheel import Wheel, pressed
 from chauffeur.executors import Executor, executor_for
 from chauffeur.safety.bounds import least_target_mps
-from chauffeur.safety.shield import GroundShield, Shield, rollout, shield_for
+from chauffeur.safety.shield import GroundShield, Shield, StreetShield, rollout, shield_for
 from chauffeur.worlds.base import Driver, MirroredWorld
 from chauffeur.worlds.places import TownPlaces
 
@@ -404,9 +404,9 @@ class Control:
         return actuate(self._world, observation, command, settled.target_lane, self._shield)
 
     def _brake(self, observation: Observation) -> Actuated:
-        """Brake, past driver and shield, which may be what failed: straight on, or in a lot with the wheel held."""
+        """Brake, past driver and shield, which may be what failed: wheel straight, on streets and in lots held."""
         braking = min(FAULT_BRAKING_MPS2, max(0.0, observation.ego.speed_mps) / self.dt_s)
-        steering = self._steering if isinstance(self._shield, GroundShield) else 0.0
+        steering = self._steering if isinstance(self._shield, GroundShield | StreetShield) else 0.0
         return actuate(self._world, observation, Command(-braking, steering), None, None)
 
     def _outcome(self, before: Observation, now: Observation, start: Start) -> str:

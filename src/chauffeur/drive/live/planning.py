@@ -16,7 +16,7 @@ from typing import Final
 from chauffeur.concept import CameraImage, ChauffeurError, Context, History, Instruction, Observation, PersonId, Plan
 from chauffeur.describe.answers import with_way
 from chauffeur.describe.services.sources import Sources, SourceSettings
-from chauffeur.drive.emergency import NO_SHOULDER, planned_for
+from chauffeur.drive.emergency import NO_SHOULDER, STOPPING, planned_for
 from chauffeur.drive.events import DriveEvent, WishEventKind
 from chauffeur.drive.live.messages import MessageError
 from chauffeur.drive.live.mirror import Mirror
@@ -34,7 +34,7 @@ from chauffeur.drive.loop import LoopMemory
 from chauffeur.drive.planning import PLAN_WITHIN_S, RECALLED, START_WITHIN_S, Judged, PlanSteps, plan_once
 from chauffeur.drive.seat import SeatCamera
 from chauffeur.drive.session import parse_wish
-from chauffeur.drive.surroundings import describing, opened
+from chauffeur.drive.surroundings import describing, opened, weathered
 from chauffeur.memory.tolerant import TolerantMemory
 from chauffeur.planners.base import Planner, looks
 from chauffeur.planners.prompts import Setting, build_system_message
@@ -132,6 +132,9 @@ class Planning:
         except Exception as error:  # noqa: BLE001 - services and memories are others' code, too; the wish is answered
             self._tell("unplanned", request.wish, f"The planner failed: {type(error).__name__}: {error}")
             return
+        if order.plan.alarm == "stop":
+            self._tell("halt", request.wish, STOPPING)  # to stand in a lane is control's
+            return
         if order.plan.refusal or order.plan.policy is None:
             words = order.plan.refusal or "The planner gave no program."
             answered = request.aside and not order.plan.offer
@@ -154,7 +157,8 @@ class Planning:
         instruction = replace(parse_wish(request.text, PersonId(request.person)), confirmed=request.confirmed)
 
         async def describe() -> Context:
-            return with_way((await describing(self._sources))(observation), there)
+            described = weathered(self._mirror.world, await describing(self._sources))(observation)
+            return with_way(described, there)
 
         async def recall(instruction: Instruction, context: Context) -> History:
             return self._memory.recall(instruction.person, instruction, context, RECALLED)

@@ -508,6 +508,10 @@ class Runtime:
             self._again(interaction, event.kind, event.text)
         elif event.kind in FINAL:
             self._close(interaction, event)
+        elif event.kind == "halt" and sent_by == "planner":
+            self.halt()
+            self._tell(event)
+            self._close(interaction, replace(event, kind="interrupted"))
         else:
             stages: dict[EventKind, Stage] = {"planned": "planned", "started": "driven", "resumed": "driven"}
             stage = stages.get(event.kind, interaction.stage)

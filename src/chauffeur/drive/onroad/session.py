@@ -361,7 +361,7 @@ class VehicleSession:
             describe=describe,
             recall=recall,
             system=lambda: SystemMessage(system_text(self.limits)),
-            own=lambda _: self._stop_plan() if stopping else None,
+            own=self._own,
             check=check,
             fit=lambda plan: fitted(plan, self._settings.stack.limits, before.cap_mps),
             tell=tell,
@@ -393,6 +393,13 @@ class VehicleSession:
             words = f"Planning took more than {START_WITHIN_S:.0f} s; the vehicle is elsewhere by now. Ask again."
             return replace(made, status="failed", words=words)
         return made
+
+    def _own(self, text: str) -> Plan | None:
+        """The session's own plan: a speed of 0 for a stop, and words for distress."""
+        if is_stop(text):
+            return self._stop_plan()
+        words = answered_at_once(text)
+        return Plan(Thoughts(words), None, words, intent="ask", planner="onroad") if words else None
 
     def _stop_plan(self) -> Plan:
         """A stop needs no model: the word is enough."""
@@ -428,7 +435,7 @@ class VehicleSession:
                 if not slows:
                     return replace(answer, status="failed", words=f"{why} Nothing was published.")
                 self._say("trouble", f"{why} A lower speed is asked for all the same.", number)
-        if number < self._newest and not is_stop(answer.text):
+        if number < self._newest and not is_stop(answer.text) and answer.plan.alarm != "stop":
             return replace(answer, status="superseded", words=_SUPERSEDED.words)
         try:
             published = self._vehicle.apply(parameters)

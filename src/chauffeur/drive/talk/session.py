@@ -464,6 +464,9 @@ class Talk:
 
     def _became(self, event: DriveEvent) -> None:
         """What became of a wish."""
+        if event.kind == "halt":
+            self._stop()
+            return
         runtime = self._runtime
         interaction = None if runtime is None else runtime.interactions.get(event.wish)
         conversation = self._conversations.event(event, interaction)

@@ -19,9 +19,10 @@ from torch import nn
 from chauffeur.models.net.connector import Connector
 from chauffeur.models.net.transformer import TransformerConfig, transformer
 from chauffeur.models.net.vision import VisionConfig, vision
+from chauffeur.planners.camera_faults import HEIGHT, WIDTH
 from chauffeur.planners.vilad.words import MOST_PIECES
 from chauffeur.planners.vilad.words import WIDTH as WORD_WIDTH
-from chauffeur.planners.vlm.pictures import CELLS, HEIGHT, WIDTH
+from chauffeur.planners.vlm.pictures import CELLS
 from chauffeur.planners.vlm.template import HEARD, SIGHTS, TEMPLATE
 
 FREE: Final = 2

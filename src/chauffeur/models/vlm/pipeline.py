@@ -25,9 +25,9 @@ from chauffeur.models.vlm.gains import gain_table
 from chauffeur.models.vlm.recipe import VlmRecipe, train
 from chauffeur.models.vlm.scenes import PictureSet, Split, load_pictures, make_pictures
 from chauffeur.models.vlm.wishes import held_wishes
+from chauffeur.planners.camera_faults import HEIGHT, WIDTH
 from chauffeur.planners.vilad.words import load_words
 from chauffeur.planners.vlm.engine import TRUST, WORDS_FOLDER, VlmEngine
-from chauffeur.planners.vlm.pictures import HEIGHT, WIDTH
 from chauffeur.planners.vlm.sentences import shipped_encoder
 from chauffeur.planners.vlm.template import SEEN_WEATHERS, TEMPLATE, GainCodebook
 from chauffeur.safety.gain_box import gain_box

@@ -29,7 +29,8 @@ from chauffeur.camera import (
 from chauffeur.concept import DataError, Lead, Observation, Scenario, VehicleState
 from chauffeur.drive.session import make_world
 from chauffeur.geometry import wrap_to_pi
-from chauffeur.planners.vlm.pictures import CELLS, HEIGHT, WIDTH, small
+from chauffeur.planners.camera_faults import HEIGHT, WIDTH, small
+from chauffeur.planners.vlm.pictures import CELLS
 from chauffeur.worlds.base import World
 from chauffeur.worlds.highway.scenarios import BUILT_IN as ROADS
 from chauffeur.worlds.track.manoeuvres import MANOEUVRES, ManoeuvreName, manoeuvre

@@ -7,10 +7,10 @@ import unicodedata
 
 from chauffeur.language.tokens import plain
 from chauffeur.planners.onboard.clauses import Clause
-from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.lexicon import rewrite
 from chauffeur.planners.onboard.meaning import Meaning, NotUnderstood
 from chauffeur.planners.onboard.words import words_file
+from chauffeur.safety.dangers import danger
 
 CAN_DO = (
     "I can drive faster or slower or at a speed you name, follow closer or further back, change lanes, overtake, turn "

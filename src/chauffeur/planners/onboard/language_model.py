@@ -13,10 +13,18 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Final
 
-from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, ProgramError, Situation, Usage
-from chauffeur.planners.arbitration import UNSURE_WORDS, Wish, agreed, asked, question_about, undenied, wary_of
+from chauffeur.concept import Alarm, ConfigError, Plan, PlanRequest, Program, ProgramError, Situation, Usage
+from chauffeur.planners.arbitration import (
+    UNSURE_WORDS,
+    Wish,
+    agreed,
+    alarm_in,
+    asked,
+    question_about,
+    undenied,
+    wary_of,
+)
 from chauffeur.planners.base import OnText, Planner, declined
-from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import DialectStep, shall_i
 from chauffeur.planners.onboard.dialect import write as program_of
 from chauffeur.planners.onboard.doubts import ENGLISH_ONLY, foreign
@@ -31,6 +39,8 @@ from chauffeur.planners.onboard.reply import OnboardReply, read_reply
 from chauffeur.planners.onboard.thoughts import thoughts_of
 from chauffeur.planners.onboard.town import asked_plainly, plan_in_town
 from chauffeur.planners.onboard.understand import meanings_said
+from chauffeur.planners.weather_doubts import never_faster
+from chauffeur.safety.dangers import danger
 
 SHIPPED: Final = Path(__file__).parent / "weights"
 """The model that comes with the package."""
@@ -213,6 +223,7 @@ class LanguageModelPlanner:
         """Version of the model."""
         return str(self._engine.about.get("version", "unnamed"))
 
+    @never_faster
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; what is not understood, not possible or not to be done is declined in words."""
         begun = time.perf_counter()
@@ -235,7 +246,7 @@ class LanguageModelPlanner:
         linked, used, wish = settled.linked, settled.used, settled.wish
         if asks := settled.question(request):
             plan = asked(self, asks, begun, offer=wish, raw=settled.written.text)
-            plan = replace(plan, usage=usage_of(settled.written))
+            plan = replace(plan, usage=usage_of(settled.written), alarm=_alarm(settled.steps, wish, settled.written))
             return undenied(self, plan, request, begun, meant=linked.choice.intent)
         plan = Plan(
             thoughts=thoughts_of(linked.reading, linked.choice, settled.situation, used),
@@ -295,7 +306,8 @@ class LanguageModelPlanner:
         linked = link(reply.steps, situation, request.limits, leaning, wary=wary)
         if isinstance(linked, Declined):
             intent = "+".join(step.meaning.family for step in reply.steps)
-            return declined(self, linked.words, begun, intent=intent, usage=usage_of(written), raw=written.text)
+            plan = declined(self, linked.words, begun, intent=intent, usage=usage_of(written), raw=written.text)
+            return replace(plan, alarm=_alarm(reply.steps, wish, written))
         used = tuple(leaning(step.meaning.family) for step in reply.steps)
         return Settled(wish, reply.source, reply.steps, linked, used, situation, written)
 
@@ -307,6 +319,13 @@ class LanguageModelPlanner:
             except ProgramError:
                 self._read[wish] = ()
         return self._read[wish]
+
+
+def _alarm(steps: Sequence[DialectStep], wish: str, written: Written) -> Alarm:
+    """What a wish that is not driven was read as, where that is a stop at once."""
+    if any(step.wait_s is not None or step.condition is not None for step in steps):
+        return ""
+    return alarm_in(wish, [step.meaning.family for step in steps], meanings_said(wish), written.sure)
 
 
 def usage_of(written: Written) -> Usage:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import partial
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program
-from chauffeur.planners.arbitration import Wish, asked, slow_words, unanswered, undenied, wary_of
+from chauffeur.planners.arbitration import Wish, alarm_in, asked, slow_words, unanswered, undenied, wary_of
 from chauffeur.planners.base import declined
 from chauffeur.planners.onboard.choose import choose
-from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.doubts import CAN_DO
 from chauffeur.planners.onboard.exemplars import program_of
 from chauffeur.planners.onboard.meaning import NotUnderstood
@@ -18,6 +18,8 @@ from chauffeur.planners.onboard.personal import corrections_of, leaning_of
 from chauffeur.planners.onboard.thoughts import thoughts_of
 from chauffeur.planners.onboard.town import asked_plainly, plan_in_town
 from chauffeur.planners.onboard.understand import understand
+from chauffeur.planners.weather_doubts import never_faster
+from chauffeur.safety.dangers import danger
 
 VERSION = "meaning-v2"
 """Changes whenever the same request could be planned differently."""
@@ -43,6 +45,7 @@ class RetrievalPlanner:
         """Rule set with its version."""
         return VERSION
 
+    @never_faster
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; a wish that is not understood or not possible is declined in words."""
         begun = time.perf_counter()
@@ -66,15 +69,16 @@ class RetrievalPlanner:
         corrections = corrections_of(request.rounds)
         leaning = partial(leaning_of, request.history, corrections=corrections)
         wary = wary_of(ready.instruction.text, "+".join(step.family for step in reading.steps))
+        alarm = alarm_in(ready.instruction.text, [step.family for step in reading.steps], reading.steps)
         choice = choose(reading, request.context.situation, request.limits, leaning, wary=wary)
         if isinstance(choice, Declined):
             intent = "+".join(step.family for step in reading.steps)
-            return declined(self, choice.words, begun, intent=intent)
+            return replace(declined(self, choice.words, begun, intent=intent), alarm=alarm)
         used = [leaning(step.family) for step in reading.steps]
         if why := slow_words(choice.steps, request.context.situation, request.limits):
             does = ", then ".join(step.does for step in choice.steps)
             if question := unanswered(request.instruction, f"{why} Shall I {does}?"):
-                return asked(self, question, begun, offer=ready.instruction.text)
+                return replace(asked(self, question, begun, offer=ready.instruction.text), alarm=alarm)
         source = program_of([step.filled for step in choice.steps])
         plan = Plan(
             thoughts=thoughts_of(reading, choice, request.context.situation, used),

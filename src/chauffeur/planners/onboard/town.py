@@ -20,7 +20,6 @@ from chauffeur.language.emergency import SAFE_STOP_WISH
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.arbitration import UNSURE_WORDS, asked, unanswered, undenied
 from chauffeur.planners.base import NO_WISH, Planner, declined
-from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.doubts import CAN_DO
 from chauffeur.planners.onboard.town_intents import PLAIN_WISHES, TownIntent, intent_of
 from chauffeur.planners.onboard.town_program import program_of
@@ -35,6 +34,7 @@ from chauffeur.planners.onboard.town_steps import (
 from chauffeur.planners.onboard.understand import meanings_said
 from chauffeur.planners.talk2drive.style import LOOK_AHEAD, destination_of
 from chauffeur.programs.catalogue import vocabulary_of
+from chauffeur.safety.dangers import danger
 
 SNIPPETS: Final = Path(__file__).parent / "snippets"
 """The policy repository that comes with the package."""
@@ -278,7 +278,7 @@ def _declined(planner: Planner, said: str, meant: TownIntent, situation: Situati
     if meant.kind not in words:
         return None
     plan = declined(planner, words[meant.kind], begun, intent=_INTENTS.get(meant.kind, "ask"))
-    return replace(plan, offer=SAFE_STOP_WISH) if meant.kind == "distress" else plan
+    return replace(plan, offer=SAFE_STOP_WISH, alarm="distress") if meant.kind == "distress" else plan
 
 
 def _impossible(step: TownStep, situation: Situation) -> str:

@@ -27,7 +27,6 @@ from chauffeur.planners.arbitration import (
     within_mood,
 )
 from chauffeur.planners.base import declined
-from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.dialect import DialectStep
 from chauffeur.planners.onboard.doubts import foreign
 from chauffeur.planners.onboard.exemplars.library import number
@@ -51,6 +50,8 @@ from chauffeur.planners.talk2drive.style import (
     named_spot,
     place_of,
 )
+from chauffeur.planners.weather_doubts import never_faster
+from chauffeur.safety.dangers import danger
 from chauffeur.worlds.town.recipes import PLACE_KINDS
 
 _STANDING: Final = frozenset({"stop", "pull_over"})
@@ -125,6 +126,7 @@ class EmbeddedParameters:
         """Version of the model that reads the words."""
         return self._model.model
 
+    @never_faster
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan; what is not understood, not possible or no matter of parameters is declined in words."""
         begun = time.perf_counter()
@@ -148,6 +150,8 @@ class EmbeddedParameters:
             if plainly := _plain_words(steps):  # on other roads "turn right" may be a change of the lane
                 request = replace(request, instruction=replace(request.instruction, text=plainly))
         settled = self._model.settle(_compared(request), begun)
+        if isinstance(settled, Plan) and settled.alarm == "stop":
+            return settled  # no hint outweighs it
         reads = () if isinstance(settled, Plan) else tuple(map(kind_of, settled.linked.choice.intent.split("+")))
         known = situation.world in HINT_KINDS
         hint = hint_of(wish, situation, request.history, reads[0] if reads else "") if known else None

@@ -29,6 +29,7 @@ from chauffeur.planners.prompts import Message, data_block, repair_turns, wish_t
 from chauffeur.planners.prompts.system import fill, template
 from chauffeur.planners.talk2drive.answer import ParametersAnswer, read_answer
 from chauffeur.planners.talk2drive.style import DISTANCE_M, RATIO_S
+from chauffeur.planners.weather_doubts import never_faster
 from chauffeur.planners.wish_goal import goal_of
 from chauffeur.safety.envelope import policy_findings
 
@@ -90,6 +91,7 @@ class Talk2DrivePlanner:
         """Model as asked for."""
         return self._name.partition("/")[2]
 
+    @never_faster
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan.
 

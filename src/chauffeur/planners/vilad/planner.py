@@ -14,10 +14,19 @@ from typing import Final
 
 import numpy as np
 
-from chauffeur.concept import InstructionError, Parameters, ParkingLot, Plan, PlanRequest, Street, Thoughts, Usage
+from chauffeur.concept import (
+    Alarm,
+    InstructionError,
+    Parameters,
+    ParkingLot,
+    Plan,
+    PlanRequest,
+    Street,
+    Thoughts,
+    Usage,
+)
 from chauffeur.language.corrections import last_said
 from chauffeur.planners.base import declined
-from chauffeur.planners.onboard.dangers import danger
 from chauffeur.planners.onboard.town import town_destination
 from chauffeur.planners.onboard.town_steps import landmark_in
 from chauffeur.planners.vilad.driving import TEMPLATE as DRIVE
@@ -44,6 +53,7 @@ from chauffeur.planners.vilad.parking import (
     verified,
 )
 from chauffeur.planners.vilad.unmasking import Unmasking, unmask
+from chauffeur.safety.dangers import danger
 
 SPEED_MPS: Final = 3.0
 """In a parking lot, where ways are narrow."""
@@ -123,7 +133,9 @@ class ViladPlanner:
         if written.values["way"] == 0:
             words = refusal_of(street, written.values)
             refused = declined(self, words, begun, intent=intent_of(asked), usage=usage, raw=written.raw)
-            return replace(refused, model=engine.version)
+            anywhere = all(asked[name] == NONE for name in ("mark", "place", "metres", "turn"))
+            alarm: Alarm = "stop" if asked["halt"] == "stop" and anywhere else ""
+            return replace(refused, model=engine.version, alarm=alarm)
         limit = request.context.situation.speed_limit_mps
         return Plan(
             thoughts=Thoughts(drive_words(street, written.values)),

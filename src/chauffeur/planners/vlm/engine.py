@@ -12,10 +12,10 @@ import numpy as np
 
 from chauffeur.concept import ActionMatrix, DataError
 from chauffeur.language.text_classifier import load_sorter
+from chauffeur.planners.camera_faults import HEIGHT, WIDTH, small
 from chauffeur.planners.exported import open_exported
 from chauffeur.planners.vilad.engine import SHIPPED as WORDS_FOLDER
 from chauffeur.planners.vilad.words import WordTable, load_words
-from chauffeur.planners.vlm.pictures import HEIGHT, WIDTH, small
 from chauffeur.planners.vlm.sentences import load_head, shipped_encoder
 from chauffeur.planners.vlm.template import DECIDED, STYLES, TEMPLATE, GainCodebook
 

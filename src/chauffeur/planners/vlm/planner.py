@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from chauffeur.concept import CameraImage, History, InstructionError, Plan, PlanRequest, Situation, Thoughts, Usage
-from chauffeur.language.weather import FOG, RAIN, SNOW, UNKNOWN, said_weather, weather_of
+from chauffeur.concept import (
+    ActionMatrix,
+    CameraImage,
+    History,
+    InstructionError,
+    Plan,
+    PlanRequest,
+    Situation,
+    Thoughts,
+    Usage,
+)
+from chauffeur.language.weather import FOG, RAIN, SNOW, UNKNOWN, said_weather, weather_of, without_said_weather
+from chauffeur.planners.camera_faults import camera_fault
 from chauffeur.planners.motion import settings_of
 from chauffeur.planners.prompts.motion import matrix_words
-from chauffeur.planners.vlm.engine import VlmEngine, shipped
-from chauffeur.planners.vlm.pictures import fault_of
+from chauffeur.planners.vlm.engine import VlmEngine, VlmReading, shipped
 from chauffeur.planners.vlm.taste import (
     STEP,
     STYLE_SETTING,
@@ -24,7 +35,7 @@ from chauffeur.planners.vlm.taste import (
 )
 from chauffeur.planners.vlm.template import RECALLS, SEEN_WEATHERS, STYLES
 from chauffeur.planners.vlm.words import AS_SEEN, SAID, more_careful, scene_words, taste_words, thought_words
-from chauffeur.safety.gain_box import moved
+from chauffeur.safety.gain_box import care, most_careful, moved
 
 INTENT: Final = "motion.gains"
 RECALL_SETTING: Final = "recall"
@@ -35,24 +46,23 @@ SIMILAR: Final = 0.6
 """A remembered wish this much like the present one speaks for it."""
 _LEAST_SHIFT: Final = 0.02
 """Smaller shifts of the gains by a person's taste are left out: nobody would feel them."""
+_DOUBTED: Final = 0.5
+"""Share of the weather below which a picture may show no road at all, and is taken for the worst weather too."""
 _STANDS_MPS: Final = 1.0
 _DAMP: Final = ("sunny", "night")
 """What the weather services' "dry" may look like."""
 
 
 @dataclass(frozen=True, slots=True)
-class VlmSight:
-    """What the planner makes of its camera before the model decides.
+class _Made:
+    """What became of a wish: the reading that is told of, the gains and by how much they are to this person's taste,
+    the scene and the thoughts."""
 
-    Attributes:
-        given: Slots that are not the model's to decide.
-        said: What is wrong, for the person; empty where nothing is.
-        blind: Whether there is no picture to speak of.
-    """
-
-    given: dict[str, str]
-    said: str = ""
-    blind: bool = False
+    read: VlmReading
+    policy: ActionMatrix
+    shift: float
+    scene: str
+    thoughts: str
 
 
 class VlmPlanner:
@@ -87,66 +97,88 @@ class VlmPlanner:
         text = request.instruction.text.strip()
         if not text:
             raise InstructionError("The instruction is empty.", hint="Say how you want to be driven.")
-        situation = request.context.situation
         recall = recalled(request.history)
-        given = {"task": task_of(situation), "recall": RECALLS[recall]}
-        fault = fault_of(request.images, self._earlier)
+        given = {"task": task_of(request.context.situation), "recall": RECALLS[recall]}
+        fault = camera_fault(request.images, self._earlier)
         self._earlier = request.images[-1] if request.images else None
-        if fault:
-            given |= {"style": "conservative", "weather": "snow", "grade": "heavy"}
-            read = self._engine.read(text, None, given)
-            scene = f"{fault}: I cannot see road or weather."
-            thoughts = f"{scene} I take my most careful gains until it shows something again."
-        else:
-            pixels = request.images[-1].pixels()
-            read = self._engine.read(text, pixels, given)
-            sure = {name for name in self._engine.trusted if read.shares.get(name, 1.0) >= SURE}
-            scene = scene_words(read.values, sure)
-            thoughts = f"{scene} {thought_words(read.values)}"
-            seen = read.values["weather"]
-            worst, doubts, where = seen, list[str](), ""
-            if served := _contradicted(seen, situation):
-                worst = more_careful(worst, served)
-                doubts.append(f"The weather service says otherwise ({served}).")
-            heard = said_weather(text)
-            if heard != "none" and more_careful(seen, AS_SEEN[heard]) != seen:
-                where = "on a slippery road" if heard == "slippery" and worst != AS_SEEN[heard] else ""
-                worst = more_careful(worst, AS_SEEN[heard])
-                doubts.append(f"You say that {SAID[heard]}.")
-            if doubts:
-                # Without the picture: what is seen outweighs the words that are given beside it.
-                held = {name: read.values[name] for name in ("style", "lead", "road")}
-                read = self._engine.read(text, None, given | held | {"weather": worst, "grade": "heavy"})
-                scene = " ".join([scene, *doubts])
-                of = "the worst of all" if len(doubts) > 1 else "the worse of the two"
-                thoughts = f"{scene} I go by {of}. {thought_words(read.values, where)}"
-        style, weather = STYLES.index(read.values["style"]), SEEN_WEATHERS.index(read.values["weather"])
-        policy, shift = read.policy, -STEP * (0, -1, 1)[recall]
-        if not fault and not recall:
-            items = (item for item in request.history.items if item.intent == INTENT)
-            shift = taste_of(judged_drives(items, style, weather, SIMILAR))
-            shift = max(shift, 0.0) if weather else shift  # never bolder in bad weather
-            shift = 0.0 if abs(shift) < _LEAST_SHIFT else round(shift, 3)
-            policy = moved(policy, shift) if shift else policy
-            thoughts = f"{thoughts}{taste_words(shift)}"
+        made = self._blind(text, given, fault) if fault else self._seeing(text, given, request, recall)
+        read = made.read
         return Plan(
-            thoughts=Thoughts(thoughts),
-            policy=policy,
+            thoughts=Thoughts(f"{made.thoughts}{taste_words(made.shift)}"),
+            policy=made.policy,
             intent=INTENT,
             settings=(
-                *settings_of(policy),
+                *settings_of(made.policy),
                 (RECALL_SETTING, float((0, -1, 1)[recall])),
-                (TASTE_SETTING, shift),
-                (STYLE_SETTING, float(style)),
-                (WEATHER_SETTING, float(weather)),
+                (TASTE_SETTING, made.shift),
+                (STYLE_SETTING, float(STYLES.index(read.values["style"]))),
+                (WEATHER_SETTING, float(SEEN_WEATHERS.index(read.values["weather"]))),
             ),
             planner=self.id,
             model=self.model,
             usage=Usage(completion_tokens=read.passes, requests=1),
             latency_s=time.perf_counter() - begun,
-            raw=f"{read.text}\nP = {matrix_words(policy)}",
-            scene=scene,
+            raw=f"{read.text}\nP = {matrix_words(made.policy)}",
+            scene=made.scene,
         )
+
+    def _blind(self, text: str, given: Mapping[str, str], fault: str) -> _Made:
+        """What is driven without a picture to go by: whatever it would have shown, nothing asks for more care."""
+        read = self._engine.read(text, None, {**given, "style": "conservative", "weather": "snow", "grade": "heavy"})
+        scene = f"{fault}: I cannot see road or weather."
+        thoughts = f"{scene} I take my most careful gains until it shows something again."
+        return _Made(read, most_careful(), 0.0, scene, thoughts)
+
+    def _seeing(self, text: str, given: Mapping[str, str], request: PlanRequest, recall: int) -> _Made:
+        """What is driven by what is seen, said and told. Each source is read for itself, and of all these readings the
+        one of the most `care` is driven: one more source, whatever it says, never makes the drive less careful."""
+        pixels, heard = request.images[-1].pixels(), said_weather(text)
+        rest = without_said_weather(text) if heard != "none" else ""
+        readings, doubts, scene, where = list[VlmReading](), list[str](), "", ""
+        for words in filter(None, (rest, text)):  # the last is what is told of
+            read = self._engine.read(words, pixels, given)
+            seen, doubts, where = read.values["weather"], list[str](), ""
+            asked = [seen]
+            if read.shares.get("weather", 1.0) < _DOUBTED:
+                asked.append(SEEN_WEATHERS[-1])
+                doubts.append("I am not sure what the camera shows.")
+            if served := _contradicted(seen, request.context.situation):
+                asked.append(more_careful(seen, served))
+                doubts.append(f"The weather service says otherwise ({served}).")
+            if words is text and heard != "none" and more_careful(seen, AS_SEEN[heard]) != seen:
+                where = "on a slippery road" if heard == "slippery" and AS_SEEN[heard] not in asked else ""
+                asked.append(AS_SEEN[heard])
+                doubts.append(f"You say that {SAID[heard]}.")
+            sure = {name for name in self._engine.trusted if read.shares.get(name, 1.0) >= SURE}
+            scene = scene_words(read.values, sure)
+            readings.append(read)
+            held = {name: read.values[name] for name in ("style", "lead", "road")}
+            if doubts:  # without the picture: what is seen outweighs the words that are given beside it
+                for weather in sorted(set(asked[1:]), key=SEEN_WEATHERS.index):
+                    known = {**given, **held, "weather": weather, "grade": "heavy"}
+                    readings.append(self._engine.read(words, None, known))
+        read = readings[-1]
+        policy, shift = max((self._tasted(one, request.history, recall) for one in readings), key=_care)
+        if not doubts:
+            return _Made(read, policy, shift, scene, f"{scene} {thought_words(read.values)}")
+        scene = " ".join([scene, *doubts])
+        of = "the worst of all" if len(doubts) > 1 else "the worse of the two"
+        return _Made(read, policy, shift, scene, f"{scene} I go by {of}. {thought_words(read.values, where)}")
+
+    def _tasted(self, read: VlmReading, history: History, recall: int) -> tuple[ActionMatrix, float]:
+        """Gains of a reading as this person likes them, and by how much more careful than the words alone ask for."""
+        if recall:
+            return read.policy, -STEP * (0, -1, 1)[recall]
+        style, weather = STYLES.index(read.values["style"]), SEEN_WEATHERS.index(read.values["weather"])
+        items = (item for item in history.items if item.intent == INTENT)
+        shift = taste_of(judged_drives(items, style, weather, SIMILAR))
+        shift = max(shift, 0.0) if weather else shift  # never bolder in bad weather
+        shift = 0.0 if abs(shift) < _LEAST_SHIFT else round(shift, 3)
+        return (moved(read.policy, shift) if shift else read.policy), shift
+
+
+def _care(made: tuple[ActionMatrix, float]) -> float:
+    return care(made[0])
 
 
 def task_of(situation: Situation) -> str:

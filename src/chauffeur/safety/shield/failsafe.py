@@ -4,9 +4,9 @@ Compiled, and all in this file, because numba checks only the file a function st
 
 Arrays: a line has rows (x, y, heading) every metre. A car is (wheelbase, rear axle to middle, length, width, full lock,
 steering rate, hardest acceleration, hardest braking, grip, lag). A state is (x, y, heading) of the rear axle, speed,
-wheel angle. Everybody else is a row (x, y, heading, speed, length, width, side, brakes, first row and number of rows of
-the line it follows, station on it, offset to its left, way to a stand for the car, way that it needs between itself and
-a car that enters its lane); who follows no line has 0 rows of it and goes straight on.
+wheel angle, acceleration. Everybody else is a row (x, y, heading, speed, length, width, side, brakes, first row and
+number of rows of the line it follows, station on it, offset to its left, way to a stand for the car, way that it needs
+between itself and a car that enters its lane); who follows no line has 0 rows of it and goes straight on.
 """
 
 from __future__ import annotations
@@ -37,10 +37,11 @@ _STANDS_MPS = 0.05
 
 
 def numbers(car: KinematicBicycle) -> Array:
-    """A car as the functions here want it."""
+    """A car as the functions here want it: as large as the ground that it may come to a stand on."""
     return np.array(
         [
-            car.wheelbase_m, car.rear_to_middle_m, car.length_m, car.width_m, car.most_steering_rad,
+            car.wheelbase_m, car.rear_to_middle_m, car.length_m + 2.0 * car.stray_m, car.width_m + 2.0 * car.stray_m,
+            car.most_steering_rad,
             car.steering_rate_radps, car.most_acceleration_mps2, car.most_braking_mps2, car.grip_mps2, car.lag_s,
         ]
     )  # fmt: skip
@@ -88,8 +89,11 @@ def pursuing(state: Array, line: Array, at: int, car: Array) -> float:
 
 @compiled
 def _moved(state: Array, acceleration: float, steering: float, dt_s: float, car: Array) -> None:
-    """`control.kinematic_bicycle.advanced`, in place."""
+    """`control.kinematic_bicycle.advanced`, in place, of a car whose pedals answer by and by."""
     asked = max(-car[7], min(car[6], acceleration))
+    if car[9] > 0.0:
+        asked += (state[5] - asked) * math.exp(-dt_s / car[9])
+        state[5] = asked
     turn = car[5] * dt_s
     wheel = max(state[4] - turn, min(state[4] + turn, _clipped(steering, car[4])))
     before = state[3]
@@ -118,7 +122,6 @@ def stopped(
     """
     rows = np.empty((LONGEST, 5))
     state = start.copy()
-    held = 1 + math.ceil(car[9] / dt_s - 1e-9)
     count = 0
     at = nearest(line, state[0], state[1], at, 8)
     while count < LONGEST:
@@ -126,9 +129,9 @@ def stopped(
         rows[count, 1] = state[1] + car[1] * math.sin(state[2])
         rows[count, 2], rows[count, 3], rows[count, 4] = state[2], state[3], at
         count += 1
-        if count > held and state[3] <= 0.0:
+        if count > 1 and state[3] <= 0.0:
             break
-        if count <= held:
+        if count == 1:
             _moved(state, acceleration, steering, dt_s, car)
         else:
             wheel = state[4] if law == HELD else 0.0 if law == STRAIGHT else pursuing(state, line, at, car)
@@ -162,7 +165,7 @@ def _place(other: Array, ways: Array, sigma: float) -> tuple[float, float]:
 
 @compiled
 def _parted(pose: Array, front: float, back: float, wide: float, other: Array, side: float) -> bool:
-    """Whether a body, from so far behind its middle to so far ahead, is clear of one that stands, by separating axes."""
+    """Whether a body, from so far behind its middle to so far ahead, is clear of one that stands: separating axes."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     dx, dy = other[0] - pose[0], other[1] - pose[1]
     u, v = c * dx + s * dy, c * dy - s * dx

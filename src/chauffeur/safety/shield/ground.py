@@ -10,11 +10,11 @@ from chauffeur.safety.shield.street import StreetShield
 from chauffeur.worlds.base import World
 from chauffeur.worlds.parking.lot import LIMIT_MPS
 from chauffeur.worlds.parking.safety_filter import LotSafetyFilter
-from chauffeur.worlds.places import PavedGround, TownPlaces
+from chauffeur.worlds.places import PavedGround, StreetCar
 
 
 class GroundShield(Shield):
-    """The shield of a parking lot and a test track: the same last word, said by rules for paved ground (Guard).
+    """The shield of a parking lot: the same last word, said by rules for paved ground.
 
     The shield of roads keeps a car in its lane and off others' by distances that no parking car has, and takes it for
     one whose axles are at its ends.
@@ -30,7 +30,7 @@ class GroundShield(Shield):
         """Args: a world just reset; its control period; bounds no command may cross; speed limits (default a lot's)."""
         super().__init__(dt_s, limits)
         self._most = Limits() if limits is None else limits
-        self._lot_filter = LotSafetyFilter(world.chassis, world.ground, dt_s, world.steering_rate)
+        self._lot_filter = LotSafetyFilter(world.chassis, dt_s, world.steering_rate)
         self._limit = limit_mps
 
     def filter(self, observation: Observation, command: Command, aim: LaneId | None = None) -> FilterResult:
@@ -45,9 +45,9 @@ class GroundShield(Shield):
 
 
 def shield_for(world: World, limits: Limits | None = None) -> Shield:
-    """The shield that fits a world, just reset: of roads, of paved ground, or of a town."""
+    """The shield that fits what a world, just reset, states: paved ground, a car on streets, or neither: roads."""
     if isinstance(world, PavedGround):
         return GroundShield(world, world.dt_s, limits, world.perception().speed_limit)
-    if isinstance(world, TownPlaces):
-        return StreetShield(world.dt_s, limits)
+    if isinstance(world, StreetCar):
+        return StreetShield(world.dt_s, limits, car=world.car)
     return Shield(world.dt_s, limits)

@@ -184,7 +184,8 @@ class StreetShield(Shield):
 
     def _state(self, ego: VehicleState) -> Array:
         rear = Pose(ego.x_m, ego.y_m, ego.heading_rad).ahead(-self._car.rear_to_middle_m)
-        return np.array([rear.x_m, rear.y_m, ego.heading_rad, max(ego.speed_mps, 0.0), ego.steering_rad])
+        speed = max(ego.speed_mps, 0.0)
+        return np.array([rear.x_m, rear.y_m, ego.heading_rad, speed, ego.steering_rad, ego.acceleration_mps2])
 
     # What is left after a command -------------------------------------------------------------------------------------
 
@@ -263,7 +264,8 @@ class StreetShield(Shield):
     def _strays(self, ground: Ground, way: _Way, poses: Array) -> bool:
         """Whether the outline leaves its ground on a way, or gets farther out where it is out already."""
         car, places = self._car, poses[:, :3]
-        beyond = ground.beyond_m(places, car.length_m, car.width_m, stops=True)
+        length, width = (float(one) for one in self._numbers[2:4])
+        beyond = ground.beyond_m(places, length, width, stops=True)
         edge = way.edge_m[poses[:, 4].astype(np.int64)]
         if (beyond[1:] > np.maximum(edge[1:], beyond[0]) + _LEVEL_M).any():
             return True
@@ -271,7 +273,7 @@ class StreetShield(Shield):
         if not swings[1:].any():
             return False
         # Where a front swings out, it does so over lanes and kerbs, and the wheels stay on the road.
-        beyond = ground.beyond_m(places, car.length_m, car.width_m, stops=True, either_way=True)
+        beyond = ground.beyond_m(places, length, width, stops=True, either_way=True)
         if (beyond[1:] > np.maximum(_OVERHANG_M, beyond[0]) + _LEVEL_M).any():
             return True
         wheels = ground.beyond_m(places, car.wheelbase_m, car.width_m, stops=True, either_way=True)

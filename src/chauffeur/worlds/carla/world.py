@@ -8,6 +8,7 @@ tested against a stand-in that the town feeds and that speaks in the client libr
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -23,7 +24,7 @@ from chauffeur.concept import (
     SignalState,
     VehicleState,
 )
-from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ
+from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle
 from chauffeur.geometry import LanePlace, Pose, RoadGraph, Route, plan_route
 from chauffeur.geometry.opendrive import OpenDriveError, parse_opendrive
 from chauffeur.worlds.base import EGO
@@ -37,9 +38,12 @@ DT_S: Final = 0.05
 SEES_M: Final = 100.0
 _LIFT_M: Final = 0.5
 """So far above the road cars are put in."""
+_LAG_S: Final = 0.2
+"""Time until pedals and wheel have answered."""
+_STRAY_M: Final = 0.3
+"""What a stop may end beside where a bicycle puts it: as much as lanes leave a car of this width."""
 _TOUCH_S: Final = 0.2
 """A contact is told for so long after the server's last word of it."""
-_OFF_ROAD_M: Final = 1.0
 _STATES: Final[dict[str, SignalState]] = {"Red": "red", "Yellow": "yellow", "Green": "green"}
 _BLUEPRINTS: Final[dict[AgentKind, str]] = {
     "car": "vehicle.tesla.model3",
@@ -93,9 +97,14 @@ class CarlaWorld:
         return DT_S
 
     @property
+    def car(self) -> KinematicBicycle:
+        """The ego, as a filter may count on it: CARLA's physics answer later than a bicycle."""
+        return replace(LINCOLN_MKZ, lag_s=_LAG_S, stray_m=_STRAY_M)
+
+    @property
     def chassis(self) -> Chassis:
         """The ego's size and axles."""
-        return Chassis.of(LINCOLN_MKZ)
+        return Chassis.of(self.car)
 
     def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
         """Load the town, put in ego and traffic.
@@ -333,9 +342,7 @@ class CarlaWorld:
 
     def _look(self) -> Observation:
         own = self._state(self._ego)
-        lane = self._road.get(own.lane)
-        off = 0.0 if lane is None else abs(lane.centre.project(own.x_m, own.y_m)[1])
-        off_road = lane is None or off > lane.width_m / 2.0 + _OFF_ROAD_M
+        off_road = self._road.ground.off_road(own.x_m, own.y_m)
         crashed = self._crashed and self._config.contact_ends
         ego = VehicleState(
             EGO,

@@ -7,12 +7,12 @@ is one sample with one command; its id is `<task>_s<sample>_c<command>`.
 from __future__ import annotations
 
 import hashlib
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from chauffeur.concept import DataError, Scenario
+from chauffeur.concept.data import parse_json
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ def _read(path: Path) -> bytes:
 def parse_task(name: str, content: bytes, path: Path) -> Task:
     """One task file's content. Raises DataError naming the file and what is wrong in it."""
     try:
-        raw: Any = json.loads(content)
+        raw: Any = parse_json(content)
         commands = tuple(str(c) for c in raw["commands"])
         samples = tuple(_sample(name, i, sample) for i, sample in enumerate(raw["samples"]))
     except (ValueError, KeyError, TypeError) as error:

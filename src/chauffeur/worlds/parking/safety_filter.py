@@ -15,9 +15,12 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 from chauffeur.concept import Command, Observation, VehicleState
 from chauffeur.concept.units import kmh
 from chauffeur.geometry import Box, Pose, overlap
+from chauffeur.geometry.ground import Ground
 from chauffeur.worlds.parking.path_follower import HARDEST_MPS2, Chassis
 
 MARGIN_M: Final = 0.05
@@ -46,10 +49,9 @@ class LotFilterResult:
 class LotSafetyFilter:
     """Judges the commands of one trip, one a control period. It remembers where it left the wheel."""
 
-    def __init__(self, chassis: Chassis, ground: Box, dt_s: float, steering_rate: float) -> None:
-        """Args: the car; what is paved; the control period; how fast the wheel turns, rad/s."""
+    def __init__(self, chassis: Chassis, dt_s: float, steering_rate: float) -> None:
+        """Args: the car; the control period; how fast the wheel turns, rad/s."""
         self._chassis = chassis
-        self._ground = ground
         self._dt_s = dt_s
         self._turn = steering_rate * dt_s
         self._wheel = 0.0
@@ -73,13 +75,14 @@ class LotSafetyFilter:
             rule, reason = "speed", f"No faster than {kmh(most_mps):.0f} km/h here."
         wanted = min(asked, most)
         others = [one for one in (*observation.others, *observation.objects) if self._near(observation.ego, one)]
-        if self._ends_well(observation.ego, wanted, wheel, others):
+        ground = observation.road.ground
+        if self._ends_well(observation.ego, wanted, wheel, others, ground):
             return self._let(Command(wanted, wheel), rule, reason)
         low, high = -HARDEST_MPS2, wanted
-        if low < high and self._ends_well(observation.ego, low, wheel, others):
+        if low < high and self._ends_well(observation.ego, low, wheel, others, ground):
             for _ in range(_HALVINGS):
                 middle = (low + high) / 2.0
-                if self._ends_well(observation.ego, middle, wheel, others):
+                if self._ends_well(observation.ego, middle, wheel, others, ground):
                     low = middle
                 else:
                     high = middle
@@ -102,7 +105,9 @@ class LotSafetyFilter:
         closing = max(ego.speed_mps, 0.0) + abs(other.speed_mps) + WALK_MPS
         return math.hypot(ego.x_m - other.x_m, ego.y_m - other.y_m) < reach + closing * 2.0
 
-    def _ends_well(self, ego: VehicleState, acceleration: float, wheel_rad: float, others: list[VehicleState]) -> bool:
+    def _ends_well(
+        self, ego: VehicleState, acceleration: float, wheel_rad: float, others: list[VehicleState], ground: Ground
+    ) -> bool:
         """Whether the car touches nobody and stays on the ground, through a period and then braking to a stand."""
         curvature = math.tan(self._reached(wheel_rad)) / self._chassis.wheelbase_m
         rear, body = self._chassis.rear(ego), self._chassis.body
@@ -113,6 +118,7 @@ class LotSafetyFilter:
         if whole <= _LEVEL:
             return True
         steps = max(1, math.ceil(whole / _STEP_M))
+        places: list[tuple[float, float, float]] = []
         for i in range(1, steps + 1):
             way = whole * i / steps
             at_s = self._dt_s * min(1.0, way / period) if period > 0.0 else 0.0
@@ -124,9 +130,11 @@ class LotSafetyFilter:
             x, y = rear.x_m + chord * math.cos(heading), rear.y_m + chord * math.sin(heading)
             middle = Pose(x, y, rear.heading_rad + 2.0 * half).ahead(body.rear_to_middle_m)
             own = Box(middle.x_m, middle.y_m, middle.heading_rad, body.length_m, body.width_m)
-            if not self._ground.contains(own.grown(MARGIN_M)) or any(_meets(own, other, at_s) for other in others):
+            if any(_meets(own, other, at_s) for other in others):
                 return False
-        return True
+            places.append((own.x_m, own.y_m, own.heading_rad))
+        beyond = ground.beyond_m(np.array(places), body.length_m + 2.0 * MARGIN_M, body.width_m + 2.0 * MARGIN_M)
+        return not beyond.any()
 
 
 def _meets(own: Box, other: VehicleState, at_s: float) -> bool:

@@ -323,7 +323,8 @@ class ParkingWorld:
             state = car.state()
             moving.append(replace(state, lane=scene.lanes.closest(state.x_m, state.y_m)))
         people = tuple(walker.state() for walker in self._walkers)
-        off_road = not all(scene.lot.ground.holds(x, y) for x, y in box.corners())
+        pose = np.array([[box.x_m, box.y_m, box.heading_rad]])
+        off_road = bool(scene.lot.road.ground.beyond_m(pose, box.length_m, box.width_m)[0] > 0.0)
         late = self._tick * DT_S >= scene.config.duration_s
         return Observation(
             time_s=self._tick * DT_S,

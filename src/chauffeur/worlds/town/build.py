@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import shutil
 import tempfile
 from collections import Counter
@@ -14,6 +13,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from chauffeur.concept import DataError, Sign
+from chauffeur.concept.data import parse_json
 from chauffeur.geometry import LaneId, RoadGraph
 from chauffeur.geometry.opendrive import OpenDriveError, OpenDriveMap, read_opendrive
 from chauffeur.worlds.town.pack import (
@@ -131,7 +131,7 @@ def build_own(name: str, seed: int | None = None, folder: Path | None = None) ->
 
 def _hash_of(folder: Path) -> str:
     try:
-        return str(json.loads((folder / PACK_FILE).read_text()).get("source_hash", ""))
+        return str(parse_json((folder / PACK_FILE).read_text()).get("source_hash", ""))
     except ValueError:
         return ""
 
@@ -209,7 +209,7 @@ def _lights_and_signs(
 
 def _table(path: Path) -> list[Any]:
     try:
-        content = json.loads(path.read_text())
+        content = parse_json(path.read_text())
     except ValueError as error:
         raise DataError(f"{path} is no JSON: {error}.") from error
     if not isinstance(content, list):

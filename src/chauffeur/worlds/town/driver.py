@@ -534,7 +534,7 @@ class TownDriver:
             if lane.junction and start > nose - 0.5 and self._road.conflicts(lane.id):
                 blocked = self._blocked(i, start, end)
                 if blocked is not None:
-                    stops.append(blocked)
+                    stops.append(self._stop_lines.clear_of_lines(blocked, nose, seen.ego.speed_mps))
         return stops
 
     def _wait_line(self, i: int) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import gzip
 import json
 import re
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -16,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from chauffeur.concept import DataError, Sign, Signal, SignalState
-from chauffeur.concept.data import data_home
+from chauffeur.concept.data import data_home, parse_json
 from chauffeur.geometry import LaneId, RoadGraph
 from chauffeur.geometry.opendrive import OpenDriveError, OpenDriveMap, parse_opendrive
 from chauffeur.worlds.town.levels import Levels
@@ -280,15 +281,20 @@ def load(name_or_path: str | Path) -> MapPack:
         raise DataError(
             f"Cannot read the map pack {folder}: {error}.", hint="Build it again: chauffeur maps build."
         ) from error
-    except (OpenDriveError, KeyError, TypeError, ValueError) as error:
+    except (OpenDriveError, AttributeError, EOFError, LookupError, TypeError, ValueError, zlib.error) as error:
         raise DataError(
             f"The map pack {folder} is damaged: {error!r}.", hint="Build it again: chauffeur maps build."
         ) from error
 
 
+def has_pack(folder: Path) -> bool:
+    """Whether a folder holds a map pack."""
+    return any((folder / one).is_file() for one in (PACK_FILE, PACK_FILE + ".gz"))
+
+
 def _found(name_or_path: str | Path) -> Path:
     for folder in (Path(name_or_path), maps_folder() / name_or_path, OWN_TOWNS / name_or_path):
-        if any((folder / one).is_file() for one in (PACK_FILE, PACK_FILE + ".gz")):
+        if has_pack(folder):
             return folder
     raise DataError(
         f"There is no map pack {str(name_or_path)!r} in {maps_folder()}.",
@@ -402,7 +408,9 @@ def _state(folder: Path) -> tuple[tuple[str, int, int], ...]:
 def _unpacked(folder: Path, state: tuple[tuple[str, int, int], ...]) -> MapPack:
     del state  # read anew when it is another
     written = folder / PACK_FILE
-    content = json.loads(_read(written if written.is_file() else folder / (PACK_FILE + ".gz")))
+    content = parse_json(_read(written if written.is_file() else folder / (PACK_FILE + ".gz")))
+    if not isinstance(content, dict):
+        raise TypeError(f"{PACK_FILE} holds no fields")
     if (builder := content.get("builder", "an older one")) != BUILDER_VERSION:
         raise DataError(
             f"The map pack {folder} was built by {builder}, and this Chauffeur builds {BUILDER_VERSION}.",

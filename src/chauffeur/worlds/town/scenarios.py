@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from chauffeur.concept import ChauffeurError, Scenario
-from chauffeur.worlds.town.pack import Place, load
+from chauffeur.worlds.town.pack import Place, has_pack, load, packs
 
 
 def _built_in(name: str, config: dict[str, Any], seed: int, wish: str, title: str) -> Scenario:
@@ -35,6 +36,19 @@ BUILT_IN: tuple[Scenario, ...] = (
         "Ringstead, a town with a ring road",
     ),
 )
+
+
+def in_pack(name: str) -> Scenario | None:
+    """A drive through a town by its name, or by the folder of its map pack; None where there is no such town.
+
+    It begins somewhere in the town, as the seed says, among as much traffic as the built-in scenarios have.
+    """
+    folder = packs().get(name) or Path(name)
+    if not has_pack(folder):
+        return None
+    town = name if name in packs() else str(folder.resolve())
+    config = {"town": town, "vehicles": 35, "people": 30}
+    return Scenario(name, "town", config, 0, title=f"{folder.name}, a town that was built")
 
 
 def places_of(scenario: Scenario) -> tuple[Place, ...]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept import Observation, Scenario, ScenarioError, Signal, SignalState, VehicleState
-from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ
+from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle
 from chauffeur.geometry import LaneId, LanePlace, Route, plan_route
 from chauffeur.worlds.parking.path_follower import Chassis
 from chauffeur.worlds.places import Destination
@@ -67,9 +67,14 @@ class TownScene:
         return DT_S
 
     @property
+    def car(self) -> KinematicBicycle:
+        """The ego."""
+        return LINCOLN_MKZ
+
+    @property
     def chassis(self) -> Chassis:
         """The ego's size, axles and bounds."""
-        return Chassis.of(LINCOLN_MKZ)
+        return Chassis.of(self.car)
 
     @property
     def town(self) -> MapPack:

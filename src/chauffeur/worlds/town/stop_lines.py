@@ -59,6 +59,8 @@ class StopLineRules:
         self._served: frozenset[str] = frozenset()
         self._stood_s = 0.0
         self._lines: dict[tuple[str, float], tuple[Stretch, float]] = {}
+        self._lights_m: list[float] = []
+        """Stations of the lines ahead, or under the car, whose lights may turn red."""
 
     def stops(
         self, seen: Observation, stretch: Stretch, station: float, nose: float, meetings: Sequence[Meeting]
@@ -73,6 +75,7 @@ class StopLineRules:
         """
         speed, length = seen.ego.speed_mps, self._length_m
         self.sign, self._yellow_m, self.tail_over = None, None, False
+        self._lights_m.clear()
         stops: list[StopPoint] = []
         lights = {lane: signal for signal in seen.signals for lane in signal.lanes}
         signs = {lane: (n, sign) for n, sign in enumerate(seen.signs) if sign.kind == "stop" for lane in sign.lanes}
@@ -86,6 +89,8 @@ class StopLineRules:
                 light = lights[lane.id]
                 line = self.line_m(stretch, light, start, end)
                 self.tail_over |= line + astride_m(length) < nose < line + length + _CLEAR_M
+                if light.state != "off":
+                    self._lights_m.append(line)
                 if light.state == "yellow" and line > nose:
                     self._yellow_m = line
                 if self._light_stops(light, line, nose, speed):
@@ -102,6 +107,18 @@ class StopLineRules:
                     if self.sign is None:
                         self.sign = FIRST_SIGN + number, line - nose + length / 2.0
         return stops
+
+    def clear_of_lines(self, stop: StopPoint, nose: float, speed: float) -> StopPoint:
+        """A stop for something else, moved to where the tail stands on no line of a light: before the line where the
+        car can still stop there, else with its tail before the line, else beyond it."""
+        for line in self._lights_m:
+            astride, clear = line + astride_m(self._length_m), line + self._length_m + _CLEAR_M
+            if not astride < stop.at_m < clear:
+                continue
+            rooms = (line - _LINE_M - nose, _HARD_MPS2), (astride - nose, _YELLOW_MPS2)
+            places = [nose + room for room, braking in rooms if room > 0.0 and speed * speed <= 2.0 * braking * room]
+            return StopPoint(places[0] if places else clear, f"{stop.why}; its tail on no stop line")
+        return stop
 
     def line_m(self, stretch: Stretch, what: Signal | Sign, start: float, end: float) -> float:
         """Where a stop line is on the stretch: at the end of the lane where nobody says."""

@@ -38,7 +38,6 @@ _SIZES: Final[Mapping[AgentKind, tuple[float, float]]] = {
     "obstacle": (2.0, 2.0),
 }
 _ON_ROAD_M: Final = 0.4
-_OFF_ROAD_M: Final = 1.0
 _NEAR_LANE_M: Final = 3.0
 _AMID_M: Final = 0.5
 
@@ -84,7 +83,6 @@ class TownWorld(TownScene):
         pose = town.road[start.lane].centre.at(start.station_m)
         rear = pose.ahead(-LINCOLN_MKZ.rear_to_middle_m)
         self._state = BicycleState(rear, config.ego_speed)
-        self._offset_m = 0.0
         self._touched = frozenset[int]()
         self._crashed = False
         self._ids: dict[str, int] = {}
@@ -290,8 +288,8 @@ class TownWorld(TownScene):
 
     @property
     def _off_road(self) -> bool:
-        lane = self.town.road.get(self._lane)
-        return lane is None or abs(self._offset_m) > lane.width_m / 2.0 + _OFF_ROAD_M
+        middle = self._state.middle(LINCOLN_MKZ)
+        return self.town.road.ground.off_road(middle.x_m, middle.y_m)
 
     @property
     def _over(self) -> bool:
@@ -314,11 +312,11 @@ class TownWorld(TownScene):
             lane = road[name]
             station, offset = lane.centre.project(middle.x_m, middle.y_m)
             if -0.5 <= station <= lane.length_m and abs(offset) < lane.width_m / 2.0:
-                self._lane, self._offset_m, self._ego_station = name, offset, station
+                self._lane, self._ego_station = name, station
                 return
         place = road.locate(middle.x_m, middle.y_m, middle.heading_rad, ("driving",))
         if place is not None:
-            self._lane, self._offset_m, self._ego_station = place.lane, place.offset_m, place.station_m
+            self._lane, self._ego_station = place.lane, place.station_m
 
     def _road_users(self) -> tuple[VehicleState, ...]:
         return (self._ego(), *(one for one in self._others if one.kind != "pedestrian"))

@@ -1,4 +1,4 @@
-"""Wishes that are refused before any network is asked: what would hurt somebody is not left to a probability."""
+"""Wishes that are declined before any planner is asked: what would hurt people is not left to a probability."""
 
 from __future__ import annotations
 
@@ -6,13 +6,23 @@ import re
 from functools import lru_cache
 from typing import Final
 
+from chauffeur.concept import Verdict
 from chauffeur.language.tokens import words_of
-from chauffeur.planners.onboard.words import words_file
+from chauffeur.language.word_files import word_groups
+
+SAFE_WISH_CHECK: Final = "safe-wish-v1"
 
 _ARROW: Final = "->"
-_LINES: Final = tuple((group[0].strip("[]"), re.compile("|".join(group[1:]))) for group in words_file("dangers.txt"))
+_SCOPE: Final = "?"
+_LINES: Final = tuple(
+    (group[0].strip("[]"), re.compile("|".join(group[1:]))) for group in word_groups("chauffeur.safety", "dangers.txt")
+)
 _SAME: Final = tuple((name.removeprefix(_ARROW).strip(), lines) for name, lines in _LINES if name.startswith(_ARROW))
-_DANGERS: Final = tuple((reason, lines) for reason, lines in _LINES if not reason.startswith(_ARROW))
+_DANGERS: Final = tuple(
+    (reason.removeprefix(_SCOPE).strip(), reason.startswith(_SCOPE), lines)
+    for reason, lines in _LINES
+    if not reason.startswith(_ARROW)
+)
 _NOT: Final = (
     r"(?:(?:(?<!why )do|does|did) not|not allowed to|never|(?<!why )(?<!do )(?<!can )(?<!could )not|no|without|avoid|"
     r"instead of|rather than|afraid|scared|worried|fear|hate|stop|quit|careful|lest|keep from|in case|before|because|"
@@ -54,17 +64,30 @@ _NEAR: Final = 240
 """Characters in front of a danger in which its negation is looked for: some ten long words and what joins them."""
 
 
-@lru_cache(maxsize=32)  # the planner asks, and then the rules that draft for it
-def danger(wish: str) -> str:
-    """Why a wish is not carried out, in words for the person; empty when nothing in it is dangerous."""
+@lru_cache(maxsize=32)  # screened before the planner, which asks again, as do the rules that draft for it
+def danger(wish: str, *, unsafe_only: bool = False) -> str:
+    """Why a wish is not carried out, in words for the person; empty when nothing in it is dangerous.
+
+    Args:
+        wish: The words.
+        unsafe_only: Whether what is merely beyond a car like ours (reversing, a turn in the road) is left out.
+    """
     words = words_of(wish)
     for name, same in _SAME:
         words = _GAP.sub(" ", same.sub(name, words)).strip()
-    for reason, pattern in _DANGERS:
-        for found in pattern.finditer(words):
+    for reason, scope, pattern in _DANGERS:
+        for found in () if scope and unsafe_only else pattern.finditer(words):
             begin, end = max(0, found.start() - _NEAR), found.start()
             if _NEGATED.search(words, begin, end) and not _URGED.search(words, begin, end):
                 continue
             if not _TAKEN_BACK.match(words, found.end()):
                 return reason
     return ""
+
+
+def check_wish(text: str) -> Verdict:
+    """The verdict on a wish before any planner is asked, whichever it is and whatever kind of policy it writes."""
+    reason = danger(text, unsafe_only=True)
+    if reason:
+        return Verdict(SAFE_WISH_CHECK, False, reason, None, "Say it in another way if you meant something else.")
+    return Verdict(SAFE_WISH_CHECK, True, "Nothing in the words is known to endanger anybody.")
