@@ -36,7 +36,7 @@ COMPILES_A_LIBRARY = {"worlds/track/dynamics.py"}
 
 STEPS_AN_OPTIMISER = {
     "models/train/trainer.py", "models/onboard/adaptation.py", "models/vilad/frames_baselines.py",
-    "models/vlm/ear.py",
+    "models/vlm/ear.py", "models/meaning/recipe.py",
 }  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from chauffeur.concept.utterance import Act, ActPlace, Condition, Reference, act
 from chauffeur.language.meaning.parser import DECODER, WEIGHTS
 from chauffeur.language.meaning.pieces import MOST_PIECES, WordPieces
 from chauffeur.language.meaning.reader import MOST_CHARS, read
-from chauffeur.language.meaning.symbols import END, INDEX, POINTER, Grammar, WrittenAct, parse, write
+from chauffeur.language.meaning.symbols import END, INDEX, POINTER, ActGrammar, WrittenAct, parse, write
 from chauffeur.models.meaning.banks import banks, merged
 from chauffeur.models.meaning.composer import Composed, Composer
 from chauffeur.models.meaning.noise import with_noise
@@ -81,7 +81,7 @@ def test_what_the_language_of_acts_does_not_have_is_named(row: Any) -> None:
 def test_the_grammar_allows_only_what_it_can_read() -> None:
     rng = np.random.default_rng(1)
     for _ in range(300):
-        grammar, written = Grammar(), []
+        grammar, written = ActGrammar(), []
         for _ in range(60):
             allowed = grammar.allowed()
             if not allowed:

@@ -25,7 +25,7 @@ from chauffeur.language.meaning.symbols import (
     POINTER,
     START,
     SYMBOLS,
-    Grammar,
+    ActGrammar,
     Written,
     WrittenAct,
     parse,
@@ -77,7 +77,7 @@ class Parser:
         pieces = self._pieces.split(text)
         memory = self._encoder.run(None, {"ids": np.array([pieces.ids], np.int64)})[0]
         pointable = np.array([word >= 0 for word in pieces.words])
-        grammar = Grammar()
+        grammar = ActGrammar()
         out: list[Written] = []
         symbols, tokens = [INDEX[START]], [0]
         total = 0.0

@@ -147,7 +147,7 @@ def _reference(reference: Reference | None, names: Iterator[tuple[int, int]]) ->
 
 
 @dataclass
-class Grammar:
+class ActGrammar:
     """What may follow what has been written: give each symbol to `take`, and ask `allowed` before the next."""
 
     _next: Callable[[], tuple[str, ...]] = field(init=False)
@@ -251,7 +251,7 @@ def parse(written: Sequence[Written]) -> tuple[list[WrittenAct], Address]:
     Raises:
         ValueError: It does not keep the grammar.
     """
-    grammar, address = Grammar(), cast("Address", "car")
+    grammar, address = ActGrammar(), cast("Address", "car")
     acts: list[_Building] = []
     for one in written:
         symbol = POINTER if isinstance(one, int) else one
