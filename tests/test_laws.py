@@ -35,7 +35,7 @@ COMPILES_A_LIBRARY = {"worlds/track/dynamics.py"}
 """Compiles the functions of an installed library, whose text no model writes."""
 
 STEPS_AN_OPTIMISER = {
-    "models/train/trainer.py", "models/vilad/frames_baselines.py", "models/vlm/ear.py",
+    "models/train/trainer.py", "models/vilad/frames_baselines.py", "models/vlm/ear.py", "models/meaning/recipe.py",
 }  # fmt: skip
 
 

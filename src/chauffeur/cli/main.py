@@ -26,6 +26,7 @@ from chauffeur.cli import (
     drive,
     feedback,
     hear,
+    meaning,
     page,
     policies,
     replay,
@@ -148,6 +149,7 @@ show_app.command(epilog=scenarios.EXAMPLES)(scenarios.scenarios)
 show_app.command(epilog=apis.EXAMPLES)(apis.apis)
 show_app.command("policies", epilog=policies.SHOW_EXAMPLES)(policies.show_policies)
 show_app.command(epilog=context.EXAMPLES)(context.context)
+show_app.command(epilog=meaning.EXAMPLES)(meaning.meaning)
 show_app.command(epilog=page.EXAMPLES)(page.page)
 show_app.command(epilog=camera.EXAMPLES)(camera.camera)
 show_app.command(epilog=unmasking.EXAMPLES)(unmasking.unmasking)
