@@ -1,7 +1,7 @@
 """The learned parser: a text to acts, written symbol by symbol under the grammar.
 
 An encoder of 22 M parameters reads the text once; a decoder of two layers writes symbols and points at the text. Both
-run on one thread of a processor. `chauffeur model train meaning` makes the files.
+run on one thread of a processor. `chauffeur.models.meaning` makes the files.
 """
 
 from __future__ import annotations
