@@ -34,7 +34,7 @@ import numpy as np
 from chauffeur.concept import ActionMatrix, Limits
 from chauffeur.control import mpc, pid
 from chauffeur.executors import executor_for
-from chauffeur.executors.reference import STEP_M, Reference
+from chauffeur.executors.reference import STEP_M, ReferencePath
 from chauffeur.executors.tracking import bicycle_for
 from chauffeur.worlds.track import FRICTION, MANOEUVRES, WEATHERS, TrackWorld, track_scenario
 from chauffeur.worlds.track import world as track
@@ -262,7 +262,7 @@ class Sweep:
             track._WANDER_RAD,
             track._WANDER_MPS2,
         )
-        self.references = {name: Reference(manoeuvre(name).path, manoeuvre(name).speed_mps) for name in MANOEUVRES}
+        self.references = {name: ReferencePath(manoeuvre(name).path, manoeuvre(name).speed_mps) for name in MANOEUVRES}
 
     def run(self, values, seed, weather, errors, noise=1.0):
         """Metrics (plants, manoeuvres, METRICS) of a gain set."""

@@ -87,6 +87,17 @@ def carla_data() -> Path:
 
 
 @pytest.fixture(scope="session")
+def commands_data() -> Path:
+    """Folder of real passengers' commands with labels, and the labels' scorer."""
+    folder = SHARED_DATA / "commands"
+    if not folder.is_dir():
+        pytest.skip(
+            f"Labelled commands not found at {folder}; set CHAUFFEUR_TEST_DATA to the folder that holds commands/"
+        )
+    return folder
+
+
+@pytest.fixture(scope="session")
 def case_folder() -> Callable[[str], Path]:
     """Gives the folder of an input from the field by its name; skips where it is absent."""
 

@@ -129,4 +129,4 @@ def test_plans_of_another_form_do_not_stop_a_report(tmp_path: Path) -> None:
     write_lines(folder / "generate.jsonl", [{"item": "task0_s0_c0", "plan": {"thoughts": 3}, "error": ""}])
     failure = _failure(folder)
     assert failure.drive is None and failure.program is None
-    assert "no program or trace" in failure.drive_note
+    assert "no program that" in failure.drive_note

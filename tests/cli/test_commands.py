@@ -33,7 +33,7 @@ PROGRAM = """def overtake():
     for _ in range(20):
         yield autopilot()
 """
-DECLINED = "Fly over them."
+DECLINED = "Fly a loop."
 MISTOLD = "Change lanes."
 
 
@@ -90,7 +90,7 @@ def test_the_top_of_the_help_is_what_somebody_comes_for() -> None:
     assert {heading: sorted(names) for heading, names in panels.items()} == {
         "Drive": ["drive", "feedback", "me", "talk"],
         "Look": ["doctor", "replay", "report", "show"],
-        "Measure": ["bench", "study"],
+        "Measure": ["bench"],
         "Build": ["audit", "check", "maps", "model", "vehicle"],
     }
 
@@ -130,7 +130,6 @@ def test_an_option_has_one_name() -> None:
         (("model", "train", "onboard", "--out", "run"), "torch", "models"),
         (("model", "adapt-vlm", "--checkpoint", "base", "--out", "run"), "peft", "models"),
         (("report", "run", "--inspect", "run.eval"), "inspect_ai", "inspect"),
-        (("study", "export", "lab", "--out", "trips.parquet"), "pyarrow", "tables"),
         (("bench", "lampilot", "--data", "DbLv1", "--ray", "local"), "ray", "cluster"),
     ],
 )

@@ -63,7 +63,6 @@ FILES: Final = (
     "vehicle apply {in}.toml --speed 3 --dry-run",
     "vehicle release {in}.toml",
     "check world highway --config {in}.json",
-    "bench chaos --case {in}.json --out {out}",
     "drive Hello --planner replay/{in}",
 )
 FOLDERS: Final = (
@@ -79,9 +78,6 @@ FOLDERS: Final = (
     ("show policies {in}", ("policies.jsonl", "policies.json", "a.json", "index.json")),
     ("model policies describe {in} overtake words", ("policies.jsonl", "a.json")),
     ("model policies add {out} {in}", ("policies.jsonl", "a.json")),
-    ("study next {in}", ("study.json", "plan.json", "sessions.jsonl")),
-    ("study export {in} --out {out}", ("study.json", "plan.json", "sessions.jsonl")),
-    ("study unblind {in}", ("study.json", "plan.json", "sessions.jsonl")),
     ("maps show {in} --out {out}.png", ("pack.json", "map.xodr")),
 )  # fmt: skip
 

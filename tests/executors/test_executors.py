@@ -21,7 +21,7 @@ from chauffeur.concept import (
 )
 from chauffeur.drive.session import drive_policy
 from chauffeur.executors import executor_for
-from chauffeur.executors.reference import Reference
+from chauffeur.executors.reference import ReferencePath
 from chauffeur.executors.trajectory import rebased, reference_of
 from chauffeur.geometry import Polyline, Pose
 from chauffeur.worlds.base import World
@@ -116,13 +116,13 @@ def test_speeds_of_a_trajectory_are_its_distances() -> None:
 
 def test_a_reference_reads_a_circle() -> None:
     circle = Polyline.of((20.0 * math.sin(a / 40), 20.0 * (1.0 - math.cos(a / 40))) for a in range(60))
-    reference = Reference(circle, 5.0)
+    reference = ReferencePath(circle, 5.0)
     place = reference.locate(20.0 * math.sin(0.7), 20.0 * (1.0 - math.cos(0.7)))
     assert place.station_m == pytest.approx(14.0, abs=0.1)
     assert place.offset_m == pytest.approx(0.0, abs=0.02)
     assert place.heading_rad == pytest.approx(0.7, abs=0.02)
     assert place.curvature_per_m == pytest.approx(0.05, rel=0.05)
-    inside = Reference(circle, 5.0).locate(0.0, 1.0)
+    inside = ReferencePath(circle, 5.0).locate(0.0, 1.0)
     assert inside.offset_m == pytest.approx(1.0, abs=0.05)
 
 

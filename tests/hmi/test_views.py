@@ -14,7 +14,7 @@ from chauffeur.hmi.events import events_of
 from chauffeur.hmi.interventions import rule_counts, stretches_of
 from chauffeur.hmi.payload import policy_words, program_tokens
 from chauffeur.hmi.road import Bounds, draw_road
-from chauffeur.hmi.view import facing_right, frame_drive, in_picture, instants_of
+from chauffeur.hmi.view import facing_right, frame_drive, instants_of
 from roads import a_lane, a_road
 
 EVERYWHERE = Bounds(-500, -500, 500, 500)
@@ -43,12 +43,12 @@ def test_opposite_lanes_share_one_centre_line() -> None:
 
 
 def test_the_inside_of_an_intersection_is_clear() -> None:
-    (shot,) = in_picture((intersection_trip().frames[0].observation,))
+    (shot,) = facing_right((intersection_trip().frames[0].observation,))
     road = draw_road(shot.road, shot.objects, EVERYWHERE)
     inside = [p for line in road.lines for p in line.points_m if max(abs(p[0]), abs(p[1])) < 3.9]
     assert not inside
     sign = road.stop_signs[0]
-    assert sign.post_m[0] > 4.0, "the post stands to the right of the lane, beside the road"
+    assert sign.post_m[1] > 4.0, "the post stands to the right of the lane, beside the road"
     assert math.dist(*sign.line_m) == pytest.approx(3.6)
 
 

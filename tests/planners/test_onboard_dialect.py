@@ -13,9 +13,9 @@ from chauffeur.planners.onboard.dialect import (
     MAX_STEPS,
     SKILLS,
     UNITS,
-    Condition,
     DialectStep,
     Number,
+    StepCondition,
     read,
     tell,
     write,
@@ -46,7 +46,7 @@ def steps(draw: st.DrawFn) -> DialectStep:
     if draw(st.booleans()):
         name = draw(st.sampled_from(sorted(CONDITIONS)))
         kind = CONDITIONS[name][0]
-        condition = Condition(
+        condition = StepCondition(
             draw(st.sampled_from(["if", "once"])), name, None if kind is None else draw(numbers(kind))
         )
     wait = draw(st.none() | numbers("time"))
@@ -122,7 +122,7 @@ def linked(*some: DialectStep) -> Linked:
 
 def test_conditions_waits_and_units_are_in_the_library() -> None:
     step = DialectStep(
-        "overtake_left", None, "", Number(10.0), Condition("once", "lead_closer_than", Number(100.0, "feet"))
+        "overtake_left", None, "", Number(10.0), StepCondition("once", "lead_closer_than", Number(100.0, "feet"))
     )
     library = linked(step).library
     for name in ("def overtake_left(", "def wait(", "def lead_closer_than(", "def feet("):

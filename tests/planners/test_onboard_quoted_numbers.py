@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from chauffeur.planners.onboard.dialect import Condition, DialectStep, Number
+from chauffeur.planners.onboard.dialect import DialectStep, Number, StepCondition
 from chauffeur.planners.onboard.quoted_numbers import named, taken_over, unnamed
 
 
@@ -61,8 +61,8 @@ def test_a_number_must_be_one_that_was_said_as_that_kind(
         ),
         (
             "once the car ahead is slower than 40 mph keep 30 m",
-            [DialectStep("gap_of", Number(30), condition=Condition("once", "lead_slower_than", Number(14, "mph")))],
-            [DialectStep("gap_of", Number(30), condition=Condition("once", "lead_slower_than", Number(40, "mph")))],
+            [DialectStep("gap_of", Number(30), condition=StepCondition("once", "lead_slower_than", Number(14, "mph")))],
+            [DialectStep("gap_of", Number(30), condition=StepCondition("once", "lead_slower_than", Number(40, "mph")))],
         ),
     ],
 )

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from chauffeur.speech.audio import SAMPLE_RATE_HZ, Samples
 from chauffeur.speech.detector import FRAME
-from chauffeur.speech.segments import FRAME_S, LONGEST_S, Segmenter, Utterance
+from chauffeur.speech.segments import FRAME_S, LONGEST_S, Segmenter, SpeechSegment
 from conftest import Loudness
 
 
@@ -31,7 +31,7 @@ def cut(sound: Samples, sizes: list[int]) -> list[bytes]:
     return out
 
 
-def gather(segmenter: Segmenter, chunks: list[bytes]) -> list[Utterance]:
+def gather(segmenter: Segmenter, chunks: list[bytes]) -> list[SpeechSegment]:
     found = [utterance for chunk in chunks for utterance in segmenter.push(chunk)]
     return [*found, *segmenter.flush()]
 
@@ -59,7 +59,7 @@ def test_memory_is_bounded_and_utterances_are_pieces_of_the_stream_in_order(
     sound = frames(*parts)
     segmenter = Segmenter(Loudness(), longest_s=1.0)
     limit = segmenter.held_bytes + 2 * FRAME
-    found: list[Utterance] = []
+    found: list[SpeechSegment] = []
     for chunk in cut(sound, [size]):
         found += segmenter.push(chunk)
         assert segmenter.held_bytes < limit

@@ -81,7 +81,7 @@ class Edge:
 
 
 @dataclass(frozen=True)
-class Ground:
+class PavedMesh:
     """Triangles of the road: vertices (n, 3, 8) in the frame of the road graph, and its open edges."""
 
     triangles: RowArray
@@ -135,7 +135,7 @@ def _smooth_headings(heading: FloatArray) -> FloatArray:
     return mean
 
 
-def pave(road: RoadGraph, field: LaneField) -> Ground:
+def pave(road: RoadGraph, field: LaneField) -> PavedMesh:
     """The ground of a whole road graph."""
     walks = any(lane.kind == "sidewalk" for lane in road.lanes)
     under: list[RowArray] = []
@@ -187,7 +187,7 @@ def pave(road: RoadGraph, field: LaneField) -> Ground:
     if lot:
         middle.insert(0, _hull(lot, Paving.LOT, 2.5))
     triangles = np.concatenate([*under, *middle, *top]) if under or middle or top else np.zeros((0, 3, VERTEX))
-    return Ground(triangles.astype(np.float32), tuple(edges), triangles[:, :, :2].mean(axis=1).astype(np.float64))
+    return PavedMesh(triangles.astype(np.float32), tuple(edges), triangles[:, :, :2].mean(axis=1).astype(np.float64))
 
 
 def _borders(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from chauffeur.camera.ground import FAST_MPS, Edge, Ground, pave
+from chauffeur.camera.ground import FAST_MPS, Edge, PavedMesh, pave
 from chauffeur.camera.lane_field import LaneField
 from chauffeur.camera.solids import Material, Pile, SemanticClass, Shape, Solids
 from chauffeur.geometry import Box, RoadGraph, overlap
@@ -53,7 +53,7 @@ class CameraPlace:
 
     road: RoadGraph
     field: LaneField
-    ground: Ground
+    ground: PavedMesh
     solids: Solids
     lamps_m: FloatArray
     surroundings: Surroundings

@@ -23,7 +23,7 @@ Examples:
 
     chauffeur bench personalization --planner talk2drive/openai/qwen2.5 --base-url http://localhost:11434/v1
 
-Passengers and drives are simulated. Ctrl-C keeps what is done; the same command goes on. For people: `chauffeur study`.
+Passengers and drives are simulated. Ctrl-C keeps what is done; the same command goes on.
 
 Exit codes: 0 done, 1 trips failed for want of a planner or of workers, 2 bad input, 130 Ctrl-C.
 """

@@ -19,7 +19,6 @@ from chauffeur.cli import (
     bench_openloop,
     bench_personalization,
     camera,
-    chaos,
     coach,
     coach_town,
     context,
@@ -27,6 +26,7 @@ from chauffeur.cli import (
     drive,
     feedback,
     hear,
+    meaning,
     page,
     policies,
     replay,
@@ -36,7 +36,6 @@ from chauffeur.cli import (
     talk,
     train,
     unmasking,
-    wheel,
 )
 from chauffeur.cli import quantise_vlm as quantising_vlm
 from chauffeur.cli.audit import audit_app
@@ -46,7 +45,6 @@ from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
 from chauffeur.cli.maps import maps_app
 from chauffeur.cli.me import me_app
 from chauffeur.cli.printable import PrintableFormatter
-from chauffeur.cli.study import study_app
 from chauffeur.cli.vehicle import vehicle_app
 
 EXAMPLES = """
@@ -64,7 +62,7 @@ Examples:
 
     chauffeur show scenarios
 
-Every drive is simulated. Exit codes: 0 done, 1 refused or failed, 2 bad input, 130 stopped with Ctrl-C.
+Every drive is simulated. Exit codes: 0 done, 1 anything less, 2 bad input, 130 stopped with Ctrl-C.
 """
 
 SHOW_EXAMPLES = """
@@ -151,14 +149,13 @@ show_app.command(epilog=scenarios.EXAMPLES)(scenarios.scenarios)
 show_app.command(epilog=apis.EXAMPLES)(apis.apis)
 show_app.command("policies", epilog=policies.SHOW_EXAMPLES)(policies.show_policies)
 show_app.command(epilog=context.EXAMPLES)(context.context)
+show_app.command(epilog=meaning.EXAMPLES)(meaning.meaning)
 show_app.command(epilog=page.EXAMPLES)(page.page)
 show_app.command(epilog=camera.EXAMPLES)(camera.camera)
 show_app.command(epilog=unmasking.EXAMPLES)(unmasking.unmasking)
 show_app.command("speech", epilog=hear.EXAMPLES)(hear.hear)
 
 app.add_typer(bench_app, name="bench", rich_help_panel=MEASURE, epilog=BENCH_EXAMPLES)
-app.add_typer(study_app, name="study", rich_help_panel=MEASURE)
-bench_app.command(epilog=wheel.EXAMPLES)(wheel.human)
 bench_app.command(epilog=coach.EXAMPLES)(coach.coach)
 bench_app.command("coach-town", epilog=coach_town.EXAMPLES)(coach_town.coach_town)
 bench_app.command(epilog=bench_hostile.EXAMPLES)(bench_hostile.hostile)
@@ -167,7 +164,6 @@ bench_app.command(epilog=bench_leaderboard.EXAMPLES)(bench_leaderboard.leaderboa
 bench_app.command(epilog=bench_nuplanqa.EXAMPLES)(bench_nuplanqa.nuplanqa)
 bench_app.command(epilog=bench_openloop.EXAMPLES)(bench_openloop.openloop)
 bench_app.command(epilog=bench_personalization.EXAMPLES)(bench_personalization.personalization)
-bench_app.command(epilog=chaos.EXAMPLES)(chaos.chaos)
 scenes.scenes_app.command(epilog=bench_openloop.FRAMES_EXAMPLES)(bench_openloop.frames)
 bench_app.add_typer(scenes.scenes_app, name="scenes", epilog=scenes.GENERATE_EXAMPLES)
 

@@ -40,10 +40,10 @@ AFTER_END_S = 3.0
 
 
 class CommandSource(Protocol):
-    """A person at wheel and pedals, asked once per control period in the place of the world's driver."""
+    """Commands from outside, asked for once per control period in place of the world's driver."""
 
     def command(self) -> Command | None:
-        """What wheel and pedals ask for in this period; None once the person has given up: the trip ends there."""
+        """The command of this period; None once the source has given up: the trip ends there."""
         ...
 
 
@@ -149,8 +149,7 @@ def run_episode(
         record: Whether to keep frames (a benchmark does not need them).
         adjust: Baseline that rewrites settled set-points each period, e.g. MOBIL's lane choice.
         watch: Called with each recorded frame, for live display.
-        command_source: A person, who acts in place of the driver; what a policy beside them asks for is shown, not
-            driven.
+        command_source: Acts in place of the driver; what a policy beside it asks for is shown, not driven.
         shield: Has the last word on every command; None where a benchmark's own rules allow none.
         limits: Bounds of the set-points, whatever the policy answers in a period; None where a benchmark's own rules
             know none.

@@ -114,6 +114,7 @@ PLAN = Channel(
         latency_s=_number(),
         raw=_text(),
         scene=_text("what a planner with eyes made of its pictures"),
+        alarm=_text("stop or distress that the planner read"),
     ),
 )
 VERDICTS = Channel(

@@ -12,7 +12,7 @@ from chauffeur.concept import ActionMatrix, Command, Limits, Observation, Scenar
 from chauffeur.control.mpc import MpcWeights
 from chauffeur.control.pid import PidGains, PidLimits
 from chauffeur.executors.base import ExecutorBase, KnowsChassis, SetsManoeuvre
-from chauffeur.executors.reference import Reference
+from chauffeur.executors.reference import ReferencePath
 from chauffeur.executors.tracking import Gains, PathTracker
 from chauffeur.geometry import Polyline, joined
 from chauffeur.worlds.base import World
@@ -70,7 +70,7 @@ class ActionMatrixExecutor(ExecutorBase):
         else:
             path, target = _lane_path(observation), max(observation.ego.speed_mps, 0.0)
         tracker = PathTracker(self._chassis, self._dt_s, gains_of(policy))
-        tracker.follow(Reference(path, target))
+        tracker.follow(ReferencePath(path, target))
         self._tracker, self._set_mps, self._limits = tracker, target, limits
         self._status, self._settled_s = "running", 0.0
         self._aim(observation)

@@ -29,7 +29,7 @@ class ReferencePlace(NamedTuple):
     curvature_per_m: float
 
 
-class Reference:
+class ReferencePath:
     """A path, and where along it the car is. Beyond its end it goes on straight."""
 
     def __init__(self, path: Polyline, speeds_mps: Sequence[float] | float) -> None:

@@ -19,7 +19,7 @@ from chauffeur.concept import Command, Observation, VehicleState
 from chauffeur.control.bicycle import BicycleParameters
 from chauffeur.control.mpc import LateralMpc, MpcWeights, PathErrors, SteeringLimits
 from chauffeur.control.pid import PidGains, PidLimits, PidState, pid_follow, pid_step
-from chauffeur.executors.reference import Reference
+from chauffeur.executors.reference import ReferencePath
 from chauffeur.geometry import Polyline, Pose, wrap_to_pi
 from chauffeur.worlds.parking.path_follower import Chassis, Follower, Look
 
@@ -69,7 +69,7 @@ class PathTracker:
         self._car = bicycle_for(chassis)
         self._mpc = LateralMpc(gains.mpc, self._sub_s, self._car, SteeringLimits(angle_rad=chassis.steering_rad))
         self._follower = Follower(chassis, dt_s, jam_m=_JAM_M)
-        self._reference: Reference | None = None
+        self._reference: ReferencePath | None = None
         self._pid = PidState()
         self._before: VehicleState | None = None
         self._angle = 0.0
@@ -80,7 +80,7 @@ class PathTracker:
         self.station_m = 0.0
         """Way along the reference at the last observation, m."""
 
-    def follow(self, reference: Reference) -> None:
+    def follow(self, reference: ReferencePath) -> None:
         """Track a reference from now on; the controllers' states go on."""
         self._reference = reference
         self._follower.take(Polyline.of(zip(reference.x.tolist(), reference.y.tolist(), strict=True)), _ROOM_M)

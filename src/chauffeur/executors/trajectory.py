@@ -15,7 +15,7 @@ import numpy as np
 from chauffeur.concept import Command, Limits, Observation, ScenarioError, Setpoints, Trajectory, VehicleState
 from chauffeur.executors.action_matrix import HEADWAY_S, chassis_of
 from chauffeur.executors.base import ExecutorBase
-from chauffeur.executors.reference import Reference
+from chauffeur.executors.reference import ReferencePath
 from chauffeur.executors.tracking import DEFAULT_GAINS, PathTracker
 from chauffeur.geometry import Polyline, Pose, joined
 from chauffeur.geometry.polyline import smooth
@@ -48,7 +48,7 @@ class TrajectoryExecutor(ExecutorBase):
         super().__init__(world)
         self._tracker = PathTracker(chassis_of(world), world.dt_s, DEFAULT_GAINS)
         self._limit = world.perception().speed_limit
-        self._reference: Reference | None = None
+        self._reference: ReferencePath | None = None
         self._lost = False
 
     @property
@@ -89,7 +89,7 @@ class TrajectoryExecutor(ExecutorBase):
         start = line.nearest(ego.x_m, ego.y_m, high_m=lane.length_m)
         path = line.between(start, min(line.length_m, start + _STOP_M + ego.speed_mps**2 / (2.0 * _EASY_MPS2)))
         if path.length_m > _SAME_M:
-            self._reference = Reference(path, np.linspace(ego.speed_mps, 0.0, len(path.points_m)).tolist())
+            self._reference = ReferencePath(path, np.linspace(ego.speed_mps, 0.0, len(path.points_m)).tolist())
             self._tracker.follow(self._reference)
 
     def _aim(self, observation: Observation) -> None:
@@ -107,7 +107,7 @@ class TrajectoryExecutor(ExecutorBase):
         self._setpoints = Setpoints(max(0.0, min(target, most)), HEADWAY_S, ego.lane)
 
 
-def reference_of(policy: Trajectory, start: Pose, speed_mps: float) -> Reference:
+def reference_of(policy: Trajectory, start: Pose, speed_mps: float) -> ReferencePath:
     """Path and speeds of a trajectory in the world.
 
     Args:
@@ -139,7 +139,7 @@ def reference_of(policy: Trajectory, start: Pose, speed_mps: float) -> Reference
         raise ScenarioError("The waypoints of the trajectory lead nowhere.", hint="Give places apart.") from error
     through = np.linspace(0.0, 1.0, len(path.points_m))
     given = np.linspace(0.0, 1.0, len(speeds))
-    return Reference(path, np.interp(through, given, speeds).tolist())
+    return ReferencePath(path, np.interp(through, given, speeds).tolist())
 
 
 def rebased(policy: Trajectory, there: Pose, here: Pose) -> Trajectory:

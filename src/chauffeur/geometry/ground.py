@@ -48,6 +48,7 @@ _ALONG_COS: Final = math.cos(math.radians(95.0))
 _JUNCTION_COS: Final = math.cos(math.radians(120.0))
 """In a junction lanes of all directions share the ground: only against the traffic is against a lane."""
 _ANY_COS: Final = -2.0
+_FOR_CARS: Final = frozenset({"driving", "aisle", "emergency", "parking"})
 
 GroundFaultKind = Literal["off_road", "oncoming", "sidewalk", "bicycle", "emergency", "parking"]
 
@@ -183,7 +184,7 @@ def _table(road: RoadGraph) -> Array:
     rows: list[tuple[float, ...]] = []
     led = {one for lane in road.lanes for one in lane.successors}
     for lane in road.lanes:
-        if lane.kind not in ("driving", "aisle", "emergency", "parking") or road.paved is not None:
+        if lane.kind not in _FOR_CARS or road.paved is not None:
             continue
         either = lane.kind in ("aisle", "parking")
         cosine = _ANY_COS if either else _JUNCTION_COS if lane.junction else _ALONG_COS
@@ -203,7 +204,7 @@ def _table(road: RoadGraph) -> Array:
 def _half_m(lane: Lane, beside: Lane | None, x_m: float, y_m: float) -> float:
     """How far a lane reaches to one side, m: to the edge of the lane beside, where mean widths leave a slit between."""
     half = lane.width_m / 2.0
-    if beside is None or beside.kind not in ("driving", "emergency", "parking"):
+    if beside is None or beside.kind not in _FOR_CARS:
         return half
     apart = abs(beside.centre.project(x_m, y_m)[1])
     return max(half, min(apart - beside.width_m / 2.0, half + 1.0))

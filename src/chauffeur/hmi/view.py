@@ -58,11 +58,6 @@ def _to_the_right(first: Observation) -> _Turn:
     return _Turn.by(0.0 if abs(math.sin(heading / 2.0)) < _LEVEL else heading)
 
 
-def in_picture(instants: tuple[Observation, ...]) -> tuple[Observation, ...]:
-    """The same instants in the frame of pictures, whose y grows downwards, not turned."""
-    return _turned(instants, _Turn.by(0.0))
-
-
 def _turned(instants: tuple[Observation, ...], turn: _Turn) -> tuple[Observation, ...]:
     roads: dict[int, RoadGraph] = {}
     turned: list[Observation] = []

@@ -17,7 +17,7 @@ from chauffeur.speech.base import Expect, FollowingRecogniser, Heard, Hotword, R
 from chauffeur.speech.detector import FRAME, SileroDetector, VoiceDetector
 from chauffeur.speech.errors import RecogniserError
 from chauffeur.speech.hotwords import split_hotword
-from chauffeur.speech.segments import FRAME_S, LONGEST_S, Segmenter, Utterance
+from chauffeur.speech.segments import FRAME_S, LONGEST_S, Segmenter, SpeechSegment
 
 AHEAD_FRAMES: Final = 1
 """Frames without voice (0.03 s) after which an engine that hears ahead checks what it guesses was said so far."""
@@ -92,7 +92,7 @@ class Listener:
         self._clock = clock
         self._segments = Segmenter(SileroDetector() if detector is None else detector, clock=clock)
         self._button: Hotword | None = None
-        self._held: list[Utterance] = []
+        self._held: list[SpeechSegment] = []
         self._follower = ahead
         self._followed = 0
         self._ahead: _Ahead | None = None
@@ -195,7 +195,7 @@ class Listener:
         follower.follow(news)
         return True
 
-    def _ended(self, utterance: Utterance) -> list[Heard]:
+    def _ended(self, utterance: SpeechSegment) -> list[Heard]:
         """An utterance ended: nothing more of it if it was given already, and all of it once more if it went on."""
         self._followed = 0
         ahead, self._ahead = self._ahead, None
@@ -212,7 +212,7 @@ class Listener:
             utterance.erase()
         self._held = []
 
-    def _hold(self, utterance: Utterance) -> None:
+    def _hold(self, utterance: SpeechSegment) -> None:
         """Keep a part of what is said with a button held, as long as all of it is not too long."""
         if sum(len(one.samples) for one in self._held) > LONGEST_S * SAMPLE_RATE_HZ:
             self._held[-1].cut = True
@@ -220,13 +220,13 @@ class Listener:
         else:
             self._held.append(utterance)
 
-    def _hear(self, utterance: Utterance, button: Hotword | None = None, ahead: _Engine | None = None) -> Heard:
+    def _hear(self, utterance: SpeechSegment, button: Hotword | None = None, ahead: _Engine | None = None) -> Heard:
         try:
             return self._judge(utterance, button, ahead or self._recogniser.recognise)
         finally:
             utterance.erase()
 
-    def _judge(self, utterance: Utterance, button: Hotword | None, recognise: _Engine) -> Heard:
+    def _judge(self, utterance: SpeechSegment, button: Hotword | None, recognise: _Engine) -> Heard:
         timing = Timing(utterance.speech_s, utterance.wait_s, utterance.detect_s)
         heard = Heard(
             "not_understood",
@@ -307,9 +307,9 @@ def _given_after(heard: Heard) -> float:
     return WHOLE_FRAMES if heard.to_confirm or heard.hotword is None else HARMLESS_FRAMES
 
 
-def _joined(held: list[Utterance]) -> Utterance:
+def _joined(held: list[SpeechSegment]) -> SpeechSegment:
     """The parts of what was said with a button held, as one; the parts are erased."""
-    whole = Utterance(
+    whole = SpeechSegment(
         np.concatenate([part.samples for part in held]),
         speech_s=sum(part.speech_s for part in held),
         detect_s=sum(part.detect_s for part in held),

@@ -37,7 +37,7 @@ _END: Final = 0.35
 """Probabilities of speech from which a frame begins an utterance, and below which one does not go on with it."""
 
 
-class Utterance:
+class SpeechSegment:
     """A stretch of speech. Whoever takes it erases it when it has been heard.
 
     Attributes:
@@ -130,11 +130,11 @@ class Segmenter:
         """
         return self._kept[first * FRAME : self._frames * FRAME] if self._speaking else self._kept[:0]
 
-    def so_far(self) -> Utterance | None:
+    def so_far(self) -> SpeechSegment | None:
         """A copy of the utterance that is going on, which goes on; None if there is too little voice in it yet."""
         return self._take(waited=self._quiet) if self._speaking else None
 
-    def push(self, chunk: bytes | bytearray | memoryview | Samples) -> list[Utterance]:
+    def push(self, chunk: bytes | bytearray | memoryview | Samples) -> list[SpeechSegment]:
         """Take sound, and give the utterances that ended in it.
 
         Args:
@@ -142,7 +142,7 @@ class Segmenter:
         """
         return [utterance for utterance in self.steps(chunk) if utterance is not None]
 
-    def steps(self, chunk: bytes | bytearray | memoryview | Samples) -> Iterator[Utterance | None]:
+    def steps(self, chunk: bytes | bytearray | memoryview | Samples) -> Iterator[SpeechSegment | None]:
         """The same frame by frame: for each frame the utterance that ended with it, or None."""
         view = memoryview(_bytes(chunk))
         size = 2 * FRAME
@@ -160,7 +160,7 @@ class Segmenter:
         """So many bytes of the stream are not heard."""
         self._passed += length // 2
 
-    def flush(self) -> list[Utterance]:
+    def flush(self) -> list[SpeechSegment]:
         """The stream ends: give the utterance that was going on, if it is one."""
         utterance = self._take(waited=self._quiet) if self._speaking else None
         self.reset()
@@ -187,7 +187,7 @@ class Segmenter:
         self._quiet = 0
         self._detect_s = 0.0
 
-    def _frame(self, frame: Samples) -> Utterance | None:
+    def _frame(self, frame: Samples) -> SpeechSegment | None:
         started = self._clock()
         probability = self._detector.probability(frame)
         spent_s = self._clock() - started
@@ -237,12 +237,12 @@ class Segmenter:
         self._kept[self._frames * FRAME : (self._frames + 1) * FRAME] = frame
         self._frames += 1
 
-    def _take(self, *, waited: int, cut: bool = False) -> Utterance | None:
+    def _take(self, *, waited: int, cut: bool = False) -> SpeechSegment | None:
         """What is kept as an utterance of its own; None if there is too little voice in it."""
         if self._voiced < _FEWEST_VOICED:
             return None
         end = min(self._frames, self._last + _TAIL_FRAMES)
-        return Utterance(
+        return SpeechSegment(
             self._kept[: end * FRAME].copy(),
             speech_s=(self._last - self._first) * FRAME_S,
             wait_s=waited * FRAME_S,

@@ -210,7 +210,7 @@ def test_an_explanation_that_does_not_fit_informs() -> None:
 def test_parameters_are_shown_one_a_line() -> None:
     text = source_of(Parameters(20.0, 12.0, 1.5, -1, "left"))
     assert text.splitlines() == [
-        "target speed: 20.0 m/s (72 km/h)",
+        "target speed: 72 km/h",
         "look ahead: 1.5 s, 12 m at least",
         "lane: one to the left",
         "way: left",

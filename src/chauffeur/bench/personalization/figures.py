@@ -1,4 +1,4 @@
-"""Rates, reductions and their intervals, from rows of trips: of simulated passengers and of people alike.
+"""Rates, reductions and their intervals, from rows of trips, of simulated passengers or of people.
 
 Trips of one person hang together, so intervals resample whole persons (cluster bootstrap, `bench/kernel/stats.py`); a
 rate that is 0 or 1 throughout gets exact binomial bounds over the persons. All systems of a table are compared over the

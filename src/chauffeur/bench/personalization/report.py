@@ -63,20 +63,6 @@ def tables(rows: Rows) -> list[Table]:
     return [table for table in found if table[2]]
 
 
-def people_tables(rows: Rows) -> list[Table]:
-    """Those of a study with people, who did not say all that a simulated passenger gives away."""
-    found = [
-        _compared(
-            "Takeover rate against the keyword baseline (as Tab. IX)",
-            figures.table_ix(rows),
-            ("keyword", "Talk2Drive"),
-        ),
-        _compared("What memory adds (as Tab. X)", figures.table_x(rows), ("without", "with memory")),
-        _compared("By behaviour", figures.by_task(rows, "keyword", "with"), ("keyword", "with memory")),
-    ]
-    return [table for table in found if table[2]]
-
-
 def headline(rows: Rows) -> str:
     """The result in two sentences."""
     persons = len({row["passenger"] for row in rows})

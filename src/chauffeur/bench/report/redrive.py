@@ -8,7 +8,6 @@ from pydantic import ValidationError
 
 from chauffeur.bench.kernel.pipeline import context_adapter
 from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.lampilot.human import RecordedCommands, trace_adapter
 from chauffeur.bench.lampilot.metrics import ANY_STOP_M
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rollout import BASELINES, MAX_EPISODE_S, plan_adapter
@@ -28,7 +27,7 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.describe import describe
-from chauffeur.drive.episode import Episode, run_episode
+from chauffeur.drive.episode import Episode
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.session import drive_program, drive_without_program, make_trip
 from chauffeur.safety.shield import Shield
@@ -36,7 +35,7 @@ from chauffeur.worlds.highway import HighwayWorld, MobilBaseline
 
 
 class KeptDrive:
-    """What a run kept of its items beside the results: contexts, plans, verdicts, the hands of a person.
+    """What a run kept of its items beside the results: contexts, plans, verdicts.
 
     Raises:
         DataError: A stage file cannot be read.
@@ -46,12 +45,11 @@ class KeptDrive:
         self._contexts = run.stage("contexts", "sample")
         self._plans = run.stage("generate", "item")
         self._rollouts = run.stage("rollout", "key")
-        self._traces = run.stage("traces", "item")
         self._planner = str(run.rows[0].get("planner", ""))
 
     @property
     def baseline(self) -> str:
-        """`idm` or `mobil`; empty for planners and people."""
+        """`idm` or `mobil`; empty for planners."""
         return self._planner if self._planner in BASELINES else ""
 
     def context(self, row: Row) -> Context | None:
@@ -70,12 +68,6 @@ class KeptDrive:
         """What the checks said of the item's plan."""
         rollout = self._rollouts.get(str(row.get("rollout_key", ""))) or {}
         return tuple(Verdict(**verdict) for verdict in rollout.get("verdicts") or ())
-
-    def hands(self, row: Row) -> RecordedCommands | None:
-        """What a person's hands did; None where no person drove."""
-        trace: Any = (self._traces.get(str(row["item"])) or {}).get("trace")
-        found = _valid(trace_adapter, trace)
-        return None if found is None else RecordedCommands(found)
 
 
 def _valid(adapter: Any, value: Any) -> Any:
@@ -105,7 +97,7 @@ def drive_again(row: Row, scenario: Scenario, kept: KeptDrive) -> tuple[Recorded
     except ChauffeurError as error:
         return None, f"It could not be driven again: {error}"
     if episode is None:
-        return None, "The run kept no program or trace that could be driven again."
+        return None, "The run kept no program that could be driven again."
     note = ""
     if (episode.outcome, episode.ticks) != (row["outcome"], row["steps"]):
         again = ending_words({"outcome": episode.outcome, "success": episode.success, "steps": episode.ticks})
@@ -129,9 +121,6 @@ def _drive(
         return drive_without_program(world, referee, MAX_EPISODE_S, adjust=adjust, shield=shield)
     if kept.baseline:
         return drive_without_program(world, referee, MAX_EPISODE_S, shield=shield)
-    command_source = kept.hands(row)
-    if command_source is not None:
-        return run_episode(world, None, referee, max_s=MAX_EPISODE_S, command_source=command_source)
     if plan is None or not isinstance(plan.policy, Program):
         return None
     return drive_program(

@@ -21,7 +21,7 @@ from chauffeur.bench.lampilot.scenes.sampling import draw_road
 from chauffeur.concept import LAMPILOT_LIMITS, Scenario, ScenarioError, Situation
 from chauffeur.describe import describe
 from chauffeur.models.onboard.skill_judge import judge
-from chauffeur.planners.onboard.dialect import SKILLS, UNITS, Condition, DialectStep, Number, write
+from chauffeur.planners.onboard.dialect import SKILLS, UNITS, DialectStep, Number, StepCondition, write
 from chauffeur.planners.onboard.link import link
 from chauffeur.planners.onboard.options import Declined
 from chauffeur.planners.onboard.personal import Leaning
@@ -184,20 +184,20 @@ _WITH_MANNER = frozenset(
 )  # fmt: skip
 
 
-def _draw_condition(situation: Situation, skill: str, rng: Generator) -> Condition | None:
+def _draw_condition(situation: Situation, skill: str, rng: Generator) -> StepCondition | None:
     how = "if" if rng.random() < 0.5 else "once"
     front = situation.front
     if skill in ("lane_left", "overtake_left", "lanes_left"):
-        return Condition(how, "clear_left")
+        return StepCondition(how, "clear_left")
     if skill in ("lane_right", "overtake_right", "lanes_right"):
-        return Condition(how, "clear_right")
+        return StepCondition(how, "clear_right")
     if front is None:
         return None
     if rng.random() < 0.4:
         number = _measure(rng, front.speed_mps * float(rng.uniform(0.8, 1.2)), "speed")
-        return Condition(how, "lead_slower_than", number)
+        return StepCondition(how, "lead_slower_than", number)
     number = _measure(rng, front.distance_m * float(rng.uniform(0.7, 1.3)), "distance")
-    return Condition(how, "lead_closer_than" if rng.random() < 0.6 else "lead_further_than", number)
+    return StepCondition(how, "lead_closer_than" if rng.random() < 0.6 else "lead_further_than", number)
 
 
 def _measure(rng: Generator, si: float, kind: str) -> Number:

@@ -198,7 +198,7 @@ class Number:
 
 
 @dataclass(frozen=True, slots=True)
-class Condition:
+class StepCondition:
     """What a step depends on: `if` is looked at once, `once` is waited for."""
 
     how: Literal["if", "once"]
@@ -222,7 +222,7 @@ class DialectStep:
     number: Number | None = None
     manner: str = ""
     wait_s: Number | None = None
-    condition: Condition | None = None
+    condition: StepCondition | None = None
 
     @property
     def meaning(self) -> Meaning:
@@ -314,7 +314,7 @@ def read(source: str) -> tuple[DialectStep, ...]:
         raise ProgramError("A program of the dialect is one function drive().")
     steps: list[DialectStep] = []
     wait: Number | None = None
-    once: Condition | None = None
+    once: StepCondition | None = None
     for statement in body[0].body:
         if once is None and wait is None and (found := _delegated(statement, "wait")) is not None:
             wait = _number(_only(found), "time", statement)
@@ -367,7 +367,7 @@ def _step(statement: ast.stmt) -> DialectStep:
     return DialectStep(skill.name, _number(arguments[0], skill.takes, statement), manner)
 
 
-def _awaited(loop: ast.While) -> Condition:
+def _awaited(loop: ast.While) -> StepCondition:
     test = loop.test
     waits = len(loop.body) == 1 and ast.unparse(loop.body[0]) in ("yield autopilot()", "(yield autopilot())")
     if not waits or not isinstance(test, ast.UnaryOp) or not isinstance(test.op, ast.Not):
@@ -375,7 +375,7 @@ def _awaited(loop: ast.While) -> Condition:
     return _condition("once", test.operand)
 
 
-def _condition(how: Literal["if", "once"], test: ast.expr) -> Condition:
+def _condition(how: Literal["if", "once"], test: ast.expr) -> StepCondition:
     if not isinstance(test, ast.Call) or not isinstance(test.func, ast.Name) or test.keywords:
         raise _not_of_it(test)
     name = test.func.id
@@ -385,8 +385,8 @@ def _condition(how: Literal["if", "once"], test: ast.expr) -> Condition:
     if kind is None:
         if test.args:
             raise _not_of_it(test)
-        return Condition(how, name)
-    return Condition(how, name, _number(_only(test), kind, test))
+        return StepCondition(how, name)
+    return StepCondition(how, name, _number(_only(test), kind, test))
 
 
 def _only(call: ast.Call) -> ast.expr:

@@ -153,6 +153,22 @@ def stopped(
 
 
 @compiled
+def followed(line: Array, car: Array, speed_mps: float, dt_s: float) -> Array:
+    """Poses of a car that follows a line from its start to its end at an even speed; rows as of `stopped`."""
+    count = int(len(line) / (speed_mps * dt_s)) + 1
+    rows = np.empty((count, 5))
+    state = np.array([line[0, 0], line[0, 1], line[0, 2], speed_mps, 0.0, 0.0])
+    at = 0
+    for i in range(count):
+        at = nearest(line, state[0], state[1], at, 4)
+        rows[i, 0] = state[0] + car[1] * math.cos(state[2])
+        rows[i, 1] = state[1] + car[1] * math.sin(state[2])
+        rows[i, 2], rows[i, 3], rows[i, 4] = state[2], speed_mps, at
+        _moved(state, 0.0, pursuing(state, line, at, car), dt_s, car)
+    return rows
+
+
+@compiled
 def _apart(pose: Array, px: float, py: float, long: float, wide: float, gap: float) -> float:
     """Distance of a place from a body, and from what it keeps free ahead of itself, m."""
     dx, dy = px - pose[0], py - pose[1]

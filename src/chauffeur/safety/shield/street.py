@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation, VehicleState
-from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle
+from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle, curvature_of
 from chauffeur.geometry import Polyline, Pose, RoadGraph, Route, joined, wrap_to_pi
 from chauffeur.geometry.ground import Ground
 from chauffeur.safety.shield import failsafe
@@ -45,6 +45,14 @@ _EDGE_M: Final = 0.1
 """What the outline may reach over the edge of its ground: the filter knows the car exactly, and lanes to that."""
 _EVERY: Final = 2
 """The ground under the car is looked at every so many periods: 3 m apart at 30 m/s, less than half of any body."""
+_FOLLOWS_MPS: Final = 2.5
+_FOLLOWS_S: Final = 0.2
+"""How a line is followed to see what the car takes of the road beside it."""
+_AROUND_ROWS: Final = 3
+_SWING_SHARE: Final = 1.25
+"""Who comes into a bend from beside the middle of its lane swings out by so much more."""
+_SKID_RADPS: Final = 0.2
+"""Tyres that hold turn a car as its wheel says, to less than this; at 0.4 rad/s a car on snow is on its way round."""
 _OVERHANG_M: Final = 0.4
 """What a bumper may reach over a kerb in a bend that is too tight for it otherwise: less than to any walking person."""
 _LEVEL_M: Final = 1e-6
@@ -76,8 +84,8 @@ class _Way:
         rows: (n, 3): x, y, heading every metre.
         own: Place of the ego's lane among the lanes.
         most_mps: Speed for the bends ahead, every metre.
-        edge_m: How far a car may reach beyond its ground, every metre: as far as one whose rear axle follows the line,
-            for in the tightest bends no car's front keeps to the lane.
+        edge_m: How far a car may reach beyond its ground, every metre: a little farther than one that follows the line
+            at a walk, for in the tightest bends no car's front keeps to the lane.
     """
 
     lanes: tuple[LaneId, ...]
@@ -354,6 +362,8 @@ class StreetShield(Shield):
         limit = self._most.most_mps(math.inf if lane is None else lane.speed_limit_mps)
         allowed = max((limit - speed) / self._period_s, -_SLOWING_MPS2)
         strictest = min(allowed, self._bounds.acceleration_mps2), "speed", f"No faster than {speed_words(limit)} here."
+        if self._skids(ego) and strictest[0] > 0.0:
+            strictest = 0.0, "skid", "The tyres slide: no throttle until they hold."
         bend = float(way.most_mps[max(0, min(len(way.most_mps) - 1, round(station + speed * self._period_s)))])
         slow = (bend - speed) / self._period_s
         if slow < strictest[0]:
@@ -395,6 +405,11 @@ class StreetShield(Shield):
             if cap < strictest[0]:
                 strictest = cap, "stop", f"A stop line is {max(ahead, 0.0):.0f} m ahead, not stopped at yet."
         return strictest
+
+    def _skids(self, ego: VehicleState) -> bool:
+        """Whether a car that is more than a bicycle turns otherwise than its wheel says: throttle would spin it."""
+        wheel = ego.speed_mps * curvature_of(ego.speed_mps, ego.steering_rad, self._car)
+        return self._car.stray_m > 0.0 and abs(ego.yaw_rate_radps - wheel) > _SKID_RADPS
 
     def _stopping(self, speed: float, ahead_m: float) -> float:
         """Hardest acceleration after which the car still stops before a line."""
@@ -547,10 +562,9 @@ def _laid(road: RoadGraph, chain: tuple[LaneId, ...], own: int, car: KinematicBi
     rows = _sampled(line)
     heading = rows[:, 2]
     most = most_mps(heading, np.full(len(heading), math.inf), _BEND_MPS2, _BRAKING_MPS2)
-    smooth = np.unwrap(heading)
-    smooth[1:-1] = (smooth[:-2] + smooth[1:-1] + smooth[2:]) / 3.0
-    ahead = car.rear_to_middle_m
-    bodies = np.stack([rows[:, 0] + ahead * np.cos(smooth), rows[:, 1] + ahead * np.sin(smooth), smooth], axis=1)
-    swing = np.pad(road.ground.beyond_m(bodies, car.length_m, car.width_m, stops=True), 2, mode="edge")
-    widest = np.max([swing[i : i + len(rows)] for i in range(5)], axis=0)
-    return _Way(chain, tuple(starts), line, rows, own, most, widest + _EDGE_M)
+    poses = failsafe.followed(rows, failsafe.numbers(car), _FOLLOWS_MPS, _FOLLOWS_S)
+    beyond = road.ground.beyond_m(poses[:, :3], car.length_m, car.width_m, stops=True)
+    swing = np.zeros(len(rows) + 2 * _AROUND_ROWS)
+    np.maximum.at(swing, poses[:, 4].astype(np.int64) + _AROUND_ROWS, beyond)
+    widest = np.max([swing[i : i + len(rows)] for i in range(2 * _AROUND_ROWS + 1)], axis=0)
+    return _Way(chain, tuple(starts), line, rows, own, most, _SWING_SHARE * widest + _EDGE_M)
