@@ -43,9 +43,9 @@ _LEAST: Final = 1e-300
 _LONG_FRAMES: Final = 15
 """Silence shorter than this (0.15 s) is not judged."""
 
-_WEIGHTS: Final = (3.8, 1.74, 0.24, 2.64)
+_WEIGHTS: Final = (5.04, 2.29, 0.07, 1.11)
 """Confidence = 1 / (1 + exp(-(w0 + w1 mean + w2 worst + w3 silence))), fitted with
-`benchmarks/speech_words.py --fit --most 30` on synthetic voices and sentences that no reported figure uses."""
+`benchmarks/speech_words.py --fit --most 60` on synthetic voices and sentences that no reported figure uses."""
 
 _SURE: Final = 0.5
 """Confidence from which words are believed."""
