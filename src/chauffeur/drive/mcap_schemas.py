@@ -115,7 +115,6 @@ PLAN = Channel(
         latency_s=_number(),
         raw=_text(),
         scene=_text("what a planner with eyes made of its pictures"),
-        alarm=_text("stop or distress that the planner read"),
     ),
 )
 VERDICTS = Channel(
