@@ -14,7 +14,7 @@ from chauffeur.worlds.places import PavedGround, StreetCar
 
 
 class GroundShield(Shield):
-    """The shield of a parking lot: the same last word, said by rules for paved ground.
+    """The shield of a parking lot and a proving ground: the same last word, said by rules for paved ground.
 
     The shield of roads keeps a car in its lane and off others' by distances that no parking car has, and takes it for
     one whose axles are at its ends.
@@ -45,9 +45,9 @@ class GroundShield(Shield):
 
 
 def shield_for(world: World, limits: Limits | None = None) -> Shield:
-    """The shield that fits what a world, just reset, states: paved ground, a car on streets, or neither: roads."""
+    """The shield that fits what a world, just reset, states: a car on streets, paved ground, or neither: roads."""
+    if isinstance(world, StreetCar) and (car := world.car) is not None:
+        return StreetShield(world.dt_s, limits, car=car)
     if isinstance(world, PavedGround):
         return GroundShield(world, world.dt_s, limits, world.perception().speed_limit)
-    if isinstance(world, StreetCar):
-        return StreetShield(world.dt_s, limits, car=world.car)
     return Shield(world.dt_s, limits)

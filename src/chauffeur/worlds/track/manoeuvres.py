@@ -11,12 +11,13 @@ sideways), and clothoids of 8 m.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from typing import Final, Literal
 
 from chauffeur.concept.units import MPS_PER_KMH
-from chauffeur.geometry import Lane, Polyline, RoadGraph
+from chauffeur.geometry import Box, Lane, Polyline, RoadGraph
 
 ManoeuvreName = Literal["acceleration", "lane_change", "left_turn"]
 Weather = Literal["sunny", "rain", "fog", "snow", "night"]
@@ -27,6 +28,8 @@ FRICTION: Final[dict[Weather, float]] = {"sunny": 1.0, "rain": 0.7, "fog": 0.9, 
 """Share of the dry road's peak friction: wet asphalt, damp asphalt, rolled snow on winter tyres."""
 
 LANE_M: Final = 3.5
+PAVED_M: Final = 15.0
+"""Paved on every side of a proving ground's lanes, m."""
 CHANGE_M: Final = 50.0
 RADIUS_M: Final = 23.89
 CLOTHOID_M: Final = 8.0
@@ -80,11 +83,20 @@ def manoeuvre(name: ManoeuvreName) -> Manoeuvre:
 
 def _two_lanes() -> RoadGraph:
     """Two lanes to the east; the ego starts in the right one, whose middle is y = 0."""
-    lanes = (
+    return _proving_ground(
         Lane(f"straight_{i}", Polyline.of(((-50.0, y), (650.0, y))), LANE_M, LIMIT_MPS, road="straight", index=i)
         for i, y in enumerate((LANE_M, 0.0))
     )
-    return RoadGraph(tuple(lanes))
+
+
+def _proving_ground(lanes: Iterable[Lane]) -> RoadGraph:
+    """Lanes on a proving ground, which is paved around them: a car that slides off its lane leaves no road."""
+    held = tuple(lanes)
+    points = [point for lane in held for point in lane.centre.points_m]
+    xs, ys = [x for x, _ in points], [y for _, y in points]
+    middle = (min(xs) + max(xs)) / 2.0, (min(ys) + max(ys)) / 2.0
+    wide, deep = max(xs) - min(xs) + 2.0 * PAVED_M, max(ys) - min(ys) + 2.0 * PAVED_M
+    return RoadGraph(held, paved=Box(*middle, 0.0, wide, deep))
 
 
 def _change() -> Polyline:
@@ -132,7 +144,7 @@ def _bend_road(path: Polyline, speed_mps: float) -> RoadGraph:
     before = Polyline.of(((-30.0, 0.0), (_APPROACH_M, 0.0)))
     through, after = path.between(_APPROACH_M, bend_m), path.between(bend_m, path.length_m)
     limit = max(speed_mps, LIMIT_MPS)
-    return RoadGraph(
+    return _proving_ground(
         (
             Lane("approach", before, LANE_M, limit, road="approach", successors=("bend",)),
             Lane("bend", through, LANE_M, limit, road="bend", successors=("exit",), junction="bend"),

@@ -114,8 +114,19 @@ class TrackWorld:
         return CHASSIS
 
     @property
-    def car(self) -> KinematicBicycle:
-        """The ego, as a filter may count on it in this weather. Raises ScenarioError before the first reset."""
+    def steering_rate(self) -> float:
+        """How fast the ego's wheel turns, rad/s."""
+        return STEERING_RATE
+
+    @property
+    def car(self) -> KinematicBicycle | None:
+        """The ego, as a filter may count on it in this weather; None on a proving ground, whose manoeuvres may slide.
+
+        Raises:
+            ScenarioError: Before the first reset.
+        """
+        if self._started().street is None:
+            return None
         friction = FRICTION[self._started().weather]
         return KinematicBicycle(
             LENGTH_M,
@@ -294,7 +305,14 @@ class TrackWorld:
             steering_rad=float(self._state[2]),
         )
         lead = self._lead()
-        off_road = self._lost or plan.road.ground.off_road(box.x_m, box.y_m)
+        off_road = self._lost or (
+            plan.road.ground.off_road(box.x_m, box.y_m)
+            if plan.road.paved is None
+            else all(  # a manoeuvre is judged by its lanes, however wide the ground around them is
+                abs(one.centre.offset(box.x_m, box.y_m, place.station_m)) > one.width_m / 2.0
+                for one in plan.road.abreast(lane.id)
+            )
+        )
         late = self._tick * DT_S >= plan.duration_s - 1e-9
         front = None
         if lead is not None and lead.lane == ego.lane and lead.x_m > ego.x_m:
