@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from chauffeur.control.kinematic_bicycle import KinematicBicycle
+from chauffeur.geometry import Box
 from chauffeur.worlds.parking.lot import Spot
 from chauffeur.worlds.parking.path_follower import Chassis
 from chauffeur.worlds.parking.routes import Way
@@ -37,6 +38,11 @@ class PavedGround(Protocol):
         ...
 
     @property
+    def ground(self) -> Box:
+        """What is paved."""
+        ...
+
+    @property
     def steering_rate(self) -> float:
         """How fast the ego's wheel turns, rad/s."""
         ...
@@ -47,8 +53,8 @@ class StreetCar(Protocol):
     """A world whose car drives on streets, and that states the car: its filter foresees how it brakes and steers."""
 
     @property
-    def car(self) -> KinematicBicycle | None:
-        """The ego's size, axles, bounds, grip and lag, as they are on this trip; None where it may slide."""
+    def car(self) -> KinematicBicycle:
+        """The ego's size, axles, bounds, grip and lag, as they are on this trip."""
         ...
 
 

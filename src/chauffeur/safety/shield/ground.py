@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation
+from chauffeur.geometry import RoadGraph
+from chauffeur.geometry.ground import Ground
 from chauffeur.safety.shield.shield import FilterResult, Shield
 from chauffeur.safety.shield.street import StreetShield
 from chauffeur.worlds.base import World
@@ -30,7 +32,8 @@ class GroundShield(Shield):
         """Args: a world just reset; its control period; bounds no command may cross; speed limits (default a lot's)."""
         super().__init__(dt_s, limits)
         self._most = Limits() if limits is None else limits
-        self._lot_filter = LotSafetyFilter(world.chassis, dt_s, world.steering_rate)
+        ground = Ground(RoadGraph((), paved=world.ground))
+        self._lot_filter = LotSafetyFilter(world.chassis, dt_s, world.steering_rate, ground)
         self._limit = limit_mps
 
     def filter(self, observation: Observation, command: Command, aim: LaneId | None = None) -> FilterResult:
@@ -46,8 +49,8 @@ class GroundShield(Shield):
 
 def shield_for(world: World, limits: Limits | None = None) -> Shield:
     """The shield that fits what a world, just reset, states: a car on streets, paved ground, or neither: roads."""
-    if isinstance(world, StreetCar) and (car := world.car) is not None:
-        return StreetShield(world.dt_s, limits, car=car)
+    if isinstance(world, StreetCar):
+        return StreetShield(world.dt_s, limits, car=world.car)
     if isinstance(world, PavedGround):
         return GroundShield(world, world.dt_s, limits, world.perception().speed_limit)
     return Shield(world.dt_s, limits)

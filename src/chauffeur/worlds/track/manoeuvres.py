@@ -83,20 +83,21 @@ def manoeuvre(name: ManoeuvreName) -> Manoeuvre:
 
 def _two_lanes() -> RoadGraph:
     """Two lanes to the east; the ego starts in the right one, whose middle is y = 0."""
-    return _proving_ground(
+    lanes = (
         Lane(f"straight_{i}", Polyline.of(((-50.0, y), (650.0, y))), LANE_M, LIMIT_MPS, road="straight", index=i)
         for i, y in enumerate((LANE_M, 0.0))
     )
+    return RoadGraph(tuple(lanes))
 
 
-def _proving_ground(lanes: Iterable[Lane]) -> RoadGraph:
-    """Lanes on a proving ground, which is paved around them: a car that slides off its lane leaves no road."""
+def proving_ground(lanes: Iterable[Lane]) -> Box:
+    """What is paved around lanes on a proving ground: a car that slides off its lane leaves no road."""
     held = tuple(lanes)
     points = [point for lane in held for point in lane.centre.points_m]
     xs, ys = [x for x, _ in points], [y for _, y in points]
     middle = (min(xs) + max(xs)) / 2.0, (min(ys) + max(ys)) / 2.0
     wide, deep = max(xs) - min(xs) + 2.0 * PAVED_M, max(ys) - min(ys) + 2.0 * PAVED_M
-    return RoadGraph(held, paved=Box(*middle, 0.0, wide, deep))
+    return Box(*middle, 0.0, wide, deep)
 
 
 def _change() -> Polyline:
@@ -144,7 +145,7 @@ def _bend_road(path: Polyline, speed_mps: float) -> RoadGraph:
     before = Polyline.of(((-30.0, 0.0), (_APPROACH_M, 0.0)))
     through, after = path.between(_APPROACH_M, bend_m), path.between(bend_m, path.length_m)
     limit = max(speed_mps, LIMIT_MPS)
-    return _proving_ground(
+    return RoadGraph(
         (
             Lane("approach", before, LANE_M, limit, road="approach", successors=("bend",)),
             Lane("bend", through, LANE_M, limit, road="bend", successors=("exit",), junction="bend"),
