@@ -285,7 +285,7 @@ def test_every_question_has_a_yes_and_a_no_and_what_runs_goes_on(desk: Desk) -> 
         assert [told.yes for told in drive.told if isinstance(told, Confirm)] == [False] * 3
 
         await sent(tab, "Why did you brake?")
-        await tab.until("document.querySelector('.wish .state').textContent.includes('Answered')")
+        await tab.until("document.querySelector('.wish .state').textContent.includes('Done')")
         assert await tab.value("document.getElementById('confirm').hidden")
         assert drive.scene.wish == "w1", "no question has ended what runs"
 
