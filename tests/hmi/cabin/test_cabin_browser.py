@@ -298,12 +298,12 @@ def test_every_question_has_a_yes_and_a_no_and_what_runs_goes_on(desk: Desk) -> 
         await tab.until("!document.getElementById('pad').hidden")
         await tab.press("t")
         await tab.until("document.getElementById('pad').hidden")
+        assert not tab.troubles
         await sent(tab, "Quit, please!")
         await tab.until("document.getElementById('notes').textContent.includes('You end the session')")
         await tab.until("document.getElementById('link').textContent === 'Drive over'")
         assert drive.said("ended")[-1].outcome == "stopped"
         assert not [each for each in drive.said("conversation") if "Quit" in each.text], "it is no wish"
-        assert not tab.troubles
 
     with driving("following", planner="onboard") as drive:
         desk.run(check(drive))
