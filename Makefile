@@ -13,7 +13,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 JOBS ?= auto
 VERSIONS ?= 3.11 3.12 3.13
 # What lint reads the types of, beside what tests need; and what CI tests with it.
-EXTRAS ?= models,maps,carla,speech,viewer,oracle
+EXTRAS ?= models,maps,carla,speech,viewer
 
 .PHONY: drive test lint format bench docs extras fresh-core clean
 

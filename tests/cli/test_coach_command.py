@@ -107,7 +107,7 @@ def test_a_person_at_the_terminal(server: Any, options: list[str], tmp_path: Pat
     terminal = Terminal(options)
     terminal.until("How was it? success, commit, skip, quit, or say what was wrong >")
     shown = plain(terminal.seen)
-    assert "critic: person; simulated drives" in shown and "Ran out of time or road" in shown and "def idle" in shown
+    assert "critic: person; simulated drives" in shown and "Time or road ran out" in shown and "def idle" in shown
     assert (tmp_path / "run" / "drives" / "left_lc_s0_c0-1.html").stat().st_size > 10_000
     terminal.type("You never changed lane.\n")
     terminal.until("round 2")

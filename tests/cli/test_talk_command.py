@@ -141,6 +141,7 @@ def test_a_conversation_is_told_once_and_in_order() -> None:
         source="def drive():\n", recalled=planned.recalled, said=("Slowing [b]down[/b].\x1b[2J",),
         verdicts=(VerdictShown("format-v1", True, ""), VerdictShown("alignment-v1", False, "It says left.", True)),
         opinion="too fast", remembered="remembered as trip 0123", stages=StageTimes(0.2, 0.1, 0.03, 0.05, 0.1, 0.48),
+        result="done",
     )  # fmt: skip
     text = shown(
         SessionState("overtake", "Two lanes", 3, "onboard", "grammar/1", False, "ana", "simulated", 0.1, ("slow",)),
@@ -222,7 +223,7 @@ def test_a_line_waits_until_the_wish_before_it_is_done(tmp_path: Path) -> None:
     said = " ".join(done.stdout.split())
     assert "Here we are: station" in said, done.stdout
     assert said.index("Here we are: station") < said.index("w2 asked"), "the question, too, in its turn"
-    assert "w2 answers" in said
+    assert "w2 done" in said, "an answered question is done"
     assert "You end the session" in said
     assert "Not asked: “Turn left.”" in said or "“Turn left.” is not asked" in said
     cut = subprocess.run(

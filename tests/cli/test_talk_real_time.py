@@ -22,7 +22,7 @@ from chauffeur.drive.live.recorder import unanswered
 from chauffeur.safety.audit import read_records, verify
 
 WISH = "Hold the lane for a moment."
-DECLINED = "Fly over them."
+DECLINED = "Turn into a boat."
 PROGRAM = """def drive():
     say("Holding the [bold]lane[/].")
     for _ in range(10):

@@ -125,7 +125,7 @@ def test_gate_and_sandbox_contain_it(hostile: Hostile, strict: Sandbox) -> None:
     assert attack.outcome in hostile.outcomes | {"time", "refused"}
     _assert_contained(attack)
     if attack.outcome == "refused":
-        assert check_source(hostile.source).for_model()
+        assert check_source(hostile.source).findings
 
 
 def test_gate_refuses_most_before_anything_runs() -> None:

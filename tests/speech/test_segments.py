@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loudness import Loudness
 
 from chauffeur.speech.audio import SAMPLE_RATE_HZ, Samples
 from chauffeur.speech.detector import FRAME
 from chauffeur.speech.segments import FRAME_S, LONGEST_S, Segmenter, SpeechSegment
-from conftest import Loudness
 
 
 def frames(*runs: tuple[bool, int]) -> Samples:

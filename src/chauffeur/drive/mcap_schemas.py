@@ -107,6 +107,7 @@ PLAN = Channel(
         refusal=_text(),
         offer=_text("the wish that a yes stands for, where the refusal is a question"),
         intent=_text(),
+        alarm=_text("stop or distress, where the words were taken for that"),
         settings=_SETTINGS,
         planner=_text(),
         model=_text(),
@@ -114,7 +115,6 @@ PLAN = Channel(
         latency_s=_number(),
         raw=_text(),
         scene=_text("what a planner with eyes made of its pictures"),
-        alarm=_text("stop or distress that the planner read"),
     ),
 )
 VERDICTS = Channel(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import os
 import re
 from dataclasses import replace
@@ -50,8 +51,8 @@ IN_REACH_M = 100.0
 """So far ahead a vehicle counts as one to follow or to overtake."""
 _CLOSES_MPS = 2.0
 """Faster than the vehicle ahead by this much, the car comes up to it and stays behind it."""
-_LONGEST_LOT_S = 3600.0
-"""A trip in a lot may have no more (worlds.parking)."""
+_LONGEST_S = {"parking": 3600.0, "town": math.inf}
+"""Longest session of the worlds whose trips have an end, s: a lot allows no more (worlds.parking)."""
 _TRIES = 60
 STAYS_S = 40.0
 """How long a vehicle ahead stays in reach at least, on roads that keep one."""
@@ -135,10 +136,10 @@ def _words(text: str) -> list[str]:
 
 def lasting(scenario: Scenario, duration_s: float) -> Scenario:
     """A scenario in a town or a lot with time for a session of that long; any other as it is."""
-    if scenario.world not in ("town", "parking"):
+    longest_s = _LONGEST_S.get(scenario.world)
+    if longest_s is None:
         return scenario
-    most_s = _LONGEST_LOT_S if scenario.world == "parking" else duration_s + 1.0
-    return replace(scenario, config={**scenario.config, "duration_s": min(duration_s + 1.0, most_s)})
+    return replace(scenario, config={**scenario.config, "duration_s": min(duration_s + 1.0, longest_s)})
 
 
 def _asks_for_amenities(wish: str) -> bool:

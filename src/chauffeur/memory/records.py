@@ -39,7 +39,7 @@ def body_of(trip: Trip) -> str:
 
 def result_of_kept(body: Mapping[str, Any]) -> Result:
     """The result of a kept trip; of one kept by an older version, by its outcome and intent."""
-    return result_of_stored(body.get("result") or body["outcome"], body["intent"])
+    return result_of_stored(body.get("result") or body["outcome"], body.get("intent", ""))
 
 
 def feedback_body(feedback: Feedback) -> str:

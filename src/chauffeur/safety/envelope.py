@@ -30,7 +30,6 @@ from chauffeur.geometry import turns_ahead
 from chauffeur.programs.catalogue import vocabulary_of
 from chauffeur.safety.constant_calls import ApiUse, ProgramReading, read_program
 from chauffeur.safety.gain_box import gain_box
-from chauffeur.safety.trajectories import trajectory_faults
 from chauffeur.safety.words import IN_A_HELPER, speed_words
 
 PARAMETERS_CHECK = "parameters-v1"
@@ -81,6 +80,8 @@ def check_parameters(plan: Plan, observation: Observation, limits: Limits) -> Ve
     road = _road(observation)
     faults = [*_policy_faults(plan, road, limits), *_setting_faults(plan, road, limits), *_intent_faults(plan, road)]
     if isinstance(plan.policy, Trajectory) and not faults and _readable(plan.policy):
+        from chauffeur.safety.trajectories import trajectory_faults  # numpy, needed by trajectories alone
+
         faults = [_Fault(*fault) for fault in trajectory_faults(plan.policy, observation)]
     if not faults:
         return Verdict(PARAMETERS_CHECK, True, "Every number and manoeuvre that can be read fits the situation.")

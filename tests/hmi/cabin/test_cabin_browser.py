@@ -285,7 +285,7 @@ def test_every_question_has_a_yes_and_a_no_and_what_runs_goes_on(desk: Desk) -> 
         assert [told.yes for told in drive.told if isinstance(told, Confirm)] == [False] * 3
 
         await sent(tab, "Why did you brake?")
-        await tab.until("document.querySelector('.wish .state').textContent.includes('Answered')")
+        await tab.until("document.querySelector('.wish .state').textContent.includes('Done')")
         assert await tab.value("document.getElementById('confirm').hidden")
         assert drive.scene.wish == "w1", "no question has ended what runs"
 
@@ -298,12 +298,12 @@ def test_every_question_has_a_yes_and_a_no_and_what_runs_goes_on(desk: Desk) -> 
         await tab.until("!document.getElementById('pad').hidden")
         await tab.press("t")
         await tab.until("document.getElementById('pad').hidden")
+        assert not tab.troubles
         await sent(tab, "Quit, please!")
         await tab.until("document.getElementById('notes').textContent.includes('You end the session')")
         await tab.until("document.getElementById('link').textContent === 'Drive over'")
         assert drive.said("ended")[-1].outcome == "stopped"
         assert not [each for each in drive.said("conversation") if "Quit" in each.text], "it is no wish"
-        assert not tab.troubles
 
     with driving("following", planner="onboard") as drive:
         desk.run(check(drive))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from chauffeur.concept import Command, Intervention, LaneId, Limits, Observation
+from chauffeur.geometry import RoadGraph
+from chauffeur.geometry.ground import Ground
 from chauffeur.safety.shield.shield import FilterResult, Shield
 from chauffeur.safety.shield.street import StreetShield
 from chauffeur.worlds.base import World
@@ -14,7 +16,7 @@ from chauffeur.worlds.places import PavedGround, StreetCar
 
 
 class GroundShield(Shield):
-    """The shield of a parking lot: the same last word, said by rules for paved ground.
+    """The shield of a parking lot and a proving ground: the same last word, said by rules for paved ground.
 
     The shield of roads keeps a car in its lane and off others' by distances that no parking car has, and takes it for
     one whose axles are at its ends.
@@ -30,7 +32,8 @@ class GroundShield(Shield):
         """Args: a world just reset; its control period; bounds no command may cross; speed limits (default a lot's)."""
         super().__init__(dt_s, limits)
         self._most = Limits() if limits is None else limits
-        self._lot_filter = LotSafetyFilter(world.chassis, dt_s, world.steering_rate)
+        ground = Ground(RoadGraph((), paved=world.ground))
+        self._lot_filter = LotSafetyFilter(world.chassis, dt_s, world.steering_rate, ground)
         self._limit = limit_mps
 
     def filter(self, observation: Observation, command: Command, aim: LaneId | None = None) -> FilterResult:
@@ -45,9 +48,9 @@ class GroundShield(Shield):
 
 
 def shield_for(world: World, limits: Limits | None = None) -> Shield:
-    """The shield that fits what a world, just reset, states: paved ground, a car on streets, or neither: roads."""
-    if isinstance(world, PavedGround):
-        return GroundShield(world, world.dt_s, limits, world.perception().speed_limit)
+    """The shield that fits what a world, just reset, states: a car on streets, paved ground, or neither: roads."""
     if isinstance(world, StreetCar):
         return StreetShield(world.dt_s, limits, car=world.car)
+    if isinstance(world, PavedGround):
+        return GroundShield(world, world.dt_s, limits, world.perception().speed_limit)
     return Shield(world.dt_s, limits)

@@ -49,10 +49,11 @@ class LotFilterResult:
 class LotSafetyFilter:
     """Judges the commands of one trip, one a control period. It remembers where it left the wheel."""
 
-    def __init__(self, chassis: Chassis, dt_s: float, steering_rate: float) -> None:
-        """Args: the car; the control period; how fast the wheel turns, rad/s."""
+    def __init__(self, chassis: Chassis, dt_s: float, steering_rate: float, ground: Ground | None = None) -> None:
+        """Args: the car; the control period; how fast the wheel turns, rad/s; the ground, default the road's own."""
         self._chassis = chassis
         self._dt_s = dt_s
+        self._ground = ground
         self._turn = steering_rate * dt_s
         self._wheel = 0.0
 
@@ -75,7 +76,7 @@ class LotSafetyFilter:
             rule, reason = "speed", f"No faster than {people_speed(most_mps, at_most=True)} here."
         wanted = min(asked, most)
         others = [one for one in (*observation.others, *observation.objects) if self._near(observation.ego, one)]
-        ground = observation.road.ground
+        ground = observation.road.ground if self._ground is None else self._ground
         if self._ends_well(observation.ego, wanted, wheel, others, ground):
             return self._let(Command(wanted, wheel), rule, reason)
         low, high = -HARDEST_MPS2, wanted

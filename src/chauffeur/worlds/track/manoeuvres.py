@@ -11,12 +11,13 @@ sideways), and clothoids of 8 m.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from typing import Final, Literal
 
 from chauffeur.concept.units import MPS_PER_KMH
-from chauffeur.geometry import Lane, Polyline, RoadGraph
+from chauffeur.geometry import Box, Lane, Polyline, RoadGraph
 
 ManoeuvreName = Literal["acceleration", "lane_change", "left_turn"]
 Weather = Literal["sunny", "rain", "fog", "snow", "night"]
@@ -27,6 +28,8 @@ FRICTION: Final[dict[Weather, float]] = {"sunny": 1.0, "rain": 0.7, "fog": 0.9, 
 """Share of the dry road's peak friction: wet asphalt, damp asphalt, rolled snow on winter tyres."""
 
 LANE_M: Final = 3.5
+PAVED_M: Final = 15.0
+"""Paved on every side of a proving ground's lanes, m."""
 CHANGE_M: Final = 50.0
 RADIUS_M: Final = 23.89
 CLOTHOID_M: Final = 8.0
@@ -85,6 +88,16 @@ def _two_lanes() -> RoadGraph:
         for i, y in enumerate((LANE_M, 0.0))
     )
     return RoadGraph(tuple(lanes))
+
+
+def proving_ground(lanes: Iterable[Lane]) -> Box:
+    """What is paved around lanes on a proving ground: a car that slides off its lane leaves no road."""
+    held = tuple(lanes)
+    points = [point for lane in held for point in lane.centre.points_m]
+    xs, ys = [x for x, _ in points], [y for _, y in points]
+    middle = (min(xs) + max(xs)) / 2.0, (min(ys) + max(ys)) / 2.0
+    wide, deep = max(xs) - min(xs) + 2.0 * PAVED_M, max(ys) - min(ys) + 2.0 * PAVED_M
+    return Box(*middle, 0.0, wide, deep)
 
 
 def _change() -> Polyline:

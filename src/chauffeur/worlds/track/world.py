@@ -13,15 +13,12 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from chauffeur.concept import Capabilities, Command, Lead, Observation, Scenario, ScenarioError, VehicleState
-from chauffeur.control.kinematic_bicycle import KinematicBicycle
 from chauffeur.geometry import Box, Pose, overlap
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.over_graph import LaneDriver, ObservedPerception
 from chauffeur.worlds.parking.corridor import Body
 from chauffeur.worlds.parking.path_follower import Chassis
 from chauffeur.worlds.track.dynamics import (
-    BRAKES_MPS2,
-    DRIVE_LAG_S,
     STEP_S,
     Plant,
     advance,
@@ -37,6 +34,7 @@ from chauffeur.worlds.track.manoeuvres import (
     ManoeuvreName,
     Weather,
     manoeuvre,
+    proving_ground,
 )
 from chauffeur.worlds.track.street import StreetConfig, StreetScene, street_scene
 
@@ -51,12 +49,6 @@ STEERING_RATE: Final = 0.4
 FULL_LOCK_RAD: Final = 0.6
 CHASSIS: Final = Chassis(Body(LENGTH_M, WIDTH_M, WHEELBASE_M / 2.0), WHEELBASE_M, FULL_LOCK_RAD, 3.0)
 _LEAD: Final = 1
-STRAY_M: Final = 0.36
-"""On a dry road. Of 60 stops from 8.5 m/s with the wheel turned at random, the worst ended 0.5 m beside where a bicycle
-put it; of 40 from 5 m/s the worst did by 0.2 m when dry, 0.3 m in rain, and in snow, of which some spun, 9 of 10 by
-0.4 m at most."""
-GRIP_MPS2: Final = 6.0
-"""Lateral acceleration that the model's tyres hold on a dry road beside full braking, with a reserve."""
 _MOST_MPS2: Final = 3.0
 _WANDER_S: Final = 1.0
 _WANDER_RAD: Final = 0.0008
@@ -114,22 +106,14 @@ class TrackWorld:
         return CHASSIS
 
     @property
-    def car(self) -> KinematicBicycle:
-        """The ego, as a filter may count on it in this weather. Raises ScenarioError before the first reset."""
-        friction = FRICTION[self._started().weather]
-        return KinematicBicycle(
-            LENGTH_M,
-            WIDTH_M,
-            WHEELBASE_M,
-            WHEELBASE_M / 2.0,
-            FULL_LOCK_RAD,
-            STEERING_RATE,
-            _MOST_MPS2,
-            BRAKES_MPS2 * friction,
-            GRIP_MPS2 * friction,
-            DRIVE_LAG_S,
-            STRAY_M / friction,
-        )
+    def steering_rate(self) -> float:
+        """How fast the ego's wheel turns, rad/s."""
+        return STEERING_RATE
+
+    @property
+    def ground(self) -> Box:
+        """What is paved: a proving ground around the lanes. Raises ScenarioError before the first reset."""
+        return proving_ground(self._course.road.lanes)
 
     @property
     def manoeuvre(self) -> Manoeuvre:
@@ -294,7 +278,14 @@ class TrackWorld:
             steering_rad=float(self._state[2]),
         )
         lead = self._lead()
-        off_road = self._lost or plan.road.ground.off_road(box.x_m, box.y_m)
+        off_road = self._lost or (
+            plan.road.ground.off_road(box.x_m, box.y_m)
+            if self._started().street is not None
+            else all(  # a manoeuvre is judged by its lanes, however wide the ground around them is
+                abs(one.centre.offset(box.x_m, box.y_m, place.station_m)) > one.width_m / 2.0
+                for one in plan.road.abreast(lane.id)
+            )
+        )
         late = self._tick * DT_S >= plan.duration_s - 1e-9
         front = None
         if lead is not None and lead.lane == ego.lane and lead.x_m > ego.x_m:
