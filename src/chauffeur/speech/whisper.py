@@ -33,7 +33,7 @@ def prompt_for(expect: Expect) -> str:
 
 SURE: Final = 0.9
 """Confidence below which the person is asked. Whisper base is wrong above 0.6 in 24 of 92 driving sentences (synthetic
-voices, benchmarks/RESULTS.md), above 0.9 in 4 of 37, none of them to anything but what was said or nearly."""
+voices, benchmarks/RESULTS.md), above 0.9 in 4 of 37."""
 
 _NEEDED: Final = ("model.bin", "config.json", "tokenizer.json")
 """Without the tokenizer the library would fetch one from the network; it never gets so far."""
