@@ -283,10 +283,7 @@ class _Building:
             return
         name, _, value = one.partition(":")
         if name == "K":
-            if not self.kinds or (self._waits == "" and not self.kinds[-1][1]):
-                self.kinds[-1][1].append({"kind": value})
-            else:
-                self.kinds[-1][1].append({"kind": value})
+            self.kinds[-1][1].append({"kind": value})
         elif name in ("T", "P", "W"):
             self.kinds.append((one, []))
         elif name == "E":
