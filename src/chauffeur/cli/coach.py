@@ -172,8 +172,8 @@ class _Teller:
             code = Syntax(source, "python", theme="ansi_dark", background_color="default", word_wrap=True)
             self._console.print(Padding(code, (0, 0, 0, 2)))
         self._console.print(line)
-        for cause in words.cause_words(trip.causes):
-            self._console.print(Padding(plain(cause), (0, 0, 0, 4)))
+        for told in (*words.left_out_words(trip), *words.cause_words(trip.causes)):
+            self._console.print(Padding(plain(told), (0, 0, 0, 4)))
         if attempt.recorded.frames:
             self._drive(attempt)
             page = self._page(attempt, self._pages)

@@ -68,17 +68,13 @@ def checked(parameters: Parameters, limits: VehicleLimits) -> CheckedWish:
             f"A route ({str(parameters.route)[:40]!r}) is not published to this vehicle.",
             hint="The vehicle's own planner chooses the way.",
         )
-    return CheckedWish(_rounded_down(min(speed, most)), look_ahead, ratio, parameters.lane)
+    return CheckedWish(_as_meant(min(speed, most)), look_ahead, ratio, parameters.lane)
 
 
-def _rounded_down(speed_mps: float) -> float:
-    """A speed of whole tenths of km/h, never above the one that is meant: planners round to hundredths of m/s, by which
-    20 km/h becomes 20.016."""
-    return min(speed_mps, math.floor(kmh(speed_mps) * 10.0 + _BIT) / 10.0 * MPS_PER_KMH)
-
-
-_BIT: Final = 1e-6
-"""What a whole number of km/h loses on its way through m/s."""
+def _as_meant(speed_mps: float) -> float:
+    """The nearest tenth of a km/h, never above the speed itself: planners round to hundredths of m/s, by which 20 km/h
+    becomes 20.016."""
+    return min(speed_mps, round(kmh(speed_mps), 1) * MPS_PER_KMH)
 
 
 def _within(what: str, value: object, bounds: tuple[float, float], unit: str) -> float:
