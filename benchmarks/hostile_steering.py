@@ -250,7 +250,8 @@ class Judge:
 def asphalt(road: RoadGraph, kinds: tuple[str, ...] = ("driving", "aisle", "emergency", "parking")) -> Any:
     """The union of all lanes for cars, whatever their direction, gaps between them and islands of a few m2 closed."""
     led = {one for lane in road.lanes for one in lane.successors}
-    united = shapely.union_all([strip(_drawn_out(one, led), one.width_m) for one in road.lanes if one.kind in kinds])
+    lanes = [strip(_drawn_out(one, led), one.width_m) for one in road.lanes if one.kind in kinds]
+    united = shapely.union_all([*lanes, *(Polygon(box.corners()) for box in road.paved)])
     closed = united.buffer(JOINT_M).buffer(-JOINT_M)
     parts = [closed] if isinstance(closed, Polygon) else list(closed.geoms)
     kept = [

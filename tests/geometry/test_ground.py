@@ -100,10 +100,10 @@ def test_on_its_way_nothing_is_leapt_over() -> None:
 
 def test_where_a_map_ends_its_lanes_go_on_and_a_lot_is_what_is_paved() -> None:
     assert beyond(250.0, 0.0) == 0.0
-    lot = RoadGraph((_lane("aisle", 0.0, "aisle"),), paved=Box(50.0, 0.0, 0.0, 100.0, 20.0))
+    lot = RoadGraph((_lane("aisle", 0.0, "aisle"),), paved=(Box(100.0, 0.0, 0.0, 200.0, 20.0),))
     assert beyond(50.0, 7.0, 77.0, road=lot) == 0.0
     assert beyond(50.0, 9.5, road=lot) == pytest.approx(0.4)
-    assert beyond(150.0, 0.0, road=lot) > 1.0
+    assert beyond(250.0, 0.0, road=lot) > 1.0
 
 
 def test_slits_between_lanes_abreast_are_road() -> None:

@@ -29,7 +29,8 @@ class KinematicBicycle:
         most_acceleration_mps2, most_braking_mps2: Of the pedals, both positive.
         grip_mps2: Lateral acceleration that the tyres hold; asked for more, the car understeers.
         lag_s: Time constant with which the pedals answer; who plans a stop counts on it, `advanced` does not.
-        stray_m: How far beside or beyond the place that a bicycle of these numbers foresees the car comes to a stand.
+        stray_s: How far beside or beyond the place that a bicycle of these numbers foresees the car comes to a stand,
+            for every m/s that it brakes from.
     """
 
     length_m: float
@@ -42,7 +43,7 @@ class KinematicBicycle:
     most_braking_mps2: float
     grip_mps2: float = 8.0
     lag_s: float = 0.0
-    stray_m: float = 0.0
+    stray_s: float = 0.0
 
 
 LINCOLN_MKZ: Final = KinematicBicycle(4.902, 2.128, 2.85, 1.425, 0.61, 1.2, 3.5, 8.0)

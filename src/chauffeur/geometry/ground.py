@@ -76,17 +76,6 @@ class Ground:
         self._road = road
         self._legs = _table(road)
         self._keys, self._starts, self._order = _grid(self._legs)
-        box = road.paved
-        self._paved = (
-            np.array([math.inf, 0.0, 1.0, 0.0, 0.0, 0.0])
-            if box is None
-            else np.array(
-                [
-                    box.x_m, box.y_m, math.cos(box.heading_rad), math.sin(box.heading_rad),
-                    box.length_m / 2.0, box.width_m / 2.0,
-                ]
-            )
-        )  # fmt: skip
 
     def beyond_m(
         self, poses: Array, length_m: float, width_m: float, *, stops: bool = False, either_way: bool = False
@@ -125,7 +114,7 @@ class Ground:
         """(n, 3): how far, and x and y of the outline's farthest point."""
         rows = np.ascontiguousarray(poses, dtype=np.float64)
         outline = _outline(length_m, width_m)
-        return beyond(rows, outline, stops, either_way, self._legs, self._keys, self._starts, self._order, self._paved)
+        return beyond(rows, outline, stops, either_way, self._legs, self._keys, self._starts, self._order)
 
     def _kind(self, x_m: float, y_m: float) -> GroundFaultKind:
         kinds: tuple[GroundFaultKind, ...] = ("sidewalk", "bicycle", "emergency", "parking")
@@ -177,14 +166,17 @@ _MOVING, _STOPPING = 0.0, 1.0
 
 def _table(road: RoadGraph) -> Array:
     """Legs of all lanes for cars, a row each: x, y, ux, uy, least and most way along it, how far the lane reaches to
-    its left and to its right, least cosine of the angle to it, and whether it is only for who stops.
-
-    Where a lot is paved, what is paved is all the ground.
+    its left and to its right, least cosine of the angle to it, and whether it is only for who stops. What is paved is
+    a leg in either direction, and holds the lanes that lie in it.
     """
     rows: list[tuple[float, ...]] = []
+    for box in road.paved:
+        long, wide = box.length_m / 2.0, box.width_m / 2.0
+        c, s = math.cos(box.heading_rad), math.sin(box.heading_rad)
+        rows.append((box.x_m, box.y_m, c, s, -long, long, wide, wide, _ANY_COS, _MOVING))
     led = {one for lane in road.lanes for one in lane.successors}
     for lane in road.lanes:
-        if lane.kind not in _FOR_CARS or road.paved is not None:
+        if lane.kind not in _FOR_CARS or _held(road, lane):
             continue
         either = lane.kind in ("aisle", "parking")
         cosine = _ANY_COS if either else _JUNCTION_COS if lane.junction else _ALONG_COS
@@ -199,6 +191,10 @@ def _table(road: RoadGraph) -> Array:
             left, right = (_half_m(lane, one, *middle) for one in beside)
             rows.append((ax, ay, (bx - ax) / length, (by - ay) / length, low, high, left, right, cosine, when))
     return np.array(rows, dtype=np.float64).reshape(len(rows), 10)
+
+
+def _held(road: RoadGraph, lane: Lane) -> bool:
+    return any(all(box.holds(x, y) for x, y in lane.centre.points_m) for box in road.paved)
 
 
 def _half_m(lane: Lane, beside: Lane | None, x_m: float, y_m: float) -> float:
@@ -236,7 +232,7 @@ def _key(cx, cy):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def beyond(poses, outline, stops, free, legs, keys, starts, order, paved):  # type: ignore[no-untyped-def]
+def beyond(poses, outline, stops, free, legs, keys, starts, order):  # type: ignore[no-untyped-def]
     """See `Ground._asked`."""
     n = poses.shape[0]
     out = np.zeros((n, 3))
@@ -257,13 +253,6 @@ def beyond(poses, outline, stops, free, legs, keys, starts, order, paved):  # ty
             if on:
                 continue
             best = FAR_M
-            if paved[0] < math.inf:
-                dx, dy = px - paved[0], py - paved[1]
-                along = abs(paved[2] * dx + paved[3] * dy) - paved[4]
-                across = abs(paved[2] * dy - paved[3] * dx) - paved[5]
-                if along <= 0.0 and across <= 0.0:
-                    continue
-                best = min(best, math.hypot(max(along, 0.0), max(across, 0.0)))
             key = _key(math.floor(px / _CELL_M), math.floor(py / _CELL_M))
             cell = np.searchsorted(keys, key)
             if cell < len(keys) and keys[cell] == key:

@@ -135,11 +135,11 @@ class RoadGraph:
 
     Attributes:
         lanes: All of them.
-        paved: Ground on which a car may be anywhere, as in a parking lot; None where lanes alone count.
+        paved: Ground on which a car may be anywhere: a parking lot, a junction that is more than the lanes through it.
     """
 
     lanes: tuple[Lane, ...]
-    paved: Box | None = None
+    paved: tuple[Box, ...] = ()
 
     def __eq__(self, other: object) -> bool:
         """Same lanes in the same order."""
@@ -188,7 +188,7 @@ class RoadGraph:
     @cached_property
     def has_shape(self) -> bool:
         """Whether it is known where its lanes are: a vehicle may know no more of a road than its speed limit."""
-        return self.paved is not None or any(lane.width_m > 0.0 for lane in self.lanes)
+        return bool(self.paved) or any(lane.width_m > 0.0 for lane in self.lanes)
 
     @cached_property
     def has_parking(self) -> bool:

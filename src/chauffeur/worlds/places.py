@@ -53,8 +53,8 @@ class StreetCar(Protocol):
     """A world whose car drives on streets, and that states the car: its filter foresees how it brakes and steers."""
 
     @property
-    def car(self) -> KinematicBicycle:
-        """The ego's size, axles, bounds, grip and lag, as they are on this trip."""
+    def car(self) -> KinematicBicycle | None:
+        """The ego's size, axles, bounds, grip and lag, as they are on this trip; None where it may slide."""
         ...
 
 

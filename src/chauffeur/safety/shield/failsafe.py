@@ -36,11 +36,12 @@ _GAP_M = 0.6
 _STANDS_MPS = 0.05
 
 
-def numbers(car: KinematicBicycle) -> Array:
-    """A car as the functions here want it: as large as the ground that it may come to a stand on."""
+def numbers(car: KinematicBicycle, speed_mps: float = 0.0) -> Array:
+    """A car as the functions here want it: as large as the ground that it may come to a stand on from a speed."""
+    stray = 2.0 * car.stray_s * speed_mps
     return np.array(
         [
-            car.wheelbase_m, car.rear_to_middle_m, car.length_m + 2.0 * car.stray_m, car.width_m + 2.0 * car.stray_m,
+            car.wheelbase_m, car.rear_to_middle_m, car.length_m + stray, car.width_m + stray,
             car.most_steering_rad,
             car.steering_rate_radps, car.most_acceleration_mps2, car.most_braking_mps2, car.grip_mps2, car.lag_s,
         ]
@@ -90,6 +91,11 @@ def pursuing(state: Array, line: Array, at: int, car: Array) -> float:
     last = len(line) - 1
     row = min(ahead, last)
     beyond = float(ahead - row)
+    if at == last:  # the car itself may be beyond the end
+        beyond += max(
+            0.0,
+            math.cos(line[last, 2]) * (state[0] - line[last, 0]) + math.sin(line[last, 2]) * (state[1] - line[last, 1]),
+        )
     x, y = line[row, 0] + beyond * math.cos(line[row, 2]), line[row, 1] + beyond * math.sin(line[row, 2])
     dx, dy = x - state[0], y - state[1]
     away = max(dx * dx + dy * dy, 1e-6)

@@ -32,7 +32,7 @@ class GroundShield(Shield):
         """Args: a world just reset; its control period; bounds no command may cross; speed limits (default a lot's)."""
         super().__init__(dt_s, limits)
         self._most = Limits() if limits is None else limits
-        ground = Ground(RoadGraph((), paved=world.ground))
+        ground = Ground(RoadGraph((), paved=(world.ground,)))
         self._lot_filter = LotSafetyFilter(world.chassis, dt_s, world.steering_rate, ground)
         self._limit = limit_mps
 
@@ -49,7 +49,7 @@ class GroundShield(Shield):
 
 def shield_for(world: World, limits: Limits | None = None) -> Shield:
     """The shield that fits what a world, just reset, states: a car on streets, paved ground, or neither: roads."""
-    if isinstance(world, StreetCar):
+    if isinstance(world, StreetCar) and world.car is not None:
         return StreetShield(world.dt_s, limits, car=world.car)
     if isinstance(world, PavedGround):
         return GroundShield(world, world.dt_s, limits, world.perception().speed_limit)

@@ -53,7 +53,7 @@ _SWING_SHARE: Final = 1.25
 """Who comes into a bend from beside the middle of its lane swings out by so much more."""
 _SKID_RADPS: Final = 0.2
 """Tyres that hold turn a car as its wheel says, to less than this; at 0.4 rad/s a car on snow is on its way round."""
-_OVERHANG_M: Final = 0.4
+_OVERHANG_M: Final = 0.35
 """What a bumper may reach over a kerb in a bend that is too tight for it otherwise: less than to any walking person."""
 _LEVEL_M: Final = 1e-6
 _OVER_M: Final = 1.0
@@ -168,6 +168,7 @@ class StreetShield(Shield):
         if way is None:
             return FilterResult(command)
         station = way.station_m(ego)
+        self._numbers = failsafe.numbers(self._car, max(ego.speed_mps, 0.0))
         most, rule, reason = self._cap(observation, way, station)
         least = self._least(ego)
         capped = max(min(command.acceleration_mps2, most), least)
@@ -276,20 +277,22 @@ class StreetShield(Shield):
         """Whether the outline leaves its ground on a way, or gets farther out where it is out already."""
         poses = np.concatenate([poses[:2], poses[2:-1:_EVERY], poses[-1:]])
         car, places = self._car, poses[:, :3]
-        length, width = (float(one) for one in self._numbers[2:4])
-        beyond = ground.beyond_m(places, length, width, stops=True)
+        beyond = ground.beyond_m(places, car.length_m, car.width_m, stops=True)
         edge = way.edge_m[poses[:, 4].astype(np.int64)]
         if (beyond[1:] > np.maximum(edge[1:], beyond[0]) + _LEVEL_M).any():
             return True
-        swings = edge > _EDGE_M + _LEVEL_M
-        if not swings[1:].any():
+        length, width = (float(one) for one in self._numbers[2:4])
+        stray = width - car.width_m
+        exact = stray == 0.0
+        if exact and not (edge[1:] > _EDGE_M + _LEVEL_M).any():
             return False
-        # Where a front swings out, it does so over lanes and kerbs, and the wheels stay on the road.
+        # Where a front swings out, or a stop ends beside where it was foreseen, it does so over lanes and kerbs, and the
+        # wheels stay on the road.
         beyond = ground.beyond_m(places, length, width, stops=True, either_way=True)
         if (beyond[1:] > np.maximum(_OVERHANG_M, beyond[0]) + _LEVEL_M).any():
             return True
-        wheels = ground.beyond_m(places, car.wheelbase_m, car.width_m, stops=True, either_way=True)
-        return bool((wheels[1:] > np.maximum(_EDGE_M, wheels[0]) + _LEVEL_M).any())
+        wheels = ground.beyond_m(places, car.wheelbase_m + stray, width, stops=True, either_way=True)
+        return bool((wheels[1:] > np.maximum(_EDGE_M if exact else 0.0, wheels[0]) + _LEVEL_M).any())
 
     # The way ----------------------------------------------------------------------------------------------------------
 
@@ -409,7 +412,7 @@ class StreetShield(Shield):
     def _skids(self, ego: VehicleState) -> bool:
         """Whether a car that is more than a bicycle turns otherwise than its wheel says: throttle would spin it."""
         wheel = ego.speed_mps * curvature_of(ego.speed_mps, ego.steering_rad, self._car)
-        return self._car.stray_m > 0.0 and abs(ego.yaw_rate_radps - wheel) > _SKID_RADPS
+        return self._car.stray_s > 0.0 and abs(ego.yaw_rate_radps - wheel) > _SKID_RADPS
 
     def _stopping(self, speed: float, ahead_m: float) -> float:
         """Hardest acceleration after which the car still stops before a line."""

@@ -40,8 +40,8 @@ _LIFT_M: Final = 0.5
 """So far above the road cars are put in."""
 _LAG_S: Final = 0.2
 """Time until pedals and wheel have answered."""
-_STRAY_M: Final = 0.3
-"""What a stop may end beside where a bicycle puts it: as much as lanes leave a car of this width."""
+_STRAY_S: Final = 0.02
+"""What a stop may end beside where a bicycle puts it, m for every m/s: at 15 m/s as much as lanes leave this car."""
 _TOUCH_S: Final = 0.2
 """A contact is told for so long after the server's last word of it."""
 _STATES: Final[dict[str, SignalState]] = {"Red": "red", "Yellow": "yellow", "Green": "green"}
@@ -99,7 +99,7 @@ class CarlaWorld:
     @property
     def car(self) -> KinematicBicycle:
         """The ego, as a filter may count on it: CARLA's physics answer later than a bicycle."""
-        return replace(LINCOLN_MKZ, lag_s=_LAG_S, stray_m=_STRAY_M)
+        return replace(LINCOLN_MKZ, lag_s=_LAG_S, stray_s=_STRAY_S)
 
     @property
     def chassis(self) -> Chassis:

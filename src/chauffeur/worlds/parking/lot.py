@@ -117,7 +117,7 @@ def build_lot(aisles: int, spots_a_row: int, taken: frozenset[str] = frozenset()
     west, east = -_APPROACH_M, middles[-1] + AISLE_M / 2.0 + depth + _MARGIN_M
     top, bottom = AISLE_M / 2.0 + 1.0, -south - AISLE_M / 2.0 - 1.0
     ground = Box((west + east) / 2.0, (top + bottom) / 2.0, 0.0, east - west, top - bottom)
-    return Lot(aisles, spots, RoadGraph(tuple(lanes), paved=ground), ground, (east, -south / 2.0), (west, -south))
+    return Lot(aisles, spots, RoadGraph(tuple(lanes), paved=(ground,)), ground, (east, -south / 2.0), (west, -south))
 
 
 def way_id(start: str, end: str) -> LaneId:

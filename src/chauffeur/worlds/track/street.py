@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import ConfigDict, Field
 
 from chauffeur.concept import Street, StreetMark, StreetWay, VehicleState
-from chauffeur.geometry import Lane, Polyline, Pose, RoadGraph, Turn
+from chauffeur.geometry import Box, Lane, Polyline, Pose, RoadGraph, Turn
 
 LANE_M: Final = 3.5
 KERB_STRIP_M: Final = 2.1
@@ -151,7 +151,7 @@ def street_scene(config: StreetConfig) -> StreetScene:
             cones.append(
                 VehicleState(_CONE + len(cones), "static", x, y, start.heading_rad, 0.0, _CONE_M, _CONE_M, lane)
             )
-    return StreetScene(RoadGraph(tuple(lanes)), config.speed_mps, DURATION_S, tuple(parked), tuple(cones))
+    return StreetScene(RoadGraph(tuple(lanes), _box(config)), config.speed_mps, DURATION_S, tuple(parked), tuple(cones))
 
 
 _BEHIND_M: Final = 30.0
@@ -177,6 +177,15 @@ def _two_way(name: Arm, start: Pose, low_m: float, high_m: float, onward: tuple[
         Lane(back, line(LANE_M, back=True), LANE_M, LIMIT_MPS, road=back, index=0),
         Lane(f"{back}_kerb", line(LANE_M + _KERB_M, back=True), wide, LIMIT_MPS, "emergency", road=back, index=1),
     ]  # fmt: skip
+
+
+def _box(config: StreetConfig) -> tuple[Box, ...]:
+    """What is paved of a junction: both streets, with the strips at their kerbs, straight across it."""
+    if config.junction_m is None:
+        return ()
+    middle = config.junction_m + BOX_M / 2.0, LANE_M / 2.0
+    wide = 2.0 * (LANE_M + KERB_STRIP_M)
+    return Box(*middle, 0.0, BOX_M, wide), Box(*middle, 0.0, wide, BOX_M)
 
 
 def _through(fork: Pose, turn: Turn) -> Polyline:
