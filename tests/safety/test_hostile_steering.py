@@ -33,15 +33,15 @@ def hostile() -> ModuleType:
 KINDS = ("lock", "sinusoid", "people", "oncoming", "kerb", "late", "random", "delayed", "throttle")
 
 
-STRUCK = pytest.mark.xfail(reason="the filter of paved ground does not foresee who is steered at", strict=False)
+def _holds(row: dict[str, object]) -> bool:
+    return row["fault"] != "ego" and row["off_m"] == 0.0 and not row["off_flag"]
 
 
-@pytest.mark.parametrize("kind", [pytest.param(kind, marks=STRUCK) if kind == "people" else kind for kind in KINDS])
-def test_on_open_roads_nobody_is_struck(hostile: ModuleType, kind: str) -> None:
-    """The filter of paved ground keeps off others; lanes it does not keep (benchmarks/RESULTS.md)."""
+@pytest.mark.parametrize("kind", KINDS)
+def test_on_open_roads_nobody_is_struck_and_the_road_is_kept(hostile: ModuleType, kind: str) -> None:
     pytest.importorskip("vehiclemodels", reason="The open road needs CommonRoad's vehicle models: chauffeur[motion]")
     rows = [hostile.drive(hostile.Job(kind, "open-road", seed, True)) for seed in (4, 5)]
-    assert all(row["fault"] != "ego" for row in rows), rows
+    assert all(map(_holds, rows)), rows
     assert sum(row["way_m"] for row in rows) > 10.0, "it drives"
 
 
@@ -49,9 +49,7 @@ def test_on_open_roads_nobody_is_struck(hostile: ModuleType, kind: str) -> None:
 def test_in_towns_nobody_is_struck_and_the_road_is_kept(hostile: ModuleType, kind: str) -> None:
     pytest.importorskip("libsumo", reason="Towns need SUMO: chauffeur[town]")
     row = hostile.drive(hostile.Job(kind, "town", 6 + KINDS.index(kind), True))
-    assert row["fault"] != "ego", row
-    assert row["off_m"] <= 0.0, row
-    assert not row["off_flag"], row
+    assert _holds(row), row
 
 
 def test_the_judge_sees_what_an_unfiltered_executor_does(hostile: ModuleType) -> None:

@@ -53,7 +53,7 @@ _SWING_SHARE: Final = 1.25
 """Who comes into a bend from beside the middle of its lane swings out by so much more."""
 _SKID_RADPS: Final = 0.2
 """Tyres that hold turn a car as its wheel says, to less than this; at 0.4 rad/s a car on snow is on its way round."""
-_OVERHANG_M: Final = 0.35
+_OVERHANG_M: Final = 0.3
 """What a bumper may reach over a kerb in a bend that is too tight for it otherwise: less than to any walking person."""
 _LEVEL_M: Final = 1e-6
 _OVER_M: Final = 1.0

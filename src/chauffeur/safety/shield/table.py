@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-SHIELD_VERSION: Final = "shield-v4"
+SHIELD_VERSION: Final = "shield-v5"
 """Changes whenever the same command could be let through differently."""
 
 

@@ -48,7 +48,7 @@ WIDTH_M: Final = 1.610
 WHEELBASE_M: Final = 2.579
 TO_MIDDLE_M: Final = 0.133
 """From the middle of the car forwards to its centre of mass, m."""
-STRAY_S: Final = 0.055
+STRAY_S: Final = 0.06
 """On a dry road. Of 60 stops from 8.5 m/s with the wheel turned at random, the worst ended 0.5 m beside where a bicycle
 put it; of 40 from 5 m/s the worst did by 0.2 m when dry, 0.3 m in rain, and in snow, of which some spun, 9 of 10 by
 0.4 m at most."""
