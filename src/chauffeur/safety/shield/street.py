@@ -286,8 +286,8 @@ class StreetShield(Shield):
         exact = stray == 0.0
         if exact and not (edge[1:] > _EDGE_M + _LEVEL_M).any():
             return False
-        # Where a front swings out, or a stop ends beside where it was foreseen, it does so over lanes and kerbs, and the
-        # wheels stay on the road.
+        # Where a front swings out, or a stop ends beside where it was foreseen, it does so over lanes and kerbs, and
+        # the wheels stay on the road.
         beyond = ground.beyond_m(places, length, width, stops=True, either_way=True)
         if (beyond[1:] > np.maximum(_OVERHANG_M, beyond[0]) + _LEVEL_M).any():
             return True
