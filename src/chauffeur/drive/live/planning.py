@@ -13,7 +13,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from chauffeur.concept import CameraImage, ChauffeurError, Context, History, Instruction, Observation, PersonId, Plan
+from chauffeur.concept import (
+    ASKS,
+    CameraImage,
+    ChauffeurError,
+    Context,
+    History,
+    Instruction,
+    Observation,
+    PersonId,
+    Plan,
+)
 from chauffeur.describe.answers import with_way
 from chauffeur.describe.services.sources import Sources, SourceSettings
 from chauffeur.drive.emergency import NO_SHOULDER, STOPPING, planned_for
@@ -137,7 +147,7 @@ class Planning:
             return
         if order.plan.refusal or order.plan.policy is None:
             words = order.plan.refusal or "The planner gave no program."
-            answered = request.aside and not order.plan.offer
+            answered = request.aside and not order.plan.offer and order.plan.intent != ASKS
             self._tell("answered" if answered else "declined", request.wish, words, offer=order.plan.offer)
             return
         try:
