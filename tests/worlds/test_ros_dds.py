@@ -208,7 +208,7 @@ def test_a_wish_is_a_velocity_limit_of_our_own_sender_byte_for_byte(car: Ros2Veh
         for number in range(100):
             car.apply(wish(number / 10))
             time.sleep(0.002)
-        eventually(lambda: vehicle.got("Limit")[-1]["fields"]["max_velocity"] == pytest.approx(35.6 / 3.6, abs=0.01))
+        eventually(lambda: vehicle.got("Limit")[-1]["fields"]["max_velocity"] == pytest.approx(9.9, abs=1e-5))
         late = sorted(one["late"] for one in vehicle.got("Limit")[seen:])
         assert late[len(late) // 2] < 0.05
         car.release()

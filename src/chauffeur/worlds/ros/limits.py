@@ -75,11 +75,11 @@ def _as_meant(speed_mps: float) -> float:
     """The tenth of a km/h that a speed was rounded up from, else the speed: planners round to hundredths of m/s, by
     which 20 km/h becomes 20.016."""
     meant = round(kmh(speed_mps), 1) * MPS_PER_KMH
-    return meant if 0.0 < speed_mps - meant <= _ROUNDED_MPS else speed_mps
+    return meant if 0.0 < speed_mps - meant < _ROUNDED_MPS else speed_mps
 
 
-_ROUNDED_MPS: Final = 0.005
-"""What rounding to hundredths adds at most."""
+_ROUNDED_MPS: Final = 0.01
+"""What rounding up to hundredths adds at most."""
 
 
 def _within(what: str, value: object, bounds: tuple[float, float], unit: str) -> float:
