@@ -173,11 +173,14 @@ class StreetShield(Shield):
         least = self._least(ego)
         capped = max(min(command.acceleration_mps2, most), least)
         now = _Instant(observation.road, ego, self._state(ego), [way], self._around(observation))
-        done, fault = self._driven(now, Command(capped, command.steering_rad), least, observation)
+        held = self._held_rad(ego.speed_mps)
+        steering = max(-held, min(held, command.steering_rad))
+        done, fault = self._driven(now, Command(capped, steering), least, observation)
         said: list[Intervention] = []
         if done.steering_rad != command.steering_rad:
             mended = Command(command.acceleration_mps2, done.steering_rad)
-            said.append(Intervention("lane", _why_steered(fault), command, mended))
+            rule, why = ("skid", "Turned so far, the tyres would slide.") if fault is None else _steered(fault)
+            said.append(Intervention(rule, why, command, mended))
         if done.acceleration_mps2 < command.acceleration_mps2 - 1e-6 and (
             ego.speed_mps > 0.0 or command.acceleration_mps2 > 0.0
         ):
@@ -414,6 +417,12 @@ class StreetShield(Shield):
         wheel = ego.speed_mps * curvature_of(ego.speed_mps, ego.steering_rad, self._car)
         return self._car.stray_s > 0.0 and abs(ego.yaw_rate_radps - wheel) > _SKID_RADPS
 
+    def _held_rad(self, speed_mps: float) -> float:
+        """Wheel angle up to which the tyres of a car that is more than a bicycle hold."""
+        if self._car.stray_s == 0.0:
+            return math.inf
+        return math.atan(self._car.wheelbase_m * self._car.grip_mps2 / max(speed_mps * speed_mps, 1e-6))
+
     def _stopping(self, speed: float, ahead_m: float) -> float:
         """Hardest acceleration after which the car still stops before a line."""
         if ahead_m < 0.05:
@@ -520,12 +529,11 @@ def _owed_to(fault: _Fault) -> tuple[str, str]:
     return "gap", f"There is too little room to the {fault.other.kind} to ask for more."
 
 
-def _why_steered(fault: _Fault | None) -> str:
-    if fault is None or fault.other is None:
-        return "That would leave the road."
-    return (
-        f"That way would touch {'somebody on foot' if fault.other.kind == 'pedestrian' else 'a ' + fault.other.kind}."
-    )
+def _steered(fault: _Fault) -> tuple[str, str]:
+    if fault.other is None:
+        return "lane", "That would leave the road."
+    who = "somebody on foot" if fault.other.kind == "pedestrian" else f"a {fault.other.kind}"
+    return "lane", f"That way would touch {who}."
 
 
 def _chains(road: RoadGraph, lane: LaneId) -> list[tuple[LaneId, ...]]:
