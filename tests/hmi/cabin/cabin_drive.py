@@ -47,6 +47,10 @@ class Drive:
         with self._lock:
             return [said for said in self._said if said.kind == kind]
 
+    def wish(self, text: str) -> Any:
+        """What was last told of the newest wish in these words; older wishes are told of in between. None before."""
+        return next((said for said in reversed(self.said("conversation")) if said.text == text), None)
+
     @property
     def scene(self) -> Any:
         """The newest."""

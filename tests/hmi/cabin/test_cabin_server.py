@@ -286,6 +286,7 @@ def test_a_slow_screen_misses_scenes_and_nothing_that_matters() -> None:
                 break
         kinds = [message["kind"] for message in got]
         assert kinds.count("scene") == 1 and kinds.count("conversation") == 1 and kinds.count("note") == 100
+        assert kinds[-2:] == ["conversation", "scene"], "the newest comes after what was said before it"
         assert next(m for m in got if m["kind"] == "scene")["time_s"] == 39.9
         assert next(m for m in got if m["kind"] == "conversation")["why"] == "396"
 
