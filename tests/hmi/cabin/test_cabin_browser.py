@@ -60,14 +60,14 @@ def test_a_typed_wish_is_shown_from_thought_to_set_point(desk: Desk, drive: Driv
         assert await text(tab, "vehicle") == "Simulated drive"
         before = await tab.value(PICTURE)
         await tab.press("/")
-        await tab.type("Drive at 90 km/h.")
+        await tab.type("Drive at 60 km/h.")
         await tab.press("Enter")
         await tab.until("document.querySelector('.wish .state.drive')")
         await tab.until("document.querySelector('.code [aria-current=step]')")
-        await tab.until("document.getElementById('target').textContent === '90'")
-        assert Say("Drive at 90 km/h.") in drive.told and drive.scene.target_mps == pytest.approx(25.0, abs=0.1)
+        await tab.until("document.getElementById('target').textContent === '60'")
+        assert Say("Drive at 60 km/h.") in drive.told and drive.scene.target_mps * 3.6 == pytest.approx(60.0, abs=0.5)
         card = await tab.value("document.querySelector('.wish').innerText")
-        for part in ("typed · w1", "Drive at 90 km/h.", "It thinks", "It drives by", "passed: format"):
+        for part in ("typed · w1", "Drive at 60 km/h.", "It thinks", "It drives by", "passed: format"):
             assert part in card, part
         await tab.until("document.querySelector('.wish .legend')")
         assert "in all" in await tab.value("document.querySelector('.wish .legend .total').textContent")
@@ -314,7 +314,7 @@ def test_every_question_has_a_yes_and_a_no_and_what_runs_goes_on(desk: Desk) -> 
         assert drive.said("ended")[-1].outcome == "stopped"
         assert not [each for each in drive.said("conversation") if "Quit" in each.text], "it is no wish"
 
-    with driving("following", planner="onboard") as drive:
+    with driving("following", planner="onboard", speed=1.0) as drive:
         desk.run(check(drive))
 
 
@@ -329,7 +329,7 @@ def test_the_stop_button_stops_whatever_is_asked(desk: Desk) -> None:
         await tab.until("document.getElementById('link').textContent === 'Drive over'")
         assert drive.said("ended")[-1].outcome == "stopped"
 
-    with driving("following", planner="onboard") as drive:
+    with driving("following", planner="onboard", speed=2.0) as drive:
         desk.run(check(drive))
 
 
