@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from rich.console import Console
-from terminal import WITHIN_S, at_a_terminal, until
+from terminal import WITHIN_S
 from typer.testing import CliRunner
 
 from chauffeur.cli.main import app
@@ -236,16 +235,6 @@ def test_a_wish_that_was_cut_short_was_not_driven() -> None:
     assert "The time of this drive is over" in cut.stdout, cut.stdout
     assert "“Park in the nearest free spot.” not done" in " ".join(cut.stdout.split())
     assert cut.returncode == 1, "the wish was not driven to its end"
-
-
-def test_at_a_terminal_it_is_typed_and_ctrl_c_brings_the_car_to_a_stand(answers: str) -> None:
-    with at_a_terminal([*COMMAND, *FAST, "--planner", answers]) as (process, screen):
-        until(process, screen, "no plan")
-        os.write(screen, b"Hold the lanf\x7fe.\r")
-        until(process, screen, "Holding.")
-        process.send_signal(signal.SIGINT)
-        assert "The car stands" in until(process, screen, "(simulated drive)")
-        assert process.wait(WITHIN_S) == 130
 
 
 @pytest.mark.server
