@@ -15,6 +15,9 @@ VERSIONS ?= 3.11 3.12 3.13
 # What lint reads the types of, beside what tests need; and what CI tests with it.
 EXTRAS ?= models,maps,carla,speech,viewer
 
+# Where it is set, every worker of the tests rewrites every module's assertions again: 17 s of processor time each.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: drive test lint format bench docs extras fresh-core clean
 
 # A wish of one's own may need a town, the test track or the camera: with it comes what every world of ours drives with.

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from rich.console import Console
-from terminal import WITHIN_S, at_a_terminal, until
+from terminal import WITHIN_S
 from typer.testing import CliRunner
 
 from chauffeur.cli.main import app
@@ -41,6 +40,7 @@ from chauffeur.memory import VaultMemory
 from chauffeur.safety.audit import verify
 
 COMMAND = [sys.executable, "-c", "from chauffeur.cli.main import run; run()", "talk"]
+FAST = ("--time-scale", "3")
 EGO = ShownBody(0, "car", 0.0, 0.0, 0.0, 5.0, 2.0, 25.0)
 SCENE = Scene(12.0, EGO, (), 0.0, 0.0, 31.0, 20.0, 1.5, "a-b:1", 1, "follow", "w1", 3, "", False, 0)
 
@@ -192,7 +192,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_lines_of_a_pipe_are_driven_one_after_the_other(answers: str, tmp_path: Path) -> None:
     log = tmp_path / "talk.jsonl"
     done = subprocess.run(
-        [*COMMAND, "--as", "ana", "--planner", answers, "--audit", str(log)],
+        [*COMMAND, *FAST, "--as", "ana", "--planner", answers, "--audit", str(log)],
         input="Hold the lane.\n!that was good\nme private\n\nstop\n", capture_output=True, text=True,
         timeout=WITHIN_S, check=False,
     )  # fmt: skip
@@ -212,7 +212,6 @@ def test_lines_of_a_pipe_are_driven_one_after_the_other(answers: str, tmp_path: 
 
 @pytest.mark.slow
 def test_a_line_waits_until_the_wish_before_it_is_done(tmp_path: Path) -> None:
-    """However long that takes; and a trip that was cut short was not driven."""
     pytest.importorskip("libsumo", reason="needs the extra `town`")
     log = tmp_path / "talk.jsonl"
     command = [*COMMAND, "--scenario", "town", "--time-scale", "8", "--no-realtime", "--audit", str(log)]
@@ -226,29 +225,23 @@ def test_a_line_waits_until_the_wish_before_it_is_done(tmp_path: Path) -> None:
     assert "w2 done" in said, "an answered question is done"
     assert "You end the session" in said
     assert "Not asked: “Turn left.”" in said or "“Turn left.” is not asked" in said
+
+
+def test_a_wish_that_was_cut_short_was_not_driven() -> None:
+    command = [*COMMAND, *FAST, "Park in the nearest free spot.", "--duration", "3"]
     cut = subprocess.run(
-        [*command[:-2], "--duration", "20"], input="Take me to the station.\n", capture_output=True, text=True,
-        timeout=WITHIN_S, check=False,
-    )  # fmt: skip
-    assert "The time of this drive is over" in cut.stdout
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=WITHIN_S, check=False
+    )
+    assert "The time of this drive is over" in cut.stdout, cut.stdout
+    assert "“Park in the nearest free spot.” not done" in " ".join(cut.stdout.split())
     assert cut.returncode == 1, "the wish was not driven to its end"
-
-
-def test_at_a_terminal_it_is_typed_and_ctrl_c_brings_the_car_to_a_stand(answers: str) -> None:
-    with at_a_terminal([*COMMAND, "--planner", answers]) as (process, screen):
-        until(process, screen, "no plan")
-        os.write(screen, b"Hold the lanf\x7fe.\r")
-        until(process, screen, "Holding.")
-        process.send_signal(signal.SIGINT)
-        assert "The car stands" in until(process, screen, "(simulated drive)")
-        assert process.wait(WITHIN_S) == 130
 
 
 @pytest.mark.server
 def test_the_page_drives_the_same_session(answers: str) -> None:
     client = pytest.importorskip("websockets.sync.client", reason="needs the extra `page`")
     process = subprocess.Popen(
-        [*COMMAND, "--planner", answers, "--page", "--engine", "none"],
+        [*COMMAND, *FAST, "--planner", answers, "--page", "--engine", "none"],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         env=os.environ | {"BROWSER": "true", "DISPLAY": ""},
     )  # fmt: skip

@@ -182,7 +182,8 @@ def test_a_killed_session_loses_no_wish(silent_endpoint: str, answers: str, tmp_
 
 def _type_and_interrupt(log: Path, answers: str) -> None:
     """Drive at a terminal with the same log: it names the lost wish, takes typed lines, and ends with Ctrl-C."""
-    with at_a_terminal([*COMMAND, "--planner", answers, "--audit", str(log), "--no-realtime"]) as (process, screen):
+    command = [*COMMAND, "--planner", answers, "--audit", str(log), "--no-realtime", "--time-scale", "3"]
+    with at_a_terminal(command) as (process, screen):
         shown = until(process, screen, "no plan")
         assert "Without an answer since the last session: w1 “Slow down a bit.”" in shown
         os.write(screen, DECLINED.replace("over", "ovee\x7fr").encode())

@@ -34,11 +34,7 @@ sys.path.append(str(Path(__file__).parents[1] / "planners"))
 
 from server import ModelServer, silent, stream
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.server,
-    pytest.mark.xfail(reason="one of the drives was seen to fail on a crowded machine; not traced yet", strict=False),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.server]
 
 WISHES = ("Slow down to 20 m/s.", "Drive 27 m/s.")
 ROADS = (("overtake", 17), ("following", 3), ("overtake", 3), ("intersection", 5))
@@ -129,6 +125,10 @@ class Drive:
         self.until(lambda: self.driven(wish) or self.runtime.interactions[wish].answer is not None, what)
         return wish
 
+    def obey(self, what: str) -> None:
+        """Ask until a good answer is driven: the crossing's limit forbids it, so that trip must end first."""
+        self.until(lambda: self.driven(self.ask(what, place=1)), what)
+
     def driven(self, wish: str) -> bool:
         return self.last is not None and (self.last.plan, self.last.level) == (wish, "follow")
 
@@ -184,12 +184,15 @@ def test_a_model_that_writes_bad_programs(tmp_path, monkeypatch) -> None:
             wish = drive.ask(what, text, place)
             asked = drive.heard
             drive.until(lambda: drive.runtime.interactions[wish].answer or drive.heard > asked + 30, what)  # noqa: B023
-            drive.go_on(what)
+            answer = drive.runtime.interactions[wish].answer
+            follow = drive.obey if answer is not None and answer.kind == "failed" else drive.go_on
+            follow(what)
         assert len(drive.plans - {"", FORGED}) > 2, "some of them pass every check, and misbehave while they are driven"
-        drive.server.script(silent)
+        drive.server.script(silent(WITHIN_S))
+        asked = len(drive.server.requests)
         drive.runtime.ask(WISHES[0])
-        good = (drive.driven(drive.ask("a good answer after all", place=1)) for _ in range(5))
-        assert any(good), "but for a trip that ends just then, it is driven"
+        drive.until(lambda: len(drive.server.requests) > asked, "the model was asked")
+        drive.obey("a good answer after all")
 
 
 def test_a_vandal_in_the_shared_memory(tmp_path, monkeypatch) -> None:
@@ -220,7 +223,7 @@ def test_processes_that_die_or_stand_still(tmp_path, monkeypatch) -> None:
         assert workers
         for pid in workers:
             os.kill(pid, signal.SIGKILL)
-        drive.go_on("sandbox workers killed")
+        drive.obey("sandbox workers killed")
         for role in ("policy", "planner"):
             drive.send(role, signal.SIGSTOP)
             time.sleep(0.3)

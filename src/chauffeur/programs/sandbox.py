@@ -28,21 +28,21 @@ from chauffeur.programs.errors import (
 from chauffeur.programs.faults import MAX_MESSAGE_CHARS, fault_of
 from chauffeur.programs.prefetch import AT_FAULT, DRIVE, END, FORESEEABLE, TICK, WISH, hidden
 from chauffeur.programs.rewrite import Prepared
-from chauffeur.programs.workers import confine, on_core, present_core, uninterrupted
+from chauffeur.programs.workers import confine, on_core, present_core, processor_time, uninterrupted
 
 _EPOCH: Final = datetime.datetime(2000, 1, 1, tzinfo=datetime.UTC)
 
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """What a program may use up. Times are wall time of the worker.
+    """What a program may use up.
 
     Attributes:
-        turn_s: Computation between two calls to the host.
-        tick_s: One control period, the host's answers included. Looked at before and after each stretch of
-            computation, so that a period lasts `tick_s + turn_s + grace_s` at most.
+        turn_s: Wall time between two calls to the host, by the worker's own watch.
+        tick_s: Processor time of one control period, the host's answers included: how busy the machine is does not end
+            a program. Looked at before and after each stretch of computation.
         grace_s: How long past `turn_s` a worker may take to stop by itself before it is killed.
-        start_s: Reading the program and running its top level.
+        start_s: Reading the program and running its top level: processor time, and wall time of each of the two.
         calls: Calls to the host in one control period.
         memory_bytes: Heap of the program.
         recursion: Depth of calls.
@@ -92,7 +92,7 @@ class Sandbox:
         workers: int = 2,
         max_workers: int = 8,
         pin: bool = True,
-        clock: Callable[[], float] = time.perf_counter,
+        clock: Callable[[], float] = time.thread_time,
     ) -> None:
         """Start the workers.
 
@@ -101,7 +101,7 @@ class Sandbox:
             workers: Workers kept warm.
             max_workers: Most programs running at once.
             pin: Keep workers on the present core, where the platform can.
-            clock: Seconds, monotonic; measures the control period's budget.
+            clock: Processor time of the host, s; the worker's is added for the control period's budget.
 
         Raises:
             SandboxError: The worker program cannot be started.
@@ -206,7 +206,7 @@ class SandboxRun:
     def __init__(self, session: monty.MontySession, budget: Budget, clock: Callable[[], float]) -> None:
         self._session = session
         self._budget = budget
-        self._clock = clock
+        self._host_clock, self._worker_clock = clock, processor_time(session.worker_pid)
         self._names: frozenset[str] = frozenset()
         self._slotted: frozenset[str] = frozenset()
         self._snapshot: monty.FunctionSnapshot | None = None
@@ -220,6 +220,10 @@ class SandboxRun:
     def worker_pid(self) -> int | None:
         """Process id of the worker, for diagnostics."""
         return self._session.worker_pid
+
+    def _clock(self) -> float:
+        """Processor time of both, s."""
+        return self._host_clock() + self._worker_clock()
 
     def begin_tick(self) -> None:
         """A new control period: budgets start afresh."""

@@ -1,11 +1,16 @@
-"""What the operating system adds around a sandbox worker: one core, few files, no core dumps. Linux only."""
+"""What the operating system adds around a sandbox worker: one core, few files, no core dumps, its processor time.
+
+Linux only.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import signal
-from collections.abc import Generator
+import sys
+import time
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Final
 
@@ -47,6 +52,24 @@ def uninterrupted() -> Generator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def processor_time(pid: int | None) -> Callable[[], float]:
+    """A clock of the processor time a process has used, s; it stands still once the process is gone.
+
+    Where the platform does not tell (only Linux does), wall time.
+    """
+    if pid is None or not sys.platform.startswith("linux"):
+        return time.perf_counter
+    number, used_s = (~pid << 3) | 2, 0.0  # clock_getcpuclockid(3)
+
+    def clock() -> float:
+        nonlocal used_s
+        with contextlib.suppress(OSError):
+            used_s = time.clock_gettime(number)
+        return used_s
+
+    return clock
 
 
 def confine(pid: int, core: int | None) -> None:

@@ -47,6 +47,10 @@ class Drive:
         with self._lock:
             return [said for said in self._said if said.kind == kind]
 
+    def wish(self, text: str) -> Any:
+        """What was last told of the newest wish in these words; older wishes are told of in between. None before."""
+        return next((said for said in reversed(self.said("conversation")) if said.text == text), None)
+
     @property
     def scene(self) -> Any:
         """The newest."""
@@ -63,11 +67,13 @@ class Drive:
 
 
 @contextmanager
-def driving(scenario: str = "cruise", *, engine: str = "", planner: str = "retrieval") -> Generator[Drive]:
+def driving(
+    scenario: str = "cruise", *, engine: str = "", planner: str = "retrieval", speed: float = 0.4
+) -> Generator[Drive]:
     """A drive with its page, from the first scene on; it ends with the context, the car standing or not."""
-    # A road is a minute long: at less than real time, and with others after it, it outlasts the tests.
+    # A road is a minute long: at less than real time, and with others after it, it outlasts the tests of a module.
     starts = tuple(Start(find(scenario), 5 + number, most_s=120.0) for number in range(8))
-    settings = Settings(starts=starts, planner=planner, speed=0.4, realtime=False)
+    settings = Settings(starts=starts, planner=planner, speed=speed, realtime=False)
     over = threading.Event()
     failed: list[BaseException] = []
     with Cabin() as cabin:

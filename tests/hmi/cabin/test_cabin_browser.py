@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from cabin_desk import SAID, SAID_MPS, Desk
 from cabin_drive import Drive, driving
-from chromium import CHROMIUM, PHONE, TABLET, Tab, browser
+from chromium import CHROMIUM, PATIENCE_S, PHONE, TABLET, Tab, browser
 
 from chauffeur.drive.talk.messages import (
     Button,
@@ -34,6 +34,11 @@ from chauffeur.hmi.cabin import Cabin
 pytestmark = [pytest.mark.slow, pytest.mark.server]
 
 AUDIT = (Path(__file__).parent / "audit.js").read_text(encoding="utf-8")
+ALOUD = """{
+    window.aloud = [];
+    const told = document.getElementById('told');
+    new MutationObserver(() => window.aloud.push(told.textContent)).observe(told, { childList: true });
+}"""
 PICTURE = "document.getElementById('road').toDataURL()"
 
 
@@ -55,14 +60,14 @@ def test_a_typed_wish_is_shown_from_thought_to_set_point(desk: Desk, drive: Driv
         assert await text(tab, "vehicle") == "Simulated drive"
         before = await tab.value(PICTURE)
         await tab.press("/")
-        await tab.type("Drive at 90 km/h.")
+        await tab.type("Drive at 60 km/h.")
         await tab.press("Enter")
         await tab.until("document.querySelector('.wish .state.drive')")
         await tab.until("document.querySelector('.code [aria-current=step]')")
-        await tab.until("document.getElementById('target').textContent === '90'")
-        assert Say("Drive at 90 km/h.") in drive.told and drive.scene.target_mps == pytest.approx(25.0, abs=0.1)
+        await tab.until("document.getElementById('target').textContent === '60'")
+        assert Say("Drive at 60 km/h.") in drive.told and drive.scene.target_mps * 3.6 == pytest.approx(60.0, abs=0.5)
         card = await tab.value("document.querySelector('.wish').innerText")
-        for part in ("typed · w1", "Drive at 90 km/h.", "It thinks", "It drives by", "passed: format"):
+        for part in ("typed · w1", "Drive at 60 km/h.", "It thinks", "It drives by", "passed: format"):
             assert part in card, part
         await tab.until("document.querySelector('.wish .legend')")
         assert "in all" in await tab.value("document.querySelector('.wish .legend .total').textContent")
@@ -123,7 +128,6 @@ def test_everything_can_be_read_and_reached(desk: Desk, drive: Drive, size: tupl
     desk.run(check())
 
 
-@pytest.mark.xfail(reason="seen to fail on a crowded machine; the cause is not found yet", strict=False)
 def test_speaking_into_the_browser_changes_the_set_point(desk: Desk, drive: Drive) -> None:
     if not desk.said_bytes:
         pytest.skip("no synthetic voice here: neither flite nor espeak-ng")
@@ -132,15 +136,16 @@ def test_speaking_into_the_browser_changes_the_set_point(desk: Desk, drive: Driv
         tab = desk.tab
         await opened(tab, drive)
         assert drive.sound_bytes == 0, "nothing is recorded before a button is held"
-        for _ in range(3):  # on a starved machine the browser's sound has gaps: then it is said again
-            known, so_far = len(drive.said("heard")), drive.sound_bytes
-            await tab.finger("mousePressed", "#talk-command")
-            while drive.sound_bytes < so_far + desk.said_bytes:
-                await asyncio.sleep(0.02)
-            await tab.finger("mouseReleased", "#talk-command")
-            await asyncio.to_thread(drive.until, "words", lambda known=known: len(drive.said("heard")) > known)
-            if drive.said("heard")[-1].text == SAID:
-                break
+        heard = ""
+        async with asyncio.timeout(PATIENCE_S):
+            while heard != SAID:  # on a starved machine the browser's sound has gaps: then it is said again
+                known, so_far = len(drive.said("heard")), drive.sound_bytes
+                await tab.finger("mousePressed", "#talk-command")
+                while drive.sound_bytes < so_far + desk.said_bytes:
+                    await asyncio.sleep(0.02)
+                await tab.finger("mouseReleased", "#talk-command")
+                await asyncio.to_thread(drive.until, "words", lambda known=known: len(drive.said("heard")) > known)
+                heard = drive.said("heard")[-1].text
         await tab.until("!document.getElementById('confirm').hidden")
         assert f"“{SAID}”" in await text(tab, "heard-words")
         assert drive.told[-2:] == [Button("command", held=True), Button("command", held=False)]
@@ -148,13 +153,12 @@ def test_speaking_into_the_browser_changes_the_set_point(desk: Desk, drive: Driv
         assert before != pytest.approx(SAID_MPS, abs=0.1)
         await tab.press("y")
         await tab.until("document.querySelector('.wish .how')?.innerText.includes('said')")
-        wish = drive.said("conversation")[-1]
+        wish = drive.wish(SAID)
         await asyncio.to_thread(
             drive.until, "a set-point", lambda: drive.scene.wish == wish.wish and drive.scene.target_mps != before
         )
         assert Confirm(yes=True) in drive.told
-        wish = drive.said("conversation")[-1]
-        assert (wish.text, wish.spoken) == (SAID, True)
+        assert wish.spoken
         assert "said · " in await tab.value("document.querySelector('.wish').innerText")
         assert await tab.value("document.getElementById('confirm').hidden")
         assert drive.sound_bytes == sound_bytes, "and nothing after it is let go"
@@ -233,16 +237,13 @@ def test_a_page_that_is_closed_changes_nothing_for_the_drive(desk: Desk, drive: 
         await tab.type("Drive at 80 km/h.")
         await tab.press("Enter")
         said = "Drive at 80 km/h."
-        await asyncio.to_thread(
-            drive.until, "the wish", lambda: [line.text for line in drive.said("conversation")][-1:] == [said]
-        )
-        wish = drive.said("conversation")[-1].wish
+        await asyncio.to_thread(drive.until, "the wish", lambda: drive.wish(said))
+        wish = drive.wish(said).wish
         await asyncio.to_thread(drive.until, "the drive", lambda: drive.scene.wish == wish)
         await tab.ask("Page.navigate", url="about:blank")
         left_s = drive.scene.time_s
         await asyncio.to_thread(drive.until, "another second", lambda: drive.scene.time_s > left_s + 1.0)
-        now = drive.said("conversation")[-1]
-        assert now.wish == wish and now.outcome in ("", "finished") and not drive.scene.taken_over
+        assert drive.wish(said).outcome in ("", "finished") and not drive.scene.taken_over
         await opened(tab, drive)
         await tab.until("document.querySelector('.wish')")
         assert "Drive at 80 km/h." in await tab.value("document.querySelector('.wish').innerText")
@@ -258,13 +259,13 @@ async def sent(tab: Tab, words: str) -> None:
 
 async def asked(tab: Tab, words: str) -> None:
     """Say something that the planner is unsure of, and wait until the page asks."""
+    await tab.value(ALOUD)
     await sent(tab, words)
     await tab.until("document.getElementById('yes').checkVisibility()")
     assert "Shall I" in await text(tab, "heard-words")
-    assert "Shall I" in await text(tab, "told"), "a screen reader is told"
+    await tab.until("window.aloud.some((words) => words.includes('Shall I'))")  # a screen reader is told
 
 
-@pytest.mark.xfail(reason="seen to fail on a crowded machine; the cause is not found yet", strict=False)
 def test_every_question_has_a_yes_and_a_no_and_what_runs_goes_on(desk: Desk) -> None:
     """A planner's own question, the one after a question of the person, and the one after distress."""
 
@@ -275,6 +276,7 @@ def test_every_question_has_a_yes_and_a_no_and_what_runs_goes_on(desk: Desk) -> 
         await sent(tab, "Keep 60 m to the car ahead.")
         await asyncio.to_thread(drive.until, "the wish", lambda: drive.scene.wish == "w1")
 
+        answers: list[bool] = []
         for unsure, no in (("That was close.", "n"), ("Do you always drive so slowly?", ""), ("I feel sick.", "n")):
             await asked(tab, unsure)
             if no:
@@ -283,8 +285,13 @@ def test_every_question_has_a_yes_and_a_no_and_what_runs_goes_on(desk: Desk) -> 
                 await tab.value("document.getElementById('no').focus()")
                 await tab.press("Enter")
             await tab.until("document.getElementById('confirm').hidden")
+            answers.append(False)
+            await asyncio.to_thread(
+                drive.until,
+                "the no",
+                lambda: [told.yes for told in drive.told if isinstance(told, Confirm)] == answers,
+            )
             await tab.until("document.getElementById('notes').textContent.includes('Then I do not.')")
-        assert [told.yes for told in drive.told if isinstance(told, Confirm)] == [False] * 3
 
         await sent(tab, "Why did you brake?")
         await tab.until("document.querySelector('.wish .state').textContent.includes('Done')")
@@ -292,7 +299,7 @@ def test_every_question_has_a_yes_and_a_no_and_what_runs_goes_on(desk: Desk) -> 
         assert drive.scene.wish == "w1", "no question has ended what runs"
 
         await asked(tab, "That was close.")
-        question = drive.said("conversation")[-1].wish
+        question = drive.wish("That was close.").wish
         await tab.click("#yes")
         await asyncio.to_thread(drive.until, "what was offered", lambda: drive.scene.wish not in ("", "w1", question))
 
@@ -307,7 +314,7 @@ def test_every_question_has_a_yes_and_a_no_and_what_runs_goes_on(desk: Desk) -> 
         assert drive.said("ended")[-1].outcome == "stopped"
         assert not [each for each in drive.said("conversation") if "Quit" in each.text], "it is no wish"
 
-    with driving("following", planner="onboard") as drive:
+    with driving("following", planner="onboard", speed=1.0) as drive:
         desk.run(check(drive))
 
 
@@ -322,7 +329,7 @@ def test_the_stop_button_stops_whatever_is_asked(desk: Desk) -> None:
         await tab.until("document.getElementById('link').textContent === 'Drive over'")
         assert drive.said("ended")[-1].outcome == "stopped"
 
-    with driving("following", planner="onboard") as drive:
+    with driving("following", planner="onboard", speed=2.0) as drive:
         desk.run(check(drive))
 
 

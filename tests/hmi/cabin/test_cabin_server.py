@@ -37,6 +37,7 @@ from chauffeur.drive.talk.messages import (
     ShownBody,
     Stop,
 )
+from chauffeur.hmi import local_page
 from chauffeur.hmi.cabin import Cabin, Certificate
 from chauffeur.hmi.cabin.board import MOST_WAITING, LatestMessages, Outbox
 from chauffeur.hmi.cabin.room import NOT_UNDERSTOOD
@@ -286,6 +287,7 @@ def test_a_slow_screen_misses_scenes_and_nothing_that_matters() -> None:
                 break
         kinds = [message["kind"] for message in got]
         assert kinds.count("scene") == 1 and kinds.count("conversation") == 1 and kinds.count("note") == 100
+        assert kinds[-2:] == ["conversation", "scene"], "the newest comes after what was said before it"
         assert next(m for m in got if m["kind"] == "scene")["time_s"] == 39.9
         assert next(m for m in got if m["kind"] == "conversation")["why"] == "396"
 
@@ -409,8 +411,10 @@ def open_files() -> int:
 
 
 def test_a_crowd_at_the_door_takes_nothing_from_the_drive_and_keeps_nobody_out(
-    cabin: Cabin, caplog: pytest.LogCaptureFixture
+    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, caplog: pytest.LogCaptureFixture
 ) -> None:
+    monkeypatch.setattr(local_page, "AT_THE_DOOR_S", 1.0)
+    cabin = request.getfixturevalue("cabin")
     own = open_files()
     where = urlsplit(cabin.url)
     port = where.port

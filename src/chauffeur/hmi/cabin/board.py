@@ -39,7 +39,8 @@ class Outbox:
         return not self._waiting and not self._handing_on
 
     def put(self, text: str, key: str = "") -> None:
-        """A message; it takes the place of one with the same key that was not read yet. Without a key, none is lost."""
+        """Add a message after those that wait; an unread one with the same key is dropped. Without a key, none is."""
+        self._waiting.pop(key, None)
         if not key:
             self._single += 1
             key = f"#{self._single}"
