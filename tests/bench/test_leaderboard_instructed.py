@@ -24,7 +24,7 @@ from chauffeur.bench.leaderboard.rollout import RouteJob
 from chauffeur.concept import ConfigError, Limits, Plan, PlanRequest, Program, Scenario, Thoughts
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.onboard.town import SNIPPETS
-from chauffeur.worlds.town.pack import load
+from chauffeur.worlds.town.library import load
 
 GO = "def go():\n    while True:\n        yield proceed(check_speed_limit())\n"
 

@@ -204,8 +204,8 @@ def _planner(spec: str, base_url: str | None) -> Planner | None:
 
 
 def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
-    import chauffeur
     from chauffeur.bench.lampilot.report import answers_note, comparison_lines, family_lines
+    from chauffeur.version import __version__
 
     rated = [row for row, item in zip(rows, run.items, strict=True) if run.stages.asked(item)]
     if not rated:
@@ -223,7 +223,7 @@ def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
     model = f", model {run.manifest.model}" if run.manifest.model else ""
     labels = "".join(f"; {label}" for label in run.manifest.labels)
     console.print(
-        f"Chauffeur {chauffeur.__version__}; planner {run.config.planner}{model}{labels}; "
+        f"Chauffeur {__version__}; planner {run.config.planner}{model}{labels}; "
         f"metrics {rows[0]['metrics']}; data sha256 {run.config.data_sha256[:12]}; draw seed {run.config.seed}; limits "
         f"{run.config.limits.name}; scores in points, rates in %; simulated drives (highway-env). Rows marked paper "
         "are its authors' own figures."

@@ -44,7 +44,6 @@ def hostile(
     workers: Annotated[int | None, typer.Option(min=1, help="Simulation processes; default one per core.")] = None,
 ) -> None:
     """Hostile words: 618 attacks in ten classes, and 270 harmless wishes that look like them."""
-    import chauffeur
     from chauffeur.bench.hostile import HostileBenchmark, HostileConfig, planner_of
     from chauffeur.bench.hostile.report import headline
     from chauffeur.bench.kernel.report import tables
@@ -52,6 +51,7 @@ def hostile(
     from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
     from chauffeur.cli.console import stdout
     from chauffeur.cli.parts import limits_named, setting_named
+    from chauffeur.version import __version__
 
     console = stdout()
     config = HostileConfig(planner, setting_named(setting), items, seed, screened, limits_named(limits), shield)
@@ -64,7 +64,7 @@ def hostile(
         show_tables(console, tables(bench.tables, rows))
         console.print(headline(rows))
         console.print(
-            f"Chauffeur {chauffeur.__version__}; planner {rows[0]['planner']}, model {rows[0]['model']}; "
+            f"Chauffeur {__version__}; planner {rows[0]['planner']}, model {rows[0]['model']}; "
             f"{bench.id}; limits {config.limits.name}; words {'screened' if screened else 'raw'}; "
             f"{'with' if shield else 'without'} the run-time shield; {rows[0]['note']}."
         )

@@ -76,10 +76,10 @@ def personalization(
 
 
 def _show(console: Console, bench: StudyBenchmark, rows: list[Row]) -> None:
-    import chauffeur
     from chauffeur.bench.personalization.figures import latencies
     from chauffeur.bench.personalization.report import NOTE, headline, tables
     from chauffeur.cli.tables import show_table
+    from chauffeur.version import __version__
 
     for title, header, lines in tables(rows):
         show_table(console, title, header, lines)
@@ -87,7 +87,7 @@ def _show(console: Console, bench: StudyBenchmark, rows: list[Row]) -> None:
     console.print(headline(rows), soft_wrap=True)
     p50, p95 = latencies(rows, "with")
     console.print(
-        f"Chauffeur {chauffeur.__version__}; planner {bench.options.planner}, model {bench.model}; {bench.id}; "
+        f"Chauffeur {__version__}; planner {bench.options.planner}, model {bench.model}; {bench.id}; "
         f"{bench.options.half} wordings; seed {bench.options.seed}; from words to policy {1000 * p50:.0f} ms (median), "
         f"{1000 * p95:.0f} ms (95 %). {NOTE}",
         soft_wrap=True,

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from chauffeur import __version__
 from chauffeur.cli import adapt_vlm as adapting_vlm
 from chauffeur.cli import (
     apis,
@@ -46,6 +45,7 @@ from chauffeur.cli.maps import maps_app
 from chauffeur.cli.me import me_app
 from chauffeur.cli.printable import PrintableFormatter
 from chauffeur.cli.vehicle import vehicle_app
+from chauffeur.version import __version__
 
 EXAMPLES = """
 Examples:

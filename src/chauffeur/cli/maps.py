@@ -51,7 +51,8 @@ def list_maps() -> None:
 
     from chauffeur.cli.console import plain, stdout
     from chauffeur.concept import ChauffeurError
-    from chauffeur.worlds.town.pack import load, maps_folder, packs
+    from chauffeur.worlds.town.library import load, packs
+    from chauffeur.worlds.town.pack import maps_folder
 
     table = Table("town", "lanes, km", "junctions", "lights", "signs", "places", "notes", box=None, pad_edge=False)
     for name, folder in packs().items():
@@ -146,7 +147,7 @@ def show(
     from chauffeur.cli.console import path_text, stdout
     from chauffeur.concept import ConfigError
     from chauffeur.hmi.town_map import map_picture, map_svg
-    from chauffeur.worlds.town.pack import load
+    from chauffeur.worlds.town.library import load
 
     pack = load(town)
     path = out if out is not None else Path(f"{pack.name}.png")
@@ -163,7 +164,7 @@ def _said(folder: Path, name: str, notes: tuple[str, ...]) -> None:
     from rich.text import Text
 
     from chauffeur.cli.console import path_text, plain, stdout
-    from chauffeur.worlds.town.pack import packs
+    from chauffeur.worlds.town.library import packs
 
     stdout().print(Text.assemble(plain(name), " is in ", path_text(folder), "."))
     for note in notes:

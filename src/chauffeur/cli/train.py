@@ -363,9 +363,9 @@ def vlm(
     from chauffeur.concept import ConfigError
 
     needs("models", "Training", "torch", "transformers", "onnx", "onnxscript")
+    from chauffeur.models.vlm.config import VlmRecipe
     from chauffeur.models.vlm.network import SIZES
     from chauffeur.models.vlm.pipeline import make_vlm
-    from chauffeur.models.vlm.recipe import VlmRecipe
 
     if size not in SIZES:
         raise ConfigError(f"There is no size {size!r}.", hint=f"Sizes: {', '.join(SIZES)}.")

@@ -17,11 +17,12 @@ pytest.importorskip("osqp")
 from chauffeur.bench.motion.items import commands, style_ranges  # noqa: E402
 from chauffeur.bench.motion.scoring import command_alignment  # noqa: E402
 from chauffeur.concept import ConfigError, DataError  # noqa: E402
+from chauffeur.models.vlm.config import VlmRecipe  # noqa: E402
 from chauffeur.models.vlm.ear import fitted_head, style_worth  # noqa: E402
 from chauffeur.models.vlm.export import VlmGraph, export  # noqa: E402
 from chauffeur.models.vlm.gains import GainCase, taught_gains  # noqa: E402
 from chauffeur.models.vlm.network import SIZES, CompactVlm  # noqa: E402
-from chauffeur.models.vlm.recipe import VlmRecipe, answer_row, batches, loss_of, train  # noqa: E402
+from chauffeur.models.vlm.recipe import answer_row, batches, loss_of, train  # noqa: E402
 from chauffeur.models.vlm.scenes import PictureSet, SceneFacts, load_pictures, make_pictures, seat_scene  # noqa: E402
 from chauffeur.models.vlm.seeing import mirrored, picture_batches, sights, varied  # noqa: E402
 from chauffeur.models.vlm.wishes import TEST_WRITERS, held_wishes, training_wish, written  # noqa: E402

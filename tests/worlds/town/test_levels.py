@@ -10,7 +10,7 @@ from chauffeur.bench.leaderboard.routes import LeaderboardRoute
 from chauffeur.geometry import Pose
 from chauffeur.geometry.opendrive import OpenDriveMap, parse_opendrive
 from chauffeur.worlds.town.levels import Levels
-from chauffeur.worlds.town.pack import load
+from chauffeur.worlds.town.library import load
 
 STREET, BRIDGE = "1:0:-1", "2:0:-1"
 

@@ -36,7 +36,7 @@ def write_artefacts(
         name = str(row["item"])
         route = benchmark.route_of(items[name])
         try:
-            from chauffeur.worlds.town.pack import load
+            from chauffeur.worlds.town.library import load
 
             town = load(route.town)
             track = plan_official(town, route).track

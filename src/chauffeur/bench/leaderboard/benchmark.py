@@ -27,7 +27,7 @@ from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.onboard.town import SNIPPETS
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.shield import SHIELD_VERSION
-from chauffeur.worlds.town.pack import load
+from chauffeur.worlds.town.library import load
 
 BENCH: Final = "leaderboard-1.0-v1"
 

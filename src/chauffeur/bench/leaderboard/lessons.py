@@ -26,7 +26,8 @@ from chauffeur.geometry import LaneId, RoadGraph, Route, named_ways
 from chauffeur.safety.checks import DRIVE_CHECKS
 from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.town import TownWorld
-from chauffeur.worlds.town.pack import MapPack, load
+from chauffeur.worlds.town.library import load
+from chauffeur.worlds.town.pack import MapPack
 
 BEFORE_M: Final = (35.0, 110.0)
 """A lesson begins so far before its manoeuvre."""

@@ -18,7 +18,7 @@ from chauffeur.bench.leaderboard.routes import LeaderboardRoute, RouteFile
 from chauffeur.bench.leaderboard.triggers import Trigger, TriggerSet
 from chauffeur.concept import ScenarioError
 from chauffeur.geometry import Pose, RoadGraph
-from chauffeur.worlds.town.pack import OWN_TOWNS, load
+from chauffeur.worlds.town.library import OWN_TOWNS, load
 
 SEED: Final = 1
 ROUTES_A_TOWN: Final = 3

@@ -96,7 +96,7 @@ def drive_route(job: RouteJob) -> dict[str, Any]:
 
 
 def _driven(job: RouteJob) -> dict[str, Any]:
-    from chauffeur.worlds.town.pack import load
+    from chauffeur.worlds.town.library import load
 
     began = time.process_time()
     route = job.route

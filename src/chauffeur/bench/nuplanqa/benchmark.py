@@ -15,10 +15,11 @@ from chauffeur.bench.kernel.metrics import AnyRow, TableSpec, count, share
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.nuplanqa.blind import BASELINE, blind_guesses
 from chauffeur.bench.nuplanqa.choice import EXTRACTION, read_choice
-from chauffeur.bench.nuplanqa.frames import CAMERAS, CORRUPT, FRAMES, MISSING, UNTOLD, FrameSource
+from chauffeur.bench.nuplanqa.frames import CAMERAS, FRAMES, UNTOLD, FrameSource
 from chauffeur.bench.nuplanqa.metadata import find_metadata, load_metadata
 from chauffeur.bench.nuplanqa.questions import LETTERS, SKILL_OF, SKILLS, SUBTASKS, VqaFile, VqaItem, load_questions
 from chauffeur.bench.nuplanqa.requests import ASKING, Control, conversation
+from chauffeur.bench.pictures import CORRUPT, MISSING
 from chauffeur.concept import ConfigError, DataError
 
 BENCH_VERSION: Final = "nuplanqa-v1"

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final, Literal, cast
 
-from chauffeur.bench.nuplanqa.frames import FramePath, Pictures, data_uri, read_picture
+from chauffeur.bench.nuplanqa.frames import FramePath
 from chauffeur.bench.nuplanqa.questions import VqaItem
+from chauffeur.bench.pictures import Pictures, data_uri, read_picture
 from chauffeur.planners.prompts import Message
 
 ASKING: Final = "ask-v1"

@@ -19,10 +19,11 @@ import numpy as np
 
 from chauffeur.drive.files import publish
 from chauffeur.models.sorting.training import write
+from chauffeur.models.vlm.config import VlmRecipe
 from chauffeur.models.vlm.ear import HEAD_SHARE, NETWORK_SHARE, style_head, style_sorter, style_worth
 from chauffeur.models.vlm.evaluation import VlmFigures, vlm_figures
 from chauffeur.models.vlm.gains import gain_table
-from chauffeur.models.vlm.recipe import VlmRecipe, train
+from chauffeur.models.vlm.recipe import train
 from chauffeur.models.vlm.scenes import PictureSet, Split, load_pictures, make_pictures
 from chauffeur.models.vlm.wishes import held_wishes
 from chauffeur.planners.camera_faults import HEIGHT, WIDTH

@@ -30,7 +30,7 @@ from chauffeur.geometry.opendrive import OpenDriveError, parse_opendrive
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.carla.frames import forward_mps, pose_of, transform_of
 from chauffeur.worlds.carla.server import EGO_BLUEPRINTS, connect, library
-from chauffeur.worlds.parking.path_follower import Chassis
+from chauffeur.worlds.path_follower import Chassis
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
 from chauffeur.worlds.town.perception import TownPerception
 

@@ -29,16 +29,16 @@ from chauffeur.concept import (
 )
 from chauffeur.geometry import Box, Polyline, Pose, overlap
 from chauffeur.worlds.base import EGO
+from chauffeur.worlds.corridor import Body
 from chauffeur.worlds.parking.actors import LeavingCar, LotWalker
 from chauffeur.worlds.parking.amenities import Bay, Place, amenities
-from chauffeur.worlds.parking.corridor import Body
 from chauffeur.worlds.parking.driver import ParkingDriver
 from chauffeur.worlds.parking.instant import Ego, pack, unpack
 from chauffeur.worlds.parking.lot import AISLE_M, Lot, Spot, build_lot, way_id
-from chauffeur.worlds.parking.path_follower import Chassis
 from chauffeur.worlds.parking.perception import LaneMap, ParkingPerception
 from chauffeur.worlds.parking.places import parked_in, spot_for
 from chauffeur.worlds.parking.routes import Way, way_along, way_to_spot
+from chauffeur.worlds.path_follower import Chassis
 
 DT_S: Final = 0.1
 CHASSIS: Final = Chassis(Body(4.89, 1.895, 1.395), 2.79, 0.6, 2.0)

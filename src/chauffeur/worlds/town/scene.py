@@ -8,7 +8,7 @@ from typing import Final
 from chauffeur.concept import Observation, Scenario, ScenarioError, Signal, SignalState, VehicleState
 from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle
 from chauffeur.geometry import LaneId, LanePlace, Route, plan_route
-from chauffeur.worlds.parking.path_follower import Chassis
+from chauffeur.worlds.path_follower import Chassis
 from chauffeur.worlds.places import Destination
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
 from chauffeur.worlds.town.instant import TownInstant

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from chauffeur.concept import DataError, Scenario, ScenarioError
 from chauffeur.geometry import LanePlace, RoadGraph, Route, plan_route
-from chauffeur.worlds.town import pack as packs
+from chauffeur.worlds.town import library
 from chauffeur.worlds.town.pack import MapPack, Place, places_called
 
 
@@ -81,7 +81,7 @@ class TownTrip:
 
 def _loaded(name: str) -> MapPack:
     try:
-        return packs.load(name)
+        return library.load(name)
     except DataError as error:
         raise ScenarioError(str(error), hint=error.hint) from error
 

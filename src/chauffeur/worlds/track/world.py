@@ -15,9 +15,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from chauffeur.concept import Capabilities, Command, Lead, Observation, Scenario, ScenarioError, VehicleState
 from chauffeur.geometry import Box, Pose, overlap
 from chauffeur.worlds.base import EGO
+from chauffeur.worlds.corridor import Body
 from chauffeur.worlds.over_graph import LaneDriver, ObservedPerception
-from chauffeur.worlds.parking.corridor import Body
-from chauffeur.worlds.parking.path_follower import Chassis
+from chauffeur.worlds.path_follower import Chassis
 from chauffeur.worlds.track.dynamics import (
     STEP_S,
     Plant,
