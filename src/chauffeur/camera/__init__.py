@@ -7,12 +7,11 @@ from chauffeur.camera.renderer_choice import make_renderer
 from chauffeur.camera.rig import RIGS, Camera, Rig, front_rig, nuplan_rig, nuscenes_rig, rig_of
 from chauffeur.camera.scene import Instance
 from chauffeur.camera.solids import SemanticClass
-from chauffeur.camera.weather import WEATHERS, Conditions, Weather
+from chauffeur.camera.weather import Conditions
 
 __all__ = [
     "LOOKS",
     "RIGS",
-    "WEATHERS",
     "Camera",
     "CameraImages",
     "CameraLook",
@@ -24,7 +23,6 @@ __all__ = [
     "Rig",
     "SemanticClass",
     "Sighting",
-    "Weather",
     "front_rig",
     "look_of",
     "make_renderer",

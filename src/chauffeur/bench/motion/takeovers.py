@@ -47,6 +47,7 @@ from chauffeur.concept import (
     Trip,
     Verdict,
 )
+from chauffeur.concept.weather import WEATHERS
 from chauffeur.describe.track import describe_track
 from chauffeur.drive.episode import Episode
 from chauffeur.drive.loop import LoopMemory, Stages, drive
@@ -58,7 +59,7 @@ from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.planners.talk2drive.recent import fitting
 from chauffeur.safety.gain_box import care, gain_box
-from chauffeur.worlds.track import WEATHERS, TrackWorld
+from chauffeur.worlds.track import TrackWorld
 from chauffeur.worlds.track.dynamics import PLANTS, Plant
 from chauffeur.worlds.track.manoeuvres import MANOEUVRES, ManoeuvreName
 
