@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from chauffeur.bench.leaderboard.benchmark import LeaderboardBenchmark, RouteItem
-from chauffeur.bench.leaderboard.planning import plan_official
 from chauffeur.bench.leaderboard.results import infractions_of, write_official
 from chauffeur.bench.leaderboard.route_map import route_map
+from chauffeur.bench.leaderboard.ways import plan_official
 from chauffeur.concept import ChauffeurError
 
 OFFICIAL: Final = "official-results.json"

@@ -19,7 +19,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.bench.leaderboard.planning import PlannedRoute
+from chauffeur.bench.leaderboard.ways import PlannedRoute
 from chauffeur.concept import (
     ChauffeurError,
     Command,

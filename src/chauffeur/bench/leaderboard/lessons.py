@@ -15,8 +15,8 @@ import numpy as np
 
 from chauffeur.bench.leaderboard.criteria import RouteReferee
 from chauffeur.bench.leaderboard.instructed import InstructedDriver, PlannerSpec
-from chauffeur.bench.leaderboard.planning import PlannedRoute, plan_official, track_of
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute
+from chauffeur.bench.leaderboard.ways import PlannedRoute, plan_official, track_of
 from chauffeur.concept import ChauffeurError, Context, Limits, Observation, Plan, PlannerError, PlanRequest, Scenario
 from chauffeur.describe import describe
 from chauffeur.describe.navigation import NavigationInstruction, Navigator

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from chauffeur.concept import DataError
-from chauffeur.planners.vilad.words import WIDTH, WordTable
+from chauffeur.planners.word_table import WIDTH, WordTable
 
 SHA256: Final = "53aa51172d142c89d9012cce15ae4d6cc0ca6895895114379cacb4fab128d9db"
 """Of `model.safetensors` of sentence-transformers/all-MiniLM-L6-v2."""

@@ -24,8 +24,8 @@ from chauffeur.models.vlm.network import SIZES, CompactVlm
 from chauffeur.models.vlm.scenes import PictureSet, SceneFacts
 from chauffeur.models.vlm.seeing import dealt, seeing_figures, sights, train_eye
 from chauffeur.models.vlm.wishes import training_wish
-from chauffeur.planners.vilad.words import WordTable
 from chauffeur.planners.vlm.template import GIVEN, RECALLS, STYLES, TEMPLATE, GainCodebook
+from chauffeur.planners.word_table import WordTable
 from chauffeur.safety.gain_box import gain_box
 
 Array = np.ndarray[Any, Any]

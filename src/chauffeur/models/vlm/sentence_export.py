@@ -11,8 +11,8 @@ from torch import nn
 
 from chauffeur.models.export.onnx_graph import write_graph
 from chauffeur.models.vilad.word_table import checkpoint, kept_pieces
-from chauffeur.planners.vilad.words import MOST_PIECES
 from chauffeur.planners.vlm.sentences import LAYERS
+from chauffeur.planners.word_table import MOST_PIECES
 
 _STEPS: Final = 127.0
 

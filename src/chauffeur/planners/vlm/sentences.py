@@ -18,8 +18,7 @@ import numpy as np
 
 from chauffeur.concept import DataError
 from chauffeur.planners.exported import open_graph
-from chauffeur.planners.vilad.engine import SHIPPED as WORDS_FOLDER
-from chauffeur.planners.vilad.words import load_words
+from chauffeur.planners.word_table import SHIPPED_WORDS, load_words
 
 Array = np.ndarray[Any, Any]
 
@@ -41,7 +40,7 @@ class SentenceEncoder:
                 f"The sentence encoder {path} cannot be read: {error}.",
                 hint="Install Chauffeur again; it ships with it.",
             ) from error
-        self._words = load_words(WORDS_FOLDER / "words.npz")
+        self._words = load_words(SHIPPED_WORDS)
 
     def features(self, text: str) -> Array:
         """float32, (FEATURES,)."""

@@ -24,6 +24,8 @@ WIDTH: Final = 96
 UNKNOWN: Final = "[UNK]"
 MOST_PIECES: Final = 64
 """Longer texts are cut."""
+SHIPPED_WORDS: Final = Path(__file__).parent / "vilad" / "weights" / "words.npz"
+"""The table that comes with the package."""
 _PARTS: Final = re.compile(r"[a-z]+|[0-9]|[.,!?;:'\"-]")
 
 
