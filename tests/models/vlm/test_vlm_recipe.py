@@ -27,12 +27,12 @@ from chauffeur.models.vlm.scenes import PictureSet, SceneFacts, load_pictures, m
 from chauffeur.models.vlm.seeing import mirrored, picture_batches, sights, varied  # noqa: E402
 from chauffeur.models.vlm.wishes import TEST_WRITERS, held_wishes, training_wish, written  # noqa: E402
 from chauffeur.planners.camera_faults import HEIGHT, WIDTH  # noqa: E402
-from chauffeur.planners.vlm.engine import WORDS_FOLDER, VlmEngine  # noqa: E402
+from chauffeur.planners.vlm.engine import VlmEngine  # noqa: E402
 from chauffeur.planners.vlm.pictures import CELLS  # noqa: E402
 from chauffeur.planners.vlm.sentences import FEATURES, load_head, shipped_encoder  # noqa: E402
 from chauffeur.planners.vlm.template import SEEN_WEATHERS, STYLES, TEMPLATE, GainCodebook  # noqa: E402
+from chauffeur.planners.word_table import SHIPPED_WORDS, load_words  # noqa: E402
 from chauffeur.planners.word_table import WIDTH as WORD_WIDTH  # noqa: E402
-from chauffeur.planners.word_table import load_words  # noqa: E402
 from chauffeur.safety.gain_box import care, gain_box  # noqa: E402
 
 CODEBOOK = GainCodebook.of(gain_box())
@@ -109,7 +109,7 @@ def test_a_mirrored_picture_comes_with_what_is_true_of_it() -> None:
 
 
 def test_the_same_recipe_gives_the_same_weights_and_another_is_not_continued(tmp_path: Path) -> None:
-    words, held = load_words(WORDS_FOLDER / "words.npz"), pictures(20)
+    words, held = load_words(SHIPPED_WORDS), pictures(20)
     whole = train(tmp_path / "whole", TINY, held, words)
     with pytest.raises(ConfigError):
         train(tmp_path / "whole", replace(TINY, steps=4), held, words)
