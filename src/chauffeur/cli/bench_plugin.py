@@ -27,12 +27,10 @@ class BenchGroup(TyperGroup):
     """The commands written here, and one for each further benchmark that is installed."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """See TyperGroup."""
         known = super().list_commands(ctx)
         return [*known, *(name for name in plugin_names(GROUP) if name not in known)]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """See TyperGroup."""
         command = super().get_command(ctx, cmd_name)
         if command is not None or cmd_name not in plugin_names(GROUP):
             return command

@@ -76,7 +76,6 @@ class ActionMatrixExecutor(ExecutorBase):
         self._aim(observation)
 
     def step(self, observation: Observation, held: Setpoints | None = None) -> Command:
-        """See Executor."""
         self._aim(observation)
         tracker = self.tracker
         before = tracker.steered.total() - tracker.steered["solved"]

@@ -155,21 +155,17 @@ class ExecutorBase:
 
     @property
     def setpoints(self) -> Setpoints:
-        """See Executor."""
         return self._setpoints
 
     @property
     def status(self) -> ExecutorStatus:
-        """See Executor."""
         return self._status
 
     @property
     def notes(self) -> tuple[tuple[float, str], ...]:
-        """See Executor."""
         return tuple(self._notes)
 
     def tick(self) -> PolicyTick:
-        """See RunningPolicy."""
         self._aim(self._world.observe())
         new, self._told = self.notes[self._told :], len(self.notes)
         return HeldSetpoints(self._setpoints, state=self._status, said=tuple(text for _, text in new))
@@ -200,14 +196,12 @@ class DriverLed(ExecutorBase):
         self._policy = policy
 
     def tick(self) -> PolicyTick:
-        """See RunningPolicy."""
         tick = HeldSetpoints(self._world.driver().initial_setpoints()) if self._policy is None else self._policy.tick()
         self._setpoints = tick.setpoints
         self._status = "finished" if tick.state == "finished" else "running"
         return tick
 
     def step(self, observation: Observation, held: Setpoints | None = None) -> Command:
-        """See Executor."""
         del observation
         driver = self._world.driver()
         return driver.command(driver.settle(self.tick().setpoints) if held is None else held)

@@ -120,12 +120,10 @@ class HostileBenchmark:
 
     @property
     def config(self) -> Mapping[str, Any]:
-        """See Benchmark."""
         scenes = {scene.id: scenario_hash(scene)[:12] for scene in self._scenes.values()}
         return {**asdict(self.options), "rollout": ROLLOUT_VERSION, "data": data_sha256(), "scenes": scenes}
 
     def items(self) -> Sequence[Input]:
-        """See Benchmark."""
         return self._inputs
 
     @cached_property
@@ -135,7 +133,6 @@ class HostileBenchmark:
         return HostileRequests(system, limits, self.options.screened)
 
     async def request(self, item: Input, desk: RequestDesk) -> PlanRequest:
-        """See Benchmark."""
 
         async def ask(request: PlanRequest) -> Plan | None:
             reply = await desk.ask(request)
@@ -144,7 +141,6 @@ class HostileBenchmark:
         return await self._requests.request(item, await desk.context(self._scenes[item.id]), ask)
 
     def job(self, item: Input, answer: Row | None) -> DriveJob:
-        """See Benchmark."""
         assert answer is not None, "it asks for plans"
         scene, limits, shield = self._scenes[item.id], self.options.limits, self.options.shield
         parts = [ROLLOUT_VERSION, scenario_hash(scene), answer["policy"], answer["refusal"], answer["intent"]]

@@ -59,15 +59,12 @@ class DriveJob:
 
     @property
     def near(self) -> str:
-        """See BenchJob."""
         return self.scenario.id
 
     def run(self) -> dict[str, Any]:
-        """See BenchJob."""
         return roll_out(self)
 
     def spoiled(self, detail: str) -> dict[str, Any]:
-        """See BenchJob."""
         row = {"key": self.key, "scene": self.scenario.id, "rollout": ROLLOUT_VERSION, "infra_failed": True}
         return row | {"refused_by": "", "detail": detail, "drive": None}
 

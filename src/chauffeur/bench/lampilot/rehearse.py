@@ -243,11 +243,9 @@ class _Desk:
 
     @property
     def best(self) -> float:
-        """See Board."""
         return self._worth.value
 
     def tell(self, worth: float) -> None:
-        """See Board."""
         with self._worth.get_lock():
             self._worth.value = max(self._worth.value, worth)
 

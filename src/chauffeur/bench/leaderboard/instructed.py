@@ -201,7 +201,6 @@ class InstructedDriver:
         self._runner.close()
 
     def command(self, observation: Observation) -> Command:
-        """See RouteDriver."""
         now = observation.time_s
         station = self._navigator.station_of(observation, self._station)
         if station is not None:

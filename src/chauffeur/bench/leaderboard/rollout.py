@@ -73,15 +73,12 @@ class RouteJob:
 
     @property
     def near(self) -> str:
-        """See BenchJob."""
         return self.route.town
 
     def run(self) -> dict[str, Any]:
-        """See BenchJob."""
         return drive_route(self)
 
     def spoiled(self, detail: str) -> dict[str, Any]:
-        """See BenchJob."""
         return _result(self, failure="Simulation crashed", detail=detail, infra_failed=True)
 
 

@@ -137,7 +137,6 @@ class RiderJob:
 
     @property
     def id(self) -> str:
-        """See BenchItem."""
         return self.key
 
     @property
@@ -146,11 +145,9 @@ class RiderJob:
         return self.manoeuvre
 
     def run(self) -> Row:
-        """See BenchJob."""
         return asyncio.run(_Sitting(self).row())
 
     def spoiled(self, detail: str) -> Row:
-        """See BenchJob."""
         return {"key": self.key, "infra_failed": True, "detail": detail}
 
 
@@ -202,7 +199,6 @@ class TakeoverBenchmark(Unasked):
 
     @property
     def config(self) -> Mapping[str, Any]:
-        """See Benchmark."""
         box = gain_box()
         return {
             "planner": self._planner,
@@ -235,12 +231,10 @@ class TakeoverBenchmark(Unasked):
         ]
 
     def job(self, item: RiderJob, answer: Row | None) -> RiderJob:
-        """See Benchmark."""
         del answer
         return item
 
     def rows(self, outcome: ItemOutcome[RiderJob]) -> Sequence[TakeoverRow]:
-        """See Benchmark."""
         found = outcome.result
         if found is None or found["infra_failed"]:
             return ()

@@ -222,7 +222,6 @@ class NuPlanQaBenchmark:
         return {item.id: guess == item.answer for item, guess in zip(self._items, guesses, strict=True)}
 
     def items(self) -> Sequence[AskedItem]:
-        """See Benchmark."""
         found: list[AskedItem] = []
         for item in self._items:
             for places in self._shifts:
@@ -244,7 +243,6 @@ class NuPlanQaBenchmark:
         del item, answer
 
     def rows(self, outcome: ItemOutcome[AskedItem]) -> Sequence[VqaRow]:
-        """See Benchmark."""
         if outcome.answer is None and not outcome.error:
             return ()
         item, one = outcome.item, outcome.item.asked

@@ -207,7 +207,6 @@ class CarlaWorld:
     # The stage of a scenario ------------------------------------------------------------------------------------------
 
     def spawn(self, kind: AgentKind, pose: Pose, speed_mps: float = 0.0) -> int:
-        """See `worlds.base.Stage`."""
         if kind not in _BLUEPRINTS:
             raise ScenarioError(f"CARLA has no road user of the kind {kind!r}.")
         actor = self._put((_BLUEPRINTS[kind],), pose)
@@ -217,7 +216,6 @@ class CarlaWorld:
         return number
 
     def drive(self, actor: int, pose: Pose, speed_mps: float) -> None:
-        """See `worlds.base.Stage`."""
         one, c = self._staged[actor], self._carla
         one.set_transform(transform_of(c, pose, float(one.get_location().z)))
         x, y = speed_mps * math.cos(pose.heading_rad), -speed_mps * math.sin(pose.heading_rad)
@@ -225,7 +223,6 @@ class CarlaWorld:
         self._shown = None
 
     def remove(self, actor: int) -> None:
-        """See `worlds.base.Stage`."""
         one = self._staged.pop(actor, None)
         if one is not None:
             self._actors.remove(one)

@@ -38,15 +38,12 @@ class ThreadedVehicle(ABC):
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def apply(self, parameters: Parameters) -> Published:
-        """See `VehicleInterface.apply`."""
         return self._setpoints.apply(parameters)
 
     def release(self) -> Published:
-        """See `VehicleInterface.release`."""
         return self._setpoints.release()
 
     def close(self) -> None:
-        """See `VehicleInterface.close`."""
         self._setpoints.end("This vehicle interface is closed.")
         self._closed = True
         self._ending.set()
