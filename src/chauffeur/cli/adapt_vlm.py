@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from chauffeur.cli.options import RunFolder
 
 EXAMPLES = """
 Examples:
@@ -26,7 +27,7 @@ command goes on. It needs PyTorch, peft and the renderer: pip install 'chauffeur
 
 def adapt_vlm(
     checkpoint: Annotated[str, typer.Option(help="Checkpoint folder or hub name: Qwen2.5-VL, Qwen3-VL, LLaVA ...")],
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
+    out: RunFolder,
     pairs: Annotated[int, typer.Option(min=1, help="Picture-instruction pairs; three a picture.")] = 10_000,
     epochs: Annotated[int, typer.Option(min=1, help="How often each pair is seen.")] = 5,
     rate: Annotated[float, typer.Option(min=0.0, help="Learning rate.")] = 1e-5,

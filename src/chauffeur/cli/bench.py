@@ -11,6 +11,7 @@ import typer
 
 from chauffeur.cli.bench_plugin import BenchGroup
 from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options
+from chauffeur.cli.options import BaseUrl
 from chauffeur.concept import LAMPILOT_LIMITS
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ def lampilot(
         bool, typer.Option("--shield", help="Let the run-time shield have the last word; LaMPilot has none.")
     ] = False,
     metrics: MetricsOption = "origin",
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
     concurrency: Annotated[
         int,
         typer.Option(
@@ -172,7 +173,7 @@ def passengers(
     planner: Annotated[str, typer.Option(help="As for `bench lampilot`.")] = "onboard",
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/passengers-PLANNER.")] = None,
     setting: Annotated[str, typer.Option(help="Prompt for language models: `few-shot` or `zero-shot`.")] = "few-shot",
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
     concurrency: Annotated[
         int, typer.Option(min=1, envvar="CHAUFFEUR_CONCURRENCY", help="Planner calls in flight at most.")
     ] = 16,

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from chauffeur.cli.options import BaseUrl
+
 EXAMPLES = """
 Examples:
 
@@ -39,7 +41,7 @@ def hostile(
     shield: Annotated[
         bool, typer.Option("--shield/--no-shield", help="Whether the run-time shield has the last word, as in a drive.")
     ] = True,
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
     concurrency: Annotated[int, typer.Option(min=1, help="Planner calls in flight at most.")] = 16,
     workers: Annotated[int | None, typer.Option(min=1, help="Simulation processes; default one per core.")] = None,
 ) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-ASKING = "Asking"
+from chauffeur.cli.options import ASKING, MaxRequests, MaxUsd, Price
 
 EXAMPLES = """
 Examples:
@@ -51,15 +51,9 @@ def nuplanqa(
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/nuplanqa-PLANNER.")] = None,
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.", rich_help_panel=ASKING)] = None,
     concurrency: Annotated[int, typer.Option(min=1, help="Calls in flight at most.", rich_help_panel=ASKING)] = 8,
-    max_usd: Annotated[
-        float | None, typer.Option(min=0.0, help="Budget of the run in USD.", rich_help_panel=ASKING)
-    ] = None,
-    max_requests: Annotated[
-        int | None, typer.Option(min=0, help="Budget of the run in requests.", rich_help_panel=ASKING)
-    ] = None,
-    price: Annotated[
-        str | None, typer.Option(help="USD per million tokens, IN/OUT, where it is not known.", rich_help_panel=ASKING)
-    ] = None,
+    max_usd: MaxUsd = None,
+    max_requests: MaxRequests = None,
+    price: Price = None,
 ) -> None:
     """Nine subtasks in four-way questions about pictures of a road, beside a baseline that sees none of them."""
     from chauffeur.bench.kernel.report import markdown, tables

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chauffeur.cli.options import ASKING, MaxRequests, MaxUsd, Price, Seed
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-ASKING = "Asking"
 EXAMPLES = """
 Examples:
 
@@ -67,15 +68,9 @@ def openloop(
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/openloop-PLANNER.")] = None,
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.", rich_help_panel=ASKING)] = None,
     concurrency: Annotated[int, typer.Option(min=1, help="Calls in flight at most.", rich_help_panel=ASKING)] = 8,
-    max_usd: Annotated[
-        float | None, typer.Option(min=0.0, help="Budget of the run in USD.", rich_help_panel=ASKING)
-    ] = None,
-    max_requests: Annotated[
-        int | None, typer.Option(min=0, help="Budget of the run in requests.", rich_help_panel=ASKING)
-    ] = None,
-    price: Annotated[
-        str | None, typer.Option(help="USD per million tokens, IN/OUT, where it is not known.", rich_help_panel=ASKING)
-    ] = None,
+    max_usd: MaxUsd = None,
+    max_requests: MaxRequests = None,
+    price: Price = None,
 ) -> None:
     """Waypoints over three seconds from a front picture and own motion, under five averagings (paper Tab. XII)."""
     from chauffeur.bench.kernel.report import markdown, tables
@@ -156,7 +151,7 @@ def frames(
     trips: Annotated[
         int, typer.Option(min=8, help="Trips for training; validation has an eighth, the test split a quarter.")
     ] = 160,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    seed: Seed = 0,
     width: Annotated[int, typer.Option(min=32, help="Pictures' width, px.")] = 160,
     height: Annotated[int, typer.Option(min=32, help="Pictures' height, px.")] = 96,
     seconds: Annotated[float, typer.Option(min=10.0, help="Of a trip in town, at most.")] = 80.0,

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chauffeur.cli.options import BaseUrl, ShardPart
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -39,10 +41,8 @@ def personalization(
     half: Annotated[str, typer.Option(help="Wordings: `test`, or `tuning` to improve a planner.")] = "test",
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/personalization-PLANNER.")] = None,
     workers: Annotated[int, typer.Option(min=1, help="Simulation processes.")] = 1,
-    shard: Annotated[
-        str | None, typer.Option(help="Only part i of n; without it, what shards have done is taken over.")
-    ] = None,
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    shard: ShardPart = None,
+    base_url: BaseUrl = None,
 ) -> None:
     """Takeover rates of simulated passengers (paper Tab. VIII, IX, X): keywords, Talk2Drive, and with memory."""
     from chauffeur.bench.kernel.run import BenchRun

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chauffeur.cli.options import BaseUrl
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -44,7 +46,7 @@ def coach(
     ] = "",
     rounds: Annotated[int, typer.Option(min=1, max=50, help="Attempts at most for each item.")] = 5,
     out: Annotated[Path | None, typer.Option(help="Folder of the attempts; default `runs/coach-<planner>`.")] = None,
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
 ) -> None:
     """Human feedback (paper Tab. IV): drive, say what was wrong, drive again; what did well is kept for more wishes."""
     from chauffeur.bench.kernel.store import RowStore

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from chauffeur.cli.options import BaseUrl
+
 EXAMPLES = """
 Examples:
 
@@ -28,7 +30,7 @@ def coach_town(
     lessons: Annotated[int, typer.Option(min=1, help="Programs that the repository shall hold.")] = 50,
     towns: Annotated[str, typer.Option(help="Only these towns, with commas between.")] = "",
     seed: Annotated[int, typer.Option(help="Of traffic, and of the words of instructions.")] = 0,
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
 ) -> None:
     """Human feedback in towns (paper Tab. V): drive an instruction, say what was wrong, drive again."""
     from chauffeur.bench.leaderboard.coaching import Apprentice, TownCoach, TownLesson

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from chauffeur.cli.options import AuditFile
+
 if TYPE_CHECKING:
     from chauffeur.drive.recording import RecordedTrip
 
@@ -76,9 +78,7 @@ def drive(
     data: Annotated[
         Path | None, typer.Option(help="LaMPilot's DbLv1 folder, for its own samples.", rich_help_panel=_RESEARCH)
     ] = None,
-    audit: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
-    ] = None,
+    audit: AuditFile = None,
     print_prompt: Annotated[
         bool,
         typer.Option(

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from chauffeur.cli.options import Processes, Seed
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -60,7 +62,7 @@ _SHOWN: Final = 20
 def generate(
     out: Annotated[Path, typer.Option(help="Folder to write; a suite begun there is continued.")],
     items: Annotated[int, typer.Option(min=1, help="Items of the main suite.")] = 4900,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    seed: Seed = 0,
     extras: Annotated[
         int | None,
         typer.Option(
@@ -70,7 +72,7 @@ def generate(
     avoid: Annotated[
         Path | None, typer.Option(help="DbLv1 folder whose instructions must not come up, e.g. LaMPilot's own.")
     ] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
+    workers: Processes = None,
 ) -> None:
     """A suite of our own with the statistics of LaMPilot-Bench (paper Tab. III), split for training and testing."""
     from chauffeur.bench.lampilot.scenes.suite import Suite, SuiteConfig
@@ -119,7 +121,7 @@ def qa(
     scenes: Annotated[
         int, typer.Option(min=5, help="Scenes for training; validation and test have a fifth each.")
     ] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    seed: Seed = 0,
     width: Annotated[int, typer.Option(min=48, help="Pictures' width, px.")] = 448,
     height: Annotated[int, typer.Option(min=32, help="Pictures' height, px.")] = 256,
     frames: Annotated[int, typer.Option(min=1, max=5, help="Instants of a scene that are rendered.")] = 4,
@@ -135,7 +137,7 @@ def qa(
         typer.Option(help="`all`, `staged` streets, our `worlds`, or one: `highway`, `crossing`, `town`, `lot`."),
     ] = "all",
     front: Annotated[int, typer.Option(min=1, max=4, help="Times as wide and high as others: front pictures.")] = 1,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
+    workers: Processes = None,
 ) -> None:
     """Questions about pictures in NuPlanQA's format, from scenes of our own, that no trick can answer."""
     from chauffeur.bench.nuplanqa.scenes.gate import BOUND
@@ -185,7 +187,7 @@ def _folders(manifest: Any) -> list[tuple[str, str, str]]:
 @scenes_app.command(epilog=CHECK_EXAMPLES)
 def check(
     data: Annotated[Path, typer.Argument(help="Suite, or any DbLv1 folder.")],
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
+    workers: Processes = None,
     out: Annotated[Path | None, typer.Option(help="Write every fault as a JSON line.")] = None,
 ) -> None:
     """Drive every scene with the scripted expert, and read every instruction back."""

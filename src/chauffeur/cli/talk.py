@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
+
+from chauffeur.cli.options import AuditFile, Wishes
 
 if TYPE_CHECKING:
     from chauffeur.hmi.cabin import Cabin
@@ -41,9 +42,7 @@ _TRIP_S: Final = 75.0
 
 
 def talk(
-    wishes: Annotated[
-        list[str] | None, typer.Argument(metavar="WISH", help="What you want, one after the other.")
-    ] = None,
+    wishes: Wishes = None,
     person: Annotated[str, typer.Option("--as", help="Whose wishes they are; their memory is used.")] = "",
     planner: Annotated[
         str,
@@ -90,9 +89,7 @@ def talk(
     speak: Annotated[bool, typer.Option("--speak", help="Say replies aloud (espeak-ng).", rich_help_panel=_VOICE)] = (
         False
     ),
-    audit: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
-    ] = None,
+    audit: AuditFile = None,
 ) -> None:
     """Drive in real time and talk: it says what it thinks and what was checked, and remembers how you liked it."""
     from contextlib import ExitStack

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from chauffeur.cli.options import RunFolder, Seed, WeightsSeed
+
 train_app = typer.Typer(no_args_is_help=True, rich_markup_mode="markdown", help="Train models of our own.")
 
 ONBOARD_EXAMPLES = """
@@ -37,8 +39,8 @@ def train() -> None:
 
 @train_app.command(epilog=ONBOARD_EXAMPLES)
 def onboard(
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    out: RunFolder,
+    seed: Seed = 0,
     draws: Annotated[int, typer.Option(min=100, help="Scenes drawn; about six in ten become cases.")] = 22_000,
     per_case: Annotated[int, typer.Option(min=1, help="Wordings tried for each case.")] = 26,
     size: Annotated[str, typer.Option(help="`small` (an hour on two cores), `medium`, or `large` (GPU).")] = "small",
@@ -100,7 +102,7 @@ seed gives the same files; those that ship are of seed 0.
 @train_app.command(epilog=SORTERS_EXAMPLES)
 def sorters(
     out: Annotated[Path, typer.Option(help="Folder for the sorters and their card.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    seed: Seed = 0,
     measured: Annotated[
         bool,
         typer.Option(
@@ -152,8 +154,8 @@ the same command goes on. It needs PyTorch: pip install 'chauffeur[models]'.
 
 @train_app.command("vilad-parking", epilog=VILAD_EXAMPLES)
 def vilad_parking(
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    out: RunFolder,
+    seed: Seed = 0,
     steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 32 commands.")] = 1_200,
     size: Annotated[str, typer.Option(help="Network: `lot` ships; `tiny`, `3M`, `10M` and more.")] = "lot",
     mode: Annotated[str, typer.Option(help="`fixed` pattern training, or `plain` without it.")] = "fixed",
@@ -164,8 +166,8 @@ def vilad_parking(
 
 @train_app.command("vilad-drive", epilog=VILAD_DRIVE_EXAMPLES)
 def vilad_drive(
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    out: RunFolder,
+    seed: Seed = 0,
     steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 32 commands.")] = 3_000,
     size: Annotated[str, typer.Option(help="Network: `lot` ships; `tiny`, `3M`, `10M` and more.")] = "lot",
     mode: Annotated[str, typer.Option(help="`fixed` pattern training, or `plain` without it.")] = "fixed",
@@ -218,8 +220,8 @@ is saved, every half minute; the same command goes on. It needs PyTorch: pip ins
 @train_app.command("vilad-frames", epilog=VILAD_FRAMES_EXAMPLES)
 def vilad_frames(
     data: Annotated[Path, typer.Option(help="Set that `chauffeur bench scenes frames` has made.")],
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of weights and batches.")] = 0,
+    out: RunFolder,
+    seed: WeightsSeed = 0,
     encoder_steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of the encoder.")] = 1_000,
     encoder_batch: Annotated[int, typer.Option(min=1, help="Frames of one of its steps.")] = 32,
     steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of the decoders, each.")] = 500,
@@ -280,7 +282,7 @@ where more are asked for.
 @train_app.command("bev-llm", epilog=BEV_LLM_EXAMPLES)
 def bev_llm(
     data: Annotated[Path, typer.Option(help="Set that `chauffeur bench scenes qa` has made.")],
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
+    out: RunFolder,
     also: Annotated[
         list[Path] | None, typer.Option(help="Another set whose training split is learned as well; may be repeated.")
     ] = None,
@@ -288,7 +290,7 @@ def bev_llm(
     gather_steps: Annotated[int, typer.Option(min=0, help="The same with the encoder frozen.")] = 1500,
     word_steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of language.")] = 300,
     begin: Annotated[Path | None, typer.Option(help="Folder of a network to begin with.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of weights and batches.")] = 0,
+    seed: WeightsSeed = 0,
     ablation: Annotated[str, typer.Option(help="`full`, or what is kept from the network.")] = "full",
 ) -> None:
     """BEV-LLM, compact: questions about multi-view pictures, with a bird's-eye view that remembers (paper Eq. 9-10)."""
@@ -350,8 +352,8 @@ pip install 'chauffeur[models,camera]'.
 
 @train_app.command("vlm", epilog=VLM_EXAMPLES)
 def vlm(
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of weights and batches.")] = 0,
+    out: RunFolder,
+    seed: WeightsSeed = 0,
     scenes: Annotated[int, typer.Option(min=20, help="Pictures to render; each gets three wishes a turn.")] = 6_000,
     steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 20 pictures with three wishes.")] = 1_600,
     size: Annotated[str, typer.Option(help="Network: `compact` ships; `tiny`, `large`.")] = "compact",

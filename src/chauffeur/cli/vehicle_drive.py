@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from chauffeur.cli.options import AuditFile, BaseUrl, Wishes
+
 if TYPE_CHECKING:
     from chauffeur.drive.onroad import VehicleRecorder
     from chauffeur.worlds.ros.settings import VehicleSettings
@@ -36,21 +38,17 @@ _STOPPED_WITH_CTRL_C: Final = 130
 
 def drive(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The vehicle's configuration file; see docs/ros.md.")],
-    wishes: Annotated[
-        list[str] | None, typer.Argument(metavar="WISH", help="What you want, one after the other.")
-    ] = None,
+    wishes: Wishes = None,
     person: Annotated[str, typer.Option("--as", help="Whose wishes they are; what they said before counts.")] = "",
     planner: Annotated[
         str, typer.Option(help="`talk2drive`, `talk2drive/openai/<model>`, or an installed one that gives parameters.")
     ] = "talk2drive",
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
     context: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Where the place, map, weather and rules come from; see docs/services.md."),
     ] = None,
-    audit: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
-    ] = None,
+    audit: AuditFile = None,
     engine: Annotated[
         str, typer.Option(help="For speech: `grammar`, `whisper/<folder>`, `endpoint/<model>`.")
     ] = "grammar",
