@@ -10,13 +10,10 @@ from chauffeur.bench.lampilot.signals import SignalLog
 from chauffeur.concept import (
     JudgedBy,
     Metric,
-    Outcome,
     Parameters,
     Plan,
     Program,
-    ProgramState,
     Scenario,
-    Setpoints,
     Trajectory,
 )
 from chauffeur.drive.episode import Referee
@@ -121,53 +118,20 @@ def _parking_referee(world: World, plan: Plan) -> Referee | None:
     return ParkingReferee(world, world.spot(place)) if place and isinstance(world, ParkingWorld) else None
 
 
-class ScoredFulfilment:
+class ScoredFulfilment(Fulfilment):
     """The referee of a free drive, with LaMPilot's scores beside it."""
 
     def __init__(self, world: HighwayWorld, plan: Plan, wish: str) -> None:
-        self._road = world.perception()
-        self._log = SignalLog(self._road)
-        self._wish = Fulfilment(world, plan, wish)
-
-    def follow(self, setpoints: Setpoints, state: ProgramState) -> None:
-        """What the policy asks for in this control period."""
-        self._wish.follow(setpoints, state)
+        super().__init__(world, plan, wish)
+        self._view = world.perception()
+        self._log = SignalLog(self._view)
 
     def observe(self) -> None:
         """Look at the instant after a control period."""
-        self._log.observe(self._road.instant())
-        self._wish.observe()
-
-    @property
-    def over(self) -> bool:
-        """Whether the wish is done, or will not be."""
-        return self._wish.over
-
-    @property
-    def success(self) -> bool:
-        """Whether all of it is done, and holds."""
-        return self._wish.success
-
-    @property
-    def shortfall(self) -> str:
-        """What is missing, in words."""
-        return self._wish.shortfall
-
-    @property
-    def parts_done(self) -> tuple[int, int]:
-        """Parts that are done, and all of them."""
-        return self._wish.parts_done
-
-    @property
-    def judged_by(self) -> JudgedBy:
-        """Source of what the drive is judged by."""
-        return self._wish.judged_by
-
-    def outcome(self) -> Outcome:
-        """What came of it, collisions apart."""
-        return self._wish.outcome()
+        self._log.observe(self._view.instant())
+        super().observe()
 
     def metrics(self) -> tuple[Metric, ...]:
         """What was asked for and reached; LaMPilot's scores by its own ruler."""
         scores = metrics_of({"success": self.success, "signals": self._log.signals().as_row()})
-        return (*self._wish.metrics(), *scores)
+        return (*super().metrics(), *scores)
