@@ -155,7 +155,7 @@ def rehearsed(
         ScenarioError: The scenario's goal cannot be judged here.
         SandboxError: No worker can be had.
     """
-    place = _sandbox() if sandbox is None else sandbox
+    place = unhurried_sandbox() if sandbox is None else sandbox
     return rehearse(
         world, sources, _judges(scenario), sandbox=place, max_s=MAX_TRY_S, library=library, stop_zone_m=ANY_STOP_M
     )
@@ -166,8 +166,8 @@ def _judges(scenario: Scenario) -> Callable[[HighwayWorld], OriginJudge]:
 
 
 @cache
-def _sandbox() -> Sandbox:
-    """One pool of warm workers for all rehearsals of this process."""
+def unhurried_sandbox() -> Sandbox:
+    """One pool of warm workers for all programs of this process that are tried, not driven."""
     sandbox = Sandbox(UNHURRIED)
     atexit.register(sandbox.close)
     return sandbox
@@ -258,11 +258,11 @@ def _join(desk: _Desk, core: int | None) -> None:
     _joined.append(desk)
     if core is not None:
         os.sched_setaffinity(0, {core})
-    _sandbox()
+    unhurried_sandbox()
 
 
 def _share(scenario: Scenario, sources: Sequence[str], library: str) -> Mapping[int, Rollout]:
-    return _tries(_joined[0], scenario, sources, library, _sandbox())
+    return _tries(_joined[0], scenario, sources, library, unhurried_sandbox())
 
 
 def _tries(
