@@ -31,6 +31,7 @@ from chauffeur.worlds.base import EGO
 from chauffeur.worlds.carla.frames import forward_mps, pose_of, transform_of
 from chauffeur.worlds.carla.server import EGO_BLUEPRINTS, connect, library
 from chauffeur.worlds.path_follower import Chassis
+from chauffeur.worlds.skeleton import ShownWorld, finite
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
 from chauffeur.worlds.town.perception import TownPerception
 
@@ -73,7 +74,7 @@ class CarlaConfig(BaseModel):
     contact_ends: bool = True
 
 
-class CarlaWorld:
+class CarlaWorld(ShownWorld):
     """A CARLA server, stepped at 20 Hz."""
 
     capabilities = TOWN_CAPABILITIES
@@ -168,8 +169,7 @@ class CarlaWorld:
 
     def step(self, command: Command) -> Command:
         """Advance 50 ms under `command`. Raises ScenarioError: the server died."""
-        if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
-            raise ValueError(f"A command must be finite numbers, not {command}.")
+        finite(command)
         asked = max(-LINCOLN_MKZ.most_braking_mps2, min(LINCOLN_MKZ.most_acceleration_mps2, command.acceleration_mps2))
         wheel = max(-LINCOLN_MKZ.most_steering_rad, min(LINCOLN_MKZ.most_steering_rad, command.steering_rad))
         speed = max(0.0, self.observe().ego.speed_mps + asked)  # where it leads within a second
@@ -183,17 +183,6 @@ class CarlaWorld:
         self._tick += 1
         self._shown, self._steering = None, wheel
         return Command(asked, wheel)
-
-    def observe(self) -> Observation:
-        """The present instant as frozen values."""
-        if self._shown is None:
-            self._shown = self._look()
-        return self._shown
-
-    @property
-    def ended(self) -> bool:
-        """Crash, off the road, or out of time."""
-        return self.observe().ended
 
     def perception(self) -> TownPerception:
         """Questions about the present instant."""
