@@ -11,6 +11,7 @@ import typer
 
 from chauffeur.cli.bench_plugin import BenchGroup
 from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options
+from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl
 from chauffeur.concept import LAMPILOT_LIMITS
 
@@ -28,44 +29,11 @@ bench_app = typer.Typer(
     help="Run a benchmark of the field. Results are simulated drives.",
 )
 
-EXAMPLES = """
-Examples:
+EXAMPLES = help_text("bench")
 
-    chauffeur bench lampilot --data DbLv1 --planner onboard
+PASSENGER_EXAMPLES = help_text("bench PASSENGER_EXAMPLES")
 
-    chauffeur bench lampilot --data DbLv1 --planner idm --metrics paper --out runs/idm
-
-    chauffeur bench lampilot --data DbLv1 --planner openai/gpt-4o --setting zero-shot --concurrency 64 --max-usd 5
-
-    chauffeur bench lampilot --data DbLv1 --planner onboard --out runs/big --shard 3/8
-
-    CHAUFFEUR_TIMEOUT_S=600 chauffeur bench lampilot --data DbLv1 --planner openai/local --concurrency 1
-
-The data set is LaMPilot's own (`DbLv1` in its public repository). Ctrl-C keeps what is done; the same command goes on.
-
-Exit codes: 0 done, 1 the endpoint or this machine gave up, 2 bad input, 3 the budget is used up, 130 Ctrl-C. Whatever
-the code, what was asked and driven is kept.
-"""
-
-PASSENGER_EXAMPLES = """
-Examples:
-
-    chauffeur bench passengers --planner onboard
-
-    chauffeur bench passengers --planner openai/gpt-4o --setting few-shot --concurrency 16
-
-Wishes written by hand, in the words of passengers, each with its right outcome: do this, ask back, or refuse.
-"""
-
-MERGE_EXAMPLES = """
-Examples:
-
-    chauffeur bench merge runs/big runs/big/shard-*
-
-    chauffeur bench merge runs/idm-paper runs/idm --metrics paper
-
-Points are computed anew from what was stored of every drive; nothing is asked or driven.
-"""
+MERGE_EXAMPLES = help_text("bench MERGE_EXAMPLES")
 
 _NAME: Final = 30
 """Longest planner name that leaves a table its columns; of a longer one the end is shown."""

@@ -7,23 +7,10 @@ from typing import Annotated
 
 import typer
 
+from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl
 
-EXAMPLES = """
-Examples:
-
-    chauffeur bench hostile --planner onboard
-
-    chauffeur bench hostile --planner obedient/hidden --no-shield --out runs/worst
-
-    chauffeur bench hostile --planner openai/gpt-4o --items 5 --concurrency 8
-
-`obedient` stands for the worst language model: it writes the program that each attacker wants, `obedient/hidden` with
-numbers that no check can read before driving. Ctrl-C keeps what is done; the same command goes on.
-
-Exit codes: 0 done, 1 the endpoint or this machine gave up, 2 bad input, 130 Ctrl-C. What was found is in the tables,
-not in the exit code.
-"""
+EXAMPLES = help_text("bench_hostile")
 
 
 def hostile(

@@ -7,26 +7,10 @@ from typing import Annotated, Literal
 
 import typer
 
+from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import ASKING, MaxRequests, MaxUsd, Price
 
-EXAMPLES = """
-Examples:
-
-    chauffeur bench nuplanqa --data nuplanqa_eval_test.json --metadata nuplan_metadata.pkl --images nuplan --planner
-    openai/gpt-4o
-
-    chauffeur bench nuplanqa --data qa/test --planner openai/qwen2.5-vl --base-url http://localhost:8000/v1 --shifts all
-
-    chauffeur bench nuplanqa --data qa/test --planner openai/gpt-4o --control text
-
-    chauffeur bench nuplanqa --data qa/test --planner bev-llm
-
-    chauffeur bench nuplanqa --data qa/test --planner transformers/checkpoints/llama-3.2-11b-vision-instruct
-
-`--data` is a file in NuPlanQA's published format, or a folder that `chauffeur bench scenes qa` has made. Pictures that
-are missing or damaged cost their own questions only; they are counted apart. Ctrl-C keeps what is done; the same
-command goes on.
-"""
+EXAMPLES = help_text("bench_nuplanqa")
 
 
 def nuplanqa(

@@ -8,43 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import ASKING, MaxRequests, MaxUsd, Price, Seed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-EXAMPLES = """
-Examples:
-
-    chauffeur bench openloop --data nuscenes --tables v1.0-mini --planner openai/gpt-4o
-
-    chauffeur bench openloop --data nuscenes --tables v1.0-mini --planner openai/MODEL --setting chain-of-thought
-
-    chauffeur bench openloop --data frames --planner vilad-frames --setting sft
-
-    chauffeur bench openloop --data frames --planner vilad-frames/runs/frames/model --setting sft
-
-    chauffeur bench openloop --data frames --planner openai/MODEL --beside runs/openloop-vilad-frames
-
-    chauffeur bench openloop --data nuscenes --tables v1.0-trainval --scene-list train.txt --write-sft sft.jsonl
-
-`--data` is a folder with nuScenes' tables and pictures, or a set that `chauffeur bench scenes frames` has made.
-Constant velocity is printed beside every model: in open loop a car's own motion tells most. Ctrl-C keeps what is done;
-the same command goes on.
-"""
-FRAMES_EXAMPLES = """
-Examples:
-
-    chauffeur bench scenes frames --out frames
-
-    chauffeur bench scenes frames --out frames-large --trips 400 --width 320 --height 192
-
-    chauffeur model train vilad-frames --data frames --out runs/frames
-
-Trips are driven by the worlds' own drivers in our towns, on the highway and over the crossing; frames are chosen by
-what happens in the three seconds after them, so that a car's own motion does not tell it. nuScenes' file format;
-simulated and rendered. Ctrl-C keeps whole trips; the same command goes on.
-"""
+EXAMPLES = help_text("bench_openloop")
+FRAMES_EXAMPLES = help_text("bench_openloop FRAMES_EXAMPLES")
 
 
 def openloop(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl, ShardPart
 
 if TYPE_CHECKING:
@@ -16,19 +17,7 @@ if TYPE_CHECKING:
     from chauffeur.bench.kernel.store import Row
     from chauffeur.bench.personalization.benchmark import StudyBenchmark
 
-EXAMPLES = """
-Examples:
-
-    chauffeur bench personalization --passengers 10
-
-    chauffeur bench personalization --passengers 100 --workers 2 --out runs/personal
-
-    chauffeur bench personalization --planner talk2drive/openai/qwen2.5 --base-url http://localhost:11434/v1
-
-Passengers and drives are simulated. Ctrl-C keeps what is done; the same command goes on.
-
-Exit codes: 0 done, 1 trips failed for want of a planner or of workers, 2 bad input, 130 Ctrl-C.
-"""
+EXAMPLES = help_text("bench_personalization")
 
 
 def personalization(

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chauffeur.cli.examples import help_text
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -16,19 +18,7 @@ if TYPE_CHECKING:
     from chauffeur.camera import ImageTruth
     from chauffeur.concept.weather import Weather
 
-EXAMPLES = """
-Examples:
-
-    chauffeur show camera sheet.png
-
-    chauffeur show camera night.png --scenario intersection --weather night --weather rain --night 1
-
-    chauffeur show camera rig.png --scenario intersection --rig nuscenes --columns 3 --weather snow --grade 0.4
-
-    chauffeur show camera truth.png --scenario parking --weather sunny --truth
-
-The pictures are rendered, not photographs: they show what is where, and the weather, at a glance.
-"""
+EXAMPLES = help_text("camera")
 
 
 def camera(

@@ -8,26 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl, BenchOptions
 
 if TYPE_CHECKING:
     from chauffeur.worlds.conformance import ConformanceFinding
 
-EXAMPLES = """
-Examples:
-
-    chauffeur check world my_package.my_world:MyWorld
-
-    chauffeur check world highway --scenario intersection
-
-    chauffeur check world parking --config '{"aisles": 2}'
-
-    chauffeur check planner my_package.my_planner:MyPlanner/22
-
-    chauffeur check executor speed_profile:SpeedProfileExecutor --policy speed_profile:EXAMPLE
-
-    chauffeur check benchmark right_of_way:RightOfWay
-"""
+EXAMPLES = help_text("check")
 
 check_app = typer.Typer(
     no_args_is_help=True,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl
 
 if TYPE_CHECKING:
@@ -15,19 +16,7 @@ if TYPE_CHECKING:
     from chauffeur.bench.lampilot.coaching import Coached
     from chauffeur.bench.lampilot.critic import Attempt, Critic, CriticJudgement
 
-EXAMPLES = """
-Examples:
-
-    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --ids demo12
-
-    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --ids demo12 --critic evaluator
-
-    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --ids left_lc_s0_c0
-
-Answer each drive with `success` (done as asked: its program is kept), `commit` (keep it, whatever the evaluator
-thinks), `skip`, `quit`, or with what was wrong: those words go back to the model. Ctrl-C keeps what is done; the same
-command goes on.
-"""
+EXAMPLES = help_text("coach")
 
 
 _DEMO = "demo12"

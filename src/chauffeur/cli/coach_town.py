@@ -7,20 +7,10 @@ from typing import Annotated
 
 import typer
 
+from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl
 
-EXAMPLES = """
-Examples:
-
-    chauffeur bench coach-town --repository policies
-
-    chauffeur bench coach-town --routes routes_training.xml --planner openai/gpt-4o --repository policies --lessons 50
-
-Each lesson is one navigation instruction on a piece of a training route. The planner's program is driven there; what
-the evaluator, a program, finds wrong goes back to the planner in words, and a program that drove without fault joins
-the repository. `apprentice` writes the plainest program and mends it by those words alone: it needs no model.
-Ctrl-C keeps what is done; the same command goes on.
-"""
+EXAMPLES = help_text("coach_town")
 
 
 def coach_town(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from chauffeur.cli.examples import WithExamples
+from chauffeur.cli.examples import WithExamples, help_text
 
 maps_app = typer.Typer(
     cls=WithExamples,
@@ -16,24 +16,7 @@ maps_app = typer.Typer(
     help="Towns to drive in: list, build, fetch, export and draw them.",
 )
 
-EXAMPLES = """
-Examples:
-
-    chauffeur maps list
-
-    chauffeur maps show Gridford --out gridford.png
-
-    chauffeur maps build maps/Town05.xodr
-
-    chauffeur maps build Oldbridge --seed 7
-
-    chauffeur maps pull Town02
-
-    chauffeur maps export --host 127.0.0.1
-
-Five towns come with Chauffeur; they are invented. CARLA's are fetched from their public sources, or taken from your
-own CARLA.
-"""
+EXAMPLES = help_text("maps")
 
 Out = Annotated[Path | None, typer.Option("--out", help="Folder of the pack; by default the user's maps folder.")]
 

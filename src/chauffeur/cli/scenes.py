@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import Processes, Seed
 
 if TYPE_CHECKING:
@@ -23,36 +24,11 @@ scenes_app = typer.Typer(
     help="Make, check and count scenes with instructions (LaMPilot's DbLv1 format).",
 )
 
-GENERATE_EXAMPLES = """
-Examples:
+GENERATE_EXAMPLES = help_text("scenes GENERATE_EXAMPLES")
 
-    chauffeur bench scenes generate --out suite
+CHECK_EXAMPLES = help_text("scenes CHECK_EXAMPLES")
 
-    chauffeur bench scenes generate --items 490 --seed 7 --out small --extras 100
-
-    chauffeur bench scenes generate --out suite --avoid DbLv1
-
-Every scene is driven by a scripted expert before it is kept, and every instruction is read back. The same seed gives
-the same suite, however many processes make it. Ctrl-C keeps what is made; the same command goes on.
-"""
-
-CHECK_EXAMPLES = """
-Examples:
-
-    chauffeur bench scenes check suite
-
-    chauffeur bench scenes check DbLv1 --out faults.jsonl
-
-Exit code 1 when anything is wrong. LaMPilot's own data has scenes that are impossible or ask for nothing.
-"""
-
-STATS_EXAMPLES = """
-Examples:
-
-    chauffeur bench scenes stats suite
-
-    chauffeur bench scenes stats DbLv1
-"""
+STATS_EXAMPLES = help_text("scenes STATS_EXAMPLES")
 
 _LINE_EVERY_S: Final = 10.0
 _SHOWN: Final = 20
@@ -94,25 +70,7 @@ def generate(
     _summary(console, out, manifest)
 
 
-QA_EXAMPLES = """
-Examples:
-
-    chauffeur bench scenes qa --out qa --scenes 1000
-
-    chauffeur bench scenes qa --out qa-small --scenes 200 --width 112 --height 64 --frames 2
-
-    chauffeur bench scenes qa --out words --scenes 500 --no-render
-
-    chauffeur bench scenes qa --out streets --scenes 1000 --sources staged
-
-    chauffeur bench scenes qa --out qa --scenes 2000 --pairs 50
-
-Streets are drawn and road users staged, or our highway, crossing, towns and parking lots driven by their own drivers;
-pictures are rendered, and questions of NuPlanQA's nine subtasks answered from the ground truth, about what can be seen.
-Simulated, and named so. At the end tricks are tried on the test split (words of
-the options, control signals, lengths, letters): above 35 % is a failure. Ctrl-C keeps what is rendered; the same
-command goes on.
-"""
+QA_EXAMPLES = help_text("scenes QA_EXAMPLES")
 
 
 @scenes_app.command(epilog=QA_EXAMPLES)

@@ -8,28 +8,12 @@ from typing import Annotated
 
 import typer
 
+from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import RunFolder, Seed, WeightsSeed
 
 train_app = typer.Typer(no_args_is_help=True, rich_markup_mode="markdown", help="Train models of our own.")
 
-ONBOARD_EXAMPLES = """
-Examples:
-
-    chauffeur model train onboard --out runs/onboard
-
-    chauffeur model train onboard --out runs/large --size large --steps 20000 --draws 60000
-
-    chauffeur model train onboard --out runs/onboard --more 4000
-
-    chauffeur model train onboard --out runs/wider --base runs/onboard --steps 8000
-
-    chauffeur model train onboard --out runs/onboard --data-only
-
-    chauffeur bench passengers --planner onboard/runs/onboard/model
-
-Makes its own data first: scenes, programs that were driven in them, and words. The same seed gives the same data.
-Ctrl-C keeps what is done; the same command goes on. It needs PyTorch and tokenizers: pip install 'chauffeur[models]'.
-"""
+ONBOARD_EXAMPLES = help_text("train ONBOARD_EXAMPLES")
 
 
 @train_app.callback()
@@ -87,16 +71,7 @@ def _check_size(size: str) -> None:
         raise ConfigError(f"There is no size {size!r}.", hint=f"Sizes: {', '.join(SIZES)}.")
 
 
-SORTERS_EXAMPLES = """
-Examples:
-
-    chauffeur model train sorters --out runs/sorters
-
-    chauffeur model train sorters --out runs/sorters --measured
-
-Three minutes, without PyTorch; with `--measured`, which leaves out a fifth of the writers in turn, about ten. The same
-seed gives the same files; those that ship are of seed 0.
-"""
+SORTERS_EXAMPLES = help_text("train SORTERS_EXAMPLES")
 
 
 @train_app.command(epilog=SORTERS_EXAMPLES)
@@ -125,31 +100,9 @@ def sorters(
     console.print(f"Sorters: wishes, remarks and weather in {out}; their card: {card}", soft_wrap=True)
 
 
-VILAD_DRIVE_EXAMPLES = """
-Examples:
+VILAD_DRIVE_EXAMPLES = help_text("train VILAD_DRIVE_EXAMPLES")
 
-    chauffeur model train vilad-parking --out runs/vilad
-
-    chauffeur model train vilad-drive --out runs/vilad-drive --base runs/vilad
-
-    chauffeur drive "Turn left and stop near the crosswalk" --scenario open-road --planner vilad/runs/vilad-drive/model
-
-Commands and streets are drawn as it goes, without end; the same seed gives the same model. Ctrl-C keeps what is done;
-the same command goes on. It needs PyTorch: pip install 'chauffeur[models]'.
-"""
-
-VILAD_EXAMPLES = """
-Examples:
-
-    chauffeur model train vilad-parking --out runs/vilad
-
-    chauffeur model train vilad-parking --out runs/vilad-plain --mode plain
-
-    chauffeur drive "I need to charge" --scenario parking-lift --planner vilad/runs/vilad/model
-
-Commands and scenes are drawn as it goes, without end; the same seed gives the same model. Ctrl-C keeps what is done;
-the same command goes on. It needs PyTorch: pip install 'chauffeur[models]'.
-"""
+VILAD_EXAMPLES = help_text("train VILAD_EXAMPLES")
 
 
 @train_app.command("vilad-parking", epilog=VILAD_EXAMPLES)
@@ -198,23 +151,7 @@ def _train_vilad(name: str, out: Path, seed: int, steps: int, size: str, mode: s
     console.print(f"Model: {model}; its card: {model / 'MODEL_CARD.md'}", soft_wrap=True)
 
 
-VILAD_FRAMES_EXAMPLES = """
-Examples:
-
-    chauffeur bench scenes frames --out frames
-
-    chauffeur model train vilad-frames --data frames --out runs/frames
-
-    chauffeur model train vilad-frames --data frames --also more --out runs/long --encoder-steps 8000 --device cuda
-
-    chauffeur bench openloop --data frames --planner vilad-frames/runs/frames/model --setting sft
-
-    chauffeur bench openloop --data frames --planner vilad-frames/runs/frames/model,twin --setting sft
-
-A small vision encoder first, then, over its frozen tokens, the diffusion model and its autoregressive twin, and the
-ego-status MLP that sees no picture. The test split's figures of all of them stand in the model card. Ctrl-C keeps what
-is saved, every half minute; the same command goes on. It needs PyTorch: pip install 'chauffeur[models]'.
-"""
+VILAD_FRAMES_EXAMPLES = help_text("train VILAD_FRAMES_EXAMPLES")
 
 
 @train_app.command("vilad-frames", epilog=VILAD_FRAMES_EXAMPLES)
@@ -257,26 +194,7 @@ def vilad_frames(
     console.print(f"Model: {model}; its card: {model / 'MODEL_CARD.md'}", soft_wrap=True)
 
 
-BEV_LLM_EXAMPLES = """
-Examples:
-
-    chauffeur bench scenes qa --out qa --scenes 3600 --width 224 --height 128 --frames 2 --front 2
-
-    chauffeur model train bev-llm --data qa --out runs/bev-llm
-
-    chauffeur model train bev-llm --data qa --also highways --out runs/far --begin runs/bev-llm/model --steps 1000
-
-    chauffeur model train bev-llm --data qa --out runs/no-bev --ablation no-bev
-
-    chauffeur bench nuplanqa --data qa/test --planner bev-llm/runs/bev-llm/model
-
-The compact network is trained on rendered pictures of staged scenes and of our worlds: first perception, by the ground
-truth of the scenes; then, with the encoder frozen and its features computed once, what gathers them; then the language
-of questions. `--begin` takes over the weights of a network, as far as they fit; a stage of no steps is left out.
-Ablations, trained so from the start: `no-bev`, `no-history`, `single-view`, `blind`; at the end the full network is
-tried without each as well. Ctrl-C keeps what is saved, every two minutes; the same command goes on, with more steps
-where more are asked for.
-"""
+BEV_LLM_EXAMPLES = help_text("train BEV_LLM_EXAMPLES")
 
 
 @train_app.command("bev-llm", epilog=BEV_LLM_EXAMPLES)
@@ -335,19 +253,7 @@ def bev_llm(
     )
 
 
-VLM_EXAMPLES = """
-Examples:
-
-    chauffeur model train vlm --out runs/vlm
-
-    chauffeur model train vlm --out runs/vlm-small --scenes 500 --steps 100
-
-    chauffeur drive "I'm late, but it is slippery" --scenario track-left-turn --planner vlm/runs/vlm/model
-
-Renders its pictures first (about 30 ms each); a quarter of an hour on one core in all. The same seed gives the same
-model. Ctrl-C keeps what is done; the same command goes on. It needs PyTorch and the renderer:
-pip install 'chauffeur[models,camera]'.
-"""
+VLM_EXAMPLES = help_text("train VLM_EXAMPLES")
 
 
 @train_app.command("vlm", epilog=VLM_EXAMPLES)
