@@ -4,7 +4,7 @@
     marks of the words (language.sorter) ----------+
 
 The encoder has read a good part of the world's English; the network and the sorter have read some thousand sentences.
-`chauffeur.models.vlm.sentence_export` makes `encoder.onnx` from the open checkpoint, `models.vlm.ear` the head.
+`benchmarks/shipped_words.py` makes `encoder.onnx` from the open checkpoint, `models.vlm.ear` the head.
 """
 
 from __future__ import annotations
