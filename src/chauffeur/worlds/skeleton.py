@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from chauffeur.concept import Command, Observation, Scenario, ScenarioError
+from chauffeur.concept import Command, JudgedBy, Observation, Outcome, Scenario, ScenarioError
 
 Config = TypeVar("Config", bound=BaseModel)
 
@@ -49,3 +49,28 @@ def config_of(model: type[Config], scenario: Scenario, kind: str) -> Config:
             f"Scenario {scenario.id!r} has a bad {kind} configuration: {faults}.",
             hint="Compare it with a built-in one: chauffeur show scenarios.",
         ) from error
+
+
+class PlaceJudge:
+    """Judge of a trip whose end is a place: the car is there, or it is not. Heirs say when it is over and done."""
+
+    judged_by: Final[JudgedBy] = "place"
+
+    @property
+    def over(self) -> bool:
+        """Whether the trip is decided."""
+        raise NotImplementedError
+
+    @property
+    def success(self) -> bool:
+        """Whether the car is where it was to be."""
+        raise NotImplementedError
+
+    @property
+    def parts_done(self) -> tuple[int, int]:
+        """One where the car is there, of one."""
+        return int(self.success), 1
+
+    def outcome(self) -> Outcome:
+        """What came of it, collisions apart."""
+        return "success" if self.success else "failure" if self.over else "timeout"
