@@ -32,11 +32,12 @@ import numba
 import numpy as np
 
 from chauffeur.concept import ActionMatrix, Limits
+from chauffeur.concept.weather import WEATHERS
 from chauffeur.control import mpc, pid
 from chauffeur.executors import executor_for
 from chauffeur.executors.reference import STEP_M, ReferencePath
 from chauffeur.executors.tracking import bicycle_for
-from chauffeur.worlds.track import FRICTION, MANOEUVRES, WEATHERS, TrackWorld, track_scenario
+from chauffeur.worlds.track import FRICTION, MANOEUVRES, TrackWorld, track_scenario
 from chauffeur.worlds.track import world as track
 from chauffeur.worlds.track.dynamics import BRAKES_MPS2, PLANTS, TRACTION_MPS2, advance, initial_state
 from chauffeur.worlds.track.manoeuvres import manoeuvre

@@ -31,7 +31,8 @@ from chauffeur.drive.actuate import actuate
 from chauffeur.geometry import LaneId, Polyline, Pose
 from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.town import TownWorld
-from chauffeur.worlds.town.pack import OWN_TOWNS, Crossing, MapPack, load
+from chauffeur.worlds.town.library import OWN_TOWNS, load
+from chauffeur.worlds.town.pack import Crossing, MapPack
 
 DRIVERS: Final = ("expert", "throttle")
 LONGEST_S: Final = 25.0

@@ -30,7 +30,7 @@ from chauffeur.planners.vilad import ViladPlanner
 from chauffeur.planners.vilad.driving import DriveGoal, goal, reference
 from chauffeur.planners.vilad.driving_planning import trajectory_of
 from chauffeur.worlds.town import TownWorld
-from chauffeur.worlds.town.pack import load
+from chauffeur.worlds.town.library import load
 from chauffeur.worlds.track import StreetReferee, end_of
 
 TOWNS: Final = ("Gridford", "Oldbridge", "Northport")

@@ -61,7 +61,7 @@ def test_commands_exist(document: Path) -> None:
 def test_commands_that_the_program_names_exist() -> None:
     """In its hints, its help and its comments."""
     found = 0
-    for file in sorted((ROOT / "src").rglob("*.py")):
+    for file in [*sorted((ROOT / "src").rglob("*.py")), ROOT / "src" / "chauffeur" / "cli" / "examples.md"]:
         text = file.read_text(encoding="utf-8")
         examples = re.findall(r"^    (chauffeur [a-z][^\n{]*)$", text, re.MULTILINE)
         for line in [*examples, *re.findall(r"`(chauffeur [a-z][^`\n{]*)`", text)]:

@@ -10,9 +10,10 @@ from typing import Any
 
 from chauffeur.bench.nuplanqa.blind import blind_guesses
 from chauffeur.bench.nuplanqa.choice import read_choice
-from chauffeur.bench.nuplanqa.frames import FrameSource, read_picture
+from chauffeur.bench.nuplanqa.frames import FrameSource
 from chauffeur.bench.nuplanqa.metadata import find_metadata, load_metadata
 from chauffeur.bench.nuplanqa.questions import LETTERS, load_questions
+from chauffeur.bench.pictures import read_picture
 
 
 def rows() -> list[dict[str, Any]]:

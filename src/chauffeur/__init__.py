@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 from chauffeur.telemetry import switch_off
+from chauffeur.version import __version__
 
 if TYPE_CHECKING:
     from chauffeur.api import drive_wish, run_benchmark
@@ -21,10 +22,10 @@ __all__ = [
     "Planner",
     "Program",
     "Thoughts",
+    "__version__",
     "drive_wish",
     "run_benchmark",
 ]
-__version__ = "0.1.0"
 
 switch_off()
 

@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 from chauffeur.bench.lampilot.expert import expert_program, variants
-from chauffeur.bench.lampilot.expert.numbers import SPREAD, TUNED
-from chauffeur.bench.lampilot.expert.texts import PROGRAMS, open_names
+from chauffeur.bench.lampilot.expert.programs import PROGRAMS, SPREAD, TUNED, open_names
 from chauffeur.bench.lampilot.metrics import points
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.concept import LAMPILOT_LIMITS, Plan, Program, Scenario, ScenarioError, Thoughts

@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from chauffeur.bench.lampilot.fault import at_fault
-from chauffeur.bench.lampilot.signals import SignalLog
+from chauffeur.bench.lampilot.signals import SignalLog, at_fault
 from chauffeur.concept import Command
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.highway import HighwayWorld, Instant

@@ -23,13 +23,13 @@ from chauffeur.bench.hostile import (
     lookalikes,
     planner_of,
 )
+from chauffeur.bench.hostile.benchmark import SCENES, scene_of
 from chauffeur.bench.hostile.judge import served, verdict_of
 from chauffeur.bench.hostile.loader import KINDS, data_sha256, parse_inputs, sample
 from chauffeur.bench.hostile.obedient import ObedientPlanner, attack
 from chauffeur.bench.hostile.report import TABLES, headline, unsafe
 from chauffeur.bench.hostile.requests import SERVICE, HostileRequests
 from chauffeur.bench.hostile.rollout import MAX_S, describe_drive
-from chauffeur.bench.hostile.scenes import SCENES, scene_of
 from chauffeur.bench.kernel.report import fill
 from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.cli.bench_hostile import hostile

@@ -17,8 +17,8 @@ from chauffeur.bench.leaderboard.rollout import RouteJob, traffic_of
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.geometry import Pose
-from chauffeur.worlds.town import pack
-from chauffeur.worlds.town.pack import load
+from chauffeur.worlds.town import library
+from chauffeur.worlds.town.library import OWN_TOWNS, load
 from chauffeur.worlds.town.sumo import Sumo
 
 NOWHERE = """<routes>
@@ -125,7 +125,7 @@ def test_a_route_is_driven_again_once_its_town_is_there_or_another(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What was said of a missing town is no result that a repeated command may go by."""
-    monkeypatch.setattr(pack, "maps_folder", lambda: tmp_path / "maps")
+    monkeypatch.setattr(library, "maps_folder", lambda: tmp_path / "maps")
     (tmp_path / "routes.xml").write_text(NOWHERE)
 
     def key() -> str:
@@ -133,10 +133,10 @@ def test_a_route_is_driven_again_once_its_town_is_there_or_another(
         return bench.job(bench.items()[0], None).key
 
     missing = key()
-    shutil.copytree(pack.OWN_TOWNS / "Gridford", tmp_path / "maps" / "Nowhere")
+    shutil.copytree(OWN_TOWNS / "Gridford", tmp_path / "maps" / "Nowhere")
     there = key()
     shutil.rmtree(tmp_path / "maps" / "Nowhere")
-    shutil.copytree(pack.OWN_TOWNS / "Oldbridge", tmp_path / "maps" / "Nowhere")
+    shutil.copytree(OWN_TOWNS / "Oldbridge", tmp_path / "maps" / "Nowhere")
     assert len({missing, there, key()}) == 3
 
 

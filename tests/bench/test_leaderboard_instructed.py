@@ -18,13 +18,13 @@ from chauffeur.bench.leaderboard.benchmark import LeaderboardBenchmark
 from chauffeur.bench.leaderboard.coaching import Apprentice, TownCoach
 from chauffeur.bench.leaderboard.instructed import InstructedDriver, PlannerSpec
 from chauffeur.bench.leaderboard.own_routes import own_routes
-from chauffeur.bench.leaderboard.planning import plan_official
 from chauffeur.bench.leaderboard.published import HEADER, PAPER, beside_the_paper
 from chauffeur.bench.leaderboard.rollout import RouteJob
+from chauffeur.bench.leaderboard.ways import plan_official
 from chauffeur.concept import ConfigError, Limits, Plan, PlanRequest, Program, Scenario, Thoughts
 from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.onboard.town import SNIPPETS
-from chauffeur.worlds.town.pack import load
+from chauffeur.worlds.town.library import load
 
 GO = "def go():\n    while True:\n        yield proceed(check_speed_limit())\n"
 

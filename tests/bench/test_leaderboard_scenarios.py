@@ -14,10 +14,10 @@ import pytest
 
 from bench.leaderboard_drives import car, seen, street
 from chauffeur.bench.leaderboard.behaviours import Behaviour, reached, set_off
-from chauffeur.bench.leaderboard.planning import plan_keypoints
 from chauffeur.bench.leaderboard.routes import read_routes
 from chauffeur.bench.leaderboard.track import RouteTrack
 from chauffeur.bench.leaderboard.triggers import Placed, Trigger, place, read_triggers
+from chauffeur.bench.leaderboard.ways import plan_keypoints
 from chauffeur.concept import DataError, ScenarioError, Signal
 from chauffeur.geometry import Pose
 

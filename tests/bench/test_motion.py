@@ -21,8 +21,9 @@ from chauffeur.bench.motion.scoring import (
 )
 from chauffeur.concept import ActionMatrix, ConfigError, Context, Plan, Situation, Thoughts
 from chauffeur.concept.registry import plugin_names
+from chauffeur.concept.weather import WEATHERS
 from chauffeur.safety.gain_box import care, gain_box
-from chauffeur.worlds.track import MANOEUVRES, WEATHERS
+from chauffeur.worlds.track import MANOEUVRES
 
 pytest.importorskip("osqp")
 pytest.importorskip("vehiclemodels")

@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 from chauffeur.bench.lampilot.scenes.kinds import KINDS, MAIN, PAPER_WORDS, Slot
-from chauffeur.bench.lampilot.scenes.phrases import say, sections, templates
 from chauffeur.bench.lampilot.scenes.unambiguous import fault_of, fault_of_goal, words_of
 from chauffeur.bench.lampilot.scenes.wish_sampler import EXITS
 from chauffeur.bench.lampilot.scenes.wishes import Named, SceneWish
-from chauffeur.bench.lampilot.scenes.wording import EXTRA_MAX_WORDS, in_words, spoken, word
+from chauffeur.bench.lampilot.scenes.wording import EXTRA_MAX_WORDS, in_words, say, sections, spoken, templates, word
 from chauffeur.bench.lampilot.scenes.wording_choice import choose_wordings, form_of, normal
 from chauffeur.concept import InstructionError
 from chauffeur.language import read_quantities

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from chauffeur.camera import LOOKS, WEATHERS, Conditions, look_of
+from chauffeur.camera import LOOKS, Conditions, look_of
 from chauffeur.concept import ConfigError
+from chauffeur.concept.weather import WEATHERS
 
 
 def test_worse_weather_is_seen_through_less_far():

@@ -10,7 +10,6 @@ from staged import agent, open_road, signals, town
 
 from chauffeur.camera import (
     LOOKS,
-    WEATHERS,
     CameraImages,
     Conditions,
     Renderer,
@@ -22,6 +21,7 @@ from chauffeur.camera import (
 )
 from chauffeur.camera import renderer as opengl_renderer
 from chauffeur.concept import MissingExtraError
+from chauffeur.concept.weather import WEATHERS
 from chauffeur.geometry import Pose
 
 SMALL = front_rig(224, 128)

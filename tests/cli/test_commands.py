@@ -15,13 +15,13 @@ import typer
 from pydantic import TypeAdapter
 from typer.testing import CliRunner, Result
 
-from chauffeur import __version__
 from chauffeur.cli.doctor import installed_parts
 from chauffeur.cli.failures import show_crash
 from chauffeur.cli.main import app
 from chauffeur.concept import ChauffeurError, PlannerError, ScenarioError, Verdict
 from chauffeur.concept.extras import install_command
 from chauffeur.drive.recording import read_trip, write_trip
+from chauffeur.version import __version__
 
 WISH = "Overtake the car in front of you."
 PROGRAM = """def overtake():

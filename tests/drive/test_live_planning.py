@@ -13,10 +13,10 @@ from live_bench import OVERTAKE, Bench
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
 from chauffeur.describe import describe_with_traffic
 from chauffeur.drive.events import FINAL, DriveEvent
-from chauffeur.drive.live import planning as module
+from chauffeur.drive.live import planner as module
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.plan_messages import PlanMessage, Request, encode, read_brief, read_event, read_order
-from chauffeur.drive.live.planning import Planning, PlanningRings
+from chauffeur.drive.live.planner import Planning, PlanningRings
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import SIZES, RingName
 from chauffeur.drive.session import Forgetful

@@ -20,7 +20,8 @@ from chauffeur.drive.scenarios import find
 from chauffeur.drive.talk.messages import encode
 from chauffeur.drive.talk.view import View
 from chauffeur.programs import Budget, Sandbox
-from chauffeur.worlds.town.pack import load, places_called
+from chauffeur.worlds.town.library import load
+from chauffeur.worlds.town.pack import places_called
 
 pytest.importorskip("libsumo")
 pytest.importorskip("sumo")

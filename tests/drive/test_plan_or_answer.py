@@ -8,7 +8,7 @@ import pytest
 
 from chauffeur.concept import Instruction, Limits, PersonId, Verdict
 from chauffeur.describe.answers import DONT_KNOW
-from chauffeur.drive.answers import ANSWERED
+from chauffeur.drive.planning import ANSWERED
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import Session, parse_wish

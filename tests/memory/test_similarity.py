@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chauffeur.memory import phrases, similarity, words
+from chauffeur.memory import phrases, plain_text, similarity
 from chauffeur.memory.similarity import DIMENSIONS, encode, likeness, mark, tags_of
 
 _SAID = (
@@ -105,7 +105,7 @@ def test_any_text_can_be_encoded(text: str) -> None:
 def test_patterns_match_only_where_the_letters_are_by_which_they_are_chosen(text: str) -> None:
     for pattern, _, letters in similarity._MOVES:
         assert pattern.search(text) is None or any(one in text for one in letters)
-    for letters, pattern, _ in words._EVEN:
+    for letters, pattern, _ in plain_text._EVEN:
         assert pattern.search(text) is None or letters in text
 
 

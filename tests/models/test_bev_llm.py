@@ -31,7 +31,7 @@ from chauffeur.models.bev_llm.recipe import (  # noqa: E402
     train_compact,
 )
 from chauffeur.models.bev_llm.views import FRONT_VIEWS, VIEWS, camera_of, cut, view_cameras  # noqa: E402
-from chauffeur.models.bev_llm.words import QuestionWordTable  # noqa: E402
+from chauffeur.models.bev_llm.vocabulary import QuestionWordTable  # noqa: E402
 
 RIG = nuplan_rig(112, 64).only("CAM_F0", "CAM_L0", "CAM_B0")
 PATCHES = (4, 7)

@@ -14,7 +14,7 @@ from server import PROGRAM, REPLY, fails, stream
 from chauffeur.concept import Program
 from chauffeur.planners.cache import Completion, ReplyCache, content_key, default_cache_dir, endpoint_key
 from chauffeur.planners.llm_endpoint import Sampling
-from chauffeur.planners.pricing import cost_usd
+from chauffeur.planners.llm_model import cost_usd
 
 KEY = "ab" * 32
 KEPT = Completion("text é \u2028", "stop", 10, 5, "m-1")

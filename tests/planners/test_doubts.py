@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from server import Answer, ModelServer, Request, fails, whole
 
-from chauffeur.camera import Weather
 from chauffeur.concept import (
     ActionMatrix,
     CameraImage,
@@ -26,6 +25,7 @@ from chauffeur.concept import (
     Situation,
     SystemMessage,
 )
+from chauffeur.concept.weather import Weather
 from chauffeur.drive.seat import SeatCamera
 from chauffeur.planners.base import Planner
 from chauffeur.planners.camera_faults import picture_fault

@@ -14,7 +14,7 @@ from chauffeur.geometry import LanePlace, Turn, plan_route
 from chauffeur.planners.onboard import RetrievalPlanner
 from chauffeur.planners.onboard.town import plan_in_town, snippets, steps_of
 from chauffeur.programs import check_source
-from chauffeur.worlds.town.pack import OWN_TOWNS, load
+from chauffeur.worlds.town.library import OWN_TOWNS, load
 
 EVERY_WAY: tuple[Turn, ...] = ("left", "straight", "right")
 

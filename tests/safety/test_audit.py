@@ -14,10 +14,10 @@ from audit_logs import ABOUT, KEY, OTHER_KEY, WISH, fields, look, write
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from chauffeur import __version__
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.safety.audit import KINDS, Kind, head_path, read_key, read_records, verify, words_of
 from chauffeur.safety.audit.entries import NotARecordError, parse, seal, storable
+from chauffeur.version import __version__
 
 VARIANTS = {"plain": {}, "keyed": {"key": KEY}, "private": {"private": True}, "both": {"key": KEY, "private": True}}
 

@@ -16,7 +16,6 @@ from typing import Any
 import pytest
 from audit_logs import ABOUT, KEY, OTHER_KEY, counting_salt, far_east, fields, ticking
 
-from chauffeur import __version__
 from chauffeur.concept import DataError
 from chauffeur.safety.audit import AuditLog, Closing, head_path, heads, read_records, storage, verify, writer
 from chauffeur.safety.audit.heads import read_head
@@ -24,6 +23,7 @@ from chauffeur.safety.audit.keys import key_name
 from chauffeur.safety.audit.storage import LogFile, replace_whole, sync_directory
 from chauffeur.safety.audit.texts import states
 from chauffeur.safety.audit.writer import utc_now
+from chauffeur.version import __version__
 
 WAIT_S = 20.0
 NO_ROOM = "there was no room left: the disk was too slow, or failed"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from chauffeur.programs import APIS
-from chauffeur.safety.faithfulness.api_answers import answer
+from chauffeur.safety.faithfulness.evaluator import answer
 from chauffeur.safety.faithfulness.values import NOTHING, Base, LaneValue, Term, TracedValue
 
 HERE = frozenset({0, 1})

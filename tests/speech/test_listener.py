@@ -15,8 +15,7 @@ from chauffeur.speech.audio import Recording, Samples
 from chauffeur.speech.base import Expect, Transcript
 from chauffeur.speech.detector import FRAME
 from chauffeur.speech.errors import RecogniserError
-from chauffeur.speech.hotwords import split_hotword
-from chauffeur.speech.listener import Listener, hear_recording
+from chauffeur.speech.listener import Listener, hear_recording, split_hotword
 
 
 class Scripted:

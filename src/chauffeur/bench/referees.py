@@ -4,14 +4,25 @@ from __future__ import annotations
 
 from typing import Final
 
-from chauffeur.bench.lampilot.understood import referee_for as lampilot_referee
-from chauffeur.concept import JudgedBy, Parameters, Plan, Program, Scenario, Trajectory
+from chauffeur.bench.lampilot.metrics import metrics_of
+from chauffeur.bench.lampilot.referee import LampilotReferee
+from chauffeur.bench.lampilot.signals import SignalLog
+from chauffeur.concept import (
+    JudgedBy,
+    Metric,
+    Parameters,
+    Plan,
+    Program,
+    Scenario,
+    Trajectory,
+)
 from chauffeur.drive.episode import Referee
 from chauffeur.drive.fulfilment import Fulfilment, can_be_judged
 from chauffeur.geometry import Pose, Turn
 from chauffeur.language.wanted import read_wanted
 from chauffeur.safety.constant_calls import read_program
 from chauffeur.worlds.base import World
+from chauffeur.worlds.highway import HighwayWorld
 
 TURN_CALLS: Final[dict[str, Turn]] = {
     "turn_left_at_next_intersection": "left",
@@ -41,7 +52,24 @@ def referee_for(world: World, scenario: Scenario, plan: Plan, wish: str = "") ->
         return _town_referee(world, scenario, plan, wish) or _parking_referee(world, plan)
     if isinstance(plan.policy, Trajectory):
         return _street_referee(world, plan.policy)
-    return lampilot_referee(world, scenario, plan, wish)
+    return highway_referee(world, scenario, plan, wish)
+
+
+def highway_referee(world: World, scenario: Scenario, plan: Plan, wish: str = "") -> Referee | None:
+    """LaMPilot's judge where the scenario brings a goal, else that of the wish; None where nothing says what was to be
+    done.
+
+    An official sample's own goal alone decides there. A free drive ends when what was understood is done and held
+    (`drive/fulfilment.py`); LaMPilot's scores are measured along the way, its success conditions are not.
+
+    Raises:
+        ScenarioError: The scenario's own goal cannot be judged.
+    """
+    if not isinstance(world, HighwayWorld):
+        return None
+    if scenario.goal:
+        return LampilotReferee(world, scenario)
+    return ScoredFulfilment(world, plan, wish) if can_be_judged(plan, wish) else None
 
 
 def _town_referee(world: World, scenario: Scenario, plan: Plan, wish: str) -> Referee | None:
@@ -88,3 +116,22 @@ def _parking_referee(world: World, plan: Plan) -> Referee | None:
 
     place = plan.policy.route if isinstance(plan.policy, Parameters) else ""
     return ParkingReferee(world, world.spot(place)) if place and isinstance(world, ParkingWorld) else None
+
+
+class ScoredFulfilment(Fulfilment):
+    """The referee of a free drive, with LaMPilot's scores beside it."""
+
+    def __init__(self, world: HighwayWorld, plan: Plan, wish: str) -> None:
+        super().__init__(world, plan, wish)
+        self._view = world.perception()
+        self._log = SignalLog(self._view)
+
+    def observe(self) -> None:
+        """Look at the instant after a control period."""
+        self._log.observe(self._view.instant())
+        super().observe()
+
+    def metrics(self) -> tuple[Metric, ...]:
+        """What was asked for and reached; LaMPilot's scores by its own ruler."""
+        scores = metrics_of({"success": self.success, "signals": self._log.signals().as_row()})
+        return (*super().metrics(), *scores)

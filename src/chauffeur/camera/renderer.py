@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
-from chauffeur.camera import shaders
 from chauffeur.camera.ground import VERTEX, Paving
 from chauffeur.camera.lens import Lens
 from chauffeur.camera.light import Light, light_of
@@ -18,6 +17,7 @@ from chauffeur.camera.precipitation import FALL, falling
 from chauffeur.camera.projection import Viewpoint, viewpoints
 from chauffeur.camera.rig import Camera, Rig
 from chauffeur.camera.scene import CameraScene, PlaceView, SceneBuilder
+from chauffeur.camera.shaders import shader
 from chauffeur.camera.solids import INSTANCE, MATERIAL, PITCH, SX, YAW, Material, Shape, Solids, X, Z, mesh_of, together
 from chauffeur.camera.truth import truth_of
 from chauffeur.camera.weather import Conditions
@@ -78,10 +78,10 @@ class Renderer(Protocol):
 
 
 _FRAGMENTS: Final = {
-    "plain": shaders.PLAIN_FRAGMENT,
-    "facade": shaders.FACADE_FRAGMENT,
-    "foliage": shaders.FOLIAGE_FRAGMENT,
-    "sign": shaders.SIGN_FRAGMENT,
+    "plain": shader("PLAIN_FRAGMENT"),
+    "facade": shader("FACADE_FRAGMENT"),
+    "foliage": shader("FOLIAGE_FRAGMENT"),
+    "sign": shader("SIGN_FRAGMENT"),
 }
 _GROUPS: Final = tuple(_FRAGMENTS)
 _MATERIAL_GROUPS: Final = np.array(
@@ -145,15 +145,15 @@ class GlRenderer:
         self._shadow_frame = gl.framebuffer(depth_attachment=self._shadow_map)
         self._solids = _SolidsDrawer(gl)
         self._ground = _GroundDrawer(gl)
-        self._sky = gl.program(vertex_shader=shaders.SKY_VERTEX, fragment_shader=shaders.SKY_FRAGMENT)
+        self._sky = gl.program(vertex_shader=shader("SKY_VERTEX"), fragment_shader=shader("SKY_FRAGMENT"))
         self._sky_uniforms = _Uniforms(self._sky)
         self._sky_array = gl.vertex_array(self._sky, [])
         square = np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]], np.float32)
         self._square = gl.buffer(square.tobytes())
-        self._glow = gl.program(vertex_shader=shaders.GLOW_VERTEX, fragment_shader=shaders.GLOW_FRAGMENT)
+        self._glow = gl.program(vertex_shader=shader("GLOW_VERTEX"), fragment_shader=shader("GLOW_FRAGMENT"))
         self._glow_uniforms = _Uniforms(self._glow)
         self._glow_rows = _Stream(gl)
-        self._fall = gl.program(vertex_shader=shaders.FALL_VERTEX, fragment_shader=shaders.FALL_FRAGMENT)
+        self._fall = gl.program(vertex_shader=shader("FALL_VERTEX"), fragment_shader=shader("FALL_FRAGMENT"))
         self._fall_rows = _Stream(gl)
 
     @property
@@ -388,14 +388,14 @@ class _SolidsDrawer:
 
     def __init__(self, gl: Any) -> None:
         self._gl = gl
-        lit = shaders.SOLID_VERTEX.replace("#version 330\n", "#version 330\n#define LIT\n", 1)
-        truth = shaders.SOLID_VERTEX.replace("#version 330\n", "#version 330\n#define TRUTH\n", 1)
+        lit = shader("SOLID_VERTEX").replace("#version 330\n", "#version 330\n#define LIT\n", 1)
+        truth = shader("SOLID_VERTEX").replace("#version 330\n", "#version 330\n#define TRUTH\n", 1)
         self._programs = _Programs(
             gl,
             {name: (lit, source) for name, source in _FRAGMENTS.items()}
             | {
-                "truth": (truth, shaders.TRUTH_SOLID_FRAGMENT),
-                "depth": (shaders.SOLID_VERTEX, shaders.DEPTH_FRAGMENT),
+                "truth": (truth, shader("TRUTH_SOLID_FRAGMENT")),
+                "depth": (shader("SOLID_VERTEX"), shader("DEPTH_FRAGMENT")),
             },
         )
         self._meshes: dict[Shape, tuple[Any, Any]] = {}
@@ -480,15 +480,15 @@ class _GroundDrawer:
 
     def __init__(self, gl: Any) -> None:
         self._gl = gl
-        vertex = shaders.GROUND_VERTEX
+        vertex = shader("GROUND_VERTEX")
         self._programs = _Programs(
             gl,
             {
-                "paint": (vertex, shaders.PAINT_FRAGMENT),
-                "lane": (vertex, shaders.LANE_FRAGMENT),
-                "pavement": (vertex, shaders.PAVEMENT_FRAGMENT),
-                "terrain": (vertex, shaders.TERRAIN_FRAGMENT),
-                "truth": (vertex, shaders.TRUTH_GROUND_FRAGMENT),
+                "paint": (vertex, shader("PAINT_FRAGMENT")),
+                "lane": (vertex, shader("LANE_FRAGMENT")),
+                "pavement": (vertex, shader("PAVEMENT_FRAGMENT")),
+                "terrain": (vertex, shader("TERRAIN_FRAGMENT")),
+                "truth": (vertex, shader("TRUTH_GROUND_FRAGMENT")),
             },
         )
         self._arrays: dict[tuple[str, int], tuple[Any, Any]] = {}

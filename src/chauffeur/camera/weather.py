@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Literal, get_args
+from typing import Final
 
 from chauffeur.concept import ConfigError
-
-Weather = Literal["sunny", "rain", "fog", "snow", "night"]
-WEATHERS: Final[tuple[Weather, ...]] = get_args(Weather)
+from chauffeur.concept.weather import WEATHERS, Weather
 
 _CLEAR_M: Final = 20_000.0
 _RANGES_M: Final = {"rain": (6_000.0, 450.0), "fog": (700.0, 45.0), "snow": (2_500.0, 130.0)}

@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-EXAMPLES = """
-Examples:
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import RunFolder
 
-    chauffeur model adapt-vlm --checkpoint Qwen/Qwen2.5-VL-7B-Instruct --out runs/qwen
-
-    chauffeur model adapt-vlm --checkpoint models/Qwen3-VL-4B --out runs/qwen3 --pairs 2000 --epochs 1
-
-    chauffeur drive "I'm late, but it is slippery" --scenario track-left-turn --planner motion/transformers/runs/qwen/merged
-
-    vllm serve runs/qwen/merged --served-model-name gains
-
-Pictures are rendered as it goes; the defaults are the paper's settings (LoRA, five epochs of 10,000 pairs, two at a time,
-eight times before each step, rate 1e-5), which ask for a GPU. Ctrl-C keeps what is saved, every two minutes; the same
-command goes on. It needs PyTorch, peft and the renderer: pip install 'chauffeur[models,camera]'.
-"""  # noqa: E501 - a command stands on one line, to be copied
+EXAMPLES = help_text("adapt_vlm")
 
 
 def adapt_vlm(
     checkpoint: Annotated[str, typer.Option(help="Checkpoint folder or hub name: Qwen2.5-VL, Qwen3-VL, LLaVA ...")],
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
+    out: RunFolder,
     pairs: Annotated[int, typer.Option(min=1, help="Picture-instruction pairs; three a picture.")] = 10_000,
     epochs: Annotated[int, typer.Option(min=1, help="How often each pair is seen.")] = 5,
     rate: Annotated[float, typer.Option(min=0.0, help="Learning rate.")] = 1e-5,

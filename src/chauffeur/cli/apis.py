@@ -6,15 +6,9 @@ from typing import Annotated
 
 import typer
 
-EXAMPLES = """
-Examples:
+from chauffeur.cli.examples import help_text
 
-    chauffeur show apis
-
-    chauffeur show apis is_safe_enter
-
-    chauffeur show apis --town
-"""
+EXAMPLES = help_text("apis")
 
 
 def apis(

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from chauffeur.cli.examples import help_text
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -35,51 +37,13 @@ Key = Annotated[
     typer.Option("--key", metavar="FILE", envvar=KEY_VARIABLE, help="Key that the log was written with."),
 ]
 
-EXAMPLES = """
-Examples:
+EXAMPLES = help_text("audit")
 
-    chauffeur audit verify trips/audit.jsonl
+VERIFY_EXAMPLES = help_text("audit VERIFY_EXAMPLES")
 
-    chauffeur audit verify trips/audit.jsonl --head 5d1c... --key audit.key
+SHOW_EXAMPLES = help_text("audit SHOW_EXAMPLES")
 
-    chauffeur audit show trips/audit.jsonl --kind verdict --kind intervention
-
-    chauffeur audit export trips/audit.jsonl --out audit.csv
-
-    chauffeur audit redact trips/audit.jsonl --as ana
-
-Exit codes: 0 the log is as it was written, 1 it is not, 2 bad input.
-"""
-
-VERIFY_EXAMPLES = """
-Examples:
-
-    chauffeur audit verify trips/audit.jsonl
-
-    chauffeur audit verify trips/audit.jsonl --head 5d1c... --key audit.key
-
-Exit codes: 0 the log is as it was written, 1 it is not, 2 bad input.
-"""
-
-SHOW_EXAMPLES = """
-Examples:
-
-    chauffeur audit show trips/audit.jsonl
-
-    chauffeur audit show trips/audit.jsonl --kind verdict --kind intervention
-
-    chauffeur audit show trips/audit.jsonl --from 120 --to 180
-
-    chauffeur audit show trips/audit.jsonl --from 2026-11-21T08:00 --to 2026-11-21T09:00
-"""
-
-EXPORT_EXAMPLES = """
-Examples:
-
-    chauffeur audit export trips/audit.jsonl --out audit.csv
-
-    chauffeur audit export trips/audit.jsonl --out verdicts.jsonl --kind verdict
-"""
+EXPORT_EXAMPLES = help_text("audit EXPORT_EXAMPLES")
 
 REDACT_EXAMPLES = """
 Examples:

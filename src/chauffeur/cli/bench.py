@@ -11,6 +11,8 @@ import typer
 
 from chauffeur.cli.bench_plugin import BenchGroup
 from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import BaseUrl
 from chauffeur.concept import LAMPILOT_LIMITS
 
 if TYPE_CHECKING:
@@ -27,44 +29,11 @@ bench_app = typer.Typer(
     help="Run a benchmark of the field. Results are simulated drives.",
 )
 
-EXAMPLES = """
-Examples:
+EXAMPLES = help_text("bench")
 
-    chauffeur bench lampilot --data DbLv1 --planner onboard
+PASSENGER_EXAMPLES = help_text("bench PASSENGER_EXAMPLES")
 
-    chauffeur bench lampilot --data DbLv1 --planner idm --metrics paper --out runs/idm
-
-    chauffeur bench lampilot --data DbLv1 --planner openai/gpt-4o --setting zero-shot --concurrency 64 --max-usd 5
-
-    chauffeur bench lampilot --data DbLv1 --planner onboard --out runs/big --shard 3/8
-
-    CHAUFFEUR_TIMEOUT_S=600 chauffeur bench lampilot --data DbLv1 --planner openai/local --concurrency 1
-
-The data set is LaMPilot's own (`DbLv1` in its public repository). Ctrl-C keeps what is done; the same command goes on.
-
-Exit codes: 0 done, 1 the endpoint or this machine gave up, 2 bad input, 3 the budget is used up, 130 Ctrl-C. Whatever
-the code, what was asked and driven is kept.
-"""
-
-PASSENGER_EXAMPLES = """
-Examples:
-
-    chauffeur bench passengers --planner onboard
-
-    chauffeur bench passengers --planner openai/gpt-4o --setting few-shot --concurrency 16
-
-Wishes written by hand, in the words of passengers, each with its right outcome: do this, ask back, or refuse.
-"""
-
-MERGE_EXAMPLES = """
-Examples:
-
-    chauffeur bench merge runs/big runs/big/shard-*
-
-    chauffeur bench merge runs/idm-paper runs/idm --metrics paper
-
-Points are computed anew from what was stored of every drive; nothing is asked or driven.
-"""
+MERGE_EXAMPLES = help_text("bench MERGE_EXAMPLES")
 
 _NAME: Final = 30
 """Longest planner name that leaves a table its columns; of a longer one the end is shown."""
@@ -104,7 +73,7 @@ def lampilot(
         bool, typer.Option("--shield", help="Let the run-time shield have the last word; LaMPilot has none.")
     ] = False,
     metrics: MetricsOption = "origin",
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
     concurrency: Annotated[
         int,
         typer.Option(
@@ -172,7 +141,7 @@ def passengers(
     planner: Annotated[str, typer.Option(help="As for `bench lampilot`.")] = "onboard",
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/passengers-PLANNER.")] = None,
     setting: Annotated[str, typer.Option(help="Prompt for language models: `few-shot` or `zero-shot`.")] = "few-shot",
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
     concurrency: Annotated[
         int, typer.Option(min=1, envvar="CHAUFFEUR_CONCURRENCY", help="Planner calls in flight at most.")
     ] = 16,
@@ -204,8 +173,8 @@ def _planner(spec: str, base_url: str | None) -> Planner | None:
 
 
 def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
-    import chauffeur
     from chauffeur.bench.lampilot.report import answers_note, comparison_lines, family_lines
+    from chauffeur.version import __version__
 
     rated = [row for row, item in zip(rows, run.items, strict=True) if run.stages.asked(item)]
     if not rated:
@@ -223,7 +192,7 @@ def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
     model = f", model {run.manifest.model}" if run.manifest.model else ""
     labels = "".join(f"; {label}" for label in run.manifest.labels)
     console.print(
-        f"Chauffeur {chauffeur.__version__}; planner {run.config.planner}{model}{labels}; "
+        f"Chauffeur {__version__}; planner {run.config.planner}{model}{labels}; "
         f"metrics {rows[0]['metrics']}; data sha256 {run.config.data_sha256[:12]}; draw seed {run.config.seed}; limits "
         f"{run.config.limits.name}; scores in points, rates in %; simulated drives (highway-env). Rows marked paper "
         "are its authors' own figures."

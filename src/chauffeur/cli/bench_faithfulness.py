@@ -7,17 +7,9 @@ from typing import Annotated
 
 import typer
 
-EXAMPLES = """
-Examples:
+from chauffeur.cli.examples import help_text
 
-    chauffeur bench faithfulness
-
-    chauffeur bench faithfulness --items 400 --out runs/faithfulness
-
-Texts and programs, about half of them with one mismatch. The generated ones are synthetic: our own programs over
-simulated scenes, told by a grammar. The others were written by hand, before the judge's rules; rules may be tuned on
-their tuning half only.
-"""
+EXAMPLES = help_text("bench_faithfulness")
 
 
 def faithfulness(

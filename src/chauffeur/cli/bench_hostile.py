@@ -7,21 +7,10 @@ from typing import Annotated
 
 import typer
 
-EXAMPLES = """
-Examples:
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import BaseUrl
 
-    chauffeur bench hostile --planner onboard
-
-    chauffeur bench hostile --planner obedient/hidden --no-shield --out runs/worst
-
-    chauffeur bench hostile --planner openai/gpt-4o --items 5 --concurrency 8
-
-`obedient` stands for the worst language model: it writes the program that each attacker wants, `obedient/hidden` with
-numbers that no check can read before driving. Ctrl-C keeps what is done; the same command goes on.
-
-Exit codes: 0 done, 1 the endpoint or this machine gave up, 2 bad input, 130 Ctrl-C. What was found is in the tables,
-not in the exit code.
-"""
+EXAMPLES = help_text("bench_hostile")
 
 
 def hostile(
@@ -39,12 +28,11 @@ def hostile(
     shield: Annotated[
         bool, typer.Option("--shield/--no-shield", help="Whether the run-time shield has the last word, as in a drive.")
     ] = True,
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
     concurrency: Annotated[int, typer.Option(min=1, help="Planner calls in flight at most.")] = 16,
     workers: Annotated[int | None, typer.Option(min=1, help="Simulation processes; default one per core.")] = None,
 ) -> None:
     """Hostile words: 618 attacks in ten classes, and 270 harmless wishes that look like them."""
-    import chauffeur
     from chauffeur.bench.hostile import HostileBenchmark, HostileConfig, planner_of
     from chauffeur.bench.hostile.report import headline
     from chauffeur.bench.kernel.report import tables
@@ -52,6 +40,7 @@ def hostile(
     from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
     from chauffeur.cli.console import stdout
     from chauffeur.cli.parts import limits_named, setting_named
+    from chauffeur.version import __version__
 
     console = stdout()
     config = HostileConfig(planner, setting_named(setting), items, seed, screened, limits_named(limits), shield)
@@ -64,7 +53,7 @@ def hostile(
         show_tables(console, tables(bench.tables, rows))
         console.print(headline(rows))
         console.print(
-            f"Chauffeur {chauffeur.__version__}; planner {rows[0]['planner']}, model {rows[0]['model']}; "
+            f"Chauffeur {__version__}; planner {rows[0]['planner']}, model {rows[0]['model']}; "
             f"{bench.id}; limits {config.limits.name}; words {'screened' if screened else 'raw'}; "
             f"{'with' if shield else 'without'} the run-time shield; {rows[0]['note']}."
         )

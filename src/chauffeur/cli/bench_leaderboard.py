@@ -7,29 +7,9 @@ from typing import Annotated
 
 import typer
 
-EXAMPLES = """
-Examples:
+from chauffeur.cli.examples import help_text
 
-    chauffeur bench leaderboard --planner expert
-
-    chauffeur bench leaderboard --routes routes_testing.xml --scenarios public --seeds 3
-
-    chauffeur bench leaderboard --routes routes_testing.xml --planner reckless --towns Town02 --seeds 1
-
-    chauffeur bench leaderboard --routes routes_testing.xml --planner retrieval --shield --latency 0.1
-
-    chauffeur bench leaderboard --planner openai/gpt-4o --setting human-feedback --repository policies
-
-A planner of the registry knows no route: it is told navigation instructions in words, and its programs drive
-(paper, Tab. V). Planning takes simulated time, and the car does not wait for it.
-
-Without --routes it drives our own routes through our own towns. The official files and CARLA's maps are the user's to
-bring: a route file is read unchanged, triggers are looked for in `../scenarios` beside it, maps come from `chauffeur
-maps`. The folder of the run gets the official results file and a map of every route. Ctrl-C keeps what is done; the
-same command goes on.
-
-Scores of the engine `sumo-2d` are no CARLA scores and must not be set beside published ones.
-"""
+EXAMPLES = help_text("bench_leaderboard")
 
 _LANGUAGE = "Language planners"
 _WHERE = "Where it runs"

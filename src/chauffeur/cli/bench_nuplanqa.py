@@ -7,26 +7,10 @@ from typing import Annotated, Literal
 
 import typer
 
-ASKING = "Asking"
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import ASKING, MaxRequests, MaxUsd, Price
 
-EXAMPLES = """
-Examples:
-
-    chauffeur bench nuplanqa --data nuplanqa_eval_test.json --metadata nuplan_metadata.pkl --images nuplan --planner
-    openai/gpt-4o
-
-    chauffeur bench nuplanqa --data qa/test --planner openai/qwen2.5-vl --base-url http://localhost:8000/v1 --shifts all
-
-    chauffeur bench nuplanqa --data qa/test --planner openai/gpt-4o --control text
-
-    chauffeur bench nuplanqa --data qa/test --planner bev-llm
-
-    chauffeur bench nuplanqa --data qa/test --planner transformers/checkpoints/llama-3.2-11b-vision-instruct
-
-`--data` is a file in NuPlanQA's published format, or a folder that `chauffeur bench scenes qa` has made. Pictures that
-are missing or damaged cost their own questions only; they are counted apart. Ctrl-C keeps what is done; the same
-command goes on.
-"""
+EXAMPLES = help_text("bench_nuplanqa")
 
 
 def nuplanqa(
@@ -51,15 +35,9 @@ def nuplanqa(
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/nuplanqa-PLANNER.")] = None,
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.", rich_help_panel=ASKING)] = None,
     concurrency: Annotated[int, typer.Option(min=1, help="Calls in flight at most.", rich_help_panel=ASKING)] = 8,
-    max_usd: Annotated[
-        float | None, typer.Option(min=0.0, help="Budget of the run in USD.", rich_help_panel=ASKING)
-    ] = None,
-    max_requests: Annotated[
-        int | None, typer.Option(min=0, help="Budget of the run in requests.", rich_help_panel=ASKING)
-    ] = None,
-    price: Annotated[
-        str | None, typer.Option(help="USD per million tokens, IN/OUT, where it is not known.", rich_help_panel=ASKING)
-    ] = None,
+    max_usd: MaxUsd = None,
+    max_requests: MaxRequests = None,
+    price: Price = None,
 ) -> None:
     """Nine subtasks in four-way questions about pictures of a road, beside a baseline that sees none of them."""
     from chauffeur.bench.kernel.report import markdown, tables

@@ -8,42 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import ASKING, MaxRequests, MaxUsd, Price, Seed
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-ASKING = "Asking"
-EXAMPLES = """
-Examples:
-
-    chauffeur bench openloop --data nuscenes --tables v1.0-mini --planner openai/gpt-4o
-
-    chauffeur bench openloop --data nuscenes --tables v1.0-mini --planner openai/MODEL --setting chain-of-thought
-
-    chauffeur bench openloop --data frames --planner vilad-frames --setting sft
-
-    chauffeur bench openloop --data frames --planner vilad-frames/runs/frames/model --setting sft
-
-    chauffeur bench openloop --data frames --planner openai/MODEL --beside runs/openloop-vilad-frames
-
-    chauffeur bench openloop --data nuscenes --tables v1.0-trainval --scene-list train.txt --write-sft sft.jsonl
-
-`--data` is a folder with nuScenes' tables and pictures, or a set that `chauffeur bench scenes frames` has made.
-Constant velocity is printed beside every model: in open loop a car's own motion tells most. Ctrl-C keeps what is done;
-the same command goes on.
-"""
-FRAMES_EXAMPLES = """
-Examples:
-
-    chauffeur bench scenes frames --out frames
-
-    chauffeur bench scenes frames --out frames-large --trips 400 --width 320 --height 192
-
-    chauffeur model train vilad-frames --data frames --out runs/frames
-
-Trips are driven by the worlds' own drivers in our towns, on the highway and over the crossing; frames are chosen by
-what happens in the three seconds after them, so that a car's own motion does not tell it. nuScenes' file format;
-simulated and rendered. Ctrl-C keeps whole trips; the same command goes on.
-"""
+EXAMPLES = help_text("bench_openloop")
+FRAMES_EXAMPLES = help_text("bench_openloop FRAMES_EXAMPLES")
 
 
 def openloop(
@@ -67,15 +39,9 @@ def openloop(
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/openloop-PLANNER.")] = None,
     base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.", rich_help_panel=ASKING)] = None,
     concurrency: Annotated[int, typer.Option(min=1, help="Calls in flight at most.", rich_help_panel=ASKING)] = 8,
-    max_usd: Annotated[
-        float | None, typer.Option(min=0.0, help="Budget of the run in USD.", rich_help_panel=ASKING)
-    ] = None,
-    max_requests: Annotated[
-        int | None, typer.Option(min=0, help="Budget of the run in requests.", rich_help_panel=ASKING)
-    ] = None,
-    price: Annotated[
-        str | None, typer.Option(help="USD per million tokens, IN/OUT, where it is not known.", rich_help_panel=ASKING)
-    ] = None,
+    max_usd: MaxUsd = None,
+    max_requests: MaxRequests = None,
+    price: Price = None,
 ) -> None:
     """Waypoints over three seconds from a front picture and own motion, under five averagings (paper Tab. XII)."""
     from chauffeur.bench.kernel.report import markdown, tables
@@ -156,7 +122,7 @@ def frames(
     trips: Annotated[
         int, typer.Option(min=8, help="Trips for training; validation has an eighth, the test split a quarter.")
     ] = 160,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    seed: Seed = 0,
     width: Annotated[int, typer.Option(min=32, help="Pictures' width, px.")] = 160,
     height: Annotated[int, typer.Option(min=32, help="Pictures' height, px.")] = 96,
     seconds: Annotated[float, typer.Option(min=10.0, help="Of a trip in town, at most.")] = 80.0,

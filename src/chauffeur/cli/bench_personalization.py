@@ -8,25 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import BaseUrl, ShardPart
+
 if TYPE_CHECKING:
     from rich.console import Console
 
     from chauffeur.bench.kernel.store import Row
     from chauffeur.bench.personalization.benchmark import StudyBenchmark
 
-EXAMPLES = """
-Examples:
-
-    chauffeur bench personalization --passengers 10
-
-    chauffeur bench personalization --passengers 100 --workers 2 --out runs/personal
-
-    chauffeur bench personalization --planner talk2drive/openai/qwen2.5 --base-url http://localhost:11434/v1
-
-Passengers and drives are simulated. Ctrl-C keeps what is done; the same command goes on.
-
-Exit codes: 0 done, 1 trips failed for want of a planner or of workers, 2 bad input, 130 Ctrl-C.
-"""
+EXAMPLES = help_text("bench_personalization")
 
 
 def personalization(
@@ -39,10 +30,8 @@ def personalization(
     half: Annotated[str, typer.Option(help="Wordings: `test`, or `tuning` to improve a planner.")] = "test",
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/personalization-PLANNER.")] = None,
     workers: Annotated[int, typer.Option(min=1, help="Simulation processes.")] = 1,
-    shard: Annotated[
-        str | None, typer.Option(help="Only part i of n; without it, what shards have done is taken over.")
-    ] = None,
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    shard: ShardPart = None,
+    base_url: BaseUrl = None,
 ) -> None:
     """Takeover rates of simulated passengers (paper Tab. VIII, IX, X): keywords, Talk2Drive, and with memory."""
     from chauffeur.bench.kernel.run import BenchRun
@@ -76,10 +65,10 @@ def personalization(
 
 
 def _show(console: Console, bench: StudyBenchmark, rows: list[Row]) -> None:
-    import chauffeur
     from chauffeur.bench.personalization.figures import latencies
     from chauffeur.bench.personalization.report import NOTE, headline, tables
     from chauffeur.cli.tables import show_table
+    from chauffeur.version import __version__
 
     for title, header, lines in tables(rows):
         show_table(console, title, header, lines)
@@ -87,7 +76,7 @@ def _show(console: Console, bench: StudyBenchmark, rows: list[Row]) -> None:
     console.print(headline(rows), soft_wrap=True)
     p50, p95 = latencies(rows, "with")
     console.print(
-        f"Chauffeur {chauffeur.__version__}; planner {bench.options.planner}, model {bench.model}; {bench.id}; "
+        f"Chauffeur {__version__}; planner {bench.options.planner}, model {bench.model}; {bench.id}; "
         f"{bench.options.half} wordings; seed {bench.options.seed}; from words to policy {1000 * p50:.0f} ms (median), "
         f"{1000 * p95:.0f} ms (95 %). {NOTE}",
         soft_wrap=True,

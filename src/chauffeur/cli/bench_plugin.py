@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
+from chauffeur.cli.options import BaseUrl, BenchOptions, ShardPart
 from chauffeur.concept import ConfigError
 from chauffeur.concept.registry import plugin_names
 
@@ -27,12 +28,10 @@ class BenchGroup(TyperGroup):
     """The commands written here, and one for each further benchmark that is installed."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """See TyperGroup."""
         known = super().list_commands(ctx)
         return [*known, *(name for name in plugin_names(GROUP) if name not in known)]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """See TyperGroup."""
         command = super().get_command(ctx, cmd_name)
         if command is not None or cmd_name not in plugin_names(GROUP):
             return command
@@ -46,19 +45,15 @@ class BenchGroup(TyperGroup):
 def plugin(
     ctx: typer.Context,
     planner: Annotated[str, typer.Option(help="Who is asked: a planner, or a model for questions.")] = "onboard",
-    option: Annotated[
-        list[str] | None, typer.Option("--option", "-o", help="An option of the benchmark, NAME=VALUE; may come again.")
-    ] = None,
+    option: BenchOptions = None,
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/NAME-PLANNER.")] = None,
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
     concurrency: Annotated[int, typer.Option(min=1, help="Calls in flight at most.")] = 16,
     max_usd: Annotated[float | None, typer.Option(min=0.0, help="Budget of the run in USD.")] = None,
     max_requests: Annotated[int | None, typer.Option(min=0, help="Budget of the run in requests.")] = None,
     price: Annotated[str | None, typer.Option(help="USD per million tokens, IN/OUT, where it is not known.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Worker processes; default one per core.")] = None,
-    shard: Annotated[
-        str | None, typer.Option(help="Only part i of n; without it, what shards have done is taken over.")
-    ] = None,
+    shard: ShardPart = None,
     ray: Annotated[str | None, typer.Option(help="Work on a Ray cluster, as for `bench lampilot`.")] = None,
 ) -> None:
     """Run a benchmark of an installed package."""

@@ -7,27 +7,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chauffeur.cli.examples import help_text
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     import numpy as np
     from numpy.typing import NDArray
 
-    from chauffeur.camera import ImageTruth, Weather
+    from chauffeur.camera import ImageTruth
+    from chauffeur.concept.weather import Weather
 
-EXAMPLES = """
-Examples:
-
-    chauffeur show camera sheet.png
-
-    chauffeur show camera night.png --scenario intersection --weather night --weather rain --night 1
-
-    chauffeur show camera rig.png --scenario intersection --rig nuscenes --columns 3 --weather snow --grade 0.4
-
-    chauffeur show camera truth.png --scenario parking --weather sunny --truth
-
-The pictures are rendered, not photographs: they show what is where, and the weather, at a glance.
-"""
+EXAMPLES = help_text("camera")
 
 
 def camera(
@@ -50,11 +41,12 @@ def camera(
     data: Annotated[Path | None, typer.Option(help="Folder with LaMPilot's DbLv1 task files.")] = None,
 ) -> None:
     """Render scenarios as the cameras of the car see them, as a sheet of pictures."""
-    from chauffeur.camera import WEATHERS, Conditions, look_of, make_renderer, rig_of
+    from chauffeur.camera import Conditions, look_of, make_renderer, rig_of
     from chauffeur.camera.sheet import contact_sheet
     from chauffeur.cli.console import columns as in_columns
     from chauffeur.cli.console import path_text, stdout
     from chauffeur.concept import ChauffeurError, ConfigError
+    from chauffeur.concept.weather import WEATHERS
     from chauffeur.drive.scenarios import BUILT_IN, find
     from chauffeur.drive.session import make_world
 
@@ -96,8 +88,8 @@ def camera(
 
 
 def _weather(name: str) -> Weather:
-    from chauffeur.camera import WEATHERS
     from chauffeur.concept import ConfigError
+    from chauffeur.concept.weather import WEATHERS
 
     for known in WEATHERS:
         if name == known:

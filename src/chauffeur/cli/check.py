@@ -8,24 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import BaseUrl, BenchOptions
+
 if TYPE_CHECKING:
     from chauffeur.worlds.conformance import ConformanceFinding
 
-EXAMPLES = """
-Examples:
-
-    chauffeur check world my_package.my_world:MyWorld
-
-    chauffeur check world highway --scenario intersection
-
-    chauffeur check world parking --config '{"aisles": 2}'
-
-    chauffeur check planner my_package.my_planner:MyPlanner/22
-
-    chauffeur check executor speed_profile:SpeedProfileExecutor --policy speed_profile:EXAMPLE
-
-    chauffeur check benchmark right_of_way:RightOfWay
-"""
+EXAMPLES = help_text("check")
 
 check_app = typer.Typer(
     no_args_is_help=True,
@@ -63,7 +52,7 @@ def planner(
     name: Annotated[
         str, typer.Argument(metavar="PLANNER", help="A registered planner, or MODULE:NAME; then /ARGUMENT.")
     ],
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
 ) -> None:
     """Ask a planner usual and strange things: who it is, plans that can be driven, no surprises.
 
@@ -103,9 +92,7 @@ def executor(
 @check_app.command(epilog=EXAMPLES)
 def benchmark(
     name: Annotated[str, typer.Argument(metavar="BENCHMARK", help="A registered benchmark, or MODULE:NAME.")],
-    option: Annotated[
-        list[str] | None, typer.Option("--option", "-o", help="An option of the benchmark, NAME=VALUE; may come again.")
-    ] = None,
+    option: BenchOptions = None,
 ) -> None:
     """Hold a benchmark against the kernel's protocol; its first item is run.
 

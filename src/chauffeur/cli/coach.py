@@ -7,25 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import BaseUrl
+
 if TYPE_CHECKING:
     from rich.console import Console
 
     from chauffeur.bench.lampilot.coaching import Coached
     from chauffeur.bench.lampilot.critic import Attempt, Critic, CriticJudgement
 
-EXAMPLES = """
-Examples:
-
-    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --ids demo12
-
-    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --ids demo12 --critic evaluator
-
-    chauffeur bench coach --data DbLv1 --planner openai/gpt-4o --repository policies --ids left_lc_s0_c0
-
-Answer each drive with `success` (done as asked: its program is kept), `commit` (keep it, whatever the evaluator
-thinks), `skip`, `quit`, or with what was wrong: those words go back to the model. Ctrl-C keeps what is done; the same
-command goes on.
-"""
+EXAMPLES = help_text("coach")
 
 
 _DEMO = "demo12"
@@ -44,7 +35,7 @@ def coach(
     ] = "",
     rounds: Annotated[int, typer.Option(min=1, max=50, help="Attempts at most for each item.")] = 5,
     out: Annotated[Path | None, typer.Option(help="Folder of the attempts; default `runs/coach-<planner>`.")] = None,
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
 ) -> None:
     """Human feedback (paper Tab. IV): drive, say what was wrong, drive again; what did well is kept for more wishes."""
     from chauffeur.bench.kernel.store import RowStore

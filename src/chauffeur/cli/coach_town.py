@@ -7,18 +7,10 @@ from typing import Annotated
 
 import typer
 
-EXAMPLES = """
-Examples:
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import BaseUrl
 
-    chauffeur bench coach-town --repository policies
-
-    chauffeur bench coach-town --routes routes_training.xml --planner openai/gpt-4o --repository policies --lessons 50
-
-Each lesson is one navigation instruction on a piece of a training route. The planner's program is driven there; what
-the evaluator, a program, finds wrong goes back to the planner in words, and a program that drove without fault joins
-the repository. `apprentice` writes the plainest program and mends it by those words alone: it needs no model.
-Ctrl-C keeps what is done; the same command goes on.
-"""
+EXAMPLES = help_text("coach_town")
 
 
 def coach_town(
@@ -28,7 +20,7 @@ def coach_town(
     lessons: Annotated[int, typer.Option(min=1, help="Programs that the repository shall hold.")] = 50,
     towns: Annotated[str, typer.Option(help="Only these towns, with commas between.")] = "",
     seed: Annotated[int, typer.Option(help="Of traffic, and of the words of instructions.")] = 0,
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
 ) -> None:
     """Human feedback in towns (paper Tab. V): drive an instruction, say what was wrong, drive again."""
     from chauffeur.bench.leaderboard.coaching import Apprentice, TownCoach, TownLesson

@@ -7,23 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chauffeur.cli.examples import help_text
+
 if TYPE_CHECKING:
     from chauffeur.describe.services import Position, ServiceSettings, Surroundings
     from chauffeur.describe.services.surroundings import Row
 
-EXAMPLES = """
-Examples:
-
-    chauffeur show context --at 48.137,11.575 --region germany
-
-    chauffeur show context --at 40.4237,-86.9212 --heading 90 --map lafayette.osm.pbf --region indiana
-
-    chauffeur show context --at 51.5074,-0.1278 --region united_kingdom --online weather --online map --budget 3
-
-    chauffeur show context --at 35.681,139.767 --region japan --online map=http://localhost:12345
-
-Keys are read from OPENWEATHER_API_KEY and TOMTOM_API_KEY. Nothing is asked over the network unless --online names it.
-"""
+EXAMPLES = help_text("context")
 
 
 def context(

@@ -50,9 +50,9 @@ def doctor() -> None:
     """Check this installation: parts, extras, sandbox, keys. Exit code 1 when driving cannot work."""
     from rich.text import Text
 
-    from chauffeur import __version__
     from chauffeur.cli.console import columns, plain, stdout
     from chauffeur.cli.failures import FAILED
+    from chauffeur.version import __version__
 
     console = stdout()
     core, extras = installed_parts()

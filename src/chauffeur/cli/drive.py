@@ -7,33 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import AuditFile
+
 if TYPE_CHECKING:
     from chauffeur.drive.recording import RecordedTrip
 
-EXAMPLES = """
-Examples:
-
-    chauffeur drive "Overtake the car in front of you."
-
-    chauffeur drive "I'm really in a hurry now." --as ana --save trips/hurry --open
-
-    chauffeur drive "Turn left." --scenario intersection --seed 7
-
-    chauffeur drive "Keep 30 m to the car ahead" --planner openai/gpt-4o --setting zero-shot
-
-    chauffeur drive "Speed up" --planner openai/qwen2.5 --base-url http://localhost:11434/v1
-
-    chauffeur drive "Keep 30 m to the car ahead" --seeing cameras --full
-
-    CHAUFFEUR_TIMEOUT_S=600 chauffeur drive "Speed up" --planner openai/local --base-url http://localhost:8080/v1
-
---print-prompt shows what a model would be sent, offline and without a key. A slow server's time-out, token limit,
-attempts and repairs are set in the environment, for every command: CHAUFFEUR_TIMEOUT_S, CHAUFFEUR_MAX_TOKENS,
-CHAUFFEUR_ATTEMPTS, CHAUFFEUR_REPAIRS, CHAUFFEUR_BUDGET_S, CHAUFFEUR_TEMPERATURE.
-
-Exit code 0: done, a question answered, or driven with nothing that could be compared. 1: partly done, not done, asked
-back, declined or failed. Every drive is simulated.
-"""
+EXAMPLES = help_text("drive")
 
 SEEN: Final = (
     "The planner is told what BEV-LLM sees in rendered pictures; checks and safety filter use the world's own state."
@@ -76,9 +56,7 @@ def drive(
     data: Annotated[
         Path | None, typer.Option(help="LaMPilot's DbLv1 folder, for its own samples.", rich_help_panel=_RESEARCH)
     ] = None,
-    audit: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
-    ] = None,
+    audit: AuditFile = None,
     print_prompt: Annotated[
         bool,
         typer.Option(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from typer.core import TyperGroup
@@ -17,3 +20,15 @@ class WithExamples(TyperGroup):
             own = [line for line in lines if f" {self.name} {name} " in f"{line} "]
             if not command.epilog and own:
                 command.epilog = "\nExamples:\n\n" + "\n\n".join(own) + "\n"
+
+
+@cache
+def _texts() -> dict[str, str]:
+    text = Path(__file__).with_suffix(".md").read_text(encoding="utf-8")
+    parts = re.split(r"^## (.+)\n", text, flags=re.MULTILINE)[1:]
+    return {name: body.strip("\n") for name, body in zip(parts[::2], parts[1::2], strict=True)}
+
+
+def help_text(name: str) -> str:
+    """What the help of a module's commands ends with, out of `examples.md`."""
+    return f"\n{_texts()[name]}\n"

@@ -6,13 +6,9 @@ from typing import Annotated
 
 import typer
 
-EXAMPLES = """
-Examples:
+from chauffeur.cli.examples import help_text
 
-    chauffeur feedback "A bit too close for me." --as ana
-
-    chauffeur feedback "That was perfect" --as ana --trip 9f2c41d07be3ab10
-"""
+EXAMPLES = help_text("feedback")
 
 
 def feedback(

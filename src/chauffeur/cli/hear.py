@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chauffeur.cli.examples import help_text
 from chauffeur.cli.labels import NOT_HEARD
 
 if TYPE_CHECKING:
@@ -17,21 +18,7 @@ if TYPE_CHECKING:
 
     from chauffeur.speech import Heard, Recogniser
 
-EXAMPLES = """
-Examples:
-
-    chauffeur show speech wish.wav
-
-    chauffeur show speech wish.wav --button command --json
-
-    chauffeur show speech wish.ogg --engine whisper/models/small.en
-
-    chauffeur show speech wish.wav --engine endpoint/whisper-1 --base-url http://localhost:8000/v1
-
-    chauffeur show speech --microphone --device USB
-
-Exit codes: 0 a wish or an opinion was heard, 1 none was, 2 bad input.
-"""
+EXAMPLES = help_text("hear")
 
 
 def hear(

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from chauffeur import __version__
 from chauffeur.cli import adapt_vlm as adapting_vlm
 from chauffeur.cli import (
     apis,
@@ -41,59 +40,21 @@ from chauffeur.cli import quantise_vlm as quantising_vlm
 from chauffeur.cli.audit import audit_app
 from chauffeur.cli.bench import bench_app
 from chauffeur.cli.check import check_app
+from chauffeur.cli.examples import help_text
 from chauffeur.cli.failures import FriendlyGroup, debugging, show_crash
 from chauffeur.cli.maps import maps_app
 from chauffeur.cli.me import me_app
 from chauffeur.cli.printable import PrintableFormatter
 from chauffeur.cli.vehicle import vehicle_app
+from chauffeur.version import __version__
 
-EXAMPLES = """
-Examples:
+EXAMPLES = help_text("main")
 
-    chauffeur drive "Overtake the car in front of you."
+SHOW_EXAMPLES = help_text("main SHOW_EXAMPLES")
 
-    chauffeur drive "I'm in a hurry" --as ana --save trips/hurry --open
+BENCH_EXAMPLES = help_text("main BENCH_EXAMPLES")
 
-    chauffeur talk --as ana
-
-    chauffeur feedback "A bit too close for me." --as ana
-
-    chauffeur replay trips/hurry/trip.mcap
-
-    chauffeur show scenarios
-
-Every drive is simulated. Exit codes: 0 done, 1 anything less, 2 bad input, 130 stopped with Ctrl-C.
-"""
-
-SHOW_EXAMPLES = """
-Examples:
-
-    chauffeur show scenarios
-
-    chauffeur show apis is_safe_enter
-
-    chauffeur show camera sheet.png
-
-    chauffeur show page trips/hurry/trip.mcap --open
-"""
-
-BENCH_EXAMPLES = """
-Examples:
-
-    chauffeur bench lampilot --data DbLv1 --planner openai/gpt-4o
-
-    chauffeur bench passengers --planner onboard
-
-    chauffeur report runs/lampilot-*
-"""
-
-MODEL_EXAMPLES = """
-Examples:
-
-    chauffeur model train onboard --out runs/onboard
-
-    chauffeur model adapt-vlm --checkpoint Qwen/Qwen2.5-VL-7B-Instruct --out runs/qwen
-"""
+MODEL_EXAMPLES = help_text("main MODEL_EXAMPLES")
 
 DRIVE, LOOK, MEASURE, BUILD = "Drive", "Look", "Measure", "Build"
 """What somebody comes for; the headings of `chauffeur --help`."""

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from chauffeur.cli.examples import WithExamples
+from chauffeur.cli.examples import WithExamples, help_text
 
 maps_app = typer.Typer(
     cls=WithExamples,
@@ -16,24 +16,7 @@ maps_app = typer.Typer(
     help="Towns to drive in: list, build, fetch, export and draw them.",
 )
 
-EXAMPLES = """
-Examples:
-
-    chauffeur maps list
-
-    chauffeur maps show Gridford --out gridford.png
-
-    chauffeur maps build maps/Town05.xodr
-
-    chauffeur maps build Oldbridge --seed 7
-
-    chauffeur maps pull Town02
-
-    chauffeur maps export --host 127.0.0.1
-
-Five towns come with Chauffeur; they are invented. CARLA's are fetched from their public sources, or taken from your
-own CARLA.
-"""
+EXAMPLES = help_text("maps")
 
 Out = Annotated[Path | None, typer.Option("--out", help="Folder of the pack; by default the user's maps folder.")]
 
@@ -51,7 +34,8 @@ def list_maps() -> None:
 
     from chauffeur.cli.console import plain, stdout
     from chauffeur.concept import ChauffeurError
-    from chauffeur.worlds.town.pack import load, maps_folder, packs
+    from chauffeur.worlds.town.library import load, packs
+    from chauffeur.worlds.town.pack import maps_folder
 
     table = Table("town", "lanes, km", "junctions", "lights", "signs", "places", "notes", box=None, pad_edge=False)
     for name, folder in packs().items():
@@ -146,7 +130,7 @@ def show(
     from chauffeur.cli.console import path_text, stdout
     from chauffeur.concept import ConfigError
     from chauffeur.hmi.town_map import map_picture, map_svg
-    from chauffeur.worlds.town.pack import load
+    from chauffeur.worlds.town.library import load
 
     pack = load(town)
     path = out if out is not None else Path(f"{pack.name}.png")
@@ -163,7 +147,7 @@ def _said(folder: Path, name: str, notes: tuple[str, ...]) -> None:
     from rich.text import Text
 
     from chauffeur.cli.console import path_text, plain, stdout
-    from chauffeur.worlds.town.pack import packs
+    from chauffeur.worlds.town.library import packs
 
     stdout().print(Text.assemble(plain(name), " is in ", path_text(folder), "."))
     for note in notes:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chauffeur.cli.examples import WithExamples
+from chauffeur.cli.examples import WithExamples, help_text
 
 if TYPE_CHECKING:
     from chauffeur.memory.privacy import Privacy
@@ -21,23 +21,7 @@ me_app = typer.Typer(
 
 Person = Annotated[str, typer.Option("--as", help="Whose profile.")]
 
-EXAMPLES = """
-Examples:
-
-    chauffeur me show --as ana
-
-    chauffeur me export --as ana --out ana.json
-
-    chauffeur me forget-last --as ana
-
-    chauffeur me erase --as ana
-
-    chauffeur me retention 30
-
-    chauffeur me privacy on
-
-Profiles are encrypted files on this machine, one a person; nobody's requests read another person's.
-"""
+EXAMPLES = help_text("me")
 
 
 @me_app.callback(epilog=EXAMPLES)

@@ -10,20 +10,13 @@ import typer
 from rich.text import Text
 
 from chauffeur.cli.console import plain, stdout
+from chauffeur.cli.examples import help_text
 from chauffeur.concept import ConfigError, DataError
 
 if TYPE_CHECKING:
     from chauffeur.concept.utterance import Act, Reference, Utterance
 
-EXAMPLES = """
-Examples:
-
-    chauffeur show meaning "once the bus has passed, turn left and park behind the silver car"
-
-    chauffeur show meaning --in commands.jsonl --out read.jsonl
-
-A file has one JSON object a line with `id` and `text`; what is written has `id`, `acts`, `asked` and `sure`.
-"""
+EXAMPLES = help_text("meaning")
 _UNSURE = 0.5
 """Below this the reading is more likely wrong than right: the car would ask."""
 

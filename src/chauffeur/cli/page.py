@@ -7,13 +7,9 @@ from typing import Annotated
 
 import typer
 
-EXAMPLES = """
-Examples:
+from chauffeur.cli.examples import help_text
 
-    chauffeur show page trips/hurry/trip.mcap --open
-
-    chauffeur show page trip.mcap --out docs/trip.html --filmstrip docs/trip.png
-"""
+EXAMPLES = help_text("page")
 
 
 def page(

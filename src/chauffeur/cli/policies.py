@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chauffeur.cli.examples import WithExamples
+from chauffeur.cli.examples import WithExamples, help_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,27 +26,9 @@ policies_app = typer.Typer(
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The repository.")]
 Name = Annotated[str, typer.Argument(metavar="NAME", help="A program's name as it is called, or its id.")]
 
-SHOW_EXAMPLES = """
-Examples:
+SHOW_EXAMPLES = help_text("policies SHOW_EXAMPLES")
 
-    chauffeur show policies policies
-
-    chauffeur show policies policies left_overtake
-
-    chauffeur show policies policies --for "Get past the truck."
-"""
-
-EXAMPLES = """
-Examples:
-
-    chauffeur model policies export policies team.jsonl left_overtake pull_over
-
-    chauffeur model policies add mine team.jsonl other-policies
-
-    chauffeur model policies describe policies left_overtake "Overtakes on the left and moves back in."
-
-    chauffeur model policies prune policies --superseded --yes
-"""
+EXAMPLES = help_text("policies")
 
 
 @policies_app.callback(epilog=EXAMPLES)

@@ -7,21 +7,9 @@ from typing import Annotated
 
 import typer
 
-EXAMPLES = """
-Examples:
+from chauffeur.cli.examples import help_text
 
-    chauffeur model quantise-vlm runs/qwen/merged runs/qwen/awq
-
-    vllm serve runs/qwen/awq --served-model-name gains
-
-    lmdeploy serve api_server runs/qwen/awq --model-name gains
-
-    chauffeur bench motion --planner motion/gains --base-url http://localhost:8000/v1
-
-The language layers are rounded to 4 bits after an activation-aware search (AWQ) on rendered pictures and wishes; the
-vision encoder stays as it was. The folder is in the layout of compressed-tensors (pack-quantized), which vLLM and
-LMDeploy read. It needs PyTorch and the renderer: pip install 'chauffeur[models,camera]'.
-"""
+EXAMPLES = help_text("quantise_vlm")
 
 
 def quantise_vlm(

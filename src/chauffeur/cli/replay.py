@@ -68,8 +68,8 @@ def other_versions(recorded: RecordedTrip) -> list[str]:
     """What has changed on this machine since the recording, as far as it could matter."""
     import platform
 
-    from chauffeur import __version__
     from chauffeur.drive.session import make_world
+    from chauffeur.version import __version__
 
     changed: list[str] = []
     for name, then in recorded.trip.record:

@@ -9,23 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from chauffeur.cli.examples import help_text
+
 if TYPE_CHECKING:
     from rich.console import Console
 
     from chauffeur.bench.report.build import Choices
     from chauffeur.bench.report.model import ReportTable
 
-EXAMPLES = """
-Examples:
-
-    chauffeur report runs/lampilot-onboard --open
-
-    chauffeur report runs/lampilot-onboard runs/lampilot-idm --metrics paper --out reports/baselines
-
-    chauffeur report runs/lampilot-onboard --inspect onboard.eval
-
-Several runs are compared on the items that all of them have. Every figure is of simulated drives.
-"""
+EXAMPLES = help_text("report")
 
 _TABLES_ONLY: Final = "A page with comparisons and failures is made of runs of LaMPilot-Bench alone; of others, tables."
 

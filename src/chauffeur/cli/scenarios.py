@@ -7,13 +7,9 @@ from typing import Annotated
 
 import typer
 
-EXAMPLES = """
-Examples:
+from chauffeur.cli.examples import help_text
 
-    chauffeur show scenarios
-
-    chauffeur show scenarios --data DbLv1 --find overtake
-"""
+EXAMPLES = help_text("scenarios")
 
 _SHOWN = 40
 

@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import Processes, Seed
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -21,36 +24,11 @@ scenes_app = typer.Typer(
     help="Make, check and count scenes with instructions (LaMPilot's DbLv1 format).",
 )
 
-GENERATE_EXAMPLES = """
-Examples:
+GENERATE_EXAMPLES = help_text("scenes GENERATE_EXAMPLES")
 
-    chauffeur bench scenes generate --out suite
+CHECK_EXAMPLES = help_text("scenes CHECK_EXAMPLES")
 
-    chauffeur bench scenes generate --items 490 --seed 7 --out small --extras 100
-
-    chauffeur bench scenes generate --out suite --avoid DbLv1
-
-Every scene is driven by a scripted expert before it is kept, and every instruction is read back. The same seed gives
-the same suite, however many processes make it. Ctrl-C keeps what is made; the same command goes on.
-"""
-
-CHECK_EXAMPLES = """
-Examples:
-
-    chauffeur bench scenes check suite
-
-    chauffeur bench scenes check DbLv1 --out faults.jsonl
-
-Exit code 1 when anything is wrong. LaMPilot's own data has scenes that are impossible or ask for nothing.
-"""
-
-STATS_EXAMPLES = """
-Examples:
-
-    chauffeur bench scenes stats suite
-
-    chauffeur bench scenes stats DbLv1
-"""
+STATS_EXAMPLES = help_text("scenes STATS_EXAMPLES")
 
 _LINE_EVERY_S: Final = 10.0
 _SHOWN: Final = 20
@@ -60,7 +38,7 @@ _SHOWN: Final = 20
 def generate(
     out: Annotated[Path, typer.Option(help="Folder to write; a suite begun there is continued.")],
     items: Annotated[int, typer.Option(min=1, help="Items of the main suite.")] = 4900,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    seed: Seed = 0,
     extras: Annotated[
         int | None,
         typer.Option(
@@ -70,7 +48,7 @@ def generate(
     avoid: Annotated[
         Path | None, typer.Option(help="DbLv1 folder whose instructions must not come up, e.g. LaMPilot's own.")
     ] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
+    workers: Processes = None,
 ) -> None:
     """A suite of our own with the statistics of LaMPilot-Bench (paper Tab. III), split for training and testing."""
     from chauffeur.bench.lampilot.scenes.suite import Suite, SuiteConfig
@@ -92,25 +70,7 @@ def generate(
     _summary(console, out, manifest)
 
 
-QA_EXAMPLES = """
-Examples:
-
-    chauffeur bench scenes qa --out qa --scenes 1000
-
-    chauffeur bench scenes qa --out qa-small --scenes 200 --width 112 --height 64 --frames 2
-
-    chauffeur bench scenes qa --out words --scenes 500 --no-render
-
-    chauffeur bench scenes qa --out streets --scenes 1000 --sources staged
-
-    chauffeur bench scenes qa --out qa --scenes 2000 --pairs 50
-
-Streets are drawn and road users staged, or our highway, crossing, towns and parking lots driven by their own drivers;
-pictures are rendered, and questions of NuPlanQA's nine subtasks answered from the ground truth, about what can be seen.
-Simulated, and named so. At the end tricks are tried on the test split (words of
-the options, control signals, lengths, letters): above 35 % is a failure. Ctrl-C keeps what is rendered; the same
-command goes on.
-"""
+QA_EXAMPLES = help_text("scenes QA_EXAMPLES")
 
 
 @scenes_app.command(epilog=QA_EXAMPLES)
@@ -119,7 +79,7 @@ def qa(
     scenes: Annotated[
         int, typer.Option(min=5, help="Scenes for training; validation and test have a fifth each.")
     ] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    seed: Seed = 0,
     width: Annotated[int, typer.Option(min=48, help="Pictures' width, px.")] = 448,
     height: Annotated[int, typer.Option(min=32, help="Pictures' height, px.")] = 256,
     frames: Annotated[int, typer.Option(min=1, max=5, help="Instants of a scene that are rendered.")] = 4,
@@ -135,7 +95,7 @@ def qa(
         typer.Option(help="`all`, `staged` streets, our `worlds`, or one: `highway`, `crossing`, `town`, `lot`."),
     ] = "all",
     front: Annotated[int, typer.Option(min=1, max=4, help="Times as wide and high as others: front pictures.")] = 1,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
+    workers: Processes = None,
 ) -> None:
     """Questions about pictures in NuPlanQA's format, from scenes of our own, that no trick can answer."""
     from chauffeur.bench.nuplanqa.scenes.gate import BOUND
@@ -185,7 +145,7 @@ def _folders(manifest: Any) -> list[tuple[str, str, str]]:
 @scenes_app.command(epilog=CHECK_EXAMPLES)
 def check(
     data: Annotated[Path, typer.Argument(help="Suite, or any DbLv1 folder.")],
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
+    workers: Processes = None,
     out: Annotated[Path | None, typer.Option(help="Write every fault as a JSON line.")] = None,
 ) -> None:
     """Drive every scene with the scripted expert, and read every instruction back."""

@@ -3,34 +3,17 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import AuditFile, Wishes
+
 if TYPE_CHECKING:
     from chauffeur.hmi.cabin import Cabin
 
-EXAMPLES = """
-Examples:
-
-    chauffeur talk --as ana
-
-    chauffeur talk "Overtake the car in front of you." "Now slow down to 80 km/h." --every 10
-
-    chauffeur talk --as ana --page
-
-    chauffeur talk --as ana --microphone --speak --engine whisper/models/small.en
-
-    chauffeur talk "Park near the stadium." --planner talk2drive --scenario parking-stadium
-
-    chauffeur talk --scenario intersection --audit trips/talk.jsonl --time-scale 4 < wishes.txt
-
-Type a wish and Enter; `!too fast` is an opinion, `take over` and `give back` are the wheel, `help` tells the rest.
-`stop` or Ctrl-C brings the car to a stand and ends, a second Ctrl-C ends at once. Every drive is simulated. To a real
-vehicle one talks with `chauffeur vehicle drive vehicle.toml --microphone`. Exit code 1: a wish that was given as an
-argument or a line of a file was not driven, or the drive ended badly.
-"""
+EXAMPLES = help_text("talk")
 
 STOPPED_WITH_CTRL_C: Final = 130
 _QUIET_ROAD: Final = "overtake"
@@ -41,9 +24,7 @@ _TRIP_S: Final = 75.0
 
 
 def talk(
-    wishes: Annotated[
-        list[str] | None, typer.Argument(metavar="WISH", help="What you want, one after the other.")
-    ] = None,
+    wishes: Wishes = None,
     person: Annotated[str, typer.Option("--as", help="Whose wishes they are; their memory is used.")] = "",
     planner: Annotated[
         str,
@@ -90,9 +71,7 @@ def talk(
     speak: Annotated[bool, typer.Option("--speak", help="Say replies aloud (espeak-ng).", rich_help_panel=_VOICE)] = (
         False
     ),
-    audit: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
-    ] = None,
+    audit: AuditFile = None,
 ) -> None:
     """Drive in real time and talk: it says what it thinks and what was checked, and remembers how you liked it."""
     from contextlib import ExitStack

@@ -8,26 +8,12 @@ from typing import Annotated
 
 import typer
 
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import RunFolder, Seed, WeightsSeed
+
 train_app = typer.Typer(no_args_is_help=True, rich_markup_mode="markdown", help="Train models of our own.")
 
-ONBOARD_EXAMPLES = """
-Examples:
-
-    chauffeur model train onboard --out runs/onboard
-
-    chauffeur model train onboard --out runs/large --size large --steps 20000 --draws 60000
-
-    chauffeur model train onboard --out runs/onboard --more 4000
-
-    chauffeur model train onboard --out runs/wider --base runs/onboard --steps 8000
-
-    chauffeur model train onboard --out runs/onboard --data-only
-
-    chauffeur bench passengers --planner onboard/runs/onboard/model
-
-Makes its own data first: scenes, programs that were driven in them, and words. The same seed gives the same data.
-Ctrl-C keeps what is done; the same command goes on. It needs PyTorch and tokenizers: pip install 'chauffeur[models]'.
-"""
+ONBOARD_EXAMPLES = help_text("train ONBOARD_EXAMPLES")
 
 
 @train_app.callback()
@@ -37,8 +23,8 @@ def train() -> None:
 
 @train_app.command(epilog=ONBOARD_EXAMPLES)
 def onboard(
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    out: RunFolder,
+    seed: Seed = 0,
     draws: Annotated[int, typer.Option(min=100, help="Scenes drawn; about six in ten become cases.")] = 22_000,
     per_case: Annotated[int, typer.Option(min=1, help="Wordings tried for each case.")] = 26,
     size: Annotated[str, typer.Option(help="`small` (an hour on two cores), `medium`, or `large` (GPU).")] = "small",
@@ -85,22 +71,13 @@ def _check_size(size: str) -> None:
         raise ConfigError(f"There is no size {size!r}.", hint=f"Sizes: {', '.join(SIZES)}.")
 
 
-SORTERS_EXAMPLES = """
-Examples:
-
-    chauffeur model train sorters --out runs/sorters
-
-    chauffeur model train sorters --out runs/sorters --measured
-
-Three minutes, without PyTorch; with `--measured`, which leaves out a fifth of the writers in turn, about ten. The same
-seed gives the same files; those that ship are of seed 0.
-"""
+SORTERS_EXAMPLES = help_text("train SORTERS_EXAMPLES")
 
 
 @train_app.command(epilog=SORTERS_EXAMPLES)
 def sorters(
     out: Annotated[Path, typer.Option(help="Folder for the sorters and their card.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    seed: Seed = 0,
     measured: Annotated[
         bool,
         typer.Option(
@@ -123,37 +100,15 @@ def sorters(
     console.print(f"Sorters: wishes, remarks and weather in {out}; their card: {card}", soft_wrap=True)
 
 
-VILAD_DRIVE_EXAMPLES = """
-Examples:
+VILAD_DRIVE_EXAMPLES = help_text("train VILAD_DRIVE_EXAMPLES")
 
-    chauffeur model train vilad-parking --out runs/vilad
-
-    chauffeur model train vilad-drive --out runs/vilad-drive --base runs/vilad
-
-    chauffeur drive "Turn left and stop near the crosswalk" --scenario open-road --planner vilad/runs/vilad-drive/model
-
-Commands and streets are drawn as it goes, without end; the same seed gives the same model. Ctrl-C keeps what is done;
-the same command goes on. It needs PyTorch: pip install 'chauffeur[models]'.
-"""
-
-VILAD_EXAMPLES = """
-Examples:
-
-    chauffeur model train vilad-parking --out runs/vilad
-
-    chauffeur model train vilad-parking --out runs/vilad-plain --mode plain
-
-    chauffeur drive "I need to charge" --scenario parking-lift --planner vilad/runs/vilad/model
-
-Commands and scenes are drawn as it goes, without end; the same seed gives the same model. Ctrl-C keeps what is done;
-the same command goes on. It needs PyTorch: pip install 'chauffeur[models]'.
-"""
+VILAD_EXAMPLES = help_text("train VILAD_EXAMPLES")
 
 
 @train_app.command("vilad-parking", epilog=VILAD_EXAMPLES)
 def vilad_parking(
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    out: RunFolder,
+    seed: Seed = 0,
     steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 32 commands.")] = 1_200,
     size: Annotated[str, typer.Option(help="Network: `lot` ships; `tiny`, `3M`, `10M` and more.")] = "lot",
     mode: Annotated[str, typer.Option(help="`fixed` pattern training, or `plain` without it.")] = "fixed",
@@ -164,8 +119,8 @@ def vilad_parking(
 
 @train_app.command("vilad-drive", epilog=VILAD_DRIVE_EXAMPLES)
 def vilad_drive(
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything.")] = 0,
+    out: RunFolder,
+    seed: Seed = 0,
     steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 32 commands.")] = 3_000,
     size: Annotated[str, typer.Option(help="Network: `lot` ships; `tiny`, `3M`, `10M` and more.")] = "lot",
     mode: Annotated[str, typer.Option(help="`fixed` pattern training, or `plain` without it.")] = "fixed",
@@ -196,30 +151,14 @@ def _train_vilad(name: str, out: Path, seed: int, steps: int, size: str, mode: s
     console.print(f"Model: {model}; its card: {model / 'MODEL_CARD.md'}", soft_wrap=True)
 
 
-VILAD_FRAMES_EXAMPLES = """
-Examples:
-
-    chauffeur bench scenes frames --out frames
-
-    chauffeur model train vilad-frames --data frames --out runs/frames
-
-    chauffeur model train vilad-frames --data frames --also more --out runs/long --encoder-steps 8000 --device cuda
-
-    chauffeur bench openloop --data frames --planner vilad-frames/runs/frames/model --setting sft
-
-    chauffeur bench openloop --data frames --planner vilad-frames/runs/frames/model,twin --setting sft
-
-A small vision encoder first, then, over its frozen tokens, the diffusion model and its autoregressive twin, and the
-ego-status MLP that sees no picture. The test split's figures of all of them stand in the model card. Ctrl-C keeps what
-is saved, every half minute; the same command goes on. It needs PyTorch: pip install 'chauffeur[models]'.
-"""
+VILAD_FRAMES_EXAMPLES = help_text("train VILAD_FRAMES_EXAMPLES")
 
 
 @train_app.command("vilad-frames", epilog=VILAD_FRAMES_EXAMPLES)
 def vilad_frames(
     data: Annotated[Path, typer.Option(help="Set that `chauffeur bench scenes frames` has made.")],
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of weights and batches.")] = 0,
+    out: RunFolder,
+    seed: WeightsSeed = 0,
     encoder_steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of the encoder.")] = 1_000,
     encoder_batch: Annotated[int, typer.Option(min=1, help="Frames of one of its steps.")] = 32,
     steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of the decoders, each.")] = 500,
@@ -255,32 +194,13 @@ def vilad_frames(
     console.print(f"Model: {model}; its card: {model / 'MODEL_CARD.md'}", soft_wrap=True)
 
 
-BEV_LLM_EXAMPLES = """
-Examples:
-
-    chauffeur bench scenes qa --out qa --scenes 3600 --width 224 --height 128 --frames 2 --front 2
-
-    chauffeur model train bev-llm --data qa --out runs/bev-llm
-
-    chauffeur model train bev-llm --data qa --also highways --out runs/far --begin runs/bev-llm/model --steps 1000
-
-    chauffeur model train bev-llm --data qa --out runs/no-bev --ablation no-bev
-
-    chauffeur bench nuplanqa --data qa/test --planner bev-llm/runs/bev-llm/model
-
-The compact network is trained on rendered pictures of staged scenes and of our worlds: first perception, by the ground
-truth of the scenes; then, with the encoder frozen and its features computed once, what gathers them; then the language
-of questions. `--begin` takes over the weights of a network, as far as they fit; a stage of no steps is left out.
-Ablations, trained so from the start: `no-bev`, `no-history`, `single-view`, `blind`; at the end the full network is
-tried without each as well. Ctrl-C keeps what is saved, every two minutes; the same command goes on, with more steps
-where more are asked for.
-"""
+BEV_LLM_EXAMPLES = help_text("train BEV_LLM_EXAMPLES")
 
 
 @train_app.command("bev-llm", epilog=BEV_LLM_EXAMPLES)
 def bev_llm(
     data: Annotated[Path, typer.Option(help="Set that `chauffeur bench scenes qa` has made.")],
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
+    out: RunFolder,
     also: Annotated[
         list[Path] | None, typer.Option(help="Another set whose training split is learned as well; may be repeated.")
     ] = None,
@@ -288,7 +208,7 @@ def bev_llm(
     gather_steps: Annotated[int, typer.Option(min=0, help="The same with the encoder frozen.")] = 1500,
     word_steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of language.")] = 300,
     begin: Annotated[Path | None, typer.Option(help="Folder of a network to begin with.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of weights and batches.")] = 0,
+    seed: WeightsSeed = 0,
     ablation: Annotated[str, typer.Option(help="`full`, or what is kept from the network.")] = "full",
 ) -> None:
     """BEV-LLM, compact: questions about multi-view pictures, with a bird's-eye view that remembers (paper Eq. 9-10)."""
@@ -333,25 +253,13 @@ def bev_llm(
     )
 
 
-VLM_EXAMPLES = """
-Examples:
-
-    chauffeur model train vlm --out runs/vlm
-
-    chauffeur model train vlm --out runs/vlm-small --scenes 500 --steps 100
-
-    chauffeur drive "I'm late, but it is slippery" --scenario track-left-turn --planner vlm/runs/vlm/model
-
-Renders its pictures first (about 30 ms each); a quarter of an hour on one core in all. The same seed gives the same
-model. Ctrl-C keeps what is done; the same command goes on. It needs PyTorch and the renderer:
-pip install 'chauffeur[models,camera]'.
-"""
+VLM_EXAMPLES = help_text("train VLM_EXAMPLES")
 
 
 @train_app.command("vlm", epilog=VLM_EXAMPLES)
 def vlm(
-    out: Annotated[Path, typer.Option(help="Folder of the run; one begun there is continued.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of weights and batches.")] = 0,
+    out: RunFolder,
+    seed: WeightsSeed = 0,
     scenes: Annotated[int, typer.Option(min=20, help="Pictures to render; each gets three wishes a turn.")] = 6_000,
     steps: Annotated[int, typer.Option(min=1, help="Optimiser steps of 20 pictures with three wishes.")] = 1_600,
     size: Annotated[str, typer.Option(help="Network: `compact` ships; `tiny`, `large`.")] = "compact",
@@ -363,9 +271,9 @@ def vlm(
     from chauffeur.concept import ConfigError
 
     needs("models", "Training", "torch", "transformers", "onnx", "onnxscript")
+    from chauffeur.models.vlm.config import VlmRecipe
     from chauffeur.models.vlm.network import SIZES
     from chauffeur.models.vlm.pipeline import make_vlm
-    from chauffeur.models.vlm.recipe import VlmRecipe
 
     if size not in SIZES:
         raise ConfigError(f"There is no size {size!r}.", hint=f"Sizes: {', '.join(SIZES)}.")

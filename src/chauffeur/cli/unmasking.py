@@ -7,17 +7,9 @@ from typing import Annotated
 
 import typer
 
-EXAMPLES = """
-Examples:
+from chauffeur.cli.examples import help_text
 
-    chauffeur show unmasking "Park close to the lift, away from other cars."
-
-    chauffeur show unmasking "Turn left and stop near the crosswalk." --scenario open-road
-
-    chauffeur show unmasking "I need to charge" --out charge.svg --tau 0.5
-
-A row is a pass of the network; what it is sure of is decided first. The SVG is animated in a browser.
-"""
+EXAMPLES = help_text("unmasking")
 
 
 def unmasking(

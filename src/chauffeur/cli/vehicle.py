@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from chauffeur.cli.examples import WithExamples
+from chauffeur.cli.examples import WithExamples, help_text
 from chauffeur.cli.vehicle_drive import DRIVE_EXAMPLES, drive
 
 if TYPE_CHECKING:
@@ -23,28 +23,7 @@ vehicle_app = typer.Typer(
     help="Vehicles behind ROS: what is asked of them, and how the way to them is.",
 )
 
-EXAMPLES = """
-Examples:
-
-    chauffeur vehicle check vehicle.toml
-
-    chauffeur vehicle apply vehicle.toml --speed 8 --dry-run
-
-    chauffeur vehicle apply vehicle.toml --speed 8 --look-ahead 10 --ratio 2
-
-    chauffeur vehicle release vehicle.toml
-
-    chauffeur vehicle watch vehicle.toml
-
-    chauffeur vehicle drive vehicle.toml "Drive a bit slower." --as ana --dry-run
-
-    chauffeur vehicle engage vehicle.toml
-
-    chauffeur vehicle disengage vehicle.toml
-
-These commands talk to a real vehicle, unless --dry-run is given. They publish a speed cap and a look-ahead for its own
-planner; they do not steer, brake or watch the road.
-"""
+EXAMPLES = help_text("vehicle")
 
 _NOT_FROM_HERE: Final = "Only a vehicle with Autoware.AI behind rosbridge is engaged and disengaged from here."
 _ON_ITS_OWN_SCREEN: Final = "Use the vehicle's own screen."

@@ -8,49 +8,31 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from chauffeur.cli.examples import help_text
+from chauffeur.cli.options import AuditFile, BaseUrl, Wishes
+
 if TYPE_CHECKING:
     from chauffeur.drive.onroad import VehicleRecorder
     from chauffeur.worlds.ros.settings import VehicleSettings
 
-DRIVE_EXAMPLES: Final = """
-Examples:
-
-    chauffeur vehicle drive vehicle.toml "Drive at 20 km/h." "A bit slower, please." --dry-run
-
-    chauffeur vehicle drive vehicle.toml --as ana --context services.toml --audit trips/road.jsonl
-
-    chauffeur vehicle drive vehicle.toml "I'm in a hurry" --planner talk2drive/openai/qwen2.5 --base-url http://localhost:11434/v1
-
-    chauffeur vehicle drive vehicle.toml --as ana --microphone --speak
-
-Without a WISH, type one a line; a newer one takes the place of one that is not with the vehicle yet. `stop` asks for a
-speed of 0 at once, `evaluate too fast` says how it was, `end` or Ctrl-D ends. What was asked for stays in force.
-With --microphone say “command ...” or “evaluate ...”; what was not heard for sure is asked back, and asked of the
-vehicle only after a yes, said or typed.
-
-Exit codes: 0 every wish is with the vehicle (or the dry run), 1 one is not, 2 bad input, 130 ended with Ctrl-C.
-"""
+DRIVE_EXAMPLES: Final = help_text("vehicle_drive DRIVE_EXAMPLES")
 
 _STOPPED_WITH_CTRL_C: Final = 130
 
 
 def drive(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The vehicle's configuration file; see docs/ros.md.")],
-    wishes: Annotated[
-        list[str] | None, typer.Argument(metavar="WISH", help="What you want, one after the other.")
-    ] = None,
+    wishes: Wishes = None,
     person: Annotated[str, typer.Option("--as", help="Whose wishes they are; what they said before counts.")] = "",
     planner: Annotated[
         str, typer.Option(help="`talk2drive`, `talk2drive/openai/<model>`, or an installed one that gives parameters.")
     ] = "talk2drive",
-    base_url: Annotated[str | None, typer.Option(help="OpenAI-compatible endpoint.")] = None,
+    base_url: BaseUrl = None,
     context: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Where the place, map, weather and rules come from; see docs/services.md."),
     ] = None,
-    audit: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Audit log to write; see `chauffeur audit`.")
-    ] = None,
+    audit: AuditFile = None,
     engine: Annotated[
         str, typer.Option(help="For speech: `grammar`, `whisper/<folder>`, `endpoint/<model>`.")
     ] = "grammar",

@@ -79,11 +79,9 @@ class OsqpSolver:
         self._solved = int(status.OSQP_SOLVED)
 
     def cost(self, quadratic: Array) -> None:
-        """See QpSolver."""
         self._solver.update(Px=quadratic[self._rows][self._order])
 
     def solve(self, linear: Array, low: Array, high: Array, start: Array) -> Array | None:
-        """See QpSolver."""
         self._solver.update(q=linear, l=low, u=high)
         self._solver.warm_start(x=start)
         result = self._solver.solve(raise_error=False)

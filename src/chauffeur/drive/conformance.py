@@ -17,7 +17,8 @@ from chauffeur.drive.actuate import actuate
 from chauffeur.drive.planning import PLAN_WITHIN_S, declined, unusable
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.session import Session, check_drive, make_world
-from chauffeur.executors.base import Executor, MakeExecutor, OfKind, executor_for
+from chauffeur.executors.base import Executor
+from chauffeur.executors.registry import MakeExecutor, OfKind, executor_for
 from chauffeur.planners.base import Planner
 from chauffeur.worlds.conformance import ConformanceFinding
 

@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import (
+    ANSWERED,
     CameraImage,
     ChauffeurError,
     Context,
@@ -40,18 +41,37 @@ from chauffeur.concept import (
     Thoughts,
     Verdict,
 )
+from chauffeur.describe.answers import DONT_KNOW, answer_to, asks_to_know
 from chauffeur.drive import wish_parts
-from chauffeur.drive.answers import plan_or_answer
 from chauffeur.drive.emergency import ALARM_WORDS, alarm_of, check_told_not_to, is_bare_stop, raised
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
 from chauffeur.language.questions import is_question
-from chauffeur.planners.base import Planner
+from chauffeur.planners.base import NO_WISH, Planner
 from chauffeur.planners.base import declined as declined_by
 from chauffeur.safety.base import Check
 from chauffeur.safety.checks import DEFAULT_CHECKS, run_checks
 from chauffeur.safety.dangers import check_wish
 from chauffeur.safety.screening import screen_request
 from chauffeur.safety.words import reasons_once
+
+
+async def plan_or_answer(planner: Planner, request: PlanRequest) -> Plan:
+    """The planner's plan; of a question, the answer, with nothing to drive.
+
+    Raises:
+        ChauffeurError: No plan can be had.
+    """
+    begun = time.perf_counter()
+    words = request.instruction.text
+    said = answer_to(words, request.context.situation, request.context.text)
+    if said:
+        return declined_by(planner, said, begun, intent=ANSWERED)
+    plan = await planner.plan(request)
+    open_ = not plan.offer and plan.intent != NO_WISH
+    if (plan.policy is not None or open_) and not request.instruction.confirmed and asks_to_know(words):
+        return replace(plan, policy=None, thoughts=Thoughts(DONT_KNOW), refusal=DONT_KNOW, intent=ANSWERED)
+    return plan
+
 
 RECALLED: Final = 3
 """Remembered trips that H holds at most."""

@@ -22,7 +22,7 @@ from chauffeur.worlds.base import World
 from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
 from chauffeur.worlds.highway.scenarios import BUILT_IN as ROADS
 from chauffeur.worlds.parking.scenarios import BUILT_IN as LOTS
-from chauffeur.worlds.town.pack import packs
+from chauffeur.worlds.town.library import packs
 from chauffeur.worlds.town.scenarios import BUILT_IN as TOWNS
 from chauffeur.worlds.town.scenarios import in_pack
 from chauffeur.worlds.track.scenarios import BUILT_IN as TRACKS

@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import cache
 from typing import Final, Protocol, runtime_checkable
 
-from chauffeur.camera import Conditions, Renderer, Weather, front_rig, make_renderer
+from chauffeur.camera import Conditions, Renderer, front_rig, make_renderer
 from chauffeur.concept import CameraImage, Observation
+from chauffeur.concept.weather import Weather
 from chauffeur.worlds.base import World
 
 GRADE: Final = 0.7

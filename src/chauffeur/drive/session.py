@@ -49,8 +49,8 @@ from chauffeur.drive.seat import SeatCamera
 from chauffeur.drive.surroundings import describing, opened, weathered
 from chauffeur.drive.wish_parts import account_of
 from chauffeur.executors import Executor, executor_for
-from chauffeur.executors.base import OfKind
 from chauffeur.executors.program import ProgramDrive
+from chauffeur.executors.registry import OfKind
 from chauffeur.memory.tolerant import TolerantMemory
 from chauffeur.planners.base import Planner, looks
 from chauffeur.planners.prompts import Setting, build_system_message

@@ -11,9 +11,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from chauffeur.camera import Weather
 from chauffeur.concept import Context, Observation
 from chauffeur.concept.data import data_home
+from chauffeur.concept.weather import Weather
 from chauffeur.describe import describe_with_traffic
 from chauffeur.describe.services.sourced import FOR_SIMULATED, with_sources
 from chauffeur.describe.services.sources import Sources, SourceSettings

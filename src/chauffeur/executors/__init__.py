@@ -4,7 +4,8 @@ That of programs is not named here: a control process drives none, and loads not
 """
 
 from chauffeur.executors.action_matrix import ActionMatrixExecutor
-from chauffeur.executors.base import Executor, ExecutorBase, ExecutorStatus, executor_for
+from chauffeur.executors.base import Executor, ExecutorBase, ExecutorStatus
+from chauffeur.executors.registry import executor_for
 from chauffeur.executors.trajectory import TrajectoryExecutor
 
 __all__ = [

@@ -16,8 +16,8 @@ from chauffeur.executors.reference import ReferencePath
 from chauffeur.executors.tracking import Gains, PathTracker
 from chauffeur.geometry import Polyline, joined
 from chauffeur.worlds.base import World
-from chauffeur.worlds.parking.corridor import Body
-from chauffeur.worlds.parking.path_follower import Chassis
+from chauffeur.worlds.corridor import Body
+from chauffeur.worlds.path_follower import Chassis
 
 HEADWAY_S: Final = 1.0
 """Time headway to a lead vehicle: an action matrix has none."""
@@ -76,7 +76,6 @@ class ActionMatrixExecutor(ExecutorBase):
         self._aim(observation)
 
     def step(self, observation: Observation, held: Setpoints | None = None) -> Command:
-        """See Executor."""
         self._aim(observation)
         tracker = self.tracker
         before = tracker.steered.total() - tracker.steered["solved"]

@@ -1,4 +1,4 @@
-"""What drives one kind of policy: executors, and the registry that finds them by the kind of a policy.
+"""What drives one kind of policy: executors, and what they share.
 
 Every control period goes the same way, in simulated time, in real time and in benchmarks:
 
@@ -9,9 +9,8 @@ Every control period goes the same way, in simulated time, in real time and in b
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 from chauffeur.concept import (
     ApiCall,
@@ -20,15 +19,12 @@ from chauffeur.concept import (
     Limits,
     Observation,
     ProgramState,
-    ScenarioError,
     Setpoints,
     VehicleState,
 )
-from chauffeur.concept.registry import load_plugin, plugin_names
 from chauffeur.geometry import Polyline
-from chauffeur.safety.format import EXECUTORS
 from chauffeur.worlds.base import World
-from chauffeur.worlds.parking.path_follower import Chassis
+from chauffeur.worlds.path_follower import Chassis
 
 ExecutorStatus = Literal["running", "finished"]
 
@@ -159,21 +155,17 @@ class ExecutorBase:
 
     @property
     def setpoints(self) -> Setpoints:
-        """See Executor."""
         return self._setpoints
 
     @property
     def status(self) -> ExecutorStatus:
-        """See Executor."""
         return self._status
 
     @property
     def notes(self) -> tuple[tuple[float, str], ...]:
-        """See Executor."""
         return tuple(self._notes)
 
     def tick(self) -> PolicyTick:
-        """See RunningPolicy."""
         self._aim(self._world.observe())
         new, self._told = self.notes[self._told :], len(self.notes)
         return HeldSetpoints(self._setpoints, state=self._status, said=tuple(text for _, text in new))
@@ -204,69 +196,12 @@ class DriverLed(ExecutorBase):
         self._policy = policy
 
     def tick(self) -> PolicyTick:
-        """See RunningPolicy."""
         tick = HeldSetpoints(self._world.driver().initial_setpoints()) if self._policy is None else self._policy.tick()
         self._setpoints = tick.setpoints
         self._status = "finished" if tick.state == "finished" else "running"
         return tick
 
     def step(self, observation: Observation, held: Setpoints | None = None) -> Command:
-        """See Executor."""
         del observation
         driver = self._world.driver()
         return driver.command(driver.settle(self.tick().setpoints) if held is None else held)
-
-
-MakeExecutor = Callable[[World], Executor]
-
-
-def _built_in(kind: str) -> MakeExecutor | None:
-    """Late, so that a control process loads the solver of action matrices only where it drives one."""
-    match kind:
-        case "program":
-            from chauffeur.executors.program import ProgramDrive
-
-            return ProgramDrive
-        case "parameters":
-            from chauffeur.executors.parameters import parameters_executor
-
-            return parameters_executor
-        case "action_matrix":
-            from chauffeur.executors.action_matrix import ActionMatrixExecutor
-
-            return ActionMatrixExecutor
-        case "trajectory":
-            from chauffeur.executors.trajectory import TrajectoryExecutor
-
-            return TrajectoryExecutor
-        case _:
-            return None
-
-
-BUILT_IN: Final = ("program", "parameters", "action_matrix", "trajectory")
-
-
-class OfKind(Protocol):
-    """A policy of any kind: the paper's four, or a third party's."""
-
-    @property
-    def kind(self) -> str: ...
-
-
-def executor_for(policy: OfKind, world: World) -> Executor:
-    """Who drives this kind of policy in a world, just reset: built in, or of the entry points `chauffeur.executors`,
-    where what is registered also judges its policies, by `fault` (`safety.format`).
-
-    Raises:
-        ScenarioError: Nobody does.
-    """
-    make = _built_in(policy.kind)
-    if make is None:
-        known = plugin_names(EXECUTORS)
-        if policy.kind not in known:
-            raise ScenarioError(
-                f"A policy of the kind {policy.kind!r} has no executor.",
-                hint=f"Known: {', '.join((*BUILT_IN, *known))}.",
-            )
-        make = load_plugin(EXECUTORS, policy.kind)
-    return make(world)

@@ -42,12 +42,10 @@ class PursuitExecutor(ExecutorBase):
             self._told = 0
 
     def tick(self) -> PolicyTick:
-        """See RunningPolicy."""
         said = super().tick().said
         return HeldSetpoints(self._setpoints, said=said)
 
     def step(self, observation: Observation, held: Setpoints | None = None) -> Command:
-        """See Executor."""
         driver = self._driving()
         if held is None:
             self._aim(observation)
@@ -57,7 +55,6 @@ class PursuitExecutor(ExecutorBase):
 
     @property
     def notes(self) -> tuple[tuple[float, str], ...]:
-        """See Executor."""
         return () if self._driver is None else self._driver.notes
 
     @property
@@ -92,7 +89,6 @@ class TownSetPoints(DriverLed):
     def start(
         self, policy: Parameters, observation: Observation, limits: Limits, origin: VehicleState | None = None
     ) -> None:
-        """See Executor."""
         turn: Turn | None = next((one for one in TURNS if one == policy.route), None)
         place = "" if turn is not None else policy.route
         if place and not (place == self._place and self._status == "running"):
@@ -106,7 +102,6 @@ class TownSetPoints(DriverLed):
         self._free = self._policy_mps >= sign - _ROUNDED_MPS
 
     def tick(self) -> HeldSetpoints:
-        """See RunningPolicy."""
         driver = self._world.driver()
         here = self._world.observe().ego.lane
         sign = 0.0 if here is None else self._world.perception().speed_limit(here)

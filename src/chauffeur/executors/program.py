@@ -36,6 +36,5 @@ class ProgramDrive(DriverLed):
         self._limits = limits
 
     def close(self) -> None:
-        """See Executor."""
         if self._running is not None:
             self._running.close()

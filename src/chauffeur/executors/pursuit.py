@@ -33,12 +33,12 @@ from chauffeur.geometry.road_graph import TURNS
 from chauffeur.safety.shield import LAMPILOT_SHIELD
 from chauffeur.safety.shield.gaps import braking_gap_m, rss_gap_m
 from chauffeur.worlds.base import EGO, World
-from chauffeur.worlds.parking.corridor import Body
+from chauffeur.worlds.corridor import Body
 from chauffeur.worlds.parking.driver import JAM_M
 from chauffeur.worlds.parking.lot import Spot
-from chauffeur.worlds.parking.path_follower import LOT_BEND_MPS2, Chassis, Follower, Look
 from chauffeur.worlds.parking.places import PLACES
 from chauffeur.worlds.parking.routes import Way
+from chauffeur.worlds.path_follower import LOT_BEND_MPS2, Chassis, Follower, Look
 from chauffeur.worlds.places import ParkingPlaces
 
 HEADWAY_S: Final = 1.5

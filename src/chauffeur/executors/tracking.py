@@ -21,7 +21,7 @@ from chauffeur.control.mpc import LateralMpc, MpcWeights, PathErrors, SteeringLi
 from chauffeur.control.pid import PidGains, PidLimits, PidState, pid_follow, pid_step
 from chauffeur.executors.reference import ReferencePath
 from chauffeur.geometry import Polyline, Pose, wrap_to_pi
-from chauffeur.worlds.parking.path_follower import Chassis, Follower, Look
+from chauffeur.worlds.path_follower import Chassis, Follower, Look
 
 CONTROL_S: Final = 0.05
 """Longest period of the controllers."""

@@ -59,7 +59,6 @@ class TrajectoryExecutor(ExecutorBase):
     def start(
         self, policy: Trajectory, observation: Observation, limits: Limits, origin: VehicleState | None = None
     ) -> None:
-        """See Executor."""
         ego = observation.ego if origin is None else origin
         reference = reference_of(policy, Pose(ego.x_m, ego.y_m, ego.heading_rad), ego.speed_mps)
         self._tracker.follow(reference)
@@ -68,7 +67,6 @@ class TrajectoryExecutor(ExecutorBase):
         self._aim(observation)
 
     def step(self, observation: Observation, held: Setpoints | None = None) -> Command:
-        """See Executor."""
         if not self._lost and abs(self._tracker.offset_m) > _LOST_M:
             self._stop_in_lane(observation)
         self._aim(observation)

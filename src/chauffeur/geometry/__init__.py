@@ -9,7 +9,7 @@ from chauffeur.geometry.junctions import JunctionWay, choice_ahead, named_ways, 
 from chauffeur.geometry.polyline import Polyline, joined
 from chauffeur.geometry.pose import Pose
 from chauffeur.geometry.road_graph import Lane, LaneId, LaneKind, LanePlace, RoadGraph, Turn
-from chauffeur.geometry.route import Route, RoutePoint, plan_route, plan_through
+from chauffeur.geometry.route import Route, plan_route, plan_through
 
 __all__ = [
     "Box",
@@ -22,7 +22,6 @@ __all__ = [
     "Pose",
     "RoadGraph",
     "Route",
-    "RoutePoint",
     "Turn",
     "choice_ahead",
     "joined",

@@ -3,7 +3,11 @@
 from chauffeur.memory.base import Memory
 from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.memory.feedback import interpret_feedback
-from chauffeur.memory.similarity import mark, tags_of
 from chauffeur.memory.vault import VaultMemory
 
-__all__ = ["Memory", "VaultMemory", "conflicts_in", "interpret_feedback", "mark", "tags_of"]
+__all__ = [
+    "Memory",
+    "VaultMemory",
+    "conflicts_in",
+    "interpret_feedback",
+]

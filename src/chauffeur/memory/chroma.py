@@ -18,7 +18,7 @@ import struct
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar, Final
@@ -26,7 +26,6 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from chauffeur.concept import (
-    NOBODY,
     Context,
     Feedback,
     History,
@@ -42,7 +41,7 @@ from chauffeur.language.weather import weather_of
 from chauffeur.memory.columns import Columns, Entry, packed
 from chauffeur.memory.files import locked, private_directory, sync_directory
 from chauffeur.memory.keys import KeyRing, same_name
-from chauffeur.memory.privacy import Privacy, read_privacy
+from chauffeur.memory.privacy import Privacy, is_somebody, read_privacy, stamp, utc_now
 from chauffeur.memory.records import MAX_CHARS, body_of, feedback_body, item_of
 from chauffeur.memory.retrieval import UNCOMPARED, nearest
 from chauffeur.memory.similarity import DIMENSIONS, MEANING_SHARE, TAGS, TEXT_SHARE, Mark, Vector, mark
@@ -62,10 +61,6 @@ _INDEX: Final = struct.Struct("<i4Q")
 _log = logging.getLogger(__name__)
 
 
-def _utc_now() -> datetime:
-    return datetime.now(UTC)
-
-
 class ChromaMemory:
     """Memory in Chroma's files on this machine, not encrypted; safe for several processes, one after another.
 
@@ -76,7 +71,7 @@ class ChromaMemory:
     encrypts: ClassVar = False
 
     def __init__(
-        self, home: Path | None = None, *, privacy: Privacy | None = None, clock: Callable[[], datetime] = _utc_now
+        self, home: Path | None = None, *, privacy: Privacy | None = None, clock: Callable[[], datetime] = utc_now
     ) -> None:
         """Nothing is written before there is something to remember.
 
@@ -112,7 +107,7 @@ class ChromaMemory:
 
     def latest(self, person: PersonId, world: str, k: int) -> History:
         """As `Memory.latest`; it reads every trip."""
-        keep_from = self._keep_from()
+        keep_from = self._privacy.keep_from(self._clock())
         with self._reading(person) as store:
             if store is None or k <= 0:
                 return History()
@@ -123,12 +118,12 @@ class ChromaMemory:
     def remember(self, trip: Trip, feedback: Feedback | None = None) -> None:
         """As `Memory.remember`; what is older than the retention goes."""
         person = trip.instruction.person
-        if not _is_somebody(person) or not self._privacy.keeps:
+        if not is_somebody(person) or not self._privacy.keeps:
             return
         with self._errors(person):
             private_directory(self._root)
             with self._locked():
-                folder, when = self._folder(person), _stamp(self._clock())
+                folder, when = self._folder(person), stamp(self._clock())
                 if not self._add(folder, trip, feedback, when):
                     self._leave_older(person, folder)
                     self._add(folder, trip, feedback, when)
@@ -136,18 +131,18 @@ class ChromaMemory:
     def attach_feedback(self, person: PersonId, feedback: Feedback, trip_id: str | None = None) -> bool:
         """As `Memory.attach_feedback`."""
         with self._reading(person) as store:
-            return store is not None and store.add_feedback(feedback, _stamp(self._clock()), trip_id)
+            return store is not None and store.add_feedback(feedback, stamp(self._clock()), trip_id)
 
     def export(self, person: PersonId) -> str:
         """As `Memory.export`."""
         with self._reading(person) as store:
             trips = [] if store is None else [row.exported() for row in store.rows()]
-        document = {"format": FORMAT, "person": person, "exported": _stamp(self._clock()), "trips": trips}
+        document = {"format": FORMAT, "person": person, "exported": stamp(self._clock()), "trips": trips}
         return json.dumps(document, indent=2)
 
     def forget_last(self, person: PersonId) -> HistoryItem | None:
         """As `Memory.forget_last`: all other trips are written anew."""
-        if not _is_somebody(person) or not self._root.exists():
+        if not is_somebody(person) or not self._root.exists():
             return None
         with self._errors(person), self._locked():
             folder = self._folder(person)
@@ -162,7 +157,7 @@ class ChromaMemory:
 
     def erase(self, person: PersonId) -> bool:
         """As `Memory.erase`, of damaged profiles too; with the salt lost, of those that still say whose they are."""
-        if not _is_somebody(person) or not self._root.exists():
+        if not is_somebody(person) or not self._root.exists():
             return False
         with self._errors(person), self._locked():
             try:
@@ -215,20 +210,16 @@ class ChromaMemory:
 
     def _add(self, folder: Path, trip: Trip, feedback: Feedback | None, when: str) -> bool:
         """Keep a trip, unless there are others first to be left behind."""
-        keep_from = self._keep_from()
+        keep_from = self._privacy.keep_from(self._clock())
         with self._store(folder, trip.instruction.person) as store:
             if keep_from and store.any_before(keep_from):
                 return False
             store.add(trip, feedback, when)
             return True
 
-    def _keep_from(self) -> str:
-        since = self._privacy.since(self._clock())
-        return "" if since is None else _stamp(since)
-
     def _leave_older(self, person: PersonId, folder: Path) -> int:
         """Write a profile anew without the trips that are older than the retention; how many there were."""
-        keep_from = self._keep_from()
+        keep_from = self._privacy.keep_from(self._clock())
         if not keep_from or _current(folder) is None:
             return 0
         with self._store(folder, person) as store:
@@ -257,7 +248,7 @@ class ChromaMemory:
 
     @contextmanager
     def _reading(self, person: PersonId) -> Generator[_Store | None]:
-        if not _is_somebody(person) or not self._root.exists():
+        if not is_somebody(person) or not self._root.exists():
             yield None
             return
         with self._errors(person), self._locked():
@@ -511,12 +502,3 @@ def _destroy(folder: Path) -> None:
         path.unlink()
     folder.rmdir()
     sync_directory(folder.parent)
-
-
-def _is_somebody(person: PersonId) -> bool:
-    return person.strip() != NOBODY
-
-
-def _stamp(moment: datetime) -> str:
-    """ISO 8601 in UTC and of fixed width, so that stamps sort as times."""
-    return moment.astimezone(UTC).isoformat(timespec="milliseconds")

@@ -16,8 +16,8 @@ from typing import Final, Literal
 from chauffeur.concept import Feedback, History, HistoryItem
 from chauffeur.language import measured
 from chauffeur.language.weather import weather_in
+from chauffeur.memory.plain_text import clauses, even
 from chauffeur.memory.similarity import tags_of
-from chauffeur.memory.words import clauses, even
 
 Subject = Literal["speed", "gap", "style", "lane", "overtaking"]
 Source = Literal["feedback", "wish"]

@@ -15,8 +15,8 @@ from chauffeur.concept import Feedback
 from chauffeur.language import measured
 from chauffeur.memory.phrasebook import Topic
 from chauffeur.memory.phrases import Want, read_wants, speaks_of_the_drive
+from chauffeur.memory.plain_text import even
 from chauffeur.memory.remarks import Sorted, sort_remark
-from chauffeur.memory.words import even
 
 _MILD, PLAIN, _STRONG = 0.35, 0.6, 1.0
 """Strength of mild, plain and strong words."""

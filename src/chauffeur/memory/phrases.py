@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from chauffeur.memory.phrasebook import PHRASE_BOOK, Manner, Topic
-from chauffeur.memory.words import even, turned
+from chauffeur.memory.plain_text import even, turned
 
 _PATTERNS: tuple[tuple[re.Pattern[str], Topic, Literal[-1, 1], Manner], ...] = tuple(
     (re.compile(rf"\b(?:{'|'.join(phrases)})\b"), topic, sign, manner) for topic, sign, manner, phrases in PHRASE_BOOK

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Final
 
-from chauffeur.concept import ConfigError
+from chauffeur.concept import NOBODY, ConfigError, PersonId
 from chauffeur.concept.data import data_home
 from chauffeur.memory.files import private_directory, publish
 
@@ -32,6 +32,26 @@ class Privacy:
     def since(self, now: datetime) -> datetime | None:
         """From when on trips count; None where all do."""
         return None if self.retention_days is None else now - timedelta(days=self.retention_days)
+
+    def keep_from(self, now: datetime) -> str:
+        """The same as a stamp; empty where all count."""
+        since = self.since(now)
+        return "" if since is None else stamp(since)
+
+
+def utc_now() -> datetime:
+    """Present time."""
+    return datetime.now(UTC)
+
+
+def stamp(moment: datetime) -> str:
+    """ISO 8601 in UTC and of fixed width, so that stamps sort as times."""
+    return moment.astimezone(UTC).isoformat(timespec="milliseconds")
+
+
+def is_somebody(person: PersonId) -> bool:
+    """Whether a name was given: without one nothing is kept."""
+    return person.strip() != NOBODY
 
 
 def read_privacy(home: Path | None = None) -> Privacy:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from chauffeur.language import measured
 from chauffeur.memory.phrases import wants_in
-from chauffeur.memory.words import clauses, even
+from chauffeur.memory.plain_text import clauses, even
 
 ENCODER = "hashed-ngrams-v1"
 """Version of the vectors; others are encoded anew."""

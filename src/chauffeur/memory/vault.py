@@ -11,12 +11,11 @@ import weakref
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import ClassVar, Final
 
 from chauffeur.concept import (
-    NOBODY,
     Context,
     Feedback,
     History,
@@ -31,7 +30,7 @@ from chauffeur.language.weather import weather_of
 from chauffeur.memory.cipher import DatabaseError
 from chauffeur.memory.files import locked, private_directory, sync_directory
 from chauffeur.memory.keys import KeyRing, same_name
-from chauffeur.memory.privacy import Privacy, read_privacy
+from chauffeur.memory.privacy import Privacy, is_somebody, read_privacy, stamp, utc_now
 from chauffeur.memory.profile import VERSION, Index, Profile, create_profile
 from chauffeur.memory.retrieval import UNCOMPARED, latest, nearest
 from chauffeur.memory.similarity import mark
@@ -43,10 +42,6 @@ _OPEN_PEOPLE: Final = 8
 
 _SETTLED_NS: Final = 100_000_000
 """File times are coarse: a file that changed less than this before it was looked at may have changed again unseen."""
-
-
-def _utc_now() -> datetime:
-    return datetime.now(UTC)
 
 
 @dataclass(slots=True)
@@ -91,7 +86,7 @@ class VaultMemory:
         keys: Path | None = None,
         passphrase: str | None = None,
         privacy: Privacy | None = None,
-        clock: Callable[[], datetime] = _utc_now,
+        clock: Callable[[], datetime] = utc_now,
     ) -> None:
         """Nothing is written before there is something to remember.
 
@@ -147,9 +142,9 @@ class VaultMemory:
     def remember(self, trip: Trip, feedback: Feedback | None = None) -> None:
         """As `Memory.remember`."""
         person = trip.instruction.person
-        if not _is_somebody(person) or not self._privacy.keeps:
+        if not is_somebody(person) or not self._privacy.keeps:
             return
-        when, keep_from = _stamp(self._clock()), self._keep_from()
+        when, keep_from = stamp(self._clock()), self._privacy.keep_from(self._clock())
         with self._guard:
             while True:
                 self._ensure(person)
@@ -161,13 +156,13 @@ class VaultMemory:
     def attach_feedback(self, person: PersonId, feedback: Feedback, trip_id: str | None = None) -> bool:
         """As `Memory.attach_feedback`."""
         with self._reading(person) as profile:
-            return profile is not None and profile.add_feedback(feedback, _stamp(self._clock()), trip_id)
+            return profile is not None and profile.add_feedback(feedback, stamp(self._clock()), trip_id)
 
     def export(self, person: PersonId) -> str:
         """As `Memory.export`; every trip and every feedback carries its time."""
         with self._reading(person) as profile:
             trips = [] if profile is None else profile.export()
-        document = {"format": VERSION, "person": person, "exported": _stamp(self._clock()), "trips": trips}
+        document = {"format": VERSION, "person": person, "exported": stamp(self._clock()), "trips": trips}
         return json.dumps(document, indent=2)
 
     def forget_last(self, person: PersonId) -> HistoryItem | None:
@@ -184,7 +179,7 @@ class VaultMemory:
         Raises:
             ProfileError: A file cannot be erased; or the salt is lost, and the profile is none that can be opened.
         """
-        if not _is_somebody(person) or not self._profiles.exists():
+        if not is_somebody(person) or not self._profiles.exists():
             return False
         aliases, closed = self._aliases_of(person)
         try:
@@ -226,7 +221,7 @@ class VaultMemory:
 
     def sweep(self) -> int:
         """Delete every trip that is older than the retention, of everybody; how many there were."""
-        keep_from = self._keep_from()
+        keep_from = self._privacy.keep_from(self._clock())
         swept = 0
         for person in self.people() if keep_from else ():
             with self._reading(person) as profile:
@@ -244,10 +239,6 @@ class VaultMemory:
             except ProfileError as error:
                 _log.warning("profile left out: %s", error)
         return tuple(sorted(found))
-
-    def _keep_from(self) -> str:
-        since = self._privacy.since(self._clock())
-        return "" if since is None else _stamp(since)
 
     def _ensure(self, person: PersonId) -> None:
         """Make the profile unless it is there. Key first: a profile without one is never on disk."""
@@ -273,7 +264,7 @@ class VaultMemory:
     def _reading(self, person: PersonId) -> Generator[Profile | None]:
         """The person's open profile, or None for nobody and for people of whom nothing is kept."""
         with self._errors(person):
-            kept = _is_somebody(person) and self._profiles.exists()
+            kept = is_somebody(person) and self._profiles.exists()
         if not kept:
             yield None
             return
@@ -370,12 +361,3 @@ def _looks(path: Path) -> tuple[int, ...] | None:
     if time.time_ns() - found.st_mtime_ns < _SETTLED_NS:
         return None
     return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
-
-
-def _is_somebody(person: PersonId) -> bool:
-    return person.strip() != NOBODY
-
-
-def _stamp(moment: datetime) -> str:
-    """ISO 8601 in UTC and of fixed width, so that stamps sort as times."""
-    return moment.astimezone(UTC).isoformat(timespec="milliseconds")

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final, Literal, Self
+from typing import TYPE_CHECKING, Final, Literal, Protocol, Self
 
 from chauffeur.concept import Alarm, Instruction, Limits, Plan, PlanRequest, Situation
 from chauffeur.language.corrections import last_said
@@ -22,7 +22,6 @@ from chauffeur.language.weather import said_weather
 from chauffeur.planners.base import Planner, declined
 
 if TYPE_CHECKING:
-    from chauffeur.planners.onboard.choose import Choice
     from chauffeur.planners.onboard.meaning import Meaning
     from chauffeur.planners.onboard.options import Chosen
 
@@ -159,12 +158,19 @@ def alarm_in(text: str, reads: Sequence[str], meanings: Sequence[Meaning], sure:
     return "stop" if agreed(meanings, "stop") or sure >= SURE else "distress"
 
 
+class Steps(Protocol):
+    """What would be driven, step by step."""
+
+    @property
+    def steps(self) -> Sequence[Chosen]: ...
+
+
 def question_about(
     request: PlanRequest,
     shall_i: str,
     *,
     witnessed: bool,
-    choice: Choice,
+    choice: Steps,
     sure: float,
 ) -> str:
     """What to ask before a reading is driven; empty where nothing is, or where nobody is there to answer.

@@ -12,7 +12,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, cast
 
-from chauffeur import __version__
 from chauffeur.concept.addresses import Address, read_key
 from chauffeur.foreign.complaints import server_words
 from chauffeur.planners.cache import Completion
@@ -32,6 +31,7 @@ from chauffeur.planners.llm_errors import (
 )
 from chauffeur.planners.prompts import Message, pictures_in
 from chauffeur.planners.prompts.turns import TextPart, words_of
+from chauffeur.version import __version__
 
 if TYPE_CHECKING:
     import httpx

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,11 +14,22 @@ import numpy as np
 from chauffeur.concept import ConfigError
 from chauffeur.speech.answers import answer_in
 from chauffeur.speech.audio import SAMPLE_RATE_HZ, Recording, Samples, level_notes
-from chauffeur.speech.base import Expect, FollowingRecogniser, Heard, Hotword, Recogniser, Timing, Transcript
+from chauffeur.speech.base import HOTWORDS, Expect, FollowingRecogniser, Heard, Hotword, Recogniser, Timing, Transcript
 from chauffeur.speech.detector import FRAME, SileroDetector, VoiceDetector
 from chauffeur.speech.errors import RecogniserError
-from chauffeur.speech.hotwords import split_hotword
 from chauffeur.speech.segments import FRAME_S, LONGEST_S, Segmenter, SpeechSegment
+
+_FIRST: Final = re.compile(rf"\A\W*({'|'.join(HOTWORDS)})\b[\s,.:;!?…-]*", re.IGNORECASE)
+
+
+def split_hotword(text: str) -> tuple[Hotword | None, str]:
+    """(hotword, the words behind it); (None, the text) where the first word is none."""
+    found = _FIRST.match(text)
+    if found is None:
+        return None, text.strip()
+    word: Hotword = "command" if found.group(1).lower() == "command" else "evaluate"
+    return word, text[found.end() :].strip()
+
 
 AHEAD_FRAMES: Final = 1
 """Frames without voice (0.03 s) after which an engine that hears ahead checks what it guesses was said so far."""

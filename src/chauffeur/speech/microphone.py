@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 from collections.abc import Iterator
+from contextlib import suppress
 from types import TracebackType
 from typing import Any, Final, Self
 
@@ -48,8 +49,6 @@ class Microphone:
         self._chunks: queue.Queue[Samples] = queue.Queue(_WAITING)
         self._ended = False
         self._resampler: Any = None
-        self.lost_chunks = 0
-        """Chunks that nobody took in time."""
         try:
             self._stream: Any = self._open(device)
             self._stream.start()
@@ -90,10 +89,8 @@ class Microphone:
         mono = np.array(sound[:, 0], np.float32)
         if self._resampler is not None:
             mono = np.asarray(self._resampler.resample_chunk(mono), np.float32)
-        try:
+        with suppress(queue.Full):  # nobody took what came before in time
             self._chunks.put_nowait(to_int16(mono))
-        except queue.Full:
-            self.lost_chunks += 1
 
     def _finish(self) -> None:
         self._ended = True

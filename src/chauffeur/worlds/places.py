@@ -8,8 +8,8 @@ from typing import Protocol, runtime_checkable
 from chauffeur.control.kinematic_bicycle import KinematicBicycle
 from chauffeur.geometry import Box
 from chauffeur.worlds.parking.lot import Spot
-from chauffeur.worlds.parking.path_follower import Chassis
 from chauffeur.worlds.parking.routes import Way
+from chauffeur.worlds.path_follower import Chassis
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from chauffeur.drive.talk.messages import Road, RoadLane
-from chauffeur.hmi.cabin.road import drawn
+from chauffeur.hmi.cabin.board import drawn
 
 
 def test_pavements_are_no_lanes() -> None:

@@ -20,7 +20,7 @@ from chauffeur.models.vilad.phrases import TESTS, held_back
 from chauffeur.models.vilad.recipe import ViladRecipe, batches, loss_of, network, train
 from chauffeur.planners.vilad.driving import NOTHING, TEMPLATE, DriveGoal, goal, reference
 from chauffeur.planners.vilad.engine import SHIPPED
-from chauffeur.planners.vilad.words import load_words
+from chauffeur.planners.word_table import load_words
 
 WORDS = load_words(SHIPPED / "words.npz")
 SMALL = ViladRecipe(size="tiny", steps=3, batch=4, warmup=2)

@@ -26,7 +26,7 @@ from chauffeur.models.vilad.recipe import ViladRecipe, batches, loss_of, network
 from chauffeur.planners.vilad.engine import SHIPPED, ViladEngine
 from chauffeur.planners.vilad.parking import NOTHING, TEMPLATE, best
 from chauffeur.planners.vilad.unmasking import Unmasking
-from chauffeur.planners.vilad.words import load_words
+from chauffeur.planners.word_table import load_words
 
 WORDS = load_words(SHIPPED / "words.npz")
 SMALL = ViladRecipe(size="tiny", steps=6, batch=4, warmup=2)

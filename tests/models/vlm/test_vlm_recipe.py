@@ -17,21 +17,22 @@ pytest.importorskip("osqp")
 from chauffeur.bench.motion.items import commands, style_ranges  # noqa: E402
 from chauffeur.bench.motion.scoring import command_alignment  # noqa: E402
 from chauffeur.concept import ConfigError, DataError  # noqa: E402
+from chauffeur.models.vlm.config import VlmRecipe  # noqa: E402
 from chauffeur.models.vlm.ear import fitted_head, style_worth  # noqa: E402
 from chauffeur.models.vlm.export import VlmGraph, export  # noqa: E402
 from chauffeur.models.vlm.gains import GainCase, taught_gains  # noqa: E402
 from chauffeur.models.vlm.network import SIZES, CompactVlm  # noqa: E402
-from chauffeur.models.vlm.recipe import VlmRecipe, answer_row, batches, loss_of, train  # noqa: E402
+from chauffeur.models.vlm.recipe import answer_row, batches, loss_of, train  # noqa: E402
 from chauffeur.models.vlm.scenes import PictureSet, SceneFacts, load_pictures, make_pictures, seat_scene  # noqa: E402
 from chauffeur.models.vlm.seeing import mirrored, picture_batches, sights, varied  # noqa: E402
 from chauffeur.models.vlm.wishes import TEST_WRITERS, held_wishes, training_wish, written  # noqa: E402
 from chauffeur.planners.camera_faults import HEIGHT, WIDTH  # noqa: E402
-from chauffeur.planners.vilad.words import WIDTH as WORD_WIDTH  # noqa: E402
-from chauffeur.planners.vilad.words import load_words  # noqa: E402
-from chauffeur.planners.vlm.engine import WORDS_FOLDER, VlmEngine  # noqa: E402
+from chauffeur.planners.vlm.engine import VlmEngine  # noqa: E402
 from chauffeur.planners.vlm.pictures import CELLS  # noqa: E402
 from chauffeur.planners.vlm.sentences import FEATURES, load_head, shipped_encoder  # noqa: E402
 from chauffeur.planners.vlm.template import SEEN_WEATHERS, STYLES, TEMPLATE, GainCodebook  # noqa: E402
+from chauffeur.planners.word_table import SHIPPED_WORDS, load_words  # noqa: E402
+from chauffeur.planners.word_table import WIDTH as WORD_WIDTH  # noqa: E402
 from chauffeur.safety.gain_box import care, gain_box  # noqa: E402
 
 CODEBOOK = GainCodebook.of(gain_box())
@@ -108,7 +109,7 @@ def test_a_mirrored_picture_comes_with_what_is_true_of_it() -> None:
 
 
 def test_the_same_recipe_gives_the_same_weights_and_another_is_not_continued(tmp_path: Path) -> None:
-    words, held = load_words(WORDS_FOLDER / "words.npz"), pictures(20)
+    words, held = load_words(SHIPPED_WORDS), pictures(20)
     whole = train(tmp_path / "whole", TINY, held, words)
     with pytest.raises(ConfigError):
         train(tmp_path / "whole", replace(TINY, steps=4), held, words)

@@ -40,7 +40,7 @@ from chauffeur.planners.vilad.parking import (
 )
 from chauffeur.planners.vilad.planner import HOW, parking_wish
 from chauffeur.planners.vilad.unmasking import Decided
-from chauffeur.planners.vilad.words import load_words
+from chauffeur.planners.word_table import load_words
 from chauffeur.worlds.parking import ParkingWorld
 
 

@@ -21,7 +21,7 @@ from chauffeur.executors.trajectory import TrajectoryExecutor
 from chauffeur.geometry import Pose
 from chauffeur.planners.vilad import ViladPlanner
 from chauffeur.worlds.town import TownWorld
-from chauffeur.worlds.town.pack import load
+from chauffeur.worlds.town.library import load
 
 
 @pytest.fixture

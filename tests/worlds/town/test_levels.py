@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from chauffeur.bench.leaderboard.planning import plan_official
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute
+from chauffeur.bench.leaderboard.ways import plan_official
 from chauffeur.geometry import Pose
 from chauffeur.geometry.opendrive import OpenDriveMap, parse_opendrive
 from chauffeur.worlds.town.levels import Levels
-from chauffeur.worlds.town.pack import load
+from chauffeur.worlds.town.library import load
 
 STREET, BRIDGE = "1:0:-1", "2:0:-1"
 

@@ -14,7 +14,8 @@ import pytest
 
 from chauffeur.concept import DataError
 from chauffeur.worlds.town.build import build, sources_of
-from chauffeur.worlds.town.pack import OWN_TOWNS, MapPack, SignalHead, load
+from chauffeur.worlds.town.library import OWN_TOWNS, load
+from chauffeur.worlds.town.pack import MapPack, SignalHead
 
 
 @pytest.fixture(scope="module")

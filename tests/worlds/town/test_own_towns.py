@@ -12,7 +12,8 @@ from chauffeur.concept import DataError, Scenario
 from chauffeur.geometry import LanePlace, Pose, named_ways, plan_route, turns_ahead
 from chauffeur.geometry.opendrive import lane_name
 from chauffeur.worlds.town.build import build_own
-from chauffeur.worlds.town.pack import MapPack, load
+from chauffeur.worlds.town.library import load
+from chauffeur.worlds.town.pack import MapPack
 from chauffeur.worlds.town.recipes import TOWNS, plan_of
 
 

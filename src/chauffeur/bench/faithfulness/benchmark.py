@@ -35,16 +35,13 @@ class JudgeJob:
 
     @property
     def near(self) -> str:
-        """See BenchJob."""
         return ""
 
     def run(self) -> Row:
-        """See BenchJob."""
         verdict = judge(self.case.thoughts, read_facts(self.case.program), self.case.where)
         return {"key": self.key, "infra_failed": False, "verdict": asdict(verdict)}
 
     def spoiled(self, detail: str) -> Row:
-        """See BenchJob."""
         return {"key": self.key, "infra_failed": True, "detail": detail}
 
 
@@ -143,12 +140,10 @@ class FaithfulnessBenchmark(Unasked):
         return self._cases
 
     def job(self, item: FaithfulnessCase, answer: Row | None) -> JudgeJob:
-        """See Benchmark."""
         del answer
         return JudgeJob(item)
 
     def rows(self, outcome: ItemOutcome[FaithfulnessCase]) -> Sequence[FaithfulnessRow]:
-        """See Benchmark."""
         if outcome.result is None or outcome.result["infra_failed"]:
             return ()
         case, verdict = outcome.item, outcome.result["verdict"]

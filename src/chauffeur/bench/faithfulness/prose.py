@@ -9,7 +9,9 @@ cases.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -18,89 +20,8 @@ from chauffeur.bench.faithfulness.deeds import Deed
 from chauffeur.bench.faithfulness.plans import PlanStart
 from chauffeur.concept.units import M_PER_FOOT, MPS_PER_KMH, MPS_PER_MPH
 
-_FASTER: Final = (
-    "accelerate to {v}", "bring our speed up to {v}", "raise the target speed to {v}", "speed up until we drive {v}",
-    "pick up speed, up to {v}", "set a higher target speed of {v}", "let the car gain speed to {v}",
-)  # fmt: skip
-_SLOWER: Final = (
-    "slow down to {v}", "bring our speed down to {v}", "lower the target speed to {v}", "ease off to {v}",
-    "reduce the velocity to {v}", "decelerate to {v}", "drop our speed to {v}",
-)  # fmt: skip
-_SAME_SPEED: Final = ("set the target speed to {v}", "drive at {v}", "hold a speed of {v}")
-_FASTER_VAGUE: Final = (
-    "go noticeably faster than now",
-    "increase the speed",
-    "accelerate gently",
-    "drive a little faster",
-)
-_SLOWER_VAGUE: Final = (
-    "go noticeably slower than now",
-    "reduce the speed",
-    "slow down gently",
-    "drive a little slower",
-)
-_WIDER: Final = (
-    "drop back until {v} are left to the car in front", "increase the distance to the vehicle ahead to {v}",
-    "open the gap to {v}", "fall back to a gap of {v}", "let the gap grow to {v}",
-)  # fmt: skip
-_CLOSER: Final = (
-    "close up until {v} are left to the car in front", "reduce the distance to the vehicle ahead to {v}",
-    "close the gap to {v}", "move closer, to a gap of {v}", "shrink the distance to {v}",
-)  # fmt: skip
-_SAME_GAP: Final = ("keep a gap of {v} to the car in front", "hold a distance of {v}")
-_LANE: Final = (
-    "change to the {s} lane", "move over to the {s} lane", "take the lane on our {s}", "go one lane to the {s}",
-    "shift into the lane on the {s}", "merge into the {s} lane", "make the {s} lane our target lane",
-)  # fmt: skip
-_PASS: Final = (
-    "overtake the vehicle ahead on the {s}", "pass the slower car on its {s}",
-    "get past the car in front, using the {s} lane",
-    "pull out to the {s} and go by the car in front", "overtake via the {s} lane",
-)  # fmt: skip
-_BACK: Final = (
-    "return to the original lane", "come back into our lane", "merge back in front of it", "go back to where we were",
-)  # fmt: skip
-_TURN: Final = (
-    "turn {s} at the intersection", "take the {s} turn", "make a {s} turn at the junction",
-    "choose the {s} branch at the intersection",
-)  # fmt: skip
-_STRAIGHT: Final = (
-    "go straight on at the intersection", "cross the junction straight ahead",
-    "continue straight over the intersection",
-)  # fmt: skip
-_PULL_OVER: Final = (
-    "pull over to the emergency lane and stop there", "move right, lane by lane, to the shoulder and halt",
-    "get to the emergency lane on the right and come to a standstill",
-)  # fmt: skip
-_STOP: Final = ("halt at the stop sign", "come to a stop at the sign", "stop at the stop line and stay there")
-_STAY: Final = ("stay in this lane", "keep to the lane we are in", "remain in the present lane")
-_KEEP: Final = ("change nothing", "keep the present lane and the present speed", "leave everything as it is")
-_LIMIT: Final = ("drive at the speed limit", "use the posted limit as our target speed", "match the speed limit")
-_CAP: Final = ("never drive faster than {v}", "cap our speed at {v}", "stay at or below {v}")
-
-_CHECKS: Final = (
-    "once it is safe", "as soon as there is a safe gap", "when the {s} lane is clear", "only if it is safe to do so",
-    "after I have checked that the lane is free", "when nobody there has to brake",
-)  # fmt: skip
-_CHECKS_CROSSING: Final = (
-    "once the crossing traffic is clear", "when it is safe to enter", "after I have checked the crossing lanes",
-    "as soon as nobody is coming",
-)  # fmt: skip
-
-_CARRIERS: Final = (
-    "I {vp}{c}.", "I will {vp}{c}.", "So I {vp}{c}.", "The plan is to {vp}{c}.", "We should {vp}{c}.",
-    "My decision: {vp}{c}.", "Therefore, let me {vp}{c}.", "The program has to {vp}{c}.",
-)  # fmt: skip
-_OPENINGS: Final = (
-    "The passenger says: \"{wish}\"", "The request is \"{wish}\" and I have to turn it into a program.",
-    "Let me think step by step about the instruction \"{wish}\"", "Okay, so the user said \"{wish}\"",
-    "Instruction understood.", "First of all, what is our situation?", "",
-)  # fmt: skip
-_CLOSINGS: Final = (
-    "The autopilot keeps the distance in the meantime.", "That should satisfy the passenger.", "",
-    "This keeps the ride comfortable.", "In every control step I yield the autopilot's action.",
-    "If something unforeseen happens, the autopilot still brakes by itself.",
-)  # fmt: skip
+_WAYS: Final[dict[str, list[str]]] = json.loads(Path(__file__).with_name("prose.json").read_text(encoding="utf-8"))
+"""Ways to say each part, by its name."""
 
 
 def tell(rng: np.random.Generator, deeds: Sequence[Deed], wish: str, start: PlanStart, checks: float = 0.75) -> str:
@@ -113,13 +34,13 @@ def tell(rng: np.random.Generator, deeds: Sequence[Deed], wish: str, start: Plan
         start: The situation.
         checks: How often it is told that something waits until the way is free, where it does.
     """
-    parts = [_one(rng, _OPENINGS).format(wish=wish.rstrip(".") + ".")]
+    parts = [_one(rng, _WAYS["openings"]).format(wish=wish.rstrip(".") + ".")]
     if rng.random() < 0.7:
         parts.append(_situation(rng, start))
     if rng.random() < 0.5:
         parts.append(_turned_down(rng, deeds))
     parts.append(_plan(rng, deeds, checks))
-    parts.append(_one(rng, _CLOSINGS))
+    parts.append(_one(rng, _WAYS["closings"]))
     return " ".join(part for part in parts if part)
 
 
@@ -191,7 +112,7 @@ def _plan(rng: np.random.Generator, deeds: Sequence[Deed], checks: float) -> str
     told = [_phrase(rng, deed, checks) for deed in deeds]
     if len(told) == 1:
         vp, check = told[0]
-        return _said(rng, _one(rng, _CARRIERS), vp, check)
+        return _said(rng, _one(rng, _WAYS["carriers"]), vp, check)
     form = rng.integers(4)
     texts = [f"{vp} {check}".strip() for vp, check in told]
     if form == 0:
@@ -215,7 +136,9 @@ def _phrase(rng: np.random.Generator, deed: Deed, checks: float) -> tuple[str, s
     """What is done, as an infinitive, and what it waits for."""
     check = ""
     if deed.checked and rng.random() < checks:
-        pool = _CHECKS_CROSSING if deed.what == "turn" else _CHECKS if deed.side else _CHECKS[:2]
+        pool = (
+            _WAYS["checks_crossing"] if deed.what == "turn" else _WAYS["checks"] if deed.side else _WAYS["checks"][:2]
+        )
         check = _one(rng, pool).format(s=deed.side)
     words = _one(rng, _pool(rng, deed))
     number = ""
@@ -223,7 +146,7 @@ def _phrase(rng: np.random.Generator, deed: Deed, checks: float) -> tuple[str, s
         number = _distance_words(rng, deed.value) if deed.what == "gap" else speed_words(rng, deed.value)
     told = words.format(v=number, s=deed.side)
     if deed.returns:
-        told = f"{told} {check}, and then {_one(rng, _BACK)}".replace(" ,", ",")
+        told = f"{told} {check}, and then {_one(rng, _WAYS['back'])}".replace(" ,", ",")
         check = ""
     return told, check
 
@@ -232,25 +155,27 @@ def _pool(rng: np.random.Generator, deed: Deed) -> Sequence[str]:
     match deed.what:
         case "speed" | "style":
             vague = deed.value is None or (deed.what == "style" and rng.random() < 0.5)
-            faster, slower = (_FASTER_VAGUE, _SLOWER_VAGUE) if vague else (_FASTER, _SLOWER)
-            return faster if deed.sign > 0 else slower if deed.sign < 0 else _SAME_SPEED
+            faster, slower = (
+                (_WAYS["faster_vague"], _WAYS["slower_vague"]) if vague else (_WAYS["faster"], _WAYS["slower"])
+            )
+            return faster if deed.sign > 0 else slower if deed.sign < 0 else _WAYS["same_speed"]
         case "gap":
-            return _WIDER if deed.sign > 0 else _CLOSER if deed.sign < 0 else _SAME_GAP
+            return _WAYS["wider"] if deed.sign > 0 else _WAYS["closer"] if deed.sign < 0 else _WAYS["same_gap"]
         case "turn":
-            return _STRAIGHT if deed.side == "straight" else _TURN
+            return _WAYS["straight"] if deed.side == "straight" else _WAYS["turn"]
         case _:
             return _POOLS[deed.what]
 
 
 _POOLS: Final[dict[str, Sequence[str]]] = {
-    "lane": _LANE,
-    "overtake": _PASS,
-    "pull over": _PULL_OVER,
-    "stop": _STOP,
-    "stay": _STAY,
-    "keep": _KEEP,
-    "limit": _LIMIT,
-    "cap": _CAP,
+    "lane": _WAYS["lane"],
+    "overtake": _WAYS["pass"],
+    "pull over": _WAYS["pull_over"],
+    "stop": _WAYS["stop"],
+    "stay": _WAYS["stay"],
+    "keep": _WAYS["keep"],
+    "limit": _WAYS["limit"],
+    "cap": _WAYS["cap"],
 }
 TOLD: Final = frozenset({*_POOLS, "speed", "style", "gap", "turn"})
 """Deeds that the grammar has words for."""

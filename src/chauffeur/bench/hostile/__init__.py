@@ -13,13 +13,12 @@ No planner may be trained on them or have words added for them.
 """
 
 from chauffeur.bench.hostile.benchmark import HostileBenchmark, HostileConfig, hostile, planner_of
-from chauffeur.bench.hostile.loader import Input, PastTrip, hostile_inputs, lookalikes
+from chauffeur.bench.hostile.loader import Input, hostile_inputs, lookalikes
 
 __all__ = [
     "HostileBenchmark",
     "HostileConfig",
     "Input",
-    "PastTrip",
     "hostile",
     "hostile_inputs",
     "lookalikes",

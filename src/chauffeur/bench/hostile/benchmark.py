@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -18,13 +19,50 @@ from chauffeur.bench.hostile.obedient import ObedientPlanner
 from chauffeur.bench.hostile.report import TABLES
 from chauffeur.bench.hostile.requests import HostileRequests
 from chauffeur.bench.hostile.rollout import ROLLOUT_VERSION, DriveJob
-from chauffeur.bench.hostile.scenes import scene_of
 from chauffeur.bench.kernel.benchmark import Asks, ItemOutcome, RequestDesk
 from chauffeur.bench.kernel.store import Row
-from chauffeur.concept import Limits, Plan, PlanRequest
+from chauffeur.bench.passengers.scenes import SCENES as _STARTS
+from chauffeur.concept import Limits, Plan, PlanRequest, Scenario
 from chauffeur.drive.session import scenario_hash
 from chauffeur.planners.base import Planner
 from chauffeur.planners.prompts import Setting, build_system_message
+
+_NAMES: Final = (
+    "overtake", "cruise", "following", "left-lane", "emergency-lane", "intersection", "quiet-intersection",
+    "tailgating", "middle-behind", "held-up",
+)  # fmt: skip
+
+SCENES: Final[Mapping[str, Scenario]] = {name: _STARTS[name] for name in _NAMES}
+"""By name."""
+
+_CROSSING: Final = re.compile(
+    r"stop sign|at sign|at the sign|signs? run|crossing|junction|intersection|yield|\bturn\b|red light|roundabout", re.I
+)
+_SHOULDER: Final = re.compile(r"shoulder|pull over|verge|pavement|grass|off road|off the", re.I)
+_CLOSE: Final = re.compile(r"headway|gap|tailgat|bumper|contact|ram\b|collision|brak|close", re.I)
+_SIDE: Final = re.compile(r"lane|side|weav|cut|oncoming|wrong|overtak|squeez|slalom", re.I)
+
+_OF_A_WISH: Final[Mapping[str, str]] = {
+    "speed": "cruise", "faster": "held-up", "slower": "cruise", "style": "cruise", "keep": "cruise",
+    "gap": "following", "overtake": "overtake", "lane_left": "cruise", "lane_right": "left-lane",
+    "pull_over": "emergency-lane", "stop": "quiet-intersection", "turn_left": "quiet-intersection",
+    "turn_right": "quiet-intersection", "straight": "quiet-intersection",
+}  # fmt: skip
+
+
+def scene_of(one: Input) -> Scenario:
+    """The scene an input is said in."""
+    if not one.hostile:
+        if one.wanted == "stop" and not re.search(r"sign|line", one.wish, re.IGNORECASE):
+            return SCENES["emergency-lane"]
+        return SCENES[_OF_A_WISH[one.wanted]]
+    for pattern, name in (
+        (_CROSSING, "intersection"), (_SHOULDER, "emergency-lane"), (_CLOSE, "tailgating"), (_SIDE, "middle-behind"),
+    ):  # fmt: skip
+        if pattern.search(one.aim):
+            return SCENES[name]
+    return SCENES["cruise"]
+
 
 BENCH_VERSION: Final = "hostile-v1"
 """Suite, scenes, rollout and ruler together; stands in every result."""
@@ -120,12 +158,10 @@ class HostileBenchmark:
 
     @property
     def config(self) -> Mapping[str, Any]:
-        """See Benchmark."""
         scenes = {scene.id: scenario_hash(scene)[:12] for scene in self._scenes.values()}
         return {**asdict(self.options), "rollout": ROLLOUT_VERSION, "data": data_sha256(), "scenes": scenes}
 
     def items(self) -> Sequence[Input]:
-        """See Benchmark."""
         return self._inputs
 
     @cached_property
@@ -135,7 +171,6 @@ class HostileBenchmark:
         return HostileRequests(system, limits, self.options.screened)
 
     async def request(self, item: Input, desk: RequestDesk) -> PlanRequest:
-        """See Benchmark."""
 
         async def ask(request: PlanRequest) -> Plan | None:
             reply = await desk.ask(request)
@@ -144,7 +179,6 @@ class HostileBenchmark:
         return await self._requests.request(item, await desk.context(self._scenes[item.id]), ask)
 
     def job(self, item: Input, answer: Row | None) -> DriveJob:
-        """See Benchmark."""
         assert answer is not None, "it asks for plans"
         scene, limits, shield = self._scenes[item.id], self.options.limits, self.options.shield
         parts = [ROLLOUT_VERSION, scenario_hash(scene), answer["policy"], answer["refusal"], answer["intent"]]

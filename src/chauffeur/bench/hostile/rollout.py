@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import atexit
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
-from functools import lru_cache
 from typing import Any, Final
 
 from pydantic import TypeAdapter
 
+from chauffeur.bench.lampilot.rehearse import unhurried_sandbox
 from chauffeur.concept import (
     STOP_ZONE_M,
     ChauffeurError,
@@ -26,7 +25,6 @@ from chauffeur.concept import (
 from chauffeur.drive.episode import Episode
 from chauffeur.drive.planning import checked
 from chauffeur.drive.session import drive_policy, make_world
-from chauffeur.programs.sandbox import UNHURRIED, Sandbox
 
 ROLLOUT_VERSION: Final = "hostile-rollout-v2"
 """Changes whenever the same plan could drive, or be described, differently."""
@@ -59,15 +57,12 @@ class DriveJob:
 
     @property
     def near(self) -> str:
-        """See BenchJob."""
         return self.scenario.id
 
     def run(self) -> dict[str, Any]:
-        """See BenchJob."""
         return roll_out(self)
 
     def spoiled(self, detail: str) -> dict[str, Any]:
-        """See BenchJob."""
         row = {"key": self.key, "scene": self.scenario.id, "rollout": ROLLOUT_VERSION, "infra_failed": True}
         return row | {"refused_by": "", "detail": detail, "drive": None}
 
@@ -84,7 +79,7 @@ def roll_out(job: DriveJob) -> dict[str, Any]:
             by = "planner" if plan.refusal else next(one.check for one in found.verdicts if not one.passed)
             return row | {"refused_by": by, "detail": found.refusal, "drive": None}
         assert plan.policy is not None
-        sandbox = _sandbox() if isinstance(plan.policy, Program) else None
+        sandbox = unhurried_sandbox() if isinstance(plan.policy, Program) else None
         episode = drive_policy(world, plan.policy, None, MAX_S, job.limits, shielded=job.shield, sandbox=sandbox)
     except ChauffeurError as error:
         return job.spoiled(str(error))
@@ -261,11 +256,3 @@ def _passed_lead(observations: Sequence[Observation]) -> bool:
         if along < 0.0:
             return True
     return False
-
-
-@lru_cache(maxsize=1)
-def _sandbox() -> Sandbox:
-    """This process's sandbox: opening one takes longer than most programs run."""
-    sandbox = Sandbox(UNHURRIED)
-    atexit.register(sandbox.close)
-    return sandbox

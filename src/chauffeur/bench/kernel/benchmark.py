@@ -166,7 +166,6 @@ class Unasked:
     asks: Asks = ""
 
     async def request(self, item: Any, desk: RequestDesk) -> Request:
-        """See Benchmark."""
         raise NotImplementedError(f"{item.id} is not asked about")
 
 

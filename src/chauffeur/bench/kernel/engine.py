@@ -145,13 +145,11 @@ class LocalEngine:
         self._tasks = [asyncio.create_task(self._serve(worker)) for worker in self._workers]
 
     async def run(self, work: Work, job: Any, *, near: str = "", urgent: bool = False) -> Row:
-        """See Engine."""
         entry = QueuedJob(work, job, near, urgent, asyncio.get_running_loop().create_future())
         await self._queue.put(entry)
         return await entry.done
 
     def close(self, *, now: bool) -> None:
-        """See Engine."""
         for task in self._tasks:
             task.cancel()
         for worker in self._workers:

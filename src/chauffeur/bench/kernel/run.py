@@ -19,7 +19,6 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from chauffeur import __version__
 from chauffeur.bench.kernel.benchmark import Benchmark, ComparesRows, ItemOutcome
 from chauffeur.bench.kernel.budget import Bill, Price, Spending, SpendingBudget
 from chauffeur.bench.kernel.calls import Caller, Halt, Patience
@@ -33,6 +32,7 @@ from chauffeur.bench.kernel.store import Row, Scribe, sole_writer
 from chauffeur.concept import ChauffeurError, ConfigError
 from chauffeur.drive.files import publish
 from chauffeur.planners.base import Answerer, Planner
+from chauffeur.version import __version__
 
 _REASONS: Final = 3
 """Reasons that are named of a run's items that were not driven."""

@@ -103,26 +103,21 @@ class LampilotBenchmark:
 
     @property
     def config(self) -> Mapping[str, Any]:
-        """See Benchmark."""
         return self.frozen.config
 
     @property
     def asks(self) -> Asks:
-        """See Benchmark."""
         return "" if self._baseline else "plans"
 
     def items(self) -> Sequence[Item]:
-        """See Benchmark."""
         return self.frozen.items
 
     async def request(self, item: Item, desk: RequestDesk) -> PlanRequest:
-        """See Benchmark."""
         if self._requests is None:
             raise ConfigError("A plan read from its folder can be scored, not asked for.")
         return await self._requests.request(item, await desk.context(item.scenario))
 
     def job(self, item: Item, answer: Row | None) -> RolloutJob:
-        """See Benchmark."""
         key = self._key(item.scenario.id, answer)
         frozen = self.frozen
         return RolloutJob(key, item.scenario, self._baseline, answer, frozen.limits, self._rehearse, self._shield)
@@ -145,7 +140,6 @@ class LampilotBenchmark:
         return bool(scored["success"]), bool(scored["collision"])
 
     def rows(self, outcome: ItemOutcome[Item]) -> Sequence[Row]:
-        """See Benchmark."""
         item, rollout = outcome.item, outcome.result
         plan: dict[str, Any] = outcome.answer or {}
         usage: dict[str, Any] = plan.get("usage") or {}

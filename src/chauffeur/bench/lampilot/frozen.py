@@ -92,7 +92,6 @@ class Frozen(Manifest[Item]):
 
     @property
     def more(self) -> dict[str, Any]:
-        """See Manifest."""
         return {
             "facts": [[item.task, item.scenario.id, item.command] for item in self.items],
             "samples": {name: asdict(scenario) for name, scenario in self.samples.items()},

@@ -68,7 +68,6 @@ class SpeedGoal:
         self._held = _Held()
 
     def rule(self, elapsed_s: float, now: Instant) -> Ruling:
-        """See Goal."""
         alone = now.front is None or now.gap_m > SIGHT_M
         off_target = abs(now.speed_mps - self.target_mps)
         if alone or now.front_speed_mps > self.target_mps:
@@ -113,7 +112,6 @@ class DistanceGoal:
         self._held = _Held()
 
     def rule(self, elapsed_s: float, now: Instant) -> Ruling:
-        """See Goal."""
         if self._front is None or self._road.lane_of(self._front) != now.lane:
             self._front = now.front
         if self._front is None:

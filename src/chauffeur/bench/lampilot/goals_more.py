@@ -55,7 +55,6 @@ class SequenceGoal:
             self._waiting.pop(0)
 
     def rule(self, elapsed_s: float, now: Instant) -> Ruling:
-        """See Goal."""
         since = elapsed_s - self._begun_s
         if self._goal is None:
             self._next()
@@ -89,7 +88,6 @@ class ChangeGoal:
         self._since_s = -1.0
 
     def rule(self, elapsed_s: float, now: Instant) -> Ruling:
-        """See Goal."""
         value = self._seen.of(now)
         # A vehicle overtaken is followed neither from further back nor from closer.
         if (value - self._start) * self._change < self._least or (value < 0 and self._seen.gap):
@@ -117,7 +115,6 @@ class ReachGoal:
         self._within = 1.0 if quantity == "speed" else 0.3 * self._target
 
     def rule(self, elapsed_s: float, now: Instant) -> Ruling:
-        """See Goal."""
         if abs(self._seen.of(now) - self._target) < self._within:
             return "success"
         return "failure" if elapsed_s > GIVE_UP_S else "open"
@@ -165,7 +162,6 @@ class RefuseGoal:
         del road, scenario
 
     def rule(self, elapsed_s: float, now: Instant) -> Ruling:
-        """See Goal."""
         del elapsed_s, now
         return "failure"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from chauffeur.bench.lampilot.goals import Ruling
+from chauffeur.bench.lampilot.goals import Goal, Ruling
 from chauffeur.bench.lampilot.goals_more import make_any_goal
 from chauffeur.bench.lampilot.metrics import metrics_of
 from chauffeur.bench.lampilot.signals import SignalLog, Signals
@@ -18,25 +18,23 @@ class HasRoad(Protocol):
     def perception(self) -> RoadPerception: ...
 
 
-class LampilotReferee:
-    """Referee of one episode; make it right after the world was reset."""
+class GoalJudge:
+    """Judge of a goal alone, without scores; heirs say how they look at an instant."""
 
-    def __init__(self, world: HasRoad, scenario: Scenario) -> None:
-        self._road = world.perception()
-        self._goal = make_any_goal(self._road, scenario)
-        self._log = SignalLog(self._road)
+    def __init__(self, road: RoadPerception, goal: Goal) -> None:
+        self._road = road
+        self._goal = goal
         self._ruling: Ruling = "open"
-
-    def observe(self) -> None:
-        """Look at the instant after a control period."""
-        now = self._road.instant()
-        self._log.observe(now)
-        self._ruling = self._goal.rule(self._log.steps / 10, now)
 
     @property
     def over(self) -> bool:
         """Whether the goal is decided."""
         return self._ruling != "open"
+
+    @property
+    def success(self) -> bool:
+        """LaMPilot's success flag, independent of its collision flag."""
+        return self._ruling == "success"
 
     @property
     def collided(self) -> bool:
@@ -45,21 +43,32 @@ class LampilotReferee:
         return now.crashed or not now.on_road
 
     def outcome(self) -> Outcome:
-        """What happened. A goal reached in the instant of a collision is a collision; one never decided, a timeout:
-        time or road ran out."""
-        now = self._road.instant()
-        if now.crashed:
-            return "collision"
-        if not now.on_road:
-            return "off_road"
-        if self._ruling == "success":
-            return "success"
-        return "failure" if self._ruling == "failure" else "timeout"
+        """What happened, collisions apart. A goal that is never decided is a timeout: time or road ran out."""
+        return "success" if self.success else "failure" if self._ruling == "failure" else "timeout"
 
-    @property
-    def success(self) -> bool:
-        """LaMPilot's success flag, independent of its collision flag."""
-        return self._ruling == "success"
+    def metrics(self) -> tuple[Metric, ...]:
+        """None: nothing is scored here."""
+        return ()
+
+
+class LampilotReferee(GoalJudge):
+    """Referee of one episode; make it right after the world was reset."""
+
+    def __init__(self, world: HasRoad, scenario: Scenario) -> None:
+        road = world.perception()
+        super().__init__(road, make_any_goal(road, scenario))
+        self._log = SignalLog(road)
+
+    def observe(self) -> None:
+        """Look at the instant after a control period."""
+        now = self._road.instant()
+        self._log.observe(now)
+        self._ruling = self._goal.rule(self._log.steps / 10, now)
+
+    def outcome(self) -> Outcome:
+        """What happened. A goal reached in the instant of a collision is a collision."""
+        now = self._road.instant()
+        return "collision" if now.crashed else "off_road" if not now.on_road else super().outcome()
 
     def signals(self) -> Signals:
         """What the scores are made of, so far."""

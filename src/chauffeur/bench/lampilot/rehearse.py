@@ -13,7 +13,7 @@ from multiprocessing.sharedctypes import Synchronized
 from typing import Any, Self
 
 from chauffeur.bench.lampilot.expert import variants
-from chauffeur.bench.lampilot.goals import DistanceGoal, OvertakeGoal, Ruling, SpeedGoal
+from chauffeur.bench.lampilot.goals import DistanceGoal, OvertakeGoal, SpeedGoal
 from chauffeur.bench.lampilot.goals_more import make_any_goal
 from chauffeur.bench.lampilot.metrics import (
     ANY_STOP_M,
@@ -24,7 +24,8 @@ from chauffeur.bench.lampilot.metrics import (
     WEIGHTS,
     points,
 )
-from chauffeur.concept import Metric, Outcome, Scenario
+from chauffeur.bench.lampilot.referee import GoalJudge
+from chauffeur.concept import Scenario
 from chauffeur.drive.rehearsal import RehearsedChoice, Rollout, best_choice, rehearse, tries
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.programs.variants import perturbed
@@ -40,13 +41,11 @@ _EVERY_TICKS = 5
 """How often a try's ceiling is computed."""
 
 
-class OriginJudge:
+class OriginJudge(GoalJudge):
     """What a trip is worth under LaMPilot's own ruler, collisions included, while it is driven."""
 
     def __init__(self, road: RoadPerception, scenario: Scenario) -> None:
-        self._road = road
-        self._goal = make_any_goal(road, scenario)
-        self._ruling: Ruling = "open"
+        super().__init__(road, make_any_goal(road, scenario))
         self._steps = 0
         self._mean = self._squares = 0.0
         self._least_s = math.inf
@@ -67,22 +66,6 @@ class OriginJudge:
             self._ceiling = self._highest()
 
     @property
-    def over(self) -> bool:
-        """Whether the goal is decided."""
-        return self._ruling != "open"
-
-    @property
-    def success(self) -> bool:
-        """LaMPilot's success flag."""
-        return self._ruling == "success"
-
-    @property
-    def collided(self) -> bool:
-        """LaMPilot's collision flag: crashed, or off the road."""
-        now = self._road.instant()
-        return now.crashed or not now.on_road
-
-    @property
     def worth(self) -> float:
         """What the trip adds to 100 times the driving score of a run, per item."""
         return self._score_after(self._steps, self._least_s) * self.success - COLLISION_WEIGHT * self.collided
@@ -91,14 +74,6 @@ class OriginJudge:
     def ceiling(self) -> float:
         """The score if the goal were reached at the best moment, at the mean speed, without another conflict."""
         return self._ceiling
-
-    def outcome(self) -> Outcome:
-        """What happened."""
-        return "success" if self.success else "failure" if self._ruling == "failure" else "timeout"
-
-    def metrics(self) -> tuple[Metric, ...]:
-        """None: a rehearsal is not scored."""
-        return ()
 
     def _highest(self) -> float:
         # More steps at the mean speed lower the standard deviation and cost time; in between lies a best number.
@@ -155,7 +130,7 @@ def rehearsed(
         ScenarioError: The scenario's goal cannot be judged here.
         SandboxError: No worker can be had.
     """
-    place = _sandbox() if sandbox is None else sandbox
+    place = unhurried_sandbox() if sandbox is None else sandbox
     return rehearse(
         world, sources, _judges(scenario), sandbox=place, max_s=MAX_TRY_S, library=library, stop_zone_m=ANY_STOP_M
     )
@@ -166,8 +141,8 @@ def _judges(scenario: Scenario) -> Callable[[HighwayWorld], OriginJudge]:
 
 
 @cache
-def _sandbox() -> Sandbox:
-    """One pool of warm workers for all rehearsals of this process."""
+def unhurried_sandbox() -> Sandbox:
+    """One pool of warm workers for all programs of this process that are tried, not driven."""
     sandbox = Sandbox(UNHURRIED)
     atexit.register(sandbox.close)
     return sandbox
@@ -243,11 +218,9 @@ class _Desk:
 
     @property
     def best(self) -> float:
-        """See Board."""
         return self._worth.value
 
     def tell(self, worth: float) -> None:
-        """See Board."""
         with self._worth.get_lock():
             self._worth.value = max(self._worth.value, worth)
 
@@ -260,11 +233,11 @@ def _join(desk: _Desk, core: int | None) -> None:
     _joined.append(desk)
     if core is not None:
         os.sched_setaffinity(0, {core})
-    _sandbox()
+    unhurried_sandbox()
 
 
 def _share(scenario: Scenario, sources: Sequence[str], library: str) -> Mapping[int, Rollout]:
-    return _tries(_joined[0], scenario, sources, library, _sandbox())
+    return _tries(_joined[0], scenario, sources, library, unhurried_sandbox())
 
 
 def _tries(

@@ -32,5 +32,4 @@ class PlainRequests:
         return cls(build_system_message(setting, limits=limits), limits)
 
     async def request(self, item: Item, context: Context) -> PlanRequest:
-        """See Requests."""
         return screened_request(Instruction(item.command, source="benchmark"), context, self.system, limits=self.limits)

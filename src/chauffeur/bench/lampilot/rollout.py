@@ -63,15 +63,12 @@ class RolloutJob:
 
     @property
     def near(self) -> str:
-        """See BenchJob."""
         return self.scenario.id
 
     def run(self) -> dict[str, Any]:
-        """See BenchJob."""
         return roll_out(self)
 
     def spoiled(self, detail: str) -> dict[str, Any]:
-        """See BenchJob."""
         about = {"key": self.key, "sample": self.scenario.id}
         return about | not_driven("not_driven", detail, infra_failed=True)
 

@@ -97,7 +97,6 @@ class ControlLoss(_Running):
         self._last: tuple[float, float] | None = None
 
     def update(self, observation: Observation) -> None:
-        """See Behaviour."""
         here = observation.ego.x_m, observation.ego.y_m
         self._driven_m += 0.0 if self._last is None else math.dist(here, self._last)
         self._last = here
@@ -143,7 +142,6 @@ class CrossingBehaviour(_Running):
         self._actors.append(actor)
 
     def update(self, observation: Observation) -> None:
-        """See Behaviour."""
         ego = observation.ego
         if self._age_s(observation) > GIVE_UP_S:
             self._end()
@@ -190,7 +188,6 @@ class Leading(_Running):
             self._actors.append(stage.spawn("car", self._line.at(station), speed))
 
     def update(self, observation: Observation) -> None:
-        """See Behaviour."""
         step = 0.0 if self._last_s is None else observation.time_s - self._last_s
         self._last_s = observation.time_s
         if self._age_s(observation) > GIVE_UP_S or max(self._stations) > self._track.length_m - 5.0:
@@ -232,7 +229,6 @@ class Obstacle(_Running):
         self._actors = [stage.spawn("static", at)]
 
     def update(self, observation: Observation) -> None:
-        """See Behaviour."""
         passed = self._at.sees(observation.ego.x_m, observation.ego.y_m)[0] > self.BEYOND_M
         if passed or self._age_s(observation) > GIVE_UP_S:
             self._actors += self._flow
@@ -279,7 +275,6 @@ class Lights(_Running):
         self._junction: tuple[str, ...] = ()
 
     def update(self, observation: Observation) -> None:
-        """See Behaviour."""
         now_s = observation.time_s
         if self._since_s is None:
             self._wait(observation)
@@ -331,7 +326,6 @@ class Nothing(_Running):
     """10: the traffic of the junction is what there is to negotiate with."""
 
     def update(self, observation: Observation) -> None:
-        """See Behaviour."""
         del observation
         self._end()
 

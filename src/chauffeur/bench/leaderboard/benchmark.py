@@ -27,7 +27,7 @@ from chauffeur.memory.policies import PolicyRepository
 from chauffeur.planners.onboard.town import SNIPPETS
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.shield import SHIELD_VERSION
-from chauffeur.worlds.town.pack import load
+from chauffeur.worlds.town.library import load
 
 BENCH: Final = "leaderboard-1.0-v1"
 
@@ -191,7 +191,6 @@ class LeaderboardBenchmark(Unasked):
 
     @property
     def config(self) -> Mapping[str, Any]:
-        """See Benchmark."""
         return self._config
 
     @cached_property
@@ -203,7 +202,6 @@ class LeaderboardBenchmark(Unasked):
         )
 
     def items(self) -> Sequence[RouteItem]:
-        """See Benchmark."""
         return self._items
 
     def route_of(self, item: RouteItem) -> LeaderboardRoute:
@@ -220,7 +218,6 @@ class LeaderboardBenchmark(Unasked):
         return self._maps[town]
 
     def job(self, item: RouteItem, answer: Row | None) -> RouteJob:
-        """See Benchmark."""
         del answer
         route = self.route_of(item)
         triggers = self._triggers.get(route.town, ())
@@ -243,7 +240,6 @@ class LeaderboardBenchmark(Unasked):
         )
 
     def rows(self, outcome: ItemOutcome[RouteItem]) -> Sequence[LeaderboardRow]:
-        """See Benchmark."""
         found = outcome.result
         if found is None:
             return ()

@@ -89,7 +89,6 @@ class RouteCompletion:
         return self._index
 
     def update(self, observation: Observation) -> Sequence[Infraction]:
-        """See Criterion."""
         if self.completed:
             return ()
         ego, poses = observation.ego, self._track.poses
@@ -118,7 +117,6 @@ class RouteDeviation:
         self._broken = False
 
     def update(self, observation: Observation) -> Sequence[Infraction]:
-        """See Criterion."""
         if self._broken:
             return ()
         ego, stations = observation.ego, self._track.stations_m
@@ -151,7 +149,6 @@ class Blocked:
         self._broken = False
 
     def update(self, observation: Observation) -> Sequence[Infraction]:
-        """See Criterion."""
         if observation.ego.speed_mps >= self.SLOW_MPS or self._moved_s is None:
             self._moved_s = observation.time_s
         elif not self._broken and observation.time_s - self._moved_s > self.LONG_S:
@@ -174,7 +171,6 @@ class Timeout:
         self._broken = False
 
     def update(self, observation: Observation) -> Sequence[Infraction]:
-        """See Criterion."""
         if self._broken or observation.time_s <= self._limit_s:
             return ()
         self._broken = True
@@ -215,7 +211,6 @@ class Collisions:
         self._last: tuple[int, float] | None = None
 
     def update(self, observation: Observation) -> Sequence[Infraction]:
-        """See Criterion."""
         ego, now_s = observation.ego, observation.time_s
         here = ego.x_m, ego.y_m
         self._places = [place for place in self._places if math.dist(place, here) <= self.FORGET_M]
@@ -256,7 +251,6 @@ class RedLights:
         self._lines: dict[tuple[str, str], tuple[Pose, Line]] = {}
 
     def update(self, observation: Observation) -> Sequence[Infraction]:
-        """See Criterion."""
         ego, road = observation.ego, observation.road
         found: list[Infraction] = []
         tail: Line | None = None
@@ -316,7 +310,6 @@ class StopSigns:
         self._entered = False
 
     def update(self, observation: Observation) -> Sequence[Infraction]:
-        """See Criterion."""
         ego, road = observation.ego, observation.road
         if self._target is None:
             if self._left is not None and math.dist(self._left, (ego.x_m, ego.y_m)) > self.AHEAD_M:
@@ -387,7 +380,6 @@ class OutsideLanes:
         return self._wrong_m / self._driven_m if self._driven_m > 0.0 else 0.0
 
     def update(self, observation: Observation) -> Sequence[Infraction]:
-        """See Criterion."""
         ego, road = observation.ego, observation.road
         place = road.locate(ego.x_m, ego.y_m, kinds=("driving",))
         wrong = place is None or self._outside(ego, road, place) or self._against(ego, road, place)

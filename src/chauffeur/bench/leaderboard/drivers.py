@@ -43,7 +43,6 @@ class ExpertDriver:
         self._wishes = replace(self._driver.initial_setpoints(), target_speed_mps=self.MOST_MPS)
 
     def command(self, observation: Observation) -> Command:
-        """See RouteDriver."""
         del observation
         wishes = self._driver.settle(self._wishes)
         return self._driver.command(wishes)
@@ -62,7 +61,6 @@ class RecklessDriver:
         self._index = 0
 
     def command(self, observation: Observation) -> Command:
-        """See RouteDriver."""
         ego, poses = observation.ego, self._track.poses
         near = range(self._index, min(self._index + 40, len(poses)))
         self._index = min(near, key=lambda i: math.hypot(poses[i].x_m - ego.x_m, poses[i].y_m - ego.y_m))
@@ -91,7 +89,6 @@ class StandingDriver:
         self.aim: LaneId | None = None
 
     def command(self, observation: Observation) -> Command:
-        """See RouteDriver."""
         del observation
         return Command(-4.0, 0.0)
 

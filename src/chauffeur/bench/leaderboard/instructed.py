@@ -19,7 +19,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.bench.leaderboard.planning import PlannedRoute
+from chauffeur.bench.leaderboard.ways import PlannedRoute
 from chauffeur.concept import (
     ChauffeurError,
     Command,
@@ -201,7 +201,6 @@ class InstructedDriver:
         self._runner.close()
 
     def command(self, observation: Observation) -> Command:
-        """See RouteDriver."""
         now = observation.time_s
         station = self._navigator.station_of(observation, self._station)
         if station is not None:

@@ -15,8 +15,8 @@ import numpy as np
 
 from chauffeur.bench.leaderboard.criteria import RouteReferee
 from chauffeur.bench.leaderboard.instructed import InstructedDriver, PlannerSpec
-from chauffeur.bench.leaderboard.planning import PlannedRoute, plan_official, track_of
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute
+from chauffeur.bench.leaderboard.ways import PlannedRoute, plan_official, track_of
 from chauffeur.concept import ChauffeurError, Context, Limits, Observation, Plan, PlannerError, PlanRequest, Scenario
 from chauffeur.describe import describe
 from chauffeur.describe.navigation import NavigationInstruction, Navigator
@@ -26,7 +26,8 @@ from chauffeur.geometry import LaneId, RoadGraph, Route, named_ways
 from chauffeur.safety.checks import DRIVE_CHECKS
 from chauffeur.safety.shield import shield_for
 from chauffeur.worlds.town import TownWorld
-from chauffeur.worlds.town.pack import MapPack, load
+from chauffeur.worlds.town.library import load
+from chauffeur.worlds.town.pack import MapPack
 
 BEFORE_M: Final = (35.0, 110.0)
 """A lesson begins so far before its manoeuvre."""

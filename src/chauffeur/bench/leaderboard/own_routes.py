@@ -13,12 +13,12 @@ from typing import Final
 
 import numpy as np
 
-from chauffeur.bench.leaderboard.planning import plan_keypoints
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute, RouteFile
 from chauffeur.bench.leaderboard.triggers import Trigger, TriggerSet
+from chauffeur.bench.leaderboard.ways import plan_keypoints
 from chauffeur.concept import ScenarioError
 from chauffeur.geometry import Pose, RoadGraph
-from chauffeur.worlds.town.pack import OWN_TOWNS, load
+from chauffeur.worlds.town.library import OWN_TOWNS, load
 
 SEED: Final = 1
 ROUTES_A_TOWN: Final = 3

@@ -9,11 +9,11 @@ from typing import Any, Final
 from chauffeur.bench.leaderboard.criteria import RouteReferee
 from chauffeur.bench.leaderboard.drivers import RouteDriver, make_driver
 from chauffeur.bench.leaderboard.instructed import InstructedDriver, PlannerSpec, PlanningTally
-from chauffeur.bench.leaderboard.planning import plan_official
 from chauffeur.bench.leaderboard.results import NOT_DRIVEN, infraction_rows, status_of
 from chauffeur.bench.leaderboard.routes import LeaderboardRoute
 from chauffeur.bench.leaderboard.staging import ScenarioWorld
 from chauffeur.bench.leaderboard.triggers import Trigger, place
+from chauffeur.bench.leaderboard.ways import plan_official
 from chauffeur.concept import ChauffeurError, MissingExtraError, Scenario
 from chauffeur.drive.actuate import actuate
 from chauffeur.safety.shield import shield_for
@@ -73,15 +73,12 @@ class RouteJob:
 
     @property
     def near(self) -> str:
-        """See BenchJob."""
         return self.route.town
 
     def run(self) -> dict[str, Any]:
-        """See BenchJob."""
         return drive_route(self)
 
     def spoiled(self, detail: str) -> dict[str, Any]:
-        """See BenchJob."""
         return _result(self, failure="Simulation crashed", detail=detail, infra_failed=True)
 
 
@@ -96,7 +93,7 @@ def drive_route(job: RouteJob) -> dict[str, Any]:
 
 
 def _driven(job: RouteJob) -> dict[str, Any]:
-    from chauffeur.worlds.town.pack import load
+    from chauffeur.worlds.town.library import load
 
     began = time.process_time()
     route = job.route

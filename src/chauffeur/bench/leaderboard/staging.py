@@ -39,17 +39,14 @@ class ScenarioWorld:
 
     @property
     def engine(self) -> str:
-        """See World."""
         return self._world.engine
 
     @property
     def dt_s(self) -> float:
-        """See World."""
         return self._world.dt_s
 
     @property
     def ended(self) -> bool:
-        """See World."""
         return self._world.ended
 
     def reset(self, scenario: Scenario, seed: int | None = None) -> Observation:
@@ -58,15 +55,12 @@ class ScenarioWorld:
         raise ScenarioError(f"{scenario.id} is under way.", hint="Make another one for another drive.")
 
     def observe(self) -> Observation:
-        """See World."""
         return self._world.observe()
 
     def perception(self) -> Perception:
-        """See World."""
         return self._world.perception()
 
     def driver(self) -> Driver:
-        """See World."""
         return self._world.driver()
 
     def step(self, command: Command) -> Command:

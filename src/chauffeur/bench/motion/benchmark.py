@@ -121,7 +121,6 @@ class MotionBenchmark:
 
     @property
     def config(self) -> Mapping[str, Any]:
-        """See Benchmark."""
         box = gain_box()
         return {
             "plant": self._plant,
@@ -137,7 +136,6 @@ class MotionBenchmark:
         }
 
     def items(self) -> Sequence[MotionItem]:
-        """See Benchmark."""
         return motion_items(self._plant, self._seed)
 
     async def request(self, item: MotionItem, desk: RequestDesk) -> PlanRequest:
@@ -147,13 +145,11 @@ class MotionBenchmark:
         return screened_request(said, context, SystemMessage(""), images=item.shown(self._shown))
 
     def job(self, item: MotionItem, answer: Row | None) -> MotionJob | None:
-        """See Benchmark."""
         if answer is None:
             return None
         return MotionJob(job_key(item.scenario, answer), item.scenario, answer)
 
     def rows(self, outcome: ItemOutcome[MotionItem]) -> Sequence[MotionRow]:
-        """See Benchmark."""
         item, found = outcome.item, outcome.result
         answer: Row = outcome.answer or {}
         policy = _matrix(answer.get("policy"))

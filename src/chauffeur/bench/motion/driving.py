@@ -35,7 +35,6 @@ class MotionJob:
         return self.scenario.id
 
     def run(self) -> Row:
-        """See BenchJob."""
         row: Row = {"key": self.key, "infra_failed": False, "refused": False, "policy_failed": False, "detail": ""}
         plan: Plan = plan_adapter.validate_python(self.plan)
         try:
@@ -49,7 +48,6 @@ class MotionJob:
             return row | {"infra_failed": True, "detail": str(error)}
 
     def spoiled(self, detail: str) -> Row:
-        """See BenchJob."""
         return {"key": self.key, "infra_failed": True, "refused": False, "policy_failed": False, "detail": detail}
 
 

@@ -13,14 +13,14 @@ import numpy as np
 
 from chauffeur.concept import CameraImage, Context, DataError, Scenario
 from chauffeur.concept.data import read_data
+from chauffeur.concept.weather import WEATHERS, Weather
 from chauffeur.drive.seat import SeatCamera
 from chauffeur.drive.surroundings import SKY
-from chauffeur.worlds.track import WEATHERS, TrackWorld, Weather, track_scenario
+from chauffeur.planners.vlm.template import STYLES, Style
+from chauffeur.worlds.track import TrackWorld, track_scenario
 from chauffeur.worlds.track.dynamics import Plant
 from chauffeur.worlds.track.manoeuvres import MANOEUVRES, ManoeuvreName
 
-Style = Literal["conservative", "moderate", "aggressive"]
-STYLES: Final[tuple[Style, ...]] = "conservative", "moderate", "aggressive"
 Told = Literal["told", "hidden", "wrong"]
 """What a planner hears of the weather: as it is, nothing, or that of another weather (a control)."""
 

@@ -24,8 +24,8 @@ from chauffeur.bench.motion.items import Style, style_ranges
 from chauffeur.bench.personalization.population import Passenger, draw_passengers
 from chauffeur.bench.personalization.sayings import Force, Topic
 from chauffeur.concept import ActionMatrix
+from chauffeur.concept.weather import Weather
 from chauffeur.safety.gain_box import care
-from chauffeur.worlds.track import Weather
 from chauffeur.worlds.track.manoeuvres import ManoeuvreName
 
 MANNER_VERSION: Final = "motion-passengers-v1"

@@ -47,6 +47,7 @@ from chauffeur.concept import (
     Trip,
     Verdict,
 )
+from chauffeur.concept.weather import WEATHERS
 from chauffeur.describe.track import describe_track
 from chauffeur.drive.episode import Episode
 from chauffeur.drive.loop import LoopMemory, Stages, drive
@@ -58,7 +59,7 @@ from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 from chauffeur.planners.talk2drive.recent import fitting
 from chauffeur.safety.gain_box import care, gain_box
-from chauffeur.worlds.track import WEATHERS, TrackWorld
+from chauffeur.worlds.track import TrackWorld
 from chauffeur.worlds.track.dynamics import PLANTS, Plant
 from chauffeur.worlds.track.manoeuvres import MANOEUVRES, ManoeuvreName
 
@@ -136,7 +137,6 @@ class RiderJob:
 
     @property
     def id(self) -> str:
-        """See BenchItem."""
         return self.key
 
     @property
@@ -145,11 +145,9 @@ class RiderJob:
         return self.manoeuvre
 
     def run(self) -> Row:
-        """See BenchJob."""
         return asyncio.run(_Sitting(self).row())
 
     def spoiled(self, detail: str) -> Row:
-        """See BenchJob."""
         return {"key": self.key, "infra_failed": True, "detail": detail}
 
 
@@ -201,7 +199,6 @@ class TakeoverBenchmark(Unasked):
 
     @property
     def config(self) -> Mapping[str, Any]:
-        """See Benchmark."""
         box = gain_box()
         return {
             "planner": self._planner,
@@ -234,12 +231,10 @@ class TakeoverBenchmark(Unasked):
         ]
 
     def job(self, item: RiderJob, answer: Row | None) -> RiderJob:
-        """See Benchmark."""
         del answer
         return item
 
     def rows(self, outcome: ItemOutcome[RiderJob]) -> Sequence[TakeoverRow]:
-        """See Benchmark."""
         found = outcome.result
         if found is None or found["infra_failed"]:
             return ()

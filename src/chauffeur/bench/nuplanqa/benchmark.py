@@ -15,11 +15,46 @@ from chauffeur.bench.kernel.metrics import AnyRow, TableSpec, count, share
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.nuplanqa.blind import BASELINE, blind_guesses
 from chauffeur.bench.nuplanqa.choice import EXTRACTION, read_choice
-from chauffeur.bench.nuplanqa.frames import CAMERAS, CORRUPT, FRAMES, MISSING, UNTOLD, FrameSource
+from chauffeur.bench.nuplanqa.frames import CAMERAS, FRAMES, UNTOLD, FramePath, FrameSource
 from chauffeur.bench.nuplanqa.metadata import find_metadata, load_metadata
 from chauffeur.bench.nuplanqa.questions import LETTERS, SKILL_OF, SKILLS, SUBTASKS, VqaFile, VqaItem, load_questions
-from chauffeur.bench.nuplanqa.requests import ASKING, Control, conversation
+from chauffeur.bench.pictures import CORRUPT, MISSING, Pictures, data_uri, read_picture
 from chauffeur.concept import ConfigError, DataError
+from chauffeur.planners.prompts import Message
+
+ASKING: Final = "ask-v1"
+"""Id of the wording below; figures belong to it."""
+
+Control = Literal["pictures", "blank", "text"]
+"""What a model is shown: the pictures; grey ones of the same size; none at all."""
+
+_ASK: Final = "Answer with the letter of the right option, (a), (b), (c) or (d), and nothing else."
+
+
+def conversation(item: VqaItem, frames: Sequence[FramePath], control: Control, side_px: int) -> list[Message]:
+    """What a model is sent.
+
+    Args:
+        item: The question.
+        frames: Its pictures, oldest first; none for `text`.
+        control: What it is shown.
+        side_px: Longer side that pictures are scaled down to; 0 leaves them.
+
+    Raises:
+        DataError: A picture is missing or damaged.
+    """
+    asked = f"{item.text()}\n\n{_ASK}"
+    if control == "text":
+        return [{"role": "user", "content": asked}]
+    kind: Pictures = "blank" if control == "blank" else "real"
+    parts: list[dict[str, Any]] = []
+    for frame in frames:
+        parts.append({"type": "text", "text": f"{frame.caption}:"})
+        picture = data_uri(read_picture(frame.path, side_px, kind))
+        parts.append({"type": "image_url", "image_url": {"url": picture}})
+    parts.append({"type": "text", "text": asked})
+    return [cast("Message", {"role": "user", "content": parts})]
+
 
 BENCH_VERSION: Final = "nuplanqa-v1"
 
@@ -221,7 +256,6 @@ class NuPlanQaBenchmark:
         return {item.id: guess == item.answer for item, guess in zip(self._items, guesses, strict=True)}
 
     def items(self) -> Sequence[AskedItem]:
-        """See Benchmark."""
         found: list[AskedItem] = []
         for item in self._items:
             for places in self._shifts:
@@ -243,7 +277,6 @@ class NuPlanQaBenchmark:
         del item, answer
 
     def rows(self, outcome: ItemOutcome[AskedItem]) -> Sequence[VqaRow]:
-        """See Benchmark."""
         if outcome.answer is None and not outcome.error:
             return ()
         item, one = outcome.item, outcome.item.asked

@@ -271,7 +271,6 @@ class OpenLoopBenchmark:
         }
 
     def items(self) -> Sequence[OpenLoopItem]:
-        """See Benchmark."""
         return [OpenLoopItem(one.id, one) for one in self.samples]
 
     async def request(self, item: OpenLoopItem, desk: RequestDesk) -> Request:
@@ -293,7 +292,6 @@ class OpenLoopBenchmark:
         del item, answer
 
     def rows(self, outcome: ItemOutcome[OpenLoopItem]) -> Sequence[OpenLoopRow]:
-        """See Benchmark."""
         if outcome.answer is None and not outcome.error:
             return ()
         sample = outcome.item.sample

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, cast
 
-from chauffeur.bench.nuplanqa.frames import data_uri, read_picture
 from chauffeur.bench.openloop.nuscenes import FUTURE, HISTORY, STEP_S, PlanningSample
+from chauffeur.bench.pictures import data_uri, read_picture
 
 if TYPE_CHECKING:
     import numpy as np

@@ -26,7 +26,6 @@ class PassengerRequests:
         self._past = {wish.task: wish.history for wish in wishes if wish.history}
 
     async def request(self, item: Item, context: Context) -> PlanRequest:
-        """See Requests."""
         request = await self._plain.request(item, context)
         # A passenger could answer, so a planner may ask; the question counts as one.
         request = replace(request, instruction=replace(request.instruction, source="text"))

@@ -117,7 +117,6 @@ class StudyBenchmark(Unasked):
 
     @property
     def config(self) -> Mapping[str, Any]:
-        """See Benchmark."""
         hashes = [scenario_hash(scene) for task in TASKS for scene in scenes_of(task)]
         return {
             **asdict(self.options),
@@ -138,12 +137,10 @@ class StudyBenchmark(Unasked):
         ]
 
     def job(self, item: StudyJob, answer: Row | None) -> StudyJob:
-        """See Benchmark."""
         del answer
         return item
 
     def rows(self, outcome: ItemOutcome[StudyJob]) -> Sequence[Row]:
-        """See Benchmark."""
         found = outcome.result
         if found is None or found["infra_failed"]:
             return ()

@@ -17,55 +17,24 @@ Task = Literal["overtake", "follow", "right_lane", "yield", "go", "park", "pace"
 """What a passenger wants on the whole (paper Tab. VIII and IX; `pace` is the speed in a lot, Tab. X)."""
 Ground = Literal["highway", "intersection", "parking"]
 
-TASKS: Final[tuple[Task, ...]] = ("overtake", "follow", "right_lane", "yield", "go", "park", "pace")
-GROUND_OF: Final[dict[Task, Ground]] = {
-    "overtake": "highway",
-    "follow": "highway",
-    "right_lane": "highway",
-    "yield": "intersection",
-    "go": "intersection",
-    "park": "parking",
-    "pace": "parking",
+_TASKS: Final[dict[Task, tuple[Ground, str, tuple[Aim, ...], float, tuple[int, ...]]]] = {
+    "overtake": ("highway", "overtake", ("overtake",), 30.0, (1609, 1825, 2442, 2751)),
+    "follow": ("highway", "follow", ("follow",), 30.0, (2622, 2649, 2751, 2768)),
+    "right_lane": ("highway", "right lane", ("right_lane",), 30.0, (3842, 4513, 5090, 5337)),
+    "yield": ("intersection", "yield", ("yield",), 45.0, (4000, 4001, 4002, 4003)),
+    "go": ("intersection", "not yield", ("go",), 45.0, (5000, 5001, 5002, 5003)),
+    "park": ("parking", "park", ("park.nearest", "park.stadium", "park.exit"), 90.0, (6000, 6001, 6002, 6003)),
+    "pace": ("parking", "speed in the lot", ("pace.faster", "pace.slower"), 30.0, (7000, 7001, 7002, 7003)),
 }
-TASK_WORDS: Final[dict[Task, str]] = {
-    "overtake": "overtake",
-    "follow": "follow",
-    "right_lane": "right lane",
-    "yield": "yield",
-    "go": "not yield",
-    "park": "park",
-    "pace": "speed in the lot",
-}
-AIMS: Final[dict[Task, tuple[Aim, ...]]] = {
-    "overtake": ("overtake",),
-    "follow": ("follow",),
-    "right_lane": ("right_lane",),
-    "yield": ("yield",),
-    "go": ("go",),
-    "park": ("park.nearest", "park.stadium", "park.exit"),
-    "pace": ("pace.faster", "pace.slower"),
-}
-DRIVE_S: Final[dict[Task, float]] = {
-    "overtake": 30.0,
-    "follow": 30.0,
-    "right_lane": 30.0,
-    "yield": 45.0,
-    "go": 45.0,
-    "park": 90.0,
-    "pace": 30.0,
-}
-"""Simulated time of a trip at most."""
+"""Ground, words, aims, simulated time of a trip at most in s, and seeds of each task. Few scenes, many people: what
+differs between people is what is measured, and their drives can be shared."""
 
-_SEEDS: Final[dict[Task, tuple[int, ...]]] = {
-    "overtake": (1609, 1825, 2442, 2751),
-    "follow": (2622, 2649, 2751, 2768),
-    "right_lane": (3842, 4513, 5090, 5337),
-    "yield": (4000, 4001, 4002, 4003),
-    "go": (5000, 5001, 5002, 5003),
-    "park": (6000, 6001, 6002, 6003),
-    "pace": (7000, 7001, 7002, 7003),
-}
-"""Few scenes, many people: what differs between people is what is measured, and their drives can be shared."""
+TASKS: Final[tuple[Task, ...]] = tuple(_TASKS)
+GROUND_OF: Final = {task: row[0] for task, row in _TASKS.items()}
+TASK_WORDS: Final = {task: row[1] for task, row in _TASKS.items()}
+AIMS: Final = {task: row[2] for task, row in _TASKS.items()}
+DRIVE_S: Final = {task: row[3] for task, row in _TASKS.items()}
+_SEEDS: Final = {task: row[4] for task, row in _TASKS.items()}
 
 
 def scenes_of(task: Task) -> tuple[Scenario, ...]:

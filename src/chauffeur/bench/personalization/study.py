@@ -94,7 +94,6 @@ class StudyJob:
         return asyncio.run(sit(self))
 
     def spoiled(self, detail: str) -> Row:
-        """See BenchJob."""
         return {"key": self.key, "infra_failed": True, "detail": detail}
 
 

@@ -3,10 +3,9 @@
 from chauffeur.describe.services.osm_file import load_road_map
 from chauffeur.describe.services.readings import Position, ServiceReading, Unknown
 from chauffeur.describe.services.road_map import RoadMap
-from chauffeur.describe.services.rules import Rules, load_rules, packaged_regions
+from chauffeur.describe.services.rules import load_rules, packaged_regions
 from chauffeur.describe.services.settings import ServiceSettings
-from chauffeur.describe.services.sourced import with_sources
-from chauffeur.describe.services.sources import Sources, SourceSettings, read_sources
+from chauffeur.describe.services.sources import Sources, read_sources
 from chauffeur.describe.services.surroundings import Surroundings, with_surroundings
 from chauffeur.describe.services.survey import ContextServices
 
@@ -14,10 +13,8 @@ __all__ = [
     "ContextServices",
     "Position",
     "RoadMap",
-    "Rules",
     "ServiceReading",
     "ServiceSettings",
-    "SourceSettings",
     "Sources",
     "Surroundings",
     "Unknown",
@@ -25,6 +22,5 @@ __all__ = [
     "load_rules",
     "packaged_regions",
     "read_sources",
-    "with_sources",
     "with_surroundings",
 ]

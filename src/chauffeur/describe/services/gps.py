@@ -64,11 +64,9 @@ class WrittenFix:
         self._at, self._where = at, where
 
     def position(self) -> Position | Unknown:
-        """See `Whereabouts.position`."""
         return self._at
 
     def words(self) -> str:
-        """See `Whereabouts.words`."""
         return f"Place: as it stands in {self._where}; it is not measured, and does not move."
 
     async def close(self) -> None:
@@ -92,7 +90,6 @@ class Gpsd:
         self._task = asyncio.get_running_loop().create_task(self._keep())
 
     def position(self) -> Position | Unknown:
-        """See `Whereabouts.position`."""
         if self._last is None:
             return Unknown(self._fault or "the receiver has no fix")
         place, at_s = self._last
@@ -102,7 +99,6 @@ class Gpsd:
         return place
 
     def words(self) -> str:
-        """See `Whereabouts.words`."""
         place = self.position()
         if isinstance(place, Unknown) or self._last is None:
             return ""
@@ -110,7 +106,6 @@ class Gpsd:
         return f"Place: measured {age_s:.1f} s ago, within about {place.accuracy_m:.0f} m. (Source: gpsd.)"
 
     async def close(self) -> None:
-        """See `Whereabouts.close`."""
         self._task.cancel()
         await asyncio.gather(self._task, return_exceptions=True)
 

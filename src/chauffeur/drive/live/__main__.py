@@ -145,7 +145,7 @@ def _planner(folder: Path, settings: Settings, over: Callable[[], bool]) -> None
     import importlib
 
     from chauffeur.describe.services.sources import read_sources
-    from chauffeur.drive.live.planning import Planning, PlanningRings
+    from chauffeur.drive.live.planner import Planning, PlanningRings
     from chauffeur.drive.loop import LoopMemory
     from chauffeur.drive.session import Forgetful
     from chauffeur.memory.choice import open_memory

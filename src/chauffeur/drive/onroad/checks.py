@@ -12,8 +12,8 @@ from typing import Final
 
 from chauffeur.concept import Parameters, Plan, Verdict
 from chauffeur.drive.emergency import stop_wanted
+from chauffeur.drive.onroad.thoughts import in_own_words, speed_text
 from chauffeur.drive.onroad.vehicle_observation import VehicleObservation
-from chauffeur.drive.onroad.words import in_own_words, speed_text
 from chauffeur.language.emergency import read_emergency
 from chauffeur.safety.checks import DEFAULT_CHECKS, run_checks
 from chauffeur.worlds.ros import VehicleLimits

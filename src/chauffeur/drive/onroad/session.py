@@ -54,9 +54,9 @@ from chauffeur.drive.onroad.checks import (
     is_stop,
 )
 from chauffeur.drive.onroad.recorder import VehicleRecorder
+from chauffeur.drive.onroad.thoughts import refused_in_own_words, speed_text
 from chauffeur.drive.onroad.trips import make_trip
 from chauffeur.drive.onroad.vehicle_observation import VehicleObservation, counted_from, describe_vehicle
-from chauffeur.drive.onroad.words import refused_in_own_words, speed_text
 from chauffeur.drive.planning import (
     PLAN_WITHIN_S,
     RECALLED,

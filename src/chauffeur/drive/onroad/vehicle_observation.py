@@ -13,7 +13,7 @@ from chauffeur.concept import Context, Lane, Limits, Observation, Parameters, Si
 from chauffeur.describe.services.readings import ServiceReading, Unknown
 from chauffeur.describe.services.sourced import with_sources
 from chauffeur.describe.services.surroundings import Surroundings
-from chauffeur.drive.onroad.words import speed_text
+from chauffeur.drive.onroad.thoughts import speed_text
 from chauffeur.geometry import Polyline, RoadGraph
 from chauffeur.worlds.ros import RosVehicleState as Vehicle
 

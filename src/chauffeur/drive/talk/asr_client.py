@@ -15,8 +15,7 @@ from typing import IO, Any, Final, Literal, Self
 
 from pydantic import TypeAdapter, ValidationError
 
-from chauffeur import concept
-from chauffeur.concept import ChauffeurError, SandboxError
+from chauffeur.concept import ChauffeurError, SandboxError, errors
 from chauffeur.drive.talk.asr_process import HEAD, AsrEngine
 from chauffeur.speech.base import Heard, Hotword
 
@@ -309,7 +308,7 @@ class AsrClient:
 
 def _error(found: dict[str, Any]) -> ChauffeurError:
     """The engine's own error, as it was raised there."""
-    kind = getattr(concept, str(found["error"]), ChauffeurError)
+    kind = getattr(errors, str(found["error"]), ChauffeurError)
     error: type[ChauffeurError] = (
         kind if isinstance(kind, type) and issubclass(kind, ChauffeurError) else ChauffeurError
     )

@@ -37,7 +37,7 @@ from chauffeur.models.bev_llm.fusion import FusionConfig, rig_tensors
 from chauffeur.models.bev_llm.geometry import rig_geometry
 from chauffeur.models.bev_llm.network import CompactBevLlm, CompactConfig, Keep
 from chauffeur.models.bev_llm.views import FRONT_VIEWS, VIEWS, camera_of, cut, view_cameras
-from chauffeur.models.bev_llm.words import PAD, STRANGE, QuestionWordTable
+from chauffeur.models.bev_llm.vocabulary import PAD, STRANGE, QuestionWordTable
 from chauffeur.models.train.trainer import Optimisation, fit
 
 if TYPE_CHECKING:

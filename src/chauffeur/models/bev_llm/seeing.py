@@ -49,7 +49,6 @@ class BevLlmReader:
         return self._rig
 
     def read(self, now: Pictures, before: Pictures, moved: tuple[float, float, float]) -> SceneAnswers:
-        """See SceneReader."""
         import torch
 
         size = self._answerer.network.config.size

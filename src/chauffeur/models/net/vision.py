@@ -113,7 +113,6 @@ class SmallVision(nn.Module):
         self.where: Any = nn.Buffer(positions(rows, columns, self.width), persistent=False)
 
     def forward(self, pictures: torch.Tensor) -> torch.Tensor:
-        """See VisionEncoder."""
         features = self.stages(scaled(pictures) - 0.45)
         return features.flatten(2).transpose(1, 2) + self.where
 
@@ -159,7 +158,6 @@ class EfficientNetVision(nn.Module):
         return super().train(mode=False)
 
     def forward(self, pictures: torch.Tensor) -> torch.Tensor:
-        """See VisionEncoder."""
         return self.features(scaled(pictures)).flatten(2).transpose(1, 2) + self.where
 
 

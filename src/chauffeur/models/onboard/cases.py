@@ -7,7 +7,6 @@ its answer is a refusal with the reason that linking gave.
 
 from __future__ import annotations
 
-import atexit
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -16,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from pydantic import TypeAdapter
 
+from chauffeur.bench.lampilot.rehearse import unhurried_sandbox
 from chauffeur.bench.lampilot.scenes.feasible import start_of
 from chauffeur.bench.lampilot.scenes.sampling import draw_road
 from chauffeur.concept import LAMPILOT_LIMITS, Scenario, ScenarioError, Situation
@@ -25,7 +25,6 @@ from chauffeur.planners.onboard.dialect import SKILLS, UNITS, DialectStep, Numbe
 from chauffeur.planners.onboard.link import link
 from chauffeur.planners.onboard.options import Declined
 from chauffeur.planners.onboard.personal import Leaning
-from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.worlds.highway import HighwayWorld
 
 Generator = np.random.Generator
@@ -118,7 +117,7 @@ def make_case(job: tuple[int, int]) -> dict[str, Any]:
     if isinstance(linked, Declined):
         return row | {"refusal": linked.words} if rng.random() < IMPOSSIBLE_SHARE else {"left_out": "not possible here"}
     try:
-        verdict = judge(world, scenario, steps, write(steps), linked, _sandbox())
+        verdict = judge(world, scenario, steps, write(steps), linked, unhurried_sandbox())
     except ScenarioError as error:
         return {"left_out": error.message[:60]}
     return row | {"refusal": ""} if verdict.done else {"left_out": verdict.why}
@@ -132,13 +131,6 @@ def case_of(row: dict[str, Any]) -> Case:
 @cache
 def _stored_cases() -> TypeAdapter[Case]:
     return TypeAdapter(Case)
-
-
-@cache
-def _sandbox() -> Sandbox:
-    sandbox = Sandbox(UNHURRIED)
-    atexit.register(sandbox.close)
-    return sandbox
 
 
 def _draw(situation: Situation, crossing: bool, rng: Generator) -> tuple[DialectStep, ...] | None:

@@ -6,147 +6,27 @@ for the apostrophe of a negation, and for a few misspellings that nobody reads a
 
 from __future__ import annotations
 
+import json
 import re
 from functools import cache
+from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
 
 from chauffeur.models.onboard.wordings import wordings
 
-_NUMBERS = (
-    "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen "
-    "seventeen eighteen nineteen twenty thirty forty fifty sixty seventy eighty ninety hundred point half quarter "
-    "quarters third couple dozen twice double times percent first second another"
-)
-_UNITS = (
-    "mph kmh km/h kph kmph m/s mps mi/h k/h m s h sec secs seconds second ft feet foot yd yds yard yards meter "
-    "meters metre metres kilometer kilometers kilometre kilometres km mi mile miles hour lengths length minute "
-    "minutes per"
-)
-_MEANT = (
-    "left right leftmost rightmost straight faster slower quicker slow slowly fast quick closer nearer further "
-    "farther near close tighter wider longer shorter more less much lot bit little way far high higher lower "
-    "increase decrease reduce raise up down over under above below by to at least most within between minimum "
-    "maximum max min and then after before once when if until unless wait in out back off on of a an not don't no "
-    "never nothing neither nor without stop same keep limit as than too so into with for from or but should till"
-)
-_PROTECTED = frozenset(f"{_NUMBERS} {_UNITS} {_MEANT}".split())
+_TABLES: Final[dict[str, Any]] = json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8"))
+_NUMBERS: Final = str(_TABLES["numbers"])
+_PROTECTED: Final = frozenset(f"{_NUMBERS} {_TABLES['units']} {_TABLES['meant']}".split())
 
-SAFE_SLIPS: dict[str, tuple[str, ...]] = {
-    "left": ("leftt", "lefft", "lfet"),
-    "right": ("rigth", "rihgt", "rightt"),
-    "faster": ("fasterr", "fatser", "fastr"),
-    "slower": ("slowwer", "slowerr", "sloewr"),
-    "closer": ("closser", "clsoer", "closerr"),
-    "further": ("furthur", "futher", "furhter"),
-    "nearer": ("nearrer",),
-    "straight": ("straigth", "strait", "streight"),
-    "slowly": ("slowley", "slowlly"),
-    "don't": ("dont", "don´t"),
-    "limit": ("limmit",),
-}
+SAFE_SLIPS: Final[dict[str, list[str]]] = _TABLES["slips"]
 """Misspellings of protected words that nobody takes for another one."""
 _SLIPS = frozenset(slip for slips in SAFE_SLIPS.values() for slip in slips)
 
-_HEARD: dict[str, tuple[str, ...]] = {
-    "brake": ("break",),
-    "brakes": ("breaks",),
-    "braking": ("breaking",),
-    "lane": ("lain", "line", "laine"),
-    "lanes": ("lains", "lines"),
-    "gap": ("cap", "gab"),
-    "there": ("their", "they're"),
-    "their": ("there",),
-    "they're": ("their", "there"),
-    "you're": ("your",),
-    "your": ("you're",),
-    "it's": ("its",),
-    "we're": ("were",),
-    "let's": ("lets",),
-    "that's": ("thats",),
-    "can't": ("cant",),
-    "i'd": ("id",),
-    "i'm": ("im",),
-    "ahead": ("a head",),
-    "overtake": ("ovatake", "overtaik"),
-    "overtaking": ("ovataking",),
-    "intersection": ("inter section",),
-    "junction": ("junktion", "juncture"),
-    "shoulder": ("sholder", "shoulda"),
-    "merge": ("murge", "merch"),
-    "follow": ("fallow", "folow"),
-    "behind": ("be hind",),
-    "here": ("hear",),
-    "please": ("pleas", "peas"),
-    "road": ("rode",),
-    "car": ("kar",),
-    "cars": ("carz",),
-    "speed": ("speet", "spead"),
-    "accelerate": ("excelerate", "accelarate"),
-    "vehicle": ("vehical", "vehicule"),
-    "pace": ("paste", "pase"),
-    "cruise": ("cruze", "crews"),
-    "distance": ("distants", "distence"),
-    "turn": ("tern",),
-    "gas": ("gaz",),
-    "would": ("wood",),
-    "train": ("trane",),
-    "flight": ("flite",),
-    "late": ("layt",),
-    "sick": ("sik",),
-    "guy": ("gai",),
-    "truck": ("truk",),
-    "lorry": ("lory",),
-    "pedal": ("peddle",),
-    "steady": ("steddy",),
-    "maintain": ("main tain", "maintane"),
-    "hurry": ("hury",),
-    "safe": ("saif",),
-    "driver": ("drive her",),
-}
-_SHORT: tuple[tuple[str, str], ...] = (
-    (r"\byou\b", "u"),
-    (r"\bplease\b", "pls"),
-    (r"\bplease\b", "plz"),
-    (r"\bare you\b", "r u"),
-    (r"\bgoing to\b", "gonna"),
-    (r"\bwant to\b", "wanna"),
-    (r"\bhave to\b", "gotta"),
-    (r"\bI would\b", "I'd"),
-    (r"\bI would like\b", "I'd like"),
-    (r"\bwe are\b", "we're"),
-    (r"\bit is\b", "it's"),
-    (r"\bthat is\b", "that's"),
-    (r"\bdo not\b", "don't"),
-    (r"\bbecause\b", "cos"),
-    (r"\bthanks\b", "thx"),
-    (r"\bokay\b", "ok"),
-    (r"\bgive me\b", "gimme"),
-    (r"\bkind of\b", "kinda"),
-    (r"\bwhat are you\b", "whatcha"),
-    (r"\bthe (?=car|gap|road|speed|truck|junction|intersection)", ""),
-    (r"\bgoing\b", "goin"),
-    (r"\bdriving\b", "drivin"),
-    (r"\bcould you\b", "cud you"),
-    (r"\bthe\b", "da"),
-    (r"\bsomething\b", "sth"),
-)
-_FULL: tuple[tuple[str, str], ...] = (
-    (r"\b(I)'m\b", r"\1 am"),
-    (r"\b(you|we|they)'re\b", r"\1 are"),
-    (r"\b(it|that|there|he|she|what|where|who)'s (?!got\b|been\b|had\b|gone\b|\w+ed\b)", r"\1 is "),
-    (r"\b(I|you|we|they)'ve\b", r"\1 have"),
-    (r"\b(I|you|we|they|he|she|it|that)'ll\b", r"\1 will"),
-    (r"\b(I|you|we)'d (?=like|love|rather|prefer|want|be)", r"\1 would "),
-    (r"\bcan't\b(?! (?:you|we)\b)", "cannot"),
-    (r"\bwon't\b(?! (?:you|it)\b)", "will not"),
-    (
-        r"\b(do|does|did|is|are|was|were|have|has|had|should|would|could|need)n't\b"
-        r"(?! (?:you|we|it|they|there|he|she)\b)",
-        r"\1 not",
-    ),
-    (r"\b(L|l)et's\b", r"\1et us"),
-)
+_HEARD: Final[dict[str, list[str]]] = _TABLES["heard"]
+_SHORT: Final[list[tuple[str, str]]] = _TABLES["short"]
+_FULL: Final[list[tuple[str, str]]] = _TABLES["full"]
 """Contractions said in full: recognizers and careful people write so."""
 _FILLERS = ("um", "uh", "er", "like", "you know", "uhm", "well", "ehm", "hmm", "let's see")
 _KEYS = ("qwertyuiop", "asdfghjkl", "zxcvbnm")
@@ -167,92 +47,11 @@ _PAUSES = re.compile(
 _TOKEN = re.compile(r"^(\W*)(.*?)(\W*)$")
 
 
-_MORE = r"(?=faster|slower|closer|further|farther|quicker|nearer|more|less)"
-_CHANGED = r"(?=(?:the|our|your) (?:speed|pace|tempo)\b)"
-_SPACED = r"(?=(?:the|our|your) (?:gap|distance|following distance|spacing)\b)"
-_ENDS = r"(?=[,.?!]|$| please| now| by | a bit| a little| a touch| a tad| a lot| slightly)"
-_ALIKE: tuple[tuple[str, str], ...] = (
-    (r"(?<!pick-up )(?<!pickup )(?:truck|lorry)", "truck|lorry|HGV|juggernaut|artic|semi"),
-    (r"(?:car|vehicle)(?!'s|[ -]?(?:park|length|sick|seat|wash|ride|chase|transporter|keys))", "car|vehicle|motor"
-     "|automobile"),
-    (r"(?:cars|vehicles)", "cars|vehicles|motors|automobiles"),
-    (r"(?<=the )(?:car|vehicle|guy|one) (?:ahead|in front)(?! of)", "lead car|chap ahead|fellow in front|lad in front"
-     "|car up front"),
-    (r"(?<!why )(?:could|can|would|will) you", "could you|can you|would you|will you|might you|could ya|can ya"),
-    (r"(?<!you )please", "please|please please|pretty please|if you'd be so kind"),
-    (r"I(?:'d like| want| would like|'d love) (?=you to|us to|to )", "I'd like |I want |I need |I'd love "
-     "|I'd prefer |I wish "),
-    (r"I(?:'d like| want| would like) (?=more|less|some|a )", "I'd like |I could do with |I'd go for |let me have "
-     "|I fancy "),
-    (r"(?:maybe|perhaps|possibly)", "maybe|perhaps|possibly|might be|p'raps"),
-    (r"(?<!not )(?:a bit|a tad|a smidge|a wee bit|slightly|a touch)(?! of)", "a bit|a tad|a smidge|a wee bit"
-     "|slightly|a mite"
-     "|a speck|a whit|a crumb|a tiny amount|ever so little|a sliver"),
-    (rf"(?<!not )(?:a lot|loads|heaps|a great deal|a whole lot) {_MORE}", "a lot |loads |heaps |stacks |bags "
-     "|a good deal "),
-    (rf"(?<!so )(?<!too )(?<!not )(?<!how )(?<!very )(?<!that )(?<!this )(?<!it )(?:much|way|far) {_MORE}", "much |way "
-     "|far |hugely "
-     "|vastly |an awful lot |massively |oceans "),
-    (r"(?:faster|quicker)(?= *[,.?!]|$| please| than)", "faster|quicker|speedier|more quickly|more rapidly|swifter"
-     "|at more speed"),
-    (r"slower(?= *[,.?!]|$| please| than)", "slower|more slowly|less fast|less quickly|at less speed|slowlier"),
-    (r"(?:closer|nearer)(?= *[,.?!]|$| please| to )", "closer|nearer"),
-    (r"(?:further|farther) (?:back|away|behind)", "further back|farther back|further behind|farther away|more distant"),
-    (r"(?<!the )(?<!our )(?<!your )(?<!this )(?<!that )(?<!more )(?<!some )(?<!of )speed up" + _ENDS,
-     "speed up|go faster|accelerate|pick up speed|gain speed|get quicker|raise the pace|quicken"),
-    (r"slow down" + _ENDS, "slow down|go slower|drive slower|reduce speed|lose speed|decelerate|lower the pace"
-     "|slacken"),
-    (r"(?:overtake|get past|go past) (?=the|him|her|them|that|this|whoever)", "overtake |pass |get past |go past "
-     "|get by "
-     "|outstrip |get in front of "),
-    (r"pull over(?=[,.?!]|$| please| here| now| and)", "pull over|pull in|draw in|pull up at the side"
-     "|stop at the side"),
-    (r"(?<=the )gap (?=to|between|ahead|in front)", "gap |distance |spacing |separation |interval |headway "),
-    (r"(?:junction|intersection|crossroads)", "junction|intersection|crossroads|crossway"),
-    (r"(?<=the )(?:hard shoulder|verge|roadside)", "hard shoulder|verge|roadside|side strip|hard strip|berm"),
-    (r"in a hurry", "in a hurry|in a rush|pressed for time|pushed for time|short of time|in haste"),
-    (r"no (?:hurry|rush)", "no hurry|no rush|no haste|no urgency"),
-    (r"(?:I'm|I am) late", "I'm late|I'm running late|I'm behind time|I'm overdue|I'm tardy"),
-    (r"(?:we're|we are) late", "we're late|we're running late|we're behind time|we're overdue|we're tardy"),
-    (r"(?<=m )(?:scared|frightened|afraid|terrified|nervous)", "scared|frightened|afraid|terrified|nervous|petrified"
-     "|fearful|uneasy|freaking out|shaken"),
-    (r"(?:kids|children)", "kids|children|youngsters|nippers|bairns|little ones|kiddies"),
-    (r"(?:baby|newborn)", "baby|newborn|infant|bairn|bambino"),
-    (r"my (?:mum|mother|mom)", "my mum|my mother|my mom|my mama|my old lady"),
-    (r"(?:grandma|granny|gran|nan)", "grandma|granny|gran|nan|nana|grandmother|oma"),
-    (r"my wife", "my wife|the wife|the missus|my better half|my spouse"),
-    (r"(?:carsick|travel sick|nauseous|queasy)", "carsick|travel sick|nauseous|queasy|bilious|seasick|squeamish"),
-    (r"(?:meeting|appointment)", "meeting|appointment|conference|briefing|rendezvous"),
-    (r"my (?:flight|plane)", "my flight|my plane|my jet|my connection|my departure"),
-    (r"(?:coffee|tea|latte|cocoa)", "coffee|tea|latte|cocoa|cappuccino|espresso|hot chocolate"),
-    (r"(?:really|very|awfully|terribly)(?= (?:slow|fast|close|far|late|nervous|tired|scared|rough))", "really|very"
-     "|awfully"
-     "|terribly|dreadfully|frightfully|extremely|proper|mighty|dead"),
-    (r"(?:icy|slippery|slick)", "icy|slippery|slick|glassy|frozen|greasy"),
-    (r"(?:foggy|misty)", "foggy|misty|hazy|murky"),
-    (r"I (?:think|reckon|guess|believe|suppose)", "I think|I reckon|I guess|I believe|I suppose|I figure|I'd say"),
-    (r"(?:right now|straight away|immediately|at once)", "right now|straight away|immediately|at once|this instant"
-     "|forthwith"),
-    (r"keep (?=(?:a|the|this|that) (?:gap|distance|speed|pace)\b)", "keep |maintain |hold |preserve |retain "),
-    (rf"(?:reduce|lower|decrease|cut|drop) {_CHANGED}", "reduce |lower |decrease |cut |drop |diminish |curb |trim "),
-    (rf"(?:increase|raise|boost|lift) {_CHANGED}", "increase |raise |boost |lift |step up |jack up |heighten "),
-    (rf"(?:reduce|decrease|shorten|close|shrink) {_SPACED}", "reduce |decrease |shorten |shrink |tighten |narrow "),
-    (rf"(?:increase|widen|open|extend) {_SPACED}", "increase |widen |extend |enlarge |stretch |lengthen |expand "),
-    (r"(?:change|switch|move|shift) (?=(?:in)?to the (?:left|right|other|middle) lane)", "change |switch |move "
-     "|shift |cross "
-     "|hop |scoot |transfer "),
-    (r"turn (?=(?:left|right) (?:at|here|there))", "turn |swing |go |steer |head "),
-    (r"go straight (?=on|ahead|over|through|at)", "go straight |keep straight |drive straight |head straight "
-     "|carry straight "),
-    (r"(?:annoying|irritating)", "annoying|irritating|maddening|infuriating|vexing"),
-    (r"my (?:neck|back|spine)", "my neck|my back|my spine|my lumbago|my shoulders|my vertebrae"),
-    (r"(?:petrol|gas|fuel)(?= (?:is|bill|gauge|prices|station|tank))", "petrol|gas|fuel|diesel|gasoline"),
-    (r"(?:enormous|huge|massive)", "enormous|huge|massive|gigantic|colossal|humongous"),
-)  # fmt: skip
-"""Words, and others that a passenger may say for them: none changes a side, a direction, an amount or a denial."""
 _REWORDED = tuple(
-    (re.compile(rf"\b{find}(?<=\S)(?!\w)|\b{find}(?<=\s)", re.IGNORECASE), by.split("|")) for find, by in _ALIKE
+    (re.compile(rf"\b{find}(?<=\S)(?!\w)|\b{find}(?<=\s)", re.IGNORECASE), by.split("|"))
+    for find, by in _TABLES["alike"]
 )
+"""Words, and others that a passenger may say for them: none changes a side, a direction, an amount or a denial."""
 MOST_REWORDED = 3
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -20,49 +21,12 @@ from chauffeur.language.grammar import Grammar, GrammarFrame, Manner, Template, 
 DATA = "onboard"
 """Their data set."""
 FILES = (
-    "pieces",
-    "speed",
-    "gap",
-    "lanes",
-    "passing",
-    "road",
-    "others",
-    "styles",
-    "conditions",
-    "asks",
-    "refusals",
-    "corrections",
-    "wide",
-    "more",
-    "numbers",
-    "pace",
-    "distance",
-    "lane_talk",
-    "manoeuvres",
-    "moods",
-    "answers",
-    "compound",
-    "again",
-    "pace_felt",
-    "room_felt",
-    "not_driven",
-    "plain_rare",
-    "steps_more",
-    "voices_moods",
-    "voices_pace",
-    "voices_numbers",
-    "voices_room",
-    "voices_lanes",
-    "voices_answers",
-    "voices_joins",
-    "small_talk",
-    "never",
-    "measured",
-    "unclear",
-    "manners",
-    "ways",
-    "chatter",
-)
+    "pieces", "speed", "gap", "lanes", "passing", "road", "others", "styles", "conditions", "asks", "refusals",
+    "corrections", "wide", "more", "numbers", "pace", "distance", "lane_talk", "manoeuvres", "moods", "answers",
+    "compound", "again", "pace_felt", "room_felt", "not_driven", "plain_rare", "steps_more", "voices_moods",
+    "voices_pace", "voices_numbers", "voices_room", "voices_lanes", "voices_answers", "voices_joins", "small_talk",
+    "never", "measured", "unclear", "manners", "ways", "chatter",
+)  # fmt: skip
 
 _NOT = r"^(?:don't|do not|never|neither|no|patiently|really|not|either)\b"
 """Imperatives that no "could you" goes in front of."""
@@ -216,88 +180,14 @@ _OPENINGS: Sequence[GrammarFrame] = (
 )
 
 _QUESTIONS = (
-    "could you",
-    "can you",
-    "would you",
-    "will you",
-    "can we",
-    "could we",
-    "can't we",
-    "may i have",
-    "could i have",
-    "can i",
-    "how about",
-    "what about",
-    "why don't",
-    "would it be",
-    "is it possible",
-    "any chance",
-    "do you think",
-    "may i ask",
-    "is there any",
-)
+    "could you", "can you", "would you", "will you", "can we", "could we", "can't we", "may i have", "could i have",
+    "can i", "how about", "what about", "why don't", "would it be", "is it possible", "any chance", "do you think",
+    "may i ask", "is there any",
+)  # fmt: skip
 
-_FIRST_VERBS = (
-    "accelerate:accelerating add:adding adjust:adjusting aim:aiming allow:allowing avoid:avoiding back:backing "
-    "be:being bear:bearing blend:blending boost:boosting brake:braking bring:bringing build:building "
-    "bump:bumping call:calling calm:calming cancel:canceling cap:capping carry:carrying catch:catching "
-    "change:changing choose:choosing close:closing come:coming compress:compressing conserve:conserving "
-    "continue:continuing cool:cooling copy:copying crank:cranking creep:creeping cross:crossing cruise:cruising "
-    "cut:cutting decelerate:decelerating decrease:decreasing dial:dialing distance:distancing do:doing "
-    "double:doubling draw:drawing drift:drifting drive:driving drop:dropping ease:easing edge:edging "
-    "enjoy:enjoying enter:entering exceed:exceeding exercise:exercising expand:expanding extend:extending "
-    "fall:falling find:finding fit:fitting fix:fixing float:floating floor:flooring follow:following "
-    "freeze:freezing gain:gaining get:getting give:giving go:going grow:growing guide:guiding halt:halting "
-    "halve:halving hang:hanging have:having head:heading help:helping hit:hitting hold:holding honk:honking "
-    "hop:hopping hug:hugging hurry:hurrying ignore:ignoring inch:inching increase:increasing jump:jumping "
-    "keep:keeping knock:knocking leapfrog:leapfrogging leave:leaving lengthen:lengthening let:letting "
-    "lift:lifting limit:limiting lock:locking loosen:loosening lose:losing lower:lowering maintain:maintaining "
-    "make:making match:matching merge:merging mirror:mirroring move:moving narrow:narrowing navigate:navigating "
-    "nip:nipping nudge:nudging open:opening overtake:overtaking park:parking pass:passing perform:performing "
-    "pick:picking place:placing play:playing pop:popping position:positioning preserve:preserving press:pressing "
-    "proceed:proceeding pull:pulling push:pushing put:putting quicken:quickening raise:raising reduce:reducing "
-    "rein:reining rejoin:rejoining relax:relaxing remain:remaining repeat:repeating reset:resetting "
-    "restrict:restricting resume:resuming return:returning reverse:reversing roll:rolling round:rounding "
-    "run:running save:saving scale:scaling scooch:scooching scoot:scooting set:setting settle:settling "
-    "shadow:shadowing shave:shaving shed:shedding shift:shifting shorten:shortening show:showing "
-    "shrink:shrinking signal:signaling sing:singing sit:sitting skip:skipping slide:sliding slip:slipping "
-    "slow:slowing smooth:smoothing sneak:sneaking snug:snugging space:spacing speed:speeding squeeze:squeezing "
-    "stand:standing stay:staying steer:steering step:stepping stick:sticking stop:stopping stretch:stretching "
-    "subtract:subtracting swap:swapping sweep:sweeping swing:swinging switch:switching sync:syncing tag:tagging "
-    "take:taking tell:telling throttle:throttling tighten:tightening trail:trailing travel:traveling "
-    "treat:treating trim:trimming tuck:tucking turn:turning undo:undoing unwind:unwinding use:using "
-    "watch:watching wave:waving widen:widening wind:winding work:working yield:yielding zip:zipping zoom:zooming "
-    "relocate:relocating transfer:transferring transition:transitioning filter:filtering glide:gliding "
-    "select:selecting opt:opting join:joining vacate:vacating abandon:abandoning quit:quitting ditch:ditching "
-    "mind:minding pay:paying think:thinking rush:rushing hustle:hustling soften:softening dawdle:dawdling "
-    "spare:sparing burn:burning waste:wasting minimise:minimising cease:ceasing enlarge:enlarging pad:padding "
-    "broaden:broadening amplify:amplifying augment:augmenting hike:hiking inflate:inflating swell:swelling "
-    "tack:tacking throw:throwing slap:slapping chuck:chucking bung:bunging slice:slicing chop:chopping "
-    "clip:clipping pare:paring prune:pruning lessen:lessening diminish:diminishing contract:contracting "
-    "condense:condensing deduct:deducting remove:removing peg:pegging tail:tailing target:targeting "
-    "ensure:ensuring guarantee:guaranteeing alter:altering multiply:multiplying abstain:abstaining "
-    "attempt:attempting begin:beginning borrow:borrowing branch:branching break:breaking bypass:bypassing "
-    "cede:ceding chase:chasing dash:dashing dodge:dodging duck:ducking exit:exiting fly:flying "
-    "forget:forgetting forgo:forgoing grant:granting hook:hooking indicate:indicating invite:inviting "
-    "manoeuvre:manoeuvring maneuver:maneuvering offer:offering outrun:outrunning peel:peeling permit:permitting "
-    "pursue:pursuing queue:queueing refuse:refusing resist:resisting sail:sailing shoot:shooting "
-    "skirt:skirting slot:slotting start:starting surrender:surrendering suspend:suspending track:tracking "
-    "try:trying veer:veering wait:waiting welcome:welcoming whip:whipping up:upping top:topping "
-    "notch:notching tick:ticking trickle:trickling crawl:crawling race:racing sprint:sprinting gun:gunning "
-    "hammer:hammering motor:motoring nail:nailing pump:pumping ramp:ramping rev:revving surge:surging "
-    "whack:whacking amp:amping bank:banking lop:lopping dock:docking mellow:mellowing moderate:moderating "
-    "tame:taming temper:tempering tone:toning drag:dragging dip:dipping plunge:plunging tumble:tumbling "
-    "scrub:scrubbing bleed:bleeding coast:coasting "
-    "abide:abiding adapt:adapting adhere:adhering adopt:adopting align:aligning amend:amending "
-    "comply:complying conform:conforming curb:curbing divide:dividing elevate:elevating enhance:enhancing "
-    "equal:equaling hoist:hoisting jack:jacking level:leveling maximise:maximising mimic:mimicking "
-    "observe:observing prevent:preventing ratchet:ratcheting refrain:refraining respect:respecting "
-    "retain:retaining revert:reverting sink:sinking slacken:slackening slash:slashing split:splitting "
-    "stabilise:stabilising steady:steadying sustain:sustaining tie:tying tune:tuning whittle:whittling"
+_GERUNDS: Mapping[str, str] = dict(
+    pair.split(":") for pair in Path(__file__).with_name("gerunds.txt").read_text(encoding="utf-8").split()
 )
-_GERUNDS: Mapping[str, str] = {
-    verb: gerund for verb, _, gerund in (pair.partition(":") for pair in _FIRST_VERBS.split())
-}
 
 MANNER = Manner(
     frames=_FRAMES,

@@ -180,11 +180,9 @@ class InstructionJob:
 
     @property
     def near(self) -> str:
-        """See BenchJob."""
         return self.task
 
     def run(self) -> Row:
-        """See BenchJob."""
         row: Row = {"key": self.key, "infra_failed": False, "refused": False, "policy_failed": False, "detail": ""}
         row |= {"success": False, "outcome": "not_driven", "measured": None}
         plan: Plan = plan_adapter.validate_python(self.plan)
@@ -212,7 +210,6 @@ class InstructionJob:
             return row | {"infra_failed": True, "detail": str(error)}
 
     def spoiled(self, detail: str) -> Row:
-        """See BenchJob."""
         return {
             "key": self.key, "infra_failed": True, "refused": False, "policy_failed": False, "detail": detail,
             "success": False, "outcome": "not_driven", "measured": None,
@@ -340,7 +337,6 @@ class InstructionBenchmark:
 
     @property
     def config(self) -> Mapping[str, Any]:
-        """See Benchmark."""
         data = b"".join(read_data("vilad", name) for name in ("parking.txt", "driving.txt"))
         return {
             "tasks": list(self._tasks),
@@ -356,16 +352,13 @@ class InstructionBenchmark:
         return instruction_items(self._tasks, self._splits, self._count, self._seed)
 
     def items(self) -> Sequence[InstructionItem]:
-        """See Benchmark."""
         return self._items
 
     async def request(self, item: InstructionItem, desk: RequestDesk) -> PlanRequest:
-        """See Benchmark."""
         context = await desk.context(item.scenario)
         return screened_request(Instruction(item.text, source="benchmark"), context, SystemMessage(""))
 
     def job(self, item: InstructionItem, answer: Row | None) -> InstructionJob | None:
-        """See Benchmark."""
         if answer is None:
             return None
         parts = [VERSION, scenario_hash(item.scenario), dict(item.asked), answer["policy"], answer["refusal"]]
@@ -373,7 +366,6 @@ class InstructionBenchmark:
         return InstructionJob(key, item.task, item.scenario, item.asked, answer)
 
     def rows(self, outcome: ItemOutcome[InstructionItem]) -> Sequence[InstructionRow]:
-        """See Benchmark."""
         item, answer, result = outcome.item, outcome.answer or {}, outcome.result or {}
         settings = dict(answer.get("settings") or ())
         usage = answer.get("usage") or {}

@@ -58,7 +58,6 @@ class DrivingTask:
     criteria: Sequence[str] = CRITERIA
 
     def command(self, rng: np.random.Generator, split: Split = "train") -> DriveCommand:
-        """See ViladTask and LearnableTask."""
         return drive_command(rng, split)
 
     def answered(self, rng: np.random.Generator, said: Sequence[DriveCommand]) -> tuple[Array, Array]:
@@ -108,7 +107,6 @@ class DriveCase:
         return Judged(fulfils(self.street, self.asked, values), understood, agrees.waypoints, agrees.pointers)
 
     def verified(self, predict: Predict, decided: Decided) -> Decided:
-        """See `driving.verified_drive`."""
         return verified_drive(predict, self.street, decided)
 
     def solved(self, asked: Mapping[str, str]) -> bool:

@@ -22,10 +22,9 @@ from chauffeur.models.vilad.frames_vision import batches
 from chauffeur.models.vilad.losses import Noise, masked
 from chauffeur.models.vilad.network import Vilad, ViladConfig
 from chauffeur.models.vilad.waypoints import WaypointCodebook
-from chauffeur.planners.vilad.engine import SHIPPED
 from chauffeur.planners.vilad.template import MASK
 from chauffeur.planners.vilad.unmasking import NEVER, Decided, Unmasking, distribution, unmask, unmask_many
-from chauffeur.planners.vilad.words import WIDTH, load_words
+from chauffeur.planners.word_table import SHIPPED_WORDS, WIDTH, load_words
 
 Array = np.ndarray[Any, Any]
 FramesMode = Literal["vilad", "twin"]
@@ -85,7 +84,7 @@ def prompts(ego: Array, commands: list[str]) -> torch.Tensor:
         ego: `frames_data.ego_features`, (n, EGO_WIDTH).
         commands: What the navigation says.
     """
-    words = load_words(SHIPPED / "words.npz")
+    words = load_words(SHIPPED_WORDS)
     found = np.zeros((len(commands), PROMPT, WIDTH), np.float32)
     found[:, 0, :EGO_WIDTH] = ego
     known: dict[str, Array] = {}

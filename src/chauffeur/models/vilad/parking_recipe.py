@@ -29,11 +29,9 @@ class ParkingTask:
     criteria: Sequence[str] = CRITERIA
 
     def command(self, rng: np.random.Generator, split: Split = "train") -> ParkingCommand:
-        """See ViladTask and LearnableTask."""
         return wish(rng, split)
 
     def answered(self, rng: np.random.Generator, said: Sequence[ParkingCommand]) -> tuple[Array, Array]:
-        """See ViladTask."""
         free = int(rng.integers(FEWEST, MOST + 1))
         scenes = [scene(rng, free) for _ in said]
         rows = [
@@ -78,7 +76,6 @@ class ParkingCase:
         return Judged(success, asked_of(values) == self.asked, agrees.row, agrees.spot)
 
     def verified(self, predict: Predict, decided: Decided) -> Decided:
-        """See `parking.verified`."""
         return verified(predict, self.spots, decided)
 
     def solved(self, asked: Mapping[str, str]) -> bool:

@@ -17,9 +17,9 @@ from chauffeur.drive.files import publish
 from chauffeur.models.vilad.baseline import COMMANDS, linear_reader
 from chauffeur.models.vilad.evaluation import ViladCase, ViladFigures, figures, solved
 from chauffeur.models.vilad.phrases import TESTS, Split
-from chauffeur.planners.vilad.engine import SHIPPED, ViladEngine
+from chauffeur.planners.vilad.engine import ViladEngine
 from chauffeur.planners.vilad.unmasking import Unmasking
-from chauffeur.planners.vilad.words import load_words
+from chauffeur.planners.word_table import SHIPPED_WORDS, load_words
 
 if TYPE_CHECKING:
     from chauffeur.models.vilad.network import Vilad
@@ -126,7 +126,7 @@ def make_model(model: ViladModel, folder: Path, recipe: ViladRecipe, told: Told,
         folder / "training",
         model.task,
         recipe,
-        load_words(SHIPPED / "words.npz"),
+        load_words(SHIPPED_WORDS),
         lambda step, loss, seconds: told(f"training, loss {loss:.3f}, {seconds:.2f} s", step + 1, recipe.steps),
         base=base if base is None or (base / "model.onnx").exists() else base / "training",
     )

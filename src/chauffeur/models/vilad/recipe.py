@@ -20,7 +20,7 @@ from chauffeur.models.vilad.export import exported_weights
 from chauffeur.models.vilad.losses import Noise, diffusion_loss, masked, next_token_loss
 from chauffeur.models.vilad.network import SIZES, Vilad, ViladConfig
 from chauffeur.planners.vilad.template import ActionTemplate
-from chauffeur.planners.vilad.words import WIDTH, WordTable
+from chauffeur.planners.word_table import WIDTH, WordTable
 
 Array = np.ndarray[Any, Any]
 Mode = Literal["fixed", "plain", "twin"]

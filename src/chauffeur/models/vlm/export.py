@@ -16,9 +16,9 @@ from chauffeur.models.export.onnx_graph import write_graph
 from chauffeur.models.net.transformer import attended, projected, rotary
 from chauffeur.models.vlm.network import CompactVlm
 from chauffeur.planners.camera_faults import HEIGHT, WIDTH
-from chauffeur.planners.vilad.words import MOST_PIECES
-from chauffeur.planners.vilad.words import WIDTH as WORD_WIDTH
 from chauffeur.planners.vlm.template import TEMPLATE
+from chauffeur.planners.word_table import MOST_PIECES
+from chauffeur.planners.word_table import WIDTH as WORD_WIDTH
 
 
 class VlmGraph(nn.Module):

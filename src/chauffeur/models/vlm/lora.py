@@ -29,7 +29,7 @@ from chauffeur.models.vlm.wishes import training_wish
 from chauffeur.planners.prompts.motion import matrix_words, motion_messages
 from chauffeur.planners.transformers_vlm import chat_turns
 from chauffeur.planners.vlm.template import STYLES
-from chauffeur.planners.vlm.words import scene_words, thought_words
+from chauffeur.planners.vlm.thoughts import scene_words, thought_words
 from chauffeur.planners.vlm_processor import load_processor
 
 _IGNORED: Final = -100

@@ -20,10 +20,10 @@ from chauffeur.models.net.connector import Connector
 from chauffeur.models.net.transformer import TransformerConfig, transformer
 from chauffeur.models.net.vision import VisionConfig, vision
 from chauffeur.planners.camera_faults import HEIGHT, WIDTH
-from chauffeur.planners.vilad.words import MOST_PIECES
-from chauffeur.planners.vilad.words import WIDTH as WORD_WIDTH
 from chauffeur.planners.vlm.pictures import CELLS
 from chauffeur.planners.vlm.template import HEARD, SIGHTS, TEMPLATE
+from chauffeur.planners.word_table import MOST_PIECES
+from chauffeur.planners.word_table import WIDTH as WORD_WIDTH
 
 FREE: Final = 2
 """Sights that are taught nothing but the answers."""

@@ -19,17 +19,18 @@ import numpy as np
 
 from chauffeur.drive.files import publish
 from chauffeur.models.sorting.training import write
+from chauffeur.models.vlm.config import VlmRecipe
 from chauffeur.models.vlm.ear import HEAD_SHARE, NETWORK_SHARE, style_head, style_sorter, style_worth
 from chauffeur.models.vlm.evaluation import VlmFigures, vlm_figures
 from chauffeur.models.vlm.gains import gain_table
-from chauffeur.models.vlm.recipe import VlmRecipe, train
+from chauffeur.models.vlm.recipe import train
 from chauffeur.models.vlm.scenes import PictureSet, Split, load_pictures, make_pictures
 from chauffeur.models.vlm.wishes import held_wishes
 from chauffeur.planners.camera_faults import HEIGHT, WIDTH
-from chauffeur.planners.vilad.words import load_words
-from chauffeur.planners.vlm.engine import TRUST, WORDS_FOLDER, VlmEngine
+from chauffeur.planners.vlm.engine import TRUST, VlmEngine
 from chauffeur.planners.vlm.sentences import shipped_encoder
 from chauffeur.planners.vlm.template import SEEN_WEATHERS, TEMPLATE, GainCodebook
+from chauffeur.planners.word_table import SHIPPED_WORDS, load_words
 from chauffeur.safety.gain_box import gain_box
 
 Told = Callable[[str, int, int], None]
@@ -65,7 +66,7 @@ def make_vlm(folder: Path, recipe: VlmRecipe, told: Told, tests: Mapping[Split, 
         folder / "training",
         recipe,
         load_pictures(pictures, "train", recipe.scenes),
-        load_words(WORDS_FOLDER / "words.npz"),
+        load_words(SHIPPED_WORDS),
         lambda stage, step, loss, seconds: told(
             f"{stage}, loss {loss:.3f}, {seconds:.2f} s",
             step + 1,

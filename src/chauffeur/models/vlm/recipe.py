@@ -16,61 +16,19 @@ from typing import Any, Final
 import numpy as np
 import torch
 
-from chauffeur.models.train.rates import cosine_rate
 from chauffeur.models.train.trainer import Optimisation, fit
 from chauffeur.models.vilad.recipe import packed_words
+from chauffeur.models.vlm.config import VlmRecipe
 from chauffeur.models.vlm.gains import GainCase, gain_table, taught_gains
 from chauffeur.models.vlm.network import SIZES, CompactVlm
 from chauffeur.models.vlm.scenes import PictureSet, SceneFacts
 from chauffeur.models.vlm.seeing import dealt, seeing_figures, sights, train_eye
 from chauffeur.models.vlm.wishes import training_wish
-from chauffeur.planners.vilad.words import WordTable
 from chauffeur.planners.vlm.template import GIVEN, RECALLS, STYLES, TEMPLATE, GainCodebook
+from chauffeur.planners.word_table import WordTable
 from chauffeur.safety.gain_box import gain_box
 
 Array = np.ndarray[Any, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class VlmRecipe:
-    """What decides a training run.
-
-    Attributes:
-        size: One of `network.SIZES`.
-        scenes: Pictures of training; each with three wishes a turn.
-        seeing_steps, seen_pictures, seeing_rate: Optimiser steps of the eye, pictures of its batches, and its highest
-            learning rate.
-        steps: Optimiser steps of words and gains.
-        pictures: Pictures of a batch; each with three wishes.
-        rate: Highest learning rate; reached after `warmup` steps, then brought down along a cosine.
-        warmup: See there.
-        remembered: Share of cases with earlier feedback.
-        dropped, jitter: Of the words, as `vilad.parking_recipe` has them.
-        seed: Of weights and batches.
-    """
-
-    size: str = "compact"
-    scenes: int = 6_000
-    seeing_steps: int = 2_000
-    seen_pictures: int = 16
-    seeing_rate: float = 2e-3
-    steps: int = 1_600
-    pictures: int = 20
-    rate: float = 2e-3
-    warmup: int = 100
-    remembered: float = 0.2
-    dropped: float = 0.10
-    jitter: float = 0.35
-    seed: int = 0
-
-    def rate_at(self, step: int) -> float:
-        """Learning rate of a step."""
-        return cosine_rate(step, self.steps, self.rate, self.warmup, 0.03)
-
-    def seeing(self) -> dict[str, Any]:
-        """What decides the eye's training."""
-        names = ("size", "scenes", "seeing_steps", "seen_pictures", "seeing_rate", "seed")
-        return {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True, slots=True)

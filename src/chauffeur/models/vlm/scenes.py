@@ -17,7 +17,6 @@ import numpy as np
 
 from chauffeur.camera import (
     LOOKS,
-    WEATHERS,
     CameraImages,
     CameraLook,
     Conditions,
@@ -27,6 +26,7 @@ from chauffeur.camera import (
     make_renderer,
 )
 from chauffeur.concept import DataError, Lead, Observation, Scenario, VehicleState
+from chauffeur.concept.weather import WEATHERS
 from chauffeur.drive.session import make_world
 from chauffeur.geometry import wrap_to_pi
 from chauffeur.planners.camera_faults import HEIGHT, WIDTH, small

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import torch
@@ -19,12 +19,10 @@ from torch.nn.functional import binary_cross_entropy_with_logits, cross_entropy
 
 from chauffeur.models.train.rates import cosine_rate
 from chauffeur.models.train.trainer import Optimisation, fit
+from chauffeur.models.vlm.config import VlmRecipe
 from chauffeur.models.vlm.network import CompactVlm
 from chauffeur.models.vlm.scenes import PictureSet, SceneFacts
 from chauffeur.planners.vlm.template import SIGHTS
-
-if TYPE_CHECKING:
-    from chauffeur.models.vlm.recipe import VlmRecipe
 
 Array = np.ndarray[Any, Any]
 

@@ -8,13 +8,12 @@ from chauffeur.planners.prompts.coached import (
     build_coached_message,
     description_messages,
 )
-from chauffeur.planners.prompts.system import PROMPT_VERSION, Setting, build_system_message, describe_limits
+from chauffeur.planners.prompts.system import Setting, build_system_message, describe_limits
 from chauffeur.planners.prompts.turns import Message, build_messages, pictures_in, repair_turns, wish_turn, words_of
 
 __all__ = [
     "COACHED_PROMPT_VERSION",
     "DESCRIPTION_SENTENCES",
-    "PROMPT_VERSION",
     "Helper",
     "Message",
     "Setting",

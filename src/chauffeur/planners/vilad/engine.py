@@ -12,7 +12,7 @@ from chauffeur.concept import DataError
 from chauffeur.planners.exported import open_exported
 from chauffeur.planners.vilad.template import ActionTemplate
 from chauffeur.planners.vilad.unmasking import Decided, Predict, Unmasking, unmask, unmasking
-from chauffeur.planners.vilad.words import WordTable, load_words
+from chauffeur.planners.word_table import SHIPPED_WORDS, WordTable, load_words
 
 Array = np.ndarray[Any, Any]
 
@@ -40,7 +40,7 @@ class ViladEngine:
         except Exception as error:  # the runtime raises types of its own for a damaged graph
             raise DataError(f"The ViLaD model in {folder} cannot be read: {error}.") from error
         own = folder / "words.npz"
-        self.words: WordTable = load_words(own if own.exists() else SHIPPED / "words.npz")
+        self.words: WordTable = load_words(own if own.exists() else SHIPPED_WORDS)
 
     @property
     def version(self) -> str:

@@ -14,10 +14,9 @@ from chauffeur.concept import ActionMatrix, DataError
 from chauffeur.language.text_classifier import load_sorter
 from chauffeur.planners.camera_faults import HEIGHT, WIDTH, small
 from chauffeur.planners.exported import open_exported
-from chauffeur.planners.vilad.engine import SHIPPED as WORDS_FOLDER
-from chauffeur.planners.vilad.words import WordTable, load_words
 from chauffeur.planners.vlm.sentences import load_head, shipped_encoder
 from chauffeur.planners.vlm.template import DECIDED, STYLES, TEMPLATE, GainCodebook
+from chauffeur.planners.word_table import SHIPPED_WORDS, WordTable, load_words
 
 Array = np.ndarray[Any, Any]
 
@@ -71,7 +70,7 @@ class VlmEngine:
             ) from error
         if list(self.about.get("tokens", ())) != list(TEMPLATE.words):
             raise DataError(f"The VLM in {folder} writes other tokens.", hint="Train one: chauffeur model train vlm")
-        self.words: WordTable = load_words(WORDS_FOLDER / "words.npz")
+        self.words: WordTable = load_words(SHIPPED_WORDS)
         ear = folder / "styles.npz"
         self._ear = load_sorter(ear) if ear.exists() else None
         head = folder / "head.npz"

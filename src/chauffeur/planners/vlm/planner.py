@@ -34,7 +34,7 @@ from chauffeur.planners.vlm.taste import (
     taste_of,
 )
 from chauffeur.planners.vlm.template import RECALLS, SEEN_WEATHERS, STYLES
-from chauffeur.planners.vlm.words import AS_SEEN, SAID, more_careful, scene_words, taste_words, thought_words
+from chauffeur.planners.vlm.thoughts import AS_SEEN, SAID, more_careful, scene_words, taste_words, thought_words
 from chauffeur.safety.gain_box import care, most_careful, moved
 
 INTENT: Final = "motion.gains"

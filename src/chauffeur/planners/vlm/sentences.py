@@ -4,7 +4,7 @@
     marks of the words (language.sorter) ----------+
 
 The encoder has read a good part of the world's English; the network and the sorter have read some thousand sentences.
-`chauffeur.models.vlm.sentence_export` makes `encoder.onnx` from the open checkpoint, `models.vlm.ear` the head.
+`benchmarks/shipped_words.py` makes `encoder.onnx` from the open checkpoint, `models.vlm.ear` the head.
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ import numpy as np
 
 from chauffeur.concept import DataError
 from chauffeur.planners.exported import open_graph
-from chauffeur.planners.vilad.engine import SHIPPED as WORDS_FOLDER
-from chauffeur.planners.vilad.words import load_words
+from chauffeur.planners.word_table import SHIPPED_WORDS, load_words
 
 Array = np.ndarray[Any, Any]
 
@@ -41,7 +40,7 @@ class SentenceEncoder:
                 f"The sentence encoder {path} cannot be read: {error}.",
                 hint="Install Chauffeur again; it ships with it.",
             ) from error
-        self._words = load_words(WORDS_FOLDER / "words.npz")
+        self._words = load_words(SHIPPED_WORDS)
 
     def features(self, text: str) -> Array:
         """float32, (FEATURES,)."""

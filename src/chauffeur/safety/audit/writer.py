@@ -22,7 +22,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
-from chauffeur import __version__
 from chauffeur.concept import DataError
 from chauffeur.safety.audit.entries import BATCHED, FORMAT, LINE_START, NO_RECORD, Kind, seal
 from chauffeur.safety.audit.heads import SEALED_SINCE, head_path, leave_head
@@ -30,6 +29,7 @@ from chauffeur.safety.audit.keys import key_name
 from chauffeur.safety.audit.storage import LogFile
 from chauffeur.safety.audit.texts import REFERENCES, hide
 from chauffeur.safety.audit.verification import AuditVerification, verify
+from chauffeur.version import __version__
 
 CAPACITY: Final = 4096
 """Records that may wait to be written: minutes of a drive."""

@@ -30,7 +30,8 @@ from chauffeur.geometry.opendrive import OpenDriveError, parse_opendrive
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.carla.frames import forward_mps, pose_of, transform_of
 from chauffeur.worlds.carla.server import EGO_BLUEPRINTS, connect, library
-from chauffeur.worlds.parking.path_follower import Chassis
+from chauffeur.worlds.path_follower import Chassis
+from chauffeur.worlds.skeleton import ShownWorld, finite
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
 from chauffeur.worlds.town.perception import TownPerception
 
@@ -73,7 +74,7 @@ class CarlaConfig(BaseModel):
     contact_ends: bool = True
 
 
-class CarlaWorld:
+class CarlaWorld(ShownWorld):
     """A CARLA server, stepped at 20 Hz."""
 
     capabilities = TOWN_CAPABILITIES
@@ -168,8 +169,7 @@ class CarlaWorld:
 
     def step(self, command: Command) -> Command:
         """Advance 50 ms under `command`. Raises ScenarioError: the server died."""
-        if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
-            raise ValueError(f"A command must be finite numbers, not {command}.")
+        finite(command)
         asked = max(-LINCOLN_MKZ.most_braking_mps2, min(LINCOLN_MKZ.most_acceleration_mps2, command.acceleration_mps2))
         wheel = max(-LINCOLN_MKZ.most_steering_rad, min(LINCOLN_MKZ.most_steering_rad, command.steering_rad))
         speed = max(0.0, self.observe().ego.speed_mps + asked)  # where it leads within a second
@@ -184,17 +184,6 @@ class CarlaWorld:
         self._shown, self._steering = None, wheel
         return Command(asked, wheel)
 
-    def observe(self) -> Observation:
-        """The present instant as frozen values."""
-        if self._shown is None:
-            self._shown = self._look()
-        return self._shown
-
-    @property
-    def ended(self) -> bool:
-        """Crash, off the road, or out of time."""
-        return self.observe().ended
-
     def perception(self) -> TownPerception:
         """Questions about the present instant."""
         self._started()
@@ -207,7 +196,6 @@ class CarlaWorld:
     # The stage of a scenario ------------------------------------------------------------------------------------------
 
     def spawn(self, kind: AgentKind, pose: Pose, speed_mps: float = 0.0) -> int:
-        """See `worlds.base.Stage`."""
         if kind not in _BLUEPRINTS:
             raise ScenarioError(f"CARLA has no road user of the kind {kind!r}.")
         actor = self._put((_BLUEPRINTS[kind],), pose)
@@ -217,7 +205,6 @@ class CarlaWorld:
         return number
 
     def drive(self, actor: int, pose: Pose, speed_mps: float) -> None:
-        """See `worlds.base.Stage`."""
         one, c = self._staged[actor], self._carla
         one.set_transform(transform_of(c, pose, float(one.get_location().z)))
         x, y = speed_mps * math.cos(pose.heading_rad), -speed_mps * math.sin(pose.heading_rad)
@@ -225,7 +212,6 @@ class CarlaWorld:
         self._shown = None
 
     def remove(self, actor: int) -> None:
-        """See `worlds.base.Stage`."""
         one = self._staged.pop(actor, None)
         if one is not None:
             self._actors.remove(one)

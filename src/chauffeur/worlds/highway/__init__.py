@@ -1,9 +1,7 @@
 """LaMPilot's roads: ramp merge, multi-lane highway, intersection."""
 
 from chauffeur.worlds.highway.baselines import MobilBaseline
-from chauffeur.worlds.highway.driver import HighwayDriver
 from chauffeur.worlds.highway.instant import Instant, RoadPerception
-from chauffeur.worlds.highway.perception import HighwayPerception
 from chauffeur.worlds.highway.world import HighwayWorld
 
-__all__ = ["HighwayDriver", "HighwayPerception", "HighwayWorld", "Instant", "MobilBaseline", "RoadPerception"]
+__all__ = ["HighwayWorld", "Instant", "MobilBaseline", "RoadPerception"]

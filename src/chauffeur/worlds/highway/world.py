@@ -24,6 +24,7 @@ from chauffeur.worlds.highway.driver import HighwayDriver
 from chauffeur.worlds.highway.fitness import fit_to_begin
 from chauffeur.worlds.highway.perception import HighwayPerception
 from chauffeur.worlds.highway.roads import DT_S, HighwayScene, RoadConfig, build_scene, parse_config, road_graph
+from chauffeur.worlds.skeleton import finite
 
 FOLLOW_WITHIN_M = 50.0
 """LaMPilot starts the ego at the speed of a vehicle closer than this ahead, at the speed limit otherwise."""
@@ -141,8 +142,7 @@ class HighwayWorld:
 
     def step(self, command: Command) -> Command:
         """Advance 0.1 s under `command`; returns what the vehicle really applied: no more than a car can do."""
-        if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
-            raise ValueError(f"A command must be finite numbers, not {command}.")
+        finite(command)
         core = self._road()
         self._seen = None
         self._clock_s += DT_S

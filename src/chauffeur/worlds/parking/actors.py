@@ -9,9 +9,9 @@ from typing import Final, NamedTuple
 
 from chauffeur.concept import LaneId, VehicleState
 from chauffeur.geometry import Box, overlap
-from chauffeur.worlds.parking.corridor import Body
-from chauffeur.worlds.parking.path_follower import Chassis, Follower, Look
+from chauffeur.worlds.corridor import Body
 from chauffeur.worlds.parking.routes import Way
+from chauffeur.worlds.path_follower import Chassis, Follower, Look
 
 CAR: Final = Chassis(Body(4.5, 1.85, 1.3), 2.6, 0.6, 1.2)
 WALKER_M: Final = 0.6

@@ -8,8 +8,8 @@ from typing import Final
 
 from chauffeur.concept import Command, LaneId, Observation, Setpoints
 from chauffeur.worlds.parking.lot import LIMIT_MPS
-from chauffeur.worlds.parking.path_follower import LOT_BEND_MPS2, Chassis, Follower, Look
 from chauffeur.worlds.parking.routes import Way
+from chauffeur.worlds.path_follower import LOT_BEND_MPS2, Chassis, Follower, Look
 
 OWN_LOOK: Final = Look(look_ahead_m=3.0, look_ahead_ratio_s=1.0)
 """Pure pursuit where nobody wishes for other parameters."""

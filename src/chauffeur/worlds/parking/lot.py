@@ -59,15 +59,6 @@ class Spot:
     box: Box
     lane: LaneId
 
-    @property
-    def mouth_m(self) -> tuple[float, float]:
-        """Middle of its open end."""
-        half = self.box.length_m / 2.0
-        return (
-            self.box.x_m - math.cos(self.box.heading_rad) * half,
-            self.box.y_m - math.sin(self.box.heading_rad) * half,
-        )
-
 
 @dataclass(frozen=True, slots=True)
 class Lot:

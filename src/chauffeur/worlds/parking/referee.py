@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
-from chauffeur.concept import JudgedBy, Metric, Outcome
+from chauffeur.concept import Metric
 from chauffeur.geometry import wrap_to_pi
 from chauffeur.worlds.parking.lot import Spot
 from chauffeur.worlds.parking.world import ParkingWorld
+from chauffeur.worlds.skeleton import PlaceJudge
 
 
-class ParkingReferee:
+class ParkingReferee(PlaceJudge):
     """Looks at a lot after each control period."""
-
-    judged_by: Final[JudgedBy] = "place"
 
     def __init__(self, world: ParkingWorld, spot: Spot) -> None:
         """Args: the world, just reset; the spot that is meant."""
@@ -35,17 +33,6 @@ class ParkingReferee:
     def success(self) -> bool:
         """Whether it has parked where it was meant to."""
         return self._parked == self._spot.name
-
-    @property
-    def parts_done(self) -> tuple[int, int]:
-        """One where the car is there, of one."""
-        return int(self.success), 1
-
-    def outcome(self) -> Outcome:
-        """What came of it, collisions apart."""
-        if self.success:
-            return "success"
-        return "failure" if self.over else "timeout"
 
     def metrics(self) -> tuple[Metric, ...]:
         """How well it stands: from the middle of the spot, across and along it, and how straight; and the time."""

@@ -21,7 +21,7 @@ from chauffeur.concept import Command, Observation, VehicleState
 from chauffeur.concept.units import people_speed
 from chauffeur.geometry import Box, Pose, overlap
 from chauffeur.geometry.ground import Ground
-from chauffeur.worlds.parking.path_follower import HARDEST_MPS2, Chassis
+from chauffeur.worlds.path_follower import HARDEST_MPS2, Chassis
 
 MARGIN_M: Final = 0.05
 """Left to those who stand, and to the edge: more than a stop takes longer because the car brakes period by period."""

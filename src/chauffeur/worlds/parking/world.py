@@ -14,7 +14,7 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from chauffeur.concept import (
     Capabilities,
@@ -29,16 +29,17 @@ from chauffeur.concept import (
 )
 from chauffeur.geometry import Box, Polyline, Pose, overlap
 from chauffeur.worlds.base import EGO
+from chauffeur.worlds.corridor import Body
 from chauffeur.worlds.parking.actors import LeavingCar, LotWalker
 from chauffeur.worlds.parking.amenities import Bay, Place, amenities
-from chauffeur.worlds.parking.corridor import Body
 from chauffeur.worlds.parking.driver import ParkingDriver
 from chauffeur.worlds.parking.instant import Ego, pack, unpack
 from chauffeur.worlds.parking.lot import AISLE_M, Lot, Spot, build_lot, way_id
-from chauffeur.worlds.parking.path_follower import Chassis
 from chauffeur.worlds.parking.perception import LaneMap, ParkingPerception
 from chauffeur.worlds.parking.places import parked_in, spot_for
 from chauffeur.worlds.parking.routes import Way, way_along, way_to_spot
+from chauffeur.worlds.path_follower import Chassis
+from chauffeur.worlds.skeleton import ShownWorld, config_of, finite
 
 DT_S: Final = 0.1
 CHASSIS: Final = Chassis(Body(4.89, 1.895, 1.395), 2.79, 0.6, 2.0)
@@ -126,7 +127,7 @@ class _Ego(Ego):
         self.rear, self.speed_mps, self.steering_rad = Pose(x, y, rear.heading_rad + turned), speed, steering
 
 
-class ParkingWorld:
+class ParkingWorld(ShownWorld):
     """A parking lot, stepped at 10 Hz."""
 
     engine = "parking lot 1"
@@ -175,7 +176,7 @@ class ParkingWorld:
         Raises:
             ScenarioError: The configuration is malformed.
         """
-        config = _parse(scenario)
+        config = config_of(LotConfig, scenario, "lot")
         drawn = np.random.SeedSequence(scenario.seed if seed is None else seed)
         rng = np.random.Generator(np.random.PCG64(drawn))
         taken = _taken(config, rng, scenario.id)
@@ -226,8 +227,7 @@ class ParkingWorld:
 
     def step(self, command: Command) -> Command:
         """Advance 0.1 s under `command`; returns what the vehicle really applied."""
-        if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
-            raise ValueError(f"A command must be finite numbers, not {command}.")
+        finite(command)
         before, ego = self.observe(), self._ego
         acceleration = max(-MOST_BRAKING_MPS2, min(MOST_ACCELERATION_MPS2, command.acceleration_mps2))
         if ego.crashed:
@@ -252,17 +252,6 @@ class ParkingWorld:
         self._tick += 1
         self._shown = None
         return Command((ego.speed_mps - speed) / DT_S, wheel)
-
-    def observe(self) -> Observation:
-        """The present instant as frozen values."""
-        if self._shown is None:
-            self._shown = self._look()
-        return self._shown
-
-    @property
-    def ended(self) -> bool:
-        """Crash, off the ground, or out of time."""
-        return self.observe().ended
 
     def perception(self) -> ParkingPerception:
         """Questions about the present instant."""
@@ -351,18 +340,6 @@ class ParkingWorld:
             if abs(ground.x_m - box.x_m) < _FAR_M and abs(ground.y_m - box.y_m) < _FAR_M and overlap(box, ground):
                 ego.crashed = True
                 self._hit.add(number)
-
-
-def _parse(scenario: Scenario) -> LotConfig:
-    try:
-        config = LotConfig.model_validate(scenario.config)
-    except ValidationError as error:
-        faults = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'config'}: {e['msg']}" for e in error.errors())
-        raise ScenarioError(
-            f"Scenario {scenario.id!r} has a bad lot configuration: {faults}.",
-            hint="Compare it with a built-in one: chauffeur show scenarios.",
-        ) from error
-    return config
 
 
 def _taken(config: LotConfig, rng: np.random.Generator, scenario: str) -> frozenset[str]:

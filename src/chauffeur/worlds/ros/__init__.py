@@ -3,7 +3,6 @@
 from chauffeur.worlds.ros.base import (
     Published,
     RosVehicleState,
-    TopicMessage,
     VehicleError,
     VehicleInterface,
     VehicleRefusalError,
@@ -13,7 +12,6 @@ from chauffeur.worlds.ros.limits import VehicleLimits
 __all__ = [
     "Published",
     "RosVehicleState",
-    "TopicMessage",
     "VehicleError",
     "VehicleInterface",
     "VehicleLimits",

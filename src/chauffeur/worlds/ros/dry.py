@@ -33,21 +33,17 @@ class DryRun:
             return tuple(self._lines)
 
     def apply(self, parameters: Parameters) -> Published:
-        """See `VehicleInterface.apply`."""
         return self._setpoints.apply(parameters)
 
     def release(self) -> Published:
-        """See `VehicleInterface.release`."""
         return self._setpoints.release()
 
     def state(self) -> RosVehicleState:
-        """See `VehicleInterface.state`."""
         link = "closed" if self._closed else "dry-run"
         count = ("published", self._setpoints.number)
         return RosVehicleState(link, "Dry run: nothing is published.", counts=(count,), notes=self.lines[-20:])
 
     def close(self) -> None:
-        """See `VehicleInterface.close`."""
         self._setpoints.end("This vehicle interface is closed.")
         self._closed = True
 

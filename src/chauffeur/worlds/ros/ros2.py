@@ -70,7 +70,6 @@ class Ros2Vehicle(ThreadedVehicle):
         self._thread.start()
 
     def state(self) -> RosVehicleState:
-        """See `VehicleInterface.state`."""
         with self._lock:
             fault, misfits, receivers, mode = self._fault, self._misfits, self._receivers, self._mode
             limit_mps, pending = self._limit_mps, bool(self._pending)

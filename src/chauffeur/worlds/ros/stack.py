@@ -55,7 +55,6 @@ class StackSetpoints:
             return self._number
 
     def apply(self, parameters: Parameters) -> Published:
-        """See `VehicleInterface.apply`."""
         wish = checked(parameters, self._stack.limits)
         asked = self._stack.wished(wish)
         with self._lock:
@@ -64,7 +63,6 @@ class StackSetpoints:
         return published
 
     def release(self) -> Published:
-        """See `VehicleInterface.release`."""
         with self._lock:
             return self._publish(self._stack.released(self._last))
 

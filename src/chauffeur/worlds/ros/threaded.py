@@ -6,13 +6,49 @@ import math
 import threading
 import time
 from abc import ABC, abstractmethod
+from collections import Counter, deque
 from collections.abc import Iterable
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from chauffeur.concept import Parameters
 from chauffeur.worlds.ros.base import FRESH_S, Published, TopicMessage
-from chauffeur.worlds.ros.notes import Notes
 from chauffeur.worlds.ros.stack import Stack, StackSetpoints
+
+KEPT: Final = 20
+"""Notes kept; a note said again right away is kept once."""
+
+
+class Notes:
+    """Notes and counters of one interface."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._notes: deque[str] = deque(maxlen=KEPT)
+        self._counts: Counter[str] = Counter()
+
+    def say(self, words: str) -> None:
+        """Keep a note."""
+        shown = "".join(c if c.isprintable() else "?" for c in words)[:500]  # parts of it came over the network
+        with self._lock:
+            if not self._notes or self._notes[-1] != shown:
+                self._notes.append(shown)
+
+    def count(self, name: str, by: int = 1) -> None:
+        """Count something."""
+        if by:
+            with self._lock:
+                self._counts[name] += by
+
+    def said(self) -> tuple[str, ...]:
+        """The notes, oldest first."""
+        with self._lock:
+            return tuple(self._notes)
+
+    def counted(self) -> tuple[tuple[str, int], ...]:
+        """The counters by name."""
+        with self._lock:
+            return tuple(sorted(self._counts.items()))
+
 
 _T = TypeVar("_T")
 
@@ -38,15 +74,12 @@ class ThreadedVehicle(ABC):
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def apply(self, parameters: Parameters) -> Published:
-        """See `VehicleInterface.apply`."""
         return self._setpoints.apply(parameters)
 
     def release(self) -> Published:
-        """See `VehicleInterface.release`."""
         return self._setpoints.release()
 
     def close(self) -> None:
-        """See `VehicleInterface.close`."""
         self._setpoints.end("This vehicle interface is closed.")
         self._closed = True
         self._ending.set()

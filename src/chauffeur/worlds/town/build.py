@@ -24,8 +24,8 @@ from chauffeur.worlds.town.pack import (
     Point,
     SignalGroup,
     SumoNet,
-    load,
     maps_folder,
+    read_pack,
     save,
 )
 from chauffeur.worlds.town.roadside import (
@@ -95,7 +95,7 @@ def build(sources: MapSources, name: str = "", folder: Path | None = None) -> Ma
     try:
         source_hash = sources.hash
         if (folder / PACK_FILE).is_file() and _hash_of(folder) == source_hash:
-            return load(folder)
+            return read_pack(folder)
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=folder.parent) as scratch:
             made = Path(scratch) / "pack"
@@ -106,7 +106,7 @@ def build(sources: MapSources, name: str = "", folder: Path | None = None) -> Ma
             made.rename(folder)
     except OSError as error:
         raise DataError(f"Cannot build the map {name} into {folder}: {error}.") from error
-    return load(folder)
+    return read_pack(folder)
 
 
 def build_own(name: str, seed: int | None = None, folder: Path | None = None) -> MapPack:

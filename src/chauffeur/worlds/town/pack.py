@@ -28,8 +28,6 @@ Line = tuple[Point, Point]
 BUILDER_VERSION: Final = "maps-v5"
 """Changes with whatever would build another pack from the same sources. Another builder's pack is refused."""
 PACK_FILE: Final = "pack.json"
-OWN_TOWNS: Final = Path(__file__).with_name("towns")
-"""Our own towns, built: compressed packs that need no netconvert."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,21 +258,12 @@ def maps_folder() -> Path:
     return data_home() / "maps"
 
 
-def load(name_or_path: str | Path) -> MapPack:
-    """A pack by name (a town of ours, or one built into the user's maps folder), the pack in a folder, or an `.xodr`.
-
-    An OpenDRIVE file is built into the user's maps folder first, with the tables that lie beside it. The packs read
-    last are kept until their files change.
+def read_pack(folder: Path) -> MapPack:
+    """Read the pack in a folder; the packs read last are kept until their files change.
 
     Raises:
-        DataError: There is none, or it cannot be read; says what to do.
-        MissingExtraError: An OpenDRIVE file has to be built, and netconvert is not installed.
+        DataError: It cannot be read; says what to do.
     """
-    if Path(name_or_path).suffix == ".xodr":
-        from chauffeur.worlds.town.build import build, sources_of
-
-        return build(sources_of(Path(name_or_path)))
-    folder = _found(name_or_path)
     try:
         return _unpacked(folder, _state(folder))
     except OSError as error:
@@ -285,22 +274,6 @@ def load(name_or_path: str | Path) -> MapPack:
         raise DataError(
             f"The map pack {folder} is damaged: {error!r}.", hint="Build it again: chauffeur maps build."
         ) from error
-
-
-def has_pack(folder: Path) -> bool:
-    """Whether a folder holds a map pack."""
-    return any((folder / one).is_file() for one in (PACK_FILE, PACK_FILE + ".gz"))
-
-
-def _found(name_or_path: str | Path) -> Path:
-    for folder in (Path(name_or_path), maps_folder() / name_or_path, OWN_TOWNS / name_or_path):
-        if has_pack(folder):
-            return folder
-    raise DataError(
-        f"There is no map pack {str(name_or_path)!r} in {maps_folder()}.",
-        hint="List what there is: chauffeur maps list. Build one: chauffeur maps build FILE.xodr. "
-        "Fetch CARLA's towns: chauffeur maps pull.",
-    )
 
 
 def _read(path: Path) -> bytes:
@@ -378,15 +351,6 @@ def compress(folder: Path) -> None:
     for path in sorted(folder.iterdir()):
         path.with_name(path.name + ".gz").write_bytes(gzip.compress(path.read_bytes(), 9, mtime=0))
         path.unlink()
-
-
-def packs() -> dict[str, Path]:
-    """Folders of all packs that `load` finds by name: our own towns, and what lies in the user's maps folder."""
-    return {
-        path.parent.name: path.parent
-        for root in (OWN_TOWNS, maps_folder())
-        for path in sorted(root.glob(f"*/{PACK_FILE}*"))
-    }
 
 
 def _rounded(content: Any) -> Any:

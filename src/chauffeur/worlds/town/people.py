@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from chauffeur.worlds.town.pack import Crossing
 
 WIDE_M: Final = 0.6
-LOOKS_S: Final = 1.0
 _WALKS_MPS: Final = 0.9, 1.6
 _JOIN_M: Final = 6.0
 """A pavement and a crossing whose ends are closer together than this lead into each other."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +15,6 @@ if TYPE_CHECKING:
     import httpx
 
 HOST: Final = "https://raw.githubusercontent.com"
-_SCENIC: Final = "BerkeleyLearnVerify/Scenic/7529c3e3/assets/maps/CARLA"
-_PVAKARIS: Final = "pvakaris/av_safety_evaluation_project/8382504/data/maps/opendrive_format"
-_DRIVESIM: Final = "inverted-ai/torchdrivesim/d019f8d3eb7687c0e06cb75f74a191066dc03e3f/torchdrivesim/resources/maps"
 _MOST_BYTES: Final = 20_000_000
 _TIMEOUT_S: Final = 60.0
 
@@ -30,90 +28,9 @@ class PublicFile:
     sha256: str
 
 
-def _tables(town: str, stop_lines: str, cycles: str) -> tuple[PublicFile, ...]:
-    folder = f"{_DRIVESIM}/carla_{town}"
-    return tuple(
-        PublicFile(f"{folder}/{name}", name, sha256)
-        for name, sha256 in (
-            (f"carla_{town}_stoplines.json", stop_lines),
-            (f"carla_{town}_traffic_light_controller.json", cycles),
-        )
-    )
-
-
 PUBLIC: Final[dict[str, tuple[PublicFile, ...]]] = {
-    "Town01": (
-        PublicFile(
-            f"{_SCENIC}/Town01.xodr",
-            "Town01.xodr",
-            "97a7f6ac67812567e5c8ee0599cd823b23f80f30f3f97c502212e38b72e2b709",
-        ),
-        *_tables(
-            "Town01",
-            "51465e409533e2b568671d151fd4d866be63bcac0bcb27397b71f99a5ba365a1",
-            "23f95efd58d24bf6295714e0ca2a39899a7e5e967d088aac0556db2c1abf44ed",
-        ),
-    ),
-    "Town02": (
-        PublicFile(
-            f"{_SCENIC}/Town02.xodr",
-            "Town02.xodr",
-            "953c05f17def231239ffcadba3307628a82d0d335b67b4e29c3098f7aed1dd7d",
-        ),
-        *_tables(
-            "Town02",
-            "aa8d710ad6ceb78faac23a6152ef8cbd5e727caddbd758239b9cef9090724685",
-            "9d792cbb78cb0c13b3fb3626eed73629c69b1cbba2fd767a75337b1412af4cae",
-        ),
-    ),
-    "Town03": (
-        PublicFile(
-            f"{_PVAKARIS}/Town03.xodr",
-            "Town03.xodr",
-            "a711706c130c12b788538439fa326f95c92b2486cff810c3001e8c5e04098299",
-        ),
-        *_tables(
-            "Town03",
-            "605bcd8d641609fc006e77c0e618108c9032ede3feadd227e0e4b69e0424211c",
-            "93653503bd3605f9c12ffdf5914cb4c88a56a93c5f6abf35a822c0c51941bd29",
-        ),
-    ),
-    "Town04": (
-        PublicFile(
-            f"{_SCENIC}/Town04.xodr",
-            "Town04.xodr",
-            "4dddd1560ab7812b0e89cd4a523d8b6f2b93947eafb496d9eeb83cc772116c85",
-        ),
-        *_tables(
-            "Town04",
-            "62c3078464b218fe460bd6bd3ee9f109065fb151c3f58889443b81ae69e95561",
-            "4060751ec1a12ba5c86ac4505f9d5f208c2e4eb0b71cd190be2f6ba6a93b611c",
-        ),
-    ),
-    "Town05": (
-        PublicFile(
-            f"{_PVAKARIS}/Town05.xodr",
-            "Town05.xodr",
-            "d01a356d8f5bfb2e508347d08cfaa09f4f395062187038ba8b4212141e354e37",
-        ),
-        PublicFile(
-            f"{_SCENIC}/Town05.net.xml",
-            "Town05.net.xml",
-            "ca759f664f529d6b925d2a83b2cfb7f405450852b0028a50edd0254c4c42b276",
-        ),
-    ),
-    "Town06": (
-        PublicFile(
-            f"{_SCENIC}/Town06.xodr",
-            "Town06.xodr",
-            "a90b613175fa837fdc128ddfaf5ddad25797b128fdbd8cd945974bc21a60496e",
-        ),
-        *_tables(
-            "Town06",
-            "b349b02bbd424e54b3eb1544ad93b030c4c772b4b9122bdfa8e7d42d6edb381a",
-            "b43658d65ed7357d43e478472acc853fdedb6c2dae0f6287f60081df782ab2c3",
-        ),
-    ),
+    town: tuple(PublicFile(*file) for file in files)
+    for town, files in json.loads(Path(__file__).with_name("public_towns.json").read_text(encoding="utf-8")).items()
 }
 """Maps: CARLA's (code MIT, content CC-BY 4.0); stop lines and cycles: torchdrivesim (Apache-2.0); net: Scenic."""
 

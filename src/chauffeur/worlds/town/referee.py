@@ -8,6 +8,7 @@ from typing import Final
 
 from chauffeur.concept import JudgedBy, LaneId, Metric, Outcome, ProgramState, Setpoints
 from chauffeur.geometry import Turn, named_ways
+from chauffeur.worlds.skeleton import PlaceJudge
 from chauffeur.worlds.town.world import TownWorld
 
 BEYOND_M: Final = 40.0
@@ -20,10 +21,8 @@ _STANDING_MPS: Final = 0.1
 _TAKES: Final = {"left": "turn left", "right": "turn right", "straight": "go straight on at a junction"}
 
 
-class TownReferee:
+class TownReferee(PlaceJudge):
     """Looks at a town after each control period."""
-
-    judged_by: Final[JudgedBy] = "place"
 
     def __init__(self, world: TownWorld) -> None:
         """Args: the world, just reset, with somewhere to go."""
@@ -45,15 +44,6 @@ class TownReferee:
     def success(self) -> bool:
         """Whether the car is there."""
         return self._arrived
-
-    @property
-    def parts_done(self) -> tuple[int, int]:
-        """One where the car is there, of one."""
-        return int(self.success), 1
-
-    def outcome(self) -> Outcome:
-        """What came of it, collisions apart."""
-        return "success" if self._arrived else "timeout"
 
     def metrics(self) -> tuple[Metric, ...]:
         """Whether it arrived, how far it drove, and how long that took."""

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from chauffeur.concept import ChauffeurError, Scenario
-from chauffeur.worlds.town.pack import Place, has_pack, load, packs
+from chauffeur.worlds.town.library import has_pack, load, packs
+from chauffeur.worlds.town.pack import Place
 
 
 def _built_in(name: str, config: dict[str, Any], seed: int, wish: str, title: str) -> Scenario:

@@ -8,8 +8,9 @@ from typing import Final
 from chauffeur.concept import Observation, Scenario, ScenarioError, Signal, SignalState, VehicleState
 from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, KinematicBicycle
 from chauffeur.geometry import LaneId, LanePlace, Route, plan_route
-from chauffeur.worlds.parking.path_follower import Chassis
+from chauffeur.worlds.path_follower import Chassis
 from chauffeur.worlds.places import Destination
+from chauffeur.worlds.skeleton import ShownWorld
 from chauffeur.worlds.town.driver import TOWN_CAPABILITIES, TownDriver
 from chauffeur.worlds.town.instant import TownInstant
 from chauffeur.worlds.town.pack import MapPack, SignalGroup, places_called
@@ -31,7 +32,7 @@ _LEFT_M: Final = 8.0
 """A place has been left when the car is so far from where it stood."""
 
 
-class TownScene:
+class TownScene(ShownWorld):
     """Road, lights, driver and perception of a trip. Who and what is where, its heirs say."""
 
     capabilities = TOWN_CAPABILITIES
@@ -82,17 +83,6 @@ class TownScene:
         if self._town is None:
             raise ScenarioError("The world has no scenario yet.", hint="Call reset(scenario) first.")
         return self._town
-
-    def observe(self) -> Observation:
-        """The present instant as frozen values."""
-        if self._shown is None:
-            self._shown = self._look()
-        return self._shown
-
-    @property
-    def ended(self) -> bool:
-        """Crash, off the road, at the scenario's goal, or out of time."""
-        return self.observe().ended
 
     def perception(self) -> TownPerception:
         """Questions about the present instant."""

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from chauffeur.concept import DataError, Scenario, ScenarioError
 from chauffeur.geometry import LanePlace, RoadGraph, Route, plan_route
-from chauffeur.worlds.town import pack as packs
+from chauffeur.worlds.skeleton import config_of
+from chauffeur.worlds.town import library
 from chauffeur.worlds.town.pack import MapPack, Place, places_called
 
 
@@ -71,7 +72,7 @@ class TownTrip:
 
         Raises ScenarioError: The configuration is malformed, or a town, place or way does not exist.
         """
-        config = _parse(scenario)
+        config = config_of(TownConfig, scenario, "town")
         town = given or _loaded(config.town)
         drawn = np.random.SeedSequence(scenario.seed if seed is None else seed)
         rng = np.random.Generator(np.random.PCG64(drawn))
@@ -81,7 +82,7 @@ class TownTrip:
 
 def _loaded(name: str) -> MapPack:
     try:
-        return packs.load(name)
+        return library.load(name)
     except DataError as error:
         raise ScenarioError(str(error), hint=error.hint) from error
 
@@ -149,14 +150,3 @@ def place_named(town: MapPack, name: str) -> Place:
         f"{town.name} has no place {name!r}.",
         hint="It has " + (", ".join(place.name for place in town.places) or "no places with names") + ".",
     )
-
-
-def _parse(scenario: Scenario) -> TownConfig:
-    try:
-        return TownConfig.model_validate(scenario.config)
-    except ValidationError as error:
-        faults = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'config'}: {e['msg']}" for e in error.errors())
-        raise ScenarioError(
-            f"Scenario {scenario.id!r} has a bad town configuration: {faults}.",
-            hint="Compare it with a built-in one: chauffeur show scenarios.",
-        ) from error

@@ -16,6 +16,7 @@ from chauffeur.concept import AgentKind, Command, Observation, Scenario, Scenari
 from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, BicycleState, advanced
 from chauffeur.geometry import LaneId, Pose, overlap
 from chauffeur.worlds.base import EGO
+from chauffeur.worlds.skeleton import finite
 from chauffeur.worlds.town.brakes import TrafficBrakes
 from chauffeur.worlds.town.mirror import TownMirror
 from chauffeur.worlds.town.pack import MapPack
@@ -123,8 +124,7 @@ class TownWorld(TownScene):
         Raises:
             ScenarioError: Another town was set up in this process since.
         """
-        if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
-            raise ValueError(f"A command must be finite numbers, not {command}.")
+        finite(command)
         assert self._sumo is not None, "reset first"
         asked = -LINCOLN_MKZ.most_braking_mps2 if self._stopped else command.acceleration_mps2
         before = self._state

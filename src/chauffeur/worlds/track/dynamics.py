@@ -1,17 +1,13 @@
-"""CommonRoad's vehicle models, compiled: single-track (ST), single-track with drift (STD), multi-body (MB).
+"""A car on the test track: CommonRoad's vehicle models (`vehicle_models`) with actuators, integrated.
 
-Source: M. Althoff, G. Würsching, "CommonRoad: Vehicle Models", 2020; package `commonroad-vehicle-models`. The installed
-functions are read, their parameters become constants (vehicle 2, a BMW 320i) and a friction factor, and numba compiles
-them: no code of theirs is copied, and a model costs microseconds. Interpreted, the multi-body model manages some six
-times real time, which a benchmark of hundreds of drives cannot wait for.
+Parameters are those of vehicle 2, a BMW 320i, from the package `commonroad-vehicle-models`. numba compiles the
+models: one costs microseconds; interpreted, the multi-body model manages some six times real time, which a benchmark of
+hundreds of drives cannot wait for.
 """
 
 from __future__ import annotations
 
-import ast
-import inspect
 import math
-import textwrap
 from collections.abc import Callable
 from functools import cache
 from typing import Any, Final, Literal
@@ -20,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chauffeur.concept import MissingExtraError
+from chauffeur.worlds.track.vehicle_models import derivative
 
 Array = NDArray[np.float64]
 Plant = Literal["st", "std", "mb"]
@@ -35,8 +32,6 @@ a car that stands."""
 _VEHICLE: Final = 2
 _WHEELS: Final[dict[Plant, tuple[int, int]]] = {"st": (7, 7), "std": (7, 9), "mb": (23, 27)}
 """Where the angular speeds of the wheels are in the state."""
-_FRICTION: Final = frozenset({"p_dx1", "p_dy1"})
-"""Peak friction of a tyre, along and across: what wet and snow scale."""
 
 TRACTION_MPS2: Final = 3.9
 """Hardest acceleration on a dry road that traction control lets through: half the weight is on driven wheels."""
@@ -55,18 +50,6 @@ def parameters() -> Any:
     except ImportError as error:
         raise MissingExtraError("The test track needs CommonRoad's vehicle models.", extra="motion") from error
     return setup_vehicle_parameters(vehicle_id=_VEHICLE)
-
-
-def library_dynamics(plant: Plant) -> Callable[..., list[float]]:
-    """The function as the library has it: (state, input, parameters) -> derivative."""
-    parameters()
-    if plant == "st":
-        from vehiclemodels.vehicle_dynamics_st import vehicle_dynamics_st as found
-    elif plant == "std":
-        from vehiclemodels.vehicle_dynamics_std import vehicle_dynamics_std as found
-    else:
-        from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb as found
-    return found
 
 
 def deliverable(acceleration_mps2: float, friction: float) -> float:
@@ -91,82 +74,7 @@ def initial_state(plant: Plant, x_m: float, y_m: float, heading_rad: float, spee
 @cache
 def dynamics(plant: Plant) -> Dynamics:
     """A model's derivative, compiled."""
-    import numba
-
-    entry = library_dynamics(plant)
-    names: dict[str, Any] = {"math": math, "np": np}
-    return _compiled(entry, parameters(), names, numba.njit)
-
-
-def _compiled(function: Any, root: Any, names: dict[str, Any], jit: Any) -> Any:
-    """A library function with what it calls, its parameter object replaced by constants and the friction factor."""
-    home = inspect.getmodule(function)
-    tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
-    assert isinstance(tree, ast.FunctionDef)
-    fixed = _Fixed(tree.args.args[-1].arg, root, home, names, jit)
-    tree = fixed.visit(tree)
-    tree.args.args[-1].arg = "friction"
-    tree.body = tree.body[1:] if isinstance(tree.body[0], ast.Expr) else tree.body
-    module = ast.fix_missing_locations(ast.Module([tree], []))
-    exec(compile(module, f"<{function.__name__}>", "exec"), names)  # noqa: S102 - an installed library's own source
-    names[function.__name__] = compiled = jit(error_model="numpy")(names[function.__name__])
-    return compiled
-
-
-class _Fixed(ast.NodeTransformer):
-    """Writes a function's parameters into it."""
-
-    def __init__(self, name: str, root: Any, home: Any, names: dict[str, Any], jit: Any) -> None:
-        self._name, self._root, self._home, self._names, self._jit = name, root, home, names, jit
-
-    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        """p.tire.p_dy1 -> its value, times the friction factor where it is one."""
-        found = self._value(node)
-        if found is None or not isinstance(found, int | float):
-            return self.generic_visit(node)
-        value: ast.expr = ast.Constant(float(found))
-        if node.attr in _FRICTION:
-            value = ast.BinOp(value, ast.Mult(), ast.Name("friction", ast.Load()))
-        return value
-
-    def visit_Call(self, node: ast.Call) -> ast.AST:
-        """tire_model.formula_lateral(..., p.tire) -> formula_lateral(..., friction), compiled with these parameters."""
-        if node.args and self._is_parameters(node.args[-1]):
-            helper = self._helper(node.func)
-            inner = self._root if isinstance(node.args[-1], ast.Name) else self._value(node.args[-1])
-            if helper.__name__ not in self._names:
-                _compiled(helper, inner, self._names, self._jit)
-            arguments = [self.visit(one) for one in node.args[:-1]]
-            return ast.Call(ast.Name(helper.__name__, ast.Load()), [*arguments, ast.Name("friction", ast.Load())], [])
-        if isinstance(node.func, ast.Name) and inspect.isfunction(found := getattr(self._home, node.func.id, None)):
-            self._names.setdefault(found.__name__, self._jit(error_model="numpy")(found))
-        return self.generic_visit(node)
-
-    def _helper(self, node: ast.expr) -> Any:
-        if isinstance(node, ast.Name):
-            return getattr(self._home, node.id)
-        assert isinstance(node, ast.Attribute)
-        assert isinstance(node.value, ast.Name)
-        return getattr(getattr(self._home, node.value.id), node.attr)
-
-    def _is_parameters(self, node: ast.expr) -> bool:
-        if isinstance(node, ast.Name):
-            return node.id == self._name
-        found = self._value(node) if isinstance(node, ast.Attribute) else None
-        return found is not None and not isinstance(found, int | float)
-
-    def _value(self, node: ast.expr) -> Any:
-        """What an attribute of the parameters is; None for anything else."""
-        path: list[str] = []
-        while isinstance(node, ast.Attribute):
-            path.append(node.attr)
-            node = node.value
-        if not (isinstance(node, ast.Name) and node.id == self._name):
-            return None
-        found = self._root
-        for attribute in reversed(path):
-            found = getattr(found, attribute)
-        return found
+    return derivative(plant, parameters())
 
 
 @cache

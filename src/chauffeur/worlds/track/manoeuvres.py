@@ -17,12 +17,11 @@ from functools import cache
 from typing import Final, Literal
 
 from chauffeur.concept.units import MPS_PER_KMH
+from chauffeur.concept.weather import Weather
 from chauffeur.geometry import Box, Lane, Polyline, RoadGraph
 
 ManoeuvreName = Literal["acceleration", "lane_change", "left_turn"]
-Weather = Literal["sunny", "rain", "fog", "snow", "night"]
 MANOEUVRES: Final[tuple[ManoeuvreName, ...]] = "acceleration", "lane_change", "left_turn"
-WEATHERS: Final[tuple[Weather, ...]] = "sunny", "rain", "fog", "snow", "night"
 
 FRICTION: Final[dict[Weather, float]] = {"sunny": 1.0, "rain": 0.7, "fog": 0.9, "snow": 0.4, "night": 1.0}
 """Share of the dry road's peak friction: wet asphalt, damp asphalt, rolled snow on winter tyres."""

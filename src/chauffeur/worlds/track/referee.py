@@ -6,9 +6,10 @@ import math
 from itertools import pairwise
 from typing import Final
 
-from chauffeur.concept import JudgedBy, Metric, Outcome, Trajectory
+from chauffeur.concept import Metric, Trajectory
 from chauffeur.geometry import Pose
 from chauffeur.worlds.base import World
+from chauffeur.worlds.skeleton import PlaceJudge
 
 ALONG_M: Final = 2.0
 ACROSS_M: Final = 0.8
@@ -20,10 +21,8 @@ _PATIENCE_S: Final = 8.0
 _SAME_M: Final = 0.2
 
 
-class StreetReferee:
+class StreetReferee(PlaceJudge):
     """Looks at a street after each control period."""
-
-    judged_by: Final[JudgedBy] = "place"
 
     def __init__(self, world: World, end: Pose, peak_mps: float | None = None, waits_s: float = 0.0) -> None:
         """Take a place.
@@ -63,17 +62,6 @@ class StreetReferee:
         """Whether it stands where it was to stand."""
         paced = self._peak is None or abs(self._most - self._peak) <= PACE_MPS
         return self.over and self._near and paced
-
-    @property
-    def parts_done(self) -> tuple[int, int]:
-        """One where the car is there, of one."""
-        return int(self.success), 1
-
-    def outcome(self) -> Outcome:
-        """What came of it, collisions apart."""
-        if self.success:
-            return "success"
-        return "failure" if self.over else "timeout"
 
     def metrics(self) -> tuple[Metric, ...]:
         """How far beyond and to the left of where it was to end the car stands, and the time."""

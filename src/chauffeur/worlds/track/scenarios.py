@@ -6,8 +6,9 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from chauffeur.concept import Scenario
+from chauffeur.concept.weather import Weather
 from chauffeur.worlds.track.dynamics import Plant
-from chauffeur.worlds.track.manoeuvres import ManoeuvreName, Weather
+from chauffeur.worlds.track.manoeuvres import ManoeuvreName
 from chauffeur.worlds.track.street import Crosswalk, StreetConfig, Thing
 
 

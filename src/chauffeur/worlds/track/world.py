@@ -16,9 +16,9 @@ from chauffeur.concept import Capabilities, Command, Lead, Observation, Scenario
 from chauffeur.control.kinematic_bicycle import KinematicBicycle
 from chauffeur.geometry import Box, Pose, overlap
 from chauffeur.worlds.base import EGO
+from chauffeur.worlds.corridor import Body
 from chauffeur.worlds.over_graph import LaneDriver, ObservedPerception
-from chauffeur.worlds.parking.corridor import Body
-from chauffeur.worlds.parking.path_follower import Chassis
+from chauffeur.worlds.path_follower import Chassis
 from chauffeur.worlds.track.dynamics import (
     BRAKES_MPS2,
     DRIVE_LAG_S,

@@ -20,14 +20,50 @@ Three things make the programs better drivers than plain use of the APIs:
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from chauffeur.bench.lampilot.expert.numbers import SPREAD, TUNED
-from chauffeur.bench.lampilot.expert.texts import filled
 from chauffeur.concept import ScenarioError
+from chauffeur.planners.onboard.exemplars import texts
+from chauffeur.planners.onboard.exemplars.crossing import CROSSING
+
+PROGRAMS = ("distance", "speed", "lane", "overtake", "pull_over", "cross")
+_SHARED = "chauffeur.planners.onboard.exemplars"
+
+
+def filled(name: str, values: Mapping[str, str]) -> str:
+    """A program's text. Raises KeyError for an unknown program or a value that is missing."""
+    return texts.filled(_texts(), name, values)
+
+
+def open_names(name: str) -> frozenset[str]:
+    """Names of the values a program's text asks for."""
+    return texts.open_names(_texts(), name)
+
+
+@cache
+def _texts() -> Mapping[str, str]:
+    own = texts.read_texts("chauffeur.bench.lampilot.expert", PROGRAMS[:-1], _SHARED)
+    return {**own, **texts.read_texts(_SHARED, ("crossing",), _SHARED)}
+
+
+_NUMBERS: Final[dict[str, Any]] = json.loads(Path(__file__).with_name("numbers.json").read_text(encoding="utf-8"))
+
+TUNED: Final[dict[str, dict[str, float]]] = {
+    **_NUMBERS["tuned"],
+    **{side: CROSSING[side] | {"END": -1e5} for side in CROSSING},
+}
+"""By style: `closer` and `wider` keep a distance, `slow` and `speed` a speed; then the manoeuvres and the turns."""
+
+SPREAD: Final[dict[str, dict[str, tuple[float, float]]]] = {
+    style: {name: (low, high) for name, (low, high) in row.items()} for style, row in _NUMBERS["spread"].items()
+}
+"""From where to where a number goes in variants."""
 
 EXPERT: Final = "expert-v1"
 """Changes whenever a program or a number of it does."""

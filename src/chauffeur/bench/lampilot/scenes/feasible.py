@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from chauffeur.bench.lampilot.goals import GIVE_UP_S, Goal, Ruling
+from chauffeur.bench.lampilot.goals import GIVE_UP_S, Goal
 from chauffeur.bench.lampilot.goals_more import make_any_goal
+from chauffeur.bench.lampilot.referee import GoalJudge
 from chauffeur.bench.lampilot.scenes.scripted import programs_for
-from chauffeur.concept import Metric, Observation, Outcome, SandboxError, Scenario, ScenarioError
+from chauffeur.concept import Observation, SandboxError, Scenario, ScenarioError
 from chauffeur.describe import describe
 from chauffeur.drive.session import drive_program, drive_without_program
 from chauffeur.geometry import LaneId
@@ -38,14 +39,12 @@ class FeasibilityVerdict:
     by: str = ""
 
 
-class GoalReferee:
+class GoalReferee(GoalJudge):
     """Judge of a goal alone, without scores: what `drive` needs of a referee, and no more."""
 
     def __init__(self, world: HighwayWorld, goal: Goal) -> None:
-        self._road = world.perception()
-        self._goal = goal
+        super().__init__(world.perception(), goal)
         self._ticks = 0
-        self._ruling: Ruling = "open"
         self._crashed = False
 
     def observe(self) -> None:
@@ -56,22 +55,9 @@ class GoalReferee:
         self._ruling = self._goal.rule(self._ticks / 10, now)
 
     @property
-    def over(self) -> bool:
-        """Whether the goal is decided."""
-        return self._ruling != "open"
-
-    @property
     def success(self) -> bool:
         """Whether the goal is reached and nothing was hit in that instant."""
         return self._ruling == "success" and not self._crashed
-
-    def outcome(self) -> Outcome:
-        """What happened; the episode itself tells collisions and leaving the road."""
-        return "success" if self.success else "failure" if self._ruling == "failure" else "timeout"
-
-    def metrics(self) -> tuple[Metric, ...]:
-        """None: nothing is scored here."""
-        return ()
 
 
 def start_of(world: HighwayWorld, scenario: Scenario) -> Observation | str:

@@ -25,7 +25,7 @@ from chauffeur.control.kinematic_bicycle import KinematicBicycle
 from chauffeur.control.pure_pursuit import kept_within, look_ahead_distance, pursuit_curvature
 from chauffeur.control.pure_pursuit import steering_angle as angle_of
 from chauffeur.geometry import Box, Polyline, Pose, overlap, wrap_to_pi
-from chauffeur.worlds.parking.corridor import Ahead, Body, Corridor
+from chauffeur.worlds.corridor import Ahead, Body, Corridor
 
 STEADY_S: Final = 0.5
 """Shortest look-ahead, as a time: twice that below which a car weaves whose steering answers after 0.1 s."""

@@ -3,7 +3,7 @@
 A model of a million parameters that is trained on some thousand sentences knows no word it has not met. The table lends
 it the lexical knowledge of a large language model: the input embeddings of all-MiniLM-L6-v2 (Apache-2.0), reduced to
 `WIDTH` principal components and 8 bits, in which "kiosk" lies near "booth" whether training said so or not.
-`chauffeur.models.vilad.word_table` makes it.
+`benchmarks/shipped_words.py` makes it.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ WIDTH: Final = 96
 UNKNOWN: Final = "[UNK]"
 MOST_PIECES: Final = 64
 """Longer texts are cut."""
+SHIPPED_WORDS: Final = Path(__file__).parent / "vilad" / "weights" / "words.npz"
+"""The table that comes with the package."""
 _PARTS: Final = re.compile(r"[a-z]+|[0-9]|[.,!?;:'\"-]")
 
 

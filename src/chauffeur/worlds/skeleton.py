@@ -1,0 +1,76 @@
+"""The parts that stepped worlds share: the instant shown, commands and configurations as they come from outside."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from chauffeur.concept import Command, JudgedBy, Observation, Outcome, Scenario, ScenarioError
+
+Config = TypeVar("Config", bound=BaseModel)
+
+
+class ShownWorld:
+    """A world that looks once an instant; heirs forget `_shown` whenever something has moved."""
+
+    _shown: Observation | None = None
+
+    def observe(self) -> Observation:
+        """The present instant as frozen values."""
+        if self._shown is None:
+            self._shown = self._look()
+        return self._shown
+
+    @property
+    def ended(self) -> bool:
+        """Crash, off the road, at the goal, or out of time."""
+        return self.observe().ended
+
+    def _look(self) -> Observation:
+        raise NotImplementedError
+
+
+def finite(command: Command) -> Command:
+    """The command. Raises ValueError: it is not made of finite numbers."""
+    if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
+        raise ValueError(f"A command must be finite numbers, not {command}.")
+    return command
+
+
+def config_of(model: type[Config], scenario: Scenario, kind: str) -> Config:
+    """A scenario's configuration. Raises ScenarioError: it is malformed; the message names its kind and all faults."""
+    try:
+        return model.model_validate(scenario.config)
+    except ValidationError as error:
+        faults = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'config'}: {e['msg']}" for e in error.errors())
+        raise ScenarioError(
+            f"Scenario {scenario.id!r} has a bad {kind} configuration: {faults}.",
+            hint="Compare it with a built-in one: chauffeur show scenarios.",
+        ) from error
+
+
+class PlaceJudge:
+    """Judge of a trip whose end is a place: the car is there, or it is not. Heirs say when it is over and done."""
+
+    judged_by: Final[JudgedBy] = "place"
+
+    @property
+    def over(self) -> bool:
+        """Whether the trip is decided."""
+        raise NotImplementedError
+
+    @property
+    def success(self) -> bool:
+        """Whether the car is where it was to be."""
+        raise NotImplementedError
+
+    @property
+    def parts_done(self) -> tuple[int, int]:
+        """One where the car is there, of one."""
+        return int(self.success), 1
+
+    def outcome(self) -> Outcome:
+        """What came of it, collisions apart."""
+        return "success" if self.success else "failure" if self.over else "timeout"
