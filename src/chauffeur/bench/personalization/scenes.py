@@ -30,7 +30,7 @@ _TASKS: Final[dict[Task, tuple[Ground, str, tuple[Aim, ...], float, tuple[int, .
 differs between people is what is measured, and their drives can be shared."""
 
 TASKS: Final[tuple[Task, ...]] = tuple(_TASKS)
-GROUND_OF: Final = {task: row[0] for task, row in _TASKS.items()}
+GROUND_OF: Final[dict[Task, Ground]] = {task: row[0] for task, row in _TASKS.items()}
 TASK_WORDS: Final = {task: row[1] for task, row in _TASKS.items()}
 AIMS: Final = {task: row[2] for task, row in _TASKS.items()}
 DRIVE_S: Final = {task: row[3] for task, row in _TASKS.items()}
