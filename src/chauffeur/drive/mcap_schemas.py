@@ -54,6 +54,7 @@ _VEHICLE = _object(
     acceleration_mps2=_number("Along the heading"),
     yaw_rate_radps=_number("Counter-clockwise"),
     steering_rad=_number("Front wheels, positive to the left"),
+    colour={"type": ["string", "null"], "description": "Of its paint or clothes, where the world says one"},
 )
 _COMMAND = _object(
     acceleration_mps2=_number("Along the heading"), steering_rad=_number("Front wheels, positive to the left")
