@@ -6,9 +6,12 @@ All are frozen values. The paper's letter stands in each docstring.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Literal, NewType
+from typing import TYPE_CHECKING, Any, Literal, NewType
 
 from chauffeur.concept.images import CameraImage
+
+if TYPE_CHECKING:
+    from chauffeur.concept.scene import Observation
 
 PersonId = NewType("PersonId", str)
 """Name a person's memory is kept under; only `memory` knows what file that means."""
@@ -391,7 +394,11 @@ LAMPILOT_LIMITS = Limits(name="lampilot", max_over_limit_mps=9.0, min_time_headw
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """Everything a planner is given: I, C, S, H, V (pictures), the limits it is told of, and earlier rounds."""
+    """Everything a planner is given: I, C, S, H, V (pictures), the limits it is told of, and earlier rounds.
+
+    `observation` is the instant that C describes, as values, for planners that look for what words point at; None where
+    there is none, or the planner is to see by pictures alone.
+    """
 
     instruction: Instruction
     context: Context
@@ -400,6 +407,7 @@ class PlanRequest:
     rounds: tuple[Round, ...] = ()
     limits: Limits = field(default_factory=Limits)
     images: tuple[CameraImage, ...] = ()
+    observation: Observation | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

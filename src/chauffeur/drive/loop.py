@@ -58,6 +58,8 @@ class Stages:
     execute: Callable[[PlanRequest, Plan, tuple[Verdict, ...], Scenario, int], Trip]
     tell: Listener = nobody_listens
     see: Callable[[Observation], tuple[CameraImage, ...]] = no_pictures
+    shows: bool = True
+    """Whether planners get the instant as values; not where C is read from pictures."""
 
 
 def steps_of(stages: Stages, observation: Observation, limits: Limits) -> PlanSteps:
@@ -81,6 +83,7 @@ def steps_of(stages: Stages, observation: Observation, limits: Limits) -> PlanSt
         own=lambda text: planned_for(text, observation),
         check=check,
         see=lambda: stages.see(observation),
+        observe=lambda: observation if stages.shows else None,
         tell=stages.tell,
     )
 

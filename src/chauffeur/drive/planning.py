@@ -73,6 +73,10 @@ def no_pictures(observation: Observation) -> tuple[CameraImage, ...]:
     return ()
 
 
+def _unseen() -> None:
+    return None
+
+
 def _as_it_is(plan: Plan) -> Plan:
     return plan
 
@@ -91,6 +95,7 @@ class PlanSteps:
         check: V, at the latest instant there is. Its second argument tells that the plan is the car's own.
         check_yes: V of what a yes would drive, where `check` leaves that to another process.
         see: V of the paper: pictures, for planners that look.
+        observe: The instant that C describes, for planners that look for what words point at.
         fit: What the vehicle takes of a plan, whose maker knows no vehicle.
         tell: Hears each letter as it comes.
         within_s: Time of the clock after which the planner is given up on.
@@ -106,6 +111,7 @@ class PlanSteps:
     check: Callable[[Plan, bool], Awaitable[Judged]]
     check_yes: Callable[[Plan, bool], Awaitable[Judged]] | None = None
     see: Callable[[], tuple[CameraImage, ...]] = tuple
+    observe: Callable[[], Observation | None] = _unseen
     fit: Callable[[Plan], Plan] = _as_it_is
     tell: Listener = nobody_listens
     within_s: float = math.inf
@@ -178,7 +184,8 @@ async def request_once(instruction: Instruction, steps: PlanSteps) -> PlanReques
     images = steps.see()
     if images:
         steps.tell(DriveEvent("view", value=images))
-    return screened_request(instruction, context, system, history, limits=steps.limits, images=images)
+    request = screened_request(instruction, context, system, history, limits=steps.limits, images=images)
+    return replace(request, observation=steps.observe())
 
 
 def screened_request(

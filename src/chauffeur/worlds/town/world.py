@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import AgentKind, Command, Observation, Scenario, ScenarioError, SignalState, VehicleState
-from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, BicycleState, advanced
 from chauffeur.concept.utterance import Colour
-from chauffeur.geometry import LaneId, LanePlace, Pose, overlap
+from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, BicycleState, advanced
+from chauffeur.geometry import LaneId, Pose, overlap
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.town.brakes import TrafficBrakes
 from chauffeur.worlds.town.colours import drawn_colour
@@ -114,7 +114,7 @@ class TownWorld(TownScene):
         self._sumo.step()
         self._traffic = Traffic(self._sumo, config.vehicles, rng)
         self._staged = Staged(town.road, start, self.drive)
-        self._stage_ids = tuple(self._set_out(one, start) for one in config.stage)
+        self._stage_ids = tuple(self._set_out(one) for one in config.stage)
         self._tell_traffic()
         self._sumo.step()
         self._look_round()
@@ -184,7 +184,7 @@ class TownWorld(TownScene):
         """Ids of the scenario's stage, in its order."""
         return self._stage_ids
 
-    def _set_out(self, actor: StagedActor, start: LanePlace) -> int:
+    def _set_out(self, actor: StagedActor) -> int:
         """Put one of the scenario's stage on the road; returns its id. Raises ScenarioError."""
         pose = self._staged.pose_of(actor)
         if not actor.drives:
