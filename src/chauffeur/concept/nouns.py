@@ -452,6 +452,7 @@ class Plan:
         raw: The reply as it came, for the record.
         scene: C as the planner itself saw it in pictures, in words; memory keeps it (Eq. 23). Empty without pictures.
         alarm: Where the words were understood as an alarm; empty where they were not.
+        unused: Parts of the wish, as said, that the policy does not use; None where the planner does not tell.
     """
 
     thoughts: Thoughts
@@ -467,6 +468,7 @@ class Plan:
     raw: str = ""
     scene: str = ""
     alarm: Alarm = ""
+    unused: tuple[str, ...] | None = None
 
 
 MismatchKind = Literal[
@@ -586,10 +588,11 @@ Outcome = Literal["success", "failure", "collision", "off_road", "timeout", "end
 """What happened. Why it happened is in `Causes`."""
 
 
-JudgedBy = Literal["words", "plan", "goal", "place"]
+JudgedBy = Literal["words", "plan", "goal", "place", "reading", "labels"]
 """What a drive is held against: the words, read by rules that see no plan; what the planner says it understood, where
 the rules read nothing in the words (judge and judged then share that reading); the scenario's own goal; the place that
-the plan leads to, found by the planner and reached by the world's own geometry."""
+the plan leads to, found by the planner and reached by the world's own geometry; the learned reading of the words, which
+the planner shares, over geometry that it does not; labels by people, over the same geometry."""
 
 
 @dataclass(frozen=True, slots=True)

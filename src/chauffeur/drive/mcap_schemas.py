@@ -159,7 +159,7 @@ TRIP = Channel(
         record=_array(_array({}), "[name, value] pairs of provenance"),
         unused=_array(_text(), "Parts of the wish that the plan does not use"),
         parts_done={"type": ["array", "null"]},
-        judged_by=_text("words, plan, goal, place, or empty"),
+        judged_by=_text("words, plan, goal, place, reading, labels, or empty"),
     ),
 )
 LANES = Channel(

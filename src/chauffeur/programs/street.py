@@ -113,8 +113,10 @@ class TownApis(DrivingApis):
             meant = reference_of(kind, colour, state, side)
         except DataError as error:
             raise BadArgumentValueError(f"see: {error}") from None
-        found = ground(meant, self._street.look()).targets
-        return found[0].agent if found and found[0].kind == "agent" else None
+        found = [
+            one for one in ground(meant, self._street.look()).targets if one.kind == "agent" and one.forward_m > 0.0
+        ]
+        return found[0].agent if found else None
 
     def _in_sight(self, veh: int | None) -> bool:
         try:

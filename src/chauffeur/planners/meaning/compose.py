@@ -104,6 +104,8 @@ class _Composer:
         self._pace = ANY_PACE
         self._referents: dict[Reference, Grounded] = {}
         self._moved_on = False
+        """Whether an act before leads to where other things are in sight."""
+        self._turned = False
         self._last = False
 
     def composed(self) -> Composed:
@@ -124,6 +126,7 @@ class _Composer:
             done.append(act)
             told.append(self._told(act))
             self._moved_on = self._moved_on or (act.act in _MOVES_ON and not act.negated)
+            self._turned = self._turned or (act.act in ("turn", "straight") and not act.negated)
         referents = tuple(self._referents.values())
         if not done:
             return Composed(undoable=tuple(undoable), referents=referents)
@@ -168,7 +171,9 @@ class _Composer:
             self._pace = held
 
     def _forbidden(self, act: Act) -> Iterator[str]:
-        """What is done where something is not to be done: the road is followed without it."""
+        """What is done where something is not to be done: what else is asked for, or the road is followed."""
+        if any(not one.negated and one.act in _MOVES_ON | _STANDS for one in self._acts):
+            return
         if act.act == "turn" and "straight" in self._situation.turns:
             yield "go_straight_at_next_intersection()"
             yield f"yield from cross_the_junction({self._pace:g})"
@@ -426,18 +431,27 @@ class _Composer:
         if reference.kind not in _ROAD_USERS:
             raise _UndoableError(f"I cannot make out {reference_words(reference)} here")
         found = self._grounded(reference, act)
-        targets = [one for one in found.targets if self._matters(one, reference)][:_MOST_USERS]
+        here = found.targets
+        if self._turned:  # what is told after a turn is on the street that it leads into
+            here = tuple(one for one in here if not self._before_junction(one))
+        targets = [one for one in here if self._matters(one, reference)][:_MOST_USERS]
         if targets:
             for one in targets:
                 yield [], f"agent({one.agent})"
             return
-        if found.targets:
+        if here:
             return
+        self._referents[reference] = replace(found, targets=())
         kind = {"vehicles": "vehicle", "traffic": "vehicle", "pedestrians": "pedestrian"}.get(
             reference.kind, reference.kind
         )
         words = (json.dumps(part or "") for part in (kind, reference.colour, reference.state, reference.side))
         yield [f"who = yield from look_for({', '.join(words)}, {self._pace:g})", "if who is None:", "    return"], "who"
+
+    def _before_junction(self, target: Target) -> bool:
+        """Whether something lies before the next junction, or behind us."""
+        ahead = ground(Reference("junction"), self._seen).fits
+        return target.kind == "agent" and bool(ahead) and target.forward_m < ahead[0].forward_m
 
     def _matters(self, target: Target, reference: Reference) -> bool:
         """Of a plural: whether this one is ahead and may come in the way."""
@@ -446,7 +460,7 @@ class _Composer:
         agent = next((one for one in self._seen.others if one.id == target.agent), None)
         return agent is not None and target.forward_m > 0.0 and "parked" not in states_of(agent, self._seen)
 
-    def _agent(self, reference: Reference):
+    def _agent(self, reference: Reference) -> VehicleState | None:
         targets = self._referents.get(reference)
         if targets is None or not targets.targets or targets.targets[0].kind != "agent":
             return None

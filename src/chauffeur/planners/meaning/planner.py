@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
-from chauffeur.concept.utterance import Act, Utterance
+from chauffeur.concept.utterance import Act, Span, Utterance
 from chauffeur.language.meaning.reader import read
 from chauffeur.language.meaning.words import act_words
 from chauffeur.planners.arbitration import asked, unanswered
@@ -94,7 +94,13 @@ class MeaningPlanner:
             planner=self.id,
             model=self.model,
             latency_s=time.perf_counter() - begun,
+            unused=tuple(utterance.text[low:high] for low, high in (*_spans(made), *utterance.unused)),
         )
+
+
+def _spans(made: Composed) -> list[Span]:
+    """The words of acts that are not done."""
+    return [one.act.span for one in made.undoable if one.act.span is not None]
 
 
 def _listed(acts: tuple[Act, ...]) -> str:

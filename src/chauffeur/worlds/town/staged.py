@@ -30,6 +30,7 @@ class StagedActor(BaseModel):
         colour: Of it; drawn where none is given.
         ahead_m: Of its middle, along the lane from beside the middle of the ego; negative behind it.
         left_m: Of its middle, to the left of the middle of that lane.
+        way: The turns that lead to it, where it is round a corner; straight on by default.
         heading: Which way it faces: along the lane, against it, or over it to the left or right.
         speed_mps: Of its move; 0 for one that stays.
         after_s: When it sets off.
@@ -45,6 +46,7 @@ class StagedActor(BaseModel):
     colour: Colour | None = None
     ahead_m: float = Field(ge=-80.0, le=300.0)
     left_m: float = Field(default=0.0, ge=-30.0, le=30.0)
+    way: tuple[Turn, ...] = ()
     heading: Literal["along", "against", "left", "right"] = "along"
     speed_mps: float = Field(default=0.0, ge=0.0, le=30.0)
     after_s: float = Field(default=0.0, ge=0.0)
@@ -87,17 +89,26 @@ class Staged:
 
     def __init__(self, road: RoadGraph, start: LanePlace, drive: Callable[[int, Pose, float], None]) -> None:
         """Args: the road, where the ego begins, and how one of the stage is moved."""
-        lanes = lanes_onward(road, start.lane)
-        before = road.predecessors(start.lane)
-        back = [] if not before else [min(before, key=lambda one: (abs(one.bend_rad), one.id))]
-        self._line: Polyline = joined([*(one.centre for one in back), *(road[lane].centre for lane in lanes)])
-        self._zero_m = sum(one.length_m for one in back) + start.station_m
+        self._road, self._start = road, start
         self._drive = drive
+        self._lines: dict[tuple[Turn, ...], tuple[Polyline, float]] = {}
         self._moving: list[_Moving] = []
+
+    def _line(self, way: tuple[Turn, ...]) -> tuple[Polyline, float]:
+        """(the middle of the lanes along some turns, the station at which the ego begins)."""
+        if way not in self._lines:
+            road, own = self._road, self._start.lane
+            lanes = [road[lane].centre for lane in lanes_onward(road, own, way)]
+            before = min(road.predecessors(own), key=lambda one: (abs(one.bend_rad), one.id), default=None)
+            back = [] if before is None else [before.centre]
+            zero = sum(one.length_m for one in back) + self._start.station_m
+            self._lines[way] = joined([*back, *lanes]), zero
+        return self._lines[way]
 
     def pose_of(self, actor: StagedActor) -> Pose:
         """Where one begins."""
-        at = self._line.at(min(max(0.0, self._zero_m + actor.ahead_m), self._line.length_m))
+        line, zero = self._line(actor.way)
+        at = line.at(min(max(0.0, zero + actor.ahead_m), line.length_m))
         x, y = at.place(0.0, actor.left_m)
         return Pose(x, y, at.heading_rad + _HEADINGS[actor.heading])
 
