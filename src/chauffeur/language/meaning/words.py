@@ -7,7 +7,8 @@ from chauffeur.concept.utterance import Act, Reference
 
 def act_words(act: Act) -> str:
     """An act in plain words."""
-    parts = [("do not " if act.negated else "") + act.act.replace("_", " ")]
+    verb = "do that" if act.act == "refuse" else act.act.replace("_", " ")
+    parts = [("do not " if act.negated else "") + verb]
     parts += [value for value in (act.side, act.to, act.direction) if value]
     if act.value is not None:
         parts.append(f"{act.value:g} {act.unit}".strip())

@@ -42,6 +42,7 @@ _CANNOT: Final[dict[Verb, str]] = {
     "exit": "I do not drive off the street",
     "goto": "the place is not in sight; name it alone, and I take you there",
     "move": "I keep to the middle of the lane",
+    "refuse": "that is nothing a car does",
 }
 _EVENTS: Final = {
     "opens": "I cannot see whether it opens",
@@ -86,7 +87,7 @@ class Composed:
 
 def compose(utterance: Utterance, observation: Observation, situation: Situation, limits: Limits) -> Composed:
     """A program that does the acts of an utterance one after the other, as far as they can be done from here."""
-    acts = [act for act in utterance.acts if not act.purpose and act.act not in ("none", "refuse")]
+    acts = [act for act in utterance.acts if not act.purpose and act.act != "none"]
     return _Composer(acts, observation, situation, limits).composed()
 
 

@@ -30,7 +30,6 @@ _FOR_OTHERS: Final = {
 _WHY_NOT: Final = {
     "illegal": "The rules of the road do not allow that.",
     "dangerous": "That would put people in danger.",
-    "not driving": "That is nothing a car can do.",
 }
 
 
@@ -66,8 +65,9 @@ class MeaningPlanner:
         if not utterance.acts or all(act.act == "none" for act in utterance.acts):
             words = _FOR_OTHERS.get(utterance.address, "I hear nothing in that for me to do, and change nothing.")
             return declined(self, words, begun, intent=NO_WISH)
-        if (refused := next((act for act in utterance.acts if act.act == "refuse"), None)) is not None:
-            return declined(self, _WHY_NOT[refused.why or "not driving"], begun, intent="refuse")
+        forbidden = [act for act in utterance.acts if act.act == "refuse" and act.why in ("illegal", "dangerous")]
+        if (refused := next(iter(forbidden), None)) is not None:
+            return declined(self, _WHY_NOT[refused.why or "dangerous"], begun, intent="refuse")
         if vocabulary_of(request.context.situation.world) != "town":
             return declined(self, _NOT_HERE, begun, intent="not there")
         if request.observation is None:
