@@ -109,6 +109,7 @@ PLAN = Channel(
         offer=_text("the wish that a yes stands for, where the refusal is a question"),
         intent=_text(),
         alarm=_text("stop or distress, where the words were taken for that"),
+        unused={"type": ["array", "null"], "description": "Parts of the wish that the policy does not use"},
         settings=_SETTINGS,
         planner=_text(),
         model=_text(),

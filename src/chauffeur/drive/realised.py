@@ -65,7 +65,7 @@ _ALIKE: Final = {"silver": "grey", "grey": "silver"}
 
 
 @dataclass(frozen=True, slots=True)
-class Instant:
+class DriveInstant:
     """What is kept of an instant of a drive.
 
     Attributes:
@@ -95,13 +95,13 @@ class DriveTrace:
 
     road: RoadGraph
     first: Observation
-    instants: list[Instant] = field(default_factory=list[Instant])
+    instants: list[DriveInstant] = field(default_factory=list[DriveInstant])
 
     def add(self, seen: Observation, *, told_to_stand: bool) -> None:
         """Keep an instant."""
         lights: dict[LaneId, SignalState] = {lane: signal.state for signal in seen.signals for lane in signal.lanes}
         agents = {one.id: one for one in (*seen.others, *seen.objects)}
-        self.instants.append(Instant(seen.time_s, seen.ego, agents, lights, told_to_stand))
+        self.instants.append(DriveInstant(seen.time_s, seen.ego, agents, lights, told_to_stand))
 
 
 @dataclass(frozen=True, slots=True)

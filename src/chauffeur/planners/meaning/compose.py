@@ -62,7 +62,7 @@ class Undoable:
 
 
 @dataclass(frozen=True, slots=True)
-class Composed:
+class ComposedActs:
     """What acts come to.
 
     Attributes:
@@ -85,7 +85,7 @@ class Composed:
     told: tuple[str, ...] = ()
 
 
-def compose(utterance: Utterance, observation: Observation, situation: Situation, limits: Limits) -> Composed:
+def compose(utterance: Utterance, observation: Observation, situation: Situation, limits: Limits) -> ComposedActs:
     """A program that does the acts of an utterance one after the other, as far as they can be done from here."""
     acts = [act for act in utterance.acts if not act.purpose and act.act != "none"]
     return _Composer(acts, observation, situation, limits).composed()
@@ -109,7 +109,7 @@ class _Composer:
         self._turned = False
         self._last = False
 
-    def composed(self) -> Composed:
+    def composed(self) -> ComposedActs:
         body: list[str] = []
         done: list[Act] = []
         told: list[str] = []
@@ -122,7 +122,7 @@ class _Composer:
                 undoable.append(Undoable(act, str(error)))
                 continue
             except _UnclearError as error:
-                return Composed(question=str(error), referents=tuple(self._referents.values()))
+                return ComposedActs(question=str(error), referents=tuple(self._referents.values()))
             body += [f"    # {act_words(act).replace('—', '-')}", *(f"    {line}" for line in lines)]
             done.append(act)
             told.append(self._told(act))
@@ -130,11 +130,11 @@ class _Composer:
             self._turned = self._turned or (act.act in ("turn", "straight") and not act.negated)
         referents = tuple(self._referents.values())
         if not done:
-            return Composed(undoable=tuple(undoable), referents=referents)
+            return ComposedActs(undoable=tuple(undoable), referents=referents)
         if not (done[-1].act in _STANDS or done[-1].act == "wait") or done[-1].negated:
             body.append(f"    yield from drive_on(200, {self._pace:g})")
         source = "\n".join(["def as_told():", *body, ""])
-        return Composed(
+        return ComposedActs(
             source,
             helpers_used(source),
             "+".join(dict.fromkeys(_tag(act) for act in done)),

@@ -12,7 +12,7 @@ from chauffeur.language.meaning.reader import read
 from chauffeur.language.meaning.words import act_words
 from chauffeur.planners.arbitration import asked, unanswered
 from chauffeur.planners.base import NO_WISH, declined
-from chauffeur.planners.meaning.compose import Composed, compose
+from chauffeur.planners.meaning.compose import ComposedActs, compose
 from chauffeur.programs.catalogue import vocabulary_of
 
 VERSION: Final = "meaning-v1"
@@ -98,7 +98,7 @@ class MeaningPlanner:
         )
 
 
-def _spans(made: Composed) -> list[Span]:
+def _spans(made: ComposedActs) -> list[Span]:
     """The words of acts that are not done."""
     return [one.act.span for one in made.undoable if one.act.span is not None]
 
@@ -107,7 +107,7 @@ def _listed(acts: tuple[Act, ...]) -> str:
     return "; then ".join(act_words(act).replace(" — ", ", ") for act in acts)
 
 
-def _thoughts(utterance: Utterance, made: Composed, left_out: str) -> str:
+def _thoughts(utterance: Utterance, made: ComposedActs, left_out: str) -> str:
     parts = [f"{sentence}." for sentence in made.told]
     parts += [left_out] if left_out else []
     parts += [f"I do not use “{utterance.text[low:high]}”." for low, high in utterance.unused]
