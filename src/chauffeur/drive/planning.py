@@ -184,8 +184,8 @@ async def request_once(instruction: Instruction, steps: PlanSteps) -> PlanReques
     images = steps.see()
     if images:
         steps.tell(DriveEvent("view", value=images))
-    request = screened_request(instruction, context, system, history, limits=steps.limits, images=images)
-    return replace(request, observation=steps.observe())
+    seen = steps.observe()
+    return screened_request(instruction, context, system, history, limits=steps.limits, images=images, observation=seen)
 
 
 def screened_request(
@@ -196,12 +196,13 @@ def screened_request(
     rounds: tuple[Round, ...] = (),
     limits: Limits = _USUAL_LIMITS,
     images: tuple[CameraImage, ...] = (),
+    observation: Observation | None = None,
 ) -> PlanRequest:
     """What a planner is given, in a drive or a benchmark: put together here alone, and screened.
 
     The arguments are those of `PlanRequest`.
     """
-    return screen_request(PlanRequest(instruction, context, system, history, rounds, limits, images))[0]
+    return screen_request(PlanRequest(instruction, context, system, history, rounds, limits, images, observation))[0]
 
 
 async def _planned(request: PlanRequest, steps: PlanSteps) -> Plan:

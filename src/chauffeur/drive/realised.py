@@ -50,6 +50,7 @@ _BESIDE_M: Final = 5.0
 _ASIDE_M: Final = 5.5
 _NEAR_M: Final = 12.0
 _GAP_M: Final = 45.0
+_ON_M, _ALONG_M = 10.0, 40.0
 _SLOWER: Final = 0.8
 _PACE_MPS: Final = 1.0
 _ENDED_S: Final = 6.0
@@ -130,11 +131,12 @@ def judge(acts: Sequence[Act], trace: DriveTrace, referents: Referents | None = 
     judging = _Judging(trace, referents or {})
     found: list[JudgedAct] = []
     start, missed = 0, False
-    for act in (one for one in acts if not one.purpose and one.act not in ("none", "refuse")):
+    wanted = [one for one in acts if not one.purpose and one.act not in ("none", "refuse")]
+    for act in wanted:
         if missed:
             found.append(JudgedAct(act, "not_done", "it was not come to"))
             continue
-        result, end, why = judging.act(act, start)
+        result, end, why = judging.act(act, start, last=act is wanted[-1])
         found.append(JudgedAct(act, result, why))
         missed = result in ("not_done", "opposite") and not act.negated
         start = max(start, end)
@@ -160,8 +162,10 @@ class _Judging:
         self._all = trace.instants
         self._passages = self._driven_through()
 
-    def act(self, act: Act, start: int) -> _Found:
+    def act(self, act: Act, start: int, *, last: bool) -> _Found:
         """(result, instant at which it was done, what is missing)."""
+        if act.act == "straight" and not (last or act.negated or act.when or act.place):
+            return self._along(act, start)
         if act.negated:
             return self._kept_from(act, start)
         doing: dict[str, Callable[[Act, int], _Found]] = {
@@ -249,6 +253,8 @@ class _Judging:
         reference = None if act.place is None else act.place.ref
         if reference is not None and reference.kind in ("junction", "road", "light"):
             nth = max(1, reference.ordinal or 1)
+        if side == "straight" and any(one.leaves <= start and one.way != "straight" for one in self._passages):
+            return self._along(act, start)
         for passage in self._passages:
             if passage.enters < start:
                 continue
@@ -265,6 +271,14 @@ class _Judging:
                 if nth < 1:
                     return "not_done", passage.leaves, f"the car went {passage.way}, where a way leads {side}"
         return "not_done", start, "the car did not turn" if side != "straight" else "the car crossed no junction"
+
+    def _along(self, act: Act, start: int) -> _Found:
+        """Of "straight" after a turn: that the street which it leads into is driven along."""
+        turned = any(one.leaves <= start and one.way != "straight" for one in self._passages)
+        result, end, why = self._go(act, start, _ALONG_M if turned else _ON_M)
+        if any(one.way != "straight" and start < one.leaves <= end for one in self._passages):
+            return "not_done", end, "the car turned off"
+        return result, end, why
 
     # Standing ---------------------------------------------------------------------------------------------------------
 
@@ -427,7 +441,10 @@ class _Judging:
                     return "opposite", ours, "the car went first"
                 end = max(end, theirs)
             elif theirs is None:
+                past = next((i for i in range(start, len(self._all)) if self._is_behind(i, number)), None)
                 waited = self._slowed_for(number, start)
+                if waited is None and act.target.kind not in ("pedestrian", "pedestrians"):
+                    waited = past  # its way and ours do not meet
                 if waited is None:
                     return "not_done", start, "it did not go, and the car did not wait"
                 end = max(end, waited)
@@ -484,17 +501,27 @@ class _Judging:
 
     # Driving on -------------------------------------------------------------------------------------------------------
 
-    def _go(self, act: Act, start: int) -> _Found:
-        began, driven = -1, 0.0
-        for i in range(start + 1, len(self._all)):
-            one, before = self._all[i].ego, self._all[i - 1].ego
-            driven += math.hypot(one.x_m - before.x_m, one.y_m - before.y_m)
-            if driven > 1.0 and began < 0:
-                began = i
-            if driven > 12.0:
-                late = self._held(act.when, began, start, None)
-                return ("done", i, "") if not late else ("not_done", i, late)
-        return "not_done", start, "the car did not drive on"
+    def _go(self, act: Act, start: int, way_m: float = _ON_M) -> _Found:
+        """That the car drives on, from a stand where it stood."""
+        late = "the car did not drive on"
+        begins = [start, *(i for i in range(start + 1, len(self._all)) if self._sets_off(i))]
+        for k, began in enumerate(begins):
+            until = begins[k + 1] if k + 1 < len(begins) else len(self._all)
+            late = self._held(act.when, min(began + 10, len(self._all) - 1), start, None)
+            if late and k + 1 < len(begins):
+                continue
+            driven = 0.0
+            for i in range(began + 1, len(self._all)):
+                one, before = self._all[i].ego, self._all[i - 1].ego
+                driven += math.hypot(one.x_m - before.x_m, one.y_m - before.y_m)
+                if driven > way_m:
+                    return ("done", i, "") if not late else ("not_done", i, late)
+                if i >= until and act.when is not None:
+                    break
+        return "not_done", start, late or "the car did not drive on"
+
+    def _sets_off(self, i: int) -> bool:
+        return self._all[i].ego.speed_mps >= _STANDS_MPS > self._all[i - 1].ego.speed_mps
 
     def _lane(self, act: Act, start: int) -> _Found:
         side = act.side or {"leftmost": "left", "rightmost": "right"}.get(act.to or "", "")

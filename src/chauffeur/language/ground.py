@@ -141,7 +141,7 @@ def _fitting(reference: Reference, observation: Observation) -> list[Target]:
         found = _junctions(observation)
     else:
         return []
-    if reference.of is not None and reference.of.kind not in ("road", "lane", "sidewalk"):
+    if kind in _KINDS and reference.of is not None and reference.of.kind not in ("road", "lane", "sidewalk"):
         around = _fitting(reference.of, observation)
         found = [
             one

@@ -108,6 +108,7 @@ class _Composer:
         """Whether an act before leads to where other things are in sight."""
         self._turned = False
         self._last = False
+        self._next: Act | None = None
 
     def composed(self) -> ComposedActs:
         body: list[str] = []
@@ -116,6 +117,7 @@ class _Composer:
         undoable: list[Undoable] = []
         for k, act in enumerate(self._acts):
             self._last = k == len(self._acts) - 1
+            self._next = None if self._last else self._acts[k + 1]
             try:
                 lines = list(self._lines(act))
             except _UndoableError as error:
@@ -127,7 +129,7 @@ class _Composer:
             done.append(act)
             told.append(self._told(act))
             self._moved_on = self._moved_on or (act.act in _MOVES_ON and not act.negated)
-            self._turned = self._turned or (act.act in ("turn", "straight") and not act.negated)
+            self._turned = self._turned or (act.act == "turn" and not act.negated)
         referents = tuple(self._referents.values())
         if not done:
             return ComposedActs(undoable=tuple(undoable), referents=referents)
@@ -279,6 +281,8 @@ class _Composer:
 
     def _go(self, act: Act) -> Iterator[str]:
         steps = 3 * _LAST_STEPS // 4 if self._last else 3 * _STOOD_STEPS
+        if self._next is not None and self._next.act in ("turn", "straight", "lane"):
+            steps = 20  # what follows is at the next junction, however near
         if act.when is not None and act.when.type == "until":
             yield from self._before(act.when, act)
             return
@@ -304,6 +308,14 @@ class _Composer:
             )
         if nth > 1:
             yield f'yield from pass_ways("{side}", {nth - 1}, {self._pace:g})'
+        if side == "straight" and reference is None and act.when is None and self._is_told_before_junction(self._next):
+            yield f"yield from drive_on(20, {self._pace:g})"
+            return
+        if side == "straight" and self._turned and nth == 1:  # along the street that the turn leads into
+            yield 'if can_go("straight"):'
+            yield "    go_straight_at_next_intersection()"
+            yield f"yield from drive_on(240, {self._pace:g})"
+            return
         if self._moved_on or nth > 1:
             yield "for _ in range(12000):"
             yield f'    if can_go("{side}"):'
@@ -311,6 +323,14 @@ class _Composer:
             yield f"    yield proceed(min(check_speed_limit(), {self._pace:g}))"
         yield f"{'go_straight' if side == 'straight' else f'turn_{side}'}_at_next_intersection()"
         yield f"yield from cross_the_junction({self._pace:g})"
+
+    def _is_told_before_junction(self, act: Act | None) -> bool:
+        """Whether an act is done by a road user that is seen before the next junction."""
+        if act is None or act.act not in _STANDS | {"avoid", "pass"}:
+            return False
+        users = [one for one in references_of(act) if one.kind in _ROAD_USERS]
+        fits = [target for one in users for target in ground(one, self._seen, act.act).fits]
+        return any(self._before_junction(target) and target.forward_m > 0.0 for target in fits)
 
     def _past(self, place: ActPlace, reference: Reference, act: Act) -> Iterator[str]:
         """Lines that come past a road user by which a turn is told, where it is told so."""
@@ -340,8 +360,7 @@ class _Composer:
                     yield from lines
                     yield f"yield from until_passed({name}, {self._pace:g})"
         for _ in range(times):
-            yield f"change_lane_{side}()"
-            yield f"yield from drive_on(120, {self._pace:g})"
+            yield f"yield from over_{side}({self._pace:g})"
 
     def _speed(self, act: Act) -> Iterator[str]:
         limit = self._limit_mps
@@ -433,7 +452,7 @@ class _Composer:
             raise _UndoableError(f"I cannot make out {reference_words(reference)} here")
         found = self._grounded(reference, act)
         here = found.targets
-        if self._turned:  # what is told after a turn is on the street that it leads into
+        if self._turned and act.act != "follow":  # what is told after a turn is on the street that it leads into
             here = tuple(one for one in here if not self._before_junction(one))
         targets = [one for one in here if self._matters(one, reference)][:_MOST_USERS]
         if targets:

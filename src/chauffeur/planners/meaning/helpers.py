@@ -14,6 +14,10 @@ HELPERS: Final[dict[str, str]] = {
         yield proceed(min(check_speed_limit(), pace))
 """,
     "halt": """def halt(steps):
+    for _ in range(400):
+        yield stop()
+        if get_speed_of(get_ego_vehicle()) < 0.1:
+            break
     for _ in range(steps):
         yield stop()
 """,
@@ -66,6 +70,20 @@ HELPERS: Final[dict[str, str]] = {
         if not ahead or distance < 25.0:
             return
         yield proceed(min(check_speed_limit(), pace))
+""",
+    "over_left": """def over_left(pace):
+    for _ in range(200):
+        if change_lane_left():
+            break
+        yield proceed(min(check_speed_limit(), pace))
+    yield from drive_on(120, pace)
+""",
+    "over_right": """def over_right(pace):
+    for _ in range(200):
+        if change_lane_right():
+            break
+        yield proceed(min(check_speed_limit(), pace))
+    yield from drive_on(120, pace)
 """,
     "until_clear": """def until_clear(pace):
     for _ in range(40):
@@ -144,7 +162,7 @@ HELPERS: Final[dict[str, str]] = {
     gone = 0.0
     for _ in range(12000):
         gone = gone + 0.05 * get_speed_of(get_ego_vehicle())
-        if gone > 22.0:
+        if gone > 38.0:
             break
         yield proceed(min(check_speed_limit(), pace))
 """,

@@ -56,6 +56,11 @@ class StagedActor(BaseModel):
     turns: tuple[Turn, ...] = ()
 
     @property
+    def at_once(self) -> bool:
+        """Whether it moves from the beginning."""
+        return self.after_s <= 0.0 and math.isinf(self.near_m)
+
+    @property
     def agent_kind(self) -> AgentKind:
         """What observations call it: a van is a large car."""
         return "car" if self.kind == "van" else self.kind

@@ -188,7 +188,7 @@ class TownWorld(TownScene):
         """Put one of the scenario's stage on the road; returns its id. Raises ScenarioError."""
         pose = self._staged.pose_of(actor)
         if not actor.drives:
-            number = self.spawn(actor.agent_kind, pose, 0.0, actor.colour)
+            number = self.spawn(actor.agent_kind, pose, actor.speed_mps if actor.at_once else 0.0, actor.colour)
             if actor.kind == "van":
                 make = MAKES["van"]
                 self._actors[number].length_m, self._actors[number].width_m = make.length_m, make.width_m
