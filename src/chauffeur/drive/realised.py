@@ -602,6 +602,8 @@ class _Judging:
             case "gone":
                 users = () if when.ref is None else self.meant(when.ref, start)
                 return next((why for number in users if (why := self._still_there(number, begins, start))), "")
+            case "passed" if when.ref is not None and when.ref.kind in _PLACELESS:
+                return "" if any(one.leaves <= begins for one in self._passages) else "it had not been passed"
             case "passed":
                 users = () if when.ref is None else self.meant(when.ref, start)
                 return "" if any(self._is_behind(begins, number) for number in users) else "it had not been passed"

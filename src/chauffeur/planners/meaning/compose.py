@@ -20,6 +20,8 @@ ANY_PACE: Final = 70.0
 _SLOW_SHARE: Final = 0.5
 _SLOWER: Final = 0.7
 _LEAST_MPS: Final = 2.0
+_LOOKING_MPS, _LOOKS_FROM_M = 7.0, 18.0
+"""Behind a junction what is to be found there is looked for from so far on, at no more than this speed."""
 _LAST_STEPS: Final = 1200
 _STOOD_STEPS: Final = 60
 _MOST_USERS: Final = 6
@@ -308,7 +310,9 @@ class _Composer:
             )
         if nth > 1:
             yield f'yield from pass_ways("{side}", {nth - 1}, {self._pace:g})'
-        if side == "straight" and reference is None and act.when is None and self._is_told_before_junction(self._next):
+        on = self._next is not None and self._next.act == "turn"  # along the road, up to where it turns
+        on = on or self._is_told_before_junction(self._next)
+        if side == "straight" and reference is None and act.when is None and on:
             yield f"yield from drive_on(20, {self._pace:g})"
             return
         if side == "straight" and self._turned and nth == 1:  # along the street that the turn leads into
@@ -322,7 +326,9 @@ class _Composer:
             yield "        break"
             yield f"    yield proceed(min(check_speed_limit(), {self._pace:g}))"
         yield f"{'go_straight' if side == 'straight' else f'turn_{side}'}_at_next_intersection()"
-        yield f"yield from cross_the_junction({self._pace:g})"
+        looks = self._next is not None and any(one.kind in _ROAD_USERS for one in references_of(self._next))
+        pace = min(self._pace, _LOOKING_MPS) if looks else self._pace
+        yield f"yield from cross_the_junction({pace:g}{f', {_LOOKS_FROM_M:g}' if looks else ''})"
 
     def _is_told_before_junction(self, act: Act | None) -> bool:
         """Whether an act is done by a road user that is seen before the next junction."""
@@ -466,7 +472,8 @@ class _Composer:
             reference.kind, reference.kind
         )
         words = (json.dumps(part or "") for part in (kind, reference.colour, reference.state, reference.side))
-        yield [f"who = yield from look_for({', '.join(words)}, {self._pace:g})", "if who is None:", "    return"], "who"
+        pace = min(self._pace, _LOOKING_MPS)
+        yield [f"who = yield from look_for({', '.join(words)}, {pace:g})", "if who is None:", "    return"], "who"
 
     def _before_junction(self, target: Target) -> bool:
         """Whether something lies before the next junction, or behind us."""

@@ -72,18 +72,26 @@ HELPERS: Final[dict[str, str]] = {
         yield proceed(min(check_speed_limit(), pace))
 """,
     "over_left": """def over_left(pace):
-    for _ in range(200):
-        if change_lane_left():
+    ego = get_ego_vehicle()
+    goal = None
+    for _ in range(600):
+        if goal is not None and get_lane_of(ego) == goal:
             break
+        goal = get_left_lane(ego)
+        change_lane_left()
         yield proceed(min(check_speed_limit(), pace))
-    yield from drive_on(120, pace)
+    yield from drive_on(20, pace)
 """,
     "over_right": """def over_right(pace):
-    for _ in range(200):
-        if change_lane_right():
+    ego = get_ego_vehicle()
+    goal = None
+    for _ in range(600):
+        if goal is not None and get_lane_of(ego) == goal:
             break
+        goal = get_right_lane(ego)
+        change_lane_right()
         yield proceed(min(check_speed_limit(), pace))
-    yield from drive_on(120, pace)
+    yield from drive_on(20, pace)
 """,
     "until_clear": """def until_clear(pace):
     for _ in range(40):
@@ -106,6 +114,10 @@ HELPERS: Final[dict[str, str]] = {
         if not in_sight(who):
             say("It is out of sight. I go on along the road.")
             return
+        if has_passed(who):
+            say("We are past it already, so I stop here.")
+            yield from halt(80)
+            return
         yield stop_behind(who)
         stood = stood + 1 if get_target_speed() < 0.05 and get_speed_of(get_ego_vehicle()) < 0.1 else 0
         if stood > 60:
@@ -116,6 +128,10 @@ HELPERS: Final[dict[str, str]] = {
     for _ in range(2400):
         if not in_sight(who):
             say("It is out of sight. I go on along the road.")
+            return
+        if has_passed(who):
+            say("We are past it already, so I stop here.")
+            yield from halt(80)
             return
         yield stop_beside(who)
         stood = stood + 1 if get_target_speed() < 0.05 and get_speed_of(get_ego_vehicle()) < 0.1 else 0
@@ -135,7 +151,8 @@ HELPERS: Final[dict[str, str]] = {
 """,
     "stand_before_junction": """def stand_before_junction(pace):
     for _ in range(2400):
-        left = get_distance_to_junction() - 2.0
+        state, line = check_traffic_light()
+        left = min(get_distance_to_junction() - 6.0, line - 1.0)
         if left < 0.5:
             break
         yield proceed(min(check_speed_limit(), pace, max(0.8, (2.4 * left) ** 0.5)))
@@ -151,7 +168,7 @@ HELPERS: Final[dict[str, str]] = {
     say("I have not come to see what you mean.")
     return None
 """,
-    "cross_the_junction": """def cross_the_junction(pace):
+    "cross_the_junction": """def cross_the_junction(pace, beyond=38.0):
     last = get_distance_to_junction()
     for _ in range(12000):
         now = get_distance_to_junction()
@@ -162,7 +179,7 @@ HELPERS: Final[dict[str, str]] = {
     gone = 0.0
     for _ in range(12000):
         gone = gone + 0.05 * get_speed_of(get_ego_vehicle())
-        if gone > 38.0:
+        if gone > beyond:
             break
         yield proceed(min(check_speed_limit(), pace))
 """,
