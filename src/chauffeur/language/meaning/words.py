@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from chauffeur.concept.utterance import Act, Reference
+from collections.abc import Mapping
+from typing import Final
+
+from chauffeur.concept.utterance import Act, Condition, Event, Reference
+
+_MANY: Final = ("vehicles", "pedestrians")
 
 
 def act_words(act: Act) -> str:
@@ -20,14 +25,38 @@ def act_words(act: Act) -> str:
     if act.manner is not None:
         parts.append(f"({act.manner})")
     if act.when is not None:
-        event = "" if act.when.event == "other" else f" {act.when.event}"
-        of = "" if act.when.ref is None else f" {reference_words(act.when.ref)}"
-        parts.append(f"— {act.when.type}{of}{event}")
+        parts.append(f"— {condition_words(act.when)}")
     if act.purpose:
         parts.append("(as the purpose of the act before)")
     if act.why is not None:
         parts.append(f"({act.why})")
     return " ".join(parts)
+
+
+_EVENTS: Final[Mapping[Event, tuple[str, str]]] = {
+    "green": ("is green", "the light is green"),
+    "red": ("is red", "the light is red"),
+    "clear": ("is clear", "it is clear"),
+    "passed": ("is passed", "it is passed"),
+    "gone": ("has gone", "it has gone"),
+    "moves": ("moves", "it moves"),
+    "stopped": ("has stopped", "it has stopped"),
+    "opens": ("opens", "it opens"),
+    "near": ("is near", "it is near"),
+    "arrives": ("arrives", "somebody arrives"),
+    "told": ("says so", "you say so"),
+    "other": ("", ""),
+}
+"""What an event is called with, and without, a reference."""
+
+
+def condition_words(when: Condition) -> str:
+    """A condition in plain words."""
+    with_reference, alone = _EVENTS[when.event]
+    event = alone if when.ref is None else f"{reference_words(when.ref)} {with_reference}"
+    if when.ref is not None and when.ref.kind in _MANY:
+        event = event.replace(" is ", " are ").replace(" has ", " have ").replace(" moves", " move")
+    return f"{when.type} {event}".strip()
 
 
 def reference_words(reference: Reference) -> str:

@@ -224,10 +224,11 @@ class _Composer:
             yield f"yield from until_passed({name}, {self._pace:g})"
 
     def _yield(self, act: Act) -> Iterator[str]:
-        if act.target is None:
+        target = act.target
+        if target is None or (target.kind in PLURALS and not ground(target, self._seen).fits):
             yield f"yield from until_clear({self._pace:g})"
             return
-        for lines, name in self._user(act.target, act):
+        for lines, name in self._user(target, act):
             yield from lines
             yield f"yield from let_go({name})"
 
@@ -249,6 +250,12 @@ class _Composer:
         relation = "near"
         if act.place is not None and act.place.rel != "here":
             reference, relation = act.place.ref or reference, act.place.rel
+        if (
+            reference is not None
+            and reference.of is not None
+            and reference.kind in ("parking_space", "road", "sidewalk")
+        ):
+            reference, relation = reference.of, "near"
         if reference is None or reference.kind in ("me_here", "road", "lane", "sidewalk", "parking_space"):
             yield f"yield from halt({_LAST_STEPS if self._last else 2 * _STOOD_STEPS})"
             return

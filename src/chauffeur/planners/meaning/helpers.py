@@ -152,10 +152,10 @@ HELPERS: Final[dict[str, str]] = {
     "stand_before_junction": """def stand_before_junction(pace):
     for _ in range(2400):
         state, line = check_traffic_light()
-        left = min(get_distance_to_junction() - 6.0, line - 1.0)
+        left = min(get_distance_to_junction() - 6.0, line - 2.0)
         if left < 0.5:
             break
-        yield proceed(min(check_speed_limit(), pace, max(0.8, (2.4 * left) ** 0.5)))
+        yield proceed(min(check_speed_limit(), pace, max(0.6, (1.5 * left) ** 0.5)))
     yield from halt(80)
 """,
     "look_for": """def look_for(kind, colour, state, side, pace):

@@ -197,7 +197,8 @@ class TownWorld(TownScene):
         road = self.town.road
         place = road.locate(pose.x_m, pose.y_m, pose.heading_rad, ("driving",))
         edge = "" if place is None else self._sumo_lane(place.lane, place.station_m)
-        if place is None or not edge or edge.startswith(":") or actor.kind not in MAKES:
+        apart = place is None or abs(place.offset_m) > _NEAR_LANE_M
+        if place is None or apart or not edge or edge.startswith(":") or actor.kind not in MAKES:
             raise ScenarioError(f"A {actor.kind} cannot set out {actor.ahead_m:g} m ahead: there is no lane for it.")
         assert self._sumo is not None
         edges: list[str] = []
