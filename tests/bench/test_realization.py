@@ -69,6 +69,7 @@ def test_what_a_town_cannot_stage_has_no_scene(acts: list[Any]) -> None:
         ("Turn right.", [RIGHT], "meaning", "whole"),
         ("Turn right.", [{"act": "turn", "side": "left"}], "meaning", "opposite"),  # judged by the label, not the words
         ("Park behind the red car.", [PARK], "meaning", "none"),  # the distractor is red: words and label differ
+        ("Turn right.", [RIGHT], "blind", "none"),
         ("Make a phone call.", [RIGHT], "meaning", "declined"),
         ("Turn right, then enter the parking lot.", [RIGHT], "meaning", "asked"),
     ],
@@ -85,7 +86,7 @@ def test_what_came_of_a_command(tmp_path: Path, text: str, acts: list[Any], read
 def test_it_is_a_benchmark_of_the_kernel(tmp_path: Path) -> None:
     bench = realization(str(commands(tmp_path, ("Turn right.", [RIGHT]), ("Turn round.", [{"act": "u_turn"}]))))
     assert faults(bench) == []
-    assert [item.id for item in bench.items()] == ["c0/labels", "c0/meaning", "c0/keyword"]
+    assert [item.id for item in bench.items()] == ["c0/labels", "c0/meaning", "c0/keyword", "c0/blind"]
 
 
 def test_real_commands_are_staged(commands_data: Path) -> None:

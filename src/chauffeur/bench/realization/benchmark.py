@@ -1,7 +1,8 @@
 """The benchmark: stage, read, ground, compose, check, drive, judge by the labels; a row a command and reader.
 
 `labels` are people's readings, driven by the same composer: what is missing there is missing in grounding, composing or
-driving, not in reading. Any other reader is a planner, which gets the words alone.
+driving, not in reading. `blind` hears nothing and drives on: what is whole there any careful driver does. Any other
+reader is a planner, which gets the words alone.
 """
 
 from __future__ import annotations
@@ -19,7 +20,17 @@ from chauffeur.bench.kernel.benchmark import ItemOutcome, Unasked
 from chauffeur.bench.kernel.metrics import TableSpec, count, share
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.realization.stage import Scene, stage_of
-from chauffeur.concept import ChauffeurError, DataError, Instruction, Limits, Plan, SystemMessage
+from chauffeur.concept import (
+    ChauffeurError,
+    DataError,
+    Instruction,
+    Limits,
+    Plan,
+    Program,
+    ScenarioError,
+    SystemMessage,
+    Thoughts,
+)
 from chauffeur.concept.utterance import Utterance, acts_from_json
 from chauffeur.describe import describe
 from chauffeur.drive.planning import checked, screened_request
@@ -32,7 +43,9 @@ from chauffeur.worlds.town import TownWorld
 
 VERSION: Final = "realization-v1"
 """Stage, judge and rollout together; changes whenever the same command could give another row."""
-LABELS: Final = "labels"
+LABELS, BLIND = "labels", "blind"
+_ON: Final = "def go():\n    while True:\n        yield proceed(check_speed_limit())\n"
+"""What the blind reader drives, whatever was said."""
 MAX_S: Final = 75.0
 """Simulated time of a drive: a red light, a crossing and two junctions."""
 _NOTE: Final = "simulated drives (SUMO), staged scenes; judged by people's labels over the geometry of the drive"
@@ -50,7 +63,7 @@ class RealizationItem:
         command: The command's own id.
         text: The words.
         acts: What people say that they mean, in written form.
-        reader: `labels`, or a planner.
+        reader: `labels`, `blind`, or a planner.
     """
 
     id: str
@@ -95,6 +108,8 @@ def _driven(item: RealizationItem) -> Row:
         plan: Plan
         if item.reader == LABELS:
             plan = MeaningPlanner().plan_of(Utterance(item.text, acts), request)
+        elif item.reader == BLIND:
+            plan = Plan(Thoughts("I drive on."), Program(_ON), planner=BLIND)
         else:
             plan = asyncio.run(make_planner(item.reader).plan(request))
         found = checked(plan, seen, Limits(), DEFAULT_CHECKS)
@@ -103,7 +118,10 @@ def _driven(item: RealizationItem) -> Row:
             return {"came": came, "detail": found.refusal, "acts": [], "collision": False, "seconds": 0.0}
         ids = {reference: tuple(world.staged[k] for k in places) for reference, places in scene.referents.items()}
         referee = MeaningReferee(world, acts, "labels", ids)
-        episode = drive_policy(world, plan.policy, referee, MAX_S, Limits())
+        try:
+            episode = drive_policy(world, plan.policy, referee, MAX_S, Limits())
+        except ScenarioError as error:  # known only when the policy meets the world
+            return {"came": "declined", "detail": str(error), "acts": [], "collision": False, "seconds": 0.0}
         judged = [{"act": one.act.act, "result": one.result, "why": one.why} for one in referee.judged]
         return {
             "came": _came([one["result"] for one in judged]),
@@ -174,7 +192,7 @@ class RealizationBenchmark(Unasked):
 
         Args:
             commands: A JSONL file of labelled commands, or a folder of them.
-            readers: `labels` and planners.
+            readers: `labels`, `blind` and planners.
             most: How many commands, spread evenly over the files; 0 for all.
 
         Raises:
@@ -271,11 +289,11 @@ def _labelled(commands: Path) -> list[Row]:
             acts_from_json(cast("dict[str, Any]", row)["acts"])
             found.append(cast("Row", row))
     if not found:
-        raise DataError(f"There are no labelled commands in {commands}.", hint="Give --data FOLDER.")
+        raise DataError(f"There are no labelled commands in {commands}.", hint="Give -o data=FOLDER.")
     return found
 
 
-def realization(data: str = "", readers: str = "labels,meaning,keyword", items: int = 0) -> RealizationBenchmark:
+def realization(data: str = "", readers: str = "labels,meaning,keyword,blind", items: int = 0) -> RealizationBenchmark:
     """The benchmark, as its entry point gives it.
 
     Args:
@@ -285,6 +303,6 @@ def realization(data: str = "", readers: str = "labels,meaning,keyword", items: 
     """
     if not data:
         raise DataError(
-            "Realization needs labelled commands.", hint="Give --data FOLDER; docs/meaning.md has the form."
+            "Realization needs labelled commands.", hint="Give -o data=FOLDER; docs/meaning.md has the form."
         )
     return RealizationBenchmark(Path(data), [one.strip() for one in readers.split(",") if one.strip()], items)
