@@ -37,7 +37,8 @@ Referents = Mapping[Reference, tuple[int, ...]]
 """Ids of the road users that references mean, where a stage names them."""
 
 STOOD_S: Final = 2.5
-FOLLOWED_S: Final = 15.0
+FOLLOWED_S, FOLLOWED_ON_S = 12.0, 40.0
+"""A road user is followed once it was for 12 s and over a junction, where ways part, or for 40 s."""
 PERIOD_S: Final = 0.1
 """Instants of a drive are looked at so often."""
 _EVERY_S: Final = 1.0
@@ -51,7 +52,7 @@ _ASIDE_M: Final = 5.5
 _NEAR_M: Final = 12.0
 _GAP_M: Final = 45.0
 _ON_M, _ALONG_M = 10.0, 40.0
-_SLOWER: Final = 0.8
+_SLOWER, _SLOWLY, _USUAL_SHARE, _ROLLS_MPS = 0.85, 0.7, 0.6, 3.0
 _PACE_MPS: Final = 1.0
 _ENDED_S: Final = 6.0
 _VEHICLES: Final[frozenset[AgentKind]] = frozenset({"car", "truck", "bus", "motorcycle", "bicycle"})
@@ -393,12 +394,13 @@ class _Judging:
         if not users:
             return "not_judged", start, "nobody that was meant was in sight"
         best = max((self._followed(number, start) for number in users), key=lambda one: one[0])
-        if best[0] >= FOLLOWED_S:
+        if best[0] > 0.0:
             return "done", best[1], ""
-        return "not_done", start, f"it was followed for {best[0]:.0f} s only"
+        return "not_done", start, "it was not followed for long enough, or not where it went"
 
     def _followed(self, number: int, start: int) -> tuple[float, int]:
-        """(longest time, instant of its end) for which the car drove on the path of a road user, some way behind it."""
+        """(time, instant of its end) for which the car drove on the path of a road user, some way behind it; 0 where it
+        was too short."""
         path: list[tuple[float, float]] = []
         longest, at, since, moved = 0.0, start, -1, 0.0
         for i in range(len(self._all)):
@@ -423,7 +425,8 @@ class _Judging:
             if since < 0:
                 since, moved = i, 0.0
             lasted = self._all[i].time_s - self._all[since].time_s
-            if moved > 15.0 and lasted > longest:
+            parted = any(since < one.enters and one.leaves <= i for one in self._passages)
+            if moved > 15.0 and lasted >= (FOLLOWED_S if parted else FOLLOWED_ON_S) and lasted > longest:
                 longest, at = lasted, i
         return longest, at
 
@@ -541,31 +544,47 @@ class _Judging:
     def _speed(self, act: Act, start: int) -> _Found:
         if not self._all:
             return "not_done", start, "nothing was driven"
-        began = self._all[start].ego.speed_mps
         factor = {"mph": MPS_PER_MPH, "m/s": 1.0}.get(act.unit, MPS_PER_KMH)
-        wanted = None if act.value is None else act.value * factor
         abreast = None
         if act.when is not None and act.when.ref is not None and act.when.type == "while":
             abreast = self.meant(act.when.ref, start)
-        held = -1
+        if act.value is None and act.direction != "faster" and abreast is None:
+            return self._slower(start)
+        began, held = self._all[start].ego.speed_mps, -1
         for i in range(start, len(self._all)):
             instant = self._all[i]
-            lane = self._trace.road.get(instant.ego.lane)
-            limit = 13.9 if lane is None else lane.speed_limit_mps
             if abreast is not None and not any(self._abreast(i, number) for number in abreast):
                 held = -1
                 continue
             speed = instant.ego.speed_mps
-            if wanted is not None:
-                fits = abs(speed - wanted) <= _PACE_MPS
+            if act.value is not None:
+                fits = abs(speed - act.value * factor) <= _PACE_MPS
             elif act.direction == "faster":
-                fits = speed > max(began + _PACE_MPS, 0.0)
+                fits = speed > began + _PACE_MPS
             else:
-                fits = speed < max(_SLOWER * limit, 0.0) and speed > _STANDS_MPS
+                fits = _STANDS_MPS < speed < _SLOWLY * self._limit_mps(i)
             held = -1 if not fits else i if held < 0 else held
             if fits and instant.time_s - self._all[held].time_s >= 1.0:
                 return "done", i, ""
         return "not_done", start, "the speed was not reached"
+
+    def _slower(self, start: int) -> _Found:
+        """That the car drives slower than it did, or than one usually does where it has just set off."""
+        began = self._all[start].ego.speed_mps
+        rolls = began > _ROLLS_MPS
+        first, last = (2.0, 6.0) if rolls else (4.0, 12.0)
+        most = _SLOWER * max(began, _USUAL_SHARE * self._limit_mps(start))
+        at = self._all[start].time_s
+        window = [one for one in self._all[start:] if first <= one.time_s - at <= last]
+        if not window or window[-1].time_s - at < last - 2.0 * PERIOD_S:
+            return "not_done", start, "it was not driven for long enough"
+        if max(one.ego.speed_mps for one in window) >= most:
+            return "not_done", start, "the car did not drive slower"
+        return "done", start + len(window), ""
+
+    def _limit_mps(self, i: int) -> float:
+        lane = self._trace.road.get(self._all[i].ego.lane)
+        return math.inf if lane is None else lane.speed_limit_mps
 
     def _abreast(self, i: int, number: int) -> bool:
         agent, ego = self._all[i].agents.get(number), self._all[i].ego

@@ -18,6 +18,8 @@ TOWN: Final = "Gridford"
 LEFT_LANE, RIGHT_LANE = ("4:0:-1", 6.0), ("4:0:-2", 6.0)
 """A street of two lanes each way, 60 m before a junction with lights; left turns from the one, right from the other."""
 SEED: Final = 1
+_ROLLING_MPS: Final = 10.0
+"""Of a car that is to change its speed: from a stand whatever it does is slower than that."""
 _KERB_M: Final = -2.8
 _KERB_PLACES_M: Final = (44.0, 30.0, 20.0)
 _AFTER_TURN_M: Final = (112.0, 96.0)
@@ -41,18 +43,20 @@ class Scene:
 
     Attributes:
         start: Lane and station at which the ego begins.
+        speed_mps: Of the ego there.
         actors: The stage.
         referents: Which of them each reference means, by place on the stage.
     """
 
     start: tuple[str, float]
+    speed_mps: float = 0.0
     actors: list[StagedActor] = field(default_factory=list[StagedActor])
     referents: dict[Reference, tuple[int, ...]] = field(default_factory=dict[Reference, tuple[int, ...]])
 
     def scenario(self, name: str) -> Scenario:
         """As a world takes it."""
         config: dict[str, Any] = {
-            "town": TOWN, "start": list(self.start), "vehicles": 0, "people": 0,
+            "town": TOWN, "start": list(self.start), "vehicles": 0, "people": 0, "ego_speed": self.speed_mps,
             "stage": [one.model_dump(mode="json", exclude_defaults=True) for one in self.actors],
         }  # fmt: skip
         return Scenario(f"realization-{name}", "town", config, SEED)
@@ -71,7 +75,7 @@ def stage_of(acts: Sequence[Act]) -> Scene | None:
     first = turns[0].side if turns and turns[0].act == "turn" else None
     lanes = [act.side for act in wanted if act.act == "lane"]
     left = lanes[0] == "right" if lanes else first == "left"
-    scene = Scene(LEFT_LANE if left else RIGHT_LANE)
+    scene = Scene(LEFT_LANE if left else RIGHT_LANE, _ROLLING_MPS if wanted[0].act == "speed" else 0.0)
     side: tuple[Any, ...] = ()
     try:
         for act in wanted:
@@ -133,7 +137,8 @@ def _actor(
     if reference.state == "turning" or (moves and reference.side == "right" and act.act != "lane"):
         raise _UnstagedError
     if role == "follow" and kind not in ("pedestrian", "static", "obstacle"):
-        return StagedActor(kind=kind, colour=colour, ahead_m=18.0, drives=True, turns=way)
+        turns = way or (("left",) if scene.start == LEFT_LANE else ("right",))  # where it goes decides, not the road
+        return StagedActor(kind=kind, colour=colour, ahead_m=18.0, drives=True, turns=turns)
     if role == "moves" and not way and kind != "pedestrian":
         return StagedActor(kind=kind, colour=colour, ahead_m=16.0, speed_mps=7.0, after_s=6.0, for_m=200.0)
     if moves and kind not in ("pedestrian", "static", "obstacle") and not way:

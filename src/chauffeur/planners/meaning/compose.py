@@ -18,7 +18,7 @@ from chauffeur.planners.meaning.helpers import helpers_used
 ANY_PACE: Final = 70.0
 """m/s: no slower than the limit."""
 _SLOW_SHARE: Final = 0.5
-_SLOWER: Final = 0.7
+_SLOWER: Final = 0.6
 _LEAST_MPS: Final = 2.0
 _LOOKING_MPS, _LOOKS_FROM_M = 7.0, 18.0
 """Behind a junction what is to be found there is looked for from so far on, at no more than this speed."""
