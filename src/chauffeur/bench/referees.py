@@ -18,6 +18,7 @@ from chauffeur.concept import (
 )
 from chauffeur.drive.episode import Referee
 from chauffeur.drive.fulfilment import Fulfilment, can_be_judged
+from chauffeur.drive.realised import MeaningReferee
 from chauffeur.geometry import Pose, Turn
 from chauffeur.language.wanted import read_wanted
 from chauffeur.safety.constant_calls import read_program
@@ -29,6 +30,8 @@ TURN_CALLS: Final[dict[str, Turn]] = {
     "turn_right_at_next_intersection": "right",
     "go_straight_at_next_intersection": "straight",
 }
+MEANING: Final = "meaning"
+"""The planner whose acts can be judged one by one: what it goes by is the meaning of the words."""
 _STOPS: Final = ("stop", "pull_over", "park")
 _TURNS: Final[tuple[Turn, ...]] = ("left", "right", "straight")
 RED_S: Final = 90.0
@@ -41,11 +44,16 @@ def referee_for(world: World, scenario: Scenario, plan: Plan, wish: str = "") ->
     trajectory's end.
 
     Ways, sides, stops and speeds are those of the words, read by rules that see no plan; where they say none, those of
-    the plan. A place is the plan's: found by the planner, reached by the world's own geometry.
+    the plan. A place is the plan's: found by the planner, reached by the world's own geometry. Of the planner that
+    drives by the meaning of words, each act is judged by itself.
 
     Raises:
         ScenarioError: There is no such spot.
     """
+    if plan.planner == MEANING and world.capabilities.places and world.capabilities.turns:
+        from chauffeur.language.meaning.reader import read
+
+        return MeaningReferee(world, read(wish).acts, "reading")
     if isinstance(plan.policy, Trajectory) and world.capabilities.turns and world.capabilities.places:
         return _end_referee(world, plan.policy, waits_s=RED_S)
     if world.capabilities.places:

@@ -25,6 +25,7 @@ from chauffeur.camera.ground import stop_lines
 from chauffeur.camera.place import CameraPlace, place_of
 from chauffeur.camera.solids import Pile, Solids, X, Y, together
 from chauffeur.concept import ScenarioError
+from chauffeur.concept.paint import PAINT_RGB
 from chauffeur.geometry import Pose, RoadGraph, wrap_to_pi
 
 if TYPE_CHECKING:
@@ -284,7 +285,7 @@ def _body(
     origin_m: tuple[float, float],
     world: Pose,
 ) -> BodyShape:
-    paint = paints[(agent.id * 7 + 3) % len(paints)]
+    paint = paints[(agent.id * 7 + 3) % len(paints)] if agent.colour is None else PAINT_RGB[agent.colour]
     moving = kind in ("car", "suv", "truck", "bus", "motorcycle", "bicycle")
     parked = moving and _parked(agent, road)
     near = math.hypot(agent.x_m - world.x_m, agent.y_m - world.y_m) < DETAIL_M

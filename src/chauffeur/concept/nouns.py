@@ -6,9 +6,12 @@ All are frozen values. The paper's letter stands in each docstring.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Literal, NewType
+from typing import TYPE_CHECKING, Any, Literal, NewType
 
 from chauffeur.concept.images import CameraImage
+
+if TYPE_CHECKING:
+    from chauffeur.concept.scene import Observation
 
 PersonId = NewType("PersonId", str)
 """Name a person's memory is kept under; only `memory` knows what file that means."""
@@ -391,7 +394,11 @@ LAMPILOT_LIMITS = Limits(name="lampilot", max_over_limit_mps=9.0, min_time_headw
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """Everything a planner is given: I, C, S, H, V (pictures), the limits it is told of, and earlier rounds."""
+    """Everything a planner is given: I, C, S, H, V (pictures), the limits it is told of, and earlier rounds.
+
+    `observation` is the instant that C describes, as values, for planners that look for what words point at; None where
+    there is none, or the planner is to see by pictures alone.
+    """
 
     instruction: Instruction
     context: Context
@@ -400,6 +407,7 @@ class PlanRequest:
     rounds: tuple[Round, ...] = ()
     limits: Limits = field(default_factory=Limits)
     images: tuple[CameraImage, ...] = ()
+    observation: Observation | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -444,6 +452,7 @@ class Plan:
         raw: The reply as it came, for the record.
         scene: C as the planner itself saw it in pictures, in words; memory keeps it (Eq. 23). Empty without pictures.
         alarm: Where the words were understood as an alarm; empty where they were not.
+        unused: Parts of the wish, as said, that the policy does not use; None where the planner does not tell.
     """
 
     thoughts: Thoughts
@@ -459,6 +468,7 @@ class Plan:
     raw: str = ""
     scene: str = ""
     alarm: Alarm = ""
+    unused: tuple[str, ...] | None = None
 
 
 MismatchKind = Literal[
@@ -578,10 +588,11 @@ Outcome = Literal["success", "failure", "collision", "off_road", "timeout", "end
 """What happened. Why it happened is in `Causes`."""
 
 
-JudgedBy = Literal["words", "plan", "goal", "place"]
+JudgedBy = Literal["words", "plan", "goal", "place", "reading", "labels"]
 """What a drive is held against: the words, read by rules that see no plan; what the planner says it understood, where
 the rules read nothing in the words (judge and judged then share that reading); the scenario's own goal; the place that
-the plan leads to, found by the planner and reached by the world's own geometry."""
+the plan leads to, found by the planner and reached by the world's own geometry; the learned reading of the words, which
+the planner shares, over geometry that it does not; labels by people, over the same geometry."""
 
 
 @dataclass(frozen=True, slots=True)

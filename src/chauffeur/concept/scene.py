@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
 from chauffeur.concept.nouns import Lead, ParkingLot
+from chauffeur.concept.utterance import Colour
 from chauffeur.geometry import Box, LaneId, RoadGraph, Route, Turn
 
 
@@ -52,6 +53,7 @@ class VehicleState:
         acceleration_mps2: Along its heading; 0 where the world does not say.
         yaw_rate_radps: Counter-clockwise; 0 where the world does not say.
         steering_rad: Angle of the front wheels, positive to the left; 0 where the world does not say.
+        colour: Of its paint, or a person's clothes; None where the world does not say.
     """
 
     id: int
@@ -67,6 +69,7 @@ class VehicleState:
     acceleration_mps2: float = 0.0
     yaw_rate_radps: float = 0.0
     steering_rad: float = 0.0
+    colour: Colour | None = None
 
     @property
     def box(self) -> Box:

@@ -223,7 +223,7 @@ def _act_from_json(row: Any) -> Act:
         unit=str(said.pop("unit", "")),
     )
     if target is not None:
-        act = replace(act, target=_reference_from_json(target))
+        act = replace(act, target=reference_from_json(target))
     if place is not None:
         held = dict(_mapping(place, "a place"))
         act = replace(
@@ -244,10 +244,11 @@ def _act_from_json(row: Any) -> Act:
 
 
 def _held_reference(value: Any) -> Reference | None:
-    return None if value is None else _reference_from_json(value)
+    return None if value is None else reference_from_json(value)
 
 
-def _reference_from_json(value: Any, depth: int = 0) -> Reference:
+def reference_from_json(value: Any, depth: int = 0) -> Reference:
+    """A reference of its written form. Raises DataError for what the language of acts does not have."""
     if depth > _DEEPEST:
         raise DataError(f"References are nested more than {_DEEPEST} deep.")
     said = dict(_mapping(value, "a reference"))
@@ -257,7 +258,7 @@ def _reference_from_json(value: Any, depth: int = 0) -> Reference:
         name=str(said.pop("name", "")),
     )
     if (of := said.pop("of", None)) is not None:
-        found = replace(found, of=_reference_from_json(of, depth + 1))
+        found = replace(found, of=reference_from_json(of, depth + 1))
     if (ordinal := said.pop("ordinal", None)) is not None:
         found = replace(found, ordinal=int(ordinal))
     for name in list(said):

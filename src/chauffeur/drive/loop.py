@@ -47,7 +47,7 @@ class LoopMemory(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Stages:
-    """The loop's exchangeable parts, one per arrow of the figure; `see` takes the pictures for planners that look."""
+    """The loop's exchangeable parts; `see` takes pictures for planners that look, `shows` gives them the instant."""
 
     world: World
     describe: Callable[[Observation], Context]
@@ -58,6 +58,7 @@ class Stages:
     execute: Callable[[PlanRequest, Plan, tuple[Verdict, ...], Scenario, int], Trip]
     tell: Listener = nobody_listens
     see: Callable[[Observation], tuple[CameraImage, ...]] = no_pictures
+    shows: bool = True
 
 
 def steps_of(stages: Stages, observation: Observation, limits: Limits) -> PlanSteps:
@@ -81,6 +82,7 @@ def steps_of(stages: Stages, observation: Observation, limits: Limits) -> PlanSt
         own=lambda text: planned_for(text, observation),
         check=check,
         see=lambda: stages.see(observation),
+        observe=lambda: observation if stages.shows else None,
         tell=stages.tell,
     )
 
@@ -88,7 +90,6 @@ def steps_of(stages: Stages, observation: Observation, limits: Limits) -> PlanSt
 async def drive(I: Instruction, scenario: Scenario, seed: int, limits: Limits, stages: Stages) -> Trip:  # noqa: E741, N803
     """One wish, from the words to the remembered trip."""
     observation = stages.world.reset(scenario, seed)
-
     planned = await plan_once(I, steps_of(stages, observation, limits))  # C, H, S, R, P, V
 
     trip = stages.execute(planned.request, planned.plan, planned.verdicts, scenario, seed)  # P, if no verdict stops it

@@ -54,6 +54,7 @@ _VEHICLE = _object(
     acceleration_mps2=_number("Along the heading"),
     yaw_rate_radps=_number("Counter-clockwise"),
     steering_rad=_number("Front wheels, positive to the left"),
+    colour={"type": ["string", "null"], "description": "Of its paint or clothes, where the world says one"},
 )
 _COMMAND = _object(
     acceleration_mps2=_number("Along the heading"), steering_rad=_number("Front wheels, positive to the left")
@@ -108,6 +109,7 @@ PLAN = Channel(
         offer=_text("the wish that a yes stands for, where the refusal is a question"),
         intent=_text(),
         alarm=_text("stop or distress, where the words were taken for that"),
+        unused={"type": ["array", "null"], "description": "Parts of the wish that the policy does not use"},
         settings=_SETTINGS,
         planner=_text(),
         model=_text(),
@@ -158,7 +160,7 @@ TRIP = Channel(
         record=_array(_array({}), "[name, value] pairs of provenance"),
         unused=_array(_text(), "Parts of the wish that the plan does not use"),
         parts_done={"type": ["array", "null"]},
-        judged_by=_text("words, plan, goal, place, or empty"),
+        judged_by=_text("words, plan, goal, place, reading, labels, or empty"),
     ),
 )
 LANES = Channel(

@@ -93,6 +93,10 @@ def no_pictures(observation: Observation) -> tuple[CameraImage, ...]:
     return ()
 
 
+def _unseen() -> None:
+    return None
+
+
 def _as_it_is(plan: Plan) -> Plan:
     return plan
 
@@ -111,6 +115,7 @@ class PlanSteps:
         check: V, at the latest instant there is. Its second argument tells that the plan is the car's own.
         check_yes: V of what a yes would drive, where `check` leaves that to another process.
         see: V of the paper: pictures, for planners that look.
+        observe: The instant that C describes, for planners that look for what words point at.
         fit: What the vehicle takes of a plan, whose maker knows no vehicle.
         tell: Hears each letter as it comes.
         within_s: Time of the clock after which the planner is given up on.
@@ -126,6 +131,7 @@ class PlanSteps:
     check: Callable[[Plan, bool], Awaitable[Judged]]
     check_yes: Callable[[Plan, bool], Awaitable[Judged]] | None = None
     see: Callable[[], tuple[CameraImage, ...]] = tuple
+    observe: Callable[[], Observation | None] = _unseen
     fit: Callable[[Plan], Plan] = _as_it_is
     tell: Listener = nobody_listens
     within_s: float = math.inf
@@ -198,7 +204,8 @@ async def request_once(instruction: Instruction, steps: PlanSteps) -> PlanReques
     images = steps.see()
     if images:
         steps.tell(DriveEvent("view", value=images))
-    return screened_request(instruction, context, system, history, limits=steps.limits, images=images)
+    seen = steps.observe()
+    return screened_request(instruction, context, system, history, limits=steps.limits, images=images, observation=seen)
 
 
 def screened_request(
@@ -209,12 +216,13 @@ def screened_request(
     rounds: tuple[Round, ...] = (),
     limits: Limits = _USUAL_LIMITS,
     images: tuple[CameraImage, ...] = (),
+    observation: Observation | None = None,
 ) -> PlanRequest:
     """What a planner is given, in a drive or a benchmark: put together here alone, and screened.
 
     The arguments are those of `PlanRequest`.
     """
-    return screen_request(PlanRequest(instruction, context, system, history, rounds, limits, images))[0]
+    return screen_request(PlanRequest(instruction, context, system, history, rounds, limits, images, observation))[0]
 
 
 async def _planned(request: PlanRequest, steps: PlanSteps) -> Plan:

@@ -172,6 +172,7 @@ class Session:
             execute=partial(self._execute, world),
             tell=self.tell,
             see=partial(self._see, SeatCamera(world, seed)) if looks(self.planner) else no_pictures,
+            shows=self.seeing is None,
         )
 
     def _see(self, camera: SeatCamera, observation: Observation) -> tuple[CameraImage, ...]:

@@ -126,7 +126,8 @@ def account_of(wish: str, plan: Plan) -> WishAccount:
     known = _known_to(plan)
     unused = [one for one in parts if one in left_out or (one.kind != "act" and not _is_known(one, known))]
     defied = [one.words for one in parts if one.denied and one.kind == "act" and _does(one, planned)]
-    return WishAccount(tuple(served), tuple(dict.fromkeys(one.words for one in unused)), tuple(defied))
+    told = tuple(dict.fromkeys(one.words for one in unused)) if plan.unused is None else plan.unused
+    return WishAccount(tuple(served), told, tuple(defied))
 
 
 TOLD_NOT_TO_CHECK: Final = "told-not-to-v1"

@@ -13,6 +13,7 @@ from pathlib import Path
 from PIL import Image, ImageDraw, ImageFont
 
 from chauffeur.concept import DataError, Observation, VehicleState
+from chauffeur.concept.paint import css_colour
 from chauffeur.concept.units import people_speed
 from chauffeur.drive.files import publish
 from chauffeur.drive.recording import RecordedTrip
@@ -265,7 +266,8 @@ class _Panel:
             elif thing.kind == "static":
                 self._cone(thing)
         for car in shot.others:
-            self._body(car, _CRASH if car.crashed else _CAR, _CAR_EDGE)
+            paint = _CAR if car.colour is None else css_colour(car.colour)
+            self._body(car, _CRASH if car.crashed else paint, _CAR_EDGE)
         self._body(shot.ego, _CRASH if shot.ego.crashed else _EGO, _EGO_EDGE, halo=True)
 
     def ring(self, ego: VehicleState) -> None:

@@ -27,6 +27,7 @@ from chauffeur.concept import (
     Verdict,
     result_of,
 )
+from chauffeur.concept.paint import css_colour
 from chauffeur.concept.results import result_of_stored
 from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH, SpeedUnit
 from chauffeur.drive.recording import RecordedTrip
@@ -348,6 +349,7 @@ def _cars(shots: tuple[Observation, ...], sight: Bounds) -> list[Json]:
             "l": states[0].length_m,
             "w": states[0].width_m,
             "k": states[0].kind,
+            **({} if states[0].colour is None else {"paint": css_colour(states[0].colour)}),
             "v": [round(state.speed_mps, 1) for state in states],
             **_column(states),
         }

@@ -2,10 +2,10 @@
 
 A vocabulary is the part of the table that a kind of road understands: `road` is LaMPilot's, `town` adds the paper's
 town calls (Sec. IV-B: `check_front_vehicle`, `check_speed_limit`, `stop`, `proceed`) and those for lights, people,
-junctions and places. Prompt documentation (`render_docs`), the static gate's signatures (`argument_problem`) and the
-run-time binding all read it. Names and meanings of roads are those of the public LaMPilot benchmark, so its programs
-run unchanged; `get_speed_limit` is ours. A vehicle or lane is an opaque handle: a program passes it on, compares it
-with `==` or tests it for None, and can do nothing else with it.
+junctions, places and single road users (`agent`). Prompt documentation (`render_docs`), the static gate's signatures
+(`argument_problem`) and the run-time binding all read it. Names and meanings of roads are those of the public LaMPilot
+benchmark, so its programs run unchanged; `get_speed_limit` is ours. A vehicle or lane is an opaque handle: a program
+passes it on, compares it with `==` or tests it for None, and can do nothing else with it.
 """
 
 from __future__ import annotations
@@ -121,6 +121,7 @@ def _param_stub(param: Param) -> str:
 
 
 _VEH = Param("veh", "vehicle", "a vehicle")
+_VEH_OR_GONE = Param("veh", "vehicle", "a vehicle; None is one that is out of sight", optional=True)
 _VEH_OR_EGO = Param("veh", "vehicle", "a vehicle; None is the ego", default=None, optional=True)
 _LANE_OR_EGO = Param("lane", "lane", "a lane; None is the lane the ego is in", optional=True)
 _DISTANCE = Param("distance", "number", "how far to look", "m", default=100.0, low=0.0, high=2000.0)
@@ -394,6 +395,119 @@ TOWN_CALLS: Final[tuple[Api, ...]] = (
         "flag",
         "if not change_lane_right(): ...",
         result="whether there is such a lane",
+        effect="wish",
+    ),
+    Api(
+        "agent",
+        "A road user in sight by its number, as the situation tells it.",
+        "vehicle",
+        "car = agent(17)",
+        result="the vehicle or person, or None where none with that number is in sight any more",
+        maybe_none=True,
+        params=(Param("label", "number", "its number", low=0.0, high=1e9),),
+    ),
+    Api(
+        "see",
+        "The road user that a description means, as a passenger would mean it: of several the nearest ahead. Empty "
+        "texts leave an attribute open.",
+        "vehicle",
+        'car = see("car", "black", "parked", "right")',
+        result="the vehicle or person, or None where none such is in sight",
+        maybe_none=True,
+        params=(
+            Param("kind", "text", "car, truck, bus, van, motorcycle, bicycle, pedestrian or vehicle"),
+            Param("colour", "text", "its colour"),
+            Param("state", "text", "parked, moving, stopped, oncoming, turning, crossing, walking or standing"),
+            Param("side", "text", "left or right of the ego"),
+        ),
+    ),
+    Api(
+        "in_sight",
+        "Whether a road user is still in sight.",
+        "flag",
+        "if not in_sight(agent(17)): ...",
+        params=(_VEH_OR_GONE,),
+    ),
+    Api(
+        "get_distance_to",
+        "Distance along the ego's way to a road user, parked ones beside it included.",
+        "place",
+        "is_ahead, distance = get_distance_to(agent(17))",
+        result=f"(whether it is ahead, m from the front bumper to its near end); {NOTHING_AHEAD_M:g} m where it is not",
+        params=(_VEH,),
+    ),
+    Api(
+        "is_moving",
+        "Whether a road user moves.",
+        "flag",
+        "if is_moving(agent(17)): ...",
+        params=(_VEH,),
+    ),
+    Api(
+        "has_gone",
+        "Whether a road user has crossed or left the ego's way, is behind the ego, or out of sight.",
+        "flag",
+        "if has_gone(agent(17)): ...",
+        params=(_VEH_OR_GONE,),
+    ),
+    Api(
+        "has_passed",
+        "Whether the ego has passed a road user: all of it is behind the ego.",
+        "flag",
+        "if has_passed(agent(17)): ...",
+        params=(_VEH_OR_GONE,),
+    ),
+    Api(
+        "is_clear",
+        "Whether nobody who crosses the ego's way has to be let go first.",
+        "flag",
+        "if is_clear(): ...",
+    ),
+    Api(
+        "follow",
+        "Drives behind a road user, in its lane and the way it goes, within the speed limit. Yield it in every step.",
+        "action",
+        "yield follow(agent(17))",
+        result="[speed wanted m/s]",
+        params=(_VEH,),
+        effect="wish",
+    ),
+    Api(
+        "stop_behind",
+        "Drives on, and stands a few metres behind a road user, a parked one beside the way included. Yield it in "
+        "every step.",
+        "action",
+        "yield stop_behind(agent(17))",
+        result="[speed wanted m/s]",
+        params=(_VEH,),
+        effect="wish",
+    ),
+    Api(
+        "stop_beside",
+        "Drives on, and stands beside a road user. Yield it in every step.",
+        "action",
+        "yield stop_beside(agent(17))",
+        result="[speed wanted m/s]",
+        params=(_VEH,),
+        effect="wish",
+    ),
+    Api(
+        "stop_beyond",
+        "Drives past a road user that stands beside the way, and stands a few metres in front of it. Yield it in every "
+        "step.",
+        "action",
+        "yield stop_beyond(agent(17))",
+        result="[speed wanted m/s]",
+        params=(_VEH,),
+        effect="wish",
+    ),
+    Api(
+        "give_way_to",
+        "Drives on, and waits before the place where a road user crosses or may cross the way. Yield it in every step.",
+        "action",
+        "yield give_way_to(agent(17))",
+        result="[speed wanted m/s]",
+        params=(_VEH,),
         effect="wish",
     ),
     Api(

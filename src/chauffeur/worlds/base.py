@@ -100,6 +100,32 @@ class StreetPerception(Perception, Protocol):
         """The lane to the right (negative: left) that the ego may change into from its own; None without."""
         ...
 
+    def look(self) -> Observation:
+        """The present instant."""
+        ...
+
+    def on_way(self, vehicle_id: int) -> tuple[float, float, float]:
+        """Where a road user is by the ego's way: (m from the front bumper to its middle, negative behind it; m to the
+        left of the way; m/s to the left). Raises KeyError for an id that nobody around has."""
+        ...
+
+    def crosses_at(self, vehicle_id: int) -> float | None:
+        """Distance to where a road user that is beside the way will come onto it, or would from where it stands; None
+        where it will not. Raises KeyError."""
+        ...
+
+    def turn_after(self, vehicle_id: int) -> Turn | None:
+        """The way at the next junction that a road user ahead has taken; None while it has taken none."""
+        ...
+
+    def lane_after(self, vehicle_id: int) -> LaneId | None:
+        """The lane of a road user ahead on the ego's own street; None where it is on another."""
+        ...
+
+    def is_clear(self) -> bool:
+        """Whether no road user that crosses the way is being let go first."""
+        ...
+
     def place_ahead(self, name: str) -> float | None:
         """Distance to a place by its name or kind; None where it does not lie ahead on this way."""
         ...

@@ -194,6 +194,7 @@ class Planning:
             check=later,
             check_yes=now,
             see=lambda: self._see(observation),
+            observe=lambda: observation,
             within_s=PLAN_WITHIN_S,
             runs=request.runs,
         )

@@ -180,7 +180,7 @@ function makeStage() {
   function drawPerson(body, at) {
     ctx.beginPath();
     ctx.arc(sx(at.x), sy(at.y), Math.max(3.5, body.w * 0.75 * view.scale), 0, 2 * Math.PI);
-    ctx.fillStyle = at.crashed ? colour.bad : '#e08a1e';
+    ctx.fillStyle = at.crashed ? colour.bad : body.paint || '#e08a1e';
     ctx.fill();
     ctx.lineWidth = 1.25;
     ctx.strokeStyle = '#3d2a08';
@@ -348,7 +348,7 @@ function makeStage() {
     for (const car of drive.cars) {
       if (!present(car, at)) continue;
       if (car.k === 'pedestrian') drawPerson(car, pose(car, at));
-      else drawBody(car, pose(car, at), colour.car, colour['car-edge'], false);
+      else drawBody(car, pose(car, at), car.paint || colour.car, colour['car-edge'], false);
     }
     ctx.shadowColor = colour['ego-fill'];
     ctx.shadowBlur = 16;

@@ -125,6 +125,8 @@ class TownDriver:
         self._meetings: list[Meeting] = []
         self._tick = 0
         self.why = ""
+        self.lets_go_first = False
+        """Whether it waits, or slows down, for a road user whose way crosses its own."""
 
     def head_for(self, route: Route) -> None:
         """Go somewhere else from here on."""
@@ -192,7 +194,7 @@ class TownDriver:
     def lanes_here(self) -> tuple[LaneId, ...]:
         """The lanes of the line that the car may be in: from its rear axle's to what is a few metres ahead of it."""
         first, _ = self._stretch.lane_at(self._station - 1.0)
-        last, _ = self._stretch.lane_at(self._station + self._nose_m + _HERE_M)
+        last, _ = self._stretch.lane_at(self._station + self.nose_m + _HERE_M)
         return tuple(lane.id for lane in self._stretch.lanes[first : last + 1])
 
     def lanes_ahead(self) -> tuple[LaneId, ...]:
@@ -223,7 +225,7 @@ class TownDriver:
         nearest = self._ahead
         if nearest is None:
             return None
-        gap = nearest.first_m - self._station - self._nose_m
+        gap = nearest.first_m - self._station - self.nose_m
         away = gap + (self._chassis.length_m + nearest.other.length_m) / 2.0
         return Lead(nearest.other.id, max(0.0, away), nearest.along_mps) if away > 0.0 else None
 
@@ -233,11 +235,11 @@ class TownDriver:
         nearest = self._ahead
         if nearest is None:
             return None
-        return max(0.0, nearest.first_m - self._station - self._nose_m), max(0.0, nearest.along_mps)
+        return max(0.0, nearest.first_m - self._station - self.nose_m), max(0.0, nearest.along_mps)
 
     def light_ahead(self) -> tuple[SignalState, float] | None:
         """(state, m from the front bumper to the stop line) of the next light on the line; None where none is near."""
-        seen, nose = self._look(), self._station + self._nose_m
+        seen, nose = self._look(), self._station + self.nose_m
         lights = {lane: signal for signal in seen.signals for lane in signal.lanes}
         line_m = partial(self._stop_lines.line_m, self._stretch)
         at, _ = self._stretch.lane_at(self._station - 2.0)
@@ -285,7 +287,7 @@ class TownDriver:
         or where the way is free and will follow the wish."""
         if not self._goal and self._turn is None:
             return None
-        at, lane = self._stretch.lane_at(self._station + self._nose_m)
+        at, lane = self._stretch.lane_at(self._station + self.nose_m)
         if lane.junction or lane.road != wish.road:
             return None
         changes = self._corridor.changes[self._stretch.layer + at]
@@ -313,7 +315,7 @@ class TownDriver:
     # Where ------------------------------------------------------------------------------------------------------------
 
     @property
-    def _nose_m(self) -> float:
+    def nose_m(self) -> float:
         """From the rear axle to the front bumper."""
         return self._chassis.rear_to_middle_m + self._chassis.length_m / 2.0
 
@@ -404,11 +406,11 @@ class TownDriver:
         """Begin or end a change of lanes."""
         ego, stretch = seen.ego, self._stretch
         if self._changing_to is not None:
-            waits = ego.speed_mps < STANDING_MPS and stretch.end_m - self._station - self._nose_m < _ROOM_M + _HERE_M
+            waits = ego.speed_mps < STANDING_MPS and stretch.end_m - self._station - self.nose_m < _ROOM_M + _HERE_M
             if self._station > self._changing_to or waits:  # who waits for the next change ends this one where it is
                 self._changing_to = None
             return
-        at, lane = stretch.lane_at(self._station + self._nose_m)
+        at, lane = stretch.lane_at(self._station + self.nose_m)
         if lane.junction:
             return
         layer = stretch.layer + at
@@ -418,7 +420,7 @@ class TownDriver:
             return
         other = self._corridor.stretch(layer, goal)
         end = self._beside_until(at, other)
-        room = min(end, stretch.end_m if stretch.goal else end) - self._station - self._nose_m
+        room = min(end, stretch.end_m if stretch.goal else end) - self._station - self.nose_m
         way = max(_CHANGE_LEAST_M, ego.speed_mps * _CHANGE_S)
         if room < _CHANGE_LEAST_M * 0.6:
             return
@@ -465,7 +467,7 @@ class TownDriver:
 
     def _acceleration(self, seen: Observation, setpoints: Setpoints) -> float:
         ego, stretch = seen.ego, self._stretch
-        speed, nose = ego.speed_mps, self._station + self._nose_m
+        speed, nose = ego.speed_mps, self._station + self.nose_m
         idm = replace(TOWN_IDM, time_headway_s=max(0.8, setpoints.time_headway_s))
         limit = float(stretch.most_mps[stretch.index(self._station + 0.3 * speed)])
         target = max(0.0, min(limit, _finite(setpoints.target_speed_mps, limit)))
@@ -476,6 +478,7 @@ class TownDriver:
         elif target <= 0.0:
             least = -1.0  # who is to stand does not creep
         self.why = ""
+        self.lets_go_first = False
         stops = self._stops(seen, nose)
         follows = replace(idm, jam_distance_m=_CLOSE_M) if self._stop_lines.tail_over else idm
         for meeting in self._meetings:
@@ -490,6 +493,7 @@ class TownDriver:
             else:
                 stop = self._yields(meeting, nose, speed, target)
                 if stop is not None:
+                    self.lets_go_first = True
                     stops += [stop, *self._stop_lines.before_yellow(nose, speed)]
         for stop in stops:
             asked = _stopping(speed, stop.at_m - nose, idm)
@@ -556,7 +560,7 @@ class TownDriver:
         ego, stretch = seen.ego, self._stretch
         reach = min(NEAR_M, 22.0 + 3.0 * ego.speed_mps)
         low = stretch.index(self._station - 1.0)
-        high = stretch.index(self._station + self._nose_m + reach) + 1
+        high = stretch.index(self._station + self.nose_m + reach) + 1
         here = Pose(ego.x_m, ego.y_m, ego.heading_rad)
         own = self._road.get(ego.lane)
         around: list[VehicleState] = []
@@ -573,7 +577,7 @@ class TownDriver:
             if own is not None and other.speed_mps < 0.15 and ahead < -ego.length_m:
                 continue
             around.append(other)
-        x, y, wider = stretch.swept(self._nose_m)
+        x, y, wider = stretch.swept(self.nose_m)
         line = x[low:high], y[low:high], stretch.heading[low:high]
         half = self._chassis.width_m / 2.0 + _SIDE_M
         return self._foresight.meetings(seen, around, line, float(low), half + wider[low:high])

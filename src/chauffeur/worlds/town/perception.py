@@ -16,6 +16,9 @@ from chauffeur.worlds.town.pack import Place, places_called
 _REACH_M: Final = 120.0
 _PEOPLE_M: Final = 60.0
 _ASIDE_M: Final = 5.0
+_ON_WAY_M: Final = 1.6
+"""A road user whose middle is so near to the middle of the way is on it."""
+_DRIFTS_MPS: Final = 0.25
 _CHANGE_M: Final = 15.0
 """Room that a change of lanes needs at least."""
 
@@ -31,6 +34,7 @@ class TownPerception:
         places: Sequence[Place] = (),
     ) -> None:
         self._road, self._look, self._driver, self._places = road, look, driver, places
+        self.look = look
         self._choices: dict[
             tuple[LaneId, ...], tuple[LaneId, float, Mapping[Turn, tuple[JunctionWay, ...]]] | None
         ] = {}
@@ -159,10 +163,68 @@ class TownPerception:
                 nearest = ahead
         return nearest
 
+    def on_way(self, vehicle_id: int) -> tuple[float, float, float]:
+        """(m from the front bumper to a road user's middle along the way, m to the left of it, m/s to the left)."""
+        one = self.vehicle(vehicle_id)
+        line, rear = self._driver.stretch.line, self._driver.station_m
+        station = line.nearest(one.x_m, one.y_m, rear - _PEOPLE_M, rear + _REACH_M)
+        pose = line.at(station)
+        ahead, aside = pose.sees(one.x_m, one.y_m)
+        nose = rear + self._driver.nose_m
+        away = ahead if not 0.0 < station < line.length_m else 0.0  # beyond the end of the line that is known
+        return station + away - nose, aside, one.speed_mps * math.sin(one.heading_rad - pose.heading_rad)
+
+    def crosses_at(self, vehicle_id: int) -> float | None:
+        """Distance to where a road user beside the way comes onto it; None where it does not."""
+        ahead, aside, leftward = self.on_way(vehicle_id)
+        one = self.vehicle(vehicle_id)
+        if abs(aside) < _ON_WAY_M:
+            return ahead - one.length_m / 2.0
+        if aside * leftward > 0.0 and abs(leftward) > _DRIFTS_MPS:
+            return None  # it moves away
+        if abs(leftward) <= _DRIFTS_MPS:
+            return ahead - one.length_m / 2.0 if abs(aside) < _ASIDE_M else None
+        along = math.sqrt(max(0.0, one.speed_mps**2 - leftward**2))
+        pose = self._driver.stretch.line.at(self._driver.station_m)
+        with_us = 1.0 if math.cos(one.heading_rad - pose.heading_rad) > 0.0 else -1.0
+        return ahead + with_us * along * abs(aside / leftward)
+
+    def turn_after(self, vehicle_id: int) -> Turn | None:
+        """The way at the next junction that a road user ahead has taken; None while it has taken none."""
+        lane, found = self.vehicle(vehicle_id).lane, self._choice()
+        if lane is None or found is None:
+            return None
+        road = self._road
+        for turn, ways in found[2].items():
+            for way in ways:
+                exits = {one.id for one in road.abreast(way.exit)}
+                onward = {one.id for name in exits for one in road.successors(name)}
+                if lane in way.lanes or lane in exits or lane in onward:
+                    return turn
+        return None
+
+    def lane_after(self, vehicle_id: int) -> LaneId | None:
+        """The lane of a road user on the ego's own street; None where it is on another."""
+        lane, own = self.vehicle(vehicle_id).lane, self._look().ego.lane
+        if lane is None or own is None or self._road[own].junction or not self._road.places_between(own, lane):
+            return None
+        return lane if self._road[lane].kind == "driving" else None
+
+    def is_clear(self) -> bool:
+        """Whether no road user that crosses the way is being let go first."""
+        return not self._driver.lets_go_first
+
     def junction_ahead(self) -> tuple[float, tuple[Turn, ...]] | None:
         """(m, ways on from the street) of the next junction with a choice of ways; None without."""
-        lanes, ego = self._driver.lanes_ahead(), self._look().ego
-        own = self._road.get(ego.lane)
+        found, ego = self._choice(), self._look().ego
+        if found is None or ego.lane is None:
+            return None
+        done = self._road[ego.lane].centre.nearest(ego.x_m, ego.y_m)
+        return max(0.0, found[1] - done - ego.length_m / 2.0), tuple(found[2])
+
+    def _choice(self) -> tuple[LaneId, float, Mapping[Turn, tuple[JunctionWay, ...]]] | None:
+        """The next junction on the way where it parts, as `choice_ahead` tells it."""
+        lanes, own = self._driver.lanes_ahead(), self._road.get(self._look().ego.lane)
         if own is None or not lanes:
             return None
         if own.id not in lanes:
@@ -171,11 +233,7 @@ class TownPerception:
             lanes = lanes[lanes.index(own.id) :]
         if lanes not in self._choices:
             self._choices = {lanes: choice_ahead(self._road, lanes)}
-        found = self._choices[lanes]
-        if found is None:
-            return None
-        done = own.centre.nearest(ego.x_m, ego.y_m)
-        return max(0.0, found[1] - done - ego.length_m / 2.0), tuple(found[2])
+        return self._choices[lanes]
 
     def lane_beside(self, side: int) -> LaneId | None:
         """The lane to the right (negative: left) that the ego may change into from its own; None without."""

@@ -36,6 +36,41 @@ BUILT_IN: tuple[Scenario, ...] = (
         "Drive me to the hospital.",
         "Ringstead, a town with a ring road",
     ),
+    _built_in(
+        "town-street",
+        {
+            "town": "Gridford",
+            "start": ["4:0:-2", 6.0],
+            "vehicles": 0,
+            "people": 0,
+            "stage": [
+                {"kind": "bus", "colour": "red", "ahead_m": 18.0, "drives": True},
+                {"kind": "car", "colour": "blue", "ahead_m": 30.0, "left_m": -2.8},
+                {"kind": "car", "colour": "silver", "ahead_m": 44.0, "left_m": -2.8},
+                {
+                    "kind": "pedestrian",
+                    "colour": "yellow",
+                    "ahead_m": 57.0,
+                    "left_m": -3.6,
+                    "heading": "left",
+                    "speed_mps": 1.3,
+                    "for_m": 11.0,
+                    "near_m": 34.0,
+                },
+                {
+                    "kind": "truck",
+                    "colour": "white",
+                    "ahead_m": 60.0,
+                    "left_m": 7.0,
+                    "heading": "against",
+                    "drives": True,
+                },
+            ],
+        },
+        7,
+        "Park behind the silver car.",
+        "A street in Gridford: a bus ahead, cars parked at the kerb, a person who wants to cross",
+    ),
 )
 
 

@@ -192,6 +192,15 @@ class Sumo:
         )
         self._kind_of[name] = make
 
+    def put(self, name: str, make: str, edges: Sequence[str], lane: str, middle: Pose, speed_mps: float) -> None:
+        """Have a vehicle of the traffic set out on some edges from a place of its lane, with a speed."""
+        front = middle.ahead(MAKES[make].length_m / 2.0)
+        self.add(name, make, edges)
+        edge, _, index = lane.rpartition("_")
+        degrees = 90.0 - math.degrees(middle.heading_rad)
+        self._sumo.vehicle.moveToXY(name, edge, int(index or 0), front.x_m, front.y_m, degrees, 1, _MATCH_M)
+        self._sumo.vehicle.setPreviousSpeed(name, speed_mps)
+
     def go_on(self, name: str, edges: Sequence[str]) -> None:
         """Somebody has another way from the edge it is on."""
         self._way_of.pop(name, None)

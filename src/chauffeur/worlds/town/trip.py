@@ -13,6 +13,7 @@ from chauffeur.geometry import LanePlace, RoadGraph, Route, plan_route
 from chauffeur.worlds.skeleton import config_of
 from chauffeur.worlds.town import library
 from chauffeur.worlds.town.pack import MapPack, Place, places_called
+from chauffeur.worlds.town.staged import StagedActor
 
 
 class TownConfig(BaseModel):
@@ -26,6 +27,7 @@ class TownConfig(BaseModel):
         start_m, goal_m: Of `lanes`.
         vehicles: In the traffic; fewer where the town is full.
         people: On foot.
+        stage: Road users and things that are put before the ego; what they are numbered stands in `TownWorld.staged`.
         ego_speed: At the start, m/s.
         duration_s: Time limit.
         contact_ends: Whether a collision ends the trip; a benchmark may count it and go on.
@@ -41,6 +43,7 @@ class TownConfig(BaseModel):
     goal_m: float | None = None
     vehicles: int = Field(default=60, ge=0, le=400)
     people: int = Field(default=20, ge=0, le=200)
+    stage: tuple[StagedActor, ...] = Field(default=(), max_length=40)
     ego_speed: float = Field(default=0.0, ge=0.0, le=30.0)
     duration_s: float = Field(default=600.0, gt=0.0, le=36_000.0)
     contact_ends: bool = True

@@ -13,15 +13,18 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import AgentKind, Command, Observation, Scenario, ScenarioError, SignalState, VehicleState
+from chauffeur.concept.utterance import Colour
 from chauffeur.control.kinematic_bicycle import LINCOLN_MKZ, BicycleState, advanced
 from chauffeur.geometry import LaneId, Pose, overlap
 from chauffeur.worlds.base import EGO
 from chauffeur.worlds.skeleton import finite
 from chauffeur.worlds.town.brakes import TrafficBrakes
+from chauffeur.worlds.town.colours import drawn_colour
 from chauffeur.worlds.town.mirror import TownMirror
 from chauffeur.worlds.town.pack import MapPack
 from chauffeur.worlds.town.people import People
 from chauffeur.worlds.town.scene import DT_S, SEES_M, TownScene
+from chauffeur.worlds.town.staged import Staged, StagedActor, lanes_onward
 from chauffeur.worlds.town.sumo import EGO_NAME, MAKES, Link, Mover, Sumo
 from chauffeur.worlds.town.traffic import Traffic
 
@@ -53,6 +56,7 @@ class _Actor:
     speed_mps: float
     length_m: float
     width_m: float
+    colour: Colour | None
 
 
 class TownWorld(TownScene):
@@ -87,6 +91,8 @@ class TownWorld(TownScene):
         self._touched = frozenset[int]()
         self._crashed = False
         self._ids: dict[str, int] = {}
+        self._colour_seed = trip.simulator_seed
+        self._colours: dict[int, Colour | None] = {}
         self._lane_places: dict[str, tuple[tuple[str, float, float], LaneId | None]] = {}
         self._actors: dict[int, _Actor] = {}
         self._next_actor = FIRST_ACTOR
@@ -108,6 +114,8 @@ class TownWorld(TownScene):
         self._tell_traffic(first=True)
         self._sumo.step()
         self._traffic = Traffic(self._sumo, config.vehicles, rng)
+        self._staged = Staged(town.road, start, self.drive)
+        self._stage_ids = tuple(self._set_out(one) for one in config.stage)
         self._tell_traffic()
         self._sumo.step()
         self._look_round()
@@ -132,6 +140,7 @@ class TownWorld(TownScene):
         self._tick += 1
         self._locate()
         self._people.step(DT_S, self._lane_lights, self._road_users())
+        self._staged.step(self._tick * DT_S, DT_S, self._state.middle(LINCOLN_MKZ))
         self._mind_lights()
         self._tell_traffic()
         self._sumo.step()
@@ -157,13 +166,50 @@ class TownWorld(TownScene):
 
     # The stage of a scenario ------------------------------------------------------------------------------------------
 
-    def spawn(self, kind: AgentKind, pose: Pose, speed_mps: float = 0.0) -> int:
-        """Put somebody or something on the road, its middle at a pose; returns its id. Raises ScenarioError."""
+    def spawn(self, kind: AgentKind, pose: Pose, speed_mps: float = 0.0, colour: Colour | None = None) -> int:
+        """Put a road user or a thing on the road, its middle at a pose; returns its id. Raises ScenarioError.
+
+        A road user without a colour has one drawn.
+        """
         if kind not in _SIZES:
             raise ScenarioError(f"A town has no road user of the kind {kind!r}.", hint=f"Say {', '.join(_SIZES)}.")
         number, self._next_actor = self._next_actor, self._next_actor + 1
-        self._actors[number] = _Actor(number, kind, pose, speed_mps, *_SIZES[kind])
+        shown = colour or self._colour_of(number, kind)
+        self._actors[number] = _Actor(number, kind, pose, speed_mps, *_SIZES[kind], shown)
         self._look_round()
+        return number
+
+    @property
+    def staged(self) -> tuple[int, ...]:
+        """Ids of the scenario's stage, in its order."""
+        return self._stage_ids
+
+    def _set_out(self, actor: StagedActor) -> int:
+        """Put one of the scenario's stage on the road; returns its id. Raises ScenarioError."""
+        pose = self._staged.pose_of(actor)
+        if not actor.drives:
+            number = self.spawn(actor.agent_kind, pose, actor.speed_mps if actor.at_once else 0.0, actor.colour)
+            if actor.kind == "van":
+                make = MAKES["van"]
+                self._actors[number].length_m, self._actors[number].width_m = make.length_m, make.width_m
+            self._staged.add(actor, number)
+            return number
+        road = self.town.road
+        place = road.locate(pose.x_m, pose.y_m, pose.heading_rad, ("driving",))
+        edge = "" if place is None else self._sumo_lane(place.lane, place.station_m)
+        apart = place is None or abs(place.offset_m) > _NEAR_LANE_M
+        if place is None or apart or not edge or edge.startswith(":") or actor.kind not in MAKES:
+            raise ScenarioError(f"A {actor.kind} cannot set out {actor.ahead_m:g} m ahead: there is no lane for it.")
+        assert self._sumo is not None
+        edges: list[str] = []
+        for lane in lanes_onward(road, place.lane, actor.turns):
+            names = (name.rpartition("_")[0] for name in self._net.lanes.get(lane, ()))
+            edges += [name for name in names if name and not name.startswith(":") and name not in edges[-1:]]
+        name = f"s{len(self._ids) + 1}"
+        number = self._ids[name] = len(self._ids) + 1
+        self._colours[number] = actor.colour or drawn_colour(self._colour_seed, number, actor.agent_kind)
+        first = edges.index(edge.rpartition("_")[0])
+        self._sumo.put(name, actor.kind, edges[first:], edge, pose, actor.speed_mps)
         return number
 
     def drive(self, actor: int, pose: Pose, speed_mps: float) -> None:
@@ -349,13 +395,14 @@ class TownWorld(TownScene):
                     make.width_m,
                     lane,
                     acceleration_mps2=mover.acceleration_mps2,
+                    colour=self._colour_of(number, make.kind),
                 )
             )
         self._brakes.mind(self._ego(), movers)
         for walker in self._people.walkers:
             one = self._people.state(walker)
             if abs(one.x_m - middle.x_m) < SEES_M and abs(one.y_m - middle.y_m) < SEES_M:
-                found.append(one)
+                found.append(replace(one, colour=self._colour_of(one.id, one.kind)))
         for actor in self._actors.values():
             p = actor.pose
             if math.hypot(p.x_m - middle.x_m, p.y_m - middle.y_m) < SEES_M:
@@ -364,10 +411,14 @@ class TownWorld(TownScene):
                 if actor.kind != "pedestrian":
                     place = self.town.road.locate(p.x_m, p.y_m, p.heading_rad, ("driving",))
                     lane = None if place is None or abs(place.offset_m) > _NEAR_LANE_M else place.lane
-                found.append(
-                    VehicleState(actor.id, actor.kind, p.x_m, p.y_m, p.heading_rad, actor.speed_mps, *size, lane)
-                )
+                state = VehicleState(actor.id, actor.kind, p.x_m, p.y_m, p.heading_rad, actor.speed_mps, *size, lane)
+                found.append(replace(state, colour=actor.colour))
         self._mind_contacts(found)
+
+    def _colour_of(self, number: int, kind: AgentKind) -> Colour | None:
+        if number not in self._colours:
+            self._colours[number] = drawn_colour(self._colour_seed, number, kind)
+        return self._colours[number]
 
     def _on_another_level(self, lane: LaneId | None, x_m: float, y_m: float, ego: Pose) -> bool:
         """Whether somebody in a lane is over the ego, or under it."""

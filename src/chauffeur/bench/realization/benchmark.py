@@ -1,0 +1,308 @@
+"""The benchmark: stage, read, ground, compose, check, drive, judge by the labels; a row a command and reader.
+
+`labels` are people's readings, driven by the same composer: what is missing there is missing in grounding, composing or
+driving, not in reading. `blind` hears nothing and drives on: what is whole there any careful driver does. Any other
+reader is a planner, which gets the words alone.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final, Literal, cast
+
+from chauffeur.bench.kernel.benchmark import ItemOutcome, Unasked
+from chauffeur.bench.kernel.metrics import TableSpec, count, share
+from chauffeur.bench.kernel.store import Row
+from chauffeur.bench.realization.stage import Scene, stage_of
+from chauffeur.concept import (
+    ChauffeurError,
+    DataError,
+    Instruction,
+    Limits,
+    Plan,
+    Program,
+    ScenarioError,
+    SystemMessage,
+    Thoughts,
+)
+from chauffeur.concept.utterance import Utterance, acts_from_json
+from chauffeur.describe import describe
+from chauffeur.drive.planning import checked, screened_request
+from chauffeur.drive.realised import MeaningReferee
+from chauffeur.drive.session import drive_policy, make_world, scenario_hash
+from chauffeur.planners.meaning import MeaningPlanner
+from chauffeur.planners.registry import make_planner
+from chauffeur.safety.checks import DEFAULT_CHECKS
+from chauffeur.worlds.town import TownWorld
+
+VERSION: Final = "realization-v1"
+"""Stage, judge and rollout together; changes whenever the same command could give another row."""
+LABELS, BLIND = "labels", "blind"
+_ON: Final = "def go():\n    while True:\n        yield proceed(check_speed_limit())\n"
+"""What the blind reader drives, whatever was said."""
+MAX_S: Final = 75.0
+"""Simulated time of a drive: a red light, a crossing and two junctions."""
+_NOTE: Final = "simulated drives (SUMO), staged scenes; judged by people's labels over the geometry of the drive"
+_MOST_BYTES: Final = 4_000_000
+
+Came = Literal["whole", "part", "none", "opposite", "asked", "declined", "failed"]
+
+
+@dataclass(frozen=True, slots=True)
+class RealizationItem:
+    """A command to be read by one reader.
+
+    Attributes:
+        id: Of command and reader.
+        command: The command's own id.
+        text: The words.
+        acts: What people say that they mean, in written form.
+        reader: `labels`, `blind`, or a planner.
+    """
+
+    id: str
+    command: str
+    text: str
+    acts: tuple[Any, ...]
+    reader: str
+
+
+@dataclass(frozen=True, slots=True)
+class RealizationJob:
+    """A command to stage, plan, drive and judge."""
+
+    key: str
+    item: RealizationItem
+
+    @property
+    def near(self) -> str:
+        """See BenchJob."""
+        return self.item.command
+
+    def run(self) -> Row:
+        """See BenchJob."""
+        try:
+            return {"key": self.key, "infra_failed": False, **_driven(self.item)}
+        except ChauffeurError as error:
+            return self.spoiled(str(error))
+
+    def spoiled(self, detail: str) -> Row:
+        """See BenchJob."""
+        return {"key": self.key, "infra_failed": True, "detail": detail}
+
+
+def _driven(item: RealizationItem) -> Row:
+    acts = acts_from_json(item.acts)
+    scene = cast("Scene", stage_of(acts))
+    scenario = scene.scenario(item.command)
+    world = cast("TownWorld", make_world(scenario))
+    try:
+        seen = world.reset(scenario)
+        request = screened_request(Instruction(item.text), describe(seen), SystemMessage(""), observation=seen)
+        plan: Plan
+        if item.reader == LABELS:
+            plan = MeaningPlanner().plan_of(Utterance(item.text, acts), request)
+        elif item.reader == BLIND:
+            plan = Plan(Thoughts("I drive on."), Program(_ON), planner=BLIND)
+        else:
+            plan = asyncio.run(make_planner(item.reader).plan(request))
+        found = checked(plan, seen, Limits(), DEFAULT_CHECKS)
+        if found.refusal or plan.policy is None:
+            came: Came = "asked" if plan.intent == "ask" else "declined"
+            return {"came": came, "detail": found.refusal, "acts": [], "collision": False, "seconds": 0.0}
+        ids = {reference: tuple(world.staged[k] for k in places) for reference, places in scene.referents.items()}
+        referee = MeaningReferee(world, acts, "labels", ids)
+        try:
+            episode = drive_policy(world, plan.policy, referee, MAX_S, Limits())
+        except ScenarioError as error:  # known only when the policy meets the world
+            return {"came": "declined", "detail": str(error), "acts": [], "collision": False, "seconds": 0.0}
+        judged = [{"act": one.act.act, "result": one.result, "why": one.why} for one in referee.judged]
+        return {
+            "came": _came([one["result"] for one in judged]),
+            "detail": episode.causes.detail,
+            "acts": judged,
+            "collision": episode.final.ego.crashed,
+            "seconds": episode.duration_s,
+        }
+    finally:
+        world.close()
+
+
+def _came(results: Sequence[str]) -> Came:
+    if "opposite" in results:
+        return "opposite"
+    done = results.count("done")
+    return "whole" if done == len(results) else "part" if done else "none"
+
+
+@dataclass(frozen=True, slots=True)
+class RealizationRow:
+    """What became of a command.
+
+    Attributes:
+        item: Its id, the same for all readers.
+        reader: Who read it.
+        verb: Of its first act.
+        text: The words.
+        came: Whole, in part, none of it, the opposite; asked back or declined instead.
+        collision: Whether the car touched anything.
+        acts: What became of each act.
+        detail: What is missing, or why it was not driven.
+        seconds: Simulated time driven.
+        note: What must be said wherever the row is shown.
+    """
+
+    item: str
+    reader: str
+    verb: str
+    text: str
+    came: str
+    collision: bool
+    acts: tuple[Mapping[str, Any], ...]
+    detail: str
+    seconds: float
+    note: str = _NOTE
+
+
+_MEASURES: Final = (
+    share("realization-whole-v1", "whole", lambda row: row["came"] == "whole"),
+    share("realization-part-v1", "in part", lambda row: row["came"] == "part"),
+    share("realization-none-v1", "not", lambda row: row["came"] == "none"),
+    share("realization-opposite-v1", "opposite", lambda row: row["came"] == "opposite"),
+    share("realization-asked-v1", "asked", lambda row: row["came"] == "asked"),
+    share("realization-declined-v1", "declined", lambda row: row["came"] == "declined"),
+    count("realization-collisions-v1", "ego collisions", lambda row: row["collision"]),
+)
+
+
+class RealizationBenchmark(Unasked):
+    """Labelled commands that a town can stage, by several readers."""
+
+    id = VERSION
+    row = RealizationRow
+
+    def __init__(self, commands: Path, readers: Sequence[str], most: int = 0) -> None:
+        """Make it.
+
+        Args:
+            commands: A JSONL file of labelled commands, or a folder of them.
+            readers: `labels`, `blind` and planners.
+            most: How many commands, spread evenly over the files; 0 for all.
+
+        Raises:
+            DataError: Commands cannot be read.
+        """
+        self._readers = tuple(readers)
+        self._rows = tuple(_labelled(commands))
+        self._most = most
+
+    @property
+    def tables(self) -> Sequence[TableSpec]:
+        """See Benchmark."""
+        by_verb = [
+            TableSpec(f"By the first verb: {reader}", _MEASURES, "verb", rows=_of(reader), heads=("verb", "commands"))
+            for reader in self._readers
+        ]
+        return (TableSpec("What was done of what was said", _MEASURES, "reader", self._readers, total=False), *by_verb)
+
+    @property
+    def config(self) -> Mapping[str, Any]:
+        """See Benchmark."""
+        content = json.dumps([(row["id"], row["text"], row["acts"]) for row in self._rows], sort_keys=True)
+        return {
+            "commands": hashlib.sha256(content.encode()).hexdigest(),
+            "staged": len(self._staged),
+            "of": len(self._rows),
+            "readers": list(self._readers),
+            "most": self._most,
+        }
+
+    @cached_property
+    def _staged(self) -> tuple[Row, ...]:
+        found = [row for row in self._rows if row.get("clear", 1) and stage_of(acts_from_json(row["acts"])) is not None]
+        if not self._most or len(found) <= self._most:
+            return tuple(found)
+        return tuple(found[k * len(found) // self._most] for k in range(self._most))
+
+    def items(self) -> Sequence[RealizationItem]:
+        """See Benchmark."""
+        return tuple(
+            RealizationItem(f"{row['id']}/{reader}", row["id"], row["text"], tuple(row["acts"]), reader)
+            for row in self._staged
+            for reader in self._readers
+        )
+
+    def job(self, item: RealizationItem, answer: Row | None) -> RealizationJob:
+        """See Benchmark."""
+        del answer
+        scene = cast("Scene", stage_of(acts_from_json(item.acts)))
+        parts = [VERSION, scenario_hash(scene.scenario(item.command)), item.text, item.acts, item.reader]
+        return RealizationJob(hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:24], item)
+
+    def rows(self, outcome: ItemOutcome[RealizationItem]) -> Sequence[RealizationRow]:
+        """See Benchmark."""
+        item, result = outcome.item, outcome.result
+        if result is None or result["infra_failed"]:
+            return ()
+        row = RealizationRow(
+            item=item.command,
+            reader=item.reader,
+            verb=next(act["act"] for act in item.acts if not act.get("purpose")),
+            text=item.text,
+            came=result["came"],
+            collision=result["collision"],
+            acts=tuple(result["acts"]),
+            detail=result["detail"],
+            seconds=result["seconds"],
+        )
+        return (row,)
+
+
+def _of(reader: str) -> Callable[[Mapping[str, Any]], bool]:
+    def own(row: Mapping[str, Any]) -> bool:
+        return row["reader"] == reader
+
+    return own
+
+
+def _labelled(commands: Path) -> list[Row]:
+    """Labelled commands of a file or a folder. Raises DataError."""
+    files = sorted(commands.glob("*.jsonl")) if commands.is_dir() else [commands]
+    found: list[Row] = []
+    for file in files:
+        try:
+            if file.stat().st_size > _MOST_BYTES:
+                raise DataError(f"{file} has more than {_MOST_BYTES} bytes.")
+            lines = file.read_text(encoding="utf-8").splitlines()
+            rows = [json.loads(line) for line in lines if line.strip()]
+        except (OSError, ValueError, RecursionError) as error:
+            raise DataError(f"{file} holds no labelled commands: {error}.") from error
+        for row in rows:
+            if not isinstance(row, dict) or not {"id", "text", "acts"} <= set(cast("dict[str, Any]", row)):
+                raise DataError(f"{file}: a command has `id`, `text` and `acts`.")
+            acts_from_json(cast("dict[str, Any]", row)["acts"])
+            found.append(cast("Row", row))
+    if not found:
+        raise DataError(f"There are no labelled commands in {commands}.", hint="Give -o data=FOLDER.")
+    return found
+
+
+def realization(data: str = "", readers: str = "labels,meaning,keyword,blind", items: int = 0) -> RealizationBenchmark:
+    """The benchmark, as its entry point gives it.
+
+    Args:
+        data: File or folder of labelled commands.
+        readers: Who reads, separated by commas.
+        items: How many commands; 0 for all that can be staged.
+    """
+    if not data:
+        raise DataError(
+            "Realization needs labelled commands.", hint="Give -o data=FOLDER; docs/meaning.md has the form."
+        )
+    return RealizationBenchmark(Path(data), [one.strip() for one in readers.split(",") if one.strip()], items)

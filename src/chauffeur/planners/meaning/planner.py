@@ -1,0 +1,114 @@
+"""Reads what words mean, looks for what they refer to, and composes a program of the acts."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Final
+
+from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
+from chauffeur.concept.utterance import Act, Span, Utterance
+from chauffeur.language.meaning.reader import read
+from chauffeur.language.meaning.words import act_words
+from chauffeur.planners.arbitration import asked, unanswered
+from chauffeur.planners.base import NO_WISH, declined
+from chauffeur.planners.meaning.compose import ComposedActs, compose
+from chauffeur.programs.catalogue import vocabulary_of
+
+VERSION: Final = "meaning-v1"
+SURE: Final = 0.5
+"""Below this a reading is more likely wrong than right, and is asked about."""
+_NOT_HERE: Final = "I drive by what is in sight in towns only. Use another planner here."
+_BLIND: Final = "I am not told who is around, so I cannot look for what you mean."
+_FOR_OTHERS: Final = {
+    "remark": "I hear a remark, and nothing for me to do.",
+    "story": "I hear a story, and nothing for me to do.",
+    "question": "I hear a question, and change nothing.",
+    "feedback": "Thank you for telling me. I change nothing now.",
+    "other": "I think that was not said to me, and change nothing.",
+}
+_WHY_NOT: Final = {
+    "illegal": "The rules of the road do not allow that.",
+    "dangerous": "That would put people in danger.",
+}
+
+
+class MeaningPlanner:
+    """Drives acts about things in sight, in a town."""
+
+    @classmethod
+    def from_spec(cls, argument: str) -> MeaningPlanner:
+        """The planner named `meaning`. Raises ConfigError for an argument: it has no variants."""
+        if argument:
+            raise ConfigError(f"The meaning planner has no variant {argument!r}.", hint="Write just: meaning")
+        return cls()
+
+    @property
+    def id(self) -> str:
+        """Registry name."""
+        return "meaning"
+
+    @property
+    def model(self) -> str:
+        """Reader and composer with their version."""
+        return VERSION
+
+    async def plan(self, request: PlanRequest) -> Plan:
+        """One plan: of a reading that is sure, whose references are clear, and of which everything can be done."""
+        return self.plan_of(read(request.instruction.text), request)
+
+    def plan_of(self, utterance: Utterance, request: PlanRequest) -> Plan:
+        """The plan for words that are read already."""
+        begun = time.perf_counter()
+        if utterance.emergency:
+            return replace(declined(self, "I stop.", begun, intent="stop"), alarm="stop")
+        if not utterance.acts or all(act.act == "none" for act in utterance.acts):
+            words = _FOR_OTHERS.get(utterance.address, "I hear nothing in that for me to do, and change nothing.")
+            return declined(self, words, begun, intent=NO_WISH)
+        forbidden = [act for act in utterance.acts if act.act == "refuse" and act.why in ("illegal", "dangerous")]
+        if (refused := next(iter(forbidden), None)) is not None:
+            return declined(self, _WHY_NOT[refused.why or "dangerous"], begun, intent="refuse")
+        if vocabulary_of(request.context.situation.world) != "town":
+            return declined(self, _NOT_HERE, begun, intent="not there")
+        if request.observation is None:
+            return declined(self, _BLIND, begun, intent="not there")
+        if utterance.sure < SURE:
+            words = f"I understand: {_listed(utterance.acts)}. Is that what you want?"
+            if unanswered(request.instruction, words):
+                return asked(self, words, begun, offer=request.instruction.text)
+        made = compose(utterance, request.observation, request.context.situation, request.limits)
+        if made.question:
+            return asked(self, made.question, begun)
+        if not made.done:
+            words = " ".join(f"I cannot {act_words(one.act)}: {one.reason}." for one in made.undoable)
+            return declined(self, words or "I see nothing to do in that.", begun, intent="not there")
+        left_out = " ".join(f"I cannot {act_words(one.act)}: {one.reason}." for one in made.undoable)
+        if left_out:
+            words = f"{left_out} Shall I do the rest: {_listed(made.done)}?"
+            if unanswered(request.instruction, words):
+                return asked(self, words, begun, offer=request.instruction.text)
+        return Plan(
+            thoughts=Thoughts(_thoughts(utterance, made, left_out)),
+            policy=Program(made.source, library=made.library),
+            intent=made.intent,
+            planner=self.id,
+            model=self.model,
+            latency_s=time.perf_counter() - begun,
+            unused=tuple(utterance.text[low:high] for low, high in (*_spans(made), *utterance.unused)),
+        )
+
+
+def _spans(made: ComposedActs) -> list[Span]:
+    """The words of acts that are not done."""
+    return [one.act.span for one in made.undoable if one.act.span is not None]
+
+
+def _listed(acts: tuple[Act, ...]) -> str:
+    return "; then ".join(act_words(act).replace(" — ", ", ") for act in acts)
+
+
+def _thoughts(utterance: Utterance, made: ComposedActs, left_out: str) -> str:
+    parts = [f"{sentence}." for sentence in made.told]
+    parts += [left_out] if left_out else []
+    parts += [f"I do not use “{utterance.text[low:high]}”." for low, high in utterance.unused]
+    return " ".join(parts)
