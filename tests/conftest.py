@@ -24,6 +24,10 @@ for _number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
     if signal.getsignal(_number) == signal.SIG_IGN:
         signal.signal(_number, signal.default_int_handler if _number == signal.SIGINT else signal.SIG_DFL)
 
+# As many workers as cores, and a thread each: two threads that wait for each other on a crowded machine take ten times
+# as long. Workers and the processes of tests inherit it.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 # Building the tree of commands takes 80 ms, a command that refuses a file 2 ms: it is built once, as in a process.
 typer.testing._get_command = functools.cache(typer.testing._get_command)  # pyright: ignore
 

@@ -108,9 +108,7 @@ if __name__ == "__main__":
         [*CHAUFFEUR, "bench", "lampilot", "--data", str(data), "--out", str(tmp_path / "run"), "--workers", "1"],
         [sys.executable, str(tmp_path / "talk.py")],
     ]
-    codes, attempts, output = _attempts(
-        commands, tmp_path, XDG_CACHE_HOME=str(cache), HOME=str(tmp_path / "home"), OMP_NUM_THREADS="1"
-    )
+    codes, attempts, output = _attempts(commands, tmp_path, XDG_CACHE_HOME=str(cache), HOME=str(tmp_path / "home"))
     assert codes == [0, 0, 0], output[-3000:]
     assert attempts == 0
     others = {str(path.relative_to(cache)) for path in cache.iterdir()} - {"chauffeur", "matplotlib"}

@@ -46,8 +46,6 @@ from chauffeur.planners.registry import make_planner
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.scenarios import BUILT_IN
 
-torch.set_num_threads(1)  # two threads that wait for each other on a crowded machine take ten times as long
-
 WISHES = [
     ("take the left lane", DialectStep("lane_left")),
     ("take the right lane", DialectStep("lane_right")),

@@ -314,7 +314,7 @@ def test_every_question_has_a_yes_and_a_no_and_what_runs_goes_on(desk: Desk) -> 
         assert drive.said("ended")[-1].outcome == "stopped"
         assert not [each for each in drive.said("conversation") if "Quit" in each.text], "it is no wish"
 
-    with driving("following", planner="onboard", speed=1.0) as drive:
+    with driving("following", planner="onboard") as drive:
         desk.run(check(drive))
 
 
