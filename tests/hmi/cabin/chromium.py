@@ -119,14 +119,20 @@ class Tab:
 
     async def finger(self, kind: str, selector: str) -> None:
         """`mousePressed` or `mouseReleased` in the middle of an element."""
-        box = await self.value(
+        x, y = await self._middle(selector)
+        await self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
+    async def _middle(self, selector: str) -> list[float]:
+        return await self.value(
             f"(() => {{ const r = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
             " return [r.x + r.width / 2, r.y + r.height / 2]; })()"
         )
-        await self.ask("Input.dispatchMouseEvent", type=kind, x=box[0], y=box[1], button="left", clickCount=1)
 
     async def click(self, selector: str) -> None:
-        """A short touch."""
+        """A short touch, once the element lies still: what is said above a button moves it."""
+        seen: list[float] = []
+        while seen != (seen := await self._middle(selector)):
+            await asyncio.sleep(0.1)
         await self.finger("mousePressed", selector)
         await self.finger("mouseReleased", selector)
 
