@@ -514,11 +514,11 @@ class Faithfulness:
 
 NotCompared = Literal[
     "no-policy", "no-program", "no-explanation", "no-claims", "unreadable", "policy-failed", "no-rule-here",
-    "own-manoeuvre", "check-broke",
+    "own-manoeuvre", "check-broke", "road-users",
 ]  # fmt: skip
 """Why a check compared nothing: there is no policy, or none that is a program; no explanation, or one that claims
 nothing; the program cannot be read, or failed on the way; the rule does not hold here; it is the car's own emergency
-manoeuvre; the check itself failed."""
+manoeuvre; the check itself failed; the program is about road users by name, which no text is compared with."""
 
 Comparison = Literal["held", "failed", "not_compared"]
 """State of a verdict: compared and held, compared and failed, nothing compared."""

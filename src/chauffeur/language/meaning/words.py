@@ -5,32 +5,63 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from chauffeur.concept.utterance import Act, Condition, Event, Reference
+from chauffeur.concept.utterance import Act, Condition, Direction, Event, Manner, Reference, Verb
 
 _MANY: Final = ("vehicles", "pedestrians")
 
 
+_VERBS: Final[Mapping[Verb, str]] = {
+    "avoid": "steer clear of", "yield": "give way to", "pull_over": "pull over", "go": "drive on",
+    "straight": "go straight on", "u_turn": "turn round", "exit": "leave", "goto": "drive to", "none": "do nothing",
+    "refuse": "do that",
+}  # fmt: skip
+"""Acts whose words are not their names."""
+_MANNERS: Final[Mapping[Manner, str]] = {"slow": "slowly", "quick": "quickly", "careful": "carefully"}
+_SPEEDS: Final[Mapping[Direction, str]] = {"slower": "slow down", "less": "slow down", "same": "keep this speed"}
+
+
 def act_words(act: Act) -> str:
-    """An act in plain words."""
-    verb = "do that" if act.act == "refuse" else act.act.replace("_", " ")
-    parts = [("do not " if act.negated else "") + verb]
-    parts += [value for value in (act.side, act.to, act.direction) if value]
-    if act.value is not None:
-        parts.append(f"{act.value:g} {act.unit}".strip())
-    if act.target is not None:
-        parts.append(reference_words(act.target))
+    """An act in plain words, as a person would say it to a driver."""
+    parts = ["do not" if act.negated else "", _said(act), "" if act.target is None else reference_words(act.target)]
     if act.place is not None:
-        where = "" if act.place.ref is None else f" {reference_words(act.place.ref)}"
-        parts.append(f"{act.place.rel.replace('_', ' ')}{where}")
+        where = "" if act.place.ref is None else reference_words(act.place.ref)
+        rel = act.place.rel.replace("_", " ")
+        parts.append(f"at the next {where.removeprefix('the ')}" if rel == "next" else f"{rel} {where}")
     if act.manner is not None:
-        parts.append(f"({act.manner})")
+        parts.append(_MANNERS[act.manner])
     if act.when is not None:
         parts.append(f"— {condition_words(act.when)}")
     if act.purpose:
         parts.append("(as the purpose of the act before)")
     if act.why is not None:
         parts.append(f"({act.why})")
-    return " ".join(parts)
+    return " ".join(part.strip() for part in parts if part.strip())
+
+
+def _said(act: Act) -> str:
+    """The verb with what belongs to it."""
+    amount = "" if act.value is None else f"{act.value:g} {act.unit}".strip()
+    match act.act:
+        case "lane" if act.to == "original":
+            return "change back to the original lane"
+        case "lane" if act.to == "behind target":
+            return "change to the lane of"
+        case "lane":
+            return f"change to the {act.to or act.side or 'next'} lane"
+        case "keep":
+            return f"keep to the {act.to or act.side} lane" if act.to or act.side else "keep the lane"
+        case "move":
+            return f"move a little to the {act.side}" if act.side else "move a little aside"
+        case "speed":
+            change = "" if act.direction is None else _SPEEDS.get(act.direction, "speed up")
+            return f"{change} ({amount})" if change and amount else change or f"drive at {amount or 'another speed'}"
+        case "gap":
+            size = amount and f"a gap of {amount}"
+            change = "less distance" if act.direction == "less" else "the same distance"
+            change = "more distance" if act.direction in (None, "more") else change
+            return f"keep {size or change}" + (" to" if act.target is not None else "")
+        case _:
+            return f"{_VERBS.get(act.act, act.act)} {act.side or ''} {amount}"
 
 
 _EVENTS: Final[Mapping[Event, tuple[str, str]]] = {
@@ -66,5 +97,5 @@ def reference_words(reference: Reference) -> str:
     parts += [reference.kind.replace("_", " "), f"“{reference.name}”" if reference.name else ""]
     parts += [f"on the {reference.side}" if reference.side else "", reference.where or ""]
     if reference.of is not None:
-        parts.append(f"at/of {reference_words(reference.of)}")
+        parts.append(f"of {reference_words(reference.of)}")
     return " ".join(part for part in parts if part)

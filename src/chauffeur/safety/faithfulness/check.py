@@ -5,6 +5,7 @@ Both inform: an explanation that does not fit is told, and the drive goes on.
 
 from __future__ import annotations
 
+import re
 from typing import Final
 
 from chauffeur.concept import Faithfulness, Limits, NotCompared, Observation, Plan, Program, Verdict
@@ -16,6 +17,7 @@ from chauffeur.safety.faithfulness.tracer import read_facts
 FAITHFULNESS_CHECK: Final = "alignment-v1"
 DRIVEN_CHECK: Final = "alignment-driven-v1"
 
+_NAMES_ROAD_USERS: Final = re.compile(r"\bagent\(")
 _REMEDY: Final = "Let the thoughts say what the program does, or the program do what the thoughts say."
 
 
@@ -54,6 +56,7 @@ _NOT_COMPARED: Final[dict[NotCompared, str]] = {
     "no-claims": "The explanation claims nothing that can be compared.",
     "unreadable": "The program cannot be read.",
     "policy-failed": "The program failed on the way.",
+    "road-users": "The program is about single road users, which reading compares with no explanation.",
 }
 
 
@@ -67,6 +70,8 @@ def _facts(plan: Plan) -> Facts | NotCompared:
         return "no-program"
     if not plan.thoughts.text.strip():
         return "no-explanation"
+    if _NAMES_ROAD_USERS.search(plan.policy.source):
+        return "road-users"
     facts = read_facts(plan.policy.source, plan.policy.library)
     return facts if facts.readable else "unreadable"
 
