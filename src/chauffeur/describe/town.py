@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 from chauffeur.concept import Context, Observation, Signal, VehicleState
+from chauffeur.concept.sight import states_of
 from chauffeur.describe.road import (
     ego_lane,
     front_in_sight,
@@ -24,6 +25,8 @@ SIGHT_M = 60.0
 NEAR_M = 40.0
 """Vehicles within this are told one by one."""
 MOST_VEHICLES = 3
+MOST_NUMBERED = 8
+"""Road users whose numbers are told."""
 _WIDE_M = 8.0
 
 
@@ -50,6 +53,7 @@ def describe_town(observation: Observation) -> Context:
         *_vehicles(observation),
         *_lights(observation),
         *_people(observation),
+        *_numbered(observation),
     ]
     if observation.stop_sign_m is not None and observation.stop_sign_m < SIGHT_M:
         sentences.append(f"A stop sign is {observation.stop_sign_m:.0f} m ahead.")
@@ -79,6 +83,27 @@ def _vehicles(observation: Observation) -> list[str]:
         )
         found.append((away, text))
     return [text for _, text in sorted(found)[:MOST_VEHICLES]]
+
+
+def _numbered(observation: Observation) -> list[str]:
+    """The nearest road users by the number under which programs name them (`agent(17)`)."""
+    own = observation.ego
+    ego = Pose(own.x_m, own.y_m, own.heading_rad)
+    found: list[tuple[float, str]] = []
+    for one in observation.others:
+        forward, leftward = ego.sees(one.x_m, one.y_m)
+        away = math.hypot(forward, leftward)
+        if away > SIGHT_M or forward < -own.length_m:
+            continue
+        words = " ".join(part for part in (_spoken_state(one, observation), one.colour or "", one.kind) if part)
+        found.append((away, f"{one.id} {words}, {away:.0f} m"))
+    named = "; ".join(text for _, text in sorted(found)[:MOST_NUMBERED])
+    return [f"Road users by number: {named}."] if named else []
+
+
+def _spoken_state(agent: VehicleState, observation: Observation) -> str:
+    states = states_of(agent, observation)
+    return next((state for state in ("parked", "oncoming", "crossing", "turning", "moving") if state in states), "")
 
 
 def own_signals(observation: Observation) -> list[Signal]:

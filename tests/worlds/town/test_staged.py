@@ -15,6 +15,7 @@ from chauffeur.camera.weather import Conditions
 from chauffeur.concept import Observation, Scenario, ScenarioError, VehicleState
 from chauffeur.concept.paint import PAINT_RGB, css_colour
 from chauffeur.concept.utterance import Colour
+from chauffeur.describe import describe
 
 pytest.importorskip("libsumo")
 
@@ -128,3 +129,11 @@ def test_the_camera_paints_a_car_in_its_colour(world: TownWorld) -> None:
     paints = {tuple(round(float(part), 3) for part in row[RED : BLUE + 1]) for row in scene.movable.rows}
     for colour, there in (("red", True), ("blue", True), ("green", False), ("yellow", False)):
         assert (tuple(round(part, 3) for part in PAINT_RGB[colour]) in paints) == there  # type: ignore[index]
+
+
+def test_the_situation_tells_road_users_by_their_numbers(world: TownWorld) -> None:
+    seen = world.reset(scenario(PARKED, BUS))
+    parked, bus = world.staged
+    text = describe(seen).text
+    assert f"{parked} parked silver car, 44 m" in text
+    assert f"{bus} red bus, 18 m" in text

@@ -19,7 +19,7 @@ from typing import Any, Final, Literal, cast
 from chauffeur.bench.kernel.benchmark import ItemOutcome, Unasked
 from chauffeur.bench.kernel.metrics import TableSpec, count, share
 from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.realization.stage import Scene, stage_of
+from chauffeur.bench.realization.stage import CommandScene, stage_of
 from chauffeur.concept import (
     ChauffeurError,
     DataError,
@@ -99,7 +99,7 @@ class RealizationJob:
 
 def _driven(item: RealizationItem) -> Row:
     acts = acts_from_json(item.acts)
-    scene = cast("Scene", stage_of(acts))
+    scene = cast("CommandScene", stage_of(acts))
     scenario = scene.scenario(item.command)
     world = cast("TownWorld", make_world(scenario))
     try:
@@ -241,7 +241,7 @@ class RealizationBenchmark(Unasked):
     def job(self, item: RealizationItem, answer: Row | None) -> RealizationJob:
         """See Benchmark."""
         del answer
-        scene = cast("Scene", stage_of(acts_from_json(item.acts)))
+        scene = cast("CommandScene", stage_of(acts_from_json(item.acts)))
         parts = [VERSION, scenario_hash(scene.scenario(item.command)), item.text, item.acts, item.reader]
         return RealizationJob(hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:24], item)
 

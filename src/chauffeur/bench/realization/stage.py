@@ -38,7 +38,7 @@ _EVENTS: Final = frozenset({"gone", "passed", "moves", "green", "clear"})
 
 
 @dataclass(slots=True)
-class Scene:
+class CommandScene:
     """Where a command is said.
 
     Attributes:
@@ -66,7 +66,7 @@ class _UnstagedError(Exception):
     """The command names what a town cannot stage."""
 
 
-def stage_of(acts: Sequence[Act]) -> Scene | None:
+def stage_of(acts: Sequence[Act]) -> CommandScene | None:
     """The scene of a labelled command; None where a town cannot stage it."""
     wanted = [act for act in acts if not act.purpose]
     if not wanted or any(act.act not in _VERBS for act in wanted):
@@ -75,7 +75,7 @@ def stage_of(acts: Sequence[Act]) -> Scene | None:
     first = turns[0].side if turns and turns[0].act == "turn" else None
     lanes = [act.side for act in wanted if act.act == "lane"]
     left = lanes[0] == "right" if lanes else first == "left"
-    scene = Scene(LEFT_LANE if left else RIGHT_LANE, _ROLLING_MPS if wanted[0].act == "speed" else 0.0)
+    scene = CommandScene(LEFT_LANE if left else RIGHT_LANE, _ROLLING_MPS if wanted[0].act == "speed" else 0.0)
     side: tuple[Any, ...] = ()
     try:
         for act in wanted:
@@ -107,7 +107,7 @@ def _roles(act: Act) -> list[tuple[Reference, str]]:
     return found
 
 
-def _put(scene: Scene, reference: Reference, role: str, act: Act, way: tuple[Any, ...]) -> None:
+def _put(scene: CommandScene, reference: Reference, role: str, act: Act, way: tuple[Any, ...]) -> None:
     if reference in scene.referents or reference.kind in _NEEDS_NOTHING:
         return
     kind = _KINDS.get(reference.kind)
@@ -120,7 +120,7 @@ def _put(scene: Scene, reference: Reference, role: str, act: Act, way: tuple[Any
 
 
 def _actor(
-    scene: Scene, reference: Reference, kind: StagedKind, role: str, act: Act, way: tuple[Any, ...]
+    scene: CommandScene, reference: Reference, kind: StagedKind, role: str, act: Act, way: tuple[Any, ...]
 ) -> StagedActor:
     thing = kind in ("static", "obstacle")
     if thing and (reference.colour is not None or role == "gone"):
@@ -161,7 +161,7 @@ def _actor(
     return StagedActor(kind=kind, colour=colour, ahead_m=at, left_m=aside, way=way, speed_mps=pace, for_m=12.0)
 
 
-def _distract(scene: Scene, reference: Reference, actor: StagedActor, role: str) -> None:
+def _distract(scene: CommandScene, reference: Reference, actor: StagedActor, role: str) -> None:
     """Put a distractor at the kerb, nearer than what is meant."""
     if scene.start == LEFT_LANE and not actor.way:
         return

@@ -44,7 +44,7 @@ BUILT_IN: tuple[Scenario, ...] = (
             "vehicles": 0,
             "people": 0,
             "stage": [
-                {"kind": "bus", "colour": "red", "ahead_m": 18.0, "drives": True},
+                {"kind": "bus", "colour": "red", "ahead_m": 14.0, "drives": True, "turns": ["right"]},
                 {"kind": "car", "colour": "blue", "ahead_m": 30.0, "left_m": -2.8},
                 {"kind": "car", "colour": "silver", "ahead_m": 44.0, "left_m": -2.8},
                 {
