@@ -219,11 +219,11 @@ def test_it_stands_where_it_is_told_to(executor: ProgramExecutor, town: Town, ca
 
 
 def test_what_one_follows_decides_lane_and_way(executor: ProgramExecutor, town: Town) -> None:
-    assert ticked(executor, town, "yield follow(who)").setpoints.turn is None
+    assert ticked(executor, town, "yield follow_agent(who)").setpoints.turn is None
     town.street.lanes[17] = town.road.perception().adjacent_lane(town.road.perception().lane_of(0), 1) or "beside"
-    assert ticked(executor, town, "yield follow(who)").setpoints.target_lane == town.street.lanes[17]
+    assert ticked(executor, town, "yield follow_agent(who)").setpoints.target_lane == town.street.lanes[17]
     town.street.turned[17] = "left"
-    assert ticked(executor, town, "yield follow(who)").setpoints.turn == "left"
+    assert ticked(executor, town, "yield follow_agent(who)").setpoints.turn == "left"
 
 
 def test_who_crosses_is_waited_for_and_who_does_not_is_not(executor: ProgramExecutor, town: Town) -> None:

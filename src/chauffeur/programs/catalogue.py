@@ -464,10 +464,10 @@ TOWN_CALLS: Final[tuple[Api, ...]] = (
         "if is_clear(): ...",
     ),
     Api(
-        "follow",
+        "follow_agent",
         "Drives behind a road user, in its lane and the way it goes, within the speed limit. Yield it in every step.",
         "action",
-        "yield follow(agent(17))",
+        "yield follow_agent(agent(17))",
         result="[speed wanted m/s]",
         params=(_VEH,),
         effect="wish",

@@ -171,11 +171,12 @@ class _Gate:
         self._apis = apis_of(vocabulary)
         self._findings: list[Finding] = []
         self._bound = bound_names(tree)
-        self._known = self._bound | top_level_names(helpers) | self._apis.keys() | BUILTINS
+        defined = self._bound | top_level_names(helpers)
+        self._known = defined | self._apis.keys() | BUILTINS
         self._math = {"math"} | _aliases_of_math(tree)
         self._offered = top_level_generators(helpers)
         self._generators = generator_names(tree) | self._offered
-        self._calls = CallChecks(tree, self._bound)
+        self._calls = CallChecks(tree, defined)
 
     def run(self) -> list[Finding]:
         delegated = {id(node.value) for node in all_nodes(self._tree) if isinstance(node, ast.YieldFrom)}

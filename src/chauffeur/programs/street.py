@@ -151,7 +151,7 @@ class TownApis(DrivingApis):
     def _is_clear(self) -> bool:
         return self._street.is_clear()
 
-    def _follow(self, veh: int) -> list[float]:
+    def _follow_agent(self, veh: int) -> list[float]:
         street = self._street
         turn, lane = street.turn_after(veh), street.lane_after(veh)
         if turn is not None:

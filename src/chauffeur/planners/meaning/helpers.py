@@ -61,7 +61,7 @@ HELPERS: Final[dict[str, str]] = {
     for _ in range(2400):
         if not in_sight(who) or not is_moving(who):
             return
-        yield follow(who)
+        yield follow_agent(who)
     say("It has not stopped for two minutes, and I go on.")
 """,
     "until_near": """def until_near(who, pace):
@@ -106,7 +106,7 @@ HELPERS: Final[dict[str, str]] = {
         if not in_sight(who):
             say("It is out of sight. I go on along the road.")
             return
-        yield follow(who)
+        yield follow_agent(who)
 """,
     "stand_behind": """def stand_behind(who):
     stood = 0
