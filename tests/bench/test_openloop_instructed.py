@@ -19,11 +19,11 @@ from chauffeur.bench.kernel.calls import Patience
 from chauffeur.bench.kernel.conformance import faults
 from chauffeur.bench.kernel.report import fill
 from chauffeur.bench.kernel.run import BenchRun, Effort
-from chauffeur.bench.openloop.doscenes import Instruction, read_annotations
+from chauffeur.bench.openloop.doscenes import SceneInstruction, read_annotations
 from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleration, constant_velocity
 from chauffeur.bench.openloop.instructed import HISTORY_ONLY, MODEL, STEPS, InstructedBenchmark
 from chauffeur.bench.openloop.nuscenes import NuScenesTables
-from chauffeur.bench.openloop.requests import read_context, waypoints_text
+from chauffeur.bench.openloop.requests import question, read_context, waypoints_text
 from chauffeur.bench.openloop.waypoint_parser import read_waypoints
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError, Usage
@@ -125,13 +125,13 @@ def test_annotations_are_read_as_they_are_published(data: Path) -> None:
     found = read_annotations(data / "Annotations")
     one, two = (f"doScenesAnnotations - Annotator {i}.csv" for i in (1, 2))
     assert found.instructions == (
-        Instruction("scene-0001", "no reference", "turn left", f"{one}:2"),
-        Instruction("scene-0001", "static", "turn left, at the kiosk", f"{one}:3"),
-        Instruction("scene-0002", "dynamic", "turn right behind the tram", f"{one}:4"),
-        Instruction("scene-0003", "static and dynamic", "go straight", f"{one}:5"),
-        Instruction("scene-0004", "no reference", "go straight", f"{one}:6"),
-        Instruction("scene-0900", "no reference", "go straight", f"{one}:7"),
-        Instruction("scene-0002", "static and dynamic", "turn right", f"{two}:2"),
+        SceneInstruction("scene-0001", "no reference", "turn left", f"{one}:2"),
+        SceneInstruction("scene-0001", "static", "turn left, at the kiosk", f"{one}:3"),
+        SceneInstruction("scene-0002", "dynamic", "turn right behind the tram", f"{one}:4"),
+        SceneInstruction("scene-0003", "static and dynamic", "go straight", f"{one}:5"),
+        SceneInstruction("scene-0004", "no reference", "go straight", f"{one}:6"),
+        SceneInstruction("scene-0900", "no reference", "go straight", f"{one}:7"),
+        SceneInstruction("scene-0002", "static and dynamic", "turn right", f"{two}:2"),
     )
     assert found.blank == 1 and found.malformed == ()
     alone = read_annotations(data / "Annotations" / two)
@@ -234,6 +234,15 @@ def test_the_instruction_is_all_that_differs_and_no_navigation_leaks(data: Path,
     if setting == "zero-shot":
         assert "5.5 and 6.0 s from now? Answer with twelve positions" in opened[0]
         assert opened[0].count("(x, y)") == STEPS
+
+
+def test_the_question_for_three_seconds_is_the_one_that_its_figures_belong_to(data: Path) -> None:
+    sample = NuScenesTables(data, "v1.0-mini").samples()[0]
+    assert question(sample, "zero-shot").endswith(
+        "Navigation: turn left\n"
+        "Where will the car be 0.5, 1.0, 1.5, 2.0, 2.5 and 3.0 s from now? Answer with six positions, nothing else: "
+        "[(x, y), (x, y), (x, y), (x, y), (x, y), (x, y)]"
+    )
 
 
 def test_navigation_is_still_read_off_the_first_three_seconds(data: Path) -> None:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from chauffeur.bench.openloop.instructed import InstructedBenchmark
 
+FRAMES = "Which frames"
 EXAMPLES = help_text("bench_openloop")
 FRAMES_EXAMPLES = help_text("bench_openloop FRAMES_EXAMPLES")
 
@@ -35,10 +36,14 @@ def openloop(
     ] = None,
     setting: Annotated[str, typer.Option(help="`zero-shot`, `chain-of-thought` or `sft`.")] = "zero-shot",
     shown: Annotated[str, typer.Option(help="`pictures`, or `blank` (grey ones).")] = "pictures",
-    scene_list: Annotated[Path | None, typer.Option(help="File with the names of scenes, one a line.")] = None,
+    scene_list: Annotated[
+        Path | None, typer.Option(help="File with the names of scenes, one a line.", rich_help_panel=FRAMES)
+    ] = None,
     side: Annotated[int, typer.Option(min=0, help="Longer side of the pictures in px; 0 as they are.")] = 448,
-    stride: Annotated[int, typer.Option(min=1, help="Only every so many-th frame.")] = 1,
-    limit: Annotated[int, typer.Option(min=0, help="Only the first so many frames; 0 for all.")] = 0,
+    stride: Annotated[int, typer.Option(min=1, help="Only every so many-th frame.", rich_help_panel=FRAMES)] = 1,
+    limit: Annotated[
+        int, typer.Option(min=0, help="Only the first so many frames; 0 for all.", rich_help_panel=FRAMES)
+    ] = 0,
     beside: Annotated[
         list[Path] | None, typer.Option(help="Folder of another run to show beside this one; may come again.")
     ] = None,

@@ -43,7 +43,7 @@ _MOST_LINES: Final = 10
 
 
 @dataclass(frozen=True, slots=True)
-class Instruction:
+class SceneInstruction:
     """What an annotator would tell the car in a scene.
 
     Attributes:
@@ -70,7 +70,7 @@ class Annotations:
         sha256: Of the files.
     """
 
-    instructions: tuple[Instruction, ...]
+    instructions: tuple[SceneInstruction, ...]
     blank: int
     malformed: tuple[str, ...]
     sha256: str
@@ -89,7 +89,7 @@ def read_annotations(path: Path) -> Annotations:
             hint="Name doScenes' folder `Annotations`.",
         )
     digest, blank = hashlib.sha256(), 0
-    instructions, malformed = list[Instruction](), list[str]()
+    instructions, malformed = list[SceneInstruction](), list[str]()
     for file in files:
         content = _content(file)
         digest.update(content)
@@ -158,7 +158,7 @@ def _record(lines: Sequence[bytes]) -> Sequence[str] | str:
         return f"it is no CSV ({error})"
 
 
-def _instruction(number: str, kind: str, text: str, place: str) -> Instruction | str:
+def _instruction(number: str, kind: str, text: str, place: str) -> SceneInstruction | str:
     """A row that has an instruction, or what is wrong with it."""
     scene = _SCENE.fullmatch(number)
     if scene is None:
@@ -170,4 +170,4 @@ def _instruction(number: str, kind: str, text: str, place: str) -> Instruction |
         return f"the instruction has {len(text)} characters, more than {_MOST_CHARS}"
     if not text.isprintable():
         return "the instruction has characters that cannot be printed"
-    return Instruction(f"scene-{int(scene[1]):04}", refers, text, place)
+    return SceneInstruction(f"scene-{int(scene[1]):04}", refers, text, place)

@@ -26,7 +26,7 @@ from chauffeur.bench.kernel.stats import Array
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.openloop.benchmark import OpenLoopBenchmark, OpenLoopItem, OpenLoopStatus
 from chauffeur.bench.openloop.conventions import distances, standing
-from chauffeur.bench.openloop.doscenes import INSTRUCTION_KINDS, Instruction, read_annotations
+from chauffeur.bench.openloop.doscenes import INSTRUCTION_KINDS, SceneInstruction, read_annotations
 from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleration, constant_velocity
 from chauffeur.bench.openloop.nuscenes import PlanningSample
 from chauffeur.bench.openloop.waypoint_parser import read_waypoints
@@ -186,7 +186,7 @@ class InstructedBenchmark(OpenLoopBenchmark):
                 "The setting sft is for 3 s without instructions.", hint="Choose zero-shot or chain-of-thought."
             )
         self.annotations = read_annotations(Path(instructions))
-        self._by_scene: dict[str, list[Instruction]] = defaultdict(list)
+        self._by_scene: dict[str, list[SceneInstruction]] = defaultdict(list)
         for one in self.annotations.instructions:
             self._by_scene[one.scene].append(one)
         super().__init__(data, setting=setting, **options)
