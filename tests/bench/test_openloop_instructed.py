@@ -333,9 +333,19 @@ def test_no_waypoints_are_a_car_that_stays_and_no_answer_counts_nowhere(data: Pa
     )
     assert unreadable["status"] == "unreadable" and unreadable["fde_m"] == pytest.approx(36.0)
     assert column(bench, rows, 0, MODEL, "no waypoints %") == 1 / 4
+    assert column(bench, rows, 0, MODEL, "no waypoints without %") == 0.0
     lost = next(row for row in rows if row["method"] == MODEL and row["instruction"] == "turn right")
     assert lost["status"] == "no answer" and lost["ade_m"] is None and lost["kept"] is None
     assert [size for name, size, _ in fill(bench.tables[0], rows).lines if name == MODEL] == [4]
+
+
+def test_a_gain_of_form_alone_can_be_told(data: Path) -> None:
+    """A model that answers only when spoken to gains over a car that stays; the share of answers says so."""
+    bench, rows = run(data, lambda text: deaf(text) if told(text) else "Where to?")
+    assert column(bench, rows, 0, MODEL, "gain ADE m") > 1.0
+    assert column(bench, rows, 0, MODEL, "no waypoints %") == 0.0
+    assert column(bench, rows, 0, MODEL, "no waypoints without %") == 1.0
+    assert column(bench, rows, 0, "constant velocity", "no waypoints %") is None
 
 
 def test_without_the_question_without_words_there_is_no_gain(data: Path) -> None:
@@ -355,7 +365,7 @@ def test_the_challenges_filter_leaves_out_the_worst_scenes() -> None:
     """40 scenes off by 1 m with the instruction and 2 m without; one of them by 1,000 m with it, another without."""
     rows = [
         {"scene": f"scene-{i:04}", "kind": "no reference", "method": MODEL, "status": "answered",
-         "ade_m": 1000.0 if i == 7 else 1.0, "fde_m": 1.0,
+         "status_without": None, "ade_m": 1000.0 if i == 7 else 1.0, "fde_m": 1.0,
          "ade_without_m": None, "fde_without_m": None, "kept": None, "kept_without": None}
         for i in range(40)
     ]  # fmt: skip

@@ -145,7 +145,8 @@ def _tell_instructed(console: Console, bench: InstructedBenchmark, folder: Path)
         console.print(line, soft_wrap=True, markup=False)
     if len(left_out) > _SHOWN:
         console.print(f"... and {len(left_out) - _SHOWN} more, in {folder / 'left_out.txt'}.", soft_wrap=True)
-    write_results(folder, {"left_out.txt": "".join(f"{line}\n" for line in left_out)})
+    if left_out:
+        write_results(folder, {"left_out.txt": "".join(f"{line}\n" for line in left_out)})
     console.print(
         "Gain: error without the instruction minus error with it, same model and scene. Annotators had seen the whole "
         "scene: an instruction is privileged, and may be about what comes after the 6 s. No navigation is shown.",

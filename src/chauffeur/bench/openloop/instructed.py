@@ -65,7 +65,8 @@ class InstructedRow:
         status: What became of it; `no answer` counts nowhere.
         detail: Why there is none.
         ade_m, fde_m: With the instruction; of an unreadable answer those of a car that stays.
-        ade_without_m, fde_without_m: The same method in the same scene without it; None until it has been asked.
+        status_without, ade_without_m, fde_without_m: The same method in the same scene without it; None until it has
+            been asked.
         kept, kept_without: Whether the scene is among the 97.5 % with the lowest ADE of the method.
         answer: The model's words.
     """
@@ -81,6 +82,7 @@ class InstructedRow:
     detail: str
     ade_m: float | None
     fde_m: float | None
+    status_without: OpenLoopStatus | None
     ade_without_m: float | None
     fde_without_m: float | None
     kept: bool | None
@@ -97,6 +99,13 @@ def _mean(name: str, title: str, of: Callable[[AnyRow], float]) -> Measure:
     return mean(f"instructed-{name}-v1", title, "m", lambda row: of(row) if _compared(row) else None, 2)
 
 
+def _unreadable(name: str, title: str, column: str) -> Measure:
+    """Share of the model's answers that are no waypoints: where the two shares differ, the gain is of form too."""
+    return share(
+        f"instructed-{name}-v1", title, lambda row: row[column] == "unreadable" if row["method"] == MODEL else None, 2
+    )
+
+
 _GAINS: Final = (
     _mean("ade", "ADE", lambda row: row["ade_m"]),
     _mean("ade-without", "ADE without", lambda row: row["ade_without_m"]),
@@ -104,7 +113,8 @@ _GAINS: Final = (
     _mean("fde", "FDE", lambda row: row["fde_m"]),
     _mean("fde-without", "FDE without", lambda row: row["fde_without_m"]),
     _mean("fde-gain", "gain FDE", lambda row: row["fde_without_m"] - row["fde_m"]),
-    share("instructed-unreadable-v1", "no waypoints", lambda row: row["status"] == "unreadable", 2),
+    _unreadable("unreadable", "no waypoints", "status"),
+    _unreadable("unreadable-without", "no waypoints without", "status_without"),
 )
 
 
@@ -258,6 +268,7 @@ class InstructedBenchmark(OpenLoopBenchmark):
             detail=outcome.error,
             ade_m=own[0],
             fde_m=own[1],
+            status_without=None,
             ade_without_m=None,
             fde_without_m=None,
             kept=None,
@@ -272,6 +283,7 @@ class InstructedBenchmark(OpenLoopBenchmark):
                     model,
                     method=name,
                     status="answered",
+                    status_without="answered",
                     detail="",
                     ade_m=ade,
                     fde_m=fde,
@@ -286,7 +298,7 @@ class InstructedBenchmark(OpenLoopBenchmark):
         """The model's errors without an instruction beside those with one, and which scenes are kept (Q97.5)."""
         without = {row["scene"]: row for row in rows if row["kind"] == HISTORY_ONLY}
         found = [
-            row | {"ade_without_m": base["ade_m"], "fde_without_m": base["fde_m"]}
+            row | {"status_without": base["status"], "ade_without_m": base["ade_m"], "fde_without_m": base["fde_m"]}
             if row["method"] == MODEL and row["kind"] != HISTORY_ONLY and (base := without.get(row["scene"]))
             else row
             for row in rows
