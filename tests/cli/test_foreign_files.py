@@ -72,6 +72,7 @@ FOLDERS: Final = (
     ("show scenarios --data {in}", ("tasks.json",)),
     ("bench openloop --data {in} --write-sft {out}", tuple(f"v1.0-mini/{one}.json" for one in (
         "scene", "sample", "sample_data", "ego_pose", "calibrated_sensor", "sensor", "openloop"))),
+    ("bench openloop --data {in} --instructions {in}", ("a.csv",)),
     ("bench nuplanqa --data {in} --planner keyword --out {out}", ("questions.json", "metadata.json")),
     ("report {in}", ("plan.json", "results.jsonl", "provenance.json", "rollout.jsonl", "generate.jsonl")),
     ("bench merge {out} {in}", ("plan.json", "results.jsonl", "generate.jsonl")),

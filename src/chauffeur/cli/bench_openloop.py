@@ -1,4 +1,5 @@
-"""`chauffeur bench openloop` and `bench scenes frames`: three seconds ahead from one picture (paper Tab. XII)."""
+"""`chauffeur bench openloop` and `bench scenes frames`: three seconds ahead from one picture (paper Tab. XII), or six
+with and without an instruction (doScenes)."""
 
 from __future__ import annotations
 
@@ -14,6 +15,11 @@ from chauffeur.cli.options import ASKING, MaxRequests, MaxUsd, Price, Seed
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from rich.console import Console
+
+    from chauffeur.bench.openloop.instructed import InstructedBenchmark
+
+FRAMES = "Which frames"
 EXAMPLES = help_text("bench_openloop")
 FRAMES_EXAMPLES = help_text("bench_openloop FRAMES_EXAMPLES")
 
@@ -24,12 +30,20 @@ def openloop(
         str, typer.Option(help="The model: openai/NAME, transformers/FOLDER, vilad-frames or vilad-frames/FOLDER.")
     ] = "",
     tables_of: Annotated[str, typer.Option("--tables", help="E.g. v1.0-mini; default the only one.")] = "",
+    instructions: Annotated[
+        Path | None,
+        typer.Option(help="doScenes' annotations (folder or file): 6 s ahead, with each instruction and without."),
+    ] = None,
     setting: Annotated[str, typer.Option(help="`zero-shot`, `chain-of-thought` or `sft`.")] = "zero-shot",
     shown: Annotated[str, typer.Option(help="`pictures`, or `blank` (grey ones).")] = "pictures",
-    scene_list: Annotated[Path | None, typer.Option(help="File with the names of scenes, one a line.")] = None,
+    scene_list: Annotated[
+        Path | None, typer.Option(help="File with the names of scenes, one a line.", rich_help_panel=FRAMES)
+    ] = None,
     side: Annotated[int, typer.Option(min=0, help="Longer side of the pictures in px; 0 as they are.")] = 448,
-    stride: Annotated[int, typer.Option(min=1, help="Only every so many-th frame.")] = 1,
-    limit: Annotated[int, typer.Option(min=0, help="Only the first so many frames; 0 for all.")] = 0,
+    stride: Annotated[int, typer.Option(min=1, help="Only every so many-th frame.", rich_help_panel=FRAMES)] = 1,
+    limit: Annotated[
+        int, typer.Option(min=0, help="Only the first so many frames; 0 for all.", rich_help_panel=FRAMES)
+    ] = 0,
     beside: Annotated[
         list[Path] | None, typer.Option(help="Folder of another run to show beside this one; may come again.")
     ] = None,
@@ -43,11 +57,15 @@ def openloop(
     max_requests: MaxRequests = None,
     price: Price = None,
 ) -> None:
-    """Waypoints over three seconds from a front picture and own motion, under five averagings (paper Tab. XII)."""
+    """Waypoints over three seconds from a front picture and own motion, under five averagings (paper Tab. XII).
+
+    With --instructions over six seconds, with what people would tell the car and without (doScenes).
+    """
     from chauffeur.bench.kernel.report import markdown, tables
     from chauffeur.bench.kernel.run import BenchRun, write_results
     from chauffeur.bench.openloop import OpenLoopBenchmark
     from chauffeur.bench.openloop.frames import SIMULATED
+    from chauffeur.bench.openloop.instructed import InstructedBenchmark
     from chauffeur.bench.openloop.requests import training_lines
     from chauffeur.bench.openloop.table12 import HEADER, LEARNING, our_lines, paper_lines
     from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
@@ -58,8 +76,21 @@ def openloop(
     from chauffeur.planners.registry import make_answerer
 
     console = stdout()
-    bench = OpenLoopBenchmark(
-        str(data), tables_of, "sft" if write_sft else setting, shown, str(scene_list or ""), side, limit, stride
+    if instructions is not None and (write_sft is not None or beside):
+        raise ConfigError("--instructions is measured over 6 s.", hint="Leave out --write-sft and --beside.")
+    options: dict[str, Any] = {
+        "version": tables_of,
+        "setting": "sft" if write_sft else setting,
+        "shown": shown,
+        "scenes": str(scene_list or ""),
+        "side": side,
+        "limit": limit,
+        "every": stride,
+    }
+    bench = (
+        OpenLoopBenchmark(str(data), **options)
+        if instructions is None
+        else InstructedBenchmark(str(data), str(instructions), **options)
     )
     if write_sft is not None:
         lines = [*training_lines((one for one in bench.samples if one.whole), data)]
@@ -69,11 +100,16 @@ def openloop(
     if not planner:
         raise ConfigError("Nobody is asked.", hint="Name a model with --planner, e.g. openai/gpt-4o.")
     who = make_answerer(planner, **planner_options(planner, base_url))
-    parts = ["openloop", planner.replace("/", "-"), *(one for one in (setting, shown) if one not in _USUAL)]
+    name = "openloop" if instructions is None else "openloop-instructed"
+    parts = [name, planner.replace("/", "-"), *(one for one in (setting, shown) if one not in _USUAL)]
     run = BenchRun(out or Path("runs") / "-".join(parts), bench, who)
     work = effort(1, concurrency, max_usd, max_requests, price)
     rows = carry_out(console, run, lambda watch: run.run(watch, work), f"Open-loop planning ({bench.id})")
     show_tables(console, tables(bench.tables, rows))
+    if isinstance(bench, InstructedBenchmark):
+        _tell_instructed(console, bench, run.folder)
+        finish(console, run)
+        return
     on = "our frames" if bench.own else "nuScenes"
     shown_as = "" if shown == "pictures" else ", grey pictures"
     compared = our_lines(f"{who.id}{shown_as} ({on})", LEARNING[setting], rows)
@@ -95,6 +131,29 @@ def openloop(
 
 
 _USUAL = ("zero-shot", "pictures")
+_SHOWN = 20
+"""Lines of what was left out on the console; all are in the run folder."""
+
+
+def _tell_instructed(console: Console, bench: InstructedBenchmark, folder: Path) -> None:
+    """What was asked about, what of the annotations was not, and what the figures are of."""
+    from chauffeur.bench.kernel.run import write_results
+    from chauffeur.bench.openloop.frames import SIMULATED
+
+    left_out = bench.left_out
+    for line in left_out[:_SHOWN]:
+        console.print(line, soft_wrap=True, markup=False)
+    if len(left_out) > _SHOWN:
+        console.print(f"... and {len(left_out) - _SHOWN} more, in {folder / 'left_out.txt'}.", soft_wrap=True)
+    if left_out:
+        write_results(folder, {"left_out.txt": "".join(f"{line}\n" for line in left_out)})
+    console.print(
+        "Gain: error without the instruction minus error with it, same model and scene. Annotators had seen the whole "
+        "scene: an instruction is privileged, and may be about what comes after the 6 s. No navigation is shown.",
+        soft_wrap=True,
+    )
+    if bench.own:
+        console.print(SIMULATED, soft_wrap=True)
 
 
 def _others(folders: list[Path]) -> list[tuple[str, list[Mapping[str, Any]]]]:

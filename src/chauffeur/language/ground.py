@@ -41,6 +41,8 @@ _KINDS: Final[dict[ReferenceKind, tuple[AgentKind, ...]]] = {
     "obstacle": ("static", "obstacle"), "cone": ("static",), "barrier": ("obstacle",),
 }  # fmt: skip
 """Kinds of road users that a word covers."""
+ROAD_USERS: Final = frozenset(_KINDS)
+"""Words for what can be pointed at among those who are on the road, or stand in its way."""
 PLURALS: Final[frozenset[ReferenceKind]] = frozenset({"vehicles", "pedestrians", "traffic"})
 _TAKEN_FOR: Final[dict[Colour, tuple[Colour, ...]]] = {
     "silver": ("grey",), "grey": ("silver",), "dark": ("black", "grey", "blue", "brown", "green"),

@@ -30,7 +30,7 @@ from chauffeur.bench.openloop.conventions import (
 )
 from chauffeur.bench.openloop.extrapolation import constant_velocity
 from chauffeur.bench.openloop.nuscenes import FUTURE, NuScenesTables, PlanningSample
-from chauffeur.bench.openloop.requests import ASKING, THOUGHTS, OpenLoopSetting, Shown, opening, question
+from chauffeur.bench.openloop.requests import ASKING, THOUGHTS, OpenLoopSetting, Shown, opening, question, with_wish
 from chauffeur.bench.openloop.waypoint_parser import READING, read_waypoints
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.planners.base import Prose
@@ -197,10 +197,11 @@ def distance_columns(predicted: FloatArray | None, truth: FloatArray, whose: Who
 
 @dataclass(frozen=True, slots=True)
 class OpenLoopItem:
-    """A frame that is asked about."""
+    """A frame that is asked about, and what the passenger says there; empty for nothing."""
 
     id: str
     sample: PlanningSample
+    instruction: str = ""
 
 
 class OpenLoopBenchmark:
@@ -208,8 +209,10 @@ class OpenLoopBenchmark:
 
     id = BENCH
     asks: Literal["words"] = "words"
-    row = OpenLoopRow
+    row: type = OpenLoopRow
     tables = _tables()
+    steps = FUTURE
+    """Waypoints asked for."""
 
     def __init__(
         self,
@@ -251,7 +254,7 @@ class OpenLoopBenchmark:
         root = Path(data)
         self.tables_read = NuScenesTables(root, version or _only_version(root))
         names, digest = _names(scenes)
-        self.samples = self.tables_read.samples(names)[::every][: limit or None]
+        self.samples = self.asked_about(self.tables_read.samples(names, self.steps))[::every][: limit or None]
         if not self.samples:
             raise DataError(f"{self.tables_read.folder} has no frame with 2 s before it.")
         self.own = self.tables_read.marks is not None
@@ -270,15 +273,19 @@ class OpenLoopBenchmark:
             "reading": READING,
         }
 
+    def asked_about(self, samples: Sequence[PlanningSample]) -> Sequence[PlanningSample]:
+        """The samples that are asked about, of all that have 2 s before them."""
+        return samples
+
     def items(self) -> Sequence[OpenLoopItem]:
         return [OpenLoopItem(one.id, one) for one in self.samples]
 
     async def request(self, item: OpenLoopItem, desk: RequestDesk) -> Request:
         """See Benchmark. Raises DataError: a picture is missing or damaged, or an earlier question got no answer."""
-        asked = question(item.sample, self._setting)
+        asked = question(item.sample, self._setting, item.instruction)
         if self._setting != "chain-of-thought":
             return [opening(item.sample, asked, self._shown, self._side)]
-        turns: list[Message] = [opening(item.sample, THOUGHTS[0], self._shown, self._side)]
+        turns: list[Message] = [opening(item.sample, with_wish(THOUGHTS[0], item.instruction), self._shown, self._side)]
         for following in (*THOUGHTS[1:], asked):
             reply = await desk.ask(tuple(turns))
             if not isinstance(reply, Prose):
@@ -291,7 +298,7 @@ class OpenLoopBenchmark:
         """See Benchmark: the answer itself is the result."""
         del item, answer
 
-    def rows(self, outcome: ItemOutcome[OpenLoopItem]) -> Sequence[OpenLoopRow]:
+    def rows(self, outcome: ItemOutcome[OpenLoopItem]) -> Sequence[Any]:
         if outcome.answer is None and not outcome.error:
             return ()
         sample = outcome.item.sample

@@ -60,11 +60,11 @@ class L2Errors:
 
 
 def distances(predicted: FloatArray, truth: FloatArray) -> FloatArray:
-    """Of each waypoint from the true one, (6,), m; NaN where the truth is not known.
+    """Of each waypoint from the true one, (steps,), m; NaN where the truth is not known.
 
     Args:
-        predicted: (6, 2).
-        truth: (6, 2), NaN where the log had ended.
+        predicted: (steps, 2).
+        truth: (steps, 2), NaN where the log had ended.
     """
     return np.hypot(*(predicted - truth).T)
 
@@ -113,6 +113,6 @@ def fails(predicted: FloatArray | None, truth: FloatArray) -> bool:
     return bool((distances(predicted, truth)[:2] > FAILS_M).any())
 
 
-def standing() -> FloatArray:
-    """A car that stays where it is, (6, 2): what an answer without waypoints counts as."""
-    return np.zeros((FUTURE, 2))
+def standing(steps: int = FUTURE) -> FloatArray:
+    """A car that stays where it is, (steps, 2): what an answer without waypoints counts as."""
+    return np.zeros((steps, 2))

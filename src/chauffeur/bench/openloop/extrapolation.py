@@ -1,6 +1,6 @@
 """What a car's own motion says of the next three seconds: the baselines that see nothing.
 
-All arrays are as in `nuscenes.PlanningSample`: history (5, 3) and future (6, 2), ego frame, 0.5 s apart.
+All arrays are as in `nuscenes.PlanningSample`: history (5, 3) and future (steps, 2), ego frame, 0.5 s apart.
 """
 
 from __future__ import annotations
@@ -30,23 +30,23 @@ FutureKind = Literal["stays", "starts", "turns", "brakes", "speeds up", "goes on
 FUTURE_KINDS: Final[tuple[FutureKind, ...]] = get_args(FutureKind)
 
 
-def constant_velocity(history: FloatArray) -> FloatArray:
-    """Straight on as fast as over the last half second, (6, 2)."""
+def constant_velocity(history: FloatArray, steps: int = FUTURE) -> FloatArray:
+    """Straight on as fast as over the last half second, (steps, 2)."""
     speed = float(np.hypot(*(history[-1, :2] - history[-2, :2]))) / STEP_S
-    ahead = speed * STEP_S * np.arange(1, FUTURE + 1)
-    return np.stack((ahead, np.zeros(FUTURE)), axis=1).astype(np.float64)
+    ahead = speed * STEP_S * np.arange(1, steps + 1)
+    return np.stack((ahead, np.zeros(steps)), axis=1).astype(np.float64)
 
 
-def constant_turn_and_acceleration(history: FloatArray) -> FloatArray:
-    """Acceleration and yaw rate of the last second go on (CTRA), until the car stands; (6, 2)."""
+def constant_turn_and_acceleration(history: FloatArray, steps: int = FUTURE) -> FloatArray:
+    """Acceleration and yaw rate of the last second go on (CTRA), until the car stands; (steps, 2)."""
     moved = np.hypot(*np.diff(history[:, :2], axis=0).T) / STEP_S
     acceleration = float(moved[-1] - moved[-2]) / STEP_S
     speed = max(0.0, float(moved[-1]) + acceleration * STEP_S / 2.0)
     rate = float(history[-1, 2] - history[-2, 2]) / STEP_S
-    fine, found = 10, np.zeros((FUTURE, 2))
+    fine, found = 10, np.zeros((steps, 2))
     dt = STEP_S / fine
     x = y = heading = 0.0
-    for i in range(FUTURE):
+    for i in range(steps):
         for _ in range(fine):
             speed = max(0.0, speed + acceleration * dt)
             heading += rate * dt if speed > 0.0 else 0.0

@@ -86,7 +86,8 @@ class PlanningSample:
         scene: Name of its scene.
         picture: File of the front camera's picture.
         history: Poses (x, y, heading rad), oldest first, the present one last; (HISTORY + 1, 3).
-        future: Where the car was then, every 0.5 s; (FUTURE, 2); NaN where the scene had ended.
+        future: Where the car was then, every 0.5 s; (steps, 2), FUTURE unless asked otherwise; NaN where the scene had
+            ended.
         command: High-level command; empty for none.
         kind, place: Of our own sets; empty otherwise.
     """
@@ -126,8 +127,8 @@ def in_frame(poses: FloatArray, origin: FloatArray) -> FloatArray:
 
 
 def future_command(future: FloatArray) -> str:
-    """The command that ST-P3 and UniAD read off the true future (6, 2): it is no input that a car would have."""
-    last = future[-1, 1]
+    """The command that ST-P3 and UniAD read off the true future's first 3 s: it is no input that a car would have."""
+    last = future[FUTURE - 1, 1]
     if not math.isfinite(last):
         return ""
     return "turn left" if last >= ASIDE_M else "turn right" if last <= -ASIDE_M else "go straight"
@@ -237,6 +238,11 @@ class NuScenesTables:
             raise self._wrong("sample_data", token, "is_key_frame", row.get("is_key_frame"), "true or false")
         return bool(row["is_key_frame"])
 
+    @property
+    def scenes(self) -> frozenset[str]:
+        """Names of all scenes. Raises DataError: one has none."""
+        return frozenset(self._text("scene", token, "name") for token in self._tables["scene"])
+
     def _chain(self, scene: str) -> list[str]:
         """Samples of a scene in order."""
         found, seen = list[str](), set[str]()
@@ -273,11 +279,12 @@ class NuScenesTables:
             raise self._wrong("sample", sample, "timestamp", value, "a time in microseconds")
         return float(value) * 1e-6
 
-    def samples(self, scenes: frozenset[str] | None = None) -> list[PlanningSample]:
+    def samples(self, scenes: frozenset[str] | None = None, steps: int = FUTURE) -> list[PlanningSample]:
         """Every sample with 2 s before it and at least one after; of a marked set the marked ones.
 
         Args:
             scenes: Names of those that count; None for all.
+            steps: Length of the futures, at least FUTURE.
 
         Raises:
             DataError: A link leads nowhere.
@@ -288,11 +295,11 @@ class NuScenesTables:
             name = self._text("scene", scene, "name")
             if scenes is None or name in scenes:
                 for drive in self._drives(scene):
-                    found += self._samples_of(name, drive, marks)
+                    found += self._samples_of(name, drive, marks, steps)
         return found
 
     def _samples_of(
-        self, scene: str, drive: Sequence[str], marks: Mapping[str, OpenLoopMark] | None
+        self, scene: str, drive: Sequence[str], marks: Mapping[str, OpenLoopMark] | None, steps: int
     ) -> Iterator[PlanningSample]:
         poses, files = self._driven(drive)
         for at in range(HISTORY, len(drive) - 1):
@@ -300,8 +307,8 @@ class NuScenesTables:
             if marks is not None and mark is None:
                 continue
             history = in_frame(poses[at - HISTORY : at + 1], poses[at])
-            future = np.full((FUTURE, 2), np.nan)
-            after = in_frame(poses[at + 1 : at + 1 + FUTURE], poses[at])[:, :2]
+            future = np.full((steps, 2), np.nan)
+            after = in_frame(poses[at + 1 : at + 1 + steps], poses[at])[:, :2]
             future[: len(after)] = after
             said = future_command(future) if mark is None else mark.command
             kind, place = ("", "") if mark is None else (mark.kind, mark.place)

@@ -1,4 +1,4 @@
-"""What a model is asked for: six waypoints after a picture and the car's own motion, in three settings.
+"""What a model is asked for: waypoints after a picture and the car's own motion, in three settings.
 
 zero-shot         one question.
 chain-of-thought  OpenEMMA's three questions first (the scene, the road users that matter, the driver's intent), each
@@ -40,11 +40,9 @@ _ROLE: Final = (
     "You drive a car. The picture is of its front camera, now. Positions are in the car's own frame of this instant, "
     "in metres: x ahead, y to the left; the car is at (0, 0)."
 )
-_ASK: Final = (
-    "Where will the car be 0.5, 1.0, 1.5, 2.0, 2.5 and 3.0 s from now? Answer with six positions, nothing else: "
-    "[(x, y), (x, y), (x, y), (x, y), (x, y), (x, y)]"
-)
+_WORDS: Final = {6: "six", 12: "twelve"}
 _SAID: Final = "Navigation: "
+_WISH: Final = "The passenger says: "
 _WAS: Final = "Was at (x, y, heading in degrees): "
 
 
@@ -75,11 +73,26 @@ def read_context(text: str) -> tuple[FloatArray, str]:
     return np.array(rows), said
 
 
-def question(sample: PlanningSample, setting: OpenLoopSetting) -> str:
-    """The text of the last question."""
+def question(sample: PlanningSample, setting: OpenLoopSetting, instruction: str = "") -> str:
+    """The text of the last question, with what the passenger says where there is an instruction."""
     if setting == "sft":
         return f"{context_of(sample)}\nWaypoints:"
-    return f"{_ROLE}\n{context_of(sample)}\n{_ASK}"
+    return f"{_ROLE}\n{context_of(sample)}\n{with_wish(_ask(len(sample.future)), instruction)}"
+
+
+def with_wish(text: str, instruction: str) -> str:
+    """A question with the passenger's instruction before it; the question alone where there is none."""
+    return f"{_WISH}{instruction}\n{text}" if instruction else text
+
+
+def _ask(steps: int) -> str:
+    """The question for so many waypoints, half seconds apart."""
+    *times, last = (f"{STEP_S * (i + 1):.1f}" for i in range(steps))
+    form = ", ".join(["(x, y)"] * steps)
+    return (
+        f"Where will the car be {', '.join(times)} and {last} s from now? "
+        f"Answer with {_WORDS.get(steps, steps)} positions, nothing else: [{form}]"
+    )
 
 
 def opening(sample: PlanningSample, text: str, shown: Shown, side_px: int) -> Message:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -33,53 +34,53 @@ _BREAK: Final = re.compile(
 """What parts two lists of points: a sentence or paragraph that ends, a word that compares, the end of a list."""
 _GAP_CHARS: Final = 80
 _X, _Y = (re.compile(rf"\b{name}\b[\"'\s]{{0,4}}[:=]\s{{0,4}}({NUMBER.pattern})", re.IGNORECASE) for name in "xy")
-_TIMES: Final = tuple(STEP_S * (i + 1) for i in range(FUTURE))
 _MOST_M: Final = 500.0
-"""No vehicle gets farther in three seconds."""
+"""No vehicle gets farther in six seconds."""
 
 
-def read_waypoints(words: str) -> FloatArray | None:
-    """Six waypoints (6, 2), m, of an answer; None where it has none that can be meant.
+def read_waypoints(words: str, steps: int = FUTURE) -> FloatArray | None:
+    """Waypoints (steps, 2), m, of an answer; None where it has none that can be meant.
 
     Read are brackets of any kind that hold two numbers, with or without names (`(1, 0.2)`, `[1, 0.2]`, `{"x": 1, "y":
     0.2}`), or three of which the first is the time; else lines with two numbers. Points that follow each other are one
-    list, whose last six count: models go on from the past that they were told. What stands beside a list of six is no
-    part of it; two different lists of six are no answer, and neither are fewer.
+    list, whose last `steps` count: models go on from the past that they were told. What stands beside a list of so many
+    is no part of it; two different lists are no answer, and neither are fewer points.
     """
     text = plain_signs(answer_in(words))
+    times = tuple(STEP_S * (i + 1) for i in range(steps))
     pairs, ends = list[Pair](), list[int]()
     lists: list[list[Pair]] = []
     for one in _GROUP.finditer(text):
-        if (pair := _pair(one[1])) is not None:
+        if (pair := _pair(one[1], times)) is not None:
             gap = text[ends[-1] : one.start()] if ends else ""
             if not ends or len(gap) > _GAP_CHARS or _BREAK.search(gap):
                 lists.append([])
             lists[-1].append(pair)
             pairs.append(pair)
             ends.append(one.end())
-    found = {points for one in lists if (points := _points(one))}
-    if not found and len(pairs) == FUTURE:  # a sentence each
-        found = {points for points in (_points(pairs),) if points}
+    found = {points for one in lists if (points := _points(one, times))}
+    if not found and len(pairs) == steps:  # a sentence each
+        found = {points for points in (_points(pairs, times),) if points}
     if not found:
-        found = {points for one in _lines(text) if (points := _points(one))}
+        found = {points for one in _lines(text, times) if (points := _points(one, times))}
     if len(found) != 1:
         return None
     meant = np.array(found.pop(), np.float64)
     return meant if np.isfinite(meant).all() and float(np.abs(meant).max()) < _MOST_M else None
 
 
-def _points(pairs: list[Pair]) -> tuple[tuple[float, float], ...]:
-    """The six waypoints of a list; nothing where it has fewer."""
-    timed = [pair for pair in pairs if pair[2] is not None][-FUTURE:]
-    meant = timed if [pair[2] for pair in timed] == list(_TIMES) else [pair for pair in pairs if pair[2] is None]
-    return tuple(pair[:2] for pair in meant[-FUTURE:]) if len(meant) >= FUTURE else ()
+def _points(pairs: list[Pair], times: Sequence[float]) -> tuple[tuple[float, float], ...]:
+    """The waypoints of a list, one a time; nothing where it has fewer."""
+    timed = [pair for pair in pairs if pair[2] is not None][-len(times) :]
+    meant = timed if [pair[2] for pair in timed] == list(times) else [pair for pair in pairs if pair[2] is None]
+    return tuple(pair[:2] for pair in meant[-len(times) :]) if len(meant) >= len(times) else ()
 
 
-def _lines(text: str) -> list[list[Pair]]:
+def _lines(text: str, times: Sequence[float]) -> list[list[Pair]]:
     """Pairs of lines that follow each other."""
     lists: list[list[Pair]] = [[]]
     for line in text.splitlines():
-        pair = _pair(_COUNT.sub("", line)) if len(line) <= _LINE_CHARS else None
+        pair = _pair(_COUNT.sub("", line), times) if len(line) <= _LINE_CHARS else None
         if pair is not None:
             lists[-1].append(pair)
         elif line.strip():
@@ -87,7 +88,7 @@ def _lines(text: str) -> list[list[Pair]]:
     return lists
 
 
-def _pair(text: str) -> Pair | None:
+def _pair(text: str, times: Sequence[float]) -> Pair | None:
     """(x, y, time or None) of a bracket or line; None where it holds no pair."""
     if _SIDE.search(text):
         return None
@@ -97,6 +98,6 @@ def _pair(text: str) -> Pair | None:
     numbers = numbers_in(text)
     if len(numbers) == 2:
         return numbers[0], numbers[1], None
-    if len(numbers) == 3 and numbers[0] in _TIMES:
+    if len(numbers) == 3 and numbers[0] in times:
         return numbers[1], numbers[2], numbers[0]
     return None

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
-from chauffeur.concept.utterance import Act, Span, Utterance
+from chauffeur.concept.utterance import Act, Reference, Span, Utterance
+from chauffeur.language.ground import ROAD_USERS
 from chauffeur.language.meaning.reader import read
 from chauffeur.language.meaning.words import act_words
 from chauffeur.planners.arbitration import asked, unanswered
@@ -31,6 +33,11 @@ _WHY_NOT: Final = {
     "illegal": "The rules of the road do not allow that.",
     "dangerous": "That would put people in danger.",
 }
+
+
+_SEEN: Final = ROAD_USERS | {"light"}
+_BY_NAME: Final = frozenset({"building", "landmark", "lot", "gate", "driveway"})
+"""Places that a town's map knows by their names, and sight does not."""
 
 
 class MeaningPlanner:
@@ -96,6 +103,29 @@ class MeaningPlanner:
             latency_s=time.perf_counter() - begun,
             unused=tuple(utterance.text[low:high] for low, high in (*_spans(made), *utterance.unused)),
         )
+
+
+def plan_by_sight(request: PlanRequest) -> Plan | None:
+    """The plan for words about road users or lights in sight of a car in a town; None for all other words: a plain
+    turn, a speed, a place by its name.
+    """
+    if vocabulary_of(request.context.situation.world) != "town" or request.observation is None:
+        return None
+    utterance = read(request.instruction.text)
+    kinds = {one.kind for act in utterance.acts for one in _references(act)}
+    if not kinds & _SEEN or kinds & _BY_NAME or any(act.act == "goto" for act in utterance.acts):
+        return None
+    return MeaningPlanner().plan_of(utterance, request)
+
+
+def _references(act: Act) -> Iterator[Reference]:
+    """What an act names, and what that belongs to."""
+    places = act.place and act.place.ref, act.when and act.when.ref
+    for named in (act.target, *places):
+        one = named
+        while one is not None:
+            yield one
+            one = one.of
 
 
 def _spans(made: ComposedActs) -> list[Span]:

@@ -25,6 +25,7 @@ from chauffeur.planners.arbitration import (
     wary_of,
 )
 from chauffeur.planners.base import OnText, Planner, declined
+from chauffeur.planners.meaning.planner import plan_by_sight
 from chauffeur.planners.onboard.dialect import DialectStep, shall_i
 from chauffeur.planners.onboard.dialect import write as program_of
 from chauffeur.planners.onboard.doubts import ENGLISH_ONLY, foreign
@@ -225,6 +226,8 @@ class LanguageModelPlanner:
             from chauffeur.planners.talk2drive.embedded import EmbeddedParameters
 
             return await EmbeddedParameters(self).plan(request)
+        if (told := plan_by_sight(request)) is not None:
+            return replace(told, planner=self.id)
         if (told := plan_in_town(self, request)) is not None:
             return told
         plan = self._in_words(request, begun)
