@@ -1,11 +1,11 @@
 """What is driven of commands in German, Spanish, French and Chinese: planned where the act can be driven, as far as V.
 
-    python benchmarks/languages.py [--planner onboard] [--wrong] [FILE ...]
+    python benchmarks/languages.py [--planner onboard] [--each] [FILE ...]
 
-A command is right if the plan is the act of its label (whether the checks then let it through is another matter), asked if
-nothing is planned and the person is told that English is needed, asked back or declined, wrong if another act is planned,
-opposite if it is the other side or the other way. A call for help is right if the car's own emergency answer comes, and
-a sentence that asks for nothing or for nothing now (`none`) if nothing is planned.
+A command is right if the plan is the act of its label (whether the checks then let it through is another matter), asked
+if nothing is planned and the person is told that English is needed, asked back or declined, wrong if another act is
+planned, opposite if it is the other side or the other way. A call for help is right if the car's own emergency answer
+comes, and a sentence that asks for nothing, or for nothing now (`none`), if nothing is planned.
 """
 
 from __future__ import annotations

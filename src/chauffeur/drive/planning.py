@@ -249,8 +249,8 @@ async def _planned(request: PlanRequest, steps: PlanSteps) -> Plan:
 async def _answered(
     request: PlanRequest, wish: Verdict, steps: PlanSteps, other: OtherWish | None
 ) -> tuple[bool, Plan]:
-    """(whether it is the car's own answer, R and P): an unsafe wish reaches no planner, nor does one of another language
-    that its table has not, and a planner that understands an alarm is not left to answer it."""
+    """(whether it is the car's own answer, R and P): an unsafe wish reaches no planner, nor does one in another
+    language that could not be read, and a planner that understands an alarm is not left to answer it."""
     text = request.instruction.text
     own = steps.own(text)
     if own is not None:

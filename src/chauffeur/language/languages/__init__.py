@@ -1,7 +1,7 @@
 """Commands in German, Spanish, French and Chinese: the commonest acts, read by a closed table of whole sentences.
 
-A sentence is read only if the table of its language has all of it, but for courtesies; what has a negation, a condition,
-or any word that the table does not know is not read, and the person is told in their language that English is needed.
+A sentence is read only if the table of its language has all of it, but for courtesies. One with a negation, a condition
+or any other word is not read, and the person is told in their language that English is needed.
 Calls to stop and for help are read by `language.emergency`, before anything else.
 """
 
@@ -121,12 +121,18 @@ class _Table:
         text = self._fold(_KMH.sub(" kmh ", text))
         return re.sub(r"[\W_]+", "" if self.spaceless else " ", text).strip()
 
-    def bare(self, words: str) -> str:
-        """Words without courtesies."""
-        return " ".join(self._filler.sub(" ", words).split()) if not self.spaceless else self._filler.sub("", words)
+    def _forms(self, words: str) -> tuple[str, ...]:
+        """The words as they are, without courtesies, and without what makes a request of an order."""
+        bare = self._bare(words)
+        return words, bare, self._bare(self._lead.sub("", words)), self._bare(self._lead.sub("", bare))
+
+    def _bare(self, words: str) -> str:
+        blank = "" if self.spaceless else " "
+        return " ".join(self._filler.sub(blank, words).split())
 
     def negated(self, words: str) -> bool:
-        """Whether any word denies something."""
+        """Whether any word denies something; "can you not" asks for it."""
+        words = self._lead.sub("", words)
         return not self.negations.isdisjoint(words if self.spaceless else words.split())
 
     def call_in(self, text: str) -> Call | None:
@@ -138,7 +144,7 @@ class _Table:
         )
         for kind, pattern in calls:
             for piece in stretches:
-                if pattern.fullmatch(piece) or pattern.fullmatch(self.bare(piece)):
+                if any(map(pattern.fullmatch, self._forms(piece))):
                     return Call(self.language, kind, piece)
         return None
 
@@ -152,10 +158,9 @@ class _Table:
         for pattern, value in self._numbers:
             words, count = pattern.subn(_NUMBER, words)
             values += [value] * count
-        bare = self.bare(words)
-        forms = (words, bare, self.bare(self._lead.sub("", bare).strip()), self.bare(self._lead.sub("", words).strip()))
+        forms = self._forms(words)
         for english, told, pattern in self._acts:
-            if any(pattern.fullmatch(form) for form in forms):
+            if any(map(pattern.fullmatch, forms)):
                 value = values[0] if values else ""
                 return english.replace(_NUMBER, value), self.told.format(told.replace(_NUMBER, value))
         return None
