@@ -14,7 +14,7 @@ from chauffeur.drive.emergency import EMERGENCY_PLANNER
 from chauffeur.drive.scenarios import find, suiting
 from chauffeur.drive.session import Session, parse_wish
 from chauffeur.language.emergency import read_emergency
-from chauffeur.language.languages import LANGUAGES, help_question, language_of, read_call, read_other
+from chauffeur.language.languages.reader import LANGUAGES, help_question, language_of, read_call, read_other
 from chauffeur.planners.registry import make_planner
 
 REAL = Path("/work/shared/data/commands")

@@ -17,7 +17,7 @@ from typing import Final
 from chauffeur.concept import Alarm, Observation, Parameters, Plan, Program, Thoughts, Verdict
 from chauffeur.drive.fallback import MINIMAL_RISK_BRAKING_MPS2
 from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency, tells_of_alarm
-from chauffeur.language.languages import help_question
+from chauffeur.language.languages.reader import help_question
 from chauffeur.safety.bounds import least_speed_mps, shoulder_at_right
 from chauffeur.safety.constant_calls import read_program
 

@@ -48,7 +48,7 @@ from chauffeur.drive import wish_parts
 from chauffeur.drive.emergency import ALARM_WORDS, alarm_of, check_told_not_to, is_bare_stop, raised
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
 from chauffeur.language.emergency import read_emergency
-from chauffeur.language.languages import OtherWish, read_other
+from chauffeur.language.languages.reader import OtherWish, read_other
 from chauffeur.language.questions import is_question
 from chauffeur.planners.base import NO_WISH, Planner
 from chauffeur.planners.base import declined as declined_by

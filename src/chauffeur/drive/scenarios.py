@@ -11,7 +11,7 @@ from pathlib import Path
 
 from chauffeur.concept import Observation, Scenario, ScenarioError
 from chauffeur.drive.session import drive_without_program, make_world
-from chauffeur.language.languages import read_other
+from chauffeur.language.languages.reader import read_other
 from chauffeur.language.tokens import tokens_of
 from chauffeur.language.weather import said_weather
 from chauffeur.planners.onboard.meaning import Manoeuvre, Reading

@@ -17,7 +17,7 @@ from typing import Final, Literal
 
 from chauffeur.language.distress import distress_in, is_only_told, safe_stop_in
 from chauffeur.language.hazards import called_out, hazard_in
-from chauffeur.language.languages import Language, read_call
+from chauffeur.language.languages.reader import Language, read_call
 from chauffeur.language.plain_line import COURTESY, line_of, pieces_of, sentences_of
 
 Kind = Literal["stop", "safe_stop", "ask", "no_stop"]
