@@ -22,7 +22,7 @@ _MOST_CHARACTERS: Final = 200
 """Longer texts are told by their language, but are no command and no call."""
 _LEAST_SHARE: Final = 0.4
 """Of a text's words, known in the language that it is taken for."""
-_HEADING: Final = re.compile(r"\[(.+?)\] ?(.*)")
+_HEADING: Final = re.compile(r"\[([^\[\]]+)\] ?(.*)")
 _SPOKEN: Final = ("stop", "distress", "lead", "= v", "= cross")
 """Groups, beside those of the acts, whose words tell the language."""
 _LONG: Final = 6
