@@ -17,6 +17,7 @@ from typing import Final
 from chauffeur.concept import Alarm, Observation, Parameters, Plan, Program, Thoughts, Verdict
 from chauffeur.drive.fallback import MINIMAL_RISK_BRAKING_MPS2
 from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency, tells_of_alarm
+from chauffeur.language.languages.reader import help_question
 from chauffeur.safety.bounds import least_speed_mps, shoulder_at_right
 from chauffeur.safety.constant_calls import read_program
 
@@ -104,9 +105,9 @@ def planned_for(text: str, observation: Observation) -> Plan | None:
             return _plan(f"There is no shoulder here. {STOPPING}", _STOP_PROGRAM, "stop", 0.0)
         case "ask":
             return Plan(
-                Thoughts(f"“{found.words}”: {QUESTION}"),
+                Thoughts(f"“{found.words}”: {question_to(found)}"),
                 None,
-                ASKED,
+                ASKED if found.language is None else question_to(found),
                 intent="ask",
                 planner=EMERGENCY_PLANNER,
                 offer=SAFE_STOP_WISH,
@@ -114,6 +115,11 @@ def planned_for(text: str, observation: Observation) -> Plan | None:
         case "no_stop":
             speed = round(max(observation.ego.speed_mps, least_speed_mps(observation) or 0.0), 2)
             return _plan(GOING_ON, _GO_ON_PROGRAM.format(speed=speed), "speed.keep", speed)
+
+
+def question_to(found: Emergency) -> str:
+    """The question to a person in distress, in their language."""
+    return QUESTION if found.language is None else help_question(found.language)
 
 
 def _plan(thoughts: str, source: str, intent: str, speed_mps: float) -> Plan:

@@ -3,6 +3,7 @@
 What really differs between drives is handed in as `PlanSteps`; the order, and what no drive may leave out, stands here:
 
     I C H S   gathered, and screened: words are data, whoever wrote them
+    I         of a command in German, Spanish, French or Chinese that is read: the English sentence of its act
     R P       the car's own answer to emergency words; nothing for a wish that is unsafe whoever plans; an answer from C
               to a question; else the planner's, of which an alarm goes back to the car's own answer. A planner that
               hangs or breaks ends in an error with words
@@ -26,6 +27,7 @@ from typing import Final
 
 from chauffeur.concept import (
     ANSWERED,
+    ASKS,
     CameraImage,
     ChauffeurError,
     Context,
@@ -45,6 +47,8 @@ from chauffeur.describe.answers import DONT_KNOW, answer_to, asks_to_know
 from chauffeur.drive import wish_parts
 from chauffeur.drive.emergency import ALARM_WORDS, alarm_of, check_told_not_to, is_bare_stop, raised
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
+from chauffeur.language.emergency import read_emergency
+from chauffeur.language.languages.reader import OtherWish, read_other
 from chauffeur.language.questions import is_question
 from chauffeur.planners.base import NO_WISH, Planner
 from chauffeur.planners.base import declined as declined_by
@@ -178,9 +182,15 @@ async def plan_once(instruction: Instruction, steps: PlanSteps) -> Planned:
     Raises:
         ChauffeurError: No plan could be had.
     """
+    other = read_other(instruction.text)
     request = await request_once(instruction, steps)
+    if other is not None and other.english and read_emergency(instruction.text) is None:
+        instruction = replace(instruction, text=other.english)
+        request = replace(request, instruction=instruction)
     wish = check_wish(instruction.text)
-    own, plan = await _answered(request, wish, steps)
+    own, plan = await _answered(request, wish, steps, other)
+    if other is not None and other.english and not own:
+        plan = replace(plan, thoughts=Thoughts(f"{other.words} {plan.thoughts.text}"))
     steps.tell(DriveEvent("plan", text=plan.thoughts.text, value=plan))
     verdicts, now = await steps.check(plan, own)
     if wish.stops and not own:
@@ -244,15 +254,19 @@ async def _planned(request: PlanRequest, steps: PlanSteps) -> Plan:
     raise PlannerError(f"The planner failed: {type(error).__name__}: {error}", retryable=True) from error
 
 
-async def _answered(request: PlanRequest, wish: Verdict, steps: PlanSteps) -> tuple[bool, Plan]:
-    """(whether it is the car's own answer, R and P): an unsafe wish reaches no planner, and a planner that understands
-    an alarm is not left to answer it."""
+async def _answered(
+    request: PlanRequest, wish: Verdict, steps: PlanSteps, other: OtherWish | None
+) -> tuple[bool, Plan]:
+    """(whether it is the car's own answer, R and P): an unsafe wish reaches no planner, nor does one in another
+    language that could not be read, and a planner that understands an alarm is not left to answer it."""
     text = request.instruction.text
     own = steps.own(text)
     if own is not None:
         return True, steps.fit(own)
     if wish.stops:
         return False, declined_by(steps.planner, wish.reason, time.perf_counter(), intent="refuse")
+    if other is not None and not other.english:
+        return False, declined_by(steps.planner, other.words, time.perf_counter(), intent=ASKS)
     plan = steps.fit(await _planned(request, steps))
     plan = await _worth_asking(_meant(plan, request.instruction) if steps.runs else plan, request, steps)
     alarm = alarm_of(plan, text)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from chauffeur.concept import Observation, Scenario, ScenarioError
 from chauffeur.drive.session import drive_without_program, make_world
+from chauffeur.language.languages.reader import read_other
 from chauffeur.language.tokens import tokens_of
 from chauffeur.language.weather import said_weather
 from chauffeur.planners.onboard.meaning import Manoeuvre, Reading
@@ -106,6 +107,9 @@ def suiting(wish: str) -> Scenario:
     A wish that a scenario is listed with is shown there. Any other is read as a planner reads it; its first part
     decides. The road depends on the words alone: where what it needs is not installed, driving says what to install.
     """
+    other = read_other(wish)
+    if other is not None and other.english:
+        wish = other.english
     for scenario in BUILT_IN:
         if _words(scenario.wish) == _words(wish):
             return scenario

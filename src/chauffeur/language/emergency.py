@@ -17,6 +17,7 @@ from typing import Final, Literal
 
 from chauffeur.language.distress import distress_in, is_only_told, safe_stop_in
 from chauffeur.language.hazards import called_out, hazard_in
+from chauffeur.language.languages.reader import Language, read_call
 from chauffeur.language.plain_line import COURTESY, line_of, pieces_of, sentences_of
 
 Kind = Literal["stop", "safe_stop", "ask", "no_stop"]
@@ -37,16 +38,26 @@ class Emergency:
         words: The stretch that says so, in plain words.
         alone: Whether the utterance says nothing else that a planner could be asked for.
         slower: Of `no_stop`: whether slowing down is forbidden as well ("don't brake").
+        language: Of the words; None for English.
     """
 
     kind: Kind
     words: str
     alone: bool = True
     slower: bool = False
+    language: Language | None = None
 
 
 def read_emergency(text: str) -> Emergency | None:
-    """What an utterance has of an emergency; None where it has nothing."""
+    """What an utterance has of an emergency, in English or a language of `languages`; None where it has nothing."""
+    found = _read_english(text)
+    if found is not None and found.kind == "stop":
+        return found
+    call = read_call(text)
+    return found if call is None else Emergency(call.kind, call.words, language=call.language)
+
+
+def _read_english(text: str) -> Emergency | None:
     line = line_of(text)
     refusals = [match for match in _NEGATED.finditer(line) if not _MEANT_OTHERWISE.match(line, match.end())]
     masked = line

@@ -203,7 +203,15 @@ class Planning:
         if planned.refusal:
             plan = replace(plan, policy=None, refusal=planned.refusal)
         self._brief(
-            PlanningInputs(request.wish, instruction, context, history, plan, self._mirror.trip, observation.tick)
+            PlanningInputs(
+                request.wish,
+                planned.request.instruction,
+                context,
+                history,
+                plan,
+                self._mirror.trip,
+                observation.tick,
+            )
         )
         return PlanMessage(
             wish=request.wish,

@@ -16,7 +16,7 @@ from typing import Final, Self
 
 from chauffeur.concept import NOBODY, ChauffeurError, Feedback, History, Limits, Observation, PersonId, Plan
 from chauffeur.concept.units import kmh
-from chauffeur.drive.emergency import GOING_ON, QUESTION, STOPPING, brings_to_a_stand, stop_wanted
+from chauffeur.drive.emergency import GOING_ON, STOPPING, brings_to_a_stand, question_to, stop_wanted
 from chauffeur.drive.events import DriveEvent
 from chauffeur.drive.live.messages import Report
 from chauffeur.drive.live.mirror import live_world
@@ -286,8 +286,8 @@ class Talk:
                 self._say(Note("There is no shoulder here."))
                 self._stop()
             case Emergency(kind="ask"):
-                self._asking.pass_over(words.text, "asked_back", QUESTION)
-                self._attention.offer(QUESTION, SAFE_STOP_WISH)
+                self._asking.pass_over(words.text, "asked_back", question_to(found))
+                self._attention.offer(question_to(found), SAFE_STOP_WISH)
             case Emergency(kind="no_stop", alone=True) if not self._is_stopping_by_plan():
                 self._asking.pass_over(words.text, "answered", GOING_ON)
                 self._say(Note(GOING_ON))
