@@ -22,7 +22,7 @@ from chauffeur.drive.session_recorder import DriveRecorder, open_audit
 from chauffeur.memory.vault import VaultMemory
 from chauffeur.safety.audit import AuditLog, AuditRecord, read_records, redact, verify, words_of
 
-WISH = "Überhol ihn for Zebedee."
+WISH = "Overtake the Škoda for Zebedee."
 UNWANTED = "Fly, said Zebedee."
 TOO_FAST = "Like the wind, Zebedee says."
 PROGRAM = """def drive():

@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from chauffeur.concept import Parameters, Plan, Program, Result, Verdict
+from chauffeur.concept import ASKS, Parameters, Plan, Program, Result, Verdict
 from chauffeur.concept.results import undriven
 from chauffeur.drive.events import EventKind
 from chauffeur.language.wanted import ActKind, WantedPart, WantedSide, read_wanted
@@ -162,6 +162,8 @@ def result_of_event(kind: EventKind, wish: str, plan: Plan | None) -> Result:
         wish: The words.
         plan: What was made of them, where anything was.
     """
+    if kind == "answered" and plan is not None and plan.intent == ASKS:
+        return Result.ASKED_BACK
     if kind in _OF_EVENTS:
         return _OF_EVENTS[kind]
     if plan is None:

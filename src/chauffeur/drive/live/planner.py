@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import (
-    ASKS,
     CameraImage,
     ChauffeurError,
     Context,
@@ -147,7 +146,7 @@ class Planning:
             return
         if order.plan.refusal or order.plan.policy is None:
             words = order.plan.refusal or "The planner gave no program."
-            answered = request.aside and not order.plan.offer and order.plan.intent != ASKS
+            answered = request.aside and not order.plan.offer
             self._tell("answered" if answered else "declined", request.wish, words, offer=order.plan.offer)
             return
         try:

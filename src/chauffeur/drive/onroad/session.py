@@ -24,7 +24,6 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Final, Literal, Self, TypeVar
 
 from chauffeur.concept import (
-    ASKS,
     NOBODY,
     ChauffeurError,
     ConfigError,
@@ -386,8 +385,7 @@ class VehicleSession:
         self._question.ask(plan.refusal, plan.offer)
         if plan.policy is None and not verdicts[0].stops:
             words = plan.refusal or "The planner gave no parameters."
-            aside = said_aside(request.instruction.text) and not plan.offer and plan.intent != ASKS
-            status = "answered" if aside else "declined"
+            status = "answered" if said_aside(request.instruction.text) and not plan.offer else "declined"
             return replace(made, status=status, words=f"{words} {counted_from(seen)}".rstrip())
         if reasons := _reasons(verdicts):
             return replace(made, status="refused", words=reasons)

@@ -8,6 +8,7 @@ clauses to be put around others, `correction.*` wishes that refer to what was dr
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -185,9 +186,7 @@ _QUESTIONS = (
     "may i ask", "is there any",
 )  # fmt: skip
 
-_GERUNDS: Mapping[str, str] = dict(
-    pair.split(":") for pair in Path(__file__).with_name("gerunds.txt").read_text(encoding="utf-8").split()
-)
+_GERUNDS: Mapping[str, str] = json.loads(Path(__file__).with_name("gerunds.json").read_text(encoding="utf-8"))
 
 MANNER = Manner(
     frames=_FRAMES,
