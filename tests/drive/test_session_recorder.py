@@ -38,7 +38,7 @@ from chauffeur.planners.registry import make_planner
 from chauffeur.safety.audit import AuditLog, AuditRecord, head_path, read_records, redact, verify, words_of
 from roads import a_road
 
-WISH = "Überhol ihn for Zebedee."
+WISH = "Overtake the Škoda for Zebedee."
 PROGRAM = """def overtake():
     # For Zebedee.
     say("Changing lanes, Zebedee.")
