@@ -257,7 +257,7 @@ class _Composer:
         ):
             reference, relation = reference.of, "near"
         if reference is None or reference.kind in ("me_here", "road", "lane", "sidewalk", "parking_space"):
-            yield f"yield from halt({_LAST_STEPS if self._last else 2 * _STOOD_STEPS})"
+            yield f"yield from halt({2 * _STOOD_STEPS})"
             return
         if reference.kind in ("light", "stop_sign", "junction", "crosswalk", "end_of_road"):
             self._grounded(reference, act)
@@ -270,7 +270,7 @@ class _Composer:
         else:
             raise _UndoableError(f"I cannot make out {reference_words(reference)} here")
         if self._last:
-            yield f"yield from halt({_LAST_STEPS})"
+            yield f"yield from halt({_STOOD_STEPS})"
 
     def _stand(self, relation: str, reference: Reference) -> str:
         """Where one stands by a road user: behind, beside or beyond it."""
