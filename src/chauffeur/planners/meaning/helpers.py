@@ -8,6 +8,34 @@ from __future__ import annotations
 import re
 from typing import Final
 
+_OVER: Final = """def over_SIDE(pace):
+    ego = get_ego_vehicle()
+    goal = None
+    for _ in range(600):
+        if goal is not None and get_lane_of(ego) == goal:
+            break
+        goal = get_SIDE_lane(ego)
+        change_lane_SIDE()
+        yield proceed(min(check_speed_limit(), pace))
+    yield from drive_on(20, pace)
+"""
+_STAND: Final = """def stand_WHERE(who):
+    stood = 0
+    for _ in range(2400):
+        if not in_sight(who):
+            say("It is out of sight. I go on along the road.")
+            return
+PASSED        yield stop_WHERE(who)
+        stood = stood + 1 if get_target_speed() < 0.05 and get_speed_of(get_ego_vehicle()) < 0.1 else 0
+        if stood > 60:
+            return
+"""
+_PASSED: Final = """        if has_passed(who):
+            say("We are past it already, so I stop here.")
+            yield from halt(80)
+            return
+"""
+
 HELPERS: Final[dict[str, str]] = {
     "drive_on": """def drive_on(steps, pace):
     for _ in range(steps):
@@ -71,28 +99,8 @@ HELPERS: Final[dict[str, str]] = {
             return
         yield proceed(min(check_speed_limit(), pace))
 """,
-    "over_left": """def over_left(pace):
-    ego = get_ego_vehicle()
-    goal = None
-    for _ in range(600):
-        if goal is not None and get_lane_of(ego) == goal:
-            break
-        goal = get_left_lane(ego)
-        change_lane_left()
-        yield proceed(min(check_speed_limit(), pace))
-    yield from drive_on(20, pace)
-""",
-    "over_right": """def over_right(pace):
-    ego = get_ego_vehicle()
-    goal = None
-    for _ in range(600):
-        if goal is not None and get_lane_of(ego) == goal:
-            break
-        goal = get_right_lane(ego)
-        change_lane_right()
-        yield proceed(min(check_speed_limit(), pace))
-    yield from drive_on(20, pace)
-""",
+    "over_left": _OVER.replace("SIDE", "left"),
+    "over_right": _OVER.replace("SIDE", "right"),
     "until_clear": """def until_clear(pace):
     for _ in range(40):
         yield proceed(min(check_speed_limit(), pace))
@@ -108,47 +116,9 @@ HELPERS: Final[dict[str, str]] = {
             return
         yield follow_agent(who)
 """,
-    "stand_behind": """def stand_behind(who):
-    stood = 0
-    for _ in range(2400):
-        if not in_sight(who):
-            say("It is out of sight. I go on along the road.")
-            return
-        if has_passed(who):
-            say("We are past it already, so I stop here.")
-            yield from halt(80)
-            return
-        yield stop_behind(who)
-        stood = stood + 1 if get_target_speed() < 0.05 and get_speed_of(get_ego_vehicle()) < 0.1 else 0
-        if stood > 60:
-            return
-""",
-    "stand_beside": """def stand_beside(who):
-    stood = 0
-    for _ in range(2400):
-        if not in_sight(who):
-            say("It is out of sight. I go on along the road.")
-            return
-        if has_passed(who):
-            say("We are past it already, so I stop here.")
-            yield from halt(80)
-            return
-        yield stop_beside(who)
-        stood = stood + 1 if get_target_speed() < 0.05 and get_speed_of(get_ego_vehicle()) < 0.1 else 0
-        if stood > 60:
-            return
-""",
-    "stand_beyond": """def stand_beyond(who):
-    stood = 0
-    for _ in range(2400):
-        if not in_sight(who):
-            say("It is out of sight. I go on along the road.")
-            return
-        yield stop_beyond(who)
-        stood = stood + 1 if get_target_speed() < 0.05 and get_speed_of(get_ego_vehicle()) < 0.1 else 0
-        if stood > 60:
-            return
-""",
+    "stand_behind": _STAND.replace("WHERE", "behind").replace("PASSED", _PASSED),
+    "stand_beside": _STAND.replace("WHERE", "beside").replace("PASSED", _PASSED),
+    "stand_beyond": _STAND.replace("WHERE", "beyond").replace("PASSED", ""),
     "stand_before_junction": """def stand_before_junction(pace):
     for _ in range(2400):
         state, line = check_traffic_light()

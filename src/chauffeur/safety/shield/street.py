@@ -179,8 +179,8 @@ class StreetShield(Shield):
         said: list[Intervention] = []
         if done.steering_rad != command.steering_rad:
             mended = Command(command.acceleration_mps2, done.steering_rad)
-            rule, why = ("skid", "Turned so far, the tyres would slide.") if fault is None else _steered(fault)
-            said.append(Intervention(rule, why, command, mended))
+            rule = "skid" if fault is None else "lane"
+            said.append(Intervention(rule, _why_steered(fault), command, mended))
         if done.acceleration_mps2 < command.acceleration_mps2 - 1e-6 and (
             ego.speed_mps > 0.0 or command.acceleration_mps2 > 0.0
         ):
@@ -529,11 +529,13 @@ def _owed_to(fault: _Fault) -> tuple[str, str]:
     return "gap", f"There is too little room to the {fault.other.kind} to ask for more."
 
 
-def _steered(fault: _Fault) -> tuple[str, str]:
+def _why_steered(fault: _Fault | None) -> str:
+    if fault is None:
+        return "Turned so far, the tyres would slide."
     if fault.other is None:
-        return "lane", "That would leave the road."
+        return "That would leave the road."
     who = "somebody on foot" if fault.other.kind == "pedestrian" else f"a {fault.other.kind}"
-    return "lane", f"That way would touch {who}."
+    return f"That way would touch {who}."
 
 
 def _chains(road: RoadGraph, lane: LaneId) -> list[tuple[LaneId, ...]]:

@@ -10,7 +10,7 @@ import math
 from typing import Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from chauffeur.concept import Capabilities, Command, Lead, Observation, Scenario, ScenarioError, VehicleState
 from chauffeur.control.kinematic_bicycle import KinematicBicycle
@@ -19,6 +19,7 @@ from chauffeur.worlds.base import EGO
 from chauffeur.worlds.corridor import Body
 from chauffeur.worlds.over_graph import LaneDriver, ObservedPerception
 from chauffeur.worlds.path_follower import Chassis
+from chauffeur.worlds.skeleton import ShownWorld, config_of, finite
 from chauffeur.worlds.track.dynamics import (
     BRAKES_MPS2,
     DRIVE_LAG_S,
@@ -77,7 +78,7 @@ class TrackConfig(BaseModel):
     street: StreetConfig | None = None
 
 
-class TrackWorld:
+class TrackWorld(ShownWorld):
     """A test track, stepped at 20 Hz."""
 
     engine = "test track 1 (CommonRoad vehicle models 3.0.2)"
@@ -100,7 +101,6 @@ class TrackWorld:
         self._rng = np.random.default_rng(0)
         self._tick = 0
         self._crashed = False
-        self._shown: Observation | None = None
         self._perception: ObservedPerception | None = None
         self._driver: LaneDriver | None = None
 
@@ -178,7 +178,7 @@ class TrackWorld:
             ScenarioError: The configuration is malformed.
             MissingExtraError: The vehicle models are not installed.
         """
-        config = _parse(scenario)
+        config = config_of(TrackConfig, scenario, "track")
         self._config, self._scenario = config, scenario.id
         self._rng = np.random.default_rng(np.random.SeedSequence(scenario.seed if seed is None else seed))
         plan = self._course
@@ -193,8 +193,7 @@ class TrackWorld:
 
     def step(self, command: Command) -> Command:
         """Advance 0.05 s under `command`; returns what the actuators were told, and could be."""
-        if not (math.isfinite(command.acceleration_mps2) and math.isfinite(command.steering_rad)):
-            raise ValueError(f"A command must be finite numbers, not {command}.")
+        command = finite(command)
         config = self._started()
         friction = FRICTION[config.weather]
         wanted = deliverable(min(_MOST_MPS2, command.acceleration_mps2), friction)
@@ -222,18 +221,6 @@ class TrackWorld:
         if self._touching():
             self._crashed, self._shown = True, None
         return Command(wanted, angle)
-
-    def observe(self) -> Observation:
-        """The present instant as frozen values."""
-        self._started()
-        if self._shown is None:
-            self._shown = self._look()
-        return self._shown
-
-    @property
-    def ended(self) -> bool:
-        """Crash, off the ground, or out of time."""
-        return self.observe().ended
 
     def perception(self) -> ObservedPerception:
         """Questions about the present instant."""
@@ -336,14 +323,3 @@ class TrackWorld:
             off_road=off_road,
             ended=self._crashed or off_road or late,
         )
-
-
-def _parse(scenario: Scenario) -> TrackConfig:
-    try:
-        return TrackConfig.model_validate(scenario.config)
-    except ValidationError as error:
-        faults = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'config'}: {e['msg']}" for e in error.errors())
-        raise ScenarioError(
-            f"Scenario {scenario.id!r} has a bad track configuration: {faults}.",
-            hint="Compare it with a built-in one: chauffeur show scenarios.",
-        ) from error
