@@ -15,18 +15,29 @@ from chauffeur.concept.errors import DataError
 Verb = Literal[
     "follow", "pass", "avoid", "yield", "stop", "park", "pull_over", "wait", "go", "turn", "straight", "lane", "keep",
     "u_turn", "speed", "gap", "move", "enter", "exit", "goto", "none", "refuse",
+    "again", "undo", "cancel", "yes", "no", "pick", "unclear",
 ]  # fmt: skip
+"""What a person asks for. The last line is the verbs of dialogue: they mean something only beside the turn before."""
 Side = Literal["left", "right"]
 LaneAim = Literal["leftmost", "rightmost", "middle", "behind target", "original"]
 Direction = Literal["slower", "faster", "same", "more", "less"]
 Manner = Literal["slow", "quick", "careful"]
+Measure = Literal["by", "at_most", "at_least", "times", "over_limit", "under_limit"]
+"""How a value counts; without one it is the value itself."""
+Degree = Literal["bit", "much"]
+Aim = Literal["limit", "maximum", "traffic", "nearest"]
+"""A value without a number: the speed limit, as fast as is allowed, as the traffic; the nearest parking space."""
+Style = Literal["hurry", "relaxed", "gentle", "careful", "sporty", "economical", "normal"]
+"""How the whole drive is to be."""
 Relation = Literal[
     "at", "before", "after", "behind", "in_front_of", "beside", "near", "opposite", "on", "into", "next", "here"
 ]
 ConditionKind = Literal["once", "until", "while", "before", "after", "if", "unless"]
 Event = Literal[
-    "green", "red", "clear", "passed", "gone", "moves", "stopped", "opens", "near", "arrives", "told", "other"
-]
+    "green", "red", "clear", "passed", "gone", "moves", "stopped", "opens", "near", "arrives", "told", "other",
+    "time", "slower", "closer", "further",
+]  # fmt: skip
+"""The last line's have a value: so much time has gone by; the reference is slower, closer, further away than it."""
 ReferenceKind = Literal[
     "car", "truck", "bus", "van", "motorcycle", "bicycle", "pedestrian", "animal", "vehicle", "vehicles",
     "pedestrians", "traffic", "obstacle", "cone", "barrier", "light", "stop_sign", "sign", "junction", "crosswalk",
@@ -86,6 +97,8 @@ class Condition:
     type: ConditionKind
     event: Event
     ref: Reference | None = None
+    value: float | None = None
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +108,12 @@ class Act:
     Attributes:
         act: The verb.
         side, to, direction, manner: As said.
-        value: Amount of a speed or gap; None where none was said.
-        unit: Unit of the value as said: `km/h`, `mph`, `m/s`, `m`, `ft`, `s`, `lengths`; empty where none was said.
+        value: Amount of a speed or gap, number of lanes; None where none was said.
+        unit: Unit of the value as said: `km/h`, `mph`, `m/s`, `m`, `ft`, `yd`, `s`, `lengths`, `share`; empty where
+            none was said.
+        measure: How the value counts.
+        degree: A little or much, of a change.
+        aim, style: As said.
         negated: The person says not to do it.
         target: Whom or what it is about.
         place: Where it is done.
@@ -113,6 +130,10 @@ class Act:
     manner: Manner | None = None
     value: float | None = None
     unit: str = ""
+    measure: Measure | None = None
+    degree: Degree | None = None
+    aim: Aim | None = None
+    style: Style | None = None
     negated: bool = False
     target: Reference | None = None
     place: ActPlace | None = None
@@ -129,6 +150,7 @@ class Utterance:
     Attributes:
         text: The words as they came.
         acts: In the order in which the person wants them done; empty where nothing is asked of the car.
+        opinion: Of feedback on what has been driven: the acts that would have been right; `yes` for praise.
         address: Whom or what the words are for.
         emergency: Whether they are words of distress or an order to stop at once.
         sure: Probability that the reading is right, 0 to 1, calibrated on writers left out of training.
@@ -137,6 +159,7 @@ class Utterance:
 
     text: str
     acts: tuple[Act, ...] = ()
+    opinion: tuple[Act, ...] = ()
     address: Address = "car"
     emergency: bool = False
     sure: float = 1.0
@@ -151,6 +174,10 @@ _CHOICES: Final[Mapping[str, tuple[str, ...]]] = {
     "to": get_args(LaneAim),
     "direction": get_args(Direction),
     "manner": get_args(Manner),
+    "measure": get_args(Measure),
+    "degree": get_args(Degree),
+    "aim": get_args(Aim),
+    "style": get_args(Style),
     "why": get_args(Why),
     "kind": get_args(ReferenceKind),
     "colour": get_args(Colour),
@@ -171,7 +198,7 @@ def acts_to_json(acts: Sequence[Act]) -> list[dict[str, Any]]:
 
 def _act_to_json(act: Act) -> dict[str, Any]:
     found: dict[str, Any] = {"act": act.act}
-    for name in ("side", "to", "direction", "manner", "value", "unit", "why"):
+    for name in ("side", "to", "direction", "manner", "value", "unit", "measure", "degree", "aim", "style", "why"):
         if (value := getattr(act, name)) not in (None, ""):
             found[name] = value
     if act.negated:
@@ -181,7 +208,9 @@ def _act_to_json(act: Act) -> dict[str, Any]:
     if act.place is not None:
         found["place"] = {"rel": act.place.rel, **_ref(act.place.ref)}
     if act.when is not None:
-        found["when"] = {"type": act.when.type, "event": act.when.event, **_ref(act.when.ref)}
+        when = act.when
+        amount = {} if when.value is None else {"value": when.value, "unit": when.unit}
+        found["when"] = {"type": when.type, "event": when.event, **_ref(when.ref), **amount}
     if act.purpose:
         found["purpose"] = True
     return found
@@ -234,10 +263,16 @@ def _act_from_json(row: Any) -> Act:
         kind, event = _chosen("type", held.get("type")), _chosen("event", held.get("event"))
         act = replace(
             act,
-            when=Condition(cast("ConditionKind", kind), cast("Event", event), _held_reference(held.get("ref"))),
+            when=Condition(
+                cast("ConditionKind", kind),
+                cast("Event", event),
+                _held_reference(held.get("ref")),
+                _number(held.get("value")),
+                str(held.get("unit", "")),
+            ),
         )
     for name in list(said):
-        if name not in ("side", "to", "direction", "manner", "why"):
+        if name not in ("side", "to", "direction", "manner", "measure", "degree", "aim", "style", "why"):
             raise DataError(f"An act has no field {name!r}.")
         act = replace(act, **{name: _chosen(name, said[name])})
     return act

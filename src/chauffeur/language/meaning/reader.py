@@ -48,16 +48,22 @@ def read(text: str, parser: Parser | None = None) -> Utterance:
     """
     reads = shipped_parser() if parser is None else parser
     acts: list[Act] = []
+    opinion: list[Act] = []
     address, log_probability = "car", 0.0
     for low, high in _stretches(text[:MOST_CHARS]):
         parsed = reads.parse(text[low:high])
-        acts += [_resolved(act, parsed, text[low:high], low) for act in parsed.acts]
+        read_here = [_resolved(act, parsed, text[low:high], low) for act in parsed.acts]
+        if parsed.address == "car":
+            acts += read_here
+        elif parsed.address == "feedback":
+            opinion += read_here
         log_probability += parsed.log_probability
         address = parsed.address if parsed.address != "car" and not acts else address
     sure = 1.0 / (1.0 + math.exp(-(_SURE_BIAS + _SURE_SLOPE * max(log_probability, -20.0))))
     return Utterance(
         text,
         tuple(acts),
+        tuple(opinion),
         "car" if acts else address,
         read_emergency(text) is not None,
         sure,
@@ -85,12 +91,8 @@ def _resolved(written: WrittenAct, parsed: Parsed, text: str, offset: int) -> Ac
     """An act whose pointers are words, numbers and names."""
     low, high = spans_of(parsed, written.span)
     act = replace(written.act, span=(offset + low, offset + high))
-    if written.value is not None:
-        start, _ = spans_of(parsed, (written.value,))
-        quantities = read_quantities(text[start : max(high, start + 1)])
-        if quantities:
-            value, unit = _said(quantities[0])
-            act = replace(act, value=value, unit=unit)
+    if written.value is not None and (amount := _amount(written.value, parsed, text, high)) is not None:
+        act = replace(act, value=amount[0], unit=amount[1])
     names = iter(written.names)
     place, when = act.place, act.when
     target = _named(act.target, names, parsed, text)
@@ -98,7 +100,16 @@ def _resolved(written: WrittenAct, parsed: Parsed, text: str, offset: int) -> Ac
         place = ActPlace(place.rel, _named(place.ref, names, parsed, text))
     if when is not None:
         when = replace(when, ref=_named(when.ref, names, parsed, text))
+        if written.event_value is not None and (amount := _amount(written.event_value, parsed, text, high)) is not None:
+            when = replace(when, value=amount[0], unit=amount[1])
     return replace(act, target=target, place=place, when=when)
+
+
+def _amount(token: int, parsed: Parsed, text: str, high: int) -> tuple[float, str] | None:
+    """The quantity that begins at a token, in the unit in which it was said; None where the rules find none there."""
+    start, _ = spans_of(parsed, (token,))
+    found = read_quantities(text[start : max(high, start + 1)])
+    return _said(found[0]) if found else None
 
 
 def _named(
@@ -121,7 +132,7 @@ def _said(quantity: Quantity) -> tuple[float, str]:
     elif quantity.dimension == "distance":
         units = _LENGTH_UNITS
     else:
-        return quantity.value, {"time": "s", "share": "share"}.get(quantity.dimension, "")
+        return quantity.value, {"time": "s", "share": "share", "lanes": "lanes"}.get(quantity.dimension, "")
     words = quantity.said.lower().split()
     for unit, factor, marks in units:
         if not marks or any(word.startswith(mark) for word in words for mark in marks):

@@ -16,18 +16,22 @@ from chauffeur.concept.utterance import (
     Act,
     ActPlace,
     Address,
+    Aim,
     Colour,
     Condition,
     ConditionKind,
+    Degree,
     Direction,
     Event,
     LaneAim,
     Manner,
+    Measure,
     Reference,
     ReferenceKind,
     Relation,
     Side,
     State,
+    Style,
     Verb,
     Where,
     Why,
@@ -49,6 +53,10 @@ _ACT_FIELDS: Final = (
     _values("side", Side),
     _values("to", LaneAim),
     _values("direction", Direction),
+    _values("measure", Measure),
+    _values("degree", Degree),
+    _values("aim", Aim),
+    _values("style", Style),
     ("VALUE",),
     _values("why", Why),
     ("T",),
@@ -70,12 +78,14 @@ _ADDRESS: Final = tuple(f"U:{one}" for one in get_args(Address) if one != "car")
 _VERBS: Final = _values("A", Verb)
 _KINDS: Final = _values("K", ReferenceKind)
 _EVENTS: Final = _values("E", Event)
+_MEASURED: Final = ("E:time", "E:slower", "E:closer", "E:further")
+"""Events with a value."""
 
 SYMBOLS: Final[tuple[str, ...]] = tuple(
     dict.fromkeys(
         (
             *(PAD, START, END, POINTER, *_ADDRESS, *_VERBS, *_KINDS, *_EVENTS),
-            *(one for group in (*_ACT_FIELDS, *_REFERENCE_FIELDS) for one in group),
+            *(one for group in (*_ACT_FIELDS, ("CVALUE",), *_REFERENCE_FIELDS) for one in group),
         )
     )
 )
@@ -99,13 +109,17 @@ class WrittenAct:
         span: First and last token it was read from.
         value: Token of its number.
         names: Tokens (first, last) of its references' names, in the order in which they are written.
+        event_value: Token of its condition's number.
     """
 
     act: Act
     span: tuple[int, int]
     value: int | None = None
     names: tuple[tuple[int, int], ...] = ()
+    event_value: int | None = None
 
+
+_WRITTEN_FIELDS: Final = ("manner", "side", "to", "direction", "measure", "degree", "aim", "style")
 
 # Writing --------------------------------------------------------------------------------------------------------------
 
@@ -118,7 +132,7 @@ def write(acts: Sequence[WrittenAct], address: Address = "car") -> list[Written]
         act = one.act
         out += [f"A:{act.act}", one.span[0], one.span[1]]
         out += ["NOT"] * act.negated + ["PURPOSE"] * act.purpose
-        out += [f"{name}:{value}" for name in ("manner", "side", "to", "direction") if (value := getattr(act, name))]
+        out += [f"{name}:{value}" for name in _WRITTEN_FIELDS if (value := getattr(act, name))]
         if one.value is not None:
             out += ["VALUE", one.value]
         out += [f"why:{act.why}"] if act.why else []
@@ -127,7 +141,9 @@ def write(acts: Sequence[WrittenAct], address: Address = "car") -> list[Written]
         if act.place is not None:
             out += [f"P:{act.place.rel}", *_reference(act.place.ref, names)]
         if act.when is not None:
-            out += [f"W:{act.when.type}", f"E:{act.when.event}", *_reference(act.when.ref, names)]
+            out += [f"W:{act.when.type}", f"E:{act.when.event}"]
+            out += ["CVALUE", one.event_value] if one.event_value is not None else []
+            out += _reference(act.when.ref, names)
     return out
 
 
@@ -181,6 +197,8 @@ class ActGrammar:
         elif symbol.startswith("K:"):
             self._of.append(0)
             self._next = self._attributes
+        elif symbol == "CVALUE":
+            self._point(1, self._kind_or_act)
         elif symbol in ("T", "OF") or symbol.startswith(("P:", "W:", "E:")):
             self._opens(symbol)
         elif symbol == END:
@@ -211,7 +229,8 @@ class ActGrammar:
             self._next = lambda: _KINDS
             return
         if symbol.startswith("E:"):
-            self._next = self._kind_or_act
+            measured = ("CVALUE",) if symbol in _MEASURED else ()
+            self._next = lambda: (*measured, *self._kind_or_act())
             return
         self._pass_field(symbol)
         self._of = []
@@ -275,6 +294,7 @@ class _Building:
     named: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     names: list[list[int]] = field(default_factory=list[list[int]])
     value: int | None = None
+    event_value: int | None = None
     _waits: str = ""
 
     def take(self, one: Written) -> None:
@@ -292,8 +312,8 @@ class _Building:
             self.names.append([])
             self._waits = "name"
             self.kinds[-1][1][-1]["name"] = "?"
-        elif one == "VALUE":
-            self._waits = "value"
+        elif one in ("VALUE", "CVALUE"):
+            self._waits = "value" if one == "VALUE" else "event"
         elif one == "OF":
             return
         elif one in ("NOT", "PURPOSE"):
@@ -312,6 +332,8 @@ class _Building:
             self._waits = "" if len(self.names[-1]) == 2 else "name"
         elif self._waits == "value":
             self.value, self._waits = token, ""
+        elif self._waits == "event":
+            self.event_value, self._waits = token, ""
         else:
             self.pointers.append(token)
 
@@ -331,7 +353,7 @@ class _Building:
                 act = replace(act, when=Condition(cast("ConditionKind", kind), cast("Event", event), reference))
         low, high = sorted(self.pointers)
         names = tuple((min(pair), max(pair)) for pair in self.names if len(pair) == 2)
-        return WrittenAct(act, (low, high), self.value, names)
+        return WrittenAct(act, (low, high), self.value, names, self.event_value)
 
 
 def _nested(held: Sequence[dict[str, Any]]) -> Reference | None:

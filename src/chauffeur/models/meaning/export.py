@@ -10,6 +10,7 @@ from typing import Any, Final
 import torch
 from torch import Tensor, nn
 
+from chauffeur.concept import DataError
 from chauffeur.language.meaning.parser import DECODER, ENCODER, PIECES
 from chauffeur.language.meaning.pieces import MOST_PIECES
 from chauffeur.language.meaning.symbols import MOST_SYMBOLS
@@ -49,6 +50,46 @@ class _Decoder(nn.Module):
     def forward(self, written: Tensor, positions: Tensor, memory: Tensor) -> Tensor:
         mask = torch.ones(memory.shape[:2], dtype=torch.long)
         return self.network.decode(written, positions, memory, mask)[:, -1]
+
+
+_LAYER: Final = (
+    "attention.self.query", "attention.self.key", "attention.self.value", "attention.output.dense",
+    "intermediate.dense", "output.dense",
+)  # fmt: skip
+_DECODER: Final = (
+    "pointed",
+    *(f"decoder.layers.{layer}.{name}" for layer in range(2) for name in (
+        "self_attn.in_proj_", "self_attn.out_proj", "multihead_attn.out_proj", "linear1", "linear2")),
+    "point_from", "point_to", "out",
+)  # fmt: skip
+"""Matrices in the order in which the graphs use them."""
+
+
+def exported_weights(folder: Path) -> dict[str, Tensor]:
+    """The parameters of a network from the files that it was exported to: its matrices as their 8 bits tell them."""
+    import onnx
+    from onnx import numpy_helper
+
+    found: dict[str, Tensor] = {}
+    encoder = tuple(f"encoder.encoder.layer.{layer}.{name}" for layer in range(6) for name in _LAYER)
+    for file, matrices in ((ENCODER, encoder), (DECODER, _DECODER)):
+        graph = onnx.load(str(folder / file)).graph
+        held = {one.name: torch.from_numpy(numpy_helper.to_array(one).copy()) for one in graph.initializer}
+        quantised = [name.removesuffix("_quantized") for name in held if name.endswith("_quantized")]
+        if len(quantised) != len(matrices):
+            raise DataError(f"{folder / file} has {len(quantised)} matrices in 8 bits; {len(matrices)} are wanted.")
+        for name, matrix in zip(quantised, matrices, strict=True):
+            steps = held[f"{name}_quantized"].float() - held[f"{name}_zero_point"].float()
+            weight = "weight" if matrix.endswith("_") else ".weight"
+            found[f"{matrix}{weight}"] = (steps * held[f"{name}_scale"]).T.contiguous()
+        for name, value in held.items():
+            own = name.removeprefix("network.")
+            if own.startswith(("encoder.", "decoder.", "symbols.", "places.", "out.", "point")) and value.is_floating_point():
+                found.setdefault(own, value)
+        if "steps" in held:
+            table = next(value for value in held.values() if value.dtype == torch.int8 and value.shape[0] > 20_000)
+            found["encoder.embeddings.word_embeddings.weight"] = table.float() * held["steps"]
+    return {name: value for name, value in found.items() if not name.endswith(("_scale", "_zero_point"))}
 
 
 def export_parser(network: MeaningParser, vocabulary: Path, folder: Path) -> None:

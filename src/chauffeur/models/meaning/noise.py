@@ -82,7 +82,7 @@ def _without_articles(
 ) -> tuple[list[str], tuple[WrittenAct, ...]]:
     held = {act.span[0] for act in acts} | {act.span[1] for act in acts}
     held |= {at for act in acts for name in act.names for at in name} | {
-        act.value for act in acts if act.value is not None
+        at for act in acts for at in (act.value, act.event_value) if at is not None
     }
     gone = [i for i, word in enumerate(words) if word in _ARTICLES and i not in held and rng.random() < share]
     moved = np.arange(len(words)) - np.searchsorted(gone, np.arange(len(words)))
@@ -105,4 +105,5 @@ def _moved(act: WrittenAct, to: np.ndarray) -> WrittenAct:
         (int(to[act.span[0]]), int(to[act.span[1]])),
         None if act.value is None else int(to[act.value]),
         tuple((int(to[low]), int(to[high])) for low, high in act.names),
+        None if act.event_value is None else int(to[act.event_value]),
     )

@@ -19,6 +19,7 @@ from chauffeur.language.meaning.pieces import WordPieces, read_vocabulary
 from chauffeur.language.meaning.symbols import END, INDEX, MOST_SYMBOLS, PAD, POINTER, START, SYMBOLS, Written
 from chauffeur.models.meaning.banks import banks, merged
 from chauffeur.models.meaning.batches import Sentences, tensors
+from chauffeur.models.meaning.labelled import written
 from chauffeur.models.meaning.network import MeaningParser, ParserConfig
 
 WEIGHTS: Final = "parser.pt"
@@ -33,11 +34,13 @@ class MeaningRecipe:
     Attributes:
         encoder: Folder of all-MiniLM-L6-v2 (Apache-2.0), or of another BERT of its width.
         out: Folder of the weights.
-        held_out: Writers whose banks are left out.
+        base: Folder of a trained parser to go on from; empty to begin with the encoder alone.
+        held_out: Writers whose banks and labelled sentences are left out.
         seconds: Time of training, s; the learning rate falls to zero over it.
         steps: Steps at most; 0 for as many as fit the time.
         batch: Sentences a step.
         encoder_rate, decoder_rate: Learning rates at their highest.
+        frozen: The encoder's first layers that stay as they are, to save time when a training goes on.
         smoothing: Of the targets.
         seed: Of sentences and weights.
         workers: Processes that compose.
@@ -47,12 +50,14 @@ class MeaningRecipe:
 
     encoder: str
     out: str
+    base: str = ""
     held_out: tuple[str, ...] = ()
     seconds: float = 900.0
     steps: int = 0
     batch: int = 256
     encoder_rate: float = 2.5e-4
     decoder_rate: float = 8e-4
+    frozen: int = 0
     smoothing: float = 0.03
     seed: int = 1
     workers: int = 2
@@ -75,13 +80,19 @@ def fit(
     torch.manual_seed(recipe.seed)
     encoder = AutoModel.from_pretrained(recipe.encoder, add_pooling_layer=False).float()
     network = MeaningParser(encoder, recipe.network).to(recipe.device)
+    if recipe.base:
+        go_on_from(network, Path(recipe.base))
     # Word vectors stay as they were: rare words that no bank holds keep their neighbourhood.
     encoder.embeddings.word_embeddings.weight.requires_grad_(False)
+    if recipe.frozen:
+        for part in (network.encoder.embeddings, *network.encoder.encoder.layer[: recipe.frozen]):
+            part.requires_grad_(False)
     writers = banks(recipe.held_out)
     whole = merged(writers)
     vocabulary = Path(recipe.encoder) / VOCABULARY
     stream = Sentences(
         [whole, *(merged([whole, *[writer] * len(writers)], writer.name) for writer in writers)],
+        written(recipe.held_out),
         vocabulary,
         recipe.seed,
         recipe.batch,
@@ -98,27 +109,30 @@ def fit(
     )
     begun, step, total, looked = time.monotonic(), 0, 0.0, 0.0
     network.train()
-    for batch in loader:
-        passed = time.monotonic() - begun - looked
-        done = max(passed / recipe.seconds, step / recipe.steps if recipe.steps else 0.0)
-        if done >= 1.0:
-            break
-        factor = min(1.0, (step + 1) / 200) * (0.5 * (1.0 + math.cos(math.pi * done)) * 0.98 + 0.02)
-        for group, rate in zip(optimiser.param_groups, rates, strict=True):
-            group["lr"] = rate * factor
-        loss = loss_of(network, [one.to(recipe.device, non_blocking=True) for one in batch], recipe.smoothing)
-        optimiser.zero_grad(set_to_none=True)
-        loss.backward()
-        nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimiser.step()
-        step += 1
-        if step % 100 == 0:
-            total = float(loss.detach())
-            tell(f"step {step}  loss {total:.4f}  {step * recipe.batch / max(passed, 1e-9):.0f}/s  {passed:.0f} s")
-        if look is not None and step % 2000 == 0:
-            start = time.monotonic()
-            look(network, step)
-            looked += time.monotonic() - start
+    try:
+        for batch in loader:
+            passed = time.monotonic() - begun - looked
+            done = max(passed / recipe.seconds, step / recipe.steps if recipe.steps else 0.0)
+            if done >= 1.0:
+                break
+            factor = min(1.0, (step + 1) / 200) * (0.5 * (1.0 + math.cos(math.pi * done)) * 0.98 + 0.02)
+            for group, rate in zip(optimiser.param_groups, rates, strict=True):
+                group["lr"] = rate * factor
+            loss = loss_of(network, [one.to(recipe.device, non_blocking=True) for one in batch], recipe.smoothing)
+            optimiser.zero_grad(set_to_none=True)
+            loss.backward()
+            nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+            optimiser.step()
+            step += 1
+            if step % 100 == 0:
+                total = float(loss.detach())
+                tell(f"step {step}  loss {total:.4f}  {step * recipe.batch / max(passed, 1e-9):.0f}/s  {passed:.0f} s")
+            if look is not None and step % 2000 == 0:
+                start = time.monotonic()
+                look(network, step)
+                looked += time.monotonic() - start
+    except KeyboardInterrupt:
+        tell(f"Stopped after {step} steps; what was learned is kept.")
     folder = Path(recipe.out)
     folder.mkdir(parents=True, exist_ok=True)
     torch.save(
@@ -126,8 +140,24 @@ def fit(
         folder / WEIGHTS,
     )
     held = asdict(recipe) | {"trained_steps": step, "loss": total, "banks": [bank.name for bank in writers]}
+    held["symbols"] = list(SYMBOLS)
     (folder / CONFIG).write_text(json.dumps(held, indent=1))
     return network
+
+
+def go_on_from(network: MeaningParser, folder: Path) -> None:
+    """Take over what a trained parser knows, symbol by symbol: symbols that it did not have begin untrained."""
+    held: dict[str, Tensor] = torch.load(folder / WEIGHTS, weights_only=True)
+    known: list[str] = json.loads((folder / CONFIG).read_text()).get("symbols", list(SYMBOLS))
+    own = network.state_dict()
+    rows = [(INDEX[symbol], at) for at, symbol in enumerate(known) if symbol in INDEX]
+    new, old = torch.tensor([row[0] for row in rows]), torch.tensor([row[1] for row in rows])
+    for name, value in held.items():
+        if name in ("symbols.weight", "out.weight", "out.bias"):
+            own[name][new] = value.float()[old]
+        elif own[name].shape == value.shape:
+            own[name] = value.to(own[name].dtype)
+    network.load_state_dict(own)
 
 
 def loss_of(network: MeaningParser, batch: Sequence[Tensor], smoothing: float) -> Tensor:
