@@ -84,7 +84,10 @@ def exported_weights(folder: Path) -> dict[str, Tensor]:
             found[f"{matrix}{weight}"] = (steps * held[f"{name}_scale"]).T.contiguous()
         for name, value in held.items():
             own = name.removeprefix("network.")
-            if own.startswith(("encoder.", "decoder.", "symbols.", "places.", "out.", "point")) and value.is_floating_point():
+            if (
+                own.startswith(("encoder.", "decoder.", "symbols.", "places.", "out.", "point"))
+                and value.is_floating_point()
+            ):
                 found.setdefault(own, value)
         if "steps" in held:
             table = next(value for value in held.values() if value.dtype == torch.int8 and value.shape[0] > 20_000)

@@ -14,12 +14,12 @@ from typing import Final
 import numpy as np
 
 from chauffeur.concept.data import data_folder
+from chauffeur.language.meaning.symbols import WrittenAct
 from chauffeur.models.meaning.composer import Composed
 from chauffeur.models.meaning.labelled import act_of, line_of
 from chauffeur.models.onboard.cases import WEIGHTS
 from chauffeur.models.onboard.speech import Unit, spoken
 from chauffeur.models.onboard.wordings import beside, clause, conditioned, in_order, levels, utter
-from chauffeur.language.meaning.symbols import WrittenAct
 from chauffeur.planners.meaning.dialect_acts import AHEAD, CONDITION_ACTS, MANNER_ACTS, REMARK_ACTS, SKILL_ACTS
 from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, Kind
 
@@ -55,8 +55,8 @@ _SORTED: Final[Mapping[str, str]] = {
 }  # fmt: skip
 """Outright wishes of `data/sorters/wishes.tsv`: a hint is an act only where its world is known."""
 _TOWN: Final[Mapping[str, str]] = {
-    "faster": "speed direction:faster", "slower": "speed direction:slower", "calm": "speed direction:slower style:relaxed",
-    "hurry": "speed direction:faster style:hurry", "question": "U:question", "none": "U:remark",
+    "faster": "speed direction:faster", "slower": "speed direction:slower",
+    "calm": "speed direction:slower style:relaxed", "hurry": "speed direction:faster style:hurry", "question": "U:question", "none": "U:remark",
     "uturn": "u_turn",
 }  # fmt: skip
 
@@ -200,7 +200,12 @@ class HighwaySentences:
         )
 
     def _whole(
-        self, parts: Sequence[tuple[str, str, str | None, str]], text: str, *, whole: bool = False, event: str | None = None
+        self,
+        parts: Sequence[tuple[str, str, str | None, str]],
+        text: str,
+        *,
+        whole: bool = False,
+        event: str | None = None,
     ) -> Composed | None:
         """A text with the acts of its parts, each with the words it was made of; `whole` gives it all of them."""
         words = text.split()

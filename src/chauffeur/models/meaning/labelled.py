@@ -11,7 +11,7 @@ are verbs and the symbols of `language.meaning.symbols`, `VALUE` and `CVALUE` (o
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Any, Final, cast
@@ -35,6 +35,8 @@ from chauffeur.models.meaning.composer import COLOURS, Composed
 _BRACKET: Final = re.compile(r"\[([^\[\]|]*)\|([^\[\]|]*)\]")
 _ADDRESS: Final = re.compile(r"\s\|U:(\w+)\s*$")
 _MARKS: Final = re.compile(r"(@\d+\(|\)@|<|>|#)")
+_PAINTS: Final = ("white", "black", "grey", "red", "yellow", "silver", "orange", "blue", "green")
+"""Colours that are exchanged for each other."""
 _SWAPPED: Final = {"left": "right", "right": "left"}
 
 
@@ -214,8 +216,7 @@ def varied(sentence: Composed, rng: np.random.Generator) -> Composed:
     said = [colour for colour in COLOURS if any(_bare(word) == colour for word in words)]
     if said and rng.random() < 0.5:
         held = {colour for one in acts for colour in _colours(one.act)}
-        new = [colour for colour in ("white", "black", "grey", "red", "yellow", "silver", "orange", "blue", "green")]
-        change = {old: new[int(rng.integers(len(new)))] for old in said if old in held}
+        change = {old: _PAINTS[int(rng.integers(len(_PAINTS)))] for old in said if old in held}
         if len(set(change.values())) == len(change):
             words = [word.lower().replace(_bare(word), change.get(_bare(word), _bare(word))) if _bare(word) in change
                      else word for word in words]  # fmt: skip
@@ -244,7 +245,7 @@ def _coloured(act: Act, change: dict[str, str]) -> Act:
     return _mapped(act, lambda one: replace(one, colour=cast("Any", change.get(one.colour or "", one.colour))))
 
 
-def _mapped(act: Act, by: Any) -> Act:
+def _mapped(act: Act, by: Callable[[Reference], Reference]) -> Act:
     """An act with each of its references changed."""
 
     def deep(one: Reference | None) -> Reference | None:

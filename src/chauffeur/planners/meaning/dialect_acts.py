@@ -1,6 +1,6 @@
 """The acts of each skill of the driving dialect, in the notation of labels: read here in both directions.
 
-`chauffeur.models.meaning` says the skills' wordings as these acts; `planners.meaning.highway` drives acts by the skills.
+`chauffeur.models.meaning` says the skills' wordings as these acts; `planners.meaning.highway` drives acts by skills.
 """
 
 from __future__ import annotations
