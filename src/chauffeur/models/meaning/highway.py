@@ -55,9 +55,9 @@ _SORTED: Final[Mapping[str, str]] = {
 }  # fmt: skip
 """Outright wishes of `data/sorters/wishes.tsv`: a hint is an act only where its world is known."""
 _TOWN: Final[Mapping[str, str]] = {
-    "faster": "speed direction:faster", "slower": "speed direction:slower",
-    "calm": "speed direction:slower style:relaxed", "hurry": "speed direction:faster style:hurry", "question": "U:question", "none": "U:remark",
-    "uturn": "u_turn",
+    "faster": "speed direction:faster", "slower": "speed direction:slower", "uturn": "u_turn",
+    "calm": "speed direction:slower style:relaxed", "hurry": "speed direction:faster style:hurry",
+    "question": "U:question", "none": "U:remark",
 }  # fmt: skip
 
 
