@@ -5,8 +5,8 @@ from chauffeur.concept import MismatchKind as Kind
 from chauffeur.safety.faithfulness.check import DRIVEN_CHECK, FAITHFULNESS_CHECK, check_driven, check_faithfulness
 from chauffeur.safety.faithfulness.facts import Effect, Facts, FactSurroundings
 from chauffeur.safety.faithfulness.judge import judge, judge_drive
+from chauffeur.safety.faithfulness.relations import read_facts
 from chauffeur.safety.faithfulness.report import KINDS, mismatch_words, score_words
-from chauffeur.safety.faithfulness.tracer import read_facts
 
 __all__ = [
     "DRIVEN_CHECK",

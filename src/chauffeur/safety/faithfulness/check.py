@@ -11,8 +11,8 @@ from typing import Final
 from chauffeur.concept import Faithfulness, Limits, NotCompared, Observation, Plan, Program, Verdict
 from chauffeur.safety.faithfulness.facts import Effect, Facts, FactSurroundings
 from chauffeur.safety.faithfulness.judge import judge, judge_drive
+from chauffeur.safety.faithfulness.relations import read_facts
 from chauffeur.safety.faithfulness.report import claims_words, mismatch_words, score_words
-from chauffeur.safety.faithfulness.tracer import read_facts
 
 FAITHFULNESS_CHECK: Final = "alignment-v1"
 DRIVEN_CHECK: Final = "alignment-driven-v1"

@@ -1,61 +1,64 @@
-"""What a program does, as values: what reading finds in its text, and what running it on copies of a scene showed."""
+"""What a program does, as values an explanation can be held against, and what running it showed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Literal
 
 from chauffeur.concept import Observation
-from chauffeur.safety.faithfulness.values import Base, Term
 
-Deed = Literal["speed", "headway", "gap", "lane", "turn", "go", "wait", "say"]
-"""What an event is: a wish for a speed, a headway, a lane or a route; a gap that is steered towards; leaving the stop
-sign; time that passes; words."""
+DeedKind = Literal["speed", "headway", "gap", "lane", "turn", "go", "wait"]
+"""A set-point for speed, headway, lane or route; a gap that is steered towards; leaving the stop sign; time
+that passes."""
+Base = Literal["", "ego", "other", "limit", "gap", "past", "behind", "headway", "sign", "per speed"]
+"""What a number counts from: nothing; the ego's speed; another vehicle's; the limit; the gap ahead; the lead over one
+that was passed; the gap behind; the headway; the way to the stop sign; a way divided by the ego's speed."""
 
-
+PERIOD_S: Final = 0.1
+"""Time between two yields in the highway worlds."""
 STANDING_MPS: Final = 0.5
 """A car this slow stands."""
 
 
+@dataclass(frozen=True, slots=True, order=True)
+class Term:
+    """One alternative of a number: `factor * base + offset`, SI; `bound` for an argument of min or max."""
+
+    base: Base
+    factor: float
+    offset: float
+    bound: bool = False
+
+
 @dataclass(frozen=True, slots=True)
-class Event:
+class Deed:
     """Something a program does.
 
     Attributes:
-        deed: What.
-        line: Program line, 1-based; None inside a helper of a library.
-        terms: Alternatives of its number: m/s of a speed, s of a headway or a wait.
-        sides: Of a lane: where it may lead, -1 left, 0 no change, +1 right. Of a turn: -1, 0 straight, +1.
-        checked: Of a lane: the program asks whether it may enter before it does. Of leaving the stop sign: whether
-            traffic that crosses was asked about.
-        depends: What else it depends on: `other speed`, `gap`, `behind`, `stopped`, `sign`, ...
-        times: How often it is repeated at most; 0 for as often as it goes.
-        back: Of a lane: whether it leads back to one the ego has been in.
-        reference: Of a speed: found as what a controller steers towards, not as a wish itself.
-        open: Whether its number may be another one than those known.
+        kind: What.
+        line: Program line, 1-based; None inside a library.
+        terms: Alternatives of its number, in order; empty where it cannot be told.
+        sides: Of a lane or a turn: -1 left, 0 its own or straight on, +1 right; empty where it cannot be told.
+        back: Of a lane: it leads to one the ego has been in.
+        times: How often it may be done; 0 for as often as it goes.
+        aimed: Of a speed: what a controller steers towards, not the set-point itself.
+        bounds: Least and most that `verify` allows for the number.
     """
 
-    deed: Deed
+    kind: DeedKind
     line: int | None
-    terms: frozenset[Term] = frozenset()
+    terms: tuple[Term, ...] = ()
     sides: frozenset[int] = frozenset()
-    checked: bool = False
-    depends: frozenset[str] = frozenset()
-    times: int = 1
     back: bool = False
-    reference: bool = False
-    open: bool = False
+    times: int = 1
+    aimed: bool = False
+    bounds: tuple[float, float] = (float("-inf"), float("inf"))
 
-
-@dataclass(frozen=True, slots=True)
-class FactMark:
-    """A number that something measured is compared with, or subtracted from it: `gap < 30`, `gap - 25`."""
-
-    base: Base
-    value: float
-    line: int | None
-    compared: bool
+    @property
+    def stops(self) -> bool:
+        """Whether it is a set-point for standing still."""
+        still = any(not t.factor and abs(t.offset) < 0.05 and not t.bound for t in self.terms)
+        return self.kind == "speed" and not self.aimed and still
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,27 +66,27 @@ class Facts:
     """What reading finds.
 
     Attributes:
-        events: What the program does, in the order of its text with its functions put in where they are called.
-        marks: Numbers that measured things are held against.
-        spans_s: Times its loops may last, s.
-        literals: Plain numbers written in the program.
-        readable: Whether it was read at all; False for text that is no program, or too long.
+        deeds: In the order of the text, functions put in where they are called.
+        marks: What measured things are compared with, or what is taken off them: (base, number).
+        spans_s: How long its loops may last.
+        asks_free: Whether it asks if a lane may be entered.
+        readable: Whether it was read at all.
     """
 
-    events: tuple[Event, ...] = ()
-    marks: tuple[FactMark, ...] = ()
-    spans_s: tuple[float, ...] = ()
-    literals: frozenset[float] = frozenset()
+    deeds: tuple[Deed, ...] = ()
+    marks: frozenset[tuple[Base, float]] = frozenset()
+    spans_s: frozenset[float] = frozenset()
+    asks_free: bool = False
     readable: bool = True
 
-    def of(self, *deeds: Deed) -> Iterator[tuple[int, Event]]:
-        """Events of some kinds with their places."""
-        return ((place, event) for place, event in enumerate(self.events) if event.deed in deeds)
+    def of(self, *kinds: DeedKind) -> list[tuple[int, Deed]]:
+        """Deeds of some kinds with their places."""
+        return [(place, deed) for place, deed in enumerate(self.deeds) if deed.kind in kinds]
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What happened when a program ran: in a drive, or on a copy of the scene. Simulated.
+    """What happened when a program ran. Simulated.
 
     Attributes:
         lanes_moved: Lanes to the right (negative: left) between start and end.
@@ -112,6 +115,11 @@ class Effect:
     def stood(self) -> bool:
         """Whether it stood still at some time."""
         return self.extremes_mps[0] < STANDING_MPS
+
+    @property
+    def sides(self) -> frozenset[int]:
+        """Sides to which it was out of its first lane."""
+        return frozenset(side for side, out in ((-1, self.leftmost < 0), (1, self.rightmost > 0)) if out)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,3 +155,11 @@ class FactSurroundings:
             sign_m=observation.stop_sign_m,
             crossing=bool(observation.road.junctions),
         )
+
+    def worth(self, term: Term) -> float | None:
+        """A number where this is, SI; None where what it counts from is not known."""
+        known = {"ego": self.speed_mps, "limit": self.limit_mps, "other": self.other_mps, "gap": self.gap_m}
+        if not term.factor:
+            return term.offset
+        base = known.get(term.base)
+        return None if base is None else term.factor * base + term.offset
