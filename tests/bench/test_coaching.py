@@ -19,7 +19,7 @@ from chauffeur.bench.lampilot.critic import Attempt, EvaluatorCritic, PersonCrit
 from chauffeur.bench.lampilot.description import usable_description
 from chauffeur.bench.lampilot.policy_aid import PolicyAid, aid_for
 from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
-from chauffeur.bench.referees import highway_referee
+from chauffeur.bench.referees import referee_for
 from chauffeur.concept import LAMPILOT_LIMITS, ConfigError, DataError, Program
 from chauffeur.describe import describe
 from chauffeur.drive.again import drive_again
@@ -133,7 +133,7 @@ def test_a_frozen_repository_serves_a_run_and_its_programs_travel_with_the_plan(
     assert plan.policy == Program(USE_IT, library=GO_LEFT)
     verdicts = run_checks(plan, observation, LAMPILOT_LIMITS)
     assert declined(plan, verdicts) == ""
-    referee = highway_referee(world, item.scenario, plan)
+    referee = referee_for(world, item.scenario, plan)
     episode = drive_policy(world, plan.policy, referee, trip_s(item.scenario), LAMPILOT_LIMITS, minimum_speed=True)
     assert episode.success and episode.outcome == "success"
     assert episode.said[0][1] == "Here we go." and "is_safe_enter" in {c.name for f in episode.frames for c in f.calls}
@@ -143,7 +143,7 @@ def test_a_frozen_repository_serves_a_run_and_its_programs_travel_with_the_plan(
     write_trip(tmp_path / "trip.mcap", trip, episode.frames, item.scenario, system=request.system, final=episode.final)
     read = read_trip(tmp_path / "trip.mcap")
     assert read.trip.plan.policy == plan.policy and read.system == request.system
-    again = drive_again(read, LAMPILOT_LIMITS, highway_referee).trip
+    again = drive_again(read, LAMPILOT_LIMITS, referee_for).trip
     assert again is not None and compare_trips(recorded, again) is None
     assert "def go_left():" in policy_words(plan.policy)
     alone = replace(plan, policy=Program(USE_IT))

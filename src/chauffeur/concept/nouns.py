@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, NewType
 
 from chauffeur.concept.images import CameraImage
+from chauffeur.concept.utterance import Act
 
 if TYPE_CHECKING:
     from chauffeur.concept.scene import Observation
@@ -453,6 +454,7 @@ class Plan:
         scene: C as the planner itself saw it in pictures, in words; memory keeps it (Eq. 23). Empty without pictures.
         alarm: Where the words were understood as an alarm; empty where they were not.
         unused: Parts of the wish, as said, that the policy does not use; None where the planner does not tell.
+        acts: What the policy does, in order, as the planner claims; empty where it does not tell.
     """
 
     thoughts: Thoughts
@@ -469,6 +471,7 @@ class Plan:
     scene: str = ""
     alarm: Alarm = ""
     unused: tuple[str, ...] | None = None
+    acts: tuple[Act, ...] = ()
 
 
 MismatchKind = Literal[
@@ -589,10 +592,11 @@ Outcome = Literal["success", "failure", "collision", "off_road", "timeout", "end
 
 
 JudgedBy = Literal["words", "plan", "goal", "place", "reading", "labels"]
-"""What a drive is held against: the words, read by rules that see no plan; what the planner says it understood, where
-the rules read nothing in the words (judge and judged then share that reading); the scenario's own goal; the place that
-the plan leads to, found by the planner and reached by the world's own geometry; the learned reading of the words, which
-the planner shares, over geometry that it does not; labels by people, over the same geometry."""
+"""What a drive is held against: the words, read by rules that see no plan (recordings of older versions); what the
+planner says it does, where the reading of the words is unsure or finds nothing, and where only the plan has a number
+(judge and judged then share that); the scenario's own goal; the place that the plan leads to, found by the planner and
+reached by the world's own geometry; the learned reading of the words, which the planner may share, over geometry that
+it does not; labels by people, over the same geometry."""
 
 
 @dataclass(frozen=True, slots=True)

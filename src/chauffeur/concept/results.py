@@ -54,7 +54,8 @@ def result_of(trip: Trip) -> Result:
 
 def is_whole(trip: Trip) -> bool:
     """Whether nothing of the wish stayed unused, and what was driven had a meaning that is known."""
-    return not trip.unused and (trip.outcome == "success" or bool(trip.plan.intent))
+    done, of = trip.parts_done or (0, 0)
+    return not trip.unused and done == of and (trip.outcome == "success" or bool(trip.plan.intent))
 
 
 def undriven(intent: str, *, offer: bool = False) -> Result:

@@ -110,6 +110,7 @@ PLAN = Channel(
         intent=_text(),
         alarm=_text("stop or distress, where the words were taken for that"),
         unused={"type": ["array", "null"], "description": "Parts of the wish that the policy does not use"},
+        acts=_array(_ANY_OBJECT, "What the policy does, as the planner claims"),
         settings=_SETTINGS,
         planner=_text(),
         model=_text(),

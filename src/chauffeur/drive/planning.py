@@ -44,9 +44,9 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.describe.answers import DONT_KNOW, answer_to, asks_to_know
-from chauffeur.drive import wish_parts
 from chauffeur.drive.emergency import ALARM_WORDS, alarm_of, check_told_not_to, is_bare_stop, raised
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
+from chauffeur.drive.judge import account
 from chauffeur.language.emergency import read_emergency
 from chauffeur.language.languages.reader import OtherWish, read_other
 from chauffeur.language.questions import is_question
@@ -196,7 +196,7 @@ async def plan_once(instruction: Instruction, steps: PlanSteps) -> Planned:
     if wish.stops and not own:
         verdicts = (*verdicts, wish)
     elif not own:
-        told = check_told_not_to(instruction.text, plan, now) or wish_parts.check_told_not_to(instruction.text, plan)
+        told = check_told_not_to(instruction.text, plan, now) or account.check_told_not_to(instruction.text, plan)
         verdicts = (*verdicts, *told)
     steps.tell(DriveEvent("verdicts", value=verdicts))
     return Planned(plan, verdicts, request)

@@ -38,16 +38,16 @@ from chauffeur.concept import (
 from chauffeur.concept.registry import load_plugin
 from chauffeur.describe import describe_with_traffic
 from chauffeur.describe.services.sources import SourceSettings
-from chauffeur.drive.effects import effect_of
 from chauffeur.drive.emergency import not_checked
 from chauffeur.drive.episode import Episode, Referee, run_episode
 from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
+from chauffeur.drive.judge.account import unused_of
+from chauffeur.drive.judge.effects import effect_of
 from chauffeur.drive.loop import LoopMemory, Stages, drive, steps_of
 from chauffeur.drive.planning import declined, no_pictures, request_once, unusable
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.seat import SeatCamera
 from chauffeur.drive.surroundings import describing, opened, weathered
-from chauffeur.drive.wish_parts import account_of
 from chauffeur.executors import Executor, executor_for
 from chauffeur.executors.program import ProgramDrive
 from chauffeur.executors.registry import OfKind
@@ -397,7 +397,7 @@ def make_trip(
         seed=seed,
         said=() if episode is None else episode.said,
         record=record,
-        unused=() if episode is None else account_of(request.instruction.text, plan).unused,
+        unused=() if episode is None else unused_of(request.instruction.text, plan),
         parts_done=None if episode is None else episode.parts_done,
         judged_by="" if episode is None else episode.judged_by,
     )

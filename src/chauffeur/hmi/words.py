@@ -64,10 +64,10 @@ RESULT_TONES: Final[dict[Result, Tone]] = {
     Result.FAILED: "bad",
 }
 _JUDGED_BY: Final[dict[JudgedBy, str]] = {
-    "reading": "Judged by geometry, for what the words were read to mean; the planner goes by the same reading.",
+    "reading": "Judged by geometry, for what the words were read to mean; a planner may go by the same reading.",
     "labels": "Judged by geometry, for what people say the words mean.",
     "words": "Judged by your words, which rules read that see no plan.",
-    "plan": "Judged by what the planner understood, for rules alone read less: judge and planner share it.",
+    "plan": "Judged by what the planner says it does, where the words read alone say less: judge and planner share it.",
     "goal": "Judged by the scenario's own goal.",
     "place": "Judged by the place: the planner chose it, the world's geometry says whether the car is there.",
 }

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from chauffeur.concept import Command, Observation, Scenario, ScenarioError, Setpoints
+from chauffeur.concept import Command, Observation, Scenario, ScenarioError
 from chauffeur.geometry import Lane, LanePlace, Pose, plan_route
 from chauffeur.worlds.base import Driver, Perception, Stage, World
 
 pytest.importorskip("libsumo")
 pytest.importorskip("sumo")
 
-from chauffeur.worlds.town import TownReferee, TownWay, TownWorld, WayReferee
+from chauffeur.worlds.town import TownReferee, TownWorld
 from chauffeur.worlds.town.build import build, sources_of
 from chauffeur.worlds.town.pack import MapPack, Place
 from chauffeur.worlds.town.scene import STANDS_S
@@ -172,48 +172,6 @@ def test_a_trip_to_a_place_ends_at_a_stand_that_lasts(world: TownWorld, scenario
     assert referee.success
     assert world.ended == scenario_goal
     assert stood * world.dt_s >= STANDS_S
-
-
-def test_a_trip_is_done_when_the_way_is_taken_and_a_stop_only_when_it_was_asked_for(world: TownWorld) -> None:
-    world.reset(scenario(vehicles=0))
-    ways, stop = WayReferee(world, (TownWay("left"),), stops=False), WayReferee(world, (), stops=True)
-    stop.follow(Setpoints(5.0, 1.4), "running")
-    for _ in range(80):
-        world.step(Command(-3.0, 0.0))
-        ways.observe()
-        stop.observe()
-    assert not stop.success, "it stands, but nobody asked for it"
-    stop.follow(Setpoints(0.0, 1.4), "running")
-    for _ in range(80):
-        world.step(Command(-3.0, 0.0))
-        stop.observe()
-    assert stop.over
-    assert stop.outcome() == "success"
-    driver = world.driver()
-    for _ in range(4000):
-        setpoints = replace(driver.initial_setpoints(), turn="left")
-        world.step(driver.command(driver.settle(setpoints)))
-        ways.observe()
-        if ways.over:
-            break
-    assert ways.success
-    assert not ways.shortfall
-
-
-def test_a_way_that_was_not_asked_for_is_astray_and_of_two_turns_one_is_half(world: TownWorld) -> None:
-    world.reset(scenario(vehicles=0))
-    other, both = WayReferee(world, (TownWay("right"),), stops=False), WayReferee(world, (TownWay("left"),) * 2, False)
-    driver = world.driver()
-    for _ in range(4000):
-        world.step(driver.command(driver.settle(replace(driver.initial_setpoints(), turn="left"))))
-        other.observe()
-        both.observe()
-        if both.parts_done[0]:
-            break
-    assert both.parts_done == (1, 2)
-    assert not both.over
-    assert other.parts_done == (0, 1)
-    assert not other.success
 
 
 def test_traffic_yields_to_the_ego_whose_way_it_knows(world: TownWorld, town: MapPack) -> None:

@@ -25,7 +25,7 @@ from chauffeur.bench.kernel.store import Row, RowStore, StorageError, sole_write
 from chauffeur.bench.lampilot.critic import Attempt, Critic, CriticJudgement
 from chauffeur.bench.lampilot.description import FALLBACK_WORDS, usable_description
 from chauffeur.bench.lampilot.policy_aid import offer
-from chauffeur.bench.referees import highway_referee
+from chauffeur.bench.referees import referee_for
 from chauffeur.concept import (
     ChauffeurError,
     DataError,
@@ -243,7 +243,7 @@ class Coach:
         episode = None
         if not refusal:
             assert isinstance(plan.policy, Program)
-            referee = highway_referee(world, item.scenario, plan)
+            referee = referee_for(world, item.scenario, plan)
             episode = drive_program(world, plan.policy.source, referee, MAX_EPISODE_S, library=plan.policy.library)
             if episode.causes.infra_failed:  # says nothing about the program, so nobody judges it
                 raise SandboxError(episode.causes.detail)

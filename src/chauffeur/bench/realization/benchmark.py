@@ -33,15 +33,15 @@ from chauffeur.concept import (
 )
 from chauffeur.concept.utterance import Utterance, acts_from_json
 from chauffeur.describe import describe
+from chauffeur.drive.judge.referee import ActsReferee
 from chauffeur.drive.planning import checked, screened_request
-from chauffeur.drive.realised import MeaningReferee
 from chauffeur.drive.session import drive_policy, make_world, scenario_hash
 from chauffeur.planners.meaning import MeaningPlanner
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.checks import DEFAULT_CHECKS
 from chauffeur.worlds.town import TownWorld
 
-VERSION: Final = "realization-v1"
+VERSION: Final = "realization-v2"
 """Stage, judge and rollout together; changes whenever the same command could give another row."""
 LABELS, BLIND = "labels", "blind"
 _ON: Final = "def go():\n    while True:\n        yield proceed(check_speed_limit())\n"
@@ -117,7 +117,7 @@ def _driven(item: RealizationItem) -> Row:
             came: Came = "asked" if plan.intent == "ask" else "declined"
             return {"came": came, "detail": found.refusal, "acts": [], "collision": False, "seconds": 0.0}
         ids = {reference: tuple(world.staged[k] for k in places) for reference, places in scene.referents.items()}
-        referee = MeaningReferee(world, acts, "labels", ids)
+        referee = ActsReferee(world, acts, "labels", ids)
         try:
             episode = drive_policy(world, plan.policy, referee, MAX_S, Limits())
         except ScenarioError as error:  # known only when the policy meets the world

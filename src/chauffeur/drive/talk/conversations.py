@@ -10,13 +10,13 @@ from typing import Final
 from chauffeur.concept import Feedback, History, HistoryItem, Observation, Parameters, Plan, Policy, Program
 from chauffeur.concept.units import people_speed
 from chauffeur.drive.events import DriveEvent
+from chauffeur.drive.judge.account import result_of_event, unused_of
 from chauffeur.drive.live.messages import Report
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Interaction
 from chauffeur.drive.talk.messages import Conversation, HowWasIt, StageTimes
 from chauffeur.drive.talk.verdicts import Judge, JudgedCase
 from chauffeur.drive.talk.wish_queue import Words
-from chauffeur.drive.wish_parts import account_of, result_of_event
 from chauffeur.geometry.road_graph import TURNS
 from chauffeur.programs.loops import has_end
 
@@ -134,7 +134,7 @@ class Conversations:
                 shown = replace(shown, why=event.text)
         if event.final:
             result = result_of_event(event.kind, shown.text, each.plan)
-            unused = () if each.plan is None else account_of(shown.text, each.plan).unused
+            unused = () if each.plan is None else unused_of(shown.text, each.plan)
             left_out = f"I did not use: {', '.join(f'“{part}”' for part in unused)}." if unused else ""
             why = " ".join(text for text in (event.text, left_out) if text)
             shown = replace(shown, stage="closed", outcome=event.kind, result=str(result), why=why)

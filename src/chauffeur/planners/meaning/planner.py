@@ -101,6 +101,7 @@ class MeaningPlanner:
             planner=self.id,
             model=self.model,
             latency_s=time.perf_counter() - begun,
+            acts=made.done,
             unused=tuple(utterance.text[low:high] for low, high in (*_spans(made), *utterance.unused)),
         )
 

@@ -23,7 +23,8 @@ from chauffeur.concept import (
     result_of,
 )
 from chauffeur.drive.again import drive_again
-from chauffeur.drive.fulfilment import GAP_M, HELD_S, SPEED_MPS, asked_of
+from chauffeur.drive.judge.setpoints import GAP_M, SPEED_MPS
+from chauffeur.drive.judge.trace import HELD_S
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.drive.scenarios import BUILT_IN, find, planner_for, seeds_with_lead, suiting
 from chauffeur.drive.session import Session, drive_without_program
@@ -102,7 +103,7 @@ def test_a_lane_that_is_crossed_for_an_instant_is_not_held() -> None:
 """
     recorded = driven("Change to the left lane.", find("overtake"), Fixed(there_and_back, "lane.left"))
     assert recorded.trip.outcome == "failure"
-    assert recorded.trip.causes.detail == "The car is not in the lane that was asked for."
+    assert "lane" in recorded.trip.causes.detail
 
 
 def test_a_program_that_still_has_to_come_back_is_waited_for() -> None:
@@ -124,7 +125,7 @@ def test_a_program_that_still_has_to_come_back_is_waited_for() -> None:
 def test_a_speed_that_traffic_does_not_allow_is_not_done() -> None:
     recorded = driven("Drive at 100 km/h.", find("overtake"))
     assert recorded.trip.outcome in ("failure", "timeout")
-    assert recorded.trip.causes.detail == "The vehicle ahead held the car up."
+    assert "held the car up" in recorded.trip.causes.detail
 
 
 def test_a_speed_is_held_within_tolerance() -> None:
@@ -151,11 +152,6 @@ def test_who_says_nothing_of_what_was_understood_claims_nothing() -> None:
     source = "def drive():\n    yield autopilot()\n"
     recorded = driven("Do your best.", find("overtake"), Fixed(source, ""))
     assert recorded.trip.outcome == "ended"
-
-
-def test_the_number_of_a_setting_belongs_to_the_last_part_that_sets_it() -> None:
-    plan = Plan(Thoughts(""), None, intent="speed.set+overtake.left", settings=(("target_speed_mps", 31.0),))
-    assert [ask.speed_mps for ask in asked_of(plan)] == [None, 31.0]
 
 
 @pytest.mark.parametrize(
@@ -254,15 +250,14 @@ LEFT_LANE = """def drive():
 """
 
 
-def test_sides_and_speeds_are_those_of_the_words_and_not_of_the_plan() -> None:
+def test_what_is_judged_is_what_was_said_and_not_what_the_plan_says() -> None:
     place = find("overtake")
-    misread = driven("Change to the right lane.", place, Fixed(LEFT_LANE, "lane.left"))
-    assert result_of(misread.trip) == "not done", "the plan did what it understood, which was not what was said"
-    assert misread.trip.judged_by == "words"
-    untold = driven("Change to the left lane.", place, Fixed(LEFT_LANE, ""))
-    assert (result_of(untold.trip), untold.trip.judged_by) == ("done", "words")
+    misread = driven("Change to the right lane.", place, Fixed(LEFT_LANE, "lane.left")).trip
+    assert (result_of(misread), misread.judged_by) == ("not done", "reading")
+    untold = driven("Change to the left lane.", place, Fixed(LEFT_LANE, "")).trip
+    assert (result_of(untold), untold.judged_by) == ("done", "reading")
     mood = driven("I feel like flying today.", find("cruise"), Fixed(SLOW, "speed.set", (("target_speed_mps", 25.0),)))
-    assert mood.trip.judged_by == "plan", "the rules read nothing in it, so the judge shares the planner's reading"
+    assert (mood.trip.outcome, mood.trip.judged_by) == ("success", "plan"), "nothing is read in it, so the plan's acts"
 
 
 SLOW = """def drive():
@@ -273,9 +268,9 @@ SLOW = """def drive():
 
 
 @pytest.mark.parametrize("wish", ["Slow down when it rains", "Drive at 90 km/h after the bridge"])
-def test_a_condition_that_is_not_used_is_named_and_the_drive_is_partly_done(wish: str) -> None:
+def test_a_condition_that_is_not_used_is_named_and_never_ticked(wish: str) -> None:
     recorded = driven(wish, find("cruise"), Fixed(SLOW, "speed.set", (("target_speed_mps", 25.0),)))
-    assert recorded.trip.outcome == "success"
+    assert recorded.trip.outcome == "ended", "nothing could be compared"
     assert result_of(recorded.trip) == "partly done"
     assert recorded.trip.unused[0] in wish
     sign, label, tone = trip_words(recorded.trip)

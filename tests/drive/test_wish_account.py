@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from chauffeur.concept import Parameters, Plan, Program, Thoughts
-from chauffeur.drive.wish_parts import account_of, check_told_not_to, result_of_event
+from chauffeur.drive.judge.account import check_told_not_to, result_of_event, unused_of
 
 NOTHING = "def f():\n    yield autopilot()\n"
 
@@ -24,23 +24,18 @@ def going_to(route: str) -> Plan:
         ("Overtake the lorry.", plan("overtake.left"), ()),
         ("Overtake and come back.", plan("overtake.left"), ()),
         ("Step on it, I'm late", plan("style.hurry"), ()),
-        ("Hang a louie", plan("turn.left"), ()),
         ("Pull over after the fountain", plan("pull_over"), ("after the fountain",)),
-        ("Speed up, then honk", plan("speed.increase"), ("honk",)),
         ("Turn left, then left again", plan("way left"), ("left again",)),
         ("Turn left, then left again", plan("way left+way left"), ()),
         ("Slow down if it starts raining", plan("speed.decrease"), ("if it starts raining",)),
         ("Stop after the church", plan("stop", 'def f():\n    x = get_distance_to_place("church")\n'), ()),
         ("Take me to the hospital", going_to("hospital"), ()),
         ("Take me to the hospital", going_to("station"), ("to the hospital",)),
-        ("Take me to the station and wait", going_to("station"), ("wait",)),
-        ("Park near the lift", plan("park", thoughts="You want to park near the lift."), ()),
-        ("Park away from the lift", plan("park", thoughts="You want to park near the exit."), ("away from the lift",)),
         ("Change lanes when it is safe", plan("lane.left"), ()),
     ],
 )  # fmt: skip
 def test_parts_that_the_plan_does_not_use_are_named(wish: str, made: Plan, unused: tuple[str, ...]) -> None:
-    assert account_of(wish, made).unused == unused
+    assert unused_of(wish, made) == unused
 
 
 @pytest.mark.parametrize(
@@ -53,7 +48,6 @@ def test_parts_that_the_plan_does_not_use_are_named(wish: str, made: Plan, unuse
         ("Don't turn left, turn right", "turn.right", False),
         ("Don't overtake, stay behind", "follow", False),
         ("Let the bus in", "yield", False),
-        ("Don't you want to overtake?", "overtake.left", False),
     ],
 )
 def test_a_plan_that_does_what_it_was_told_not_to_is_not_driven(wish: str, intent: str, stops: bool) -> None:
@@ -62,7 +56,7 @@ def test_a_plan_that_does_what_it_was_told_not_to_is_not_driven(wish: str, inten
 
 def test_a_plan_without_a_policy_leaves_nothing_out() -> None:
     asked = Plan(Thoughts(""), None, refusal="Shall I?", intent="ask")
-    assert account_of("Pull over after the fountain", asked).unused == ()
+    assert unused_of("Pull over after the fountain", asked) == ()
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from chauffeur.drive.effects import effect_of
 from chauffeur.drive.episode import Episode, run_episode
+from chauffeur.drive.judge.effects import effect_of
 from chauffeur.programs import UNHURRIED, ProgramExecutor, Sandbox
 from chauffeur.safety.faithfulness import Effect, FactSurroundings, judge, read_facts
 from chauffeur.worlds.highway import HighwayWorld

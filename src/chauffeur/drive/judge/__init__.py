@@ -1,0 +1,1 @@
+"""One judge of drives: acts of an utterance, held against the geometry of what was driven."""
