@@ -62,7 +62,7 @@ except DataError as error:
 def test_every_set_has_a_card_that_counts_right(name: str) -> None:
     card = (DATA / name / "CARD.md").read_text(encoding="utf-8")
     assert re.findall(r"^- \*\*(.+?)\*\*:", card, re.MULTILINE) == ["What", "Written by", "Lines", "Used by", "Licence"]
-    files = [path for path in (DATA / name).iterdir() if path.name != "CARD.md"]
+    files = [path for path in (DATA / name).rglob("*") if path.is_file() and path.name != "CARD.md"]
     lines = sum(path.read_bytes().count(b"\n") for path in files)
     assert f"- **Lines**: {lines:,}" in card
     assert f"]({name}/CARD.md)" in (DATA / "README.md").read_text(encoding="utf-8")
