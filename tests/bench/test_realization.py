@@ -12,8 +12,9 @@ pytest.importorskip("libsumo")
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome
 from chauffeur.bench.kernel.conformance import faults
-from chauffeur.bench.realization import RealizationBenchmark, realization, stage_of
-from chauffeur.concept import DataError
+from chauffeur.bench.realization import RealizationBenchmark, highway_scenario, realization, stage_of
+from chauffeur.bench.realization.stage import ENDS, FAR, LEFT_LANE, RIGHT_LANE, SIDE_STREETS
+from chauffeur.concept import ConfigError, DataError
 from chauffeur.concept.utterance import Reference, acts_from_json
 
 SILVER = {"kind": "car", "colour": "silver"}
@@ -86,12 +87,17 @@ def test_what_came_of_a_command(tmp_path: Path, text: str, acts: list[Any], read
 def test_it_is_a_benchmark_of_the_kernel(tmp_path: Path) -> None:
     bench = realization(str(commands(tmp_path, ("Turn right.", [RIGHT]), ("Turn round.", [{"act": "u_turn"}]))))
     assert faults(bench) == []
-    assert [item.id for item in bench.items()] == ["c0/labels", "c0/meaning", "c0/keyword", "c0/blind"]
+    assert [item.id for item in bench.items()] == [
+        "c0/town/labels",
+        "c0/town/meaning",
+        "c0/town/keyword",
+        "c0/town/blind",
+    ]
 
 
 def test_real_commands_are_staged(commands_data: Path) -> None:
     bench = RealizationBenchmark(commands_data, ["labels"])
-    assert len(bench.items()) > 150
+    assert len(bench.items()) > 230
     assert len(RealizationBenchmark(commands_data, ["labels"], 20).items()) == 20
 
 
@@ -105,6 +111,76 @@ def test_other_files_are_refused(tmp_path: Path, content: str) -> None:
         RealizationBenchmark(file, ["labels"])
 
 
-def test_no_commands_are_refused() -> None:
+def test_a_folder_without_commands_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError):
-        realization()
+        realization(str(tmp_path))
+
+
+def test_our_own_commands_are_read_by_default() -> None:
+    bench = realization(readers="labels")
+    assert {item.set for item in bench.items()} == {"town_a", "town_b"}
+    assert len(bench.items()) > 200
+
+
+JUNCTION = {"kind": "junction"}
+LEFT = {"act": "turn", "side": "left"}
+RED = {"kind": "car", "colour": "red"}
+
+
+@pytest.mark.parametrize(
+    ("acts", "start"),
+    [
+        ([LEFT], LEFT_LANE),
+        ([LEFT | {"place": {"rel": "after", "ref": {"kind": "bus"}}}], SIDE_STREETS["left"]),  # a kerb, and a left turn
+        ([RIGHT, {"act": "lane", "side": "left"}], SIDE_STREETS["right"]),  # into a street of two lanes
+        ([LEFT | {"place": {"rel": "at", "ref": {"kind": "end_of_road"}}}], ENDS["left"]),
+        ([LEFT | {"place": {"rel": "at", "ref": JUNCTION | {"ordinal": 2}}}], FAR["left"]),
+        ([{"act": "lane", "to": "rightmost"}], LEFT_LANE),
+        ([{"act": "keep", "side": "right"}], RIGHT_LANE),
+    ],
+)
+def test_a_command_is_said_where_it_can_be_done(acts: list[Any], start: Any) -> None:
+    assert staged(*acts).start == start
+
+
+def test_an_ordinal_has_others_like_it_before_and_behind() -> None:
+    scene = staged({"act": "stop", "place": {"rel": "beside", "ref": RED | {"ordinal": 2}}})
+    assert {(one.kind, one.colour) for one in scene.actors} == {("car", "red")}
+    assert scene.referents == {Reference("car", "red", ordinal=2): (1,)}
+
+
+def test_what_is_spoken_of_again_is_there_once() -> None:
+    scene = staged(
+        {"act": "yield", "target": {"kind": "car", "colour": "red", "state": "oncoming"}},
+        {"act": "follow", "target": {"kind": "car", "deictic": True}},
+    )
+    assert len(set(scene.referents.values())) == 1
+
+
+def test_a_distractor_is_nothing_else_that_is_named() -> None:
+    blue = {"kind": "car", "colour": "blue"}
+    scene = staged(
+        PARK | {"not": True, "place": {"rel": "behind", "ref": RED}}, PARK | {"place": {"rel": "behind", "ref": blue}}
+    )
+    assert [one.colour for one in scene.actors].count("blue") == 1
+
+
+@pytest.mark.parametrize(
+    ("acts", "road"),
+    [
+        ([{"act": "pass", "target": {"kind": "vehicle", "where": "ahead"}}], "ramp-merge-v0"),
+        ([{"act": "pull_over"}], "dt-highway-v0"),
+        ([RIGHT], "dt-intersection-v0"),
+        ([RIGHT, LEFT], None),
+        ([{"act": "follow", "target": RED}], None),  # its vehicles have no colours
+        ([PARK], None),
+    ],
+)
+def test_what_a_highway_can_stage(acts: list[Any], road: str | None) -> None:
+    scenario = highway_scenario(acts_from_json(acts), "x")
+    assert (scenario and scenario.config["type"]) == road
+
+
+def test_a_world_without_a_stage_is_refused() -> None:
+    with pytest.raises(ConfigError):
+        realization(worlds="track")

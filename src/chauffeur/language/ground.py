@@ -43,6 +43,10 @@ _KINDS: Final[dict[ReferenceKind, tuple[AgentKind, ...]]] = {
 """Kinds of road users that a word covers."""
 ROAD_USERS: Final = frozenset(_KINDS)
 """Words for what can be pointed at among those who are on the road, or stand in its way."""
+_AT_JUNCTIONS: Final[frozenset[ReferenceKind]] = frozenset({"junction", "crosswalk", "end_of_road"})
+"""Places that are at a junction, or are one: a world's map knows no others."""
+_SEEN: Final = frozenset[ReferenceKind]({*ROAD_USERS, "light", "stop_sign", "sign", *_AT_JUNCTIONS})
+"""What narrows a search for what stands by it; other things ("under the trees") are not known, and narrow nothing."""
 PLURALS: Final[frozenset[ReferenceKind]] = frozenset({"vehicles", "pedestrians", "traffic"})
 _TAKEN_FOR: Final[dict[Colour, tuple[Colour, ...]]] = {
     "silver": ("grey",), "grey": ("silver",), "dark": ("black", "grey", "blue", "brown", "green"),
@@ -128,6 +132,20 @@ def reference_of(kind: str, colour: str = "", state: str = "", side: str = "") -
     return reference_from_json({name: value for name, value in said.items() if value})
 
 
+def spoken_of(reference: Reference, before: Iterable[Reference]) -> Reference | None:
+    """Which of the references before it one takes up: of its kind, told by nothing that was not said of that one."""
+    if reference.kind in PLURALS:
+        return None
+    return next((one for one in reversed(tuple(before)) if one != reference and _takes_up(reference, one)), None)
+
+
+def _takes_up(reference: Reference, before: Reference) -> bool:
+    said = ("colour", "state", "side", "where", "ordinal", "of")
+    return reference.kind == before.kind and all(
+        getattr(reference, one) in (None, getattr(before, one)) for one in said
+    )
+
+
 # What fits ------------------------------------------------------------------------------------------------------------
 
 
@@ -139,11 +157,11 @@ def _fitting(reference: Reference, observation: Observation) -> list[Target]:
         found = _lights(observation)
     elif kind in ("stop_sign", "sign"):
         found = _signs(reference, observation)
-    elif kind == "junction":
+    elif kind in _AT_JUNCTIONS:
         found = _junctions(observation)
     else:
         return []
-    if kind in _KINDS and reference.of is not None and reference.of.kind not in ("road", "lane", "sidewalk"):
+    if kind in _KINDS and reference.of is not None and reference.of.kind in _SEEN:
         around = _fitting(reference.of, observation)
         found = [
             one
@@ -364,7 +382,7 @@ def _plural(reference: Reference) -> str:
 def _absent(reference: Reference, observation: Observation) -> str:
     """Why nothing is meant, by the first attribute that nothing in sight has."""
     bare = Reference(reference.kind)
-    if reference.kind not in _KINDS and reference.kind not in ("light", "stop_sign", "sign", "junction"):
+    if reference.kind not in _SEEN:
         return f"I cannot make out a {reference.kind.replace('_', ' ')} here."
     if not _fitting(bare, observation):
         return f"I see no {_plural(bare) if reference.kind in PLURALS else _noun(bare)}."

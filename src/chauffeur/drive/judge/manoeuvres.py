@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept.utterance import Act
-from chauffeur.drive.judge.conditions import too_early
+from chauffeur.drive.judge.conditions import begin, too_early
 from chauffeur.drive.judge.references import ROAD_USERS, WAYSIDE, ahead, meant
 from chauffeur.drive.judge.setpoints import GAP_M, GAP_SHARE, planned_gap
 from chauffeur.drive.judge.standing import ON_M, go
@@ -33,10 +34,13 @@ def turn(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
     nth = 1
     if reference is not None and reference.kind in (*WAYSIDE, "road"):
         nth = max(1, reference.ordinal or 1)
-    for passage in drive.passages:
-        if passage.enters < start:
-            continue
+    passed = act.when.ref if act.when is not None and act.when.event == "passed" else None
+    first = max(1, passed.ordinal or 1) if passed is not None and passed.kind in WAYSIDE else 0
+    for passage in [one for one in drive.passages if one.enters >= start][first:]:
         if passage.way == side or side is None:
+            if nth > 1 and side == "straight":
+                nth -= 1
+                continue
             if nth > 1:
                 return Found("not_done", passage.leaves, "the car turned at an earlier junction")
             if drive.all[-1].time_s - drive.all[passage.leaves].time_s < BEYOND_S - 1e-6:
@@ -121,7 +125,13 @@ def _is_at(drive: Drive, i: int, to: str) -> bool:
 
 def keep(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
     """That the car drives on and keeps to its lane."""
-    if act.side is not None or act.to is not None:
+    start, waits = begin(drive, act, start)
+    if waits:
+        return Found(*waits)
+    act = replace(act, when=None)
+    if act.side is not None and act.to is None:
+        act = replace(act, side=None, to="leftmost" if act.side == "left" else "rightmost")
+    if act.to is not None:
         return lane(drive, act, start, last=last)
     found = go(drive, act, start)
     until = len(drive.all) - 1 if last else found.end

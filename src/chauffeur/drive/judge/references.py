@@ -25,7 +25,7 @@ _MEANS: Final[dict[ReferenceKind, frozenset[AgentKind]]] = {
 }  # fmt: skip
 ROAD_USERS: Final = frozenset(_MEANS)
 """Words for what drives, walks or stands on the road."""
-WAYSIDE: Final[frozenset[ReferenceKind]] = frozenset({"junction", "light", "stop_sign"})
+WAYSIDE: Final[frozenset[ReferenceKind]] = frozenset({"junction", "light", "stop_sign", "crosswalk", "end_of_road"})
 """What a junction is known by."""
 _PLURALS: Final = ("vehicles", "pedestrians", "traffic")
 _ALIKE: Final = {"silver": "grey", "grey": "silver"}

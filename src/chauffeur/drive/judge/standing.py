@@ -12,8 +12,10 @@ from chauffeur.drive.judge.trace import HELD_S, ON_PATH_M, STANDS_MPS, Drive, Fo
 
 _BEHIND_M: Final = 10.0
 _BESIDE_M: Final = 5.0
-_ASIDE_M: Final = 5.5
+_ASIDE_M: Final = 7.5
+"""As far as across the other lane of a street: who stops "by him on the left" stops there."""
 _NEAR_M: Final = 12.0
+_BLOCK_M: Final = 40.0
 ON_M: Final = 10.0
 """So far a car has driven that drives on."""
 
@@ -32,13 +34,14 @@ def stop(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
         if not stands:
             return Found("not_done", start, "the car did not come to a stand")
         return Found("not_judged", stood, "no predicate knows this place")
-    shoulder = act.act == "pull_over" and any(lane.emergency for lane in drive.road.lanes)
+    shoulder = act.act == "pull_over" and drive.road.uninterrupted and any(lane.emergency for lane in drive.road.lanes)
     for i, j in stands:
         lane = drive.road.get(drive.all[j].ego.lane)
         if shoulder:
             fits = lane is not None and lane.emergency
         elif users is None and reference is not None and reference.kind != "me_here":
-            fits = drive.before_junction(i)
+            beyond = relation in ("after", "behind") and reference.kind != "end_of_road"
+            fits = _just_behind_junction(drive, start, i) if beyond else drive.before_junction(i)
         else:
             fits = users is None or any(_stands_by(drive, i, number, relation) for number in users)
         if fits:
@@ -47,6 +50,15 @@ def stop(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
     if stands:
         return Found("not_done", stands[-1][1], "the car stood elsewhere")
     return Found("not_done", start, "the car did not come to a stand")
+
+
+def _just_behind_junction(drive: Drive, start: int, i: int) -> bool:
+    """Whether the car stands behind a junction that it has driven through since an act began, and in the same block."""
+    last = next((one for one in reversed(drive.passages) if start <= one.enters and one.leaves <= i), None)
+    if last is None:
+        return False
+    ego, then = drive.all[i].ego, drive.all[last.leaves].ego
+    return math.hypot(ego.x_m - then.x_m, ego.y_m - then.y_m) < _BLOCK_M
 
 
 def _told(drive: Drive, i: int, j: int) -> bool:

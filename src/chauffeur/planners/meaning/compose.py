@@ -10,8 +10,8 @@ from typing import Final
 from chauffeur.concept import Limits, Observation, Situation, VehicleState
 from chauffeur.concept.sight import AT_KERB_M, states_of
 from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH
-from chauffeur.concept.utterance import Act, ActPlace, Condition, Reference, ReferenceKind, Utterance, Verb
-from chauffeur.language.ground import PLURALS, Grounded, Target, ground
+from chauffeur.concept.utterance import Act, ActPlace, Condition, Reference, ReferenceKind, Side, Utterance, Verb
+from chauffeur.language.ground import PLURALS, Grounded, Target, ground, spoken_of
 from chauffeur.language.meaning.words import act_words, reference_words
 from chauffeur.planners.meaning.helpers import helpers_used
 
@@ -22,9 +22,18 @@ _SLOWER: Final = 0.6
 _LEAST_MPS: Final = 2.0
 _LOOKING_MPS, _LOOKS_FROM_M = 7.0, 18.0
 """Behind a junction what is to be found there is looked for from so far on, at no more than this speed."""
+_CHANGES_FROM_M: Final = 6.0
+"""From where a junction begins to where a lane change is first tried, which waits for the lane: blocks are short."""
+_STOPS_FROM_M: Final = 48.0
+"""From where a junction begins to where one stands behind it."""
 _LAST_STEPS: Final = 1200
 _STOOD_STEPS: Final = 60
+_FOLLOWED_STEPS: Final = 900
+"""What is told after following begins so much later."""
+_WAITED_STEPS: Final = 100
+_STEPS_A_S: Final = 20
 _MOST_USERS: Final = 6
+_MOST_JUNCTIONS: Final = 8
 _WIDTH_M: Final = 1.9
 """A road user that stands nearer to the middle of our way than this is in it."""
 _WAYS: Final = {"left": "to the left", "right": "to the right", "straight": "straight on"}
@@ -109,6 +118,10 @@ class _Composer:
         self._moved_on = False
         """Whether an act before leads to where other things are in sight."""
         self._turned = False
+        self._changed: Side | None = None
+        """The side to which lanes were changed last."""
+        self._looked_for: Reference | None = None
+        """What the program looks for behind a turn, and calls `who`."""
         self._last = False
         self._next: Act | None = None
 
@@ -169,7 +182,7 @@ class _Composer:
         doing: dict[Verb, Callable[[Act], Iterator[str]]] = {
             "follow": self._follow, "pass": self._pass, "avoid": self._pass, "yield": self._yield, "stop": self._stop,
             "park": self._stop, "pull_over": self._stop, "go": self._go, "turn": self._turn,
-            "straight": self._turn, "lane": self._lane, "keep": self._go, "speed": self._speed, "gap": self._gap,
+            "straight": self._turn, "lane": self._lane, "keep": self._keep, "speed": self._speed, "gap": self._gap,
         }  # fmt: skip
         yield from doing[act.act](act)
         if act.act != "speed":
@@ -201,7 +214,7 @@ class _Composer:
             raise _UndoableError("I do not know whom to follow")
         for line, name in who:
             yield from line
-            steps = _LAST_STEPS * 6 if self._last else _LAST_STEPS // 2
+            steps = _LAST_STEPS * 6 if self._last else _FOLLOWED_STEPS
             if act.when is not None and act.when.type == "until":
                 raise _UndoableError("I cannot tell beforehand when to stop following")
             yield f"yield from keep_behind({name}, {steps})"
@@ -234,9 +247,15 @@ class _Composer:
 
     def _wait(self, act: Act) -> Iterator[str]:
         when = act.when
+        if act.unit == "s" and act.value is not None:
+            yield f"yield from halt({round(act.value * _STEPS_A_S)})"
+            return
         if when is None:
             if act.target is not None:
                 yield from self._yield(act)
+                return
+            if not self._last:
+                yield f"yield from halt({_WAITED_STEPS})"
                 return
             yield 'say("I wait here. Tell me when to go on.")'
             yield f"yield from halt({_LAST_STEPS * 5})"
@@ -261,7 +280,11 @@ class _Composer:
             return
         if reference.kind in ("light", "stop_sign", "junction", "crosswalk", "end_of_road"):
             self._grounded(reference, act)
-            yield f"yield from stand_before_junction({self._pace:g})"
+            if relation in ("after", "behind") and reference.kind != "end_of_road":
+                yield f"yield from cross_the_junction({self._pace:g}, {_STOPS_FROM_M:g})"
+                yield f"yield from halt({2 * _STOOD_STEPS})"
+            else:
+                yield f"yield from stand_before_junction({self._pace:g})"
         elif reference.kind in _ROAD_USERS:
             for lines, name in self._user(reference, act):
                 yield from lines
@@ -308,13 +331,17 @@ class _Composer:
         elif reference is not None and reference.kind in _ROAD_USERS and act.place is not None:
             yield from self._past(act.place, reference, act)
         turns = self._situation.turns
-        if nth == 1 and not self._moved_on and side not in turns:
+        ends = reference is not None and reference.kind == "end_of_road"
+        if nth == 1 and not ends and not self._moved_on and side not in turns:
             ways = " or ".join(_WAYS[turn] for turn in turns)
             raise _UndoableError(
                 f"no way leads {_WAYS[side]} at the next junction, only {ways}"
                 if ways
                 else "there is no junction ahead"
             )
+        if ends:
+            yield f"yield from to_the_end({self._pace:g})"
+            self._moved_on = True
         if nth > 1:
             yield f'yield from pass_ways("{side}", {nth - 1}, {self._pace:g})'
         on = self._next is not None and self._next.act == "turn"  # along the road, up to where it turns
@@ -335,7 +362,10 @@ class _Composer:
         yield f"{'go_straight' if side == 'straight' else f'turn_{side}'}_at_next_intersection()"
         looks = self._next is not None and any(one.kind in _ROAD_USERS for one in references_of(self._next))
         pace = min(self._pace, _LOOKING_MPS) if looks else self._pace
-        yield f"yield from cross_the_junction({pace:g}{f', {_LOOKS_FROM_M:g}' if looks else ''})"
+        beyond = (
+            _LOOKS_FROM_M if looks else _CHANGES_FROM_M if self._next is not None and self._next.act == "lane" else 0.0
+        )
+        yield f"yield from cross_the_junction({pace:g}{f', {beyond:g}' if beyond else ''})"
 
     def _is_told_before_junction(self, act: Act | None) -> bool:
         """Whether an act is done by a road user that is seen before the next junction."""
@@ -355,25 +385,35 @@ class _Composer:
 
     def _lane(self, act: Act) -> Iterator[str]:
         index, count = self._situation.lane_index, self._situation.lane_count
-        side, times = act.side, 1
-        if act.to == "leftmost":
-            side, times = "left", index
-        elif act.to == "rightmost":
-            side, times = "right", count - 1 - index
+        side = act.side
+        if act.to in ("leftmost", "rightmost"):
+            side = "left" if act.to == "leftmost" else "right"
+        elif act.to == "original" and self._changed is not None:
+            side = "right" if self._changed == "left" else "left"
         elif act.to is not None:
-            raise _UndoableError(f"I do not know the {act.to} lane here")
-        if side is None:
-            raise _UndoableError("I do not know which lane")
-        there = index + (-1 if side == "left" else 1) * max(times, 1)
-        if not self._moved_on and times and not 0 <= there < count:
+            raise _UndoableError(f"I do not know the {act.to.replace('_', ' ')} lane here")
+        elif side is None:
+            side = "left" if index > 0 else "right"
+        there = index + (-1 if side == "left" else 1)
+        if not self._moved_on and act.to is None and not 0 <= there < count:
             raise _UndoableError(f"there is no lane to the {side} of ours")
         if act.place is not None and act.place.ref is not None and act.place.ref.kind in _ROAD_USERS:
             for lines, name in self._user(act.place.ref, act):
                 if act.place.rel in ("after", "in_front_of"):
                     yield from lines
                     yield f"yield from until_passed({name}, {self._pace:g})"
-        for _ in range(times):
-            yield f"yield from over_{side}({self._pace:g})"
+        self._changed = side
+        yield f"yield from {'outermost' if act.to in ('leftmost', 'rightmost') else 'over'}_{side}({self._pace:g})"
+
+    def _keep(self, act: Act) -> Iterator[str]:
+        side = {"leftmost": "left", "rightmost": "right"}.get(act.to or "", act.side)
+        if act.to not in (None, "leftmost", "rightmost"):
+            raise _UndoableError(f"I do not know the {act.to} lane here")
+        index, count = self._situation.lane_index, self._situation.lane_count
+        there = index == 0 if side == "left" else index == count - 1
+        if side is not None and (self._moved_on or not there):
+            yield f"yield from outermost_{side}({self._pace:g})"
+        yield from self._go(act)
 
     def _speed(self, act: Act) -> Iterator[str]:
         limit = self._limit_mps
@@ -412,6 +452,12 @@ class _Composer:
         if when.event in _EVENTS:
             raise _UndoableError(_EVENTS[when.event])
         pace = f"{self._pace:g}"
+        if when.event == "time":
+            if when.value is None or when.unit not in ("", "s"):
+                raise _UndoableError("I do not know how long that is")
+            steps = round(when.value * _STEPS_A_S)
+            yield f"yield from halt({steps})" if act.act == "wait" else f"yield from drive_on({steps}, {pace})"
+            return
         if when.event == "green":
             if not self._light_ahead:
                 raise _UndoableError("I see no traffic light ahead")
@@ -423,11 +469,12 @@ class _Composer:
                 return
             if when.event in ("near", "passed") and when.ref is not None and when.ref.kind in ("junction", "light"):
                 self._grounded(when.ref, act)
-                yield (
-                    f"yield from cross_the_junction({pace})"
-                    if when.event == "passed"
-                    else (f"yield from stand_before_junction({pace})")
-                )
+                if when.event == "near":
+                    yield f"yield from stand_before_junction({pace})"
+                    return
+                for _ in range(min(max(1, when.ref.ordinal or 1), _MOST_JUNCTIONS)):
+                    yield f"yield from cross_the_junction({pace})"
+                self._moved_on = True
                 return
             raise _UndoableError("I do not know what that waits for")
         if when.event in ("gone", "clear") and when.ref.kind in PLURALS and not ground(when.ref, self._seen).fits:
@@ -447,6 +494,9 @@ class _Composer:
 
     def _grounded(self, reference: Reference, act: Act) -> Grounded:
         found = self._referents.get(reference)
+        before = spoken_of(reference, self._referents) if reference.kind in _ROAD_USERS else None
+        if found is None and before is not None:
+            found = self._referents[reference] = self._referents[before]
         if found is None:
             found = ground(reference, self._seen, act.act)
             if found.question and self._moved_on:
@@ -467,13 +517,18 @@ class _Composer:
         here = found.targets
         if self._turned and act.act != "follow":  # what is told after a turn is on the street that it leads into
             here = tuple(one for one in here if not self._before_junction(one))
-        targets = [one for one in here if self._matters(one, reference)][:_MOST_USERS]
+        passed = act.act in ("pass", "avoid") or (act.when is not None and act.when.event == "passed")
+        targets = [one for one in here if self._matters(one, reference, parked=passed)][:_MOST_USERS]
         if targets:
             for one in targets:
                 yield [], f"agent({one.agent})"
             return
         if here:
             return
+        if self._looked_for is not None and spoken_of(reference, (self._looked_for,)) is not None:
+            yield [], "who"
+            return
+        self._looked_for = reference
         self._referents[reference] = replace(found, targets=())
         kind = {"vehicles": "vehicle", "traffic": "vehicle", "pedestrians": "pedestrian"}.get(
             reference.kind, reference.kind
@@ -487,12 +542,13 @@ class _Composer:
         ahead = ground(Reference("junction"), self._seen).fits
         return target.kind == "agent" and bool(ahead) and target.forward_m < ahead[0].forward_m
 
-    def _matters(self, target: Target, reference: Reference) -> bool:
-        """Of a plural: whether this one is ahead and may come in the way."""
+    def _matters(self, target: Target, reference: Reference, *, parked: bool) -> bool:
+        """Of a plural: whether this one is ahead and may come in the way; parked ones too where they are passed."""
         if reference.kind not in PLURALS:
             return True
         agent = next((one for one in self._seen.others if one.id == target.agent), None)
-        return agent is not None and target.forward_m > 0.0 and "parked" not in states_of(agent, self._seen)
+        stays = agent is not None and "parked" in states_of(agent, self._seen)
+        return agent is not None and target.forward_m > 0.0 and (parked or not stays)
 
     def _agent(self, reference: Reference) -> VehicleState | None:
         targets = self._referents.get(reference)

@@ -19,6 +19,17 @@ _OVER: Final = """def over_SIDE(pace):
         yield proceed(min(check_speed_limit(), pace))
     yield from drive_on(20, pace)
 """
+_OUTERMOST: Final = """def outermost_SIDE(pace):
+    for _ in range(100):
+        if get_SIDE_lane(get_ego_vehicle()) is not None:
+            break
+        yield proceed(min(check_speed_limit(), pace))
+    for _ in range(6):
+        if get_SIDE_lane(get_ego_vehicle()) is None:
+            break
+        yield from over_SIDE(pace)
+    yield from drive_on(20, pace)
+"""
 _STAND: Final = """def stand_WHERE(who):
     stood = 0
     for _ in range(2400):
@@ -101,6 +112,8 @@ HELPERS: Final[dict[str, str]] = {
 """,
     "over_left": _OVER.replace("SIDE", "left"),
     "over_right": _OVER.replace("SIDE", "right"),
+    "outermost_left": _OUTERMOST.replace("SIDE", "left"),
+    "outermost_right": _OUTERMOST.replace("SIDE", "right"),
     "until_clear": """def until_clear(pace):
     for _ in range(40):
         yield proceed(min(check_speed_limit(), pace))
@@ -152,6 +165,12 @@ HELPERS: Final[dict[str, str]] = {
         if gone > beyond:
             break
         yield proceed(min(check_speed_limit(), pace))
+""",
+    "to_the_end": """def to_the_end(pace):
+    for _ in range(8):
+        if not can_go("straight"):
+            break
+        yield from cross_the_junction(pace)
 """,
     "pass_ways": """def pass_ways(side, count, pace):
     for _ in range(8):
