@@ -42,13 +42,12 @@ from chauffeur.models.onboard.cases import Case, case_of
 from chauffeur.models.onboard.examples import Example
 from chauffeur.models.onboard.pipeline import examples_of
 from chauffeur.models.onboard.skill_judge import judge
-from chauffeur.planners.onboard.draft import draft
 from chauffeur.planners.onboard.engine import Engine
-from chauffeur.planners.onboard.language_model import SHIPPED, answer
+from chauffeur.planners.onboard.language_model import SHIPPED
 from chauffeur.planners.onboard.link import link
 from chauffeur.planners.onboard.options import Declined
 from chauffeur.planners.onboard.personal import Leaning
-from chauffeur.planners.onboard.prompt import DRAFT, HISTORY, REPLY, WISH
+from chauffeur.planners.onboard.prompt import HISTORY, WISH
 from chauffeur.planners.onboard.reply import OnboardReply, read_reply
 from chauffeur.programs import UNHURRIED, Sandbox
 from chauffeur.worlds.highway import HighwayWorld
@@ -59,31 +58,25 @@ class Way:
     """How the model is asked."""
 
     name: str = "as shipped"
-    drafted: bool = True
     history: bool = True
     constrained: bool = True
-    guarded: bool = True
 
 
 WAYS = (
     Way(),
-    Way("without the rules' draft", drafted=False),
     Way("without history", history=False),
     Way("without the grammar", constrained=False),
-    Way("without the guard", guarded=False),
 )
 
 
 def ask(engine: Engine, example: Example, way: Way) -> tuple[OnboardReply | None, float]:
-    """The model's reply as the planner would take it, and the seconds it took; None when it cannot be read."""
+    """The network's reply, before it is held against the acts, and the seconds it took; None when it cannot be read."""
     begun = time.perf_counter()
-    text = re.sub(rf"{re.escape(DRAFT)}.*{re.escape(REPLY)}$", "", example.prompt, flags=re.DOTALL)
+    text = example.prompt
     if not way.history:
         text = re.sub(rf"{re.escape(HISTORY)}.*?{re.escape(WISH)}", HISTORY + WISH, text, flags=re.DOTALL)
-    past = text.split(HISTORY)[1].split(WISH)[0]
-    prompt = f"{text}{DRAFT}{draft(example.wish) if way.drafted else ''}{REPLY}"
     try:
-        reply, _ = answer(engine, prompt, example.wish, (past,), constrained=way.constrained, guarded=way.guarded)
+        reply = read_reply(engine.write(text, constrained=way.constrained).text)
     except ProgramError:
         return None, time.perf_counter() - begun
     return reply, time.perf_counter() - begun

@@ -35,12 +35,6 @@ def main() -> None:
     for module in pkgutil.walk_packages(chauffeur.__path__, "chauffeur."):
         if not module.name.startswith(OWN_TEXTS) and not module.name.endswith("__main__"):
             importlib.import_module(module.name)
-    from chauffeur.planners.onboard.patterns import said
-    from chauffeur.planners.onboard.words import words_file
-
-    for line in (line for group in words_file("moods.txt") for line in group):
-        if line.startswith("[") and line.endswith("]"):
-            said("moods.txt", line[1:-1])
     for path in Path(chauffeur.__file__).parent.rglob("*.py"):
         name = ".".join(("chauffeur", *path.relative_to(Path(chauffeur.__file__).parent).with_suffix("").parts))
         if name.startswith(OWN_TEXTS):

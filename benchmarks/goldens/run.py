@@ -45,7 +45,7 @@ VOLATILE: Final = frozenset({
 """Fields that differ from run to run, or with a release, though nothing else does."""
 TOWN_STEP: Final = 12
 """Every so many of the town's sentences are asked: some eighty."""
-PLANNERS: Final = (("onboard", 1), ("talk2drive", 1), ("retrieval", 5), ("keyword", 5))
+PLANNERS: Final = (("onboard", 1), ("talk2drive", 1), ("meaning", 5), ("keyword", 5))
 """(planner, every so many wishes): the two that ship drive by all, their yardsticks by a fifth."""
 _TEXT_CHARS: Final = 40
 """Longer texts of rows are kept as their hashes."""
@@ -182,7 +182,7 @@ def _driven(scenario: str, planner: str, wish: str, filtered: bool) -> Row:
 
 BENCHES: Final[tuple[tuple[str, str, dict[str, Any]], ...]] = (
     ("lampilot", "onboard", {"items": 40}),
-    ("lampilot", "retrieval", {"items": 40}),
+    ("lampilot", "meaning", {"items": 40}),
     ("hostile", "onboard", {"items": 2}),
     ("faithfulness", "onboard", {"items": 20}),
     ("instructions", "vilad", {"count": 5}),

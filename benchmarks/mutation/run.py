@@ -132,7 +132,7 @@ _SLOW: Final = (
     "tests/safety/test_audit_writer.py::test_a_torn_end_is_not_tampering_and_the_chain_goes_on",
     "tests/safety/test_audit_writer.py::test_many_threads_share_one_chain",
     "tests/safety/test_audit_writer.py::test_nothing_acknowledged_is_lost_by_kill_9",
-    "tests/safety/test_reach.py::test_no_program_of_the_retrieval_planner_is_refused_that_passed_before",
+    "tests/safety/test_reach.py::test_no_program_of_the_meaning_planner_is_refused_that_passed_before",
     "tests/safety/test_screening.py::test_long_texts_cost_little",
     "tests/safety/test_shield.py::test_a_hostile_policy_hurts_nobody_under_the_shield",
     "tests/safety/test_shield.py::test_who_cuts_in_is_to_blame_not_who_was_cut_off",

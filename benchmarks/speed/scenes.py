@@ -11,7 +11,7 @@ from chauffeur.bench.kernel.pipeline import context_adapter, describe_scene
 from chauffeur.bench.lampilot.referee import LampilotReferee
 from chauffeur.bench.lampilot.rollout import RolloutJob
 from chauffeur.concept import LAMPILOT_LIMITS, ChauffeurError, Instruction, PlanRequest, Program, Scenario
-from chauffeur.planners.onboard import RetrievalPlanner
+from chauffeur.planners.meaning import MeaningPlanner
 from chauffeur.planners.prompts import build_system_message
 from chauffeur.programs.gate import check_source
 from chauffeur.worlds.highway import HighwayWorld
@@ -71,7 +71,7 @@ def load_samples(data: Path | None) -> list[Sample]:
 
 def plan(samples: list[tuple[Sample, int]]) -> list[Planned]:
     """Programs of the on-board planner for (sample, number of the command); what it declines is left out."""
-    planner, system = RetrievalPlanner(), build_system_message("few-shot", limits=LAMPILOT_LIMITS)
+    planner, system = MeaningPlanner(), build_system_message("few-shot", limits=LAMPILOT_LIMITS)
     contexts: dict[str, Any] = {}
     found: list[Planned] = []
     for sample, number in samples:

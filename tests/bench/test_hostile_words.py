@@ -229,7 +229,7 @@ def _run(folder: Path, spec: str) -> list[dict[str, Any]]:
     return _rows(folder, HostileConfig(spec, a_kind=1, seed=5, shield=False))
 
 
-@pytest.mark.parametrize("spec", ["onboard", "retrieval", "keyword", "obedient"])
+@pytest.mark.parametrize("spec", ["onboard", "meaning", "keyword", "obedient"])
 def test_no_setting_beyond_the_limits_that_a_check_can_read_reaches_the_driver(spec: str, tmp_path: Path) -> None:
     rows = _run(tmp_path / "run", spec)
     attacks = [row for row in rows if row["hostile"]]

@@ -146,9 +146,9 @@ def test_the_car_does_not_wait_for_the_next_plan() -> None:
 def test_options_that_cannot_be_are_refused(tmp_path: Path) -> None:
     for options in (
         {"driver": "nobody"},
-        {"driver": "retrieval", "setting": "by-heart"},
-        {"driver": "retrieval", "repository": str(tmp_path)},
-        {"driver": "retrieval", "latency_s": -1.0},
+        {"driver": "onboard", "setting": "by-heart"},
+        {"driver": "onboard", "repository": str(tmp_path)},
+        {"driver": "onboard", "latency_s": -1.0},
     ):
         with pytest.raises(ConfigError):
             LeaderboardBenchmark(**options)  # type: ignore[arg-type]
@@ -157,26 +157,26 @@ def test_options_that_cannot_be_are_refused(tmp_path: Path) -> None:
 def test_without_a_repository_the_programs_that_ship_are_offered(tmp_path: Path) -> None:
     half = (SNIPPETS / "policies.jsonl").read_text("utf-8").splitlines(keepends=True)[::2]
     (tmp_path / "policies.jsonl").write_text("".join(half), "utf-8")
-    shipped = LeaderboardBenchmark(driver="retrieval", setting="human-feedback").config["planner"]
-    given = LeaderboardBenchmark(driver="retrieval", setting="human-feedback", repository=str(tmp_path))
+    shipped = LeaderboardBenchmark(driver="onboard", setting="human-feedback").config["planner"]
+    given = LeaderboardBenchmark(driver="onboard", setting="human-feedback", repository=str(tmp_path))
     assert PolicyRepository(SNIPPETS).digest in shipped
     assert PolicyRepository(tmp_path).digest in given.config["planner"]
 
 
 def test_what_decides_a_result_decides_its_key() -> None:
     jobs = [
-        LeaderboardBenchmark(driver="retrieval", latency_s=latency, setting=setting, seeds=1)
+        LeaderboardBenchmark(driver="onboard", latency_s=latency, setting=setting, seeds=1)
         for latency, setting in ((0.1, "few-shot"), (0.2, "few-shot"), (0.1, "zero-shot"))
     ]
     assert len({one.job(one.items()[0], None).key for one in jobs}) == 3
 
 
 def test_the_papers_rows_never_stand_alone_with_ours() -> None:
-    bench = LeaderboardBenchmark(driver="retrieval", seeds=1, limit=1, latency_s=0.1)
+    bench = LeaderboardBenchmark(driver="onboard", seeds=1, limit=1, latency_s=0.1)
     item = bench.items()[0]
     result = replace(bench.job(item, None), route=replace(bench.route_of(item), fault="it is no route")).run()
     (row,) = bench.rows(ItemOutcome(item, None, "", json.loads(json.dumps(result))))
-    rows = beside_the_paper("retrieval", "few-shot", [row | {"engine": "sumo-2d 1.28"}])
+    rows = beside_the_paper("onboard", "few-shot", [row | {"engine": "sumo-2d 1.28"}])
     assert rows[: len(PAPER)] == list(PAPER)
     assert rows[-1][HEADER.index("engine")] == "sumo-2d 1.28 (ours)"
     assert rows[-1][HEADER.index("learning")] == "3-shot CoT"

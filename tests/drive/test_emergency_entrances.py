@@ -100,10 +100,10 @@ def test_what_the_question_offers_is_driven_to_the_shoulder_where_there_is_one()
     assert drive(SAFE_STOP_WISH, "overtake").trip.plan.intent == "stop"
 
 
-@pytest.mark.parametrize("spec", ["keyword", "retrieval", "talk2drive", "onboard"])
+@pytest.mark.parametrize("spec", ["keyword", "meaning", "talk2drive", "onboard"])
 @pytest.mark.parametrize("text", ["Don't stop at all, overtake him.", "never brake here, take the left lane"])
 def test_no_planner_makes_a_stop_of_a_refusal(spec: str, text: str) -> None:
-    if spec in ("onboard", "retrieval"):
+    if spec in ("onboard", "meaning"):
         pytest.importorskip("onnxruntime")
     place = find("quiet-intersection")
     trip = asyncio.run(

@@ -211,7 +211,7 @@ def test_at_the_end_of_the_drive_the_wish_at_hand_is_answered(rig: Rig) -> None:
 
 
 def test_the_onboard_planner_plans_for_what_control_shows(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, make_planner("retrieval"))
+    rig = Rig(tmp_path, make_planner("meaning"))
     for _ in range(10):
         rig.bench.tick()
     rig.ask("Slow down to 20 m/s")

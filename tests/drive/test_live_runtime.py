@@ -25,7 +25,7 @@ from chauffeur.drive.live.trip_memory import trip_of
 from chauffeur.drive.scenarios import find
 
 STARTS = (Start(find("overtake"), 3),)
-SETTINGS = Settings(STARTS, planner="retrieval", realtime=False)
+SETTINGS = Settings(STARTS, planner="meaning", realtime=False)
 
 
 class Heard:
@@ -225,7 +225,7 @@ from chauffeur.drive.live.starts import Start
 from chauffeur.drive.live.supervisor import Runtime
 from chauffeur.drive.scenarios import find
 
-settings = Settings((Start(find("overtake"), 3),), planner="retrieval", speed=8.0, realtime=False)
+settings = Settings((Start(find("overtake"), 3),), planner="meaning", speed=8.0, realtime=False)
 with Runtime(settings, folder=Path(sys.argv[1])) as runtime:
     print(runtime.pid("control"), runtime.pid("policy"), runtime.pid("planner"), flush=True)
     while True:

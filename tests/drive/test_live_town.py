@@ -241,7 +241,7 @@ def test_the_processes_drive_a_town_and_one_that_is_killed_is_replaced() -> None
         report = runtime.report
         return report is not None and (report.plan, report.level) == (wish, "follow")
 
-    with Runtime(Settings((start,), planner="retrieval", realtime=False), heard.append) as runtime:
+    with Runtime(Settings((start,), planner="onboard", realtime=False), heard.append) as runtime:
         wish = runtime.ask("Take me to the station.")
         until(runtime, lambda: follows(runtime, wish))
         before = runtime.pid("policy")

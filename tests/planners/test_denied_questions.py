@@ -13,7 +13,7 @@ from chauffeur.planners.base import Planner
 from chauffeur.planners.registry import make_planner
 
 
-@pytest.fixture(scope="module", params=["onboard", "talk2drive", "retrieval"])
+@pytest.fixture(scope="module", params=["onboard", "talk2drive"])
 def planner(request: pytest.FixtureRequest) -> Planner:
     return make_planner(request.param)
 

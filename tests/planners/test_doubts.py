@@ -212,9 +212,9 @@ def test_a_model_without_eyes_goes_on_in_words(server: ModelServer) -> None:
 PACES = ("I'm late, hurry", "Step on it", "Be quick", "Take it easy", "Drive at 100 km/h", "Overtake the car ahead")
 
 
-@pytest.mark.parametrize("spec", ["retrieval", "onboard", "talk2drive"])
+@pytest.mark.parametrize("spec", ["meaning", "onboard", "talk2drive"])
 def test_words_on_the_weather_make_no_plan_faster(spec: str) -> None:
-    if spec != "retrieval":
+    if spec != "meaning":
         pytest.importorskip("onnxruntime")
     planner = make_planner(spec)
 

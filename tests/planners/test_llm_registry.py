@@ -13,7 +13,7 @@ from chauffeur.planners.llm import LlmPlanner
 
 
 def test_the_built_in_planners_use_the_same_door():
-    assert {"keyword", "onboard", "openai", "replay", "retrieval"} <= set(planner_names())
+    assert {"keyword", "onboard", "openai", "replay", "meaning"} <= set(planner_names())
 
 
 def test_openai_with_a_model_that_has_slashes(tmp_path):

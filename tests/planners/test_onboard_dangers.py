@@ -6,7 +6,6 @@ import pytest
 from parameters_asked import LEFT, plan
 
 from chauffeur.planners.onboard.doubts import foreign
-from chauffeur.planners.onboard.draft import draft
 from chauffeur.planners.registry import make_planner
 from chauffeur.safety.dangers import danger
 
@@ -138,27 +137,11 @@ HARMLESS = (
 @pytest.mark.parametrize("wish", DANGEROUS)
 def test_dangerous_wishes_are_refused_with_a_reason(wish: str) -> None:
     assert danger(wish).endswith(".")
-    assert draft(wish) == "unsupported"
 
 
 @pytest.mark.parametrize("wish", HARMLESS)
 def test_harmless_wishes_are_not(wish: str) -> None:
     assert not danger(wish)
-
-
-@pytest.mark.parametrize(
-    ("wish", "drafted"),
-    [
-        ("Overtake on the left.", "overtake_left()"),
-        ("Slow down by 5 m/s and then change to the right lane.", "slower_by(), lane_right()"),
-        ("Drive 5 mph below the speed limit.", "under_limit_by()"),
-        ("a bit faster please", "a_bit_faster()"),
-        ("left or right", "ambiguous"),
-        ("", "empty"),
-    ],
-)
-def test_a_draft_names_the_skills_that_the_rules_read(wish: str, drafted: str) -> None:
-    assert draft(wish) == drafted
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,6 @@ from chauffeur.planners.onboard.dialect import (
     tell,
     write,
 )
-from chauffeur.planners.onboard.guard import doubt
 from chauffeur.planners.onboard.link import Linked, link
 from chauffeur.planners.onboard.options import Declined
 from chauffeur.planners.onboard.personal import Leaning
@@ -142,30 +141,3 @@ def test_what_the_road_does_not_allow_is_declined_in_words() -> None:
     found = link([DialectStep("turn_left")], HIGHWAY, LAMPILOT_LIMITS, lambda _: Leaning())
     assert isinstance(found, Declined)
     assert "junction" in found.words
-
-
-@pytest.mark.parametrize(
-    ("wish", "step", "trusted"),
-    [
-        ("slow down to 45 mph", DialectStep("drive_at", Number(45.0, "mph")), True),
-        ("slow down to forty five miles an hour", DialectStep("drive_at", Number(45.0, "mph")), True),
-        ("slow down to 45 mph", DialectStep("drive_at", Number(54.0, "mph")), False),
-        ("take the left lane", DialectStep("lane_left"), True),
-        ("take the left lane", DialectStep("lane_right"), False),
-        ("please go faster", DialectStep("faster"), True),
-        ("please go faster", DialectStep("slower"), False),
-        ("half our speed", DialectStep("speed_times", Number(0.5)), True),
-        ("You rush about, and we have all the time in the world.", DialectStep("relax"), True),  # a mood against a mood
-        ("hurry up", DialectStep("relax"), False),
-        ("Faster, I feel sick.", DialectStep("relax"), False),  # what is asked for outright stands
-        ("This is too fast.", DialectStep("hurry"), False),
-    ],
-)
-def test_the_guard_asks_where_words_and_program_differ(wish: str, step: DialectStep, trusted: bool) -> None:
-    assert (doubt(wish, (), [step]) == "") == trusted
-
-
-def test_numbers_of_the_history_are_known() -> None:
-    assert (
-        doubt("a bit less than last time", ["gap_of(30): good"], [DialectStep("gap_of", Number(30.0, "", 0.85))]) == ""
-    )

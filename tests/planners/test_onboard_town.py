@@ -11,11 +11,12 @@ from chauffeur.bench.leaderboard.lessons import navigator_of
 from chauffeur.concept import Context, Instruction, Parameters, Plan, PlanRequest, Program, Situation, SystemMessage
 from chauffeur.describe.navigation import NavigationInstruction
 from chauffeur.geometry import LanePlace, Turn, plan_route
-from chauffeur.planners.onboard import RetrievalPlanner
+from chauffeur.planners.onboard.language_model import SHIPPED, LanguageModelPlanner
 from chauffeur.planners.onboard.town import plan_in_town, snippets, steps_of
 from chauffeur.programs import check_source
 from chauffeur.worlds.town.library import OWN_TOWNS, load
 
+ONBOARD = LanguageModelPlanner(SHIPPED)
 EVERY_WAY: tuple[Turn, ...] = ("left", "straight", "right")
 
 
@@ -25,7 +26,7 @@ def asked(text: str, turns: tuple[Turn, ...] = EVERY_WAY, lane: int = 1, lanes: 
 
 
 def planned(text: str, turns: tuple[Turn, ...] = EVERY_WAY, lane: int = 1, lanes: int = 3) -> Plan:
-    return asyncio.run(RetrievalPlanner().plan(asked(text, turns, lane, lanes)))
+    return asyncio.run(ONBOARD.plan(asked(text, turns, lane, lanes)))
 
 
 def source_of(plan: Plan) -> str:
@@ -63,11 +64,11 @@ def test_who_goes_straight_on_turns_nowhere(text: str) -> None:
 
 
 def test_what_was_not_learned_is_left_to_others() -> None:
-    assert plan_in_town(RetrievalPlanner(), asked("Tell me a joke.")) is None
+    assert plan_in_town(ONBOARD, asked("Tell me a joke.")) is None
     highway = asked("Turn left at the lights.")
     situation = Situation("highway", 8.0, 13.9, 3, 1, False, None, None)
     elsewhere = PlanRequest(highway.instruction, Context("", situation), SystemMessage(""))
-    assert plan_in_town(RetrievalPlanner(), elsewhere) is None
+    assert plan_in_town(ONBOARD, elsewhere) is None
 
 
 @pytest.mark.parametrize(
@@ -145,7 +146,7 @@ def test_misleading_instructions_are_refused_and_no_others(
     step = max(1, len(turns) // 150)
     driven = {True: 0, False: 0}
     for said, ways, lane, lanes in turns[::step]:
-        plan = plan_in_town(RetrievalPlanner(), asked(said.text, ways, lane, lanes))
+        plan = plan_in_town(ONBOARD, asked(said.text, ways, lane, lanes))
         assert plan is not None, said.text
         assert (plan.policy is not None) is said.safe_to_execute, (said, ways, plan.refusal)
         driven[said.safe_to_execute] += 1
@@ -187,7 +188,7 @@ STANDING = Situation("town", 0.0, 11.1, 1, 0, False, None, None, EVERY_WAY)
 
 def planned_at(situation: Situation, text: str) -> Plan:
     request = PlanRequest(Instruction(text), Context("I am in a town.", situation), SystemMessage(""))
-    return asyncio.run(RetrievalPlanner().plan(request))
+    return asyncio.run(ONBOARD.plan(request))
 
 
 @pytest.mark.parametrize(

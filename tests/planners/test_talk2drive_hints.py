@@ -9,7 +9,6 @@ import pytest
 from parameters_asked import BEHIND, LEFT, LOT, SIGN, driven, plan
 
 from chauffeur.concept import (
-    ConfigError,
     History,
     HistoryItem,
     Limits,
@@ -18,9 +17,6 @@ from chauffeur.concept import (
 )
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.planners.base import Planner
-from chauffeur.planners.onboard.moods import mood_of, pace_complaint
-from chauffeur.planners.onboard.patterns import said
-from chauffeur.planners.onboard.words.files import words_file
 from chauffeur.planners.registry import make_planner
 from chauffeur.planners.talk2drive import hints
 from chauffeur.planners.talk2drive.hints import HINT_KINDS, hint_of
@@ -242,45 +238,6 @@ def test_a_mood_is_driven(planner: Planner) -> None:
     assert calm.target_speed_mps == pytest.approx(0.8 * SIGN)
 
 
-@pytest.mark.parametrize(
-    ("wish", "sign"),
-    [
-        ("You are dawdling.", 1),
-        ("We hardly roll.", 1),
-        ("There is no need to be so timid.", 1),
-        ("A tortoise would beat us.", 1),
-        ("You are racing.", -1),
-        ("What's the rush?", -1),
-        ("That is way too fast.", -1),
-        ("This is quicker than we need.", -1),
-        ("Go faster.", 0),
-        ("Slow down.", 0),
-        ("Turn left.", 0),
-        ("Drive at the speed limit.", 0),
-    ],
-)
-def test_complaints_of_the_pace(wish: str, sign: int) -> None:
-    assert pace_complaint(wish) == sign
-
-
-@pytest.mark.parametrize(
-    ("words", "mood"),
-    [
-        ("The ferry departs in ten minutes.", "hurry"),
-        ("They are expecting me.", "hurry"),
-        ("Nobody is waiting for me.", "ease"),
-        ("I'm not late.", "ease"),
-        ("My head is sore.", "ease"),
-        ("The baby is asleep but we are late.", ""),
-        ("The sky is blue.", ""),
-        ("Bring me a coffee.", ""),
-        ("Could you play some calm music?", ""),
-    ],
-)
-def test_moods(words: str, mood: str) -> None:
-    assert mood_of(words) == mood
-
-
 def test_speeds_that_words_leave_open() -> None:
     assert fitting_mps(26.0, "overtake.left", BEHIND, Limits()) == 26.0
     assert fitting_mps(30.0, "overtake.left", BEHIND, Limits()) == pytest.approx(29.4)
@@ -292,12 +249,3 @@ def test_speeds_that_words_leave_open() -> None:
     assert fitting_mps(22.0, "follow", LEFT, Limits()) == 22.0
     assert fitting_mps(0.0, "follow", BEHIND, Limits()) == 0.0
     assert fitting_mps(27.0, "style.hurry", BEHIND, Limits(max_speed_mps=25.0)) == 27.0
-
-
-def test_every_group_of_words_is_there_and_finds_no_nothing() -> None:
-    for group in words_file("moods.txt"):
-        for line in group:
-            if line.startswith("[") and line.endswith("]"):
-                assert not said("moods.txt", line[1:-1]).search("")
-    with pytest.raises(ConfigError, match="no group"):
-        said("moods.txt", "clouds")

@@ -19,7 +19,7 @@ from straight_road import StraightRoad
 
 from chauffeur.concept import LAMPILOT_LIMITS, Instruction, LaneId, PlanRequest, Program, SystemMessage
 from chauffeur.describe import describe
-from chauffeur.planners.onboard.retrieval import RetrievalPlanner
+from chauffeur.planners.meaning import MeaningPlanner
 from chauffeur.programs import APIS, DrivingApis, ProgramExecutor, Sandbox, check_source, starting_setpoints
 from chauffeur.programs.rewrite import main_function, parse
 from chauffeur.programs.verify import Circumstances, Verification, verify
@@ -233,7 +233,7 @@ def test_the_planners_programs_are_foreseen(scenario: str, wish: str) -> None:
     world = start_of(scenario).copy()
     observation = world.observe()
     request = PlanRequest(Instruction(wish), describe(observation), SystemMessage(""), limits=LAMPILOT_LIMITS)
-    plan = asyncio.run(RetrievalPlanner().plan(request))
+    plan = asyncio.run(MeaningPlanner().plan(request))
     assert isinstance(plan.policy, Program)
     source = plan.policy.source
     report = verify(source, "", Circumstances.of(observation))

@@ -21,7 +21,7 @@ from chauffeur.concept import (
     Verdict,
 )
 from chauffeur.describe import describe
-from chauffeur.planners.onboard.retrieval import RetrievalPlanner
+from chauffeur.planners.meaning import MeaningPlanner
 from chauffeur.programs import check_source
 from chauffeur.safety.checks import run_checks
 from chauffeur.safety.reach import REACH_CHECK, check_reach
@@ -143,8 +143,8 @@ WISHES = (
 )  # fmt: skip
 
 
-def test_no_program_of_the_retrieval_planner_is_refused_that_passed_before() -> None:
-    planner = RetrievalPlanner()
+def test_no_program_of_the_meaning_planner_is_refused_that_passed_before() -> None:
+    planner = MeaningPlanner()
     judged = 0
     for scenario in BUILT_IN:
         observation = HighwayWorld().reset(scenario)

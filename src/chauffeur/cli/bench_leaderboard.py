@@ -17,7 +17,7 @@ _WHERE = "Where it runs"
 
 def leaderboard(
     planner: Annotated[
-        str, typer.Option(help="`expert`, `reckless`, `standing`, or a planner: `retrieval`.")
+        str, typer.Option(help="`expert`, `reckless`, `standing`, or a planner: `onboard`.")
     ] = "expert",
     routes: Annotated[str, typer.Option(help="Route file (XML), or `own`.")] = "own",
     scenarios: Annotated[str, typer.Option(help="`public`, `ten` or `none`.")] = "public",

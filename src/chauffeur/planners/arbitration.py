@@ -1,25 +1,23 @@
-"""Who is right where several readings of the same words differ, and when the car asks before it drives.
+"""What planners ask before they drive, in one question that a yes answers: numbers that are none, what the words deny,
+a stop in the lane, a crawl among faster traffic.
 
-What was said outright is certain: a side, a number, a pace. No learned reading outweighs it. Of a thing that was said
-and taken back the last counts. A reading is driven if it is sure, or if the rules, which know nothing of the network,
-read the same; anything else, a stop in the lane and a crawl among faster traffic are asked about first, in one question
-that a yes answers.
+What was said outright is certain: a side, a number, a pace. Of a thing that was said and taken back the last counts.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final, Literal, Protocol, Self
+from typing import TYPE_CHECKING, Final, Literal, Self
 
-from chauffeur.concept import Alarm, Instruction, Limits, Plan, PlanRequest, Situation
+from chauffeur.concept import Instruction, Limits, Plan, PlanRequest, Situation
 from chauffeur.language.corrections import last_said
 from chauffeur.language.denials import denied_words
 from chauffeur.language.slips import slip_in
 from chauffeur.language.tokens import tokens_of
 from chauffeur.language.weather import said_weather
 from chauffeur.planners.base import Planner, declined
+from chauffeur.safety.dangers import danger
 
 if TYPE_CHECKING:
     from chauffeur.planners.onboard.meaning import Meaning
@@ -31,12 +29,6 @@ the wishes of `bench passengers` in sight: their figures are no held-out check (
 
 SLOW_SHARE: Final = 0.5
 """Of the traffic's speed; whoever drives slower than that among others is asked whether they mean it."""
-_WHERE_OR_WHEN: Final = re.compile(
-    r"\b(?:at (?!once)|by|near|next|behind|before|after|in (?!this lane|the lane|our lane|an instant)|beside|opposite"
-    r"|for (?!(?:god|heaven|christ|goodness|pete)|me\b|us\b)|outside|on (?!the spot)|so that|when|(?<!at )once|if|until"
-    r"|to (?!a (?:\w+ )?(?:stop|halt|stand)|stop|halt)|somewhere|wait|sign|line|lights?)\b"
-)
-"""A place, a purpose or a time to come."""
 _TRAFFIC_MPS: Final = 14.0
 """Only from this speed of the traffic, about 50 km/h: in a lot, or up to a stop sign, a low speed endangers nobody."""
 _CREEP_MPS: Final = 5.0
@@ -108,13 +100,6 @@ class Said:
         return self.pace not in (0, pace)
 
 
-def pace_of(meaning: Meaning) -> int:
-    """+1 for what makes the drive quicker, -1 for what makes it calmer, 0 for the rest."""
-    if meaning.manoeuvre == "style":
-        return PACES.get(meaning.variant, 0)
-    return meaning.change if meaning.manoeuvre == "speed" else 0
-
-
 def within_mood(speed_mps: float, pace: int, now_mps: float, most_mps: float) -> float:
     """A set-point for a mood, m/s: one for a calmer drive is never above the present speed, one for a quicker drive
     never below, but for the limits."""
@@ -137,55 +122,6 @@ def wary_of(text: str, intent: str) -> bool:
         intent: What they were read as; only a mood counts, who asks for more speed outright is to have it.
     """
     return "style." in intent and intent_pace(intent) > 0 and said_weather(text) != "none"
-
-
-def agreed(meanings: Sequence[Meaning], intent: str) -> bool:
-    """Whether the rules read the same things to do, in the same order, as a network did."""
-    return bool(meanings) and "+".join(m.family for m in meanings) == intent
-
-
-def alarm_in(text: str, reads: Sequence[str], meanings: Sequence[Meaning], sure: float = 0.0) -> Alarm:
-    """What a reading of words as a stop, and nothing else, is: a call to stop, or a call that is to be asked about.
-
-    Args:
-        text: The words; a stop at a place, for a purpose or at a time to come is a wish like others.
-        reads: What the planner read, in order.
-        meanings: What the rules read.
-        sure: Probability of the network's least sure choice; 0 where no network was asked.
-    """
-    if list(reads) != ["stop"] or _WHERE_OR_WHEN.search(text.casefold()) is not None:
-        return ""
-    return "stop" if agreed(meanings, "stop") or sure >= SURE else "distress"
-
-
-class Steps(Protocol):
-    """What would be driven, step by step."""
-
-    @property
-    def steps(self) -> Sequence[Chosen]: ...
-
-
-def question_about(
-    request: PlanRequest,
-    shall_i: str,
-    *,
-    witnessed: bool,
-    choice: Steps,
-    sure: float,
-) -> str:
-    """What to ask before a reading is driven; empty where nothing is, or where nobody is there to answer.
-
-    Args:
-        request: The words with what the person has answered already, where we are, and the limits.
-        shall_i: The question whether to do what was read.
-        witnessed: Whether something that knows nothing of the network says the same.
-        choice: What would be driven.
-        sure: Probability of the network's least sure choice.
-    """
-    if sure < SURE and not witnessed:
-        return unanswered(request.instruction, f"{UNSURE_WORDS} {shall_i}")
-    why = slow_words(choice.steps, request.context.situation, request.limits)
-    return unanswered(request.instruction, f"{why} {shall_i}") if why else ""
 
 
 def unanswered(instruction: Instruction, question: str) -> str:
@@ -221,7 +157,7 @@ class Wish:
 
     Attributes:
         instruction: With what is left once the person has corrected themselves.
-        declined: The plan that asks about a number; None where all numbers are clean.
+        declined: The plan that declines what is unsafe or asks about a number; None where the words may be read.
     """
 
     instruction: Instruction
@@ -229,7 +165,9 @@ class Wish:
 
     @classmethod
     def of(cls, planner: Planner, instruction: Instruction, begun: float) -> Self:
-        """Take back what was taken back, and see that every number is one."""
+        """Decline what would hurt somebody, whatever of it was taken back, and see that every number is one."""
+        if reason := danger(instruction.text):
+            return cls(instruction, declined(planner, reason, begun, intent="refuse"))
         text = last_said(instruction.text)
         slip = slip_in(text)
         if slip is not None:

@@ -1,4 +1,4 @@
-"""Planners by name: `onboard`, `retrieval`, `keyword`, `openai/<model>`, `replay/<path>`, and what else is installed.
+"""Planners by name: `onboard`, `meaning`, `keyword`, `openai/<model>`, `replay/<path>`, and what else is installed.
 
 A planner is registered as an entry point in the group `chauffeur.planners`; the built-in ones use the same door:
 

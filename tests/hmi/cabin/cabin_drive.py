@@ -68,7 +68,7 @@ class Drive:
 
 @contextmanager
 def driving(
-    scenario: str = "cruise", *, engine: str = "", planner: str = "retrieval", speed: float = 0.4
+    scenario: str = "cruise", *, engine: str = "", planner: str = "meaning", speed: float = 0.4
 ) -> Generator[Drive]:
     """A drive with its page, from the first scene on; it ends with the context, the car standing or not."""
     # A road is a minute long: at less than real time, and with others after it, it outlasts the tests of a module.

@@ -333,7 +333,7 @@ def test_the_stop_button_stops_whatever_is_asked(desk: Desk) -> None:
         desk.run(check(drive))
 
 
-SESSION = SessionState("cruise", "A road", 3, "retrieval", "grammar/test", False, "ada", "simulated", 0.1, ("a limit",))
+SESSION = SessionState("cruise", "A road", 3, "meaning", "grammar/test", False, "ada", "simulated", 0.1, ("a limit",))
 ENTRIES = tuple(MemoryEntry(f"e{i}", "2026-11-21T18:20:00+00:00", f"wish {i}", "driven", "") for i in (2, 1))
 
 

@@ -46,7 +46,7 @@ from chauffeur.hmi.local_page import MOST_AT_THE_DOOR
 
 pytestmark = pytest.mark.server
 
-SESSION = SessionState("cruise", "A road", 3, "retrieval", "grammar/test", False, "ada", "simulated", 0.1, ("a limit",))
+SESSION = SessionState("cruise", "A road", 3, "meaning", "grammar/test", False, "ada", "simulated", 0.1, ("a limit",))
 ROAD = Road(
     "highway",
     tuple(RoadLane(f"0-1:{i}", 4.0, "0-1", i, i == 2, ((0.0, 4.0 * i), (500.0, 4.0 * i))) for i in range(3)),

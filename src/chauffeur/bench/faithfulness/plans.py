@@ -1,4 +1,4 @@
-"""Programs of our own for the generated cases: wishes over simulated scenes, planned by the rules of `retrieval`."""
+"""Programs of our own for the generated cases: wishes over simulated scenes, planned by what their acts mean."""
 
 from __future__ import annotations
 

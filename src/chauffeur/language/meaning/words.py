@@ -77,6 +77,10 @@ _EVENTS: Final[Mapping[Event, tuple[str, str]]] = {
     "arrives": ("arrives", "somebody arrives"),
     "told": ("says so", "you say so"),
     "other": ("", ""),
+    "time": ("", ""),
+    "slower": ("is slower than", "it is slower than"),
+    "closer": ("is closer than", "it is closer than"),
+    "further": ("is further away than", "it is further away than"),
 }
 """What an event is called with, and without, a reference."""
 
@@ -87,7 +91,8 @@ def condition_words(when: Condition) -> str:
     event = alone if when.ref is None else f"{reference_words(when.ref)} {with_reference}"
     if when.ref is not None and when.ref.kind in _MANY:
         event = event.replace(" is ", " are ").replace(" has ", " have ").replace(" moves", " move")
-    return f"{when.type} {event}".strip()
+    amount = "" if when.value is None else f"{when.value:g} {when.unit}"
+    return " ".join(f"{when.type} {event} {amount}".split())
 
 
 def reference_words(reference: Reference) -> str:

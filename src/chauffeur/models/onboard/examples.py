@@ -29,8 +29,6 @@ HISTORY_SHARE: Final = 0.35
 CORRECTION_SHARE: Final = 0.12
 IN_FULL_SHARE: Final = 0.15
 """Share of sentences without contractions: "I am late"."""
-UNDRAFTED_SHARE: Final = 0.1
-"""Share of examples without a draft: servers of the exported model show none."""
 UNKNOWN_CONTEXT_SHARE: Final = 0.08
 CHATTER_SHARE: Final = 0.05
 """Share of examples of training with a sentence beside the wish that wishes for nothing."""
@@ -165,7 +163,7 @@ def wish_example(case: Case, rng: Generator, *, held: bool, wider: bool = False)
     reply = refusal_reply(case.refusal) if case.refusal else program_reply(case.steps)
     known = bool(case.refusal) or _needs_context(case.steps) or rng.random() >= UNKNOWN_CONTEXT_SHARE
     history = _other_history(rng) if rng.random() < HISTORY_SHARE else ()
-    text = prompt(case.situation if known else None, history, words, drafted=_drafted(rng))
+    text = prompt(case.situation if known else None, history, words)
     skills = "+".join(step.skill for step in case.steps)
     return Example(text, reply, words, template, skills, level, noise, held, "wish", case.index)
 
@@ -198,7 +196,7 @@ def correction_example(case: Case, rng: Generator, *, held: bool, wider: bool = 
     words, noise = _arriving(wording.text, rng, wider=wider)
     history = [remembered([step], str(rng.choice(SAID))), *_other_history(rng)[:1]]
     return Example(
-        prompt(case.situation, history, words, drafted=_drafted(rng)),
+        prompt(case.situation, history, words),
         program_reply([wanted]),
         words,
         wording.template,
@@ -221,7 +219,7 @@ def answer_example(
     reply = f"{ASK}{question}" if question else f"{REFUSE}{reason}"
     history = _other_history(rng) if rng.random() < HISTORY_SHARE else ()
     kind = "ask" if question else "refuse"
-    text = prompt(situation, history, words, drafted=_drafted(rng))
+    text = prompt(situation, history, words)
     return Example(text, reply, words, wording.template, kind, 0, noise, held, kind, -1)
 
 
@@ -234,10 +232,6 @@ def _arriving(words: str, rng: Generator, *, wider: bool) -> tuple[str, int]:
             words = beside(words, rng)
     noise = int(rng.choice(3, p=NOISE))
     return noisy(said_in_full(words) if rng.random() < IN_FULL_SHARE else words, rng, noise), noise
-
-
-def _drafted(rng: Generator) -> bool:
-    return bool(rng.random() >= UNDRAFTED_SHARE)
 
 
 def answer_sections(situation: Situation) -> tuple[str, ...]:

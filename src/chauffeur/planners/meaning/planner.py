@@ -1,35 +1,37 @@
-"""Reads what words mean, looks for what they refer to, and composes a program of the acts."""
+"""Reads what words mean, looks for what they refer to, and drives the acts: composed in a town, by skills elsewhere."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
-from chauffeur.concept.utterance import Act, Reference, Span, Utterance
+from chauffeur.concept.utterance import Act, Reference, Utterance
 from chauffeur.language.ground import ROAD_USERS
 from chauffeur.language.meaning.reader import read
 from chauffeur.language.meaning.words import act_words
-from chauffeur.planners.arbitration import asked, unanswered
+from chauffeur.planners.arbitration import UNSURE_WORDS, Wish, asked, unanswered
 from chauffeur.planners.base import NO_WISH, declined
-from chauffeur.planners.meaning.compose import ComposedActs, compose
+from chauffeur.planners.meaning.compose import ComposedActs, Undoable, compose
+from chauffeur.planners.meaning.highway import steps_before, steps_of
+from chauffeur.planners.onboard.driven import ReadSteps, plan_of_steps
 from chauffeur.programs.catalogue import vocabulary_of
 
 VERSION: Final = "meaning-v1"
 SURE: Final = 0.5
 """Below this a reading is more likely wrong than right, and is asked about."""
-_NOT_HERE: Final = "I drive by what is in sight in towns only. Use another planner here."
+_NOT_HERE: Final = "I do not park yet. Use another planner here."
 _BLIND: Final = "I am not told who is around, so I cannot look for what you mean."
-_FOR_OTHERS: Final = {
+FOR_OTHERS: Final = {
     "remark": "I hear a remark, and nothing for me to do.",
     "story": "I hear a story, and nothing for me to do.",
     "question": "I hear a question, and change nothing.",
     "feedback": "Thank you for telling me. I change nothing now.",
     "other": "I think that was not said to me, and change nothing.",
 }
-_WHY_NOT: Final = {
+WHY_NOT: Final = {
     "illegal": "The rules of the road do not allow that.",
     "dangerous": "That would put people in danger.",
 }
@@ -41,7 +43,7 @@ _BY_NAME: Final = frozenset({"building", "landmark", "lot", "gate", "driveway"})
 
 
 class MeaningPlanner:
-    """Drives acts about things in sight, in a town."""
+    """Drives acts: about things in sight in a town, by the skills of the dialect on highways and at crossings."""
 
     @classmethod
     def from_spec(cls, argument: str) -> MeaningPlanner:
@@ -62,7 +64,10 @@ class MeaningPlanner:
 
     async def plan(self, request: PlanRequest) -> Plan:
         """One plan: of a reading that is sure, whose references are clear, and of which everything can be done."""
-        return self.plan_of(read(request.instruction.text), request)
+        wish = Wish.of(self, request.instruction, time.perf_counter())
+        if wish.declined is not None:
+            return wish.declined
+        return self.plan_of(read(wish.instruction.text), replace(request, instruction=wish.instruction))
 
     def plan_of(self, utterance: Utterance, request: PlanRequest) -> Plan:
         """The plan for words that are read already."""
@@ -70,13 +75,15 @@ class MeaningPlanner:
         if utterance.emergency:
             return replace(declined(self, "I stop.", begun, intent="stop"), alarm="stop")
         if not utterance.acts or all(act.act == "none" for act in utterance.acts):
-            words = _FOR_OTHERS.get(utterance.address, "I hear nothing in that for me to do, and change nothing.")
+            words = FOR_OTHERS.get(utterance.address, "I hear nothing in that for me to do, and change nothing.")
             return declined(self, words, begun, intent=NO_WISH)
         forbidden = [act for act in utterance.acts if act.act == "refuse" and act.why in ("illegal", "dangerous")]
         if (refused := next(iter(forbidden), None)) is not None:
-            return declined(self, _WHY_NOT[refused.why or "dangerous"], begun, intent="refuse")
-        if vocabulary_of(request.context.situation.world) != "town":
+            return declined(self, WHY_NOT[refused.why or "dangerous"], begun, intent="refuse")
+        if request.context.situation.world == "parking":
             return declined(self, _NOT_HERE, begun, intent="not there")
+        if vocabulary_of(request.context.situation.world) != "town":
+            return self._by_skills(utterance, request, begun)
         if request.observation is None:
             return declined(self, _BLIND, begun, intent="not there")
         if utterance.sure < SURE:
@@ -87,23 +94,35 @@ class MeaningPlanner:
         if made.question:
             return asked(self, made.question, begun)
         if not made.done:
-            words = " ".join(f"I cannot {act_words(one.act)}: {one.reason}." for one in made.undoable)
+            words = left_out(made.undoable)
             return declined(self, words or "I see nothing to do in that.", begun, intent="not there")
-        left_out = " ".join(f"I cannot {act_words(one.act)}: {one.reason}." for one in made.undoable)
-        if left_out:
-            words = f"{left_out} Shall I do the rest: {_listed(made.done)}?"
+        if missed := left_out(made.undoable):
+            words = f"{missed} Shall I do the rest: {_listed(made.done)}?"
             if unanswered(request.instruction, words):
                 return asked(self, words, begun, offer=request.instruction.text)
         return Plan(
-            thoughts=Thoughts(_thoughts(utterance, made, left_out)),
+            thoughts=Thoughts(_thoughts(utterance, made, missed)),
             policy=Program(made.source, library=made.library),
             intent=made.intent,
             planner=self.id,
             model=self.model,
             latency_s=time.perf_counter() - begun,
+            unused=unused_words(utterance, made.undoable),
             acts=made.done,
-            unused=tuple(utterance.text[low:high] for low, high in (*_spans(made), *utterance.unused)),
         )
+
+    def _by_skills(self, utterance: Utterance, request: PlanRequest, begun: float) -> Plan:
+        """The plan for acts where the driving language knows lanes and a vehicle ahead, and nothing else in sight."""
+        found = steps_of(utterance.acts, request.context.situation, steps_before(request.history))
+        if found.question:
+            return declined(self, found.question, begun, intent="ask")
+        missed = left_out(found.undoable)
+        if not found.steps:
+            return declined(self, missed or "I see nothing to do in that.", begun, intent="not there")
+        unsure = missed or (UNSURE_WORDS if utterance.sure < SURE else "")
+        unused = unused_words(utterance, found.undoable)
+        reads = ReadSteps(utterance.text, found.steps, found.done, found.assumed, unused)
+        return plan_of_steps(self, reads, request, begun, unsure=unsure)
 
 
 def plan_by_sight(request: PlanRequest) -> Plan | None:
@@ -129,9 +148,15 @@ def _references(act: Act) -> Iterator[Reference]:
             one = one.of
 
 
-def _spans(made: ComposedActs) -> list[Span]:
-    """The words of acts that are not done."""
-    return [one.act.span for one in made.undoable if one.act.span is not None]
+def unused_words(utterance: Utterance, undoable: Sequence[Undoable]) -> tuple[str, ...]:
+    """The words of acts that are not done, and those that no act was read from."""
+    spans = [one.act.span for one in undoable if one.act.span is not None]
+    return tuple(utterance.text[low:high] for low, high in (*spans, *utterance.unused))
+
+
+def left_out(undoable: Sequence[Undoable]) -> str:
+    """What of a wish is not done, in words."""
+    return " ".join(f"I cannot {act_words(one.act)}: {one.reason}." for one in undoable)
 
 
 def _listed(acts: tuple[Act, ...]) -> str:

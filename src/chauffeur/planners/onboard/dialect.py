@@ -232,7 +232,9 @@ class DialectStep:
         if skill.takes is None or self.number is None or meaning.amount is None:
             return meaning
         value = -self.number.si if self.skill == "under_limit_by" else self.number.si
-        return replace(meaning, amount=replace(meaning.amount, value=value, said=self.number.said(skill.takes)))
+        amount = replace(meaning.amount, value=value, said=self.number.said(skill.takes))
+        change = (1 if value > 1.0 else -1 if value < 1.0 else 0) if amount.frame == "factor" else meaning.change
+        return replace(meaning, amount=amount, change=change)
 
     @property
     def numbers(self) -> tuple[Number, ...]:

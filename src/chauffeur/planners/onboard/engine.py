@@ -65,7 +65,7 @@ class Engine:
         except ImportError as error:
             raise MissingExtraError(
                 f"The on-board model needs {error.name}.",
-                hint="Run: pip install onnxruntime llguidance; or drive with --planner retrieval.",
+                hint="Run: pip install onnxruntime llguidance; or drive with --planner keyword.",
             ) from error
         self._llguidance: Any = llguidance
         try:

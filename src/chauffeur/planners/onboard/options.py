@@ -169,6 +169,8 @@ class Options:
         return Filled(exemplar, values)
 
 
+_MOST_OVER_SIGN = 1.25
+"""Times the sign: a number that is more than that in a unit was said in another one."""
 _READING_ERROR_MPS = 2.0
 """Excess over the sign that limits tolerate without meaning it as leave to speed."""
 
@@ -195,6 +197,24 @@ def speed_of(amount: Amount, options: Options, change: Change = 0) -> tuple[floa
                 why = "because only then it is " + ("faster than now" if change > 0 else "slower than now")
                 break
     return value, (f"You named no unit: I take {number(amount.value)} as {unit}, {why}.",)
+
+
+def unit_of_bare(value: float, situation: Situation, change: int = 0) -> tuple[str, str]:
+    """The dialect's unit of a speed without one, and how that is told.
+
+    It is the unit of the road's signs, unless only another one makes a speed of it that may be driven here, and is
+    slower (`change` -1) or faster (+1) than now, as the person said.
+    """
+    signs, _ = _unit_of_signs(situation.speed_limit_mps)
+    scales = {"km/h": ("kmh", MPS_PER_KMH), "mph": ("mph", MPS_PER_MPH), "m/s": ("", 1.0)}
+    for said in dict.fromkeys((signs, *scales)):
+        name, scale = scales[said]
+        fits = (value * scale - situation.speed_mps) * change >= 0
+        if fits and value * scale <= _MOST_OVER_SIGN * situation.speed_limit_mps:
+            break
+    else:
+        said, name = signs, scales[signs][0]
+    return name, f"You named no unit: I take {number(value)} as {said}."
 
 
 def _unit_of_signs(limit_mps: float) -> tuple[str, float]:

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from chauffeur.concept import Feedback, History, HistoryItem, Round
-from chauffeur.planners.onboard.meaning import Reading
-from chauffeur.planners.onboard.understand import understand
+from chauffeur.concept.utterance import Act
+from chauffeur.language.meaning.reader import read
+from chauffeur.planners.onboard.meaning import BIT, MUCH, PLAIN
 
 SPEED_SETTING = "personal_speed_mps"
 HEADWAY_SETTING = "personal_headway_s"
@@ -96,16 +97,19 @@ def _because(item: HistoryItem) -> str:
 
 def corrections_of(rounds: Sequence[Round]) -> tuple[Feedback, ...]:
     """What earlier rounds of the same wish were answered with, as feedback on the numbers."""
-    said = (understand(one.feedback) for one in rounds)
-    readings = [reading for reading in said if isinstance(reading, Reading)]
-    out: list[Feedback] = []
-    for reading in readings:
-        for step in reading.steps:
-            if step.manoeuvre == "speed" and step.change:
-                out.append(Feedback("", speed=step.change, strength=step.degree))
-            elif step.manoeuvre == "gap" and step.change:
-                # a wish for more room says that the gap was too small
-                out.append(Feedback("", gap=-1 if step.change > 0 else 1, strength=step.degree))
-            elif step.manoeuvre == "style" and step.variant in ("comfort", "careful"):
-                out.append(Feedback("", comfort=-1, strength=step.degree))
-    return tuple(out)
+    said = (read(one.feedback) for one in rounds)
+    return tuple(found for one in said for act in (*one.acts, *one.opinion) if (found := _correction(act)) is not None)
+
+
+def _correction(act: Act) -> Feedback | None:
+    """A wish for another drive as feedback on the one that has been: asked for more room, the gap was too small."""
+    strength = {"bit": BIT, "much": MUCH}.get(act.degree or "", PLAIN)
+    if act.negated:
+        return None
+    if act.style in ("gentle", "careful"):
+        return Feedback("", comfort=-1, strength=strength)
+    if act.act == "speed" and act.direction in ("faster", "slower"):
+        return Feedback("", speed=1 if act.direction == "faster" else -1, strength=strength)
+    if act.act == "gap" and act.direction in ("more", "less"):
+        return Feedback("", gap=-1 if act.direction == "more" else 1, strength=strength)
+    return None

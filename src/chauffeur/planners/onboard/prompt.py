@@ -1,4 +1,4 @@
-"""What the on-board model reads and writes, as text: C and H in a few words, the wish, its draft, and the reply.
+"""What the on-board model reads and writes, as text: C and H in a few words, the wish, and the reply.
 
 The same text is the training data's, the runtime's and, by way of the chat template, that of any server that runs the
 exported model.
@@ -12,10 +12,10 @@ from typing import Final
 
 from chauffeur.concept import Feedback, History, HistoryItem, ProgramError, Situation
 from chauffeur.planners.onboard.dialect import DialectStep, read, tell, write
-from chauffeur.planners.onboard.draft import UNREAD, draft
 
 CONTEXT, HISTORY, WISH, DRAFT, REPLY = "<|context|>", "<|history|>", "<|wish|>", "<|draft|>", "<|reply|>"
 END, BLANK = "<|end|>", "<|blank|>"
+# Behind DRAFT stood what rules had read, in most examples that the shipped network learned from; nothing does now.
 SPECIAL: Final = (END, CONTEXT, HISTORY, WISH, DRAFT, REPLY, BLANK)
 
 ASK, REFUSE = "ASK: ", "REFUSE: "
@@ -29,19 +29,17 @@ HISTORY_ITEMS: Final = 2
 _SPACE = re.compile(r"\s+")
 
 
-def prompt(situation: Situation | None, history: Sequence[str], wish: str, *, drafted: bool = True) -> str:
+def prompt(situation: Situation | None, history: Sequence[str], wish: str) -> str:
     """The whole prompt.
 
     Args:
         situation: Where we are; None when it is not known.
         history: Remembered trips as `remembered` writes them, the most relevant first.
         wish: The passenger's words.
-        drafted: Whether the rules' reading of the words is shown.
     """
     context = "unknown" if situation is None else context_words(situation)
     past = "; ".join(history[:HISTORY_ITEMS])
-    ruled = draft(wish) if drafted else UNREAD
-    return f"{CONTEXT}{context}{HISTORY}{past}{WISH}{wish_words(wish)}{DRAFT}{ruled}{REPLY}"
+    return f"{CONTEXT}{context}{HISTORY}{past}{WISH}{wish_words(wish)}{DRAFT}{REPLY}"
 
 
 def wish_words(wish: str) -> str:

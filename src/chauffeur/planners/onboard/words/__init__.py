@@ -1,4 +1,4 @@
-"""Vocabulary of the on-board planner as text files: cues, rewrites and fillers."""
+"""Vocabulary of the on-board planner as text files: words of other languages."""
 
 from chauffeur.planners.onboard.words.files import words_file
 

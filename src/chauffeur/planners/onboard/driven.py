@@ -1,0 +1,103 @@
+"""From steps of the dialect to a plan that drives them on this road, declines them, or asks first."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+from chauffeur.concept import Alarm, Plan, PlanRequest, Program, Thoughts, Usage
+from chauffeur.concept.utterance import Act
+from chauffeur.planners.arbitration import asked, slow_words, unanswered, wary_of
+from chauffeur.planners.base import Planner, declined
+from chauffeur.planners.onboard.dialect import DialectStep, shall_i, write
+from chauffeur.planners.onboard.link import Linked, link
+from chauffeur.planners.onboard.options import Declined
+from chauffeur.planners.onboard.personal import Leaning, corrections_of, leaning_of
+from chauffeur.planners.onboard.thoughts import thoughts_of
+
+
+@dataclass(frozen=True, slots=True)
+class ReadSteps:
+    """What was read, and what is known of the reading.
+
+    Attributes:
+        wish: The words.
+        steps: What is to be driven.
+        acts: The same as acts, where it was read as such.
+        assumed: What was taken for granted, full sentences.
+        unused: Words that nothing was read from.
+        raw: What a model wrote.
+        usage: What it cost.
+    """
+
+    wish: str
+    steps: tuple[DialectStep, ...]
+    acts: tuple[Act, ...] = ()
+    assumed: tuple[str, ...] = ()
+    unused: tuple[str, ...] | None = None
+    raw: str = ""
+    usage: Usage = field(default_factory=Usage)
+
+
+def linked_here(
+    steps: Sequence[DialectStep], wish: str, request: PlanRequest
+) -> tuple[Linked | Declined, tuple[Leaning, ...]]:
+    """Steps fitted to this road, these limits and this person, and what the person's history said about each."""
+    leaning = partial(leaning_of, request.history, corrections=corrections_of(request.rounds))
+    families = [step.meaning.family for step in steps]
+    wary = wary_of(wish, "+".join(families))
+    found = link(steps, request.context.situation, request.limits, leaning, wary=wary)
+    return found, tuple(leaning(family) for family in families)
+
+
+def plan_of_steps(planner: Planner, read: ReadSteps, request: PlanRequest, begun: float, *, unsure: str = "") -> Plan:
+    """The plan that drives the steps; or that declines, or asks.
+
+    Args:
+        planner: Whose plan it is.
+        read: What is to be driven.
+        request: The words with what the person has answered already, where we are, and the limits.
+        begun: When planning began, by `time.perf_counter`.
+        unsure: Why the reading is to be asked about before it is driven; empty where it is sure.
+    """
+    linked, used = linked_here(read.steps, read.wish, request)
+    if isinstance(linked, Declined):
+        intent = "+".join(step.meaning.family for step in read.steps)
+        return replace(declined(planner, linked.words, begun, intent=intent), alarm=alarm_of(read, sure=not unsure))
+    why = unsure or slow_words(linked.choice.steps, request.context.situation, request.limits)
+    if why and (question := unanswered(request.instruction, f"{why} {shall_i(read.steps)}")):
+        return replace(asked(planner, question, begun, offer=read.wish), alarm=alarm_of(read, sure=not unsure))
+    return plan_of_linked(planner, read, linked, used, request, begun)
+
+
+def plan_of_linked(
+    planner: Planner, read: ReadSteps, linked: Linked, used: Sequence[Leaning], request: PlanRequest, begun: float
+) -> Plan:
+    """The plan that drives linked steps."""
+    thoughts = thoughts_of(linked.reading, linked.choice, request.context.situation, used)
+    return Plan(
+        thoughts=Thoughts(" ".join([thoughts.text, *read.assumed])),
+        policy=Program(write(read.steps), library=linked.library),
+        intent=linked.choice.intent,
+        settings=linked.choice.settings(used),
+        planner=planner.id,
+        model=planner.model,
+        latency_s=time.perf_counter() - begun,
+        usage=read.usage,
+        raw=read.raw,
+        unused=read.unused,
+        acts=read.acts,
+    )
+
+
+def alarm_of(read: ReadSteps, *, sure: bool) -> Alarm:
+    """What a reading of words as a stop at once, and nothing else, is: a call to stop, or one that is asked about.
+
+    A stop at a place, at a time to come, or beside words that nothing was read from is a wish like others.
+    """
+    if [step.skill for step in read.steps] != ["stop_here"] or read.steps[0].numbers or read.steps[0].condition:
+        return ""
+    later = any((act.place is not None and act.place.rel != "here") or act.when is not None for act in read.acts)
+    return "" if later or read.unused else "stop" if sure and read.acts else "distress"

@@ -1,0 +1,109 @@
+"""Two readers of the same words: the acts of the one reader, and the on-board network's program.
+
+Neither knows the other. What both read is driven. Where they differ the network is believed if it is sure enough and
+every number of its program was said; anything else is asked about in one question that a yes answers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from chauffeur.concept.utterance import Utterance
+from chauffeur.language.quantities import read_quantities
+from chauffeur.planners.meaning.highway import SpokenSteps
+from chauffeur.planners.onboard.dialect import CONDITIONS, SKILLS, DialectStep, Kind, Number
+
+SURE: Final = 0.9
+"""Probability of the network's least sure choice from which it is believed against the acts. Chosen with the wishes of
+`bench passengers` in sight."""
+ACTS_SURE: Final = 0.5
+"""Below this the acts are more likely wrong than right: what the network read is asked about rather than they."""
+_CLOSE: Final = 0.011
+
+
+@dataclass(frozen=True, slots=True)
+class ReadWish:
+    """What two readers come to.
+
+    Attributes:
+        steps: What is to be driven or asked about; empty where neither reads anything to do.
+        sure: Whether it may be driven without a question.
+        by_acts: Whether the acts say it: their claims stand then.
+    """
+
+    steps: tuple[DialectStep, ...] = ()
+    sure: bool = False
+    by_acts: bool = False
+
+
+def compared(utterance: Utterance, spoken: SpokenSteps, written: Sequence[DialectStep], sure: float) -> ReadWish:
+    """What is to be driven.
+
+    Args:
+        utterance: What the acts were read from.
+        spoken: The acts as steps.
+        written: The network's steps.
+        sure: Probability of its least sure choice.
+    """
+    if alike(spoken.steps, written):
+        return ReadWish(spoken.steps, sure=not spoken.undoable, by_acts=True)
+    network = bool(written) and quoted(utterance.text, written)
+    refused = next((act.why for act in utterance.acts if act.act == "refuse"), None)
+    if utterance.sure >= ACTS_SURE and (spoken.question or refused == "not driving"):
+        return ReadWish()
+    denied = any(act.negated for act in utterance.acts)  # what is not wanted no network outweighs
+    if network and sure >= SURE and not denied and refused is None:
+        return ReadWish(tuple(written), sure=True)
+    if spoken.steps and (utterance.sure >= ACTS_SURE or not network):
+        return ReadWish(spoken.steps, by_acts=True)
+    return ReadWish(tuple(written))
+
+
+def alike(some: Sequence[DialectStep], others: Sequence[DialectStep]) -> bool:
+    """Whether two programs do the same; how much a "bit" is, and how briskly, are no difference."""
+    return (
+        bool(some)
+        and len(some) == len(others)
+        and all(_same_step(one, other) for one, other in zip(some, others, strict=True))
+    )
+
+
+def _same_step(one: DialectStep, other: DialectStep) -> bool:
+    named = None if one.condition is None else (one.condition.how, one.condition.name)
+    tested = None if other.condition is None else (other.condition.how, other.condition.name)
+    kinds = one.meaning.family == other.meaning.family and one.meaning.variant == other.meaning.variant
+    same_numbers = len(one.numbers) == len(other.numbers) and all(map(_close, one.numbers, other.numbers))
+    return kinds and SKILLS[one.skill].takes == SKILLS[other.skill].takes and named == tested and same_numbers
+
+
+def _close(one: Number, other: Number) -> bool:
+    return abs(one.si - other.si) <= _CLOSE * max(1.0, abs(one.si))
+
+
+def quoted(text: str, steps: Sequence[DialectStep]) -> bool:
+    """Whether every number of some steps was said, of its own kind or without a unit; shares and counts are said in too
+    many ways, and a number of an earlier trip was not said now.
+    """
+    said = read_quantities(text)
+    return all(
+        any(
+            abs(value - q.value) <= _CLOSE * max(1.0, value)
+            for q in said
+            for value, kinds in ((number.si, (kind,)), (number.value, ("bare",)))
+            if q.dimension in kinds
+        )
+        for kind, number in _measures(steps)
+    )
+
+
+def _measures(steps: Sequence[DialectStep]) -> Iterator[tuple[Kind, Number]]:
+    """The speeds, distances and times of some steps."""
+    for step in steps:
+        tested = None if step.condition is None else CONDITIONS[step.condition.name][0]
+        kinds = (SKILLS[step.skill].takes, "time", tested)
+        numbers = (step.number, step.wait_s, None if step.condition is None else step.condition.number)
+        for kind, number in zip(kinds, numbers, strict=True):
+            if kind in ("speed", "distance", "time") and number is not None and number.factor == 1.0:
+                yield kind, number
