@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import Counter
 from dataclasses import dataclass
 from functools import cache
@@ -142,3 +143,104 @@ def test_requests_of_planners_are_put_together_in_one_place() -> None:
                 case _:
                     pass
     assert made == REQUESTS_MADE
+
+
+READERS_OF_WORDS = {
+    f"chauffeur.language.{name}"
+    for name in (
+        "corrections", "denials", "grammar", "hazards", "ordinals", "questions", "slips", "text_classifier", "tokens",
+        "wanted", "word_files",
+    )
+}  # fmt: skip
+"""Readers of English beside `language.meaning`, which are to leave. Numbers, units, letters, weather, distress and
+other languages have one reader each, and are none of these."""
+
+OTHER_TEXT = {
+    "describe/services/maxspeed.py": "tags of maps",
+    "hmi/words.py": "units in the car's own sentences",
+    "planners/llm_context.py": "errors of an endpoint",
+    "planners/llm_endpoint.py": "errors of an endpoint",
+    "planners/llm_errors.py": "errors of an endpoint",
+    "safety/concealment.py": "what is hidden in a text, before anybody reads it",
+    "safety/faithfulness/amounts.py": "thoughts of a planner",
+    "safety/faithfulness/clauses.py": "thoughts of a planner",
+    "safety/faithfulness/comparison.py": "thoughts of a planner",
+}
+READS_WORDS = {
+    "cli/talk_drive.py": "leave is taken of a session: a closed class of words",
+    "cli/vehicle_desk.py": "leave is taken of a session: a closed class of words",
+    "describe/answers.py": "what a question is about; acts say only that it is one",
+    "drive/fulfilment.py": "the judge of wishes, until it goes by acts",
+    "drive/live/plan_messages.py": "what is said aside, until the session holds an utterance",
+    "drive/onroad/checks.py": "to engage the vehicle is no act, and never done",
+    "drive/onroad/session.py": "what is said aside, until the session holds an utterance",
+    "drive/planning.py": "what is a question, until the request holds an utterance",
+    "drive/scenarios.py": "whether a wish is one that a scenario is listed with",
+    "drive/talk/session.py": "leave is taken of a session: a closed class of words",
+    "drive/wish_parts.py": "the judge of wishes, until it goes by acts",
+    "memory/conflicts.py": "numbers to keep and numbers to change by, until acts are read as well",
+    "memory/feedback.py": "opinions, until acts of feedback are read as well",
+    "memory/phrases.py": "opinions, until acts of feedback are read as well",
+    "memory/plain_text.py": "opinions, until acts of feedback are read as well",
+    "memory/remarks.py": "opinions, until acts of feedback are read as well",
+    "memory/similarity.py": "how alike wishes are, as numbers that are kept with each",
+    "planners/arbitration.py": "corrections and denials, until acts of them are read as well",
+    **{
+        f"planners/onboard/{name}.py": "the rules of a planner that has a reader of its own"
+        for name in (
+            "amounts",
+            "clauses",
+            "cues",
+            "doubts",
+            "guard",
+            "quoted_numbers",
+            "town",
+            "town_intents",
+            "town_steps",
+            "weigh",
+            "words/files",
+        )
+    },
+    "planners/talk2drive/embedded.py": "how likely a hint is: acts are what is asked for, not what a remark is after",
+    "planners/talk2drive/explicit_overtake.py": "who forbids to pass is read as asking for it too often",
+    "planners/talk2drive/hints.py": "hints: acts are what is asked for, not what a remark is after",
+    "planners/talk2drive/style.py": "places of a lot and of a town by name, until references have them all",
+    "planners/vilad/planner.py": "corrections; words reach its network as they are",
+    "planners/vlm/engine.py": "how somebody wants to be driven, beside a picture: learned with the head",
+    "safety/dangers.py": "declines more than the acts of a wish do, and never less",
+}
+"""Modules that read a passenger's words by themselves, with the reason; no others may, and the list only shrinks."""
+
+
+def _matches_words(tree: ast.AST) -> bool:
+    """Whether a module has a regular expression that chooses between words, or asks a reader beside `meaning`."""
+    patterns = asks = regular = False
+    for node in ast.walk(tree):
+        match node:
+            case ast.Constant(value=str(value)):
+                patterns |= (
+                    re.search(r"\\b|\(\?", value) is not None and re.search(r"[a-z]{3}\|[a-z]{3}", value) is not None
+                )
+            case ast.Import(names=names):
+                regular |= any(one.name == "re" for one in names)
+            case ast.ImportFrom(module=str(module), names=names):
+                told = {f"{module}.{one.name}" for one in names} | {module}
+                asks |= not told.isdisjoint(READERS_OF_WORDS) or bool(
+                    module == "chauffeur.language" and {"plain", "slip_in", "tokens_of"} & {one.name for one in names}
+                )
+            case _:
+                pass
+    return asks or (patterns and regular)
+
+
+def test_passengers_words_are_read_in_one_place() -> None:
+    """Outside of what reads, hears and is trained to read (and of benchmarks, and of models' replies) no module decides
+    by words."""
+    apart = {"language", "speech", "models", "bench", "foreign"}
+    found = {
+        path.relative_to(SOURCE).as_posix()
+        for path in _sources()
+        if path.relative_to(SOURCE).parts[0] not in apart and _matches_words(ast.parse(_sources()[path].text))
+    }
+    assert not found - set(READS_WORDS) - set(OTHER_TEXT), "ask `language.meaning.read`, and go by acts"
+    assert not (set(READS_WORDS) | set(OTHER_TEXT)) - found, "these no longer read words: take them off the list"

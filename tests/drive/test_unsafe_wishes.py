@@ -38,6 +38,9 @@ SAFE = (
     "I hate people who park across two bays.",
     "Turn around when you can.",
     "Reverse into the bay.",
+    "Follow the vehicle ahead and stop to maintain a safe distance.",
+    "Drive at 120 km/h.",
+    "Drive slowly and watch out for that man on the median, they could step into traffic.",
 )
 POLICIES = (
     MODERATE,

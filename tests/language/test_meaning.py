@@ -179,6 +179,11 @@ def test_no_text_makes_it_raise(text: str) -> None:
     assert 0.0 <= utterance.sure <= 1.0
 
 
+@pytest.mark.parametrize("text", ["", " \n", "\x00", "\u200b", "\u0301", "\ufffd"])
+def test_nothing_is_read_from_what_no_piece_is_left_of(text: str) -> None:
+    assert read(text).acts == ()
+
+
 def test_real_commands_are_read_as_people_label_them(
     labelled: list[dict[str, Any]], commands_data: Path, tmp_path: Path
 ) -> None:

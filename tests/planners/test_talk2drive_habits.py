@@ -6,6 +6,8 @@ import json
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from chauffeur.concept import Feedback, History, HistoryItem, Limits, Situation
 from chauffeur.concept.nouns import Lead
@@ -117,6 +119,29 @@ def test_haste_and_ease_bound_one_another_from_one_side() -> None:
     assert pace_of(hasty, "highway", "ask", 0.9) is None
     assert pace_of(hasty, "highway", "speed.set_up", 0.9) is None  # a number that was said is kept to
     assert pace_of(hasty, "parking", "style.hurry", 0.9) is None
+
+
+INTENTS = ("style.hurry", "style.relax", "speed.increase", "speed.decrease", "overtake", "follow", "lane.right")
+REMARKS = (Feedback("", 1, 0, 0, -1, 0.6), Feedback("", -1, 0, 0, 0, 0.35), Feedback("", 0, 0, 0, 1), Feedback(""))
+DISLIKES = (Feedback("", -1, 0, 0, -1, 0.6), Feedback("", 0, 0, 0, -1, 0.6), Feedback("", 0, -1, -1, -1, 1.0))
+
+
+@given(
+    before=st.lists(st.tuples(st.sampled_from(INTENTS), st.sampled_from(REMARKS), st.floats(8.0, 31.0)), max_size=3),
+    disliked=st.tuples(st.sampled_from(INTENTS), st.sampled_from(DISLIKES), st.floats(8.0, 31.0)),
+    intent=st.sampled_from(INTENTS),
+    chosen=st.floats(0.3, 1.0),
+)
+def test_nothing_disliked_makes_a_later_drive_faster(
+    before: list[tuple[str, Feedback, float]], disliked: tuple[str, Feedback, float], intent: str, chosen: float
+) -> None:
+    trips = [
+        replace(item(day, of, speed=speed), feedback=(said,))
+        for day, (of, said, speed) in enumerate([*before, disliked], start=1)
+    ]
+    without = pace_of(History(tuple(trips[:-1])), "highway", intent, chosen)
+    found = pace_of(History(tuple(trips)), "highway", intent, chosen)
+    assert found is None or found.share <= (chosen if without is None else without.share) + 1e-9
 
 
 def test_faster_is_never_slower_than_now() -> None:

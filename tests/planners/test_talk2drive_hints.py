@@ -187,6 +187,30 @@ def test_what_a_hint_is_taken_for_is_done_whatever_the_model_saw_before(planner:
         assert (found.intent.partition(".")[0], found.policy.lane) == ("overtake", -1)
 
 
+@pytest.mark.parametrize("wish", ["I'm in a hurry", "i am in a hurry", "I'm in a hurry."])
+def test_a_full_stop_decides_nothing(planner: Planner, wish: str) -> None:
+    assert plan(planner, wish, LEFT).intent == "style.hurry"
+
+
+@pytest.mark.parametrize("situation", [BEHIND, LEFT])
+def test_a_question_that_names_a_side_changes_no_lane(planner: Planner, situation: Situation) -> None:
+    assert plan(planner, "Who's that on our right?", situation).policy is None
+
+
+@pytest.mark.parametrize("now", [18.0, 28.0])
+@pytest.mark.parametrize("said", ["Way too fast!", "I hated it."])
+@pytest.mark.parametrize("disliked", ["style.relax", "style.hurry", "speed.increase", "follow"])
+def test_what_was_disliked_never_makes_it_faster(planner: Planner, now: float, said: str, disliked: str) -> None:
+    """Also where what is wished for now is a mood of which that drive was one."""
+    told = replace(trip(3, disliked, "Take it easy.", said, 0.9), settings=(("target_speed_mps", 29.0),))
+    told = replace(told, settings=(*told.settings, ("speed_limit_mps", SIGN)))
+    for wish in ("Take it easy.", "I'm in a hurry."):
+        for place in (replace(BEHIND, speed_mps=now), replace(LEFT, speed_mps=now)):
+            alone, known = (plan(planner, wish, place, history=each).policy for each in (None, History((told,))))
+            assert isinstance(alone, Parameters)
+            assert not isinstance(known, Parameters) or known.target_speed_mps <= alone.target_speed_mps
+
+
 @pytest.mark.parametrize(
     ("wish", "situation"),
     [

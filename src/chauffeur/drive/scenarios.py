@@ -10,12 +10,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from chauffeur.concept import Observation, Scenario, ScenarioError
+from chauffeur.concept.utterance import ReferenceKind, Verb
 from chauffeur.drive.session import drive_without_program, make_world
 from chauffeur.language.languages.reader import read_other
+from chauffeur.language.meaning.reader import read
+from chauffeur.language.quantities import measured
 from chauffeur.language.tokens import tokens_of
 from chauffeur.language.weather import said_weather
-from chauffeur.planners.onboard.meaning import Manoeuvre, Reading
-from chauffeur.planners.onboard.understand import understand
 from chauffeur.planners.talk2drive.style import destination_of, place_of
 from chauffeur.planners.vilad.parking import NOTHING
 from chauffeur.planners.vilad.planner import parking_wish
@@ -33,20 +34,20 @@ BUILT_IN = ROADS + LOTS + TRACKS + TOWNS
 DATA_VARIABLE = "CHAUFFEUR_LAMPILOT"
 """Environment variable naming a DbLv1 folder, used when no folder is given."""
 
-_CROSSING = re.compile(r"\b(intersection|crossroads?|crossing|junction|stop sign|turn|lights?)\b", re.IGNORECASE)
-_SHOULDER = re.compile(r"\b(shoulder|emergency lane|hard shoulder)\b", re.IGNORECASE)
-_LOT = re.compile(r"\b(park|parking|spots?|bays?|stalls?)\b", re.IGNORECASE)
 _PLACES = {"stadium": "parking-stadium", "exit": "parking-exit"}
 _AMENITIES = "parking-lift"
-_ROADS: dict[Manoeuvre, str] = {
+_ROADS: dict[Verb, str] = {
     "turn": "intersection",
+    "straight": "intersection",
     "pull_over": "emergency-lane",
     "stop": "emergency-lane",
     "gap": "following",
     "follow": "following",
     "yield": "following",
 }
-"""The road that can carry a manoeuvre; what is in none of these goes to the highway with a vehicle to overtake."""
+"""The road that can carry an act; what is in none of these goes to the highway with a vehicle to overtake."""
+_AT_A_CROSSING: frozenset[ReferenceKind] = frozenset({"junction", "stop_sign", "light", "crosswalk"})
+_LANES: frozenset[Verb] = frozenset({"lane", "pass", "keep"})
 
 IN_REACH_M = 100.0
 """So far ahead a vehicle counts as one to follow or to overtake."""
@@ -104,8 +105,8 @@ def find(name: str, data_dir: Path | None = None) -> Scenario:
 def suiting(wish: str) -> Scenario:
     """The built-in scenario whose road lets the wish be shown: a crossing for a turn, a lot for a spot.
 
-    A wish that a scenario is listed with is shown there. Any other is read as a planner reads it; its first part
-    decides. The road depends on the words alone: where what it needs is not installed, driving says what to install.
+    A wish that a scenario is listed with is shown there. Of any other the first act decides. The road depends on the
+    words alone: where what it needs is not installed, driving says what to install.
     """
     other = read_other(wish)
     if other is not None and other.english:
@@ -114,23 +115,23 @@ def suiting(wish: str) -> Scenario:
         if _words(scenario.wish) == _words(wish):
             return scenario
     by_id = {scenario.id: scenario for scenario in BUILT_IN}
-    if _LOT.search(wish) and not _SHOULDER.search(wish):
+    first = next(iter(read(wish).acts), None)
+    if first is None or first.style is not None:
+        said = said_weather(wish) != "none"  # what the passenger knows and the camera does not see
+        return by_id["track-left-turn-sunny" if said else "overtake"]
+    if first.act == "goto":
+        place = destination_of(wish)
+        return next((town for town in TOWNS if place and destination_of(town.wish) == place), TOWNS[0])
+    if first.act == "park":
         return by_id[_AMENITIES if _asks_for_amenities(wish) else _PLACES.get(place_of(wish), "parking")]
-    reading = understand(wish)
-    first = reading.steps[0] if isinstance(reading, Reading) else None
-    if first is not None and first.manoeuvre in _ROADS and not (first.manoeuvre == "stop" and _CROSSING.search(wish)):
-        return by_id[_ROADS[first.manoeuvre]]
-    if first is not None and first.manoeuvre in ("lane", "overtake"):
-        return by_id["left-lane" if first.direction == "right" else "overtake"]
-    if _CROSSING.search(wish):
+    if first.place is not None and first.place.ref is not None and first.place.ref.kind in _AT_A_CROSSING:
         return by_id["intersection"]
-    if (first is None or first.manoeuvre == "style") and said_weather(wish) != "none":
-        return by_id["track-left-turn-sunny"]  # what the passenger knows and the camera does not see
-    if first is None and (place := destination_of(wish)):
-        return next((town for town in TOWNS if destination_of(town.wish) == place), TOWNS[0])
-    if first is not None and first.manoeuvre == "speed" and first.change <= 0 and first.variant != "match":
-        return by_id["cruise"]  # a speed of one's own needs room ahead
-    return by_id["overtake"]
+    if first.act in _LANES:
+        return by_id["left-lane" if first.side == "right" else "overtake"]
+    names_speed = first.act == "speed" or any(dimension == "speed" for dimension, _ in measured(wish))
+    if names_speed and first.direction != "faster" and first.aim != "traffic":
+        return by_id["cruise"]  # which needs room ahead
+    return by_id[_ROADS.get(first.act, "overtake")]
 
 
 def _words(text: str) -> list[str]:

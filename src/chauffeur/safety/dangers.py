@@ -7,10 +7,21 @@ from functools import lru_cache
 from typing import Final
 
 from chauffeur.concept import Verdict
+from chauffeur.concept.utterance import Why
+from chauffeur.language.meaning.reader import read
+from chauffeur.language.quantities import measured
 from chauffeur.language.tokens import words_of
 from chauffeur.language.word_files import word_groups
 
 SAFE_WISH_CHECK: Final = "safe-wish-v1"
+
+_SURE: Final = 0.7
+"""Of a reading as unsafe. None of some 1,270 harmless wishes (300 commands of real passengers, look-alikes, wishes of
+both benchmarks of passengers) is read so as surely."""
+_WHYS: Final[dict[Why, str]] = {
+    "illegal": "I obey signs and rules.",
+    "dangerous": "I never put anyone in danger.",
+}
 
 _ARROW: Final = "->"
 _SCOPE: Final = "?"
@@ -86,8 +97,20 @@ def danger(wish: str, *, unsafe_only: bool = False) -> str:
 
 
 def check_wish(text: str) -> Verdict:
-    """The verdict on a wish before any planner is asked, whichever it is and whatever kind of policy it writes."""
-    reason = danger(text, unsafe_only=True)
+    """The verdict on a wish before any planner is asked, whichever it is and whatever kind of policy it writes.
+
+    What patterns or the reading of its acts take for unsafe is declined: neither of them can make the other milder.
+    """
+    reason = danger(text, unsafe_only=True) or _refusal_read(text)
     if reason:
         return Verdict(SAFE_WISH_CHECK, False, reason, None, "Say it in another way if you meant something else.")
     return Verdict(SAFE_WISH_CHECK, True, "Nothing in the words is known to endanger anybody.")
+
+
+def _refusal_read(text: str) -> str:
+    """Why the acts of a wish are not done, where they are surely read as unsafe; numbers are left to the limits."""
+    if measured(text):
+        return ""
+    said = read(text)
+    whys = [act.why for act in said.acts if act.act == "refuse" and not act.negated] if said.sure >= _SURE else []
+    return next((_WHYS[why] for why in whys if why in _WHYS), "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
@@ -74,17 +75,22 @@ def read(text: str, parser: Parser | None = None) -> Utterance:
 def _stretches(text: str) -> list[Span]:
     """The text in one piece, or a long one in its sentences."""
     if len(text) <= _LONG_CHARS:
-        return [(0, len(text))] if text.strip() else []
+        return [(0, len(text))] if _seen(text) else []
     found: list[Span] = []
     for sentence in _SENTENCE.finditer(text):
         low, high = sentence.span()
-        if not sentence[0].strip():
+        if not _seen(sentence[0]):
             continue
         if found and high - found[-1][0] <= _LONG_CHARS:
             found[-1] = found[-1][0], high
         else:
             found.append((low, high))
     return found
+
+
+def _seen(text: str) -> bool:
+    """Whether a text holds anything that the parser's vocabulary does not drop."""
+    return any(unicodedata.category(char)[0] in "LNPS" and char != "\ufffd" for char in text)
 
 
 def _resolved(written: WrittenAct, parsed: Parsed, text: str, offset: int) -> Act:

@@ -13,11 +13,11 @@ from typing import Final, Literal
 
 from chauffeur.concept import History, Limits, Parameters, Plan, PlanRequest, Situation, Thoughts
 from chauffeur.language import measured
+from chauffeur.language.meaning.reader import read
 from chauffeur.language.text_classifier import load_sorter, negated
 from chauffeur.memory.conflicts import conflicts_in
 from chauffeur.planners.arbitration import (
     SURE,
-    Said,
     Wish,
     asked,
     intent_pace,
@@ -36,10 +36,10 @@ from chauffeur.planners.onboard.options import Chosen, Declined, speed_words
 from chauffeur.planners.onboard.personal import Leaning
 from chauffeur.planners.onboard.thoughts import thoughts_of
 from chauffeur.planners.onboard.town import TownStep, snippets, steps_of, town_destination
-from chauffeur.planners.onboard.understand import meanings_said
 from chauffeur.planners.talk2drive.habits import SIGN_SETTING, kind_of, pace_of, speed_for
 from chauffeur.planners.talk2drive.hints import HINT_KINDS, WEIGHTS, Hint, goes_with, hint_of
 from chauffeur.planners.talk2drive.lanes import eased_mps, fitting_mps, mood_lane, passing_mps, unsaid_turn
+from chauffeur.planners.talk2drive.outright import Outright
 from chauffeur.planners.talk2drive.style import (
     BRISK_SHARE,
     LOOK_AHEAD,
@@ -141,6 +141,9 @@ class EmbeddedParameters:
             return ready.declined
         wish = ready.instruction.text
         request = replace(request, instruction=ready.instruction)
+        outright = Outright.of(read(wish))
+        if outright.asks:
+            return declined(self, _NOT_FOR_ME, begun, intent="refuse")
         if situation.world == "town":
             steps = steps_of(wish, snippets()) or ()
             if place := town_destination(wish) or _got_out_at(steps):
@@ -157,7 +160,7 @@ class EmbeddedParameters:
         hint = hint_of(wish, situation, request.history, reads[0] if reads else "") if known else None
         if situation.world == "parking" and (spot := _spot_read(wish, settled, hint)):
             return self._park(spot, request, begun)
-        if hint is not None and self._overrules(hint, settled, reads, wish, situation.world):
+        if hint is not None and self._overrules(hint, settled, reads, wish, situation.world, outright):
             return self._or_asked(self._as_meant(hint, request, begun), hint, request, begun)
         alike = hint is not None and any(goes_with(read, hint.kind) for read in reads)
         return self._as_read(settled, request, begun) if alike else self._asked_first(settled, request, begun)
@@ -180,20 +183,20 @@ class EmbeddedParameters:
         question = unanswered(request.instruction, f"{_TAKEN[hint.kind]} Is that right?")
         return asked(self, question, begun, offer=request.instruction.text) if question else plan
 
-    def _overrules(self, hint: Hint, settled: Settled | Plan, reads: Sequence[str], wish: str, world: str) -> bool:
+    def _overrules(
+        self, hint: Hint, settled: Settled | Plan, reads: Sequence[str], wish: str, world: str, outright: Outright
+    ) -> bool:
         """Whether what words hint at counts for more than how they were read."""
         amounts = measured(wish)
         if hint.kind == "else" or _asks_an_amount(amounts, settled, world):
             return False
-        meanings = meanings_said(wish)
         side, pace = _SIDE_OF_HINT.get(hint.kind, ""), _PACE_OF_HINT.get(hint.kind, 0)
-        said = Said.of(meanings)
-        if not hint.outright and said.contradicts(side=side, pace=pace):
+        if not hint.outright and outright.contradicts(side=side, pace=pace):
             return False
         if isinstance(settled, Plan):
             sure = _SURER if _forbidden(settled) and hint.kind in _BRISK else _SURE
             return hint.kind != "none" and hint.share >= sure
-        if not hint.outright and settled.written.sure >= SURE and settled.witnessed and said.plain:
+        if not hint.outright and settled.written.sure >= SURE and settled.witnessed and outright.plain:
             return any(goes_with(read, hint.kind) for read in reads) and hint.kind == "go"
         if any(dimension == "time" for dimension, _ in amounts) and any(map(_in_time, settled.steps)):
             return False
@@ -349,29 +352,23 @@ def _forbidden(declined: Plan) -> bool:
 
 
 def _at_pace(found: Parameters, intent: str, request: PlanRequest) -> tuple[Parameters, tuple[str, ...]]:
-    """Parameters at the speed this person likes for such wishes, and why in words."""
-    found, why = _liked(found, intent, request)
-    situation = request.context.situation
-    most = request.limits.most_mps(situation.speed_limit_mps)
-    if why and intent.startswith("style."):
-        return found, why  # what this person was glad of when they said so before is what they mean by it
-    speed = within_mood(found.target_speed_mps, intent_pace(intent), situation.speed_mps, most)
-    return (found, why) if speed == found.target_speed_mps else (replace(found, target_speed_mps=round(speed, 2)), ())
+    """Parameters at the speed this person likes for such wishes, and why in words.
 
-
-def _liked(found: Parameters, intent: str, request: PlanRequest) -> tuple[Parameters, tuple[str, ...]]:
-    """Parameters at the speed this person likes, whatever we drive now."""
+    A mood that calms goes above the present speed only for who found that too slow, one that quickens below it only for
+    who found that too fast.
+    """
     situation = request.context.situation
-    sign = situation.speed_limit_mps
-    if found.target_speed_mps == 0.0 or sign <= 0.0:
-        return found, ()
-    pace = pace_of(request.history, situation.world, intent, found.target_speed_mps / sign)
-    if pace is None:
-        return found, ()
-    speed = speed_for(pace, intent, situation.speed_mps, sign, request.limits.most_mps(sign))
-    if speed is None or speed == found.target_speed_mps:
-        return found, ()
-    return replace(found, target_speed_mps=speed), (pace.because,) if pace.because else ()
+    sign, chosen = situation.speed_limit_mps, found.target_speed_mps
+    most, mood = request.limits.most_mps(sign), intent_pace(intent)
+    pace = pace_of(request.history, situation.world, intent, chosen / sign) if chosen > 0.0 and sign > 0.0 else None
+    liked = None if pace is None else speed_for(pace, intent, situation.speed_mps, sign, most)
+    speed = chosen if liked is None else liked
+    if pace is not None and pace.share * sign <= chosen:
+        speed = min(speed, chosen)  # also below the least speed
+    if pace is None or pace.sign != -mood or not intent.startswith("style."):
+        speed = within_mood(speed, mood, situation.speed_mps, most)
+    why = (pace.because,) if pace is not None and pace.because and liked is not None and speed != chosen else ()
+    return replace(found, target_speed_mps=round(speed, 2)), why
 
 
 def _heeding(plan: Plan, request: PlanRequest) -> Plan:

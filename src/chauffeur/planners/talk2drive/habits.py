@@ -43,7 +43,7 @@ _EXACT: Final = (
 """What names its own speed, or none."""
 _UNREAD: Final = ("", "ask", "refuse", "unusable")
 
-_WANTED: Final[dict[str, str]] = {
+WANTED: Final[dict[str, str]] = {
     "no_overtake": "pass",
     "passed": "stay",
     "not_right": "right",
@@ -99,10 +99,12 @@ class Pace:
     Attributes:
         share: Of the speed limit.
         because: Which trip says so, a full sentence; empty where nothing was said against it.
+        sign: 1 where it was found too slow last, -1 where too fast, 0 where nothing was said against it.
     """
 
     share: float
     because: str
+    sign: Literal[-1, 0, 1] = 0
 
 
 def meant_before(history: History, world: str) -> tuple[Meant, ...]:
@@ -132,7 +134,7 @@ def kind_of(intent: str, route: str = "") -> str:
 def _meant(item: HistoryItem) -> Meant | None:
     if item.feedback:
         remark = sort_remark(item.feedback[-1].text)
-        wanted = _WANTED.get(remark.kind, "") if remark.share >= _SURE else ""
+        wanted = WANTED.get(remark.kind, "") if remark.share >= _SURE else ""
         if wanted:
             return Meant(wanted, True, item.similarity, _because(item))
     done = kind_of(item.intent, str(_policy(item).get("route", "")))
@@ -150,7 +152,8 @@ def pace_of(history: History, world: str, intent: str, chosen_share: float) -> P
     """The speed a person likes for wishes of this kind; None where no trip says anything.
 
     What was too slow at ease is too slow in a hurry, and what was too fast in a hurry is too fast at ease; a drive of
-    the same kind that nobody complained about is repeated. Later words count more than earlier ones.
+    the same kind that nobody complained about is repeated. Later words count more than earlier ones. Nothing that was
+    disliked makes a drive faster, unless it was found too slow.
 
     Args:
         history: What memory recalled.
@@ -161,7 +164,7 @@ def pace_of(history: History, world: str, intent: str, chosen_share: float) -> P
     group = _group(intent)
     if group is None:
         return None
-    share, because, known = chosen_share, "", False
+    pace, known = Pace(chosen_share, ""), False
     for item in reversed(_newest_first(history, world)):
         settings, of = dict(item.settings), _group(item.intent)
         sign = settings.get(SIGN_SETTING, 0.0)
@@ -170,13 +173,13 @@ def pace_of(history: History, world: str, intent: str, chosen_share: float) -> P
         driven, said = settings["target_speed_mps"] / sign, item.feedback[-1]
         same = of == group and (group != "plain" or _family(item.intent) == _family(intent))
         step = _STEP * said.strength**_CURVE
-        if said.speed > 0 and (same or _RANK[of] < _RANK[group]) and share < driven * (1.0 + step):
-            share, because, known = driven * (1.0 + step), _because(item), True
-        elif said.speed < 0 and (same or _RANK[of] > _RANK[group]) and share > driven * (1.0 - step):
-            share, because, known = driven * (1.0 - step), _because(item), True
-        elif not said.speed and same:
-            share, because, known = driven, "", True
-    return Pace(share, because) if known else None
+        if said.speed > 0 and (same or _RANK[of] < _RANK[group]) and pace.share < driven * (1.0 + step):
+            pace, known = Pace(driven * (1.0 + step), _because(item), 1), True
+        elif said.speed < 0 and (same or _RANK[of] > _RANK[group]) and pace.share > driven * (1.0 - step):
+            pace, known = Pace(driven * (1.0 - step), _because(item), -1), True
+        elif not said.speed and same and said.approval >= 0:
+            pace, known = Pace(driven, ""), True
+    return pace if known else None
 
 
 def speed_for(pace: Pace, intent: str, now_mps: float, sign_mps: float, cap_mps: float) -> float | None:

@@ -28,6 +28,8 @@ HINT_KINDS: Final[Mapping[str, tuple[str, ...]]] = {
 """What can be meant, by world. `none`: nothing that is for the driver; `else`: a wish of another kind, which has to be
 read word by word."""
 
+_ENDS: Final = (*".!?", "")
+"""What was learned from ends so; who leaves the full stop out means the same."""
 _BEHIND: Final = ("stay", "right", "slower", "faster")
 """What may be meant of who says outright that nobody is to be passed."""
 _CHATS: Final = 0.6
@@ -95,7 +97,7 @@ def hint_of(wish: str, situation: Situation, history: History, read: str = "") -
     kinds = _possible(situation)
     if not kinds:
         return None
-    said = load_sorter(WEIGHTS).shares(wish, kinds)
+    said = load_sorter(WEIGHTS).shares(wish if wish.rstrip()[-1:] in _ENDS else f"{wish.rstrip()}.", kinds)
     outright = told(wish) if "pass" in kinds and said.get("none", 0.0) < _CHATS else ""
     if outright == "pass":
         return Hint("pass", 1.0, outright=True)
