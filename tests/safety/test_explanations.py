@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from chauffeur.planners.onboard.retrieval import RetrievalPlanner
 
 from chauffeur.concept import (
     LAMPILOT_LIMITS,
@@ -22,7 +23,6 @@ from chauffeur.concept import (
 )
 from chauffeur.describe import describe
 from chauffeur.planners.keyword import KeywordPlanner
-from chauffeur.planners.onboard.retrieval import RetrievalPlanner
 from chauffeur.safety.faithfulness import (
     Effect,
     FactSurroundings,

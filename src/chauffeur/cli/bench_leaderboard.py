@@ -16,9 +16,7 @@ _WHERE = "Where it runs"
 
 
 def leaderboard(
-    planner: Annotated[
-        str, typer.Option(help="`expert`, `reckless`, `standing`, or a planner: `onboard`.")
-    ] = "expert",
+    planner: Annotated[str, typer.Option(help="`expert`, `reckless`, `standing`, or a planner: `onboard`.")] = "expert",
     routes: Annotated[str, typer.Option(help="Route file (XML), or `own`.")] = "own",
     scenarios: Annotated[str, typer.Option(help="`public`, `ten` or `none`.")] = "public",
     triggers: Annotated[str, typer.Option(help="Trigger file or folder, where it is elsewhere.")] = "",

@@ -17,8 +17,8 @@ from chauffeur.drive.talk.attention import Attention
 from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.voice import Voice
 from chauffeur.drive.talk.wish_queue import Words
+from chauffeur.language.meaning.turns import answer_in
 from chauffeur.language.questions import ends_session
-from chauffeur.speech.answers import answer_in
 
 _EVALUATE: Final = "evaluate"
 _LEAVING: Final = "You end the session."

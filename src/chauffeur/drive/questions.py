@@ -9,7 +9,7 @@ from typing import Final
 
 from chauffeur.concept import Instruction, PersonId
 from chauffeur.drive.session import parse_wish
-from chauffeur.speech.answers import answer_in
+from chauffeur.language.meaning.turns import answer_in
 
 ANSWER_WITHIN_S: Final = 20.0
 """So long a yes is taken for an answer."""

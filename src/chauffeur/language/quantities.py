@@ -101,6 +101,13 @@ class Quantity:
     inner: str = ""
 
 
+_SPEED_UNITS: Final = (("mph", units.MPS_PER_MPH, ("mph", "mi")), ("km/h", units.MPS_PER_KMH, ("k",)), ("m/s", 1.0, ()))
+_LENGTH_UNITS: Final = (
+    ("lengths", units.M_PER_CAR_LENGTH, ("length",)), ("ft", units.M_PER_FOOT, ("ft", "foot", "feet")),
+    ("yd", units.M_PER_YARD, ("yd", "yard")), ("km", 1000.0, ("km", "kilo")), ("m", 1.0, ()),
+)  # fmt: skip
+
+
 def mark_quantities(tokens: list[str]) -> tuple[list[str], list[Quantity]]:
     """Replace every quantity in the tokens by a mark `#k`; k counts from 0."""
     out: list[str] = []
@@ -121,6 +128,21 @@ def mark_quantities(tokens: list[str]) -> tuple[list[str], list[Quantity]]:
 def read_quantities(text: str) -> tuple[Quantity, ...]:
     """All quantities of a text, in order."""
     return tuple(mark_quantities(tokens_of(text))[1])
+
+
+def amount_said(quantity: Quantity) -> tuple[float, str]:
+    """A quantity in the unit in which it was said."""
+    if quantity.dimension == "speed":
+        known = _SPEED_UNITS
+    elif quantity.dimension == "distance":
+        known = _LENGTH_UNITS
+    else:
+        return quantity.value, {"time": "s", "share": "share", "lanes": "lanes"}.get(quantity.dimension, "")
+    words = quantity.said.lower().split()
+    for unit, factor, marks in known:
+        if not marks or any(word.startswith(mark) for word in words for mark in marks):
+            return round(quantity.value / factor, 6), unit
+    raise AssertionError("the last unit of each list has no marks")
 
 
 def number_of(tokens: list[str]) -> list[str]:

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from chauffeur.concept import ConfigError
-from chauffeur.speech.answers import answer_in
+from chauffeur.language.meaning.turns import answer_in
 from chauffeur.speech.audio import SAMPLE_RATE_HZ, Recording, Samples, level_notes
 from chauffeur.speech.base import HOTWORDS, Expect, FollowingRecogniser, Heard, Hotword, Recogniser, Timing, Transcript
 from chauffeur.speech.detector import FRAME, SileroDetector, VoiceDetector

@@ -68,6 +68,7 @@ from chauffeur.drive.planning import (
 from chauffeur.drive.questions import NOT_MEANT, NOTHING_ASKED, OpenQuestion
 from chauffeur.drive.session import MAX_WISH_CHARACTERS
 from chauffeur.drive.session_recorder import FLUSH_TIMEOUT_S
+from chauffeur.language.meaning.turns import takes_back
 from chauffeur.language.questions import said_aside
 from chauffeur.memory.base import Memory
 from chauffeur.memory.feedback import interpret_feedback
@@ -77,7 +78,6 @@ from chauffeur.planners.talk2drive.planner import system_text
 from chauffeur.planners.talk2drive.style import LOOK_AHEAD
 from chauffeur.safety.audit.writer import utc_now
 from chauffeur.safety.words import reasons_once
-from chauffeur.speech.answers import takes_back
 from chauffeur.worlds.ros import Published, RosVehicleState, VehicleError, VehicleInterface
 from chauffeur.worlds.ros.autoware_ai import AutowareAi, PlannedSpeed
 from chauffeur.worlds.ros.settings import VehicleSettings

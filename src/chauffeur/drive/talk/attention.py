@@ -20,7 +20,7 @@ from chauffeur.drive.talk.sound import Sound
 from chauffeur.drive.talk.voice import Voice
 from chauffeur.drive.talk.wish_queue import Words
 from chauffeur.language.emergency import read_emergency
-from chauffeur.speech.answers import answer_in
+from chauffeur.language.meaning.turns import answer_in
 from chauffeur.speech.base import Heard
 
 

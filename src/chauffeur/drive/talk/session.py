@@ -56,10 +56,10 @@ from chauffeur.drive.talk.view import View
 from chauffeur.drive.talk.voice import Voice
 from chauffeur.drive.talk.wish_queue import OVER, WishQueue, Words
 from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency
+from chauffeur.language.meaning.turns import answer_in, takes_back
 from chauffeur.language.questions import ends_session
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.safety.bounds import shoulder_at_right
-from chauffeur.speech.answers import answer_in, takes_back
 
 ASK_AFTER_S: Final = 15.0
 """So long a wish is driven, in the car's time, before the car asks how it is: many have no end of their own."""

@@ -9,19 +9,20 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
 
-from chauffeur.concept.units import M_PER_CAR_LENGTH, M_PER_FOOT, M_PER_YARD, MPS_PER_KMH, MPS_PER_MPH
 from chauffeur.concept.utterance import Act, ActPlace, Reference, Span, Utterance
 from chauffeur.language.emergency import read_emergency
+from chauffeur.language.meaning.dialogue import resolved
 from chauffeur.language.meaning.parser import Parsed, Parser, shipped_parser, spans_of
 from chauffeur.language.meaning.symbols import WrittenAct
-from chauffeur.language.quantities import Quantity, read_quantities
+from chauffeur.language.meaning.turns import closed_turn
+from chauffeur.language.quantities import amount_said, read_quantities
 
 MOST_CHARS: Final = 1_000
 """What stands behind them is not read, and is told as unused."""
 _SENTENCE: Final = re.compile(r"[^.!?;\n]*[.!?;\n]*")
 _LONG_CHARS: Final = 240
 """A longer text is read sentence by sentence: the parser was trained on texts up to 300 characters."""
-_SURE_BIAS, _SURE_SLOPE = 1.58, 1.81
+SURE_BIAS, SURE_SLOPE = 1.58, 1.81
 """Logistic map from the string's log-probability to the share of right readings, fitted on real commands that no
 training saw: 273 of 300 lie above -1, of which 73 % are right; of the rest half are (`benchmarks/meaning.py`)."""
 _WORD: Final = re.compile(r"\w[\w'’]*")
@@ -33,64 +34,73 @@ _COURTESY_WORDS: Final = (
 )
 _COURTESY: Final = frozenset(_COURTESY_WORDS.split())
 """Words whose being unused tells a person nothing."""
-_SPEED_UNITS: Final = (("mph", MPS_PER_MPH, ("mph", "mi")), ("km/h", MPS_PER_KMH, ("k",)), ("m/s", 1.0, ()))
-_LENGTH_UNITS: Final = (
-    ("lengths", M_PER_CAR_LENGTH, ("length",)), ("ft", M_PER_FOOT, ("ft", "foot", "feet")),
-    ("yd", M_PER_YARD, ("yd", "yard")), ("km", 1000.0, ("km", "kilo")), ("m", 1.0, ()),
-)  # fmt: skip
 
 
-def read(text: str, parser: Parser | None = None) -> Utterance:
+def read(text: str, last: Utterance | None = None, parser: Parser | None = None) -> Utterance:
     """What a passenger's words mean. Never raises for any text.
 
     Args:
         text: The words as they came; `MOST_CHARS` of them are read.
+        last: What was said before, for words that mean something only beside it ("the other one"); None for nothing.
         parser: Reads; default the shipped one.
     """
+    emergency = read_emergency(text) is not None
+    if turns := closed_turn(text):
+        return resolved(Utterance(text, turns, emergency=emergency), last)
     reads = shipped_parser() if parser is None else parser
     acts: list[Act] = []
     opinion: list[Act] = []
     address, log_probability = "car", 0.0
-    for low, high in _stretches(text[:MOST_CHARS]):
+    for low, begins, high in _stretches(text[:MOST_CHARS]):
         parsed = reads.parse(text[low:high])
-        read_here = [_resolved(act, parsed, text[low:high], low) for act in parsed.acts]
+        found = [_resolved(act, parsed, text[low:high], low) for act in parsed.acts]
+        found = [act for act in found if act.span is None or act.span[1] > begins]
         if parsed.address == "car":
-            acts += read_here
+            acts = [act for act in acts if not any(_overlap(act, later) for later in found)] + found
         elif parsed.address == "feedback":
-            opinion += read_here
+            opinion += found
         log_probability += parsed.log_probability
         address = parsed.address if parsed.address != "car" and not acts else address
-    sure = 1.0 / (1.0 + math.exp(-(_SURE_BIAS + _SURE_SLOPE * max(log_probability, -20.0))))
-    return Utterance(
+    sure = 1.0 / (1.0 + math.exp(-(SURE_BIAS + SURE_SLOPE * max(log_probability, -20.0))))
+    said = Utterance(
         text,
         tuple(acts),
         tuple(opinion),
         "car" if acts else address,
-        read_emergency(text) is not None,
+        emergency,
         sure,
         tuple(_unused(text, (act.span for act in acts if act.span is not None))),
     )
+    return resolved(said, last)
 
 
-def _stretches(text: str) -> list[Span]:
-    """The text in one piece, or a long one in its sentences."""
+def _stretches(text: str) -> list[tuple[int, int, int]]:
+    """The text in one piece, or a long one sentence by sentence: where what is read begins, where that which was not
+    read before begins, and where both end. The sentence before is read along: an act may be said in two breaths."""
     if len(text) <= _LONG_CHARS:
-        return [(0, len(text))] if _seen(text) else []
-    found: list[Span] = []
+        return [(0, 0, len(text))] if _seen(text) else []
+    found: list[tuple[int, int, int]] = []
+    before = 0
     for sentence in _SENTENCE.finditer(text):
         low, high = sentence.span()
         if not _seen(sentence[0]):
             continue
         if found and high - found[-1][0] <= _LONG_CHARS:
-            found[-1] = found[-1][0], high
+            found[-1] = *found[-1][:2], high
         else:
-            found.append((low, high))
+            found.append((before if found and high - before <= _LONG_CHARS else low, low, high))
+        before = low
     return found
 
 
 def _seen(text: str) -> bool:
     """Whether a text holds anything that the parser's vocabulary does not drop."""
     return any(unicodedata.category(char)[0] in "LNPS" and char != "\ufffd" for char in text)
+
+
+def _overlap(act: Act, later: Act) -> bool:
+    """Whether an act was read again with more of its words."""
+    return act.span is not None and later.span is not None and act.span[1] > later.span[0]
 
 
 def _resolved(written: WrittenAct, parsed: Parsed, text: str, offset: int) -> Act:
@@ -115,7 +125,7 @@ def _amount(token: int, parsed: Parsed, text: str, high: int) -> tuple[float, st
     """The quantity that begins at a token, in the unit in which it was said; None where the rules find none there."""
     start, _ = spans_of(parsed, (token,))
     found = read_quantities(text[start : max(high, start + 1)])
-    return _said(found[0]) if found else None
+    return amount_said(found[0]) if found else None
 
 
 def _named(
@@ -129,21 +139,6 @@ def _named(
         low, high = spans_of(parsed, tokens)
         name = text[low:high].strip(" .,;:!?\"'").lower()
     return replace(reference, name=name, of=_named(reference.of, names, parsed, text))
-
-
-def _said(quantity: Quantity) -> tuple[float, str]:
-    """A quantity in the unit in which it was said."""
-    if quantity.dimension == "speed":
-        units = _SPEED_UNITS
-    elif quantity.dimension == "distance":
-        units = _LENGTH_UNITS
-    else:
-        return quantity.value, {"time": "s", "share": "share", "lanes": "lanes"}.get(quantity.dimension, "")
-    words = quantity.said.lower().split()
-    for unit, factor, marks in units:
-        if not marks or any(word.startswith(mark) for word in words for mark in marks):
-            return round(quantity.value / factor, 6), unit
-    raise AssertionError("the last unit of each list has no marks")
 
 
 def _unused(text: str, spans: Iterable[Span]) -> Iterable[Span]:

@@ -14,8 +14,8 @@ from chauffeur.bench.lampilot.scenes.wishes import Named, SceneWish
 from chauffeur.language import read_quantities
 from chauffeur.language.quantities import mark_quantities
 from chauffeur.language.tokens import plain, tokens_of
-from chauffeur.planners.onboard.understand import understand
 from chauffeur.planners.onboard.meaning import Amount, Manoeuvre, Meaning, NotUnderstood, Side
+from chauffeur.planners.onboard.understand import understand
 
 MIN_WORDS, MAX_WORDS = 2, 14
 """Of LaMPilot's instructions (Tab. III)."""
