@@ -48,7 +48,7 @@ _SHIELD: Final = tuple(
     f"tests/safety/test_shield{part}.py" for part in ("_rules_edges", "_crossing_edges", "_edges", "")
 )
 _CROSSING: Final = ("tests/safety/test_shield_crossing.py", "tests/safety/test_shield_traffic_arrays.py")
-_AUDIT: Final = tuple(f"tests/safety/test_audit{part}.py" for part in ("_words", "_edges", "_privacy", ""))
+_AUDIT: Final = tuple(f"tests/safety/test_audit{part}.py" for part in ("_verdicts", "_words", "_edges", "_privacy", ""))
 _AUDIT_FILE: Final = tuple(f"tests/safety/test_audit_{part}.py" for part in ("writer_edges", "writer", "edges"))
 _FAITHFULNESS: Final = tuple(
     f"tests/safety/test_faithfulness_{part}.py"

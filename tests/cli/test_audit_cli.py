@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import io
-import json
 from pathlib import Path
 
 import pytest
@@ -20,7 +18,7 @@ from chauffeur.drive.scenarios import find
 from chauffeur.safety.audit import AuditLog, Closing, head_path
 
 KEY = b"a key of thirty-two bytes, quite"
-COMMANDS = ["verify", "show", "export", "redact"]
+COMMANDS = ["verify", "redact"]
 
 app = typer.Typer(cls=FriendlyGroup)
 
@@ -45,18 +43,8 @@ def write(path: Path, *, key: bytes | None = None, private: bool = False) -> str
     log = AuditLog(path, about={"scenario": "cruise", "seed": 7, "simulated": True}, key=key, private=private)
     log.append("wish", {"source": "text"}, {"person": "ana", "wish": "=Faster, [bold]please[/]\x1b[2J 快点"})
     log.append("verdict", {"check": "format-v1", "passed": False, "line": 3}, {"person": "ana", "reason": "No loop."})
-    rows = [[4, 0.4, "2 m too close", [1.5, 0.1], [-3.0, 0.1]]]
-    log.append("intervention", {"rule": "gap-v1", "interventions": rows})
-    log.append(
-        "actuation",
-        {
-            "ticks": [0, 1],
-            "time_s": [0.0, 0.1],
-            "requested": [[0.25, 0.0], [1.5, -0.1]],
-            "applied_otherwise": [[1, 1.0, -0.1]],
-        },
-    )
-    log.append("actuation", {"ticks": "of another kind"})
+    for number in range(3):
+        log.append("actuation", {"ticks": [number, number]})
     return log.close().head
 
 
@@ -97,10 +85,6 @@ def test_tampering_is_exit_code_1_with_line_and_words(log: Path) -> None:
     assert result.exit_code == 1
     assert "Not as it was written" in result.output
     assert "line 3: record 2 (verdict) was changed" in one_line(result)
-    for command in (["show", log], ["export", log, "--out", log.with_suffix(".csv")]):
-        result = invoke(*command)
-        assert result.exit_code == 1
-        assert "record 2 (verdict) was changed" in one_line(result)
 
 
 def test_a_cut_off_end_shows_against_the_head(log: Path) -> None:
@@ -143,10 +127,6 @@ def test_bad_input_is_exit_code_2_with_a_hint(log: Path, tmp_path: Path) -> None
         ["verify", notes],
         ["verify", log, "--head", "5d1c"],
         ["verify", log, "--key", tmp_path / "absent"],
-        ["show", log, "--kind", "rumour"],
-        ["show", log, "--from", "yesterday"],
-        ["export", log, "--out", tmp_path / "audit.xlsx"],
-        ["export", log, "--out", log],
         ["redact", tmp_path / "absent", "--as", "ana", "--yes"],
     ]
     for arguments in bad:
@@ -154,46 +134,6 @@ def test_bad_input_is_exit_code_2_with_a_hint(log: Path, tmp_path: Path) -> None
         assert result.exit_code == 2, arguments
         assert "Error:" in result.output
         assert "Traceback" not in result.output
-
-
-def test_show_reads_like_a_table_and_says_that_it_is_simulated(log: Path) -> None:
-    result = invoke("show", log)
-    assert result.exit_code == 0
-    text = one_line(result)
-    assert "simulated drive" in text
-    assert "format-v1, line 3: refused" in text
-    assert "gap-v1, tick 4 (0.4 s): 1.50 m/s², 0.100 rad -> -3.00 m/s², 0.100 rad: 2 m too close" in text
-    assert "ticks 0 to 1 (0.0 to 0.1 s): 2 commands, 0.25 to 1.50 m/s²" in text
-    assert "1 applied otherwise than asked" in text
-    assert "of another kind" in text
-    assert "[bold]please[/]" in text  # not taken for markup
-    assert "\x1b[2J" not in result.output
-
-
-def test_show_takes_kinds_and_bounds(log: Path) -> None:
-    text = invoke("show", log, "--kind", "verdict", "--kind", "wish").output
-    assert "format-v1" in text
-    assert "gap-v1" not in text
-    text = invoke("show", log, "--from", "3", "--to", "3").output
-    assert "gap-v1" in text
-    assert "format-v1" not in text
-    assert "gap-v1" in invoke("show", log, "--from", "2020-01-01").output
-    assert "gap-v1" not in invoke("show", log, "--to", "2020-01-01T00:00:00+01:00").output
-
-
-def test_export_writes_what_was_recorded_and_no_salts(log: Path, tmp_path: Path) -> None:
-    lines, table = tmp_path / "out" / "audit.jsonl", tmp_path / "audit.csv"
-    assert "7 records written" in invoke("export", log, "--out", lines).output
-    rows = [json.loads(line) for line in lines.read_text().splitlines()]
-    assert [row["seq"] for row in rows] == list(range(7))
-    assert rows[1]["texts"] == {"person": "ana", "wish": "=Faster, [bold]please[/]\x1b[2J 快点"}
-    assert rows[3]["body"]["rule"] == "gap-v1"
-    assert "salt" not in lines.read_text()
-    assert invoke("export", log, "--out", table, "--kind", "actuation").exit_code == 0
-    with table.open(newline="") as file:
-        cells = list(csv.DictReader(file))
-    assert [row["kind"] for row in cells] == ["actuation"] * 2
-    assert json.loads(cells[0]["body"])["requested"] == [[0.25, 0.0], [1.5, -0.1]]
 
 
 def test_the_environment_names_key_and_privacy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -233,5 +173,4 @@ def test_redact_asks_first_and_is_told_of_afterwards(log: Path) -> None:
     assert result.exit_code == 0
     assert "4 texts redacted" in one_line(result)
     assert "1 record written after it" in one_line(result)
-    assert "[redacted]" in invoke("show", log, "--kind", "wish").output
     assert "holds no words of 'ana'" in one_line(invoke("redact", log, "--as", "ana", "--yes"))

@@ -57,8 +57,6 @@ FILES: Final = (
     "show speech {in}.wav --button command",
     "bench leaderboard --routes {in}.xml --scenarios none --seeds 1 --out {out} --workers 1",
     "audit verify {in}",
-    "audit show {in}",
-    "audit export {in} --out {out}",
     "vehicle check {in}.toml --wait 0",
     "vehicle apply {in}.toml --speed 3 --dry-run",
     "vehicle release {in}.toml",

@@ -20,11 +20,11 @@ from chauffeur.describe.services import (
     Unknown,
     load_rules,
     packaged_regions,
-    with_surroundings,
 )
 from chauffeur.describe.services.outside import WITHHELD, quoted
 from chauffeur.describe.services.overpass import read_ways
 from chauffeur.describe.services.roads import place_at
+from chauffeur.describe.services.sourced import with_sources
 from chauffeur.describe.services.surroundings import weather_words
 from chauffeur.describe.services.traffic import TrafficReport, read_traffic
 from chauffeur.describe.services.units import age_words, distance_words, speed_words
@@ -143,18 +143,9 @@ def test_weather_in_words() -> None:
     assert Weather(()).night(NOW) is None
 
 
-def test_context_with_surroundings() -> None:
-    found = surroundings(RoadMap([way(1, "primary", (-500, 0), (500, 0), name="High Street")]))
-    context = with_surroundings(CONTEXT, found)
-    assert context.text.startswith("I am driving at 10.0 m/s. Weather: not known")
-    assert context.situation.scene[0] == ("sign", "Town centre")
-    assert context.situation.scene[1:] == found.scene()
-    assert context.situation.speed_limit_mps == 13.9
-
-
 def check_plain(found: Surroundings) -> None:
     """Every line is short, is one line, and goes through the screening of a drive unchanged."""
-    context = with_surroundings(CONTEXT, found)
+    context = with_sources(CONTEXT, found)
     request = PlanRequest(Instruction("Go on"), context, SystemMessage(""))
     screened, noted = screen_request(request)
     assert noted == ()

@@ -9,7 +9,8 @@ from memory_trips import context, trip
 
 from chauffeur.concept import Instruction, PersonId, Situation
 from chauffeur.describe.services.readings import ServiceReading, Unknown
-from chauffeur.describe.services.surroundings import Surroundings, with_surroundings
+from chauffeur.describe.services.sourced import with_sources
+from chauffeur.describe.services.surroundings import Surroundings
 from chauffeur.describe.services.weather import Weather
 from chauffeur.language.weather import DRY, FOG, RAIN, SNOW, UNKNOWN, weather_in, weather_of
 from chauffeur.memory import VaultMemory
@@ -47,7 +48,7 @@ def test_where_nobody_told_the_weather_it_is_unknown() -> None:
 )
 def test_what_the_services_say_is_understood(weather: ServiceReading[Weather] | Unknown, bits: int) -> None:
     no = Unknown("offline")
-    there = with_surroundings(context(), Surroundings(None, 0.0, weather, no, no, no, no, no))  # type: ignore[arg-type]
+    there = with_sources(context(), Surroundings(None, 0.0, weather, no, no, no, no, no))  # type: ignore[arg-type]
     assert weather_of(there.situation) == bits
     assert weather_in(there.text) == bits
 

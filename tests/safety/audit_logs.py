@@ -12,7 +12,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from chauffeur.safety.audit import AuditLog, AuditVerification, Closing, verify_stream
+from chauffeur.safety.audit import AuditLog, AuditVerification, Closing, Kind, verify_stream
+from chauffeur.safety.audit.entries import NO_RECORD, seal
 
 KEY = b"a key of thirty-two bytes, quite"
 OTHER_KEY = b"another key of thirty-two bytes!"
@@ -73,6 +74,15 @@ def far_east() -> Generator[None]:
         else:
             os.environ["TZ"] = before
         time.tzset()
+
+
+def chain(*records: tuple[Kind, dict[str, Any]], key: bytes | None = None) -> list[bytes]:
+    """Lines of a log in which every hash is right."""
+    before, written = NO_RECORD, list[bytes]()
+    for seq, (kind, body) in enumerate(records):
+        line, before = seal(seq, before, kind, "2026-01-02T03:04:05.000+00:00", body, {}, key)
+        written.append(line)
+    return written
 
 
 def look(content: bytes, *, head: str | None = None, key: bytes | None = None) -> AuditVerification:

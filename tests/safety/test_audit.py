@@ -7,15 +7,13 @@ import hmac
 import json
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 from audit_logs import ABOUT, KEY, OTHER_KEY, WISH, fields, look, write
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from chauffeur.concept import ConfigError, DataError
-from chauffeur.safety.audit import KINDS, Kind, head_path, read_key, read_records, verify, words_of
+from chauffeur.safety.audit import KINDS, head_path, read_records, verify, words_of
 from chauffeur.safety.audit.entries import NotARecordError, parse, seal, storable
 from chauffeur.version import __version__
 
@@ -136,7 +134,7 @@ def test_records_taken_out_of_the_middle_are_found(log: tuple[bytes, str, bytes 
     assert not found.ok
     removed_at = min(gone) + 1
     assert found.findings[0].line == removed_at
-    assert ("its beginning was removed" if removed_at == 1 else "not where it belongs") in found.findings[0].what
+    assert found.findings[0].code == ("begin_missing" if removed_at == 1 else "missing")
 
 
 @given(st.integers(0, 13), st.integers(0, 13))
@@ -171,27 +169,6 @@ def test_foreign_lines_are_found(plain_log: tuple[bytes, str], junk: bytes, plac
     assert found.findings[0].line == place + 1
 
 
-@pytest.mark.parametrize(("seq", "prev", "kind"), [(1, "0", "opened"), (0, "f", "opened"), (0, "0", "wish")])
-def test_what_cannot_be_a_first_record_is_found(seq: int, prev: str, kind: Kind) -> None:
-    found = look(seal(seq, prev * 64, kind, "", {}, {}, None)[0])
-    assert "its beginning was removed" in found.findings[0].what
-
-
-def test_a_repeated_record_is_named(plain_log: tuple[bytes, str]) -> None:
-    lines = plain_log[0].splitlines(keepends=True)
-    found = look(b"".join([*lines[:4], lines[3], *lines[4:]]))
-    assert str(found.findings[0]) == "line 5: record 3 (verdict) stands here, where record 4 belongs."
-
-
-def test_a_record_changed_together_with_its_hash_is_found_at_the_next(plain_log: tuple[bytes, str]) -> None:
-    lines = plain_log[0].splitlines(keepends=True)
-    old = fields(lines[5])
-    lines[5], _ = seal(5, old["prev"], old["kind"], old["time"], {"ticks": [0, 1]}, {}, None)
-    found = look(b"".join(lines))
-    assert [finding.line for finding in found.findings] == [7]
-    assert "was not written after the record before it" in found.findings[0].what
-
-
 def test_a_cut_off_end_is_found_by_the_head_alone(log: tuple[bytes, str, bytes | None]) -> None:
     content, head, key = log
     lines = content.splitlines(keepends=True)
@@ -200,7 +177,7 @@ def test_a_cut_off_end_is_found_by_the_head_alone(log: tuple[bytes, str, bytes |
         assert look(shortened, key=key).ok  # the chain does not know how long it should be: docs/audit.md says so
         assert not look(shortened, key=key).closed
         found = look(shortened, head=head, key=key)
-        assert ["its end was cut off" in finding.what for finding in found.findings] == [True]
+        assert [finding.code for finding in found.findings] == ["head_absent"]
 
 
 def _rewritten(content: bytes, key: bytes | None) -> bytes:
@@ -225,42 +202,8 @@ def test_a_log_written_anew_is_found_by_head_or_key(log: tuple[bytes, str, bytes
     for forger in (None, OTHER_KEY):
         assert not look(_rewritten(content, forger), key=key).ok
     assert look(_rewritten(content, key), key=key).ok  # who has the key can
-    assert "lacks a seal" in str(look(_rewritten(content, None)).findings[0])
-    assert "another key" not in str(look(content).findings)
-    assert "written under the key" in look(content, key=OTHER_KEY).findings[0].what
-
-
-def test_a_key_given_for_a_log_without_one_is_not_taken_for_checked(plain_log: tuple[bytes, str]) -> None:
-    found = look(plain_log[0], key=KEY)
-    assert not found.ok
-    assert "without a key" in found.findings[0].what
-
-
-OTHER_FORMS = {
-    "spaces": lambda line: json.dumps(json.loads(line), sort_keys=True).encode(),
-    "order": lambda line: json.dumps(dict(reversed(json.loads(line).items())), separators=(",", ":")).encode(),
-    "escapes": lambda line: line.replace(b"\\u00dc", b"\\u00DC"),
-    "letters": lambda line: line.replace(b"\\u00dc", "Ü".encode()),
-    "twice": lambda line: line.replace(b'"seq":', b'"seq":99,"seq":'),
-    "return": lambda line: line + b"\r",
-}
-
-
-@pytest.mark.parametrize("form", OTHER_FORMS)
-def test_the_same_record_in_another_form_is_found(plain_log: tuple[bytes, str], form: str) -> None:
-    lines = plain_log[0].splitlines()
-    lines[1] = OTHER_FORMS[form](lines[1])
-    found = look(b"\n".join([*lines, b""]))
-    assert [str(finding) for finding in found.findings] == [
-        "line 2: it is not written the way Chauffeur writes a record."
-    ]
-
-
-def test_one_change_does_not_drown_the_reader(plain_log: tuple[bytes, str]) -> None:
-    lines = plain_log[0].splitlines(keepends=True)
-    assert len(look(b"".join([*lines[:4], b"{}\n", *lines[5:]])).findings) == 1
-    many = look(lines[0] + b"junk\n" * 500)
-    assert (len(many.findings), many.more_findings) == (100, 400)
+    assert look(_rewritten(content, None)).findings[0].code == "seal_missing"
+    assert look(content, key=OTHER_KEY).findings[0].code == "other_key"
 
 
 def test_the_head_file_is_used_when_it_is_there(tmp_path: Path) -> None:
@@ -274,37 +217,6 @@ def test_the_head_file_is_used_when_it_is_there(tmp_path: Path) -> None:
     assert verify(path, head=fields(lines[3])["hash"]).after_head == len(lines) - 5
     head_path(path).unlink()
     assert verify(path).after_head is None
-
-
-def test_what_is_no_log_is_said(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="no audit log"):
-        verify(tmp_path / "absent")
-    notes = tmp_path / "notes.txt"
-    notes.write_text("Dear diary,\nnothing happened.\n")
-    with pytest.raises(DataError, match="not an audit log"):
-        verify(notes)
-    with pytest.raises(DataError, match="cannot be read"):
-        verify(tmp_path)
-    with pytest.raises(ConfigError, match="64 hexadecimal"):
-        verify(notes, head="abc")
-    empty = tmp_path / "empty"
-    empty.write_bytes(b"")
-    assert not verify(empty).ok
-    newer, _ = seal(0, "0" * 64, "opened", "", {"format": 3}, {}, None)
-    notes.write_bytes(newer)
-    with pytest.raises(DataError, match="reads up to 2"):
-        verify(notes)
-
-
-def test_keys_are_long_enough(tmp_path: Path) -> None:
-    path = tmp_path / "key"
-    path.write_bytes(b"short")
-    with pytest.raises(ConfigError, match="5 bytes"):
-        read_key(path)
-    with pytest.raises(ConfigError, match="cannot be read"):
-        read_key(tmp_path / "absent")
-    path.write_bytes(KEY)
-    assert read_key(path) == KEY
 
 
 def test_records_come_back(tmp_path: Path) -> None:
@@ -340,15 +252,3 @@ def test_any_body_is_written_and_read(body: dict[str, object], seq: int) -> None
 def test_what_is_no_record_is_refused_in_one_way(line: bytes) -> None:
     with pytest.raises(NotARecordError):
         parse(line)
-
-
-@pytest.mark.parametrize("seq", [True, -1, 1 << 63, 0.0, "0"])
-def test_a_number_that_counts_nothing_is_none(seq: Any) -> None:
-    line, _ = seal(seq, "0" * 64, "plan", "now", {}, {}, None)
-    with pytest.raises(NotARecordError, match="fields"):
-        parse(line[:-1])
-
-
-def test_deep_nesting_is_no_record() -> None:
-    with pytest.raises(NotARecordError):
-        parse(b'{"body":' + b"[" * 100_000)

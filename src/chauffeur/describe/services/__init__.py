@@ -6,7 +6,7 @@ from chauffeur.describe.services.road_map import RoadMap
 from chauffeur.describe.services.rules import load_rules, packaged_regions
 from chauffeur.describe.services.settings import ServiceSettings
 from chauffeur.describe.services.sources import Sources, read_sources
-from chauffeur.describe.services.surroundings import Surroundings, with_surroundings
+from chauffeur.describe.services.surroundings import Surroundings
 from chauffeur.describe.services.survey import ContextServices
 
 __all__ = [
@@ -22,5 +22,4 @@ __all__ = [
     "load_rules",
     "packaged_regions",
     "read_sources",
-    "with_surroundings",
 ]

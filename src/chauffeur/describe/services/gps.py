@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, Protocol
 
-from chauffeur.concept import ConfigError
+from chauffeur.describe.services.outside import number
 from chauffeur.describe.services.readings import Position, Unknown
 
 FRESH_S: Final = 3.0
@@ -147,24 +147,10 @@ class Gpsd:
 
 def read_fix(report: dict[str, Any]) -> Position | None:
     """The place of a `TPV` report; None where it has no fix, or one that cannot be."""
-    latitude, longitude = _number(report.get("lat")), _number(report.get("lon"))
+    latitude, longitude = number(report, "lat", -90.0, 90.0), number(report, "lon", -180.0, 180.0)
     if report.get("mode") not in (2, 3) or latitude is None or longitude is None:
         return None
-    speed, track = _number(report.get("speed")), _number(report.get("track"))
-    heading = track if track is not None and speed is not None and speed >= MOVING_MPS else None
-    error = _number(report.get("eph"))
+    speed, track = number(report, "speed", MOVING_MPS, math.inf), number(report, "track", -math.inf, math.inf)
+    error = number(report, "eph", -math.inf, math.inf)
     accuracy = _USUAL_ACCURACY_M if error is None else min(max(error, 1.0), 999.0)
-    try:
-        return Position(latitude, longitude, heading, accuracy)
-    except ConfigError:
-        return None
-
-
-def _number(value: object) -> float | None:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    try:
-        number = float(value)
-    except OverflowError:
-        return None
-    return number if math.isfinite(number) else None
+    return Position(latitude, longitude, None if speed is None else track, accuracy)

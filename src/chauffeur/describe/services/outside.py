@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from datetime import datetime
 from functools import lru_cache
 from typing import Any, Final, cast
 
@@ -69,3 +70,11 @@ def number(node: object, name: str, low: float, high: float) -> float | None:
     except OverflowError:
         return None
     return found if math.isfinite(found) and low <= found <= high else None
+
+
+def unix_time(said: object) -> float | None:
+    """A time in ISO 8601 as Unix time; None where it is none."""
+    try:
+        return datetime.fromisoformat(said.replace("Z", "+00:00")).timestamp() if isinstance(said, str) else None
+    except (ValueError, OverflowError):
+        return None

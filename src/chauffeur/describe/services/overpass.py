@@ -5,21 +5,17 @@ A circle is asked for and kept as a small map, so that a drive of several hundre
 
 from __future__ import annotations
 
-import asyncio
 import math
-from collections.abc import Hashable, Mapping
-from datetime import datetime
+from collections.abc import Mapping
 from typing import Any, Final, cast
 
 from chauffeur.concept import DataError
-from chauffeur.describe.services.http_request import ServiceCaller
-from chauffeur.describe.services.outside import decoded, items, number, part
+from chauffeur.describe.services.http_source import Service, Told
+from chauffeur.describe.services.outside import decoded, items, number, part, unix_time
 from chauffeur.describe.services.readings import Position
-from chauffeur.describe.services.remote import Told
 from chauffeur.describe.services.road_map import RoadMap
 from chauffeur.describe.services.ways import DRIVEABLE, ServiceWay, way_of
 
-MAX_BYTES: Final = 3_000_000
 RADIUS_M: Final = 500.0
 """Radius of the circle that is asked for."""
 _INNER_M: Final = 150.0
@@ -46,7 +42,7 @@ def read_ways(body: bytes, centre: Position) -> Told[RoadMap]:
     if "remark" in answer:  # a query that ran out of time or memory answers with status 200 and half of the roads
         raise DataError("the map service did not finish the answer")
     ways = tuple(way for one in items(answer, "elements")[:_MAX_WAYS] if (way := _way(one)) is not None)
-    as_of_s = _time(part(answer, "osm3s").get("timestamp_osm_base"))
+    as_of_s = unix_time(part(answer, "osm3s").get("timestamp_osm_base"))
     return Told(RoadMap(ways, source="OpenStreetMap", as_of_s=as_of_s, extent=(centre, RADIUS_M)), as_of_s)
 
 
@@ -61,54 +57,26 @@ def _way(one: object) -> ServiceWay | None:
     return way_of(int(number(one, "id", 0.0, 1e15) or 0), tags, points)
 
 
-def _time(said: object) -> float | None:
-    if not isinstance(said, str):
-        return None
-    try:
-        return datetime.fromisoformat(said.replace("Z", "+00:00")).timestamp()
-    except (ValueError, OverflowError):
-        return None
+def _query(here: Position) -> dict[str, str]:
+    latitude, longitude = here.rounded(_DECIMALS)
+    around = f"around:{RADIUS_M:.0f},{latitude:.{_DECIMALS}f},{longitude:.{_DECIMALS}f}"
+    classes = "|".join(sorted(DRIVEABLE))
+    return {"data": f'[out:json][timeout:5];way({around})[highway~"^({classes})$"];out tags geom;'}
 
 
-class Overpass:
-    """A server that speaks Overpass.
-
-    Args:
-        caller: Where it is.
-    """
-
-    name = "OpenStreetMap (Overpass)"
-    fresh_s = 86_400.0
-    usable_s = 7 * 86_400.0
-    oldest_s = math.inf
-    keeps = 8  # each is a map of some megabytes
-    missing = "the service has nothing for this place"
-
-    def __init__(self, caller: ServiceCaller) -> None:
-        self._caller = caller
-
-    def cell(self, here: Position) -> Hashable:
-        """Positions that are rounded to the same one."""
-        return here.rounded(_DECIMALS)
-
-    def near(self, value: RoadMap, asked: Position, here: Position) -> bool:
-        """Well inside of the circle."""
-        del asked
-        return value.covers(here, _INNER_M)
-
-    def serves(self, value: RoadMap, asked: Position, here: Position) -> bool:
-        """Inside of the circle."""
-        del asked
-        return value.covers(here)
-
-    async def ask(self, here: Position) -> Told[RoadMap]:
-        """Ask for the roads around a position."""
-        latitude, longitude = here.rounded(_DECIMALS)
-        classes = "|".join(sorted(DRIVEABLE))
-        query = (
-            f"[out:json][timeout:5];way(around:{RADIUS_M:.0f},{latitude:.{_DECIMALS}f},{longitude:.{_DECIMALS}f})"
-            f'[highway~"^({classes})$"];out tags geom;'
-        )
-        body = await self._caller.post("/api/interpreter", {"data": query})
-        # Beside the event loop: a town's roads take some milliseconds to sort.
-        return await asyncio.to_thread(read_ways, body, Position(latitude, longitude))
+OVERPASS: Final = Service(
+    name="OpenStreetMap (Overpass)",
+    path="/api/interpreter",
+    query=_query,
+    read=lambda body, asked: read_ways(body, Position(*asked.rounded(_DECIMALS))),
+    cell=lambda here: here.rounded(_DECIMALS),
+    near=lambda value, _, here: value.covers(here, _INNER_M),
+    serves=lambda value, _, here: value.covers(here),
+    max_bytes=3_000_000,
+    fresh_s=86_400.0,
+    usable_s=7 * 86_400.0,
+    oldest_s=math.inf,
+    keeps=8,  # each is a map of some megabytes
+    posts=True,
+)
+"""A server that speaks Overpass."""

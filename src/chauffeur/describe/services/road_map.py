@@ -1,7 +1,7 @@
-"""Which road a car is on: ways in a grid, matched by position and heading.
+"""Which road a car is on: ways in a tree of rectangles (shapely), matched by position and heading.
 
 Distances are measured in a plane that touches the earth where the car is, which is right to a millimetre within the
-60 m that matter here. A lookup reads one cell of the grid and takes about 0.05 ms, whatever the size of the map.
+60 m that matter here.
 
 A road is the likelier the nearer it is and the better it points where the car does: the weight of a road is
 exp(-(d/s)^2/2 - (a/20 deg)^2/2), with d the distance beyond the edge of the road, s the accuracy of the position and a
@@ -13,32 +13,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import ModuleType
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chauffeur.concept import DataError
+from chauffeur.concept import DataError, MissingExtraError
 from chauffeur.describe.services.readings import M_PER_DEG, MAX_LATITUDE_DEG, Position, distance_m
-from chauffeur.describe.services.ways import ServiceWay
+from chauffeur.describe.services.ways import Floats, ServiceWay, nearest
 
 REACH_M: Final = 40.0
 """Roads farther away than this are not the road the car is on."""
 LOOK_AHEAD_M: Final = 2_000.0
 """How far ahead the next junction is looked for."""
 
-_PIECE_M: Final = 150.0
-"""Segments are cut into pieces no longer than this, so that none covers many cells."""
 _MAX_SEGMENT_M: Final = 50_000.0
 """A longer line between two points is a mistake in the map."""
-_MOST: Final = 60_000_000
-"""Entries of the grid that fit into memory (about 2 GB while they are sorted)."""
-_MOST_IN_CIRCLE: Final = 3_000_000
-"""Of a circle of a few hundred metres: no town has a tenth of it."""
+_MOST: Final = 10_000_000
+"""Segments that fit into memory (about 3 GB while they are sorted)."""
 _MOST_NEAR: Final = 200
-"""Pieces that are weighed in a lookup, nearest first: the time it takes is not the map's to choose."""
-_CELL_DEG: Final = 0.001
+"""Segments that are weighed in a lookup, nearest first: the time it takes is not the map's to choose."""
 _HEADING_DEG: Final = 20.0
 _MAX_TURN_DEG: Final = 50.0
 """A road that points elsewhere by more is not the road the car is on."""
@@ -46,10 +42,11 @@ _PRIOR: Final[Mapping[str, float]] = {"service": 1.0, "busway": 2.0, "track": 2.
 """Added to the squared distances: one rarely drives there."""
 _MINOR: Final = frozenset({"service", "track", "busway"})
 """Where these join a road, nobody speaks of a junction."""
+_SAME: Final = 1e-9
+"""Costs that differ by less are the same, rounded."""
 _STEPS: Final = 5_000
 """Points of the road ahead that are looked at, at most."""
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
@@ -64,6 +61,7 @@ class Candidate:
         segment: Which of its segments is nearest: the index of that segment's first point.
         fraction: Where on that segment, 0 to 1.
         forward: Whether the car drives along its points; None where the heading is not known and both is allowed.
+        cost: How badly it fits, as the exponent of its weight; 0 is best.
         share: Of all weights, 0 to 1.
     """
 
@@ -73,7 +71,14 @@ class Candidate:
     segment: int
     fraction: float
     forward: bool | None
-    share: float
+    cost: float
+    share: float = 0.0
+
+    def fits_better_than(self, other: Candidate) -> bool:
+        """Whether this place on a way is likelier than another on it; where a way passes twice, the first counts."""
+        if abs(self.cost - other.cost) < _SAME:
+            return self.segment < other.segment
+        return self.cost < other.cost
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +109,15 @@ class RoadAhead:
     seen_m: float
 
 
+def geometry() -> ModuleType:
+    """The library shapely. Raises MissingExtraError: it is not installed."""
+    try:
+        import shapely
+    except ImportError as error:
+        raise MissingExtraError("Maps need shapely.", extra="map") from error
+    return shapely
+
+
 class RoadMap:
     """Ways, ready to be looked up.
 
@@ -114,7 +128,8 @@ class RoadMap:
         extent: (centre, radius in m) beyond which ways are missing; None for a map that knows its whole region.
 
     Raises:
-        DataError: There are too many ways, or too long ones.
+        DataError: There are too many ways.
+        MissingExtraError: shapely is not installed.
     """
 
     def __init__(
@@ -125,91 +140,53 @@ class RoadMap:
         as_of_s: float | None = None,
         extent: tuple[Position, float] | None = None,
     ) -> None:
+        shapely = geometry()
         self.ways = tuple(ways)
         self.source = source
         self.as_of_s = as_of_s
         self.extent = extent
         counts = np.array([len(way.points) for way in self.ways], dtype=np.int64)
         self._first: Ints = np.concatenate(([0], np.cumsum(counts))).astype(np.int64)
-        points = np.array([point for way in self.ways for point in way.points], dtype=np.float64).reshape(-1, 2)
-        self._lat: Floats = points[:, 0]
-        self._lon: Floats = points[:, 1]
+        self._points: Floats = np.array([one for way in self.ways for one in way.points], np.float64).reshape(-1, 2)
         owner = np.repeat(np.arange(len(self.ways), dtype=np.int64), counts)
-        self._cut(owner)
-        self._fill_grid()
+        self._sort_segments(shapely, owner)
         self._join(owner)
 
-    def _cut(self, owner: Ints) -> None:
-        """Segments, cut into pieces: (way, segment, start, end, place on the segment), one row each."""
-        start = np.flatnonzero(owner[:-1] == owner[1:]) if len(owner) else np.zeros(0, dtype=np.int64)
-        lat0, lat1 = self._lat[start], self._lat[start + 1]
-        lon0 = self._lon[start]
+    def _sort_segments(self, shapely: ModuleType, owner: Ints) -> None:
+        """Segments in a tree of rectangles: owner, first point, ends (longitude, latitude), bearing; one row each."""
+        start = np.flatnonzero(owner[:-1] == owner[1:])
+        begin, end = self._points[start, ::-1], self._points[start + 1, ::-1].copy()
         # The short way round: a segment may cross the 180th meridian.
-        lon1 = lon0 + np.remainder(self._lon[start + 1] - lon0 + 180.0, 360.0) - 180.0
-        north_m = (lat1 - lat0) * M_PER_DEG
-        east_m = (lon1 - lon0) * M_PER_DEG * np.cos(np.radians((lat0 + lat1) / 2.0))
-        length_m = np.hypot(north_m, east_m)
-        fine = (length_m <= _MAX_SEGMENT_M) & (np.maximum(np.abs(lat0), np.abs(lat1)) < MAX_LATITUDE_DEG)
-        start, lat0, lat1, lon0, lon1 = start[fine], lat0[fine], lat1[fine], lon0[fine], lon1[fine]
-        bearing = np.degrees(np.arctan2(east_m[fine], north_m[fine]))
-        pieces = np.maximum(1, np.ceil(length_m[fine] / _PIECE_M)).astype(np.int64)
-        self._allow(int(pieces.sum()))
-        row = np.repeat(np.arange(len(start)), pieces)
-        step = np.arange(len(row)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-        begin, end = step / pieces[row], (step + 1) / pieces[row]
-        self._piece_way: Ints = owner[start][row]
-        self._piece_segment: Ints = start[row] - self._first[self._piece_way]
-        self._piece_begin: Floats = begin
-        self._piece_share: Floats = end - begin
-        self._piece_bearing: Floats = bearing[row]
-        self._lat0: Floats = lat0[row] + begin * (lat1 - lat0)[row]
-        self._lat1: Floats = lat0[row] + end * (lat1 - lat0)[row]
-        self._lon0: Floats = lon0[row] + begin * (lon1 - lon0)[row]
-        self._lon1: Floats = lon0[row] + end * (lon1 - lon0)[row]
-
-    def _fill_grid(self) -> None:
-        """Cells and the pieces within reach of each: every piece stands in all cells its surroundings touch."""
-        most = float(np.max(np.abs(self._lat0), initial=0.0)) + 2 * _CELL_DEG
-        margin = REACH_M / M_PER_DEG
-        margin_lon = margin / math.cos(math.radians(min(most, MAX_LATITUDE_DEG)))
-        south = _cells(np.minimum(self._lat0, self._lat1) - margin)
-        north = _cells(np.maximum(self._lat0, self._lat1) + margin)
-        west = _cells(np.minimum(self._lon0, self._lon1) - margin_lon)
-        east = _cells(np.maximum(self._lon0, self._lon1) + margin_lon)
-        high, wide = north - south + 1, east - west + 1
-        area = high * wide
-        self._allow(int(area.sum()))
-        piece = np.repeat(np.arange(len(area)), area)
-        index = np.arange(len(piece)) - np.repeat(np.cumsum(area) - area, area)
-        keys = _keys(south[piece] + index // wide[piece], west[piece] + index % wide[piece])
-        order = np.argsort(keys, kind="stable")
-        self._in_cell: Ints = piece[order]
-        cells, begins = np.unique(keys[order], return_index=True)
-        ends = np.append(begins, len(order))[1:]
-        self._cell: dict[int, tuple[int, int]] = {
-            cell: (begin, end) for cell, begin, end in zip(cells.tolist(), begins.tolist(), ends.tolist(), strict=True)
-        }
-
-    def _allow(self, entries: int) -> None:
-        if entries > (_MOST if self.extent is None else _MOST_IN_CIRCLE):
+        end[:, 0] = begin[:, 0] + np.remainder(end[:, 0] - begin[:, 0] + 180.0, 360.0) - 180.0
+        middle = np.cos(np.radians((begin[:, 1] + end[:, 1]) / 2.0))
+        east_m, north_m = ((end - begin) * M_PER_DEG).T
+        east_m = east_m * middle
+        highest = np.maximum(np.abs(begin[:, 1]), np.abs(end[:, 1]))
+        fine = (np.hypot(north_m, east_m) <= _MAX_SEGMENT_M) & (highest < MAX_LATITUDE_DEG)
+        if (count := int(fine.sum())) > _MOST:
             raise DataError(
-                f"The map of {self.source} has too many or too long roads to be sorted ({entries} pieces).",
+                f"The map of {self.source} has too many roads to be sorted ({count} segments).",
                 hint="Cut out your area: osmium extract --bbox WEST,SOUTH,EAST,NORTH map.osm.pbf -o area.osm.pbf",
             )
+        self._segment: Ints = start[fine]
+        self._owner: Ints = owner[self._segment]
+        self._begin, self._end = begin[fine], end[fine]
+        self._bearing: Floats = np.degrees(np.arctan2(east_m, north_m))[fine]
+        low, high = np.minimum(self._begin, self._end), np.maximum(self._begin, self._end)
+        self._box = shapely.box
+        self._tree = shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
 
     def _join(self, owner: Ints) -> None:
         """How many arms of road meet at each point, and which ways end where."""
         # Ways are joined where they share a point. OSM keeps seven decimals, so equal points are equal numbers.
-        place = np.rint(self._lat * 1e7).astype(np.int64) * 3_600_000_001 + np.rint(self._lon * 1e7).astype(np.int64)
+        latitude, longitude = np.rint(self._points * 1e7).astype(np.int64).T
         arms = np.full(len(owner), 2, dtype=np.int64)
         arms[self._first[:-1]] = 1
         arms[self._first[1:] - 1] = 1
         minor = np.array([way.road_class in _MINOR for way in self.ways], dtype=bool)
-        _, where = np.unique(place, return_inverse=True)
-        every = np.bincount(where, weights=arms).astype(np.int64)
-        major = np.bincount(where, weights=np.where(minor[owner], 0, arms)).astype(np.int64)
-        self._arms: Ints = every[where]
-        self._major_arms: Ints = major[where]
+        _, where = np.unique(latitude * 3_600_000_001 + longitude, return_inverse=True)
+        self._arms: Ints = np.bincount(where, weights=arms).astype(np.int64)[where]
+        self._major_arms: Ints = np.bincount(where, weights=np.where(minor[owner], 0, arms)).astype(np.int64)[where]
         self._place: Ints = where.astype(np.int64)
         self._ends: dict[int, list[tuple[int, bool]]] = {}
         first, last = where[self._first[:-1]].tolist(), where[self._first[1:] - 1].tolist()
@@ -229,59 +206,48 @@ class RoadMap:
         near = self._near(position)
         if not near:
             return None
-        least = min(cost for cost, _ in near)
-        weights = [math.exp((least - cost) / 2.0) for cost, _ in near]
+        least = min(one.cost for one in near)
+        weights = [math.exp((least - one.cost) / 2.0) for one in near]
         total = sum(weights)
-        ranked = sorted(zip(weights, near, strict=True), key=lambda pair: (-pair[0], self.ways[pair[1][1].way].id))
-        found = [
-            Candidate(one.way, self.ways[one.way], one.away_m, one.segment, one.fraction, one.forward, weight / total)
-            for weight, (_, one) in ranked
-        ]
-        return Match(found[0], tuple(found[1:]), math.exp(-least / 8.0))
+        found = [replace(one, share=weight / total) for weight, one in zip(weights, near, strict=True)]
+        best, *others = sorted(found, key=lambda one: (-one.share, one.way.id))
+        return Match(best, tuple(others), math.exp(-least / 8.0))
 
-    def _near(self, position: Position) -> list[tuple[float, _Near]]:
-        """Ways within reach that point where the car does: (cost, how it lies there), one per way."""
+    def _near(self, position: Position) -> list[Candidate]:
+        """Ways within reach that point where the car does, one each, not yet weighed against one another."""
         lat, lon = position.latitude_deg, position.longitude_deg
         if abs(lat) >= MAX_LATITUDE_DEG:
             return []
-        best: dict[int, tuple[float, _Near]] = {}
+        best: dict[int, Candidate] = {}
         across = M_PER_DEG * math.cos(math.radians(lat))
+        # A little more than the reach: what is within it is measured below.
+        high, wide = 1.01 * REACH_M / M_PER_DEG, 1.01 * REACH_M / across
         for east in (lon, lon - 360.0, lon + 360.0) if abs(lon) > 179.0 else (lon,):
-            span = self._cell.get(_key(lat, east))
-            if span is None:
-                continue
-            rows = self._in_cell[span[0] : span[1]]
-            x0, y0 = (self._lon0[rows] - east) * across, (self._lat0[rows] - lat) * M_PER_DEG
-            dx, dy = (self._lon1[rows] - east) * across - x0, (self._lat1[rows] - lat) * M_PER_DEG - y0
-            square = np.maximum(dx * dx + dy * dy, 1e-9)
-            place = np.clip(-(x0 * dx + y0 * dy) / square, 0.0, 1.0)
-            away = np.hypot(x0 + place * dx, y0 + place * dy)
+            rows = self._tree.query(self._box(east - wide, lat - high, east + wide, lat + high))
+            begin, end = ((ends[rows] - (east, lat)) * (across, M_PER_DEG) for ends in (self._begin, self._end))
+            away, place = nearest(begin[:, 0], begin[:, 1], end[:, 0], end[:, 1])
             within = np.flatnonzero(away <= REACH_M)
             if len(within) > _MOST_NEAR:
                 within = within[np.argpartition(away[within], _MOST_NEAR)[:_MOST_NEAR]]
             for index in within.tolist():
-                self._weigh(position, int(rows[index]), float(away[index]), float(place[index]), best)
+                one = self._weighed(position, int(rows[index]), float(away[index]), float(place[index]))
+                if one is not None and (one.number not in best or one.fits_better_than(best[one.number])):
+                    best[one.number] = one
         return list(best.values())
 
-    def _weigh(
-        self, position: Position, row: int, away_m: float, place: float, best: dict[int, tuple[float, _Near]]
-    ) -> None:
-        number = int(self._piece_way[row])
+    def _weighed(self, position: Position, row: int, away_m: float, fraction: float) -> Candidate | None:
+        number = int(self._owner[row])
         way = self.ways[number]
-        forward, angle = _directed(way.oneway, float(self._piece_bearing[row]), position.heading_deg)
+        forward, angle = _directed(way.oneway, float(self._bearing[row]), position.heading_deg)
         if angle > _MAX_TURN_DEG:
-            return
-        segment = int(self._piece_segment[row])
-        fraction = float(self._piece_begin[row] + place * self._piece_share[row])
+            return None
+        segment = int(self._segment[row] - self._first[number])
         # A road has width beside its line, but none beyond its ends.
         beyond = (segment == 0 and fraction <= 0.0) or (segment == len(way.points) - 2 and fraction >= 1.0)
         distance = max(0.0, away_m - (0.0 if beyond else way.half_width_m)) / max(position.accuracy_m, 1.0)
-        cost = distance**2 + (angle / _HEADING_DEG) ** 2 + _PRIOR.get(way.road_class, 0.0)
         # Between ways that lie equally well, the nearer line decides.
-        cost += (away_m / REACH_M) ** 2
-        known = best.get(number)
-        if known is None or cost < known[0]:
-            best[number] = (cost, _Near(number, away_m, segment, fraction, forward))
+        cost = distance**2 + (angle / _HEADING_DEG) ** 2 + _PRIOR.get(way.road_class, 0.0) + (away_m / REACH_M) ** 2
+        return Candidate(number, way, away_m, segment, fraction, forward, cost)
 
     def ahead(self, candidate: Candidate) -> RoadAhead | None:
         """The road ahead of a car, as far as LOOK_AHEAD_M; None where the direction it drives in is not known."""
@@ -292,7 +258,7 @@ class RoadMap:
         gone_m = 0.0
         here = self._at(candidate)
         for point in self._following(candidate):
-            there = float(self._lat[point]), float(self._lon[point])
+            there = float(self._points[point, 0]), float(self._points[point, 1])
             step_m = _apart_m(here, there)
             part = self._covered(here, there)
             gone_m += part * step_m
@@ -357,15 +323,6 @@ class RoadMap:
         return {int(self._place[self._first[number]]), int(self._place[self._first[number + 1] - 1])}
 
 
-@dataclass(frozen=True, slots=True)
-class _Near:
-    way: int
-    away_m: float
-    segment: int
-    fraction: float
-    forward: bool | None
-
-
 def _directed(oneway: int, bearing_deg: float, heading_deg: float | None) -> tuple[bool | None, float]:
     """(Whether the car drives along the points, angle between car and road in degrees)."""
     if heading_deg is None:
@@ -374,18 +331,6 @@ def _directed(oneway: int, bearing_deg: float, heading_deg: float | None) -> tup
     if oneway == 0:
         return along <= 90.0, min(along, 180.0 - along)
     return oneway > 0, along if oneway > 0 else 180.0 - along
-
-
-def _cells(degrees: Floats) -> Ints:
-    return np.floor(degrees / _CELL_DEG).astype(np.int64)
-
-
-def _keys(rows: Ints, columns: Ints) -> Ints:
-    return rows * 1_000_003 + columns
-
-
-def _key(lat: float, lon: float) -> int:
-    return math.floor(lat / _CELL_DEG) * 1_000_003 + math.floor(lon / _CELL_DEG)
 
 
 def _apart_m(one: tuple[float, float], other: tuple[float, float]) -> float:

@@ -16,10 +16,6 @@ ONLINE: Final[tuple[Online, ...]] = ("weather", "map", "traffic")
 WEATHER_URL: Final = "https://api.openweathermap.org"
 MAP_URL: Final = "https://overpass-api.de"
 TRAFFIC_URL: Final = "https://api.tomtom.com"
-WEATHER_KEY: Final = "OPENWEATHER_API_KEY"
-"""Environment variable with the key for OpenWeather."""
-TRAFFIC_KEY: Final = "TOMTOM_API_KEY"
-"""Environment variable with the key for TomTom."""
 BUDGET_S: Final = 0.3
 """How long one description of the place may wait for all services together."""
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, TypeVar
 
-from chauffeur.concept import Context
 from chauffeur.describe.services.maxspeed import Conditional
 from chauffeur.describe.services.readings import Position, ServiceReading, Unknown
 from chauffeur.describe.services.road_map import RoadAhead
@@ -99,12 +98,6 @@ class Row:
     age_s: float | None
     confidence: float
     note: str
-
-
-def with_surroundings(context: Context, surroundings: Surroundings) -> Context:
-    """C with what is known of the place: the lines behind its words, and in its `scene`."""
-    situation = replace(context.situation, scene=(*context.situation.scene, *surroundings.scene()))
-    return replace(context, text=" ".join((context.text, *surroundings.words())).strip(), situation=situation)
 
 
 def _line(name: str, known: ServiceReading[T] | Unknown, say: Callable[[T], str], young_s: float) -> str:

@@ -16,25 +16,26 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Final, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 
 from chauffeur.concept import ConfigError
-from chauffeur.describe.services import overpass, traffic, weather
-from chauffeur.describe.services.http_request import ServiceCaller
-from chauffeur.describe.services.overpass import Overpass
+from chauffeur.describe.services.http_source import HttpSource, Service
+from chauffeur.describe.services.overpass import OVERPASS
 from chauffeur.describe.services.readings import Position, ServiceReading, Unknown
-from chauffeur.describe.services.remote import Remote
-from chauffeur.describe.services.road_map import RoadMap
+from chauffeur.describe.services.road_map import RoadMap, geometry
 from chauffeur.describe.services.roads import RoadPlace, place_at
 from chauffeur.describe.services.rules import Rules
-from chauffeur.describe.services.settings import BUDGET_S, TRAFFIC_KEY, WEATHER_KEY, ServiceSettings, read_key
+from chauffeur.describe.services.settings import BUDGET_S, Online, ServiceSettings, read_key
 from chauffeur.describe.services.surroundings import Surroundings
-from chauffeur.describe.services.traffic import LEAST_CONFIDENCE, TomTom, TrafficReport
-from chauffeur.describe.services.weather import OpenWeather, Weather
+from chauffeur.describe.services.traffic import LEAST_CONFIDENCE, TOMTOM, TrafficReport
+from chauffeur.describe.services.weather import open_weather
 
-_OFF: Final = "no such service is switched on"
+if TYPE_CHECKING:
+    import httpx
+
+T = TypeVar("T")
 
 
 class ContextServices:
@@ -47,8 +48,10 @@ class ContextServices:
         clock: Unix time in seconds.
         environ: Where keys are read from.
         rng: Spreads the waits after failures.
+        transport: Answers in the place of the network: recorded replies.
 
     Raises:
+        MissingExtraError: A map service is asked, and shapely is not installed.
         ConfigError: A key cannot be one, or would cross a public network unencrypted.
     """
 
@@ -61,17 +64,20 @@ class ContextServices:
         clock: Callable[[], float] = time.time,
         environ: Mapping[str, str] = os.environ,
         rng: np.random.Generator | None = None,
+        transport: httpx.AsyncBaseTransport | None = None,
     ) -> None:
-        self._settings = settings
-        self._environ = environ
-        self._rules = rules
-        self._road_map = road_map
+        self._settings, self._environ, self._rules, self._road_map = settings, environ, rules, road_map
         self._clock = clock
         self._rng = np.random.default_rng() if rng is None else rng
-        self._callers: list[ServiceCaller] = []
-        self._weather = self._open_weather()
-        self._traffic = self._tomtom()
-        self._map = self._overpass()
+        self._transport = transport
+        off = "no such service is switched on"
+        self._weather = self._source("weather", open_weather(settings.weather_decimals), settings.weather_url, off)
+        self._traffic = self._source("traffic", TOMTOM, settings.traffic_url, off)
+        if "map" in settings.online:
+            geometry()
+        self._map: HttpSource[RoadMap] | Unknown = Unknown("no map is loaded")
+        if road_map is None:
+            self._map = self._source("map", OVERPASS, settings.map_url, "no map is loaded")
 
     async def around(self, here: Position, *, budget_s: float = BUDGET_S) -> Surroundings:
         """What is known of a place. Never raises for anything a service does, and never takes longer than the budget.
@@ -85,8 +91,7 @@ class ContextServices:
         """
         if not (math.isfinite(budget_s) and 0.0 <= budget_s <= 60.0):
             raise ConfigError(f"A budget of {budget_s:g} s cannot be used.", hint="Give seconds, 0 to 60.")
-        remotes = [one for one in (self._weather, self._map, self._traffic) if isinstance(one, Remote)]
-        running = {task for one in remotes if (task := one.start(here)) is not None}
+        running = {task for one in self._sources() if (task := one.start(here)) is not None}
         if running:
             await asyncio.wait(running, timeout=budget_s)
         now_s = self._clock()
@@ -94,7 +99,7 @@ class ContextServices:
         return Surroundings(
             at=here,
             when_s=now_s,
-            weather=self._weather.read(here, budget_s) if isinstance(self._weather, Remote) else self._weather,
+            weather=_read(self._weather, here, budget_s),
             road=place.road,
             limit=place.limit,
             ahead=place.ahead,
@@ -104,11 +109,8 @@ class ContextServices:
 
     async def close(self) -> None:
         """End what is under way, and close the connections."""
-        for remote in (self._weather, self._map, self._traffic):
-            if isinstance(remote, Remote):
-                await remote.close()
-        for caller in self._callers:
-            await caller.close()
+        for source in self._sources():
+            await source.close()
 
     async def __aenter__(self) -> Self:
         return self
@@ -116,16 +118,19 @@ class ContextServices:
     async def __aexit__(self, *_: object) -> None:
         await self.close()
 
+    def _sources(self) -> list[HttpSource[Any]]:
+        return [one for one in (self._weather, self._map, self._traffic) if isinstance(one, HttpSource)]
+
     def _place(self, here: Position, budget_s: float, now_s: float) -> RoadPlace:
         if self._road_map is not None:
             return place_at(self._road_map, here, self._rules, now_s)
-        known = self._map.read(here, budget_s) if isinstance(self._map, Remote) else self._map
+        known = _read(self._map, here, budget_s)
         if isinstance(known, Unknown):
             return RoadPlace(known, known, known)
         return place_at(known.value, here, self._rules, now_s, known.note)
 
     def _flow(self, here: Position, budget_s: float) -> ServiceReading[TrafficReport] | Unknown:
-        known = self._traffic.read(here, budget_s) if isinstance(self._traffic, Remote) else self._traffic
+        known = _read(self._traffic, here, budget_s)
         if isinstance(known, Unknown):
             return known
         if known.value.confidence < LEAST_CONFIDENCE:
@@ -139,35 +144,22 @@ class ContextServices:
         age_s = max(0.0, now_s - datetime(year, month, 1, tzinfo=UTC).timestamp())
         return ServiceReading(self._rules, "", f"rules of {self._rules.name}", age_s, 1.0)
 
-    def _open_weather(self) -> Remote[Weather] | Unknown:
-        settings = self._settings
-        if "weather" not in settings.online:
-            return Unknown(_OFF)
-        key = read_key(WEATHER_KEY, settings.weather_url, self._environ)
-        if key is None:
-            return Unknown(f"there is no key: {WEATHER_KEY} is not set")
-        caller = self._caller(settings.weather_url, ("appid", key), WEATHER_KEY, weather.MAX_BYTES)
-        return Remote(OpenWeather(caller, settings.weather_decimals), self._clock, self._rng)
-
-    def _tomtom(self) -> Remote[TrafficReport] | Unknown:
-        settings = self._settings
-        if "traffic" not in settings.online:
-            return Unknown(_OFF)
-        key = read_key(TRAFFIC_KEY, settings.traffic_url, self._environ)
-        if key is None:
-            return Unknown(f"there is no key: {TRAFFIC_KEY} is not set")
-        caller = self._caller(settings.traffic_url, ("key", key), TRAFFIC_KEY, traffic.MAX_BYTES)
-        return Remote(TomTom(caller), self._clock, self._rng)
-
-    def _overpass(self) -> Remote[RoadMap] | Unknown:
-        if self._road_map is not None or "map" not in self._settings.online:
-            return Unknown("no map is loaded")
-        caller = self._caller(self._settings.map_url, None, "", overpass.MAX_BYTES)
-        return Remote(Overpass(caller), self._clock, self._rng)
-
-    def _caller(self, url: str, key: tuple[str, str] | None, variable: str, max_bytes: int) -> ServiceCaller:
-        made = ServiceCaller(
-            url, key=key, key_variable=variable, patience_s=self._settings.patience_s, max_bytes=max_bytes
+    def _source(self, name: Online, service: Service[T], url: str, off: str) -> HttpSource[T] | Unknown:
+        if name not in self._settings.online:
+            return Unknown(off)
+        key = None if service.key is None else read_key(service.key[1], url, self._environ)
+        if service.key is not None and key is None:
+            return Unknown(f"there is no key: {service.key[1]} is not set")
+        return HttpSource(
+            service,
+            url,
+            key,
+            patience_s=self._settings.patience_s,
+            clock=self._clock,
+            rng=self._rng,
+            transport=self._transport,
         )
-        self._callers.append(made)
-        return made
+
+
+def _read(source: HttpSource[T] | Unknown, here: Position, waited_s: float) -> ServiceReading[T] | Unknown:
+    return source.read(here, waited_s) if isinstance(source, HttpSource) else source

@@ -10,17 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final
+
+import numpy as np
 
 from chauffeur.concept import DataError
 from chauffeur.concept.units import MPS_PER_KMH
-from chauffeur.describe.services.http_request import ServiceCaller
+from chauffeur.describe.services.http_source import Service, Told
 from chauffeur.describe.services.outside import decoded, items, number, part
-from chauffeur.describe.services.readings import M_PER_DEG, Position
-from chauffeur.describe.services.remote import Told
+from chauffeur.describe.services.readings import Position
+from chauffeur.describe.services.ways import nearest, plane_m
 
-MAX_BYTES: Final = 256_000
 LEAST_CONFIDENCE: Final = 0.5
 """Answers of which the service itself is less sure are not told."""
 NEAR_M: Final = 35.0
@@ -89,57 +89,44 @@ def read_traffic(body: bytes) -> Told[TrafficReport]:
 
 def _nearest(line: tuple[tuple[float, float], ...], here: Position) -> tuple[float, float] | None:
     """(Distance from a line in m, compass bearing of its nearest segment); None for less than two points."""
-    across = M_PER_DEG * math.cos(math.radians(here.latitude_deg))
-    plane = [
-        (math.remainder(lon - here.longitude_deg, 360.0) * across, (lat - here.latitude_deg) * M_PER_DEG)
-        for lat, lon in line
-    ]
-    best: tuple[float, float] | None = None
-    for (x0, y0), (x1, y1) in pairwise(plane):
-        dx, dy = x1 - x0, y1 - y0
-        square = dx * dx + dy * dy
-        place = min(1.0, max(0.0, -(x0 * dx + y0 * dy) / square)) if square > 0.0 else 0.0
-        away = math.hypot(x0 + place * dx, y0 + place * dy)
-        if square > 0.0 and (best is None or away < best[0]):
-            best = (away, math.degrees(math.atan2(dx, dy)))
-    return best
+    x, y = plane_m(np.array(line, dtype=np.float64).reshape(-1, 2), here)
+    away, _ = nearest(x[:-1], y[:-1], x[1:], y[1:])
+    away[np.hypot(np.diff(x), np.diff(y)) == 0.0] = np.inf
+    if not np.isfinite(away).any():
+        return None
+    best = int(np.argmin(away))
+    return float(away[best]), math.degrees(math.atan2(x[best + 1] - x[best], y[best + 1] - y[best]))
 
 
-class TomTom:
-    """A server that speaks TomTom's flow segment data.
+def _query(here: Position) -> dict[str, str]:
+    latitude, longitude = here.rounded(_DECIMALS)
+    return {"point": f"{latitude:.{_DECIMALS}f},{longitude:.{_DECIMALS}f}", "unit": "KMPH"}
 
-    Args:
-        caller: Where it is, with the key.
-    """
 
-    name = "TomTom"
-    fresh_s = 60.0
-    usable_s = 300.0
-    oldest_s = 300.0
-    keeps = 64
-    missing = "the road that the service answered for is another one"
+def _cell(here: Position) -> Hashable:
+    """Cells of about 100 m, and which way the car drives."""
+    return (*here.rounded(3), None if here.heading_deg is None else round(here.heading_deg / 90.0) % 4)
 
-    def __init__(self, caller: ServiceCaller) -> None:
-        self._caller = caller
 
-    def cell(self, here: Position) -> Hashable:
-        """Cells of about 100 m, and which way the car drives."""
-        way = None if here.heading_deg is None else round(here.heading_deg / 90.0) % 4
-        return (*here.rounded(3), way)
+def _same_segment(value: TrafficReport, asked: Position, here: Position) -> bool:
+    del asked
+    return value.about(here)
 
-    def near(self, value: TrafficReport, asked: Position, here: Position) -> bool:
-        """On the same segment."""
-        del asked
-        return value.about(here)
 
-    def serves(self, value: TrafficReport, asked: Position, here: Position) -> bool:
-        """On the same segment."""
-        del asked
-        return value.about(here)
-
-    async def ask(self, here: Position) -> Told[TrafficReport]:
-        """Ask how traffic flows at a position."""
-        latitude, longitude = here.rounded(_DECIMALS)
-        path = f"/traffic/services/4/flowSegmentData/absolute/{_ZOOM}/json"
-        query = {"point": f"{latitude:.{_DECIMALS}f},{longitude:.{_DECIMALS}f}", "unit": "KMPH"}
-        return read_traffic(await self._caller.get(path, query))
+TOMTOM: Final = Service(
+    name="TomTom",
+    path=f"/traffic/services/4/flowSegmentData/absolute/{_ZOOM}/json",
+    query=_query,
+    read=lambda body, _: read_traffic(body),
+    cell=_cell,
+    near=_same_segment,
+    serves=_same_segment,
+    max_bytes=256_000,
+    fresh_s=60.0,
+    usable_s=300.0,
+    oldest_s=300.0,
+    keeps=64,
+    missing="the road that the service answered for is another one",
+    key=("key", "TOMTOM_API_KEY"),
+)
+"""A server that speaks TomTom's flow segment data."""

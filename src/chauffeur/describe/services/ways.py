@@ -7,7 +7,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal, cast, get_args
 
+import numpy as np
+from numpy.typing import NDArray
+
+from chauffeur.describe.services.readings import M_PER_DEG, Position
 from chauffeur.describe.services.rules import RoadClass
+
+Floats = NDArray[np.float64]
 
 DRIVEABLE: Final = frozenset(get_args(RoadClass))
 """Values of `highway` that a car can drive on."""
@@ -92,3 +98,17 @@ def _oneway(tags: Mapping[str, str], road_class: str) -> Literal[-1, 0, 1]:
     # What the wiki calls implied: motorways and roundabouts go one way unless the map says otherwise.
     implied = road_class == "motorway" or tags.get("junction") in ("roundabout", "circular")
     return 1 if implied and said not in ("no", "0", "false") else 0
+
+
+def plane_m(points: Floats, here: Position) -> tuple[Floats, Floats]:
+    """(east, north) of points (latitude, longitude; shape (n, 2)) in a plane that touches the earth at a position."""
+    east = np.remainder(points[:, 1] - here.longitude_deg + 180.0, 360.0) - 180.0
+    across = M_PER_DEG * math.cos(math.radians(here.latitude_deg))
+    return east * across, (points[:, 0] - here.latitude_deg) * M_PER_DEG
+
+
+def nearest(x0: Floats, y0: Floats, x1: Floats, y1: Floats) -> tuple[Floats, Floats]:
+    """(Distances of segments from the origin, places of their nearest points on them, 0 to 1); shapes (n,)."""
+    dx, dy = x1 - x0, y1 - y0
+    place = np.clip(-(x0 * dx + y0 * dy) / np.maximum(dx * dx + dy * dy, 1e-9), 0.0, 1.0)
+    return np.hypot(x0 + place * dx, y0 + place * dy), place

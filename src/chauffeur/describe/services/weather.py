@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from typing import Any, Final, cast
 
 from chauffeur.concept import DataError
-from chauffeur.describe.services.http_request import ServiceCaller
+from chauffeur.describe.services.http_source import Service, Told
 from chauffeur.describe.services.outside import decoded, items, number, part
 from chauffeur.describe.services.readings import Position, distance_m
-from chauffeur.describe.services.remote import Told
 
-MAX_BYTES: Final = 64_000
 _CELL_DEG: Final = 0.01
 """About 1 km: one answer for all of it."""
 _FAR_M: Final = 15_000.0
@@ -124,41 +122,28 @@ def _night_icon(listed: list[Any]) -> bool | None:
     return {"n": True, "d": False}.get(icon[-1:]) if isinstance(icon, str) else None
 
 
-class OpenWeather:
-    """A server that speaks OpenWeather 2.5.
+def open_weather(decimals: int) -> Service[Weather]:
+    """A server that speaks OpenWeather 2.5, told the position with so many decimals."""
 
-    Args:
-        caller: Where it is, with the key.
-        decimals: Decimals of the position it is told.
-    """
+    def query(here: Position) -> dict[str, str]:
+        latitude, longitude = here.rounded(decimals)
+        return {"lat": f"{latitude:.{decimals}f}", "lon": f"{longitude:.{decimals}f}", "units": "metric"}
 
-    name = "OpenWeather"
-    fresh_s = 600.0
-    usable_s = 3_600.0
-    oldest_s = 2.0 * 3_600.0
-    keeps = 64
-    missing = "the service has nothing for this place"
-
-    def __init__(self, caller: ServiceCaller, decimals: int) -> None:
-        self._caller = caller
-        self._decimals = decimals
-
-    def cell(self, here: Position) -> Hashable:
-        """Cells of about 1 km."""
+    def cell(here: Position) -> Hashable:
         return round(here.latitude_deg / _CELL_DEG), round(here.longitude_deg / _CELL_DEG)
 
-    def near(self, value: Weather, asked: Position, here: Position) -> bool:
-        """The same cell."""
-        del value
-        return self.cell(asked) == self.cell(here)
-
-    def serves(self, value: Weather, asked: Position, here: Position) -> bool:
-        """Weather from a few kilometres away is better than none."""
-        del value
-        return distance_m(asked, here) <= _FAR_M
-
-    async def ask(self, here: Position) -> Told[Weather]:
-        """Ask for the weather."""
-        latitude, longitude = here.rounded(self._decimals)
-        query = {"lat": f"{latitude:.{self._decimals}f}", "lon": f"{longitude:.{self._decimals}f}", "units": "metric"}
-        return read_weather(await self._caller.get("/data/2.5/weather", query))
+    return Service(
+        name="OpenWeather",
+        path="/data/2.5/weather",
+        query=query,
+        read=lambda body, _: read_weather(body),
+        cell=cell,
+        near=lambda _, asked, here: cell(asked) == cell(here),
+        serves=lambda _, asked, here: distance_m(asked, here) <= _FAR_M,
+        max_bytes=64_000,
+        fresh_s=600.0,
+        usable_s=3_600.0,
+        oldest_s=2.0 * 3_600.0,
+        keeps=64,
+        key=("appid", "OPENWEATHER_API_KEY"),
+    )

@@ -16,6 +16,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal, get_args
 
+from chauffeur.safety.audit.findings import LineCode
+
 FORMAT: Final = 2
 """Version of the log; a reader refuses newer ones. Lines are as in 1, whose key did not seal the head."""
 
@@ -80,7 +82,11 @@ class AuditRecord:
 
 
 class NotARecordError(ValueError):
-    """A line that Chauffeur did not write; the text says why."""
+    """A line that Chauffeur did not write; `code` says why."""
+
+    def __init__(self, code: LineCode) -> None:
+        super().__init__(code)
+        self.code: LineCode = code
 
 
 def canonical(value: Any) -> bytes:
@@ -133,19 +139,19 @@ def parse(line: bytes) -> AuditRecord:
     try:
         value = json.loads(line)
     except (ValueError, RecursionError) as error:
-        raise NotARecordError("it is not a record in JSON") from error
+        raise NotARecordError("not_json") from error
     if not isinstance(value, dict):
-        raise NotARecordError("it is not a record in JSON")
+        raise NotARecordError("not_json")
     fields: dict[str, Any] = value
     keys = set(fields)
     if not _KEYS <= keys <= _KEYS | _OPTIONAL_KEYS:
-        raise NotARecordError("it has not the fields of a record")
+        raise NotARecordError("not_fields")
     try:
         same = canonical(fields) == line
     except (ValueError, RecursionError):
         same = False
     if not same:
-        raise NotARecordError("it is not written the way Chauffeur writes a record")
+        raise NotARecordError("not_canonical")
     texts: dict[str, Any] | None = fields.setdefault("texts", {})
     fields.setdefault("mac", "")
     if not (
@@ -157,7 +163,7 @@ def parse(line: bytes) -> AuditRecord:
         and all(isinstance(text, dict) for text in texts.values())
         and all(isinstance(fields[name], str) for name in ("time", "prev", "hash", "mac"))
     ):
-        raise NotARecordError("its fields are not of the kinds a record has")
+        raise NotARecordError("not_typed")
     return AuditRecord(**fields)
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from chauffeur.safety.audit.entries import AuditRecord
+from chauffeur.safety.audit.findings import TEXT_CODES, TextCode
 
 SALT_BYTES: Final = 16
 
@@ -34,12 +35,12 @@ class TextState:
 
     Attributes:
         name: Its name.
-        state: `stored`, `digest` (privacy mode with a key), `withheld` (without one), `redacted`, or `wrong`.
-        words: The text where it is stored, what is wrong where it is wrong; else empty.
+        state: `stored`, `digest` (privacy mode with a key), `withheld` (without one), `redacted`, or what is wrong.
+        words: The text where it is stored; else empty.
     """
 
     name: str
-    state: Literal["stored", "digest", "withheld", "redacted", "wrong"]
+    state: Literal["stored", "digest", "withheld", "redacted"] | TextCode
     words: str = ""
 
 
@@ -73,26 +74,22 @@ def states(record: AuditRecord) -> Iterator[TextState]:
     references = _references(record)
     for name in record.texts:
         if name not in references:
-            yield TextState(name, "wrong", f"its text {name!r} was added")
+            yield TextState(name, "text_added")
     for name, reference in references.items():
         yield _state(name, reference, record.texts.get(name))
 
 
 def words_of(record: AuditRecord) -> dict[str, str]:
     """The personal texts of a record as they can be shown: the words, or in brackets why there are none."""
-    marks = {
-        "digest": "[digest only]",
-        "withheld": "[withheld]",
-        "redacted": "[redacted]",
-        "wrong": "[does not fit its digest]",
-    }
+    wrong = dict.fromkeys(TEXT_CODES, "[does not fit its digest]")
+    marks = {"digest": "[digest only]", "withheld": "[withheld]", "redacted": "[redacted]", **wrong}
     return {state.name: marks.get(state.state, state.words) for state in states(record)}
 
 
 def says(record: AuditRecord, name: str, text: str, key: bytes | None = None) -> bool | None:
     """Whether a record's text was this one; None where that cannot be known (redacted, withheld, no key given)."""
     value = record.texts.get(name)
-    if value is None or _is_erased(value) or _state(name, _references(record).get(name), value).state == "wrong":
+    if value is None or _is_erased(value) or _state(name, _references(record).get(name), value).state in TEXT_CODES:
         return None
     if "text" in value:
         return value["text"] == text
@@ -108,9 +105,9 @@ def erased(record: AuditRecord) -> dict[str, dict[str, Any]]:
 
 def _state(name: str, reference: Any, value: Mapping[str, Any] | None) -> TextState:
     if reference == _WITHHELD:
-        return TextState(name, "wrong", f"its text {name!r} was added") if value else TextState(name, "withheld")
+        return TextState(name, "text_added") if value else TextState(name, "withheld")
     if value is None:
-        return TextState(name, "wrong", f"its text {name!r} was removed")
+        return TextState(name, "text_removed")
     if _is_erased(value):
         return TextState(name, "redacted")
     form: Form = "hmac" if "hmac" in value else "text"
@@ -122,7 +119,7 @@ def _state(name: str, reference: Any, value: Mapping[str, Any] | None) -> TextSt
             salt = b""
         if salt.hex() == value["salt"] and reference == {"digest": _digest(salt, form, words)}:
             return TextState(name, "stored", words) if form == "text" else TextState(name, "digest")
-    return TextState(name, "wrong", f"its text {name!r} was changed")
+    return TextState(name, "text_changed")
 
 
 def _is_erased(value: Mapping[str, Any]) -> bool:

@@ -1,4 +1,4 @@
-"""Whether an audit log is as it was written: every line looked at, everything that is wrong said in words.
+"""Whether an audit log is as it was written: every line looked at, everything that is wrong named by a code.
 
 The chain shows any change, removal, insertion or swap of lines that were written before the last one. It cannot show
 that lines are missing at the end, nor that the whole log was written anew. A log under a key shows both: every record
@@ -23,29 +23,14 @@ from chauffeur.safety.audit.entries import (
     is_sealed_with,
     parse,
 )
+from chauffeur.safety.audit.findings import TEXT_CODES, AuditFinding, Code
 from chauffeur.safety.audit.heads import SEALED_SINCE, Head, as_hash, head_path, read_head
 from chauffeur.safety.audit.keys import key_name
 from chauffeur.safety.audit.reader import AuditLine, lines, opened
 from chauffeur.safety.audit.texts import states
 
 MAX_FINDINGS: Final = 100
-"""Findings kept in words; the others are counted."""
-
-
-@dataclass(frozen=True, slots=True)
-class AuditFinding:
-    """Something that is not as it was written.
-
-    Attributes:
-        line: Line of the file, 1-based; None where it is about the log as a whole.
-        what: In words.
-    """
-
-    line: int | None
-    what: str
-
-    def __str__(self) -> str:
-        return self.what if self.line is None else f"line {self.line}: {self.what}"
+"""Findings kept; the others are counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,36 +109,30 @@ def verify(path: Path, *, head: str | None = None, key: bytes | None = None) -> 
         return found
     if given is not None and found.after_head == 0:
         return replace(found, end="whole")
-    end, what = _look_at_end(found, beside, head_path(path).name, key)
-    if not what:
+    end, code = _look_at_end(found, beside, key)
+    if code is None:
         return replace(found, end=end)
-    return replace(found, end=end, findings=(*found.findings, AuditFinding(None, what)))
+    counted = None if beside is None else beside.records
+    details = {"name": head_path(path).name, "counted": counted, "found": found.records}
+    return replace(found, end=end, findings=(*found.findings, AuditFinding(None, code, details)))
 
 
 def _look_at_end(
-    found: AuditVerification, head: Head | None, name: str, key: bytes
-) -> tuple[Literal["whole", "open", "doubtful"], str]:
-    """What the head beside a log under a key says of its end, and in words what is wrong; empty when nothing is."""
+    found: AuditVerification, head: Head | None, key: bytes
+) -> tuple[Literal["whole", "open", "doubtful"], Code | None]:
+    """What the head beside a log under a key says of its end, and what is wrong; None when nothing is."""
     if head is None:
-        return "doubtful", f"the head file {name} is missing: whether the end of the log is cannot be told."
+        return "doubtful", "headfile_missing"
     if not head.is_sealed_with(key):
-        return "doubtful", f"the head file {name} was not written with this key."
+        return "doubtful", "headfile_unsealed"
     assert head.records is not None  # what is sealed has a number
     if head.records > found.records:
-        return (
-            "doubtful",
-            f"the end was cut off: the head counts {head.records} records, and {found.records} are there.",
-        )
+        return "doubtful", "end_cut"
     if not head.closed:
-        return "open", (
-            f"the log was not closed, or is being written: behind record {head.records} its end may have been cut off."
-        )
+        return "open", "end_open"
     if head.records < found.records or head.hash != found.head:
-        return "doubtful", (
-            f"the head file {name} is not this log's last: it names record {head.records - 1}, and the last one is "
-            f"record {found.records - 1}."
-        )
-    return "whole", ""
+        return "doubtful", "headfile_other"
+    return "whole", None
 
 
 def verify_stream(file: BinaryIO, name: str, *, head: str | None = None, key: bytes | None = None) -> AuditVerification:
@@ -197,7 +176,7 @@ class _Examination:
         try:
             record = parse(line.content)
         except NotARecordError as error:
-            self._say(line.number, f"{error}.")
+            self._say(line.number, error.code)
             self.follows_a_gap = True
             return
         before = self.found
@@ -205,9 +184,7 @@ class _Examination:
             self._begin(line.number, record)
         self._check_place(line.number, record)
         if content_hash(record) != record.hash:
-            self._say(
-                line.number, f"record {record.seq} ({record.kind}) was changed: its content does not give its hash."
-            )
+            self._say_of(line.number, record, "changed")
         self._check_texts(line.number, record)
         self._check_key(line.number, record)
         self._take_note(record, sound=self.found == before)
@@ -221,15 +198,12 @@ class _Examination:
                     f"{self.name} is not an audit log: none of its lines is a record.",
                     hint="Write one with `chauffeur drive ... --audit FILE`.",
                 )
-            self._say(None, "the log holds no record.")
+            self._say(None, "empty")
         for seq, (line, _) in self.erased.items():
             if seq not in self.announced:
-                self._say(line, f"a personal text of record {seq} was erased, and no redaction record says so.")
+                self._say(line, "erased_unsaid", seq=seq)
         if self.anchor is not None and self.anchor_at is None:
-            self._say(
-                None,
-                f"no record with the head {self.anchor} is in the log: its end was cut off, or it was written anew.",
-            )
+            self._say(None, "head_absent", head=self.anchor)
         return AuditVerification(
             findings=tuple(self.findings),
             more_findings=self.found - len(self.findings),
@@ -262,38 +236,29 @@ class _Examination:
         if self.key is None:
             return
         if not self.keyed:
-            self._say(line, "the log was written without a key, and a key was given.")
+            self._say(line, "no_key")
         elif record.kind == "opened" and name != key_name(self.key):
             self.foreign_key = True
-            self._say(line, f"the log was written under the key {name}, and the key given is {key_name(self.key)}.")
+            self._say(line, "other_key", name=name, given=key_name(self.key))
 
     def _check_place(self, line: int, record: AuditRecord) -> None:
         if self.last is None:
             if not self.follows_a_gap and (record.seq != 0 or record.prev != NO_RECORD or record.kind != "opened"):
-                self._say(line, f"the log begins with record {record.seq} ({record.kind}): its beginning was removed.")
+                self._say_of(line, record, "begin_missing")
             return
         if self.follows_a_gap:
             return
         expected = self.last.seq + 1
-        if record.seq > expected:
-            missing = (
-                f"record {expected} is" if record.seq == expected + 1 else f"records {expected} to {record.seq - 1} are"
-            )
-            self._say(line, f"record {record.seq} ({record.kind}) stands here; {missing} not where it belongs.")
-        elif record.seq < expected:
-            self._say(line, f"record {record.seq} ({record.kind}) stands here, where record {expected} belongs.")
+        if record.seq != expected:
+            self._say_of(line, record, "missing" if record.seq > expected else "out_of_place", expected=expected)
         elif record.prev != self.last.hash:
-            self._say(
-                line,
-                f"record {record.seq} ({record.kind}) was not written after the record before it: one of them was "
-                "exchanged or changed.",
-            )
+            self._say_of(line, record, "exchanged")
 
     def _check_texts(self, line: int, record: AuditRecord) -> None:
         gone = 0
         for state in states(record):
-            if state.state == "wrong":
-                self._say(line, f"record {record.seq} ({record.kind}): {state.words}.")
+            if state.state in TEXT_CODES:
+                self._say_of(line, record, state.state, name=state.name)
             gone += state.state == "redacted"
             self.withheld += state.state in ("withheld", "digest")
         if gone:
@@ -301,14 +266,9 @@ class _Examination:
 
     def _check_key(self, line: int, record: AuditRecord) -> None:
         if bool(record.mac) != self.keyed:
-            self._say(
-                line, f"record {record.seq} ({record.kind}) {'lacks' if self.keyed else 'has'} a seal of the key."
-            )
-            return
-        if not self.keyed or self.key is None or self.foreign_key:
-            return
-        if not is_sealed_with(record, self.key):
-            self._say(line, f"record {record.seq} ({record.kind}) was not written with this key.")
+            self._say_of(line, record, "seal_missing" if self.keyed else "seal_added")
+        elif self.keyed and self.key is not None and not self.foreign_key and not is_sealed_with(record, self.key):
+            self._say_of(line, record, "seal_wrong")
 
     def _take_note(self, record: AuditRecord, *, sound: bool) -> None:
         if record.kind == "opened" and self.kinds and not self.closed:
@@ -327,7 +287,10 @@ class _Examination:
             listed = named if isinstance(named, list) else ()
             self.announced.update(seq for seq in listed if isinstance(seq, int))
 
-    def _say(self, line: int | None, what: str) -> None:
+    def _say_of(self, line: int, record: AuditRecord, code: Code, **details: object) -> None:
+        self._say(line, code, record=f"record {record.seq} ({record.kind})", **details)
+
+    def _say(self, line: int | None, code: Code, **details: object) -> None:
         self.found += 1
         if self.found <= MAX_FINDINGS:
-            self.findings.append(AuditFinding(line, what))
+            self.findings.append(AuditFinding(line, code, details))
