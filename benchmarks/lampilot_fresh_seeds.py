@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import Any
 
 from chauffeur.bench.kernel.pipeline import context_adapter, describe_scene
-from chauffeur.bench.kernel.report import markdown
+from chauffeur.bench.kernel.report import fill, markdown
 from chauffeur.bench.lampilot.families import family_of
 from chauffeur.bench.lampilot.metrics import ORIGIN, points
-from chauffeur.bench.lampilot.report import COLUMNS, cells, summaries
+from chauffeur.bench.lampilot.report import FAMILY_TABLE
 from chauffeur.bench.lampilot.rollout import RolloutJob, roll_out
 from chauffeur.concept import LAMPILOT_LIMITS, Instruction, PlanRequest, Scenario, SystemMessage
 from chauffeur.planners.base import Planner
@@ -63,8 +63,8 @@ def main() -> None:
     judged = [row | points(row, ORIGIN.id) for row in rows if row["outcome"] != "not_driven"]
     crashed = [row for row in judged if row["collision"] and row["steps"] <= 2]
     valid = [row | {"family": family_of(row["sample"])} for row in judged if row not in crashed]
-    lines = [[s.label, str(s.items), *cells(s), str(s.refused)] for s in summaries(valid)]
-    print(markdown(("Family", "Scenes", *COLUMNS, "refused"), lines))
+    table = fill(FAMILY_TABLE, valid)
+    print(markdown(table.header, table.cells))
     print(
         f"\nLeft out: {len(rows) - len(judged)} without the vehicle their task is about, "
         f"{len(crashed)} that start in a crash."

@@ -127,7 +127,7 @@ def test_a_class_name_is_defined_once() -> None:
 REQUESTS_MADE = {
     "drive/planning.py",  # for drives and benchmarks, screened
     "bench/hostile/requests.py",  # what screening is worth is measured without it, too
-    "bench/report/redrive.py",  # of a trip that is filed; nobody is asked
+    "bench/lampilot/shown.py",  # of a trip that is filed; nobody is asked
     "models/vlm/lora.py",  # of a training pair; nobody is asked
 }
 """Modules that may name the request of a planner as something to be made."""

@@ -182,9 +182,10 @@ def test_tables_resample_whole_clusters() -> None:
     good = share("test-good-v1", "good", lambda row: row["good"])
     rows = [{"item": str(n), "scene": str(n // 10), "good": n // 10 % 2 == 0} for n in range(200)]
     spec = TableSpec("", (good,), cluster="scene")
-    ((_, size, (wide,)),) = fill(spec, rows).lines
-    ((_, _, (narrow,)),) = fill(replace(spec, cluster="item"), rows).lines
-    assert size == 200 and wide.value == narrow.value == 0.5
+    (whole,) = fill(spec, rows).lines
+    (wide,) = whole.found
+    ((narrow,),) = (line.found for line in fill(replace(spec, cluster="item"), rows).lines)
+    assert whole.items == 200 and wide.value == narrow.value == 0.5
     assert wide.high is not None and wide.low is not None and narrow.high is not None and narrow.low is not None
     assert wide.high - wide.low > 2.0 * (narrow.high - narrow.low)
 

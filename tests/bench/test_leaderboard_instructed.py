@@ -14,11 +14,11 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "planners"))
 from server import ModelServer, stream
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome
-from chauffeur.bench.leaderboard.benchmark import LeaderboardBenchmark
+from chauffeur.bench.kernel.report import tables
+from chauffeur.bench.leaderboard.benchmark import TABLE_V, LeaderboardBenchmark
 from chauffeur.bench.leaderboard.coaching import Apprentice, TownCoach
 from chauffeur.bench.leaderboard.instructed import InstructedDriver, PlannerSpec
 from chauffeur.bench.leaderboard.own_routes import own_routes
-from chauffeur.bench.leaderboard.published import HEADER, PAPER, beside_the_paper
 from chauffeur.bench.leaderboard.rollout import RouteJob
 from chauffeur.bench.leaderboard.ways import plan_official
 from chauffeur.concept import ConfigError, Limits, Plan, PlanRequest, Program, Scenario, Thoughts
@@ -176,8 +176,7 @@ def test_the_papers_rows_never_stand_alone_with_ours() -> None:
     item = bench.items()[0]
     result = replace(bench.job(item, None), route=replace(bench.route_of(item), fault="it is no route")).run()
     (row,) = bench.rows(ItemOutcome(item, None, "", json.loads(json.dumps(result))))
-    rows = beside_the_paper("onboard", "few-shot", [row | {"engine": "sumo-2d 1.28"}])
-    assert rows[: len(PAPER)] == list(PAPER)
-    assert rows[-1][HEADER.index("engine")] == "sumo-2d 1.28 (ours)"
-    assert rows[-1][HEADER.index("learning")] == "3-shot CoT"
-    assert all("CARLA" in one[HEADER.index("engine")] for one in PAPER)
+    (table,) = tables((TABLE_V,), [row | {"engine": "sumo-2d 1.28"}])
+    ours, *printed = table.lines
+    assert ours.name == "sumo-2d 1.28" and "CARLA" in table.spec.lead
+    assert len(printed) == 5 and all(line.published for line in printed)

@@ -16,12 +16,13 @@ from small_run import Inline, quiet
 from chauffeur.bench.kernel.benchmark import ItemOutcome
 from chauffeur.bench.kernel.calls import Patience
 from chauffeur.bench.kernel.conformance import faults
+from chauffeur.bench.kernel.report import fill, published_lines
 from chauffeur.bench.kernel.run import BenchError, BenchRun, Effort
 from chauffeur.bench.nuplanqa import NuPlanQaBenchmark
 from chauffeur.bench.nuplanqa.frames import CAMERAS, FrameSource
 from chauffeur.bench.nuplanqa.metadata import load_metadata
 from chauffeur.bench.nuplanqa.questions import SKILLS, SUBTASKS, load_questions
-from chauffeur.bench.nuplanqa.table6 import HEADER, our_lines, paper_lines, strict_accuracy
+from chauffeur.bench.nuplanqa.table6 import TABLE_VI, strict_accuracy
 from chauffeur.concept import DataError, Usage
 from chauffeur.planners.base import Prose
 from chauffeur.planners.llm_errors import RefusedError, blind
@@ -204,17 +205,22 @@ def test_a_pickle_with_classes_of_nuplan_is_read_without_them(tmp_path: Path) ->
 
 
 def test_the_papers_rows_stand_beside_ours() -> None:
-    multi, single = paper_lines("multi"), paper_lines("single")
+    rows = [
+        {"item": str(place), "chain": str(place), "question": str(place), "subtask": task, "frames": 5, "correct": True,
+         "blind": place < 3}
+        for place, task in enumerate(SUBTASKS)
+    ]  # fmt: skip
+    multi, single = (
+        {line.name: line for line in published_lines(TABLE_VI, [row | {"frames": frames} for row in rows])}
+        for frames in (5, 1)
+    )
     assert len(multi) == len(single) == 9
-    named = {line[0]: line for line in multi}
-    assert named["BEV-LLM (paper)"][1:] == (
-        "61.1", "89.4", "89.6", "80.0", "78.5", "75.5", "68.2", "74.1", "79.1", "83.2", "83.4", "81.9", "78.7",
-    )  # fmt: skip
-    rows = [{"subtask": task, "correct": True, "blind": place < 3} for place, task in enumerate(SUBTASKS)]
-    (ours, blind) = our_lines("us", rows)
-    assert len(ours) == len(HEADER) == len(multi[0])
-    assert ours[-1] == "100.0" and blind[4] == "100.0" and blind[-1] == "33.3"
-    assert our_lines("us", rows[:8])[0][-1] == "n/a"
+    assert [round(100 * (one.value or 0.0), 1) for one in multi["BEV-LLM"].found] == [
+        61.1, 89.4, 89.6, 80.0, 78.5, 75.5, 68.2, 74.1, 79.1, 83.2, 83.4, 81.9, 78.7,
+    ]  # fmt: skip
+    ours, blind = fill(TABLE_VI, rows).cells
+    assert ours[-1] == "100.0" and blind[5] == "100.0" and blind[-1] == "33.3"
+    assert fill(TABLE_VI, rows[:8]).cells[0][-1] == "n/a"
 
 
 def test_cameras_of_the_published_metadata() -> None:

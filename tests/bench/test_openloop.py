@@ -17,14 +17,14 @@ from typer.testing import CliRunner
 
 from chauffeur.bench.kernel.calls import Patience
 from chauffeur.bench.kernel.conformance import faults
+from chauffeur.bench.kernel.report import fill, published_lines
 from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.bench.openloop import OpenLoopBenchmark
-from chauffeur.bench.openloop.benchmark import errors_of
+from chauffeur.bench.openloop.benchmark import TABLE_XII, errors_of
 from chauffeur.bench.openloop.conventions import CONVENTIONS, L2Errors, errors, fails, standing
 from chauffeur.bench.openloop.extrapolation import constant_turn_and_acceleration, constant_velocity, kind_of
 from chauffeur.bench.openloop.nuscenes import NuScenesTables
 from chauffeur.bench.openloop.requests import THOUGHTS, context_of, read_context, training_lines, waypoints_text
-from chauffeur.bench.openloop.table12 import HEADER, our_line, paper_lines
 from chauffeur.bench.openloop.waypoint_parser import read_waypoints
 from chauffeur.cli.main import app
 from chauffeur.concept import ConfigError, DataError, Usage
@@ -306,18 +306,21 @@ def test_a_model_that_knows_the_future_scores_nothing(tmp_path: Path) -> None:
     _, rows = run(tmp_path, Scripted(lambda text: waypoints_text(next(futures))))
     assert len(rows) == len(samples)
     for convention in ("openemma", "stp3", "uniad", "uniad-published"):
-        assert our_line("oracle", "", rows, convention=convention)[3:7] == ("0.00",) * 4
-    late = our_line("oracle", "", rows, convention="openemma-code")[3:6]
-    assert late[0] == "0.00" and all(float(cell) > 2.0 for cell in late[1:])
+        for row in rows:
+            found = errors_of(row, convention)
+            assert all((value or 0.0) < 0.005 for value in (found.at_1s, found.at_2s, found.at_3s))
+    late, kept, *_ = fill(TABLE_XII, rows).cells
+    assert kept[2:6] == ["0.00"] * 4
+    assert late[2] == "0.00" and all(float(cell) > 2.0 for cell in late[3:5])
 
 
 def test_failures_are_counted_both_ways(tmp_path: Path) -> None:
     answers = iter(["I would rather not."] + [waypoints_text(PATH)] * 30)
     _, rows = run(write_nuscenes(tmp_path), Scripted(lambda text: next(answers)), scenes="", limit=8)
     assert [row["status"] for row in rows].count("unreadable") == 1
-    kept, counted = (our_line("us", "SFT", rows, failures=failures) for failures in (False, True))
-    assert kept[-1] == counted[-1] == f"{100 / 8:.2f}"
-    assert float(kept[5]) < float(counted[5])
+    assert fill(TABLE_XII, rows).cells[1][-1] == f"{100 / 8:.2f}"
+    kept, counted = (fill(OpenLoopBenchmark.tables[place], rows).lines[-1].found[2].value for place in (0, 1))
+    assert kept is not None and counted is not None and kept < counted
     bad = next(row for row in rows if row["failed"])
     assert bad["l2_30"] == pytest.approx(24.0)  # it counts as a car that stays
 
@@ -333,10 +336,10 @@ def test_an_endpoint_that_gives_nothing_counts_nowhere(tmp_path: Path) -> None:
     _, rows = run(write_nuscenes(tmp_path), Scripted(refuse), limit=3)
     silent = [row for row in rows if row["status"] == "no answer"]
     assert len(silent) == 2 and all(row["failed"] is None for row in silent)
-    assert our_line("us", "", silent)[3:] == ("n/a",) * 5
+    assert [line.name for line in fill(TABLE_XII, silent).lines if "constant" not in line.name] == []
     assert all(errors_of(row, name) == L2Errors(None, None, None) for row in silent for name in CONVENTIONS)
     counted = next(row for row in rows if row["status"] == "answered")
-    assert our_line("us", "", rows)[3:] == our_line("us", "", [counted])[3:]
+    assert fill(TABLE_XII, rows).lines[1] == fill(TABLE_XII, [counted]).lines[1]
 
 
 def test_the_chain_of_thought_asks_before_it_asks(tmp_path: Path) -> None:
@@ -395,12 +398,11 @@ def test_a_model_behind_a_real_endpoint(tmp_path: Path) -> None:
 
 
 def test_the_papers_table_stands_beside_ours() -> None:
-    lines = paper_lines()
-    assert len(lines) == 13 and all(len(line) == len(HEADER) for line in lines)
-    assert ("ViLaD-SFT (paper, nuScenes)", "SFT", "as printed", "0.79", "1.92", "2.83", "1.85", "0.00") in lines
-    for line in lines:
-        values = [float(cell) for cell in line[3:7]]
-        assert sum(values[:3]) / 3 == pytest.approx(values[3], abs=0.016), line  # as printed: they add up
+    lines = {line.name: [one.value for one in line.found] for line in published_lines(TABLE_XII, [])}
+    assert len(lines) == 13
+    assert lines["ViLaD-SFT, SFT"] == [0.79, 1.92, 2.83, 1.85, 0.0]
+    for *values, mean, _ in lines.values():
+        assert sum(value or 0.0 for value in values) / 3 == pytest.approx(mean, abs=0.016)  # as printed: they add up
 
 
 def test_the_command_asks_and_shows_the_papers_rows(tmp_path: Path) -> None:
@@ -414,8 +416,8 @@ def test_the_command_asks_and_shows_the_papers_rows(tmp_path: Path) -> None:
     finally:
         server.close()
     assert asked.exit_code == 0, asked.output
-    said = (tmp_path / "run" / "table12.md").read_text()
-    assert "ViLaD-Opt (paper, nuScenes)" in said and "constant velocity (nuScenes)" in said
+    said = (tmp_path / "run" / "table.md").read_text()
+    assert "paper: ViLaD-Opt" in said and "| constant velocity, openemma |" in said
     assert "read off the true future" in asked.output
     written = CliRunner().invoke(app, [*arguments, "--write-sft", str(tmp_path / "sft.jsonl")])
     assert written.exit_code == 0 and len((tmp_path / "sft.jsonl").read_text().splitlines()) == 2

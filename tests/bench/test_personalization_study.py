@@ -13,10 +13,11 @@ from small_run import quiet
 
 from chauffeur.bench.kernel.conformance import faults
 from chauffeur.bench.kernel.engine import Work
+from chauffeur.bench.kernel.report import Line, fill
 from chauffeur.bench.kernel.run import BenchRun, Effort
 from chauffeur.bench.kernel.shards import Shard
 from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.personalization import figures, report
+from chauffeur.bench.personalization import figures
 from chauffeur.bench.personalization.benchmark import StudyBenchmark, StudyConfig
 from chauffeur.bench.personalization.study import ARMS, StudyJob, sit
 from chauffeur.concept import ConfigError
@@ -114,9 +115,8 @@ def test_a_run_goes_on_where_it_stopped_and_refuses_another_configuration(tmp_pa
     assert all("simulated" in row["note"] for row in rows)
     with pytest.raises(ConfigError, match="another configuration"):
         _opened(folder, 3)
-    text = report.markdown(rows, "T")
-    assert "Simulated passengers" in text
-    assert "2 simulated passengers" in text
+    assert "Simulated passengers" in (folder / "table.md").read_text()
+    assert figures.headline(rows).startswith("2 simulated passengers")
 
 
 def test_it_conforms() -> None:
@@ -146,19 +146,23 @@ def _rows(persons: int, before: int, after: int) -> list[Row]:
     ]  # fmt: skip
 
 
+def _table_ix(rows: list[Row]) -> list[Line]:
+    return [line for line in fill(figures.TABLES[0], rows).lines if line.name == "highway I"]
+
+
 def test_rates_and_reductions_are_those_of_the_rows() -> None:
-    found = figures.table_ix(_rows(12, 8, 2))[0]
-    assert (found.persons, found.trips) == (12, 120)
-    assert found.before.value == pytest.approx(0.8)
-    assert found.after.value == pytest.approx(0.2)
-    assert found.reduction.value == pytest.approx(0.75)
-    zero = figures.table_ix(_rows(12, 8, 0))[0]
-    assert zero.after.high == pytest.approx(0.2646, abs=1e-3)  # exact for 0 of 12 persons
-    assert figures.table_ix(_rows(12, 0, 2))[0].reduction.value is None
+    (found,) = _table_ix(_rows(12, 8, 2))
+    assert found.items == 120
+    assert [one.value for one in found.found] == pytest.approx([12.0, 0.8, 0.2, 0.75])
+    (zero,) = _table_ix(_rows(12, 8, 0))
+    assert zero.found[2].high == pytest.approx(0.2646, abs=1e-3)  # exact for 0 of 12 persons
+    assert (zero.found[3].value, zero.found[3].low) == (1.0, None), "a reduction is no rate"
+    (none,) = _table_ix(_rows(12, 0, 2))
+    assert none.found[3].value is None
 
 
 def test_trips_that_only_one_system_made_are_not_compared() -> None:
     rows = _rows(12, 8, 2)
     rows = [row for row in rows if row["arm"] == "keyword" or row["trip"] < 5]
-    assert figures.table_ix(rows)[0].trips == 60
-    assert figures.table_ix([row for row in rows if row["arm"] == "keyword"]) == []
+    assert [line.items for line in _table_ix(rows)] == [60]
+    assert _table_ix([row for row in rows if row["arm"] == "keyword"]) == []

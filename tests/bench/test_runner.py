@@ -10,10 +10,10 @@ from small_run import Inline
 
 from chauffeur.bench.kernel.calls import Patience
 from chauffeur.bench.kernel.progress import Standing
-from chauffeur.bench.kernel.report import markdown
+from chauffeur.bench.kernel.report import tables
 from chauffeur.bench.kernel.run import Effort
 from chauffeur.bench.lampilot.frozen import choose_items
-from chauffeur.bench.lampilot.report import comparison_lines, family_lines, summarise
+from chauffeur.bench.lampilot.report import COMPLETION, FAMILY_TABLE, SCORE_TABLE
 from chauffeur.bench.lampilot.runner import LampilotRun, RunConfig
 from chauffeur.concept import (
     ConfigError,
@@ -105,16 +105,16 @@ def test_outcomes_and_causes_are_apart_and_the_denominator_is_fixed(tmp_path: Pa
     silent = rows["left_lc_s0_c4"]
     assert silent["infra_failed"] and silent["outcome"] == "not_driven"
     assert rows["broken_s0_c0"]["infra_failed"]
-    summary = summarise("all", list(rows.values()))
-    assert (summary.items, summary.completion) == (6, pytest.approx(2 / 6))
+    assert COMPLETION.aggregate(list(rows.values()), "sample").value == pytest.approx(2 / 6)
 
     # Resume: plans and rollouts are kept, only what failed for want of infrastructure is asked again.
     asked = planner.asked
     again = _run(tmp_path, dataset, planner)
     assert {r["item"]: r for r in again} == rows
     assert planner.asked == asked + EFFORT.patience.attempts
-    assert "lane change" in markdown(*family_lines(again))
-    assert "paper: Human driver" in markdown(*comparison_lines("scripted", again))
+    families, scores = tables((FAMILY_TABLE, SCORE_TABLE), again, "scripted")
+    assert "lane change" in [line.name for line in families.lines]
+    assert {"scripted", "Human driver"} <= {line.name for line in scores.lines}
 
 
 def test_a_run_folder_keeps_its_configuration(tmp_path: Path, dataset: Dataset) -> None:

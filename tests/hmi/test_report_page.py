@@ -12,23 +12,11 @@ from pathlib import Path
 import pytest
 from sample_trips import HOSTILE, highway_trip, intersection_trip, refused_trip
 
+from chauffeur.bench.kernel.metrics import Measure, TableSpec
+from chauffeur.bench.kernel.report import Line, ResultTable
 from chauffeur.bench.kernel.stats import Interval
-from chauffeur.bench.report.model import (
-    NOT_KNOWN,
-    SIMULATED,
-    BenchReport,
-    Cell,
-    Column,
-    Failure,
-    Flip,
-    FlipList,
-    Gallery,
-    Group,
-    Headline,
-    ReportLine,
-    ReportTable,
-)
-from chauffeur.concept import Context, DataError, Program, Situation, Verdict
+from chauffeur.bench.report.model import SIMULATED, BenchReport, Card, Flip, FlipList, Gallery
+from chauffeur.concept import DataError, Program, Verdict
 from chauffeur.drive.recording import RecordedTrip
 from chauffeur.hmi.drive_svg import draw_strip
 from chauffeur.hmi.report_page import render_report, write_report_page
@@ -66,59 +54,51 @@ class Page(HTMLParser):
         self.text += data
 
 
-def _failure(drive: RecordedTrip | None, words: str = "Go on.", note: str = "") -> Failure:
-    situation = Situation("highway", 25.0, 31.0, 3, 1, False, None, None)
-    return Failure(
-        run=f"run {words}",
-        labels=(LABEL,),
+def _card(drive: RecordedTrip | None, words: str = "Go on.", note: str = "") -> Card:
+    return Card(
         item=f"item {words}",
-        sample="s",
-        family=words,
-        scenario_seed="42",
-        command=words,
+        words=words,
+        ending="Ran out of time",
+        bad=True,
         goal=words,
-        outcome="timeout",
-        happened=("Ran out of time.", words),
+        why=(words,),
         facts=(("family", words),),
-        siblings=words,
-        elsewhere=((words, words),),
-        context=Context(words, situation),
+        context=words,
         thoughts=words,
         program=Program(f"def go():\n    # {words}\n    yield autopilot()\n", library=f"def help():\n    '{words}'\n"),
         verdicts=(Verdict("format-v1", False, words, 1, words),),
         drive=drive,
         drive_note=note,
+        elsewhere=((words, words),),
     )
 
 
-def _table(words: str, **more: object) -> ReportTable:
-    columns = (
-        Column("a", words, "%", "lower", words, 1, (-10.0, 100.0)),
-        Column("b", "Count", meaning="How many."),
+def _table(words: str, group: str = "") -> ResultTable:
+    measures = (
+        Measure("a", words, lambda _: None, "%", better="lower", meaning=words),
+        Measure("b", words, lambda _: None, "%", meaning=words),
     )
+    spec = TableSpec(words, measures, heads=(words, "items"), lead=words)
     lines = (
-        ReportLine(words, (Cell("5.0", Interval(5.0, -2.0, 9.0, "bootstrap"), words), Cell("3")), (LABEL,)),
-        ReportLine("unknown", (NOT_KNOWN, Cell("0")), (LABEL,)),
-        ReportLine("all", (Cell("500.0", Interval(500.0)), Cell("0")), (LABEL,), published=True),
+        Line(words, 12, (Interval(0.05, -0.02, 0.09, "bootstrap"), Interval(None)), group, (LABEL,)),
+        Line("p", None, (Interval(0.0001), Interval(None)), group, (LABEL,), form="p"),
+        Line(words, 98, (Interval(5.0), Interval(0.5)), f"Printed {words}", published=True),
     )
-    table = ReportTable("scores", words, "Method", columns, (Group(words, lines),), words, (words,))
-    return replace(table, **more)  # type: ignore[arg-type]
+    return ResultTable(spec, lines, (words,))
 
 
 def _report(words: str = "onboard", drives: tuple[RecordedTrip | None, ...] = (None,)) -> BenchReport:
-    failures = tuple(_failure(drive, words, note=words) for drive in drives)
+    cards = tuple(_card(drive, words, note=words) for drive in drives)
     return BenchReport(
         title=words,
         subtitle=words,
-        summary=words,
-        headlines=(Headline(f"{words} [{LABEL}]", words),),
-        warnings=(words,),
-        tables=(_table(words), _table(words, id="cost", simulated=False)),
+        judge=words,
+        notices=(words,),
+        tables=(_table(words), _table(words, words)),
+        pairs=(_table(words),),
         flips=(FlipList(f"{words} [{LABEL}]", words, (Flip("s", words, 1, 0, words, words, words),), 3),),
-        galleries=(Gallery(words, (LABEL,), 9, 10, failures), Gallery("none", (LABEL,), 0, 10, ())),
-        terms=((words, words),),
+        galleries=(Gallery(words, (LABEL,), 9, 10, cards), Gallery("none", (LABEL,), 0, 10, ())),
         facts=((words, ((words, words),)),),
-        ruler="lampilot-origin-v1",
         labels=(LABEL,),
     )
 
@@ -153,20 +133,21 @@ def test_every_link_has_its_target_once() -> None:
     wanted = {value[1:] for _, name, value in page.attributes if name == "href"}
     wanted |= {value for _, name, value in page.attributes if name == "aria-labelledby"}
     assert wanted <= set(ids)
-    assert {"scores", "cost", "flips", "failures", "method"} <= wanted
+    assert {"t0", "t1", "pairs", "flips", "gallery", "method"} <= wanted
 
 
-def test_labels_and_simulated_stand_wherever_a_result_does() -> None:
+def test_labels_judge_and_simulated_stand_where_a_result_does() -> None:
     text = render_report(_report(drives=(highway_trip(seconds=3.0),)))
     rows = re.findall(r'<tr><th scope="row">(.*?)</tr>', text)
     assert sum(LABEL in row for row in rows) == 6
-    for start in ('<ul class="headlines">', '<section id="flips"', '<section id="failures"', '<article class="card'):
+    for start in ('<section id="flips"', '<section id="gallery"', '<article class="card'):
         part = text[text.index(start) : text.index(start) + 1500]
         assert LABEL in part, start
-    for section in re.findall(r'<section id="(?:scores|flips|failures)".*?</section>', text, re.DOTALL):
+    for section in re.findall(r'<section id="(?:t0|pairs)".*?</section>', text, re.DOTALL):
         assert SIMULATED in section
-    assert "Simulated drives (highway-env physics)" in text
-    assert SIMULATED in text[text.index("<article") :]
+    assert "Simulated drives; no real car moved." in text and "<b>Judge</b> onboard" in text
+    answers = render_report(replace(_report(), simulated=False))
+    assert SIMULATED not in answers and "nothing drove" in answers
 
 
 def test_bars_stay_on_their_axis() -> None:
@@ -180,8 +161,8 @@ def test_a_reader_by_ear_hears_directions_and_tables() -> None:
     text = render_report(_report())
     assert "lower is better</span>" in text
     assert "Lower is better." in text
-    assert text.count("<caption") == 2
-    assert re.search(r'role="region" aria-label="onboard \(simulated drives\)"', text)
+    assert text.count("<caption") == 5
+    assert re.search(r'role="region" aria-label="onboard"', text)
     assert 'tabindex="0"' in text
 
 
@@ -216,11 +197,12 @@ def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path) -> None:
     assert write_report_page(tmp_path / "deep" / "report.html", _report()).read_text().startswith("<!doctype html>")
 
 
-def test_the_page_opens_with_its_table_and_one_plot_and_words_come_after() -> None:
+def test_the_page_opens_with_its_table_and_one_plot() -> None:
     text = render_report(_report())
-    table, plot, words = (text.index(part) for part in ("<table>", '<figure class="plot">', '<section id="words"'))
-    assert table < plot < words
+    table, plot, pairs = (text.index(part) for part in ("<table>", '<figure class="plot">', '<section id="pairs"'))
+    assert table < plot < pairs
     assert text.count('<figure class="plot">') == 1
+    assert "&lt; 0.001" in text
 
 
 def test_every_figure_carries_the_name_of_its_column_for_narrow_screens() -> None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from chauffeur.cli.bench_plugin import BenchGroup
-from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options
+from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
 from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import BaseUrl
 from chauffeur.concept import LAMPILOT_LIMITS
@@ -173,22 +172,17 @@ def _planner(spec: str, base_url: str | None) -> Planner | None:
 
 
 def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
-    from chauffeur.bench.lampilot.report import answers_note, comparison_lines, family_lines
+    from chauffeur.bench.kernel.report import tables
+    from chauffeur.bench.lampilot.report import FAMILY_TABLE, SCORE_TABLE
     from chauffeur.version import __version__
 
     rated = [row for row, item in zip(rows, run.items, strict=True) if run.stages.asked(item)]
     if not rated:
         return
-    title = "By task family"
     if len(rated) < len(rows):
-        title += f" (partial: the {len(rated)} of {len(rows)} items that were asked)"
+        console.print(f"Partial: the {len(rated)} of {len(rows)} items that were asked.")
     planner = run.config.planner if len(run.config.planner) <= _NAME else f"...{run.config.planner[3 - _NAME :]}"
-    _table(console, title, *family_lines(rated))
-    _table(
-        console,
-        "Beside the rows that the paper printed (its own items and machines)",
-        *comparison_lines(planner, rated),
-    )
+    show_tables(console, tables((FAMILY_TABLE, SCORE_TABLE), rated, planner))
     model = f", model {run.manifest.model}" if run.manifest.model else ""
     labels = "".join(f"; {label}" for label in run.manifest.labels)
     console.print(
@@ -197,8 +191,6 @@ def _show(console: Console, run: LampilotRun, rows: list[Row]) -> None:
         f"{run.config.limits.name}; scores in points, rates in %; simulated drives (highway-env). Rows marked paper "
         "are its authors' own figures."
     )
-    if answers := answers_note(rated):
-        console.print(f"{answers[0].upper()}{answers[1:]}.")
 
 
 @bench_app.command(epilog=MERGE_EXAMPLES)
@@ -208,19 +200,13 @@ def merge(
     metrics: MetricsOption = "origin",
 ) -> None:
     """Put the shards of a LaMPilot-Bench run together, and score it as if it had been one."""
+    from chauffeur.bench.kernel.report import tables
     from chauffeur.bench.lampilot.merge import merge_shards
-    from chauffeur.bench.lampilot.report import family_lines
+    from chauffeur.bench.lampilot.report import FAMILY_TABLE
     from chauffeur.cli.console import stdout
 
     console = stdout()
     rows = merge_shards(out, shards, metrics)
-    _table(console, "By task family", *family_lines(rows))
+    show_tables(console, tables((FAMILY_TABLE,), rows))
     console.print(f"{len(rows)} items of {len(shards)} shards, metrics {rows[0]['metrics']}.")
     console.print(f"Rows: {out / 'results.jsonl'}", soft_wrap=True)
-
-
-def _table(console: Console, title: str, header: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
-    from chauffeur.cli.tables import show_table
-
-    show_table(console, title, header, lines)
-    console.print()

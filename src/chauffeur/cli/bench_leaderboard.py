@@ -62,12 +62,10 @@ def leaderboard(
     from chauffeur.bench.kernel.shards import WHOLE, Shard
     from chauffeur.bench.leaderboard.artefacts import write_artefacts
     from chauffeur.bench.leaderboard.benchmark import LeaderboardBenchmark
-    from chauffeur.bench.leaderboard.published import ENGINES_DIFFER, HEADER, beside_the_paper
     from chauffeur.bench.leaderboard.results import NOT_DRIVEN, NOTE
     from chauffeur.bench.leaderboard.scoring import scoring_named
     from chauffeur.cli.bench_run import carry_out, effort, finish, show_tables
     from chauffeur.cli.console import stdout
-    from chauffeur.cli.tables import show_table
 
     console = stdout()
     bench = LeaderboardBenchmark(
@@ -104,7 +102,4 @@ def leaderboard(
         maps = "1 route map" if drawn == 1 else f"{drawn} route maps"
         console.print(f"Official results: {written[0]}; {maps} beside it.", soft_wrap=True)
         console.print(NOTE)
-        console.print()
-        show_table(console, "Beside the paper's Tab. V", HEADER, beside_the_paper(planner, bench.setting, rows))
-        console.print(ENGINES_DIFFER)
     finish(console, run)

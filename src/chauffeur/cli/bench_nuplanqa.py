@@ -40,15 +40,12 @@ def nuplanqa(
     price: Price = None,
 ) -> None:
     """Nine subtasks in four-way questions about pictures of a road, beside a baseline that sees none of them."""
-    from chauffeur.bench.kernel.report import markdown, tables
-    from chauffeur.bench.kernel.run import BenchRun, write_results
+    from chauffeur.bench.kernel.report import tables
+    from chauffeur.bench.kernel.run import BenchRun
     from chauffeur.bench.nuplanqa import NuPlanQaBenchmark
     from chauffeur.bench.nuplanqa.frames import CAMERAS
-    from chauffeur.bench.nuplanqa.table6 import HEADER, our_lines, paper_lines, strict_accuracy
     from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
     from chauffeur.cli.console import plain, stdout
-    from chauffeur.cli.tables import show_table
-    from chauffeur.concept import DataError
     from chauffeur.planners.registry import make_answerer
 
     console = stdout()
@@ -69,17 +66,6 @@ def nuplanqa(
     work = effort(1, concurrency, max_usd, max_requests, price)
     rows = carry_out(console, run, lambda watch: run.run(watch, work), f"NuPlanQA ({bench.id})")
     show_tables(console, tables(bench.tables, rows))
-    ours = our_lines(who.id if control == "pictures" else f"{who.id}, {control} control", rows)
-    try:
-        theirs = paper_lines(frames)
-    except DataError as error:
-        console.print(f"Without the paper's rows: {error.message}", soft_wrap=True)
-        theirs = []
-    title = "Beside the paper's Tab. VI (accuracy in %; its rows are of nuPlan's published evaluation file)"
-    show_table(console, title, HEADER, [*ours, *theirs])
-    write_results(run.folder, {"table6.md": f"# {title}\n\n{markdown(HEADER, [*ours, *theirs])}\n"})
-    if (strict := strict_accuracy(rows)) is not None:
-        console.print(f"Right in all four circular shifts: {strict[0]:.1%} of {strict[1]} questions.")
     scenes = {row["scene"] for row in rows}
     if any(scene.startswith("simulated") for scene in scenes):
         console.print("The pictures are rendered and the questions generated: simulated, not nuPlan's.")

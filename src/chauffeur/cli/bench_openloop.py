@@ -3,7 +3,6 @@ with and without an instruction (doScenes)."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,8 +12,6 @@ from chauffeur.cli.examples import help_text
 from chauffeur.cli.options import ASKING, MaxRequests, MaxUsd, Price, Seed
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from rich.console import Console
 
     from chauffeur.bench.openloop.instructed import InstructedBenchmark
@@ -44,9 +41,6 @@ def openloop(
     limit: Annotated[
         int, typer.Option(min=0, help="Only the first so many frames; 0 for all.", rich_help_panel=FRAMES)
     ] = 0,
-    beside: Annotated[
-        list[Path] | None, typer.Option(help="Folder of another run to show beside this one; may come again.")
-    ] = None,
     write_sft: Annotated[
         Path | None, typer.Option(help="Write the frames as lines for chat fine-tuning, and stop.")
     ] = None,
@@ -61,23 +55,21 @@ def openloop(
 
     With --instructions over six seconds, with what people would tell the car and without (doScenes).
     """
-    from chauffeur.bench.kernel.report import markdown, tables
-    from chauffeur.bench.kernel.run import BenchRun, write_results
+    from chauffeur.bench.kernel.report import tables
+    from chauffeur.bench.kernel.run import BenchRun
     from chauffeur.bench.openloop import OpenLoopBenchmark
     from chauffeur.bench.openloop.frames import SIMULATED
     from chauffeur.bench.openloop.instructed import InstructedBenchmark
     from chauffeur.bench.openloop.requests import training_lines
-    from chauffeur.bench.openloop.table12 import HEADER, LEARNING, our_lines, paper_lines
     from chauffeur.cli.bench_run import carry_out, effort, finish, planner_options, show_tables
     from chauffeur.cli.console import stdout
-    from chauffeur.cli.tables import show_table
-    from chauffeur.concept import ConfigError, DataError
+    from chauffeur.concept import ConfigError
     from chauffeur.drive.files import publish
     from chauffeur.planners.registry import make_answerer
 
     console = stdout()
-    if instructions is not None and (write_sft is not None or beside):
-        raise ConfigError("--instructions is measured over 6 s.", hint="Leave out --write-sft and --beside.")
+    if instructions is not None and write_sft is not None:
+        raise ConfigError("--instructions is measured over 6 s.", hint="Leave out --write-sft.")
     options: dict[str, Any] = {
         "version": tables_of,
         "setting": "sft" if write_sft else setting,
@@ -108,22 +100,7 @@ def openloop(
     show_tables(console, tables(bench.tables, rows))
     if isinstance(bench, InstructedBenchmark):
         _tell_instructed(console, bench, run.folder)
-        finish(console, run)
-        return
-    on = "our frames" if bench.own else "nuScenes"
-    shown_as = "" if shown == "pictures" else ", grey pictures"
-    compared = our_lines(f"{who.id}{shown_as} ({on})", LEARNING[setting], rows)
-    for name, held in _others(beside or []):
-        compared += our_lines(f"{name} ({on})", "", held)
-    compared += our_lines(f"constant velocity ({on})", "none", rows, "cv")
-    try:
-        compared += paper_lines()
-    except DataError as error:
-        console.print(f"Without the paper's rows: {error.message}", soft_wrap=True)
-    title = "Beside the paper's Tab. XII (failures left out of the means)"
-    show_table(console, title, HEADER, compared)
-    write_results(run.folder, {"table12.md": f"# {title}\n\n{markdown(HEADER, compared, 3)}\n"})
-    if bench.own:
+    elif bench.own:
         console.print(SIMULATED, soft_wrap=True)
     else:
         console.print("Commands are read off the true future, as ST-P3 and UniAD do: no input a car would have.")
@@ -154,26 +131,6 @@ def _tell_instructed(console: Console, bench: InstructedBenchmark, folder: Path)
     )
     if bench.own:
         console.print(SIMULATED, soft_wrap=True)
-
-
-def _others(folders: list[Path]) -> list[tuple[str, list[Mapping[str, Any]]]]:
-    """(name, rows) of other runs. Raises DataError: a folder holds no results."""
-    from chauffeur.concept import DataError
-
-    found: list[tuple[str, list[Mapping[str, Any]]]] = []
-    for folder in folders:
-        try:
-            lines = (folder / "results.jsonl").read_text(encoding="utf-8").splitlines()
-            rows: list[Mapping[str, Any]] = [json.loads(line) for line in lines]
-        except (OSError, ValueError) as error:
-            raise DataError(f"{folder} holds no results of a run: {error}.") from error
-        if any(not isinstance(row, dict) or "lagged_05" not in row for row in rows):
-            raise DataError(
-                f"{folder} was measured by an earlier version of this benchmark.",
-                hint="Run it again, into another folder.",
-            )
-        found.append((folder.name.removeprefix("openloop-"), rows))
-    return found
 
 
 def frames(

@@ -37,12 +37,10 @@ def personalization(
     from chauffeur.bench.kernel.run import BenchRun
     from chauffeur.bench.kernel.shards import WHOLE, Shard
     from chauffeur.bench.personalization.benchmark import StudyBenchmark, StudyConfig
-    from chauffeur.bench.personalization.report import markdown
     from chauffeur.cli.bench_run import carry_out, effort, finish
     from chauffeur.cli.console import stdout
     from chauffeur.cli.failures import FAILED
     from chauffeur.concept import ConfigError
-    from chauffeur.drive.files import publish
 
     console = stdout()
     if half not in ("test", "tuning"):
@@ -56,8 +54,6 @@ def personalization(
         console, run, lambda watch: run.run(watch, effort(workers)), "Personalization, simulated passengers"
     )
     if rows:
-        title = f"Personalization, planner {planner}, simulated passengers"
-        publish(run.folder / "table.md", markdown(rows, title).encode(), "table")
         _show(console, bench, rows)
     finish(console, run)
     if run.spoiled:
@@ -65,19 +61,17 @@ def personalization(
 
 
 def _show(console: Console, bench: StudyBenchmark, rows: list[Row]) -> None:
-    from chauffeur.bench.personalization.figures import latencies
-    from chauffeur.bench.personalization.report import NOTE, headline, tables
-    from chauffeur.cli.tables import show_table
+    from chauffeur.bench.kernel.report import tables
+    from chauffeur.bench.personalization.figures import headline, latencies
+    from chauffeur.cli.bench_run import show_tables
     from chauffeur.version import __version__
 
-    for title, header, lines in tables(rows):
-        show_table(console, title, header, lines)
-        console.print()
+    show_tables(console, tables(bench.tables, rows))
     console.print(headline(rows), soft_wrap=True)
     p50, p95 = latencies(rows, "with")
     console.print(
         f"Chauffeur {__version__}; planner {bench.options.planner}, model {bench.model}; {bench.id}; "
         f"{bench.options.half} wordings; seed {bench.options.seed}; from words to policy {1000 * p50:.0f} ms (median), "
-        f"{1000 * p95:.0f} ms (95 %). {NOTE}",
+        f"{1000 * p95:.0f} ms (95 %). {bench.judge}",
         soft_wrap=True,
     )

@@ -95,10 +95,15 @@ def carry_out(console: Console, run: BenchRun, work: Callable[[Any], list[Row]],
 
 def show_tables(console: Console, found: Iterable[ResultTable]) -> None:
     """The kernel's tables."""
+    from chauffeur.cli.console import plain
     from chauffeur.cli.tables import show_table
 
     for table in found:
-        show_table(console, table.spec.title, table.header, table.cells)
+        show_table(
+            console, plain(table.spec.title), table.header, [[plain(c).plain for c in row] for row in table.cells]
+        )
+        for note in table.notes:
+            console.print(plain(note), soft_wrap=True)
         console.print()
 
 

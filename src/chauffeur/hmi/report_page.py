@@ -10,23 +10,14 @@ import html
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 
-from chauffeur.bench.report.model import (
-    SIMULATED,
-    BenchReport,
-    Cell,
-    Column,
-    Failure,
-    FlipList,
-    Gallery,
-    Group,
-    ReportLine,
-    ReportTable,
-)
-from chauffeur.bench.report.tables import number
+from chauffeur.bench.kernel.metrics import Measure
+from chauffeur.bench.kernel.report import Line, ResultTable, count_text, head, value_text
+from chauffeur.bench.kernel.stats import DRAWS, LEAST_CLUSTERS, Interval
+from chauffeur.bench.report.model import SIMULATED, BenchReport, Card, FlipList, Gallery
 from chauffeur.drive.files import publish
-from chauffeur.hmi import words
 from chauffeur.hmi.document import asset, content_hash, fill, printable
 from chauffeur.hmi.drive_svg import SYMBOLS, draw_strip
 from chauffeur.hmi.payload import program_tokens
@@ -42,9 +33,18 @@ _KEY = (
     "The amber car is the one that was driven; the line behind it is its way so far. Pictures go from left to right, "
     "and the marks on the curves are their moments."
 )
-_FIRST = ("scores", "pairs")
-"""Tables that the page opens with; words and the rest come after them."""
-_BAD = ("collision", "off_road", "failure", "timeout")
+_INTERVALS = (
+    f"Brackets hold 95 % intervals: percentile bootstrap, {DRAWS:,} resamples of whole clusters (e.g. scenes, with all "
+    "their commands), because items of one cluster are no independent observations. They speak of other items like "
+    "these, not of other traffic models or real roads. A rate of exactly 0 or 100 % never changes under resampling; "
+    "its bracket is the exact binomial interval with each cluster as one trial. No bracket stands where fewer than "
+    f"{LEAST_CLUSTERS} clusters have a value, or where no resample differs. Every rate is over all items to which it "
+    "applies; refusals, failed programs and failures of the machine stay in it."
+)
+_LOWEST_POINTS = -100.0
+"""Bars end here: a few collisions in a small family bring a driving score to -500."""
+_PLOTTED = 24
+"""Lines of a plot; more are no picture any more."""
 
 
 def write_report_page(path: Path, report: BenchReport) -> Path:
@@ -63,15 +63,17 @@ def write_report_page(path: Path, report: BenchReport) -> Path:
 def render_report(report: BenchReport) -> str:
     """The page of a report as text."""
     style = "\n".join(asset(name) for name in _STYLES)
-    first = [table for table in report.tables if table.id in _FIRST]
+    real = report.simulated
+    tables = [(f"t{n}", table.spec.title, _section(f"t{n}", table, real)) for n, table in enumerate(report.tables)]
     sections = [
-        *((table.id, table.title, _section(table)) for table in first),
-        ("words", "In words", _in_words(report)),
-        *((table.id, table.title, _section(table)) for table in report.tables if table not in first),
+        *tables[:1],
+        *([("pairs", "Run against run", _pairs(report))] if report.pairs else []),
         *([("flips", "Items that went differently", _flips(report.flips))] if report.flips else []),
-        ("failures", "Failures", _galleries(report.galleries)),
+        *tables[1:],
+        *([("gallery", "Not as it should be", _galleries(report.galleries))] if report.galleries else []),
         ("method", "How the figures were made", _method(report)),
     ]
+    judge = f'<p class="judge"><b>Judge</b> {_text(report.judge)}</p>' if report.judge else ""
     return fill(
         asset("report.html"),
         {
@@ -80,9 +82,9 @@ def render_report(report: BenchReport) -> str:
             "title": _text(report.title),
             "heading": _text(report.title),
             "subtitle": _text(report.subtitle) + _labels(report.labels),
-            "simulated": _text(words.SIMULATED.replace("drive", "drives")),
-            "ruler": _text(f"Ruler {report.ruler}"),
-            "warnings": "".join(f'<p class="notice">{_text(warning)}</p>' for warning in report.warnings),
+            "simulated": "Simulated drives; no real car moved." if real else "Answers about pictures; nothing drove.",
+            "notices": judge + "".join(f'<p class="notice">{_text(text)}</p>' for text in report.notices),
+            "first": sections[0][0],
             "nav": "".join(f'<a href="#{name}">{_text(title)}</a>' for name, title, _ in sections),
             "symbols": SYMBOLS,
             "sections": "\n".join(content for _, _, content in sections),
@@ -94,54 +96,49 @@ def _text(text: str) -> str:
     return html.escape(printable(text))
 
 
-def _in_words(report: BenchReport) -> str:
-    items = "".join(f"<li><b>{_text(line.subject)}:</b> {_text(line.text)}</li>" for line in report.headlines)
+def _section(name: str, table: ResultTable, simulated: bool) -> str:
+    lead = f"<p>{_text(table.spec.lead)}</p>" if table.spec.lead else ""
     return (
-        f'<section id="words" class="card">{_heading("In words")}'
-        f'<p class="first">{_text(report.summary)}</p><ul class="headlines">{items}</ul></section>'
+        f'<section id="{name}" class="card">{_heading(table.spec.title, simulated=simulated)}{lead}'
+        f"{_body(table, plotted=name == 't0')}{_notes(table.notes)}{_legend(table.spec.measures)}</section>"
     )
 
 
-def _section(table: ReportTable) -> str:
-    lead = f"<p>{_text(table.lead)}</p>" if table.lead else ""
-    # What the paper printed is for looking up: unfolded, its rows would bury those that the report is about.
-    own = tuple(group for group in table.groups if not _published(group))
-    printed = tuple(group for group in table.groups if _published(group))
-    shown = _table(replace(table, groups=own or printed))
-    if own and printed:
-        shown += _plot(table) + "".join(
-            f"<details><summary>{_text(group.heading)}</summary>"
-            f"{_table(replace(table, groups=(replace(group, heading=''),), title=group.heading))}</details>"
-            for group in printed
-        )
-    elif table.id == "scores":
-        shown += _plot(table)
-    return (
-        f'<section id="{table.id}" class="card">{_heading(table.title, simulated=table.simulated)}{lead}'
-        f"{shown}{_notes(table.notes)}{_legend(table.columns)}</section>"
-    )
+def _body(table: ResultTable, *, plotted: bool) -> str:
+    """The rows; what is printed elsewhere is for looking up: unfolded, it would bury those that the report is about."""
+    own = tuple(line for line in table.lines if not line.published)
+    printed = tuple(line for line in table.lines if line.published)
+    shown = _table(replace(table, lines=own)) + (_plot(table) if plotted else "")
+    if printed:
+        bare = replace(table, lines=tuple(replace(line, group="") for line in printed))
+        shown += f"<details><summary>{_text(printed[0].group)}</summary>{_table(bare)}</details>"
+    return shown
 
 
-def _published(group: Group) -> bool:
-    return any(line.published for line in group.lines)
+def _pairs(report: BenchReport) -> str:
+    parts = "".join(f"<h3>{_text(table.spec.title)}</h3>{_table(table)}" for table in report.pairs)
+    heading = _heading("Run against run", simulated=report.simulated)
+    return f'<section id="pairs" class="card">{heading}{parts}{_notes(report.pairs[0].notes)}</section>'
 
 
-def _plot(table: ReportTable) -> str:
-    """The last column with an axis, which is the score: a line a run, and of the paper's the best and the human's."""
-    place = max((place for place, column in enumerate(table.columns) if column.span is not None), default=None)
-    if place is None:
+def _plot(table: ResultTable) -> str:
+    """The last rate or score with a better direction: a line a run, and of what is printed the best three."""
+    columns = [place for place, measure in enumerate(table.spec.measures) if measure.better and not measure.whole]
+    if not columns:
         return ""
-    column = table.columns[place]
-    assert column.span is not None
-    own = [line for group in table.groups for line in group.lines if not line.published]
-    printed = [line for group in table.groups for line in group.lines if line.published]
-    models = [line for line in printed if "," in line.name]  # a language model and its setting
-    shown = [
-        *own,
-        *sorted(models, key=lambda line: _value(line.cells[place]))[-1:],
-        *(line for line in printed if line.name == "Human driver"),
-    ]
-    low, high = column.span
+    place = columns[-1]
+    measure = table.spec.measures[place]
+    own = [line for line in table.lines if not line.published]
+    printed = sorted(
+        (line for line in table.lines if line.published),
+        key=lambda line: _scaled(line.found[place], measure).value or -math.inf,
+        reverse=measure.better == "higher",
+    )
+    shown = [line for line in (*own, *printed[:3]) if line.found[place].value is not None]
+    span = _span([line.found[place] for line in shown], measure)
+    if span is None or len(shown) > _PLOTTED:
+        return ""
+    low, high = span
 
     def at(value: float) -> str:
         return f"{100.0 * (min(max(value, low), high) - low) / (high - low):.2f}%"
@@ -150,39 +147,52 @@ def _plot(table: ReportTable) -> str:
     grid = "".join(f'<line class="grid" x1="{at(mark)}" x2="{at(mark)}" y1="0" y2="100%"/>' for mark in marks)
     rows: list[str] = []
     for line in shown:
-        cell = line.cells[place]
-        if cell.interval is None or cell.interval.value is None:
-            continue
-        ends = tuple(at(end) for end in cell.ends) if cell.ends is not None else ()
-        whisker = f'<line class="range" x1="{ends[0]}" x2="{ends[1]}" y1="50%" y2="50%"/>' if ends else ""
-        value = at(cell.interval.value)
-        kind, name = ("printed", f"paper: {line.name}") if line.published else ("own", line.name)
+        interval = _scaled(line.found[place], measure)
+        whisker = ""
+        if interval.low is not None and interval.high is not None:
+            whisker = f'<line class="range" x1="{at(interval.low)}" x2="{at(interval.high)}" y1="50%" y2="50%"/>'
+        name = f"{line.group}: {line.said}" if line.group and not line.published else line.said
         rows.append(
-            f'<li class="{kind}"><span class="who">{_name(name, line.labels)}</span>'
-            f'<svg aria-hidden="true">{grid}{whisker}<circle class="value" cx="{value}" cy="50%" r="5"/></svg>'
-            f"<b>{_text(cell.text)}</b></li>"
+            f'<li class="{"printed" if line.published else "own"}"><span class="who">{_text(name)}</span>'
+            f'<svg aria-hidden="true">{grid}{whisker}'
+            f'<circle class="value" cx="{at(interval.value or 0.0)}" cy="50%" r="5"/></svg>'
+            f"<b>{value_text(line, place, measure)[0]}</b></li>"
         )
-    numbers = "".join(f'<text x="{at(mark)}" y="1em" text-anchor="middle">{number(mark, 0)}</text>' for mark in marks)
-    caption = f"{column.title}, {column.unit}; bars are 95 % intervals." if column.unit else column.title
-    if any(line.published for line in shown):
-        caption += (
-            " Of the paper's rows, measured by its authors on other items, its best language model and its human."
-        )
+    numbers = "".join(f'<text x="{at(mark)}" y="1em" text-anchor="middle">{mark:g}</text>' for mark in marks)
+    caption = f"{head(measure)}; bars are 95 % intervals."
+    if printed:
+        caption += " Of the printed rows, measured by others on other items, the best three."
     return (
         f'<figure class="plot"><figcaption>{_text(caption)}</figcaption><ol>{"".join(rows)}'
         f'<li class="axis" aria-hidden="true"><svg>{numbers}</svg></li></ol></figure>'
     )
 
 
-def _value(cell: Cell) -> float:
-    return -math.inf if cell.interval is None or cell.interval.value is None else cell.interval.value
+def _scaled(interval: Interval, measure: Measure) -> Interval:
+    """An interval in the unit that is shown."""
+    if measure.unit != "%" or interval.value is None:
+        return interval
+    low, high = (None if end is None else 100.0 * end for end in (interval.low, interval.high))
+    return replace(interval, value=100.0 * interval.value, low=low, high=high)
+
+
+def _span(found: Iterable[Interval], measure: Measure) -> tuple[float, float] | None:
+    """An axis that holds everything; points far below nothing stand at its end."""
+    scaled = [_scaled(interval, measure) for interval in found]
+    ends = [end for one in scaled for end in (one.low, one.value, one.high) if end is not None]
+    if not ends or all(one.low is None for one in scaled):
+        return None
+    full = 100.0 if measure.better == "higher" and measure.unit in ("%", "pt", "points") else 0.0
+    low, high = max(min(0.0, *ends), _LOWEST_POINTS), max(full, *ends)
+    return (low, high) if high > low else None
 
 
 def _axis_marks(low: float, high: float) -> list[float]:
     """Round numbers on an axis, some five of them."""
-    step = next((step for step in (5.0, 10.0, 20.0, 25.0, 50.0, 100.0) if (high - low) / step <= 6.0), 200.0)
-    first = math.ceil(low / step)
-    return [step * place for place in range(first, math.floor(high / step) + 1)]
+    rough = (high - low) / 5.0
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(step * power for step in (1.0, 2.0, 2.5, 5.0, 10.0) if step * power >= rough)
+    return [step * place for place in range(math.ceil(low / step), math.floor(high / step) + 1)]
 
 
 def _heading(title: str, *, simulated: bool = True) -> str:
@@ -194,65 +204,61 @@ def _notes(notes: Iterable[str]) -> str:
     return "".join(f'<p class="note">{_text(note)}</p>' for note in notes)
 
 
-def _table(table: ReportTable) -> str:
-    heads = "".join(f'<th scope="col">{_head(column)}</th>' for column in table.columns)
+def _table(table: ResultTable) -> str:
+    measures, (first, items) = table.spec.measures, table.spec.heads
+    heads = "".join(f'<th scope="col">{_head(measure)}</th>' for measure in measures)
+    spans = [_span([line.found[i] for line in table.lines if not line.form], m) for i, m in enumerate(measures)]
     bodies: list[str] = []
-    for group in table.groups:
-        rows = "".join(_row(line, table.columns) for line in group.lines)
-        published = ' class="published"' if any(line.published for line in group.lines) else ""
+    for group, lines in groupby(table.lines, key=lambda line: line.group):
+        mine = list(lines)
+        rows = "".join(_row(line, measures, spans, items) for line in mine)
         heading = ""
-        if group.heading:
-            across = f'colspan="{len(table.columns) + 1}" scope="rowgroup"'
-            heading = f'<tr class="group"><th {across}>{_text(group.heading)}</th></tr>'
-        bodies.append(f"<tbody{published}>{heading}{rows}</tbody>")
+        if group:
+            across = f'colspan="{len(measures) + 2}" scope="rowgroup"'
+            heading = f'<tr class="group"><th {across}>{_text(group)}</th></tr>'
+        bodies.append(f"<tbody{' class=published' if mine[0].published else ''}>{heading}{rows}</tbody>")
+    title = _text(table.spec.title)
     return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{_text(table.caption)}"><table>'
-        f'<caption class="hidden">{_text(table.caption)}</caption>'
-        f'<thead><tr><th scope="col">{_text(table.first)}</th>{heads}</tr></thead>{"".join(bodies)}</table></div>'
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{title}"><table>'
+        f'<caption class="hidden">{title}</caption>'
+        f'<thead><tr><th scope="col">{_text(first)}</th><th scope="col">{_text(items)}</th>{heads}</tr></thead>'
+        f"{''.join(bodies)}</table></div>"
     )
 
 
-def _head(column: Column) -> str:
-    unit = f" <small>{_text(column.unit)}</small>" if column.unit else ""
-    return f"{_text(column.title)}{unit}{_DIRECTIONS[column.better]}"
+def _head(measure: Measure) -> str:
+    unit = f" <small>{_text(measure.unit)}</small>" if measure.unit else ""
+    return f"{_text(measure.title)}{unit}{_DIRECTIONS[measure.better]}"
 
 
-def _row(line: ReportLine, columns: Sequence[Column]) -> str:
+def _row(line: Line, measures: Sequence[Measure], spans: Sequence[tuple[float, float] | None], items: str) -> str:
+    """A row; what a cell is, is said in it too, for screens too narrow for columns."""
     cells = "".join(
-        f"<td {_column_head(column)}>{_cell(cell, column)}</td>"
-        for cell, column in zip(line.cells, columns, strict=True)
+        f"<td{'' if not line.form or line.found[place].value is not None else ' class=none'} "
+        f'data-head="{_text(head(measure))}">{_cell(line, place, measure, spans[place])}</td>'
+        for place, measure in enumerate(measures)
     )
-    return f'<tr><th scope="row">{_name(line.name, line.labels)}</th>{cells}</tr>'
-
-
-def _column_head(column: Column) -> str:
-    """What a cell is, said in it where the screen is too narrow for columns."""
-    return f'data-head="{_text(f"{column.title} {column.unit}".strip())}"'
-
-
-def _name(name: str, labels: Sequence[str]) -> str:
-    return _text(name) + _labels(labels)
+    none = " class=none" if line.items is None else ""
+    count = f'<td{none} data-head="{_text(items)}"><b>{count_text(line)}</b></td>'
+    return f'<tr><th scope="row">{_text(line.name)}{_labels(line.labels)}</th>{count}{cells}</tr>'
 
 
 def _labels(labels: Sequence[str]) -> str:
     return "".join(f' <span class="label">{_text(label)}</span>' for label in labels)
 
 
-def _cell(cell: Cell, column: Column) -> str:
-    parts = [f"<b>{_text(cell.text)}</b>" if cell.text != "n/a" else '<span class="na">n/a</span>']
-    if cell.ends is not None:
-        low, high = (number(end, column.digits) for end in cell.ends)
-        parts.append(f"<small>[{low}, {high}]</small>")
-    if cell.note:
-        parts.append(f'<small class="brief">{_text(cell.note)}</small>')
-    return "".join(parts) + _bar(cell, column)
+def _cell(line: Line, place: int, measure: Measure, span: tuple[float, float] | None) -> str:
+    value, ends = (part.replace("-", "\N{MINUS SIGN}") for part in value_text(line, place, measure))
+    text = f"<b>{_text(value)}</b>" if value != "n/a" else '<span class="na">n/a</span>'
+    small = f"<small>{_text(ends)}</small>" if ends else ""
+    return text + small + ("" if line.form or span is None else _bar(_scaled(line.found[place], measure), span))
 
 
-def _bar(cell: Cell, column: Column) -> str:
+def _bar(interval: Interval, span: tuple[float, float]) -> str:
     """The interval on the column's axis, the value as a mark on it."""
-    if column.span is None or cell.interval is None or cell.interval.value is None:
+    if interval.value is None:
         return ""
-    low, high = column.span
+    low, high = span
 
     def at(value: float) -> float:
         return 100.0 * (min(max(value, low), high) - low) / (high - low)
@@ -260,99 +266,89 @@ def _bar(cell: Cell, column: Column) -> str:
     parts = ['<path class="axis" d="M0 4H100"/>']
     if low < 0.0 < high:
         parts.append(f'<path class="zero" d="M{at(0.0):.1f} 0V8"/>')
-    if cell.ends is not None:
-        start, end = (at(value) for value in cell.ends)
+    if interval.low is not None and interval.high is not None:
+        start, end = at(interval.low), at(interval.high)
         parts.append(f'<path class="range" d="M{start:.1f} 4H{max(end, start + 0.5):.1f}"/>')
-    parts.append(f'<path class="value" d="M{min(max(at(cell.interval.value), 1.0), 99.0):.1f} 0V8"/>')
+    parts.append(f'<path class="value" d="M{min(max(at(interval.value), 1.0), 99.0):.1f} 0V8"/>')
     return f'<svg class="bar" viewBox="0 0 100 8" preserveAspectRatio="none" aria-hidden="true">{"".join(parts)}</svg>'
 
 
-def _legend(columns: Sequence[Column]) -> str:
+def _legend(measures: Sequence[Measure]) -> str:
     rows = "".join(
-        f"<dt>{_text(column.title)}{f' <small>{_text(column.unit)}</small>' if column.unit else ''}</dt>"
-        f"<dd>{_text(column.meaning)} {_DIRECTION_WORDS[column.better]}</dd>"
-        for column in columns
-        if column.meaning
+        f"<dt>{_text(measure.title)}{f' <small>{_text(measure.unit)}</small>' if measure.unit else ''}</dt>"
+        f"<dd>{_text(measure.meaning)} {_DIRECTION_WORDS[measure.better]}</dd>"
+        for measure in measures
+        if measure.meaning
     )
-    return f'<details class="legend"><summary>What the columns mean</summary><dl>{rows}</dl></details>'
+    return f'<details class="legend"><summary>What the columns mean</summary><dl>{rows}</dl></details>' if rows else ""
 
 
 def _flips(flips: Sequence[FlipList]) -> str:
     parts = "".join(_flip_list(pair) for pair in flips)
     return (
-        f'<section id="flips" class="card">{_heading("Items that went differently")}'
-        "<p>Scenes whose commands one run completed and the other did not; those with the most first.</p>"
+        f'<section id="flips" class="card">{_heading("Items that went differently", simulated=False)}'
+        "<p>As they should be in one run and not in the other; the most first.</p>"
         f"{parts}</section>"
     )
 
 
 def _flip_list(pair: FlipList) -> str:
     rows = "".join(
-        f'<tr><th scope="row">{_text(flip.sample)}<small>{_text(flip.family)}</small></th>'
+        f'<tr><th scope="row">{_text(flip.cluster)}<small>{_text(flip.group)}</small></th>'
         f'<td data-head="Only A"><b>{flip.lost}</b></td><td data-head="Only B"><b>{flip.gained}</b></td>'
-        f'<td class="words" data-head="One of the commands">“{_text(flip.command)}”</td>'
+        f'<td class="words" data-head="One of them">“{_text(flip.words)}”</td>'
         f'<td class="words" data-head="A">{_text(flip.first)}</td>'
         f'<td class="words" data-head="B">{_text(flip.second)}</td></tr>'
         for flip in pair.flips
     )
-    lost, gained = (sum(getattr(flip, name) for flip in pair.flips) for name in ("lost", "gained"))
+    lost, gained = sum(flip.lost for flip in pair.flips), sum(flip.gained for flip in pair.flips)
     summary = f"A: {pair.first}; B: {pair.second}"
-    more = f'<p class="note">{pair.left_out:,} more scenes are not listed.</p>' if pair.left_out else ""
+    more = f'<p class="note">{pair.left_out:,} more are not listed.</p>' if pair.left_out else ""
+    heads = "".join(f'<th scope="col" class="words">{text}</th>' for text in ("One of them", "A", "B"))
     return (
-        f"<details><summary>{_text(summary)} "
-        f"<small>listed here: {lost:,} commands for A, {gained:,} for B</small></summary>"
+        f"<details><summary>{_text(summary)} <small>listed here: {lost:,} for A, {gained:,} for B</small></summary>"
         f'<div class="scroll" tabindex="0" role="region" aria-label="{_text(summary)}"><table>'
-        '<thead><tr><th scope="col">Scene</th><th scope="col">Only A</th><th scope="col">Only B</th>'
-        '<th scope="col" class="words">One of the commands</th><th scope="col" class="words">A</th>'
-        f'<th scope="col" class="words">B</th></tr></thead><tbody>{rows}</tbody></table></div>{more}</details>'
+        '<thead><tr><th scope="col">Where</th><th scope="col">Only A</th><th scope="col">Only B</th>'
+        f"{heads}</tr></thead><tbody>{rows}</tbody></table></div>{more}</details>"
     )
 
 
 def _galleries(galleries: Sequence[Gallery]) -> str:
     parts = "".join(_gallery(place, gallery) for place, gallery in enumerate(galleries))
-    drives = any(failure.drive is not None for gallery in galleries for failure in gallery.failures)
+    drives = any(card.drive is not None for gallery in galleries for card in gallery.cards)
     key = f"<p>{_KEY}</p>" if drives else ""
-    return f'<section id="failures">{_heading("Failures")}{key}{parts}</section>'
+    return f'<section id="gallery">{_heading("Not as it should be", simulated=False)}{key}{parts}</section>'
 
 
 def _gallery(place: int, gallery: Gallery) -> str:
-    heading = f"<h3>{_name(gallery.run, gallery.labels)}</h3>"
-    if not gallery.failed:
-        return f"{heading}<p>None of {gallery.items:,} items failed.</p>"
-    shown = len(gallery.failures)
-    told = f"{gallery.failed:,} of {gallery.items:,} items failed."
-    if shown < gallery.failed:
-        told += f" {shown} are shown, spread over families and kinds of failure." if shown else " None is shown."
-    cards = "".join(_failure(f"d{place}n{i}", failure) for i, failure in enumerate(gallery.failures))
+    heading = f"<h3>{_text(gallery.run)}{_labels(gallery.labels)}</h3>"
+    if not gallery.missed:
+        return f"{heading}<p>All of {gallery.items:,} rows are as they should be.</p>"
+    told = f"{gallery.missed:,} of {gallery.items:,} rows are not as they should be."
+    if (shown := len(gallery.cards)) < gallery.missed:
+        told += f" {shown} are shown, spread over groups and endings." if shown else " None is shown."
+    cards = "".join(_card(f"d{place}n{i}", gallery, card) for i, card in enumerate(gallery.cards))
     return f"{heading}<p>{told}</p>{cards}"
 
 
-def _failure(name: str, failure: Failure) -> str:
-    tone = "bad" if failure.outcome in _BAD else ""
-    goal = f'<p class="goal"><span>Wanted</span> {_text(failure.goal)}</p>' if failure.goal else ""
-    why = " ".join(failure.happened[1:])
-    happened = f'<p class="goal"><span>Why</span> {_text(why)}</p>' if why else ""
-    others = "; ".join(f"{run}: {how}" for run, how in failure.elsewhere)
-    others = f'<p class="goal"><span>Other runs</span> {_text(others)}</p>' if others else ""
-    facts = " · ".join(f"{_text(label)} {_text(value)}" for label, value in failure.facts)
-    label = _labels(failure.labels)
+def _card(name: str, gallery: Gallery, card: Card) -> str:
+    others = "; ".join(f"{run}: {how}" for run, how in card.elsewhere)
+    said = (("Wanted", card.goal), ("Why", " ".join(card.why)), ("Other runs", others))
+    goals = "".join(f'<p class="goal"><span>{what}</span> {_text(text)}</p>' for what, text in said if text)
+    facts = "".join(f" · {_text(label)} {_text(value)}" for label, value in card.facts)
     return (
         f'<article class="card failure" aria-labelledby="{name}t">'
-        f'<header><h4 id="{name}t">{_text(failure.command)}</h4>'
-        f'<p class="outcome {tone}">{_text(failure.happened[0].rstrip("."))}</p></header>'
-        f'<p class="where">{_text(failure.run)}{label} · {SIMULATED} · {facts}</p>'
-        f"{goal}{happened}{others}{_paragraph(failure.siblings)}{_drive(name, failure)}"
-        f'<div class="said">{_words(failure)}{_verdicts(failure)}</div>{_program(failure)}</article>'
+        f'<header><h4 id="{name}t">{_text(card.words)}</h4>'
+        f'<p class="outcome {"bad" if card.bad else ""}">{_text(card.ending)}</p></header>'
+        f'<p class="where">{_text(gallery.run)}{_labels(gallery.labels)} · {_text(card.item)}{facts}</p>'
+        f"{goals}{_drive(name, card)}"
+        f'<div class="said">{_words(card)}{_verdicts(card)}</div>{_program(card)}</article>'
     )
 
 
-def _paragraph(text: str) -> str:
-    return f'<p class="note">{_text(text)}</p>' if text else ""
-
-
-def _drive(name: str, failure: Failure) -> str:
-    note = _paragraph(failure.drive_note)
-    strip = None if failure.drive is None else draw_strip(failure.drive, name)
+def _drive(name: str, card: Card) -> str:
+    note = f'<p class="note">{_text(card.drive_note)}</p>' if card.drive_note else ""
+    strip = None if card.drive is None else draw_strip(card.drive, name)
     if strip is None:
         return note
     pictures = "".join(
@@ -365,30 +361,30 @@ def _drive(name: str, failure: Failure) -> str:
     return f'{note}<div class="strip {shape}">{pictures}</div><div class="charts">{charts}</div>'
 
 
-def _words(failure: Failure) -> str:
+def _words(card: Card) -> str:
     parts: list[str] = []
-    if failure.context is not None:
-        parts.append(f"<div><h5>What it was told of the scene</h5><p>{_text(failure.context.text)}</p></div>")
-    if failure.thoughts:
-        parts.append(f'<div><h5>Its reasoning</h5><p class="reasoning">{_text(failure.thoughts)}</p></div>')
+    if card.context:
+        parts.append(f"<div><h5>What it was told of the scene</h5><p>{_text(card.context)}</p></div>")
+    if card.thoughts:
+        parts.append(f'<div><h5>Its reasoning</h5><p class="reasoning">{_text(card.thoughts)}</p></div>')
     return "".join(parts)
 
 
-def _verdicts(failure: Failure) -> str:
-    refused = [verdict for verdict in failure.verdicts if not verdict.passed]
+def _verdicts(card: Card) -> str:
+    refused = [verdict for verdict in card.verdicts if not verdict.passed]
     if not refused:
         return ""
     rows = "".join(f"<li>{_text(verdict.reason)} {_text(verdict.remedy)}</li>" for verdict in refused)
     return f"<div><h5>What the checks said</h5><ul>{rows}</ul></div>"
 
 
-def _program(failure: Failure) -> str:
-    if failure.program is None:
+def _program(card: Card) -> str:
+    if card.program is None:
         return ""
-    source = failure.program.source.rstrip("\n")
+    source = card.program.source.rstrip("\n")
     parts = _listing("Its program", source)
-    if failure.program.library.strip():
-        parts += _listing("Functions of its policy repository", failure.program.library.rstrip("\n"))
+    if card.program.library.strip():
+        parts += _listing("Functions of its policy repository", card.program.library.rstrip("\n"))
     return parts
 
 
@@ -409,7 +405,6 @@ def _token(kind: str, text: str) -> str:
 
 
 def _method(report: BenchReport) -> str:
-    terms = "".join(f"<dt>{_text(term)}</dt><dd>{_text(text)}</dd>" for term, text in report.terms)
     runs = "".join(
         f'<h4>{_text(run)}</h4><dl class="pairs mono">'
         + "".join(f"<dt>{_text(name)}</dt><dd>{_text(value)}</dd>" for name, value in facts)
@@ -417,8 +412,7 @@ def _method(report: BenchReport) -> str:
         for run, facts in report.facts
     )
     return (
-        '<section id="method" class="card"><h2>How the figures were made</h2>'
-        f'<details class="legend"><summary>What each measure is, exactly</summary><dl>{terms}</dl></details>'
+        f'<section id="method" class="card"><h2>How the figures were made</h2><p>{_text(_INTERVALS)}</p>'
         f"<details><summary>Where every run comes from: versions, seeds, hashes, machine</summary>{runs}</details>"
         "</section>"
     )

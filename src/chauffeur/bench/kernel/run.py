@@ -252,7 +252,8 @@ class BenchRun:
         undriven = self._undriven()
         filled = () if self._all(undriven) else tables(self.benchmark.tables, rows)
         asked = sum(map(self.stages.asked, self.items))
-        notes = [*self.manifest.labels]
+        judge = str(getattr(self.benchmark, "judge", ""))
+        notes = [*self.manifest.labels, *([f"Judge: {judge}"] if judge else [])]
         if asked < len(self.items):
             notes.append(f"Partial: {asked} of {len(self.items)} items.")
         if undriven:
@@ -263,7 +264,9 @@ class BenchRun:
             {
                 "results.jsonl": "".join(line + "\n" for line in lines),
                 "table.md": report_markdown(self.benchmark.id, filled, notes),
-                "report.json": as_json({"bench": self.benchmark.id, "tables": [table.json for table in filled]}),
+                "report.json": as_json(
+                    {"bench": self.benchmark.id, "judge": judge, "tables": [table.json for table in filled]}
+                ),
                 "provenance.json": as_json(self.manifest.provenance()),
             },
         )

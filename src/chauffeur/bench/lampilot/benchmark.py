@@ -6,7 +6,8 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any, Final
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 from typing_extensions import TypedDict  # pydantic reads the standard library's from Python 3.12 on only
 
@@ -14,14 +15,19 @@ from chauffeur.bench.kernel.benchmark import Asks, ItemOutcome, RequestDesk
 from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.families import family_of
-from chauffeur.bench.lampilot.frozen import Frozen
+from chauffeur.bench.lampilot.frozen import BENCH_VERSION, Frozen
 from chauffeur.bench.lampilot.goals_more import answered_rightly
 from chauffeur.bench.lampilot.metrics import points, ruler_named
+from chauffeur.bench.lampilot.report import JUDGE, TABLES
 from chauffeur.bench.lampilot.requests import Requests
 from chauffeur.bench.lampilot.rollout import BASELINES, REHEARSAL_SEED, ROLLOUT_VERSION, RolloutJob, not_driven
 from chauffeur.concept import ConfigError, PlanRequest
 from chauffeur.safety.shield import SHIELD_VERSION
 from chauffeur.worlds.highway.dblv1 import Item
+
+if TYPE_CHECKING:
+    from chauffeur.bench.report.gallery import MakeCard
+    from chauffeur.bench.report.runs import Run
 
 NOT_ASKED: Final = "Not asked: the run stopped before this item."
 
@@ -77,8 +83,9 @@ class LampilotBenchmark:
     """The items of a frozen plan, driven under one ruler."""
 
     row = LampilotRow
-    tables: tuple[TableSpec, ...] = ()
-    """The paper's table is made of scenes, families and a ruler at once (`report.py`)."""
+    id = BENCH_VERSION
+    tables: tuple[TableSpec, ...] = TABLES
+    judge = JUDGE
 
     def __init__(self, frozen: Frozen, requests: Requests | None = None, ruler: str = "origin") -> None:
         """Make it.
@@ -91,7 +98,6 @@ class LampilotBenchmark:
         Raises:
             ConfigError: There is no such ruler.
         """
-        self.id = frozen.bench
         self.frozen = frozen
         self.ruler = ruler_named(ruler).id
         self._requests = requests
@@ -133,6 +139,20 @@ class LampilotBenchmark:
         if self._shield:
             parts.append(SHIELD_VERSION)
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:24]
+
+    @staticmethod
+    def rescored(run: Run, ruler: str) -> Run:
+        """See `bench.report.build.HasRulers`."""
+        from chauffeur.bench.lampilot.shown import rescored
+
+        return rescored(run, ruler)
+
+    @staticmethod
+    def cards(run: Run, data: Path | None) -> MakeCard:
+        """See `bench.report.gallery.ShowsItems`."""
+        from chauffeur.bench.lampilot.shown import cards
+
+        return cards(run, data)
 
     def tally(self, result: Row) -> tuple[bool, bool]:
         """Whether a drive succeeded, and collided: for the running scores."""

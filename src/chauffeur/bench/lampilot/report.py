@@ -1,202 +1,176 @@
-"""From rows to tables: one line a family, the paper's columns, the causes beside the outcomes."""
+"""LaMPilot-Bench's metrics and tables: the columns of the paper's Tab. IV, causes beside outcomes, costs."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from statistics import fmean
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
-from chauffeur.bench.kernel.report import interval_text
-from chauffeur.bench.kernel.stats import DRAWS, Array, Estimator, Interval, bootstrap, cluster_totals
-from chauffeur.bench.kernel.store import Row
+from chauffeur.bench.kernel.metrics import AnyRow, Better, Measure, TableSpec, count, register, share, whole
+from chauffeur.bench.kernel.stats import Array
 from chauffeur.bench.lampilot.families import FAMILIES
-from chauffeur.bench.lampilot.metrics import ORIGIN, Ruler, driving_score, ruler_named
-from chauffeur.bench.lampilot.paper import TABLE_IV, items_behind
+from chauffeur.bench.lampilot.metrics import ORIGIN, ruler_named
+
+NOTHING_DRIVEN: Final = ("refused", "not_driven")
+"""Outcomes of items without a drive; no ruler has anything to measure there."""
+LANE_TTC_CLOSE_S: Final = 2.0
+JUDGE: Final = (
+    "LaMPilot's evaluators and scores in our code, by the condition that each item brings. Shared: `expert` is told "
+    "that condition, and rehearsal tries its programs by it in the simulator that drives."
+)
 
 
-@dataclass(frozen=True, slots=True)
-class Summary:
-    """Aggregate over a set of planned items; every rate has all of them as its denominator.
+def _points(key: str, title: str, meaning: str) -> Measure:
+    """Mean points over completed items. Every scene is resampled, those without a completed item too."""
 
-    Attributes:
-        label: What the items are.
-        items: How many were planned.
-        collision, completion: Rates, 0..1.
-        ttc, speed_variance, time_efficiency: Mean points over completed items; None when none was completed.
-        driving_score: The ruler's aggregate, points.
-        policy_failed, infra_failed, refused, fallback_used: Counts.
-    """
+    def of(row: AnyRow) -> tuple[float, float]:
+        known = row["success"] and row[key] is not None
+        return (float(row[key]), 1.0) if known else (0.0, 0.0)
 
-    label: str
-    items: int
-    collision: float
-    completion: float
-    ttc: float | None
-    speed_variance: float | None
-    time_efficiency: float | None
-    driving_score: float
-    policy_failed: int
-    infra_failed: int
-    refused: int
-    fallback_used: int
-
-
-def ruler_of(rows: Sequence[Row]) -> Ruler:
-    """The ruler that rows were scored by; rows that name none are of the time when there was only LaMPilot's.
-
-    Raises:
-        ValueError: There are no rows, or they were scored by several rulers.
-    """
-    ids = {str(row.get("metrics", ORIGIN.id)) for row in rows}
-    if len(ids) != 1:
-        raise ValueError(f"rows of one ruler are needed, not of {sorted(ids)}")
-    return ruler_named(ids.pop())
-
-
-def summarise(label: str, rows: Sequence[Row]) -> Summary:
-    """Aggregate rows (one per planned item). Raises ValueError for no rows, or rows of several rulers."""
-    ruler = ruler_of(rows)
-    done = [row for row in rows if row["success"]]
-    completion = len(done) / len(rows)
-    collision = fmean(bool(row["collision"]) for row in rows)
-
-    def mean(column: str) -> float | None:
-        values = [float(row[column]) for row in done if row[column] is not None]
-        return fmean(values) if values else None
-
-    return Summary(
-        label=label,
-        items=len(rows),
-        collision=collision,
-        completion=completion,
-        ttc=mean("ttc"),
-        speed_variance=mean("speed_variance"),
-        time_efficiency=mean("time_efficiency"),
-        driving_score=driving_score(completion, mean("score") or 0.0, collision, ruler),
-        policy_failed=sum(bool(row["policy_failed"]) for row in rows),
-        infra_failed=sum(bool(row["infra_failed"]) for row in rows),
-        refused=sum(bool(row["refused"]) for row in rows),
-        fallback_used=sum(bool(row["fallback_used"]) for row in rows),
-    )
-
-
-def summaries(rows: Sequence[Row]) -> list[Summary]:
-    """One per family that occurs, then one for all."""
-    found = [summarise(family, [row for row in rows if row["family"] == family]) for family in families_in(rows)]
-    return [*found, summarise("all", rows)]
-
-
-def families_in(rows: Iterable[Row]) -> list[str]:
-    """Families that occur: the paper's in its order, then any others as they come."""
-    names = dict.fromkeys(str(row["family"]) for row in rows)
-    return [*(f for f in FAMILIES if f in names), *(f for f in names if f not in FAMILIES)]
-
-
-_POINTS = ("ttc", "speed_variance", "time_efficiency")
-_ITEMS, _COLLISIONS, _SUCCESSES, _SCORE, _PENALTY, _FIRST_POINT = range(6)
-
-
-def scene_totals(rows: Sequence[Row]) -> Array:
-    """What MEASURES are made of, summed over each sample's items.
-
-    Returns:
-        Shape (samples, 11): items, collisions, successes, score, the ruler's penalty for collisions, then sum and
-        count of each kind of points over completed items. Samples stand in order of their first item, so runs over
-        the same items give the same rows.
-
-    Raises:
-        ValueError: See ruler_of.
-    """
-    weight = ruler_of(rows).collision_weight
-    values = np.zeros((len(rows), _FIRST_POINT + 2 * len(_POINTS)))
-    for line, row in zip(values, rows, strict=True):
-        line[_ITEMS] = 1.0
-        line[_COLLISIONS] = bool(row["collision"])
-        line[_PENALTY] = weight * bool(row["collision"])
-        if not row["success"]:
-            continue
-        line[_SUCCESSES] = 1.0
-        line[_SCORE] = row["score"] or 0.0
-        for place, name in enumerate(_POINTS):
-            if row[name] is not None:
-                at = _FIRST_POINT + 2 * place
-                line[at : at + 2] = row[name], 1.0
-    return cluster_totals([str(row["sample"]) for row in rows], values)
-
-
-def _rate(column: int) -> Estimator:
-    return lambda totals: totals[..., column] / totals[..., _ITEMS]
-
-
-def _mean_points(place: int) -> Estimator:
-    at = _FIRST_POINT + 2 * place
-
-    def mean(totals: Array) -> Array:
+    def estimate(totals: Array) -> Array:
         with np.errstate(invalid="ignore"):  # no completed item: 0 / 0, undefined
-            return totals[..., at] / totals[..., at + 1]
+            return totals[..., 0] / totals[..., 1]
 
-    return mean
+    id = f"lampilot-table-{key.replace('_', '-')}-v1"
+    return register(Measure(id, title, of, "pt", estimate, better="higher", meaning=meaning))
+
+
+def _score(row: AnyRow) -> tuple[float, float]:
+    """Score, and the ruler's penalty for a collision."""
+    weight = ruler_named(str(row.get("metrics", ORIGIN.id))).collision_weight
+    return float(row["score"] or 0.0) if row["success"] else 0.0, weight * bool(row["collision"])
 
 
 def _driving_score(totals: Array) -> Array:
     # completion x mean score of successes is the score summed over successes, over all items
-    return (totals[..., _SCORE] - totals[..., _PENALTY]) / totals[..., _ITEMS]
+    return (totals[..., 0] - totals[..., 1]) / totals[..., -1]
 
 
-MEASURES: dict[str, Estimator] = {
-    "collision": _rate(_COLLISIONS),
-    "completion": _rate(_SUCCESSES),
-    **{name: _mean_points(place) for place, name in enumerate(_POINTS)},
-    "driving_score": _driving_score,
-}
-"""The aggregates of a Summary, by field name, as functions of scene totals."""
+COLLISION: Final = share(
+    "lampilot-collision-v1", "Collision", lambda row: bool(row["collision"]), 2, "lower",
+    "Share of all planned items in which the car crashed; under `origin` also where it left the road, or its end.",
+)  # fmt: skip
+COMPLETION: Final = share(
+    "lampilot-completion-v1", "Completion", lambda row: bool(row["success"]), 1, "higher",
+    "Share of all planned items in which the car did as asked, by the benchmark's own condition.",
+)  # fmt: skip
+SCORES: Final = (
+    COLLISION,
+    COMPLETION,
+    _points("ttc", "TTC", "100 when the car never came within 2 s of another, less the closer; completed items only."),
+    _points("speed_variance", "SV", "100 for a constant speed, less the more it varied; completed items only."),
+    _points("time_efficiency", "TE", "100 for done at once, 0 for done after 60 s; completed items only."),
+    register(
+        Measure(
+            "lampilot-driving-score-v1", "Driving score", _score, "pt", _driving_score, better="higher",
+            meaning="Completion times the mean score of completed items (half TTC, three tenths SV, a fifth TE); under "
+            "`origin` less 5 points for each per cent of collisions.",
+        )
+    ),
+)  # fmt: skip
+"""The columns of the paper's Tab. IV, in its order."""
 
 
-def intervals(rows: Sequence[Row], *, draws: int = DRAWS, seed: int = 0) -> dict[str, Interval]:
-    """The aggregates of `summarise` with 95 % intervals; samples are resampled, because the commands of a sample share
-    a scene. Raises ValueError for no rows, or rows of several rulers."""
-    return bootstrap(scene_totals(rows), MEASURES, draws=draws, seed=seed, rates=("collision", "completion"))
+def _cause(name: str, meaning: str) -> Measure:
+    title = name.replace("_", " ")
+    id = f"lampilot-{name.replace('_', '-')}-v1"
+    return count(id, title, lambda row: bool(row[name]), meaning=meaning)
 
 
-COLUMNS = (
-    "Collision %",
-    "Completion %",
-    "TTC pt",
-    "SV pt",
-    "TE pt",
-    "Driving score pt",
+_CAUSES: Final = (
+    _cause("policy_failed", "The program was rejected by the checks, or died while it ran."),
+    _cause("infra_failed", "Endpoint, sandbox or machine failed: nothing about the planner, and still not completed."),
+    _cause("refused", "The planner or the checks declined; nothing was driven."),
+    _cause("fallback_used", "The program was gone before the end, and the autopilot brought the car to a safe state."),
 )
-_CAUSES = ("policy failed", "infra failed", "refused", "fallback used")
 
 
-def _number(value: float | None) -> str:
-    return "n/a" if value is None else f"{value:.1f}"
+def _ended(outcome: str, title: str, meaning: str) -> Measure:
+    id = f"lampilot-ended-{outcome.replace('_', '-')}-v1"
+    return count(id, title, lambda row: row["outcome"] == outcome, meaning=meaning)
 
 
-def interval_cells(found: dict[str, Interval]) -> list[str]:
-    """Cells under COLUMNS with their intervals, e.g. `98.7 [97.4, 99.6]`."""
-    return [interval_text(found[name], *_FORMS.get(name, (1.0, 1))) for name in MEASURES]
+_OUTCOMES: Final = (
+    _ended("success", "Done as asked", "The condition of the command was met."),
+    _ended("failure", "Not done", "The condition was judged not met, e.g. not within 60 s."),
+    _ended("timeout", "Out of time or road", "Time or road ran out before the condition was met."),
+    _ended("collision", "Crashed", "The drive ended in a crash."),
+    _ended("off_road", "Left the road", "The drive ended beside the road, or beyond its end."),
+    _ended("refused", "Refused", "The planner or the checks declined; nothing was driven."),
+    _ended("not_driven", "Not driven", "No plan could be had, or the scene could not be set up."),
+)
 
 
-_FORMS = {"collision": (100.0, 2), "completion": (100.0, 1)}
-"""Factor and decimals of a measure in its column; points are shown as they are, with one."""
+def _median_lane_ttc(rows: Sequence[AnyRow]) -> float | None:
+    times = [float(row["lane_ttc_s"]) for row in rows if row.get("lane_ttc_s") is not None]
+    return float(np.median(times)) if times else None
 
 
-def cells(summary: Summary) -> list[str]:
-    """A summary's cells under COLUMNS."""
-    return [
-        f"{100 * summary.collision:.2f}",
-        f"{100 * summary.completion:.1f}",
-        _number(summary.ttc),
-        _number(summary.speed_variance),
-        _number(summary.time_efficiency),
-        _number(summary.driving_score),
-    ]
+def _close(row: AnyRow) -> bool | None:
+    if "lane_ttc_s" not in row:
+        return None
+    return row["lane_ttc_s"] is not None and float(row["lane_ttc_s"]) < LANE_TTC_CLOSE_S
 
 
-def answers_note(rows: Sequence[Row]) -> str:
+def _stopped(row: AnyRow) -> bool | None:
+    return row["stop"] == "stopped" if row.get("stop") else None
+
+
+def _fault(kind: str, title: str, meaning: str) -> Measure:
+    id = f"lampilot-fault-{kind.replace('_', '-')}-v1"
+    return count(id, title, lambda row: row["fault"] == kind if "fault" in row else None, "lower", meaning)
+
+
+_BESIDE: Final = (
+    whole(
+        "lampilot-lane-ttc-median-v1", "Lane-aware TTC, median", "s", _median_lane_ttc, better="higher",
+        meaning="Least time to collision, bumper to bumper, in the own lane only; over drives with such a conflict.",
+    ),
+    share("lampilot-lane-ttc-close-v1", "Lane-aware TTC under 2 s", _close, 1, "", "It fell below 2 s."),
+    share(
+        "lampilot-stopped-v1", "Stopped at the sign", _stopped, 1, "",
+        "Of the drives that passed a stop sign, those that slowed to less than 1 m/s at it; no condition checks it.",
+    ),
+    _fault("ego", "Own fault", "Collisions that the car itself caused."),
+    _fault("struck", "Struck", "Collisions in which another vehicle ran into the car."),
+    _fault("road_end", "Road end", "Drove off the end of the road; the origin counts it as a collision."),
+)  # fmt: skip
+
+
+def _over(column: str, estimate: str, title: str, unit: str, digits: int, meaning: str, scale: float = 1.0) -> Measure:
+    """What all known values of a column come to."""
+
+    def of(rows: Sequence[AnyRow]) -> float | None:
+        known = np.array([float(row[column]) for row in rows if row.get(column) is not None])
+        known = scale * known[np.isfinite(known)]
+        # A planner without a language model counts no tokens; an endpoint that does not report them gives 0.
+        if not len(known) or ("tokens" in column and not known.any()):
+            return None
+        match estimate:
+            case "mean":
+                return float(known.mean())
+            case "sum":
+                return float(known.sum())
+            case _:
+                return float(np.percentile(known, int(estimate.removeprefix("p"))))
+
+    id = f"lampilot-{column.replace('_', '-')}-{estimate}{'' if scale == 1.0 else f'-{scale:g}'}-v1"
+    better: Better = "lower"
+    return whole(id, title, unit, of, digits, better, meaning)
+
+
+_COST: Final = (
+    _over("latency_s", "p50", "Latency, median", "ms", 2, "From the words to the plan: half are faster.", 1000.0),
+    _over("latency_s", "p95", "Latency, p95", "ms", 2, "95 of 100 items are faster.", 1000.0),
+    _over("prompt_tokens", "mean", "Tokens in", "", 0, "Mean number of tokens sent to the language model."),
+    _over("completion_tokens", "mean", "Tokens out", "", 0, "Mean number of tokens the language model wrote."),
+    _over("cost_usd", "sum", "Cost", "USD", 4, "Price of all calls, where the price list is known."),
+    _over("cost_usd", "mean", "Cost per 1,000 items", "USD", 2, "The same, for a thousand items.", 1000.0),
+)
+
+
+def answers_note(rows: Sequence[AnyRow]) -> str:
     """How many answers were right, where some wishes are to be declined; empty where none is."""
     to_refuse = [row for row in rows if row.get("to_refuse")]
     if not to_refuse:
@@ -211,45 +185,29 @@ def answers_note(rows: Sequence[Row]) -> str:
     return f"{note}, {right - declined} of {others} others reached their goal" if others else note
 
 
-Table = tuple[tuple[str, ...], list[list[str]]]
-"""(header, lines) of a table, every cell as text."""
+def _driven(row: AnyRow) -> bool:
+    return row["outcome"] not in NOTHING_DRIVEN
 
 
-def family_lines(rows: Sequence[Row], *, draws: int = 0) -> Table:
-    """A run by family, with causes; with 95 % intervals from so many resamples where `draws` is not 0."""
-    lines = [
-        [
-            s.label,
-            str(s.items),
-            *_cells(s, [row for row in rows if s.label in (row["family"], "all")], draws),
-            *map(str, (s.policy_failed, s.infra_failed, s.refused, s.fallback_used)),
-        ]
-        for s in summaries(rows)
-    ]
-    return ("Family", "Items", *COLUMNS, *_CAUSES), lines
-
-
-def _cells(summary: Summary, rows: Sequence[Row], draws: int) -> list[str]:
-    return interval_cells(intervals(rows, draws=draws)) if draws else cells(summary)
-
-
-def comparison_lines(name: str, rows: Sequence[Row], *more: tuple[str, Sequence[Row]], draws: int = 0) -> Table:
-    """Runs in the columns of the paper's Tab. IV, the published rows below them, marked as the paper's.
-
-    The published rows were measured by LaMPilot's code, so they stand below runs of that ruler only.
-
-    Args:
-        name, rows: The first run.
-        more: Further runs.
-        draws: Resamples for 95 % intervals of the runs; 0 for none.
-
-    Raises:
-        ValueError: A run is empty, or the runs were scored by several rulers.
-    """
-    runs = [(name, rows), *more]
-    ruler = ruler_of([row for _, found in runs for row in found])
-    lines = [[label, str(len(found)), *_cells(summarise(label, found), found, draws)] for label, found in runs]
-    for method, setting, collision, *points in TABLE_IV if ruler is ORIGIN else ():
-        label = method if setting == "-" else f"{method}, {setting}"
-        lines.append([f"paper: {label}", str(items_behind(setting)), f"{collision:.2f}", *(f"{p:.1f}" for p in points)])
-    return ("Method", "Items", *COLUMNS), lines
+SCORE_TABLE: Final = TableSpec(
+    "Scores", SCORES, cluster="sample", heads=("Method", "Items"), published="lampilot/table4.json", brackets=False,
+    note=answers_note,
+)  # fmt: skip
+FAMILY_TABLE: Final = TableSpec(
+    "By task family", (*SCORES, *_CAUSES), "family", FAMILIES, "sample", heads=("Family", "Items"), brackets=False
+)
+TABLES: Final = (
+    SCORE_TABLE,
+    FAMILY_TABLE,
+    TableSpec(
+        "How the drives ended", _OUTCOMES, heads=("Method", "Items"), lead="Every planned item ends in one way."
+    ),
+    TableSpec(
+        "Beside the scores", _BESIDE, cluster="sample", rows=_driven, heads=("Method", "Drives"),
+        lead="What the benchmark's own measures leave out. Nothing here enters a score.",
+    ),
+    TableSpec(
+        "Latency and cost", _COST, heads=("Method", "Items"),
+        lead="What it took to turn words into a plan, on the machine and endpoint of each run.",
+    ),
+)  # fmt: skip

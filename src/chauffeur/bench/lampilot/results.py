@@ -9,13 +9,13 @@ import json
 from importlib.metadata import version
 from pathlib import Path
 
-from chauffeur.bench.kernel.report import markdown
+from chauffeur.bench.kernel.report import fill, markdown
 from chauffeur.bench.kernel.run import as_json, write_results
 from chauffeur.bench.kernel.stages import StageStore
 from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.lampilot.benchmark import LampilotBenchmark
 from chauffeur.bench.lampilot.frozen import Frozen
-from chauffeur.bench.lampilot.report import answers_note, family_lines
+from chauffeur.bench.lampilot.report import FAMILY_TABLE, JUDGE, TABLES, answers_note
 from chauffeur.bench.lampilot.rollout import ROLLOUT_VERSION
 from chauffeur.worlds.highway import HighwayWorld
 from chauffeur.worlds.highway.dblv1 import Item
@@ -54,19 +54,22 @@ def results(stages: StageStore[Item], ruler: str) -> list[Row]:
 
 
 def publish_results(folder: Path, stages: StageStore[Item], rows: list[Row]) -> None:
-    """Write `results.jsonl`, `provenance.json` and `table.md`. Raises DataError when they cannot be written."""
+    """Write `results.jsonl`, `provenance.json`, `report.json` and `table.md`. Raises DataError."""
     missing = sum(not stages.asked(item) for item in stages.manifest.items)
     notes = [*stages.manifest.labels, f"metrics {rows[0]['metrics']}"] if rows else []
     if answers := answers_note(rows):
         notes.append(answers)
     if missing:
         notes.append(f"partial: {missing} of {len(rows)} items have not been asked and count as not driven")
-    table = markdown(*family_lines(rows)) if rows else "No items."
+    filled = fill(FAMILY_TABLE, rows)
+    table = markdown(filled.header, filled.cells) if rows else "No items."
+    told = {"bench": stages.manifest.bench, "judge": JUDGE, "tables": [fill(spec, rows).json for spec in TABLES]}
     write_results(
         folder,
         {
             "results.jsonl": "".join(json.dumps(row, ensure_ascii=False) + "\n" for row in rows),
             "provenance.json": as_json(stages.manifest.provenance(rollout=ROLLOUT_VERSION, engine=HighwayWorld.engine)),
+            "report.json": as_json(told),
             "table.md": f"{', '.join(notes)}\n\n{table}\n",
         },
     )

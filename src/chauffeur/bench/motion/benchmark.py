@@ -88,6 +88,10 @@ class MotionBenchmark:
     """Three manoeuvres, ten commands each, five kinds of weather."""
 
     id = "motion-v1"
+    judge = (
+        "Ranges of gains a style that we chose (`data/motion/styles.json`); the driving score compares with these "
+        "fixed gains themselves. Shared: a planner that is taught a table inside them cannot miss once it reads words."
+    )
     asks: Asks = "plans"
     row = MotionRow
     tables = (

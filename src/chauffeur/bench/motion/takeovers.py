@@ -155,6 +155,10 @@ class TakeoverBenchmark(Unasked):
     """Takeover rates with fixed gains, and with a planner that looks, without and with memory."""
 
     id = TAKEOVERS
+    judge = (
+        "Simulated passengers of our own, with the same ranges of gains as in `motion`. Shared: what they remark is "
+        "what the memory can learn; nobody was asked and nobody was driven."
+    )
     row = TakeoverRow
     tables = (
         TableSpec(

@@ -18,6 +18,7 @@ from chauffeur.bench.nuplanqa.choice import EXTRACTION, read_choice
 from chauffeur.bench.nuplanqa.frames import CAMERAS, FRAMES, UNTOLD, FramePath, FrameSource
 from chauffeur.bench.nuplanqa.metadata import find_metadata, load_metadata
 from chauffeur.bench.nuplanqa.questions import LETTERS, SKILL_OF, SKILLS, SUBTASKS, VqaFile, VqaItem, load_questions
+from chauffeur.bench.nuplanqa.table6 import TABLE_VI
 from chauffeur.bench.pictures import CORRUPT, MISSING, Pictures, data_uri, read_picture
 from chauffeur.concept import ConfigError, DataError
 from chauffeur.planners.prompts import Message
@@ -128,7 +129,7 @@ def _answered(row: AnyRow) -> bool:
     return row["correct"] is not None
 
 
-_ACCURACY: Final = share("nuplanqa-accuracy-v1", "accuracy", lambda row: row["correct"])
+_ACCURACY: Final = share("nuplanqa-accuracy-v1", "accuracy", lambda row: row["correct"], better="higher")
 _BLIND: Final = share(
     "nuplanqa-blind-v1", "blind baseline", lambda row: row["blind"] if row["correct"] is not None else None
 )
@@ -169,7 +170,10 @@ class NuPlanQaBenchmark:
             heads=("right", "answers"),
         ),
         TableSpec("What became of the questions", (_STATUS,), "status", get_args(Status), heads=("status", "rows")),
+        TABLE_VI,
     )
+    judge = "The letter of the right option, as the file of questions has it. Shared: nothing, where it is NuPlanQA's; \
+questions about our own scenes are written by the generator that also makes the training data."
 
     def __init__(
         self,

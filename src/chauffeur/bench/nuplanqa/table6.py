@@ -1,53 +1,73 @@
-"""The paper's Tab. VI with our rows beside its own.
+"""The paper's Tab. VI: accuracy by subtask, beside what a baseline knows that sees the words of the options alone.
 
 The paper's averages are means of subtasks, its total the mean of the three skills; ours are made the same way. Its rows
-were measured by its authors on the published evaluation file; ours say which file they are of.
+were measured by its authors on nuPlan's published evaluation file; ours say which file they are of.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Iterable, Sequence
+from typing import Final
 
+import numpy as np
+
+from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, register
+from chauffeur.bench.kernel.stats import Array
 from chauffeur.bench.nuplanqa.questions import SKILLS, SUBTASKS
-from chauffeur.concept.data import read_data
-
-HEADER: Final = (
-    "method",
-    "traffic light",
-    "weather",
-    "road type",
-    "avg.",
-    "surr. objects",
-    "traffic flow",
-    "key objects",
-    "avg.",
-    "ego manoeuvre",
-    "situation",
-    "action",
-    "avg.",
-    "total",
-)
 
 
-def paper_lines(frames: str) -> list[tuple[str, ...]]:
-    """The paper's rows, `multi` or `single` frame. Raises DataError: the data folder is not here."""
-    table: Mapping[str, Any] = json.loads(read_data("nuplanqa", "table6.json"))
-    rows: Mapping[str, Sequence[float]] = table[frames]
-    return [(f"{name} (paper)", *(f"{value:.1f}" for value in values)) for name, values in rows.items()]
+def _of(row: AnyRow) -> tuple[float, ...]:
+    """Hits and questions of every subtask."""
+    return tuple(value for task in SUBTASKS for value in _hit(row, task))
 
 
-def our_lines(name: str, rows: Iterable[Mapping[str, Any]]) -> list[tuple[str, ...]]:
-    """Our accuracy and, below it, the blind baseline's on the same questions, in the columns of the table, in %."""
+def _hit(row: AnyRow, task: str) -> tuple[float, float]:
+    return (float(row["hit"]), 1.0) if row["subtask"] == task else (0.0, 0.0)
+
+
+def _accuracies(totals: Array) -> Array:
+    """Of every subtask, in the last axis; nan where none of its questions is there."""
+    with np.errstate(invalid="ignore"):
+        return totals[..., 0 : 2 * len(SUBTASKS) : 2] / totals[..., 1 : 2 * len(SUBTASKS) : 2]
+
+
+def _mean(name: str, title: str, tasks: Sequence[str]) -> Measure:
+    """Mean of subtasks: nan where one is missing, since an average over fewer is another quantity."""
+    places = [SUBTASKS.index(task) for task in tasks]
+
+    def estimate(totals: Array) -> Array:
+        return np.asarray(_accuracies(totals)[..., places].mean(axis=-1))
+
+    slug = name.lower().replace("/", "-").replace(" ", "-")
+    return register(Measure(f"nuplanqa-table6-{slug}-v1", title, _of, "%", estimate, better="higher"))
+
+
+def _total(totals: Array) -> Array:
+    skills = [[SUBTASKS.index(task) for task in tasks] for tasks in SKILLS.values()]
+    means = [_accuracies(totals)[..., places].mean(axis=-1) for places in skills]
+    return np.asarray(np.mean(means, axis=0))
+
+
+def _columns() -> tuple[Measure, ...]:
+    found: list[Measure] = []
+    for skill, tasks in SKILLS.items():
+        found += [_mean(task, task.lower(), (task,)) for task in tasks]
+        found.append(_mean(skill, "avg.", tasks))
+    return (*found, register(Measure("nuplanqa-table6-total-v1", "total", _of, "%", _total, better="higher")))
+
+
+def _lines(rows: Sequence[AnyRow]) -> list[AnyRow]:
+    """A row once for the model and once for the blind baseline."""
     answered = [row for row in rows if row["correct"] is not None]
-    lines = [(name, *_cells(answered, "correct"))]
+    shown = "single" if all(row["frames"] == 1 for row in answered) else "multi"
+    found: list[AnyRow] = [{**row, "line": "the model", "hit": row["correct"], "shown": shown} for row in answered]
     if any(row["blind"] is not None for row in answered):
-        lines.append(("blind baseline: words of the options alone", *_cells(answered, "blind")))
-    return lines
+        name = "blind baseline: words of the options alone"
+        found += [{**row, "line": name, "hit": bool(row["blind"]), "shown": shown} for row in answered]
+    return found
 
 
-def strict_accuracy(rows: Iterable[Mapping[str, Any]]) -> tuple[float, int] | None:
+def strict_accuracy(rows: Iterable[AnyRow]) -> tuple[float, int] | None:
     """Share of questions that are right in every circular shift, and how many; None where only one was asked."""
     groups: dict[str, list[bool]] = {}
     for row in rows:
@@ -56,25 +76,12 @@ def strict_accuracy(rows: Iterable[Mapping[str, Any]]) -> tuple[float, int] | No
     return (sum(whole) / len(whole), len(whole)) if whole else None
 
 
-def _cells(rows: Sequence[Mapping[str, Any]], column: str) -> list[str]:
-    means: dict[str, float | None] = {}
-    for task in SUBTASKS:
-        found = [bool(row[column]) for row in rows if row["subtask"] == task]
-        means[task] = 100.0 * sum(found) / len(found) if found else None
-    cells: list[str] = []
-    averages: list[float | None] = []
-    for tasks in SKILLS.values():
-        mine = [means[task] for task in tasks]
-        averages.append(_mean(mine))
-        cells += [_text(value) for value in (*mine, averages[-1])]
-    return [*cells, _text(_mean(averages))]
+def _strict_note(rows: Sequence[AnyRow]) -> str:
+    strict = strict_accuracy([row for row in rows if row["line"] == "the model"])
+    return f"Right in all four circular shifts: {strict[0]:.1%} of {strict[1]} questions." if strict else ""
 
 
-def _mean(values: Sequence[float | None]) -> float | None:
-    """None where one is missing: an average over fewer subtasks is another quantity."""
-    known = [value for value in values if value is not None]
-    return sum(known) / len(known) if len(known) == len(values) else None
-
-
-def _text(value: float | None) -> str:
-    return "n/a" if value is None else f"{value:.1f}"
+TABLE_VI: Final = TableSpec(
+    "As the paper's Tab. VI", _columns(), "line", cluster="chain", heads=("method", "answers"), total=False,
+    over=_lines, published="nuplanqa/table6.json", brackets=False, note=_strict_note,
+)  # fmt: skip

@@ -10,8 +10,8 @@ from typing import Any, Final
 from typing_extensions import TypedDict  # pydantic reads the standard library's from Python 3.12 on only
 
 from chauffeur.bench.kernel.benchmark import ItemOutcome, Unasked
-from chauffeur.bench.kernel.metrics import TableSpec, share
 from chauffeur.bench.kernel.store import Row
+from chauffeur.bench.personalization.figures import JUDGE, TABLES
 from chauffeur.bench.personalization.population import draw_passengers
 from chauffeur.bench.personalization.sayings import Half, sayings_sha256
 from chauffeur.bench.personalization.scenes import TASKS, scenes_of
@@ -87,17 +87,8 @@ class StudyBenchmark(Unasked):
 
     id = BENCH_VERSION
     row = TripRow
-    tables = (
-        TableSpec(
-            "Takeovers of the measured trips",
-            (share("personalization-takeover-v1", "takeover", lambda row: row["takeover"]),),
-            group="arm",
-            cluster="passenger",
-            rows=lambda row: row["phase"] == "measured",
-            heads=("system", "trips"),
-            total=False,
-        ),
-    )
+    tables = TABLES
+    judge = JUDGE
 
     def __init__(self, options: StudyConfig, planner_options: Mapping[str, Any] | None = None) -> None:
         """Make it.

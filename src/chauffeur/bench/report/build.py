@@ -1,27 +1,36 @@
-"""A report from run folders: everything it says, ready to be drawn as a page or as Markdown."""
+"""A report from run folders of any benchmark: everything it says, ready to be drawn as a page or as Markdown."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, Protocol, cast, runtime_checkable
 
-from chauffeur.bench.lampilot.metrics import ORIGIN
-from chauffeur.bench.report import headlines, method, pairs, tables
-from chauffeur.bench.report.failures import PICKED, failed, make_gallery
-from chauffeur.bench.report.model import BenchReport, FlipList, Gallery, Headline, ReportTable
-from chauffeur.bench.report.rulers import under_one_ruler
-from chauffeur.bench.report.runs import Run, load_runs, on_common_items
-from chauffeur.bench.report.tables import RowSampling
-from chauffeur.concept import ConfigError, DataError, Scenario
-from chauffeur.worlds.highway.dblv1 import Dataset, load_dataset
+from chauffeur.bench.kernel.metrics import TableSpec
+from chauffeur.bench.kernel.report import ALL, Line, ResultTable, fill, stored_table, with_published
+from chauffeur.bench.report.gallery import PICKED, make_gallery
+from chauffeur.bench.report.model import BenchReport, FlipList, Gallery
+from chauffeur.bench.report.pairs import flip_list, pair_table, pairs_of
+from chauffeur.bench.report.runs import Run, benchmark_kind, load_runs, on_common_items, specs_of
+from chauffeur.concept import ConfigError, DataError
 
 PICKED_IN_ALL = 24
-"""Failures shown of all runs together, unless a number for each is given; every run shows at least four."""
+"""Cards of all runs together, unless a number for each is given; every run shows at least four."""
 LEAST_PICKED = 4
 
 Progress = Callable[[str, int, int], None]
 """Called as (what, done, of how many)."""
+
+
+@runtime_checkable
+class HasRulers(Protocol):
+    """What a class of benchmarks offers beyond its tables where what is stored can be scored in several ways."""
+
+    @staticmethod
+    def rescored(run: Run, ruler: str) -> Run:
+        """The run by a ruler. Raises ConfigError: an unknown one. DataError: the run did not keep what it takes."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,151 +38,174 @@ class Choices:
     """What a report is asked for.
 
     Attributes:
-        metrics: `origin` or `paper`; empty takes the ruler that the runs agree on.
-        data: DbLv1 folder, for the scenes of runs that kept none.
-        gallery: Failures shown of each run; None shares a page's worth among the runs.
-        how: How intervals are made.
+        metrics: Name of a ruler, for benchmarks that have several; empty takes the one that the runs agree on.
+        data: Folder of the data set, for the scenes of runs that kept none.
+        gallery: Cards of each run; None shares a page's worth among the runs.
     """
 
     metrics: str = ""
     data: Path | None = None
     gallery: int | None = None
-    how: RowSampling = field(default_factory=RowSampling)
+
+
+def read_runs(folders: Sequence[Path], metrics: str = "") -> tuple[Sequence[Run], Any]:
+    """Runs of one benchmark under one ruler, and the benchmark's class; None where it is not installed.
+
+    Raises:
+        ConfigError: See load_runs; an unknown ruler, or rulers that disagree.
+        DataError: See load_runs and HasRulers.
+    """
+    runs = load_runs(folders)
+    kind = benchmark_kind(runs[0].bench)
+    if metrics:
+        if not isinstance(kind, HasRulers):
+            raise ConfigError(f"{runs[0].bench} has one ruler only.", hint="Leave --metrics out.")
+        return tuple(kind.rescored(run, metrics) for run in runs), kind
+    if len({run.ruler for run in runs}) > 1:
+        scored = "; ".join(f"{run.name} by {run.ruler}" for run in runs)
+        raise ConfigError(
+            f"The runs were scored by different rulers ({scored}), and two rulers never stand in one table.",
+            hint="Score all by one: add --metrics and its name.",
+        )
+    return runs, kind
 
 
 def build_report(folders: Sequence[Path], choices: Choices, progress: Progress) -> BenchReport:
     """Read runs and say what came of them.
 
     Raises:
-        ConfigError: No run, one twice, an unknown ruler, or rulers that disagree.
-        DataError: A folder is no finished run, damaged, or cannot be scored by the wanted ruler; or the data set is not
-            that of any run.
+        ConfigError: See read_runs.
+        DataError: See read_runs; or rows that lack what the tables are made of.
     """
-    runs = under_one_ruler(load_runs(folders), choices.metrics)
-    data = _load_data(choices.data, runs)
-    shared = on_common_items(runs)
-    warnings = [shared.note] if shared.note else []
-    comparable = len(shared.runs[0].rows) > 0
-    shown = shared.runs if comparable else runs
-    if not comparable:
-        warnings[-1] += (
-            " Each run stands over its own items: no row may be compared with another, and no pair is shown."
-        )
-    elif shared.note:
-        warnings[-1] += " All figures but the last section are over these."
-    warnings.extend(_warnings(runs, data))
-
-    made = _tables(shown, choices.how, compared=comparable and len(runs) > 1)
-    if comparable and shared.note:
-        made.append(_own_items(runs, choices.how))
-    by_id = {table.id: table for table in made}
+    runs, kind = read_runs(folders, choices.metrics)
+    bench = runs[0].bench
+    specs = specs_of(kind)
+    common, cut = on_common_items(runs)
+    comparable = len(runs) > 1 and len(common[0].rows) > 0
+    notices = _notices(runs)
+    if cut:
+        notices.append(f"{cut} {'All tables are over these.' if comparable else 'No row compares with another.'}")
+    shown = common if comparable else runs
+    if not specs:
+        notices.append(f"The tables of {bench} are those that the runs stored: no pairs and no gallery.")
+    try:
+        made = _tables(shown, specs)
+        pairs, flips, galleries = _beyond(runs, common if comparable else (), specs, kind, choices, progress)
+    except KeyError as error:
+        raise DataError(
+            f"Rows of {bench} lack {error}: an earlier version made them.",
+            hint="Run the same chauffeur bench command again: it scores what is stored.",
+        ) from error
+    ruler = f", ruler {shown[0].ruler}" if shown[0].ruler else ""
     return BenchReport(
-        title="LaMPilot-Bench: " + ", ".join(run.name for run in runs),
-        subtitle=f"{tables.number(len(shown[0].rows), 0)} items, ruler {shown[0].ruler}",
-        summary=headlines.ran_words(shown),
-        headlines=_headlines(shown, by_id, choices.how),
-        warnings=tuple(warnings),
-        tables=tuple(made),
-        flips=_flips(shared.runs) if comparable and len(runs) > 1 else (),
-        galleries=_galleries(runs, data, choices.gallery, progress),
-        terms=method.terms(shown[0].ruler, choices.how),
-        facts=tuple((run.name, method.facts(run, run.planned)) for run in runs),
-        ruler=shown[0].ruler,
+        title=f"{bench}: " + ", ".join(run.name for run in runs),
+        subtitle=f"{len({row['item'] for row in shown[0].rows}):,} items, {len(shown[0].rows):,} rows{ruler}",
+        judge=str(getattr(kind, "judge", "") or runs[0].stored.get("judge", "")),
+        notices=tuple(notices),
+        tables=made,
+        pairs=pairs,
+        flips=flips,
+        galleries=galleries,
+        facts=tuple((run.name, _facts(run)) for run in runs),
         labels=tuple(dict.fromkeys(label for run in runs for label in run.labels)),
+        simulated=getattr(kind, "asks", "") != "words",
     )
 
 
-def _load_data(folder: Path | None, runs: Sequence[Run]) -> Dataset | None:
-    if folder is None:
-        return None
-    data = load_dataset(folder)
-    if all(run.data_sha256 != data.sha256 for run in runs):
-        raise DataError(
-            f"{folder} is not the data set of these runs: its hash is {data.sha256[:12]}, theirs "
-            f"{', '.join(sorted({run.data_sha256[:12] or 'not recorded' for run in runs}))}.",
-            hint="Give the folder that the runs were made with, or leave --data out.",
-        )
-    return data
-
-
-def _scenes(run: Run, data: Dataset | None) -> dict[str, Scenario]:
-    """A run's scenes: those it kept, or else those of its data set."""
-    if run.scenes or data is None or run.data_sha256 != data.sha256:
-        return run.scenes
-    return {scene.id: scene for task in data.tasks for scene in task.samples}
-
-
-def _warnings(runs: Sequence[Run], data: Dataset | None) -> list[str]:
+def _notices(runs: Sequence[Run]) -> list[str]:
     found: list[str] = []
     for run in runs:
-        rows = run.rows
-        if len(rows) < run.planned:
-            found.append(f"{run.name}: only {len(rows):,} of the run's {run.planned:,} items, a shard of it.")
-        if run.not_asked:
+        done = len({row["item"] for row in run.rows})
+        if done < run.planned:
+            found.append(f"{run.name}: only {done:,} of the run's {run.planned:,} items.")
+        if broken := sum(bool(row.get("infra_failed")) for row in run.rows):
             found.append(
-                f"{run.name}: partial. The run stopped before {run.not_asked:,} of {len(rows):,} items; they count as "
-                "not completed."
-            )
-        found.extend(words for words in (headlines.machine_words(run),) if words)
-        if any(failed(row) for row in rows) and not _scenes(run, data):
-            found.append(
-                f"{run.name}: an earlier version made this run and kept no scenes, so its failures are shown without "
-                "drives. Name its data set with --data to see them."
+                f"{run.name}: {broken:,} of {len(run.rows):,} rows failed because of endpoint, sandbox or machine, or "
+                "were not asked for. They say nothing about the planner."
             )
     return found
 
 
-def _tables(runs: Sequence[Run], how: RowSampling, *, compared: bool) -> list[ReportTable]:
-    origin = runs[0].ruler == ORIGIN.id
-    made = [tables.score_table(runs, how, published=origin)]
-    if compared:
-        made.append(pairs.pair_table(runs, how))
-    made += [
-        tables.family_table(runs, how),
-        tables.outcome_table(runs),
-        tables.beside_table(runs, how),
-        tables.cost_table(runs),
-    ]
-    if not origin:
-        made.append(tables.published_table())
-    return made
+def _tables(runs: Sequence[Run], specs: Sequence[TableSpec]) -> tuple[ResultTable, ...]:
+    """The tables, filled anew; those that the runs stored where the benchmark's own are not at hand."""
+    if not specs:
+        stored = [(run, stored_table(table)) for run in runs for table in run.stored.get("tables", ())]
+        titles = dict.fromkeys(table.spec.title for _, table in stored)
+        alike = ([(run, table) for run, table in stored if table.spec.title == title] for title in titles)
+        return tuple(_beside(tables[0][1].spec, tables) for tables in alike)
+    made = (_beside(spec, [(run, fill(spec, run.rows)) for run in runs]) for spec in specs)
+    rows = [row for run in runs for row in run.rows]
+    return tuple(with_published(table, rows) for table in made if table.lines)
 
 
-def _own_items(runs: Sequence[Run], how: RowSampling) -> ReportTable:
-    table = tables.score_table(runs, how, published=False)
-    return replace(
-        table,
-        id="own",
-        title="Each run over all its own items",
-        lead="The runs cover different items here: do not compare the rows.",
-    )
+def _beside(spec: TableSpec, found: Sequence[tuple[Run, ResultTable]]) -> ResultTable:
+    """One table of several runs' tables: line by line, the runs below one another."""
+    notes = tuple(f"{run.name}: {note}" if len(found) > 1 else note for run, table in found for note in table.notes)
+    names = dict.fromkeys(line.name for _, table in found for line in table.lines)
+    order = [name.replace("_", " ") for name in spec.order]
+    ordered = sorted(names, key=lambda name: (name == ALL, order.index(name) if name in order else len(order)))
+    lines: list[Line] = []
+    for name in ordered:
+        for run, table in found:
+            for line in table.lines:
+                if line.name != name:
+                    continue
+                if len(names) == 1 and name == ALL:
+                    lines.append(replace(line, name=run.name, labels=run.labels))
+                elif len(found) > 1:
+                    lines.append(replace(line, name=run.name, labels=run.labels, group=name))
+                else:
+                    lines.append(line)
+    return ResultTable(spec, tuple(lines), notes)
 
 
-def _headlines(runs: Sequence[Run], by_id: dict[str, ReportTable], how: RowSampling) -> tuple[Headline, ...]:
-    lines = by_id["scores"].groups[0].lines
-    found: list[Headline] = []
-    for run, line in zip(runs, lines, strict=True):
-        families = by_id["families"] if len(runs) == 1 else tables.family_table([run], how)
-        found.append(headlines.result_words(run, line, families.groups[0].lines))
-    found.append(headlines.paper_words(lines, runs[0].ruler))
-    return tuple(found)
-
-
-def _flips(runs: Sequence[Run]) -> tuple[FlipList, ...]:
-    return tuple(found for a, b in pairs.pairs_of(runs) if (found := pairs.flip_list(a, b)).flips)
-
-
-def _galleries(
-    runs: Sequence[Run], data: Dataset | None, wanted: int | None, progress: Progress
-) -> tuple[Gallery, ...]:
-    if wanted is not None and wanted < 0:
-        raise ConfigError(f"The gallery cannot show {wanted} failures.", hint="Give 0 or more.")
-    each = min(PICKED, max(LEAST_PICKED, PICKED_IN_ALL // len(runs))) if wanted is None else wanted
+def _beyond(
+    runs: Sequence[Run], common: Sequence[Run], specs: Sequence[TableSpec], kind: Any, choices: Choices, tell: Progress
+) -> tuple[tuple[ResultTable, ...], tuple[FlipList, ...], tuple[Gallery, ...]]:
+    """What goes beyond tables: pairs, flips and galleries, in the columns of the first table over the rows as such."""
+    spec = next((spec for spec in specs if spec.over is None), None)
+    if spec is None:
+        return (), (), ()
+    group = next((spec.group for spec in specs if spec.group), "")
+    pairs = pairs_of(common) if len(common) > 1 else []
+    flips = (flip_list(a, b, spec, group) for a, b in pairs)
     found: list[Gallery] = []
-    for run in runs:
+    judged = any(measure.better and measure.unit == "%" for measure in spec.measures)
+    each = min(PICKED, max(LEAST_PICKED, PICKED_IN_ALL // len(runs))) if choices.gallery is None else choices.gallery
+    for run in runs if judged else ():
 
-        def tell(done: int, total: int, name: str = run.name) -> None:
-            progress(f"driving failures of {name} again", done, total)
+        def told(done: int, total: int, name: str = run.name) -> None:
+            tell(f"showing items of {name}", done, total)
 
-        found.append(make_gallery(run, runs, _scenes(run, data), each, tell))
-    return tuple(found)
+        found.append(make_gallery(run, runs, spec, group, kind, choices.data, each, told))
+    return tuple(pair_table(a, b, spec) for a, b in pairs), tuple(one for one in flips if one.flips), tuple(found)
+
+
+def _facts(run: Run) -> tuple[tuple[str, str], ...]:
+    """Where a run's figures come from, as (name, value); what is not known is left out."""
+    row, known = run.rows[0], run.provenance
+    versions = cast("dict[str, Any]", known.get("versions") or {})
+    found: list[tuple[str, Any]] = [
+        ("run folder", run.folder.resolve().name),
+        ("labels", "; ".join(run.labels)),
+        ("planner", row.get("planner")),
+        ("model", row.get("model") or known.get("model")),
+        ("items", f"{run.planned:,}"),
+        ("benchmark", run.bench),
+        ("ruler", run.ruler),
+        *((name.replace("_", " "), _words(value)) for name, value in run.config.items() if name != "planner"),
+        ("rollout", known.get("rollout") or row.get("rollout")),
+        *((f"version of {name}", value) for name, value in versions.items()),
+        ("python", known.get("python")),
+        ("machine", known.get("machine")),
+    ]
+    return tuple((name, str(value)) for name, value in found if value not in (None, ""))
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, dict):
+        named = cast("dict[str, Any]", value)
+        return ", ".join(f"{name.replace('_', ' ')} {item}" for name, item in named.items() if item is not None)
+    if isinstance(value, list):
+        return ", ".join(str(item) for item in cast("list[Any]", value))
+    return "" if value is None else str(value)

@@ -1,4 +1,4 @@
-"""A run as a log of Inspect AI (`inspect view`): one sample an item, the drive's result as its score.
+"""A run of any benchmark as a log of Inspect AI (`inspect view`): one sample a row, what its rates say as its score.
 
 The log is put together as plain values, checked by Inspect's own types and written by its own writer. Inspect AI is an
 extra: it is imported when a log is asked for.
@@ -10,39 +10,31 @@ import hashlib
 import importlib
 import json
 import secrets
+from collections.abc import Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.lampilot.report import MEASURES, intervals
-from chauffeur.bench.report.method import facts
-from chauffeur.bench.report.model import SIMULATED
-from chauffeur.bench.report.redrive import KeptDrive
-from chauffeur.bench.report.runs import NOTHING_DRIVEN, Run
-from chauffeur.bench.report.sentences import goal_words, happened
-from chauffeur.bench.report.tables import RowSampling
-from chauffeur.concept import ConfigError, DataError, MissingExtraError, Plan, Program, Scenario
+from chauffeur.bench.kernel.metrics import AnyRow, TableSpec
+from chauffeur.bench.kernel.report import fill
+from chauffeur.bench.report.model import SIMULATED, asked_words, ending_words
+from chauffeur.bench.report.runs import Run, specs_of
+from chauffeur.concept import ConfigError, DataError, MissingExtraError
 
-SCORER = "lampilot"
 FORMATS = (".eval", ".json")
 
-_POINTS = ("ttc", "speed_variance", "time_efficiency")
-_CAUSES = ("policy_failed", "infra_failed", "refused", "fallback_used")
-_BESIDE = ("lane_ttc_s", "stop", "fault")
 
-
-def write_inspect_log(path: Path, run: Run, how: RowSampling) -> Path:
+def write_inspect_log(path: Path, run: Run, kind: Any) -> Path:
     """Write a run as an Inspect log; the file appears whole or not at all.
 
     Args:
         path: `.eval` (zip) or `.json`.
         run: The run.
-        how: How the intervals beside its metrics are made.
+        kind: Class of its benchmark.
 
     Raises:
-        ConfigError: The file's name ends otherwise.
+        ConfigError: The file's name ends otherwise, or the benchmark declares no tables.
         MissingExtraError: Inspect AI is not installed.
         DataError: The run's stages cannot be read, or the file cannot be written.
     """
@@ -50,8 +42,11 @@ def write_inspect_log(path: Path, run: Run, how: RowSampling) -> Path:
         raise ConfigError(
             f"{path.name} is no name for an Inspect log.", hint=f"It ends in {' or '.join(FORMATS)}, e.g. run.eval."
         )
+    spec = next((spec for spec in specs_of(kind) if spec.over is None), None)
+    if spec is None:
+        raise ConfigError(f"The metrics of {run.bench} are not at hand.", hint="Install the package that it is of.")
     library = _inspect()
-    log = library.EvalLog.model_validate(log_content(run, how))
+    log = library.EvalLog.model_validate(log_content(run, spec))
     partial = path.with_name(f".{secrets.token_hex(4)}.{path.name}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -73,16 +68,17 @@ def _inspect() -> Any:
         raise MissingExtraError("An Inspect log needs Inspect AI, which is not installed.", extra="inspect") from error
 
 
-def log_content(run: Run, how: RowSampling) -> dict[str, Any]:
-    """The log as JSON values, in the layout of Inspect's `EvalLog`, version 2.
+def log_content(run: Run, spec: TableSpec) -> dict[str, Any]:
+    """The log as JSON values, in the layout of Inspect's `EvalLog`, version 2; its metrics are a table's totals.
 
     Raises:
         DataError: The run's stages cannot be read.
     """
-    kept, scenes = KeptDrive(run), run.scenes
+    plans = run.stage("generate", "item")
     identity = hashlib.sha256(json.dumps([run.plan, run.ruler], sort_keys=True).encode("utf-8", "replace")).hexdigest()
     # A run does not note when it was made; its results were last scored then.
     scored_at = datetime.fromtimestamp((run.folder / "results.jsonl").stat().st_mtime, tz=UTC).isoformat()
+    rows = [row for row in run.rows if spec.rows(row)]
     return {
         "version": 2,
         "status": "success",
@@ -90,122 +86,83 @@ def log_content(run: Run, how: RowSampling) -> dict[str, Any]:
             "eval_id": identity[:22],
             "run_id": identity[22:44],
             "created": scored_at,
-            "task": "chauffeur/lampilot",
+            "task": f"chauffeur/{run.bench}",
             "task_id": identity[44:],
-            "task_version": run.ruler,
-            "task_display_name": "LaMPilot-Bench",
-            "task_args": {"metrics": run.ruler, "setting": run.config.get("setting", "")},
+            "task_version": run.ruler or run.bench,
+            "task_args": dict(run.config),
             "tags": [SIMULATED, *run.labels],
-            "dataset": {
-                "name": f"DbLv1 format, sha256 {run.data_sha256[:12]}",
-                "samples": len(run.rows),
-                "shuffled": False,
-            },
-            "model": str(run.rows[0].get("planner") or run.name),
+            "dataset": {"name": ", ".join(run.data) or run.bench, "samples": len(rows), "shuffled": False},
+            "model": str(rows[0].get("planner") or run.name),
             "config": {"epochs": 1},
             "packages": {name: str(number) for name, number in run.provenance.get("versions", {}).items()},
-            "metadata": dict(facts(run, run.planned)),
         },
         "plan": {"name": "chauffeur", "steps": [{"solver": run.name}]},
-        "results": _results(run, how),
+        "results": _results(run, spec, rows),
         "stats": {"started_at": scored_at, "completed_at": scored_at},
-        "samples": [_sample(run, row, kept.plan(row), kept, scenes.get(str(row["sample"]))) for row in run.rows],
+        "samples": [_sample(run, spec, row, n, plans.get(str(row["item"])) or {}) for n, row in enumerate(rows)],
     }
 
 
-def _results(run: Run, how: RowSampling) -> dict[str, Any]:
-    found = intervals(run.rows, draws=how.draws, seed=how.seed)
+def _results(run: Run, spec: TableSpec, rows: Sequence[AnyRow]) -> dict[str, Any]:
+    line = fill(spec, rows).lines[-1]
     metrics = {
-        name: {
-            "name": name,
-            "value": found[name].value,
-            "metadata": {"low_95": found[name].low, "high_95": found[name].high, "interval": found[name].how},
+        measure.id: {
+            "name": measure.id,
+            "value": one.value,
+            "metadata": {"low_95": one.low, "high_95": one.high, "interval": one.how, "unit": measure.unit},
         }
-        for name in MEASURES
-        if found[name].value is not None
+        for measure, one in zip(spec.measures, line.found, strict=True)
+        if one.value is not None
     }
-    count = len(run.rows)
+    about = {"name": run.bench, "scorer": run.bench, "scored_samples": len(rows), "unscored_samples": 0}
     return {
-        "total_samples": count,
-        "completed_samples": sum(not row["infra_failed"] for row in run.rows),
-        "scores": [
-            {
-                "name": SCORER,
-                "scorer": SCORER,
-                "scored_samples": count,
-                "unscored_samples": 0,
-                "params": {"metrics": run.ruler},
-                "metrics": metrics,
-            }
-        ],
+        "total_samples": len(rows),
+        "completed_samples": sum(not row.get("infra_failed") for row in rows),
+        "scores": [{**about, "params": {"metrics": run.ruler}, "metrics": metrics}],
     }
 
 
-def _sample(run: Run, row: Row, plan: Plan | None, kept: KeptDrive, scene: Scenario | None) -> dict[str, Any]:
-    context = kept.context(row)
-    told = "" if context is None else f"{context.text}\n\n"
-    messages = [{"role": "user", "content": f"{told}{row['command']}"}]
+def _sample(run: Run, spec: TableSpec, row: AnyRow, number: int, stored: dict[str, Any]) -> dict[str, Any]:
+    messages = [{"role": "user", "content": asked_words(row)}]
+    found = {measure.id: measure.of(row) for measure in spec.measures}
     sample: dict[str, Any] = {
-        "id": str(row["item"]),
+        "id": f"{row['item']}#{number}",
         "epoch": 1,
-        "input": str(row["command"]),
-        "target": "" if scene is None else goal_words(scene.goal),
+        "input": asked_words(row),
+        "target": "",
         "messages": messages,
-        "scores": {SCORER: _score(row)},
-        "metadata": {
-            "task": row["task"],
-            "family": row["family"],
-            "sample": row["sample"],
-            "scenario_seed": str(row["scenario_seed"]),
-            "intent": row.get("intent", ""),
-            "simulated": True,
-            "labels": list(run.labels),
-            "latency_s": row.get("latency_s"),
-            "cost_usd": row.get("cost_usd"),
+        "scores": {
+            run.bench: {
+                "value": {id: values[0] for id, values in found.items() if values is not None},
+                "answer": ending_words(row),
+                "explanation": str(row.get("detail") or ""),
+            }
         },
+        "metadata": dict(row),
     }
-    if plan is not None:
-        reply = {"role": "assistant", "content": _reply(plan), "source": "generate"}
-        messages.append(reply)
-        output: dict[str, Any] = {
-            "model": plan.model or plan.planner,
-            "choices": [{"message": reply, "stop_reason": "stop"}],
-            "time": plan.latency_s,
-        }
-        sample |= {"output": output, "total_time": plan.latency_s}
-        tokens = plan.usage.prompt_tokens, plan.usage.completion_tokens
+    plan = stored.get("plan") or {}
+    if reply := _reply(plan):
+        model = str(plan.get("model") or plan.get("planner") or run.name)
+        said = {"role": "assistant", "content": reply, "source": "generate"}
+        messages.append(said)
+        output: dict[str, Any] = {"model": model, "choices": [{"message": said, "stop_reason": "stop"}]}
+        sample["output"] = output
+        usage: dict[str, int] = plan.get("usage") or {}
+        tokens = int(usage.get("prompt_tokens") or 0), int(usage.get("completion_tokens") or 0)
         if any(tokens):
-            usage = {"input_tokens": tokens[0], "output_tokens": tokens[1], "total_tokens": sum(tokens)}
-            output["usage"] = usage
-            sample["model_usage"] = {plan.model or plan.planner: usage}
-    if row["infra_failed"]:
-        sample["error"] = {"message": str(row["detail"]), "traceback": "", "traceback_ansi": ""}
+            counted = {"input_tokens": tokens[0], "output_tokens": tokens[1], "total_tokens": sum(tokens)}
+            output["usage"] = counted
+            sample["model_usage"] = {model: counted}
+    if row.get("infra_failed"):
+        sample["error"] = {"message": str(row.get("detail") or ""), "traceback": "", "traceback_ansi": ""}
     return sample
 
 
-def _reply(plan: Plan) -> str:
-    parts = [plan.thoughts.text, plan.refusal]
-    if isinstance(plan.policy, Program):
-        parts.append(f"```python\n{plan.policy.source.rstrip()}\n```")
+def _reply(plan: dict[str, Any]) -> str:
+    """What was answered, of a stored plan or stored words."""
+    policy: Any = plan.get("policy") or {}
+    source = policy.get("source", "") if isinstance(policy, dict) else ""
+    parts = [(plan.get("thoughts") or {}).get("text", ""), plan.get("refusal", ""), plan.get("text", "")]
+    if source:
+        parts.append(f"```python\n{source.rstrip()}\n```")
     return "\n\n".join(part for part in parts if part)
-
-
-def _score(row: Row) -> dict[str, Any]:
-    value: dict[str, Any] = {
-        "success": bool(row["success"]),
-        "collision": bool(row["collision"]),
-        "score": float(row["score"] or 0.0),
-    }
-    if row["outcome"] not in NOTHING_DRIVEN:
-        value |= {name: row[name] for name in _POINTS}
-    return {
-        "value": value,
-        "answer": str(row["outcome"]),
-        "explanation": " ".join(happened(row)),
-        "metadata": {
-            "outcome": row["outcome"],
-            "steps": row.get("steps"),
-            **{name: bool(row[name]) for name in _CAUSES},
-            **{name: row[name] for name in _BESIDE if name in row},
-        },
-    }

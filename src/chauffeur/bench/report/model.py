@@ -1,147 +1,65 @@
-"""A report as values: what every form of it (page, Markdown) says, before anything is drawn."""
+"""A report as values: what every form of it (page, Markdown, CSV) says, before anything is drawn."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any
 
-from chauffeur.bench.kernel.stats import Interval
-from chauffeur.concept import Context, Program, Verdict
+from chauffeur.bench.kernel.report import ResultTable
+from chauffeur.concept import Program, Verdict
 from chauffeur.drive.recording import RecordedTrip
 
 SIMULATED = "simulated drives"
-"""Said wherever a result stands."""
-
-Better = Literal["higher", "lower", ""]
+"""Said wherever a result of drives stands."""
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
-    """A column and its legend.
-
-    Attributes:
-        key: Name within its table.
-        title: Head of the column.
-        unit: Unit of its numbers; empty for counts and words.
-        better: Which direction is better; empty where neither is.
-        meaning: What it says, in one or two sentences for a reader who knows nothing of the benchmark.
-        digits: Decimals shown.
-        span: Ends of the axis its interval bars are drawn on; None for no bars.
-    """
-
-    key: str
-    title: str
-    unit: str = ""
-    better: Better = ""
-    meaning: str = ""
-    digits: int = 0
-    span: tuple[float, float] | None = None
+def said(name: str, labels: tuple[str, ...]) -> str:
+    """A name with its labels: `onboard [critic: evaluator]`."""
+    return f"{name} [{'; '.join(labels)}]" if labels else name
 
 
-@dataclass(frozen=True, slots=True)
-class Cell:
-    """What stands in one place of a table.
-
-    Attributes:
-        text: As it is read, e.g. `98.7`; `n/a` where nothing can be said.
-        interval: The number behind it, in the column's unit, where it has an interval.
-        note: A few words more, e.g. `24 of 25`.
-    """
-
-    text: str
-    interval: Interval | None = None
-    note: str = ""
-
-    @property
-    def ends(self) -> tuple[float, float] | None:
-        """Both ends of the interval, if it has them."""
-        if self.interval is None or self.interval.low is None or self.interval.high is None:
-            return None
-        return self.interval.low, self.interval.high
+_ASKED = ("command", "wish", "instruction", "text", "words", "question")
+_ENDED = ("outcome", "status", "answer", "topic", "chosen")
+_SHORT = 80
+"""Longest text that is a fact and no prose."""
 
 
-NOT_KNOWN = Cell("n/a")
+def asked_words(row: Mapping[str, Any]) -> str:
+    """What was asked in a row, in the words it has; else its item."""
+    return next((str(row[name]) for name in _ASKED if row.get(name)), str(row["item"]))
 
 
-@dataclass(frozen=True, slots=True)
-class ReportLine:
-    """A row of a table.
-
-    Attributes:
-        name: What the row is about.
-        cells: One a column.
-        labels: What must be said beside the name.
-        published: Whether the figures are the paper's own, measured by its authors.
-    """
-
-    name: str
-    cells: tuple[Cell, ...]
-    labels: tuple[str, ...] = ()
-    published: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Group:
-    """Rows that belong together, under a heading of their own where it is not empty."""
-
-    heading: str
-    lines: tuple[ReportLine, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class ReportTable:
-    """A table.
-
-    Attributes:
-        id: For links, e.g. `scores`.
-        title: What it shows.
-        lead: A sentence or two before it.
-        first: Head of the column of names.
-        columns: The others.
-        groups: Its rows.
-        notes: What stands below it.
-        simulated: Whether its figures are results of drives (then that is said in its caption).
-    """
-
-    id: str
-    title: str
-    first: str
-    columns: tuple[Column, ...]
-    groups: tuple[Group, ...]
-    lead: str = ""
-    notes: tuple[str, ...] = ()
-    simulated: bool = True
-
-    @property
-    def caption(self) -> str:
-        """Title with what must be said of the figures."""
-        return f"{self.title} ({SIMULATED})" if self.simulated else self.title
+def ending_words(row: Mapping[str, Any]) -> str:
+    """How a row ended, briefly."""
+    found = (str(row[name]) for name in _ENDED if row.get(name))
+    return next((text.replace("_", " ") for text in found if len(text) <= _SHORT), "not as it should be")
 
 
 @dataclass(frozen=True, slots=True)
 class Flip:
-    """Commands of one scene that one run completed and the other did not.
+    """Rows of one cluster, e.g. commands of one scene, that are as they should be in one run and not in the other.
 
     Attributes:
-        sample, family: The scene.
-        gained: How many of its commands the second run completed and the first did not.
-        lost: How many the first run completed and the second did not.
-        command: One of them.
-        first, second: What came of that one in either run, in words.
+        cluster, group: Which, and the line of the tables that it stands in.
+        gained: How many are right in the second run only.
+        lost: How many are right in the first run only.
+        words: What was asked in one of them.
+        first, second: What came of that one in either run.
     """
 
-    sample: str
-    family: str
+    cluster: str
+    group: str
     gained: int
     lost: int
-    command: str
+    words: str
     first: str
     second: str
 
 
 @dataclass(frozen=True, slots=True)
 class FlipList:
-    """All flips between two runs, whose names carry their labels; `left_out` more scenes are not listed."""
+    """All flips between two runs, whose names carry their labels; `left_out` more clusters are not listed."""
 
     first: str
     second: str
@@ -150,72 +68,51 @@ class FlipList:
 
 
 @dataclass(frozen=True, slots=True)
-class Failure:
-    """An item that was not completed, with everything needed to understand why.
+class Card:
+    """A row that is not as it should be, with what its run kept to understand why.
 
     Attributes:
-        run, labels: Whose it is and what must be said of it.
-        item, sample, family, scenario_seed: Which item.
-        command: The wish.
-        goal: What the benchmark wanted to see, in words; empty when the data set was not at hand.
-        outcome: As the row says, e.g. `timeout`.
-        happened: What happened and why, in sentences.
+        item: Which item.
+        words: What was asked.
+        ending: What came of it, briefly.
+        bad: Whether the drive itself went wrong.
+        goal: What the benchmark wanted to see; empty where that is not known.
+        why: Sentences on what happened.
         facts: Further facts as (name, value).
-        siblings: How the scene's other commands fared, in words.
-        elsewhere: How other runs fared with the same item, as (run, words).
-        context: C in words; None where the run kept none.
+        context: What the planner was told of the scene.
         thoughts: R; empty where there is none.
-        program: P; None for baselines and refusals.
+        program: P; None for baselines, refusals and answers in words.
         verdicts: What the checks said.
         drive: The drive, driven again with recording; None where there is none to show.
         drive_note: Why there is none, or what is to be said of it.
+        elsewhere: How other runs fared with the same item, as (run, words).
     """
 
-    run: str
-    labels: tuple[str, ...]
     item: str
-    sample: str
-    family: str
-    scenario_seed: str
-    command: str
-    goal: str
-    outcome: str
-    happened: tuple[str, ...]
-    facts: tuple[tuple[str, str], ...]
-    siblings: str
-    elsewhere: tuple[tuple[str, str], ...]
-    context: Context | None
-    thoughts: str
-    program: Program | None
-    verdicts: tuple[Verdict, ...]
-    drive: RecordedTrip | None
-    drive_note: str
+    words: str
+    ending: str
+    bad: bool = False
+    goal: str = ""
+    why: tuple[str, ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()
+    context: str = ""
+    thoughts: str = ""
+    program: Program | None = None
+    verdicts: tuple[Verdict, ...] = ()
+    drive: RecordedTrip | None = None
+    drive_note: str = ""
+    elsewhere: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Gallery:
-    """Failures of one run that were picked to be shown.
-
-    Attributes:
-        run, labels: Whose.
-        failed: How many items were not completed.
-        items: Of how many.
-        failures: The picked ones.
-    """
+    """Cards of one run that were picked to be shown: `missed` of `items` rows are not as they should be."""
 
     run: str
     labels: tuple[str, ...]
-    failed: int
+    missed: int
     items: int
-    failures: tuple[Failure, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Headline:
-    """One thing that came out: what it is about, and the sentences."""
-
-    subject: str
-    text: str
+    cards: tuple[Card, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,32 +121,26 @@ class BenchReport:
 
     Attributes:
         title: What was run.
-        subtitle: Runs, items, ruler.
-        summary: What was run, in a sentence.
-        headlines: What came out, in plain sentences.
-        warnings: What a reader must know before comparing.
+        subtitle: Benchmark, items, ruler.
+        judge: Who judges, and what judge and judged share; empty where the benchmark does not say.
+        notices: What a reader must know before comparing.
         tables: In reading order.
+        pairs: Run against run.
         flips: Items that went differently between runs.
-        galleries: Failures, by run.
-        terms: (term, definition) of every measure under this ruler.
+        galleries: By run.
         facts: (name, value) of where the figures come from, by run: (run, facts).
-        ruler: Versioned id of the metrics.
         labels: Everything that must be said of any run in it.
+        simulated: Whether its figures are results of drives.
     """
 
     title: str
     subtitle: str
-    summary: str
-    headlines: tuple[Headline, ...]
-    warnings: tuple[str, ...]
-    tables: tuple[ReportTable, ...]
+    judge: str
+    notices: tuple[str, ...]
+    tables: tuple[ResultTable, ...]
+    pairs: tuple[ResultTable, ...]
     flips: tuple[FlipList, ...]
     galleries: tuple[Gallery, ...]
-    terms: tuple[tuple[str, str], ...]
     facts: tuple[tuple[str, tuple[tuple[str, str], ...]], ...]
-    ruler: str
     labels: tuple[str, ...] = ()
-
-    def table(self, table_id: str) -> ReportTable | None:
-        """A table by id."""
-        return next((table for table in self.tables if table.id == table_id), None)
+    simulated: bool = True

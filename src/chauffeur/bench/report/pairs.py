@@ -5,16 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import combinations
 
-import numpy as np
-
-from chauffeur.bench.kernel.stats import Array, Estimator, bootstrap, sign_test
-from chauffeur.bench.kernel.store import Row
-from chauffeur.bench.lampilot.report import MEASURES, scene_totals
-from chauffeur.bench.report import columns as col
-from chauffeur.bench.report.model import Cell, Flip, FlipList, Group, ReportLine, ReportTable
+from chauffeur.bench.kernel.metrics import AnyRow, Measure, TableSpec, missed
+from chauffeur.bench.kernel.report import Line, ResultTable, fill
+from chauffeur.bench.kernel.stats import Interval, sign_test
+from chauffeur.bench.report.model import Flip, FlipList, asked_words, ending_words
 from chauffeur.bench.report.runs import Run
-from chauffeur.bench.report.sentences import ending_words
-from chauffeur.bench.report.tables import RowSampling, interval_cell, name_with_labels, with_spans
 
 ALL_PAIRS_UP_TO = 4
 """With more runs than this, only pairs with the first run are compared."""
@@ -28,90 +23,63 @@ def pairs_of(runs: Sequence[Run]) -> list[tuple[Run, Run]]:
     return [(runs[0], other) for other in runs[1:]]
 
 
-def pair_table(runs: Sequence[Run], how: RowSampling) -> ReportTable:
-    """Every pair of runs that lie over the same items (rows in the same order)."""
-    lines = [
-        ReportLine(
-            f"A: {a.name}; B: {b.name}",
-            _pair_cells(a.rows, b.rows, how),
-            tuple(dict.fromkeys((*a.labels, *b.labels))),
-        )
-        for a, b in pairs_of(runs)
+def pair_table(a: Run, b: Run, spec: TableSpec) -> ResultTable:
+    """A pair of runs that lie over the same items (rows in the same order), in the columns of a table."""
+    both = [(x, y) for x, y in zip(a.rows, b.rows, strict=True) if spec.rows(x) and spec.rows(y)]
+    rows = [x for x, _ in both], [y for _, y in both]
+    total = TableSpec(f"A: {a.name}; B: {b.name}", spec.measures, cluster=spec.cluster, heads=("", spec.heads[1]))
+    lines: list[Line] = []
+    for letter, run, mine in zip("AB", (a, b), rows, strict=True):
+        for line in fill(total, mine).lines:
+            lines.append(Line(f"{letter}: {run.name}", line.items, line.found, labels=run.labels))
+    differences = tuple(measure.difference(*rows, cluster=spec.cluster) for measure in spec.measures)
+    tests = [_test(measure, both, spec.cluster) for measure in spec.measures]
+    lines += [
+        Line("B \N{MINUS SIGN} A", len(both), differences),
+        Line("counted in A only", None, tuple(Interval(test[0]) for test in tests), form="count"),
+        Line("counted in B only", None, tuple(Interval(test[1]) for test in tests), form="count"),
+        Line("McNemar p, by item", None, tuple(Interval(test[2]) for test in tests), form="p"),
+        Line(f"sign test p, by {spec.cluster}", None, tuple(Interval(test[3]) for test in tests), form="p"),
     ]
-    groups = (Group("", tuple(lines)),)
-    notes = ["Differences are taken item by item on the same resamples of scenes; brackets hold 95 % intervals."]
-    if len(runs) > ALL_PAIRS_UP_TO:
-        notes.append(f"Pairs with the first run ({runs[0].name}) only.")
-    return ReportTable(
-        "pairs",
-        "Run against run, on the same items",
-        "Pair",
-        with_spans((col.ITEMS, *col.PAIRS), groups),
-        groups,
-        notes=tuple(notes),
+    note = (
+        "Differences are taken item by item on the same resamples; brackets hold 95 % intervals. Of a rate, counted in "
+        "one run only, McNemar's exact test, and the same with one vote for each "
+        f"{spec.cluster}, since its items hang together."
     )
+    return ResultTable(total, tuple(lines), (note,))
 
 
-def _pair_cells(a: Sequence[Row], b: Sequence[Row], how: RowSampling) -> tuple[Cell, ...]:
-    done = [(bool(x["success"]), bool(y["success"])) for x, y in zip(a, b, strict=True)]
-    only_a, only_b = done.count((True, False)), done.count((False, True))
+def _test(measure: Measure, both: Sequence[tuple[AnyRow, AnyRow]], cluster: str) -> tuple[float | None, ...]:
+    """Rows that only either run counts, and the p of both tests; nothing where the measure is no rate."""
+    found = [(str(x[cluster]), measure.holds(x), measure.holds(y)) for x, y in both]
+    known = [(name, x, y) for name, x, y in found if x is not None and y is not None]
+    if measure.unit != "%" or not known:
+        return (None,) * 4
+    only_a, only_b = (sum((x, y) == want for _, x, y in known) for want in ((True, False), (False, True)))
     votes: dict[str, int] = {}
-    for row, (first, second) in zip(a, done, strict=True):
-        votes[str(row["sample"])] = votes.get(str(row["sample"]), 0) + int(second) - int(first)
-    for_a, for_b = sum(v < 0 for v in votes.values()), sum(v > 0 for v in votes.values())
-    counts = (len(done), done.count((True, True)), only_a, only_b, done.count((False, False)))
-    by_key = {column.key: column for column in col.PAIRS}
-    differences = bootstrap(
-        np.hstack([scene_totals(a), scene_totals(b)]),
-        {name: _difference(MEASURES[name]) for name in ("completion", "collision", "driving_score")},
-        draws=how.draws,
-        seed=how.seed,
-    )
-    return (
-        *(Cell(f"{count:,}") for count in counts),
-        Cell(p_words(sign_test(only_a, only_b))),
-        Cell(p_words(sign_test(for_a, for_b)), note=f"{for_a} v {for_b} scenes"),
-        interval_cell(by_key["completion"], differences["completion"], 100.0),
-        interval_cell(by_key["collision"], differences["collision"], 100.0),
-        interval_cell(by_key["driving_score"], differences["driving_score"]),
-    )
+    for name, x, y in known:
+        votes[name] = votes.get(name, 0) + y - x
+    by_cluster = sign_test(sum(vote < 0 for vote in votes.values()), sum(vote > 0 for vote in votes.values()))
+    return only_a, only_b, sign_test(only_a, only_b), by_cluster
 
 
-def _difference(measure: Estimator) -> Estimator:
-    """B less A of a measure, from the totals of both side by side."""
-
-    def difference(totals: Array) -> Array:
-        half = totals.shape[-1] // 2
-        return measure(totals[..., half:]) - measure(totals[..., :half])
-
-    return difference
-
-
-def p_words(p: float) -> str:
-    """A p value as it is read: `< 0.001`, `0.031`, `1`."""
-    if p < 0.001:
-        return "< 0.001"
-    return "1" if p > 0.9995 else f"{p:.3f}"
-
-
-def flip_list(a: Run, b: Run, most: int = FLIPS_LISTED) -> FlipList:
-    """Scenes whose commands went differently in two runs over the same items; those with the most flips first."""
-    by_scene: dict[str, list[tuple[Row, Row]]] = {}
+def flip_list(a: Run, b: Run, spec: TableSpec, group: str, most: int = FLIPS_LISTED) -> FlipList:
+    """Clusters whose rows went differently in two runs over the same items; those with the most flips first."""
+    by_cluster: dict[str, list[tuple[AnyRow, AnyRow, bool]]] = {}
     for x, y in zip(a.rows, b.rows, strict=True):
-        if bool(x["success"]) != bool(y["success"]):
-            by_scene.setdefault(str(x["sample"]), []).append((x, y))
+        if spec.rows(x) and spec.rows(y) and (lost := missed(spec.measures, y)) != missed(spec.measures, x):
+            by_cluster.setdefault(str(x[spec.cluster]), []).append((x, y, lost))
     flips = [
         Flip(
-            sample=sample,
-            family=str(pairs[0][0]["family"]),
-            gained=sum(bool(y["success"]) for _, y in pairs),
-            lost=sum(bool(x["success"]) for x, _ in pairs),
-            command=str(pairs[0][0]["command"]),
+            cluster=cluster,
+            group=str(pairs[0][0].get(group, "")),
+            gained=sum(not lost for *_, lost in pairs),
+            lost=sum(lost for *_, lost in pairs),
+            words=asked_words(pairs[0][0]),
             first=ending_words(pairs[0][0]),
             second=ending_words(pairs[0][1]),
         )
-        for sample, pairs in by_scene.items()
+        for cluster, pairs in by_cluster.items()
     ]
-    flips.sort(key=lambda flip: (-(flip.gained + flip.lost), flip.sample))
-    shown = flips[:most]
-    return FlipList(name_with_labels(a), name_with_labels(b), tuple(shown), len(flips) - len(shown))
+    flips.sort(key=lambda flip: (-(flip.gained + flip.lost), flip.cluster))
+    return FlipList(a.said, b.said, tuple(flips[:most]), len(flips[most:]))

@@ -1,38 +1,22 @@
-"""Finished run folders as values: read tolerantly, checked for being whole, brought under one ruler and onto the same
-items before they are compared."""
+"""Run folders of any benchmark as values: read tolerantly, named apart, and cut to the items they have in common."""
 
 from __future__ import annotations
 
 import contextlib
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, cast, get_type_hints
 
+from chauffeur.bench.kernel.benchmark import GROUP
+from chauffeur.bench.kernel.metrics import TableSpec
 from chauffeur.bench.kernel.store import Row, unseal
-from chauffeur.bench.lampilot.benchmark import NOT_ASKED
-from chauffeur.bench.lampilot.metrics import ORIGIN
-from chauffeur.concept import ConfigError, DataError, Scenario
+from chauffeur.concept import ConfigError, DataError
 from chauffeur.concept.data import parse_json
+from chauffeur.concept.registry import load_plugin, plugin_names
 
-NOTHING_DRIVEN = ("refused", "not_driven")
-"""Outcomes of items without a drive; no ruler has anything to measure there."""
-
-SCHEMAS = ("lampilot-results-v1", "lampilot-results-v2")
-
-_NEEDED = ("item", "family", "sample", "command", "outcome", "success", "collision", "score")
-_UNKNOWN: Row = {
-    "scenario_seed": "",
-    "task": "",
-    "ttc": None,
-    "speed_variance": None,
-    "time_efficiency": None,
-    "policy_failed": False,
-    "infra_failed": False,
-    "refused": False,
-    "fallback_used": False,
-    "detail": "",
-}
+_AGAIN = "Run the same chauffeur bench command again; it goes on where it stopped."
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,20 +26,27 @@ class Run:
     Attributes:
         name: What the run is called in tables; unlike any other run's of the report.
         folder: Where it lies.
-        ruler: Versioned id of the metrics its rows carry.
-        rows: One per planned item, in the plan's order.
+        bench: Id of its benchmark.
+        rows: Its rows, in the plan's order.
         plan: Content of `plan.json`.
         provenance: Content of `provenance.json`; empty where there is none.
+        stored: Content of `report.json`; empty where there is none.
         labels: What must be said wherever the run is shown, e.g. `critic: evaluator`.
     """
 
     name: str
     folder: Path
-    ruler: str
+    bench: str
     rows: tuple[Row, ...]
     plan: Row
     provenance: Row
+    stored: Row
     labels: tuple[str, ...]
+
+    @property
+    def said(self) -> str:
+        """The name with its labels."""
+        return f"{self.name} [{'; '.join(self.labels)}]" if self.labels else self.name
 
     @property
     def planned(self) -> int:
@@ -63,31 +54,19 @@ class Run:
         return int(self.plan.get("planned", len(self.plan["items"])))
 
     @property
-    def not_asked(self) -> int:
-        """Items that the run stopped before, e.g. because a budget was spent; their rows say so."""
-        return sum(row["detail"] == NOT_ASKED for row in self.rows)
-
-    @property
-    def scenes(self) -> dict[str, Scenario]:
-        """Scenes by sample; empty where the run kept none (versions before 2 of the plan).
-
-        Raises:
-            DataError: The plan's scenes are damaged.
-        """
-        try:
-            return {name: Scenario(**fields) for name, fields in self.plan.get("samples", {}).items()}
-        except (TypeError, AttributeError) as error:
-            raise DataError(f"The scenes in {self.folder / 'plan.json'} are damaged: {error}.") from error
-
-    @property
     def config(self) -> Row:
         """What decided the run."""
         return dict(self.plan.get("config", {}))
 
     @property
-    def data_sha256(self) -> str:
-        """Hash of its data set; empty when its rows do not name one."""
-        return str(self.rows[0].get("data_sha256", ""))
+    def data(self) -> tuple[str, ...]:
+        """Hashes of its data."""
+        return tuple(str(value) for name, value in sorted(self.config.items()) if name.endswith("sha256"))
+
+    @property
+    def ruler(self) -> str:
+        """Versioned id of the metrics its rows carry; empty where the benchmark has but one."""
+        return str(self.rows[0].get("metrics", ""))
 
     def stage(self, name: str, key: str) -> dict[str, Row]:
         """Rows of a stage file, e.g. `generate` by `item`, the last row of a key winning; empty where there is none.
@@ -107,11 +86,29 @@ class Run:
         return found
 
 
+def benchmark_kind(bench: str) -> Any:
+    """The class of the benchmark with an id, out of those that are installed; None where it is not (any more)."""
+    names = sorted((name for name in plugin_names(GROUP) if bench.startswith(name)), key=len, reverse=True)
+    for name in names:
+        found: Any = load_plugin(GROUP, name)
+        kind: Any = found if isinstance(found, type) else get_type_hints(found).get("return")
+        for one in (kind, *getattr(kind, "__subclasses__", tuple)()):
+            if getattr(one, "id", "") == bench:
+                return one
+    return None
+
+
+def specs_of(kind: Any) -> tuple[TableSpec, ...]:
+    """The tables that a class of benchmarks declares; none where they are made for each run."""
+    found: Any = getattr(kind, "tables", ())
+    return tuple(cast("Sequence[TableSpec]", found)) if isinstance(found, tuple | list) else ()
+
+
 def load_runs(folders: Sequence[Path]) -> tuple[Run, ...]:
-    """Read runs and give each a name of its own.
+    """Read runs of one benchmark and give each a name of its own.
 
     Raises:
-        ConfigError: No folder, or one folder twice.
+        ConfigError: No folder, one folder twice, or runs of several benchmarks or rulers.
         DataError: See load_run.
     """
     if not folders:
@@ -121,6 +118,11 @@ def load_runs(folders: Sequence[Path]) -> tuple[Run, ...]:
     if twice is not None:
         raise ConfigError(f"The run folder {twice} was given twice.", hint="Name each run once.")
     runs = [load_run(folder) for folder in folders]
+    if len(benches := dict.fromkeys(run.bench for run in runs)) > 1:
+        raise ConfigError(
+            f"These are runs of {' and '.join(benches)}, which no table holds together.",
+            hint="Report each benchmark apart.",
+        )
     names = [run.name for run in runs]
     return tuple(
         replace(run, name=f"{run.name} ({_short(folder, resolved)})") if names.count(run.name) > 1 else run
@@ -137,132 +139,74 @@ def _short(folder: Path, folders: Sequence[Path]) -> str:
     return str(folder)
 
 
-_LAMPILOT: Final = "lampilot-bench"
-
-
-def tables_of_another(folder: Path) -> str:
-    """The tables that a finished run of another benchmark wrote, as Markdown; empty for a run of LaMPilot-Bench.
-
-    Raises:
-        DataError: It is no run folder that can be read.
-    """
-    if not (folder / "plan.json").is_file():
-        return ""
-    bench = str(_json(folder / "plan.json").get("bench", _LAMPILOT))
-    table = folder / "table.md"
-    return "" if bench.startswith(_LAMPILOT) or not table.is_file() else _text(table)
-
-
 def load_run(folder: Path) -> Run:
-    """Read one run folder of `chauffeur bench lampilot`.
+    """Read one run folder of `chauffeur bench`.
 
     Raises:
-        DataError: It is not one, is not finished, or holds rows that are damaged, of a newer version, or not its own.
+        DataError: It is not one, has no results yet, or holds rows that are damaged or not its own.
     """
     if not folder.is_dir():
-        raise DataError(f"No such run folder: {folder}.", hint="Make one with chauffeur bench lampilot --out FOLDER.")
+        raise DataError(f"No such run folder: {folder}.", hint="Make one with chauffeur bench NAME --out FOLDER.")
     if not (folder / "plan.json").is_file():
         raise DataError(
             f"{folder} is not a run folder: it has no plan.json.",
-            hint="Give the folder that chauffeur bench lampilot wrote, e.g. runs/lampilot-onboard.",
+            hint="Give the folder that chauffeur bench wrote, e.g. runs/lampilot-onboard.",
         )
     plan = _json(folder / "plan.json")
-    bench = str(plan.get("bench", _LAMPILOT))
-    if not bench.startswith(_LAMPILOT):
-        raise DataError(
-            f"{folder} holds a run of {bench}; a report is made of runs of LaMPilot-Bench.",
-            hint=f"Its tables are in {folder / 'table.md'}, its figures with intervals in report.json beside it.",
-        )
     if not isinstance(plan.get("items"), list) or not plan["items"]:
         raise DataError(f"{folder / 'plan.json'} plans no items, so there is nothing to report.")
     if not (folder / "results.jsonl").is_file():
-        raise DataError(
-            f"The run in {folder} is not finished: {_progress(folder, len(plan['items']))}.",
-            hint="Run the same chauffeur bench lampilot command again; it goes on where it stopped.",
-        )
-    rows = _rows(folder, plan["items"])
-    provenance = folder / "provenance.json"
+        raise DataError(f"The run in {folder} is not finished: it has no results.jsonl.", hint=_AGAIN)
+    rows = _rows(folder / "results.jsonl", [str(item) for item in plan["items"]])
+    provenance, stored = (
+        _json(folder / name) if (folder / name).is_file() else {} for name in ("provenance.json", "report.json")
+    )
     return Run(
-        name=_name(rows[0], plan),
+        name=_name(rows[0], plan, folder),
         folder=folder,
-        ruler=_only(folder, rows, "metrics", ORIGIN.id),
+        bench=str(plan.get("bench", "")),
         rows=rows,
         plan=plan,
-        provenance=_json(provenance) if provenance.is_file() else {},
+        provenance=provenance,
+        stored=stored,
         labels=tuple(dict.fromkeys(str(label) for row in rows for label in row.get("labels") or ())),
     )
 
 
-def _rows(folder: Path, items: list[Any]) -> tuple[Row, ...]:
-    path = folder / "results.jsonl"
-    by_item: dict[str, Row] = {}
+def _rows(path: Path, planned: list[str]) -> tuple[Row, ...]:
+    place = {item: number for number, item in enumerate(planned)}
+    found: list[Row] = []
     for number, line in enumerate(_text(path).split("\n"), start=1):
         if not line.strip():
             continue
-        row = _row(path, number, line)
-        by_item[str(row["item"])] = _UNKNOWN | row
-    planned = [str(item) for item in items]
-    missing = [item for item in planned if item not in by_item]
-    if missing:
-        raise DataError(
-            f"{path} has rows for {len(planned) - len(missing)} of {len(planned)} planned items; "
-            f"{missing[0]} is the first without one.",
-            hint="Run the same chauffeur bench lampilot command again; it goes on where it stopped.",
-        )
-    foreign = next(iter(by_item.keys() - set(planned)), None)
-    if foreign is not None:
-        raise DataError(
-            f"{path} has a row for {foreign}, which this run never planned.",
-            hint="Rows of several runs seem mixed in one folder; score each run in its own.",
-        )
-    return tuple(by_item[item] for item in planned)
+        try:
+            row: Any = parse_json(line)
+            item = str(row["item"])
+        except (ValueError, TypeError, KeyError) as error:
+            raise DataError(
+                f"{path}, line {number}, is no row of results ({type(error).__name__}: {error}).", hint=_AGAIN
+            ) from error
+        if item not in place:
+            raise DataError(
+                f"{path} has a row for {item}, which this run never planned.",
+                hint="Rows of several runs seem mixed in one folder; score each run in its own.",
+            )
+        found.append(row)
+    if not found:
+        raise DataError(f"{path} holds no row, so there is nothing to report.", hint=_AGAIN)
+    if len(rulers := {str(row.get("metrics", "")) for row in found}) > 1:
+        raise DataError(f"{path} mixes several rulers: {', '.join(sorted(rulers))}.", hint="Score it under one.")
+    return tuple(sorted(found, key=lambda row: place[str(row["item"])]))
 
 
-def _row(path: Path, number: int, line: str) -> Row:
-    try:
-        row: Any = parse_json(line)
-    except ValueError as error:
-        raise DataError(
-            f"{path}, line {number}, is not JSON: {error}.", hint="Score the run again to write the file anew."
-        ) from error
-    schema = row.get("schema") if isinstance(row, dict) else None
-    if schema not in SCHEMAS:
-        raise DataError(
-            f"{path}, line {number}, has the schema {schema!r}, which this version cannot read.",
-            hint=f"It reads {' and '.join(SCHEMAS)}; a newer chauffeur may have written the run.",
-        )
-    absent = [name for name in _NEEDED if name not in row]
-    if absent:
-        raise DataError(f"{path}, line {number}, lacks {', '.join(absent)}.", hint="Score the run again.")
-    return cast("Row", row)
-
-
-def _only(folder: Path, rows: tuple[Row, ...], column: str, default: str) -> str:
-    found = {str(row.get(column, default)) for row in rows}
-    if len(found) > 1:
-        raise DataError(
-            f"{folder / 'results.jsonl'} mixes several {column}: {', '.join(sorted(found))}.",
-            hint="Score the run again under one.",
-        )
-    return found.pop()
-
-
-def _name(row: Row, plan: Row) -> str:
+def _name(row: Row, plan: Row, folder: Path) -> str:
     """The planner, and its prompt setting where the planner is a language model."""
-    planner = str(row.get("planner") or plan.get("config", {}).get("planner") or "unnamed planner")
-    setting = str(plan.get("config", {}).get("setting", ""))
+    config: Row = plan.get("config", {})
+    named = (row.get("planner"), row.get("driver"), config.get("planner"))
+    planner = next((name for name in named if isinstance(name, str) and name), folder.resolve().name)
+    setting = str(config.get("setting", ""))
     # Only planners of the form `kind/model` read the system message that the setting is about.
     return f"{planner} ({setting})" if setting and "/" in planner and not planner.startswith("replay/") else planner
-
-
-def _progress(folder: Path, items: int) -> str:
-    plans, drives = folder / "generate.jsonl", folder / "rollout.jsonl"
-    parts = [
-        f"{_text(path).count(chr(10))} {what}"
-        for path, what in ((plans, "plans made"), (drives, "drives made"))
-        if path.is_file()
-    ]
-    return f"{items} items planned, {', '.join(parts) or 'nothing made yet'}, no results.jsonl"
 
 
 def _content(path: Path) -> bytes:
@@ -287,37 +231,31 @@ def _json(path: Path) -> Row:
     return cast("Row", value)
 
 
-ItemKey = tuple[str, str, str]
+RowKey = tuple[str, ...]
 
 
-def item_key(row: Row, *, same_data: bool) -> ItemKey:
-    """What makes two rows of different runs the same item: its id, and, where the data sets' hashes differ, also the
-    scene's seed and the words."""
-    item = str(row["item"])
-    return (item, "", "") if same_data else (item, str(row["scenario_seed"]), str(row["command"]))
+def keyed(run: Run, *, same_data: bool) -> dict[RowKey, Row]:
+    """A run's rows by what makes two rows of different runs the same: their item and their number within it; where the
+    data's hashes differ, also the scene's seed and the words."""
+    numbers: Counter[str] = Counter()
+    found: dict[RowKey, Row] = {}
+    for row in run.rows:
+        item = str(row["item"])
+        more = () if same_data else (str(row.get("scenario_seed", "")), str(row.get("command", "")))
+        found[(item, str(numbers[item]), *more)] = row
+        numbers[item] += 1
+    return found
 
 
-@dataclass(frozen=True, slots=True)
-class Shared:
-    """Runs cut to the items they have in common.
-
-    Attributes:
-        runs: The same runs, in the same order, rows in the first run's order.
-        note: What was cut, in words; empty when nothing was.
-    """
-
-    runs: tuple[Run, ...]
-    note: str
-
-
-def on_common_items(runs: Sequence[Run]) -> Shared:
-    """Cut runs to the items all of them have. With nothing in common every `rows` is empty."""
-    same_data = len({run.data_sha256 for run in runs}) == 1
-    tables = [{item_key(row, same_data=same_data): row for row in run.rows} for run in runs]
-    common = [key for key in tables[0] if all(key in table for table in tables)]
-    cut = tuple(replace(run, rows=tuple(table[k] for k in common)) for run, table in zip(runs, tables, strict=True))
+def on_common_items(runs: Sequence[Run]) -> tuple[tuple[Run, ...], str]:
+    """Runs cut to the rows all of them have, in the first run's order, and what was cut, in words; with nothing in
+    common every `rows` is empty."""
+    same_data = len({run.data for run in runs}) == 1
+    by_key = [keyed(run, same_data=same_data) for run in runs]
+    common = [key for key in by_key[0] if all(key in rows for rows in by_key)]
+    cut = tuple(replace(run, rows=tuple(rows[key] for key in common)) for run, rows in zip(runs, by_key, strict=True))
     if all(len(run.rows) == len(common) for run in runs):
-        return Shared(cut, "")
+        return cut, ""
     sizes = ", ".join(f"{run.name} {len(run.rows):,}" for run in runs)
     data = "" if same_data else " Their data sets differ; items count as the same when id, seed and command agree."
-    return Shared(cut, f"The runs cover different items ({sizes}); {len(common):,} are in all of them.{data}")
+    return cut, f"The runs cover different items ({sizes}); {len(common):,} rows are in all of them.{data}"

@@ -311,6 +311,10 @@ class InstructionBenchmark:
     id = VERSION
     asks: Asks = "plans"
     row = InstructionRow
+    judge = (
+        "The exact solver that also stands behind every row. Shared: what differs between rows is how words are "
+        "read, and nothing else."
+    )
     tables = (
         TableSpec("Open road (Tab. XIII, second row)", TABLE, group="split", order=TESTS, cluster="text",
                   heads=("split", "commands"), rows=lambda row: row["task"] == "driving"),
