@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
+import ast
+import asyncio
+import doctest
+import inspect
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+
+sys.path.append(str(Path(__file__).resolve().parent / "planners"))
+from server import ModelServer
 
 import chauffeur
 from chauffeur.concept import ConfigError, InstructionError, ScenarioError
 from chauffeur.drive.recording import read_trip
 
-BLOCKS = re.findall(
-    r"^```python\n(.*?)^```",
-    (Path(__file__).resolve().parents[1] / "README.md").read_text(encoding="utf-8"),
-    re.MULTILINE | re.DOTALL,
-)
+ROOT = Path(__file__).resolve().parents[1]
+_PYTHON = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+BLOCKS = _PYTHON.findall((ROOT / "README.md").read_text(encoding="utf-8"))
+NOTEBOOK = {
+    title: _PYTHON.findall(text)
+    for title, _, text in (
+        section.partition("\n")
+        for section in (ROOT / "docs" / "notebooks.md").read_text(encoding="utf-8").split("\n## ")[1:]
+    )
+}
+"""Cells of each section of the page on notebooks."""
 
 
 def _run(block: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -23,11 +38,59 @@ def _run(block: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     exec(compile(block, "README.md", "exec"), {"__name__": "__main__"})
 
 
-def test_every_name_of_the_front_page_can_be_had() -> None:
-    for name in chauffeur.__all__:
-        assert getattr(chauffeur, name) is not None
+def test_what_is_offered_is_shown_without_being_imported() -> None:
     with pytest.raises(AttributeError, match="nothing_like_it"):
         chauffeur.nothing_like_it  # noqa: B018
+    shown = "import sys, chauffeur; print(*dir(chauffeur)); print('numpy' in sys.modules)"
+    output = subprocess.run([sys.executable, "-c", shown], capture_output=True, text=True, check=True).stdout
+    assert output.splitlines() == [" ".join(sorted(chauffeur.__all__)), "False"]
+
+
+@pytest.mark.parametrize("name", ["", *(name for name in chauffeur.__all__ if name != "__version__")])
+def test_every_name_has_an_example_that_runs(name: str, tmp_path: Path) -> None:
+    known = {"chauffeur": chauffeur, "asyncio": asyncio, "folder": tmp_path}
+    found = getattr(chauffeur, name) if name else chauffeur
+    (test,) = (
+        one
+        for one in doctest.DocTestFinder(recurse=False).find(found, name or "chauffeur", globs=known)
+        if one.examples
+    )
+    outcome = doctest.DocTestRunner(optionflags=doctest.FAIL_FAST).run(test)
+    assert outcome.attempted and not outcome.failed
+
+
+async def _cells(blocks: list[str]) -> list[object]:
+    """Run blocks one after the other as a notebook does, in a running event loop; what each shows at its end."""
+    names: dict[str, object] = {"__name__": "__main__"}
+    shown: list[object] = []
+    for block in blocks:
+        tree = ast.parse(block)
+        last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
+        begun = eval(compile(tree, "notebooks.md", "exec", flags=ast.PyCF_ALLOW_TOP_LEVEL_AWAIT), names)
+        if inspect.iscoroutine(begun):
+            await begun
+        shown.append(None if last is None else eval(compile(ast.Expression(last.value), "notebooks.md", "eval"), names))
+    return shown
+
+
+@pytest.mark.parametrize("title", NOTEBOOK)
+def test_a_notebook_runs(title: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CHAUFFEUR_API_KEY", "of-no-use")
+    blocks = NOTEBOOK[title]
+    if title == "Tables and plots":
+        pytest.importorskip("pandas")
+        pytest.importorskip("matplotlib").use("agg")
+    if title == "Evaluate an endpoint":
+        server = ModelServer()
+        try:
+            *_, rows = asyncio.run(_cells([block.replace("http://localhost:8040/v1", server.url) for block in blocks]))
+            assert server.requests
+        finally:
+            server.close()
+        assert len(rows) and len(repr(rows)) < 200 and rows._repr_markdown_().startswith("#")
+        return
+    assert asyncio.run(_cells(blocks))
 
 
 def test_a_wish_is_driven(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

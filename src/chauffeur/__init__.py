@@ -1,6 +1,9 @@
 """Chauffeur: a passenger says what they want; the car does it, safely, says why, and remembers.
 
 What most programs need stands here: `drive_wish`, `run_benchmark`, and what a planner of one's own is made of.
+
+>>> chauffeur.drive_wish("Change to the left lane.", scenario="cruise").trip.plan.intent
+'lane.left'
 """
 
 from importlib import import_module
@@ -10,29 +13,38 @@ from chauffeur.telemetry import switch_off
 from chauffeur.version import __version__
 
 if TYPE_CHECKING:
-    from chauffeur.api import drive_wish, run_benchmark
-    from chauffeur.concept import Parameters, Plan, PlanRequest, Program, Thoughts
+    from chauffeur.api import drive_wish, drive_wish_async, run_benchmark
+    from chauffeur.concept import ChauffeurError, Parameters, Plan, PlanRequest, Program, Scenario, Thoughts
+    from chauffeur.hmi.notebook import Drive
     from chauffeur.planners.base import Answerer, Planner
+    from chauffeur.planners.registry import make_planner
 
 __all__ = [
     "Answerer",
+    "ChauffeurError",
+    "Drive",
     "Parameters",
     "Plan",
     "PlanRequest",
     "Planner",
     "Program",
+    "Scenario",
     "Thoughts",
     "__version__",
     "drive_wish",
+    "drive_wish_async",
+    "make_planner",
     "run_benchmark",
 ]
 
 switch_off()
 
 _HOMES: Final = {
-    "chauffeur.api": ("drive_wish", "run_benchmark"),
-    "chauffeur.concept": ("Parameters", "Plan", "PlanRequest", "Program", "Thoughts"),
+    "chauffeur.api": ("drive_wish", "drive_wish_async", "run_benchmark"),
+    "chauffeur.concept": ("ChauffeurError", "Parameters", "Plan", "PlanRequest", "Program", "Scenario", "Thoughts"),
+    "chauffeur.hmi.notebook": ("Drive",),
     "chauffeur.planners.base": ("Answerer", "Planner"),
+    "chauffeur.planners.registry": ("make_planner",),
 }
 
 
@@ -42,3 +54,8 @@ def __getattr__(name: str) -> Any:
         if name in names:
             return getattr(import_module(home), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """What completion offers: `__all__`, imported or not yet."""
+    return __all__

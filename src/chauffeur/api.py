@@ -1,11 +1,11 @@
 """Chauffeur from Python: drive a wish, with a planner of one's own, and run a benchmark.
 
 `chauffeur drive` and `chauffeur bench` say more on the way and have more switches; what drives and scores is the same.
+In a notebook, whose cells stand in a running event loop, everything here works as in a script.
 """
 
 from __future__ import annotations
 
-import asyncio
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,12 +13,13 @@ from typing import Any
 from chauffeur.bench.kernel.benchmark import make_benchmark
 from chauffeur.bench.kernel.progress import Standing
 from chauffeur.bench.kernel.run import BenchRun, Effort
-from chauffeur.bench.kernel.store import Row
 from chauffeur.bench.referees import referee_for
 from chauffeur.concept import Limits, PersonId, Scenario
-from chauffeur.drive.recording import RecordedTrip, write_trip
+from chauffeur.drive import event_loop
+from chauffeur.drive.recording import write_trip
 from chauffeur.drive.scenarios import find, planner_for, suiting
 from chauffeur.drive.session import Forgetful, Session, parse_wish
+from chauffeur.hmi.notebook import Drive, Rows
 from chauffeur.memory.choice import open_memory
 from chauffeur.memory.personal_limits import personal_limits
 from chauffeur.planners.base import Answerer, Planner
@@ -34,8 +35,11 @@ def drive_wish(
     person: str = "",
     seed: int | None = None,
     save: Path | str | None = None,
-) -> RecordedTrip:
+) -> Drive:
     """Drive one wish in simulation: plan it, check it, drive it, score it.
+
+    >>> chauffeur.drive_wish("Change to the left lane.", scenario="cruise").trip.outcome
+    'success'
 
     Args:
         wish: What the person wants, in their own words.
@@ -47,12 +51,43 @@ def drive_wish(
         save: File for the recording (MCAP), which `chauffeur replay` plays.
 
     Returns:
-        The trip (`.trip.outcome`, `.trip.plan`, `.trip.metrics`) and every control period (`.frames`).
+        The trip (`.trip.outcome`, `.trip.plan`, `.trip.metrics`), every control period (`.frames`, as a table
+        `.frame()`), and what a notebook shows of it.
 
     Raises:
         ChauffeurError: No plan could be had, or the scenario cannot be set up; the simulated car has not moved. A wish
             that is declined raises nothing: it is an outcome.
     """
+    return event_loop.run(_drive(wish, scenario, planner, person, seed, save))
+
+
+async def drive_wish_async(
+    wish: str,
+    *,
+    scenario: str | Scenario = "",
+    planner: str | Planner = "",
+    person: str = "",
+    seed: int | None = None,
+    save: Path | str | None = None,
+) -> Drive:
+    """Drive one wish as `drive_wish` does, while the caller's event loop goes on.
+
+    The drive has a thread and an event loop of its own, in which a planner is asked.
+
+    >>> asyncio.run(chauffeur.drive_wish_async("Change to the left lane.", scenario="cruise")).trip.outcome
+    'success'
+    """
+    return await event_loop.run_aside(_drive(wish, scenario, planner, person, seed, save))
+
+
+async def _drive(
+    wish: str,
+    scenario: str | Scenario,
+    planner: str | Planner,
+    person: str,
+    seed: int | None,
+    save: Path | str | None,
+) -> Drive:
     instruction = parse_wish(wish, PersonId(person.strip()))
     place = scenario if isinstance(scenario, Scenario) else find(scenario) if scenario else suiting(instruction.text)
     spec = planner_for(planner, place) if isinstance(planner, str) else planner.id
@@ -62,7 +97,7 @@ def drive_wish(
         referee=referee_for,
     )
     limits = personal_limits(instruction.person, Limits())
-    recorded = asyncio.run(session.drive(instruction, place, place.seed if seed is None else seed, limits))
+    recorded = await session.drive(instruction, place, place.seed if seed is None else seed, limits)
     if save is not None:
         write_trip(
             Path(save),
@@ -72,7 +107,7 @@ def drive_wish(
             system=recorded.system,
             final=recorded.final,
         )
-    return recorded
+    return Drive.of(recorded)
 
 
 def run_benchmark(
@@ -82,10 +117,14 @@ def run_benchmark(
     out: Path | str,
     workers: int = 0,
     **options: Any,
-) -> list[Row]:
+) -> Rows:
     """Run an installed benchmark, or go on with a run begun in the same folder.
 
-    Worker processes import the calling script: keep the call under `if __name__ == "__main__":`.
+    Worker processes import the calling script: keep the call under `if __name__ == "__main__":`; a notebook needs none.
+
+    >>> rows = chauffeur.run_benchmark("faithfulness", out=folder, items=1)
+    >>> len(rows) == len((folder / "results.jsonl").read_text().splitlines())
+    True
 
     Args:
         name: As `chauffeur bench` knows it.
@@ -95,7 +134,7 @@ def run_benchmark(
         options: The benchmark's own, as `--option` of its command takes them.
 
     Returns:
-        One row an item, as `results.jsonl` has them.
+        One row an item, as `results.jsonl` has them, and as a table (`.frame()`).
 
     Raises:
         ConfigError: There is no such benchmark, planner or option, or the folder holds another run.
@@ -105,7 +144,7 @@ def run_benchmark(
     make = {"plans": make_planner, "words": make_answerer}.get(benchmark.asks)
     asked = make(planner) if make is not None and isinstance(planner, str) else planner
     run = BenchRun(Path(out), benchmark, None if make is None or isinstance(asked, str) else asked)
-    return run.run(_unwatched, replace(Effort(), workers=workers))
+    return Rows(run.run(_unwatched, replace(Effort(), workers=workers)), run.folder)
 
 
 def _unwatched(standing: Standing) -> None:

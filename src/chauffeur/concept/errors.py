@@ -11,6 +11,12 @@ class ChauffeurError(Exception):
     Attributes:
         hint: What the reader can do now, one sentence; empty when the message says it all.
         retryable: Whether the same call may succeed later without a change.
+
+    >>> try:
+    ...     chauffeur.drive_wish("Overtake.", scenario="moon")
+    ... except chauffeur.ChauffeurError as error:
+    ...     print(error.message)
+    Unknown scenario 'moon'.
     """
 
     def __init__(self, message: str, *, hint: str = "", retryable: bool = False) -> None:

@@ -208,7 +208,11 @@ class SystemMessage:
 
 @dataclass(frozen=True, slots=True)
 class Thoughts:
-    """R: the model's reasoning, shown to the person."""
+    """R: the model's reasoning, shown to the person.
+
+    >>> chauffeur.Thoughts("The lane to the left is free.").text
+    'The lane to the left is free.'
+    """
 
     text: str
 
@@ -221,6 +225,10 @@ class Program:
         source: Program text exactly as the planner gave it.
         library: Helper functions that it calls with `yield from`, e.g. of a policy repository; checked and driven
             together with it.
+
+    >>> program = chauffeur.Program("def drive():\\n    set_target_speed(22)\\n    yield autopilot()\\n")
+    >>> program.kind, program.text.count("\\n")
+    ('program', 3)
     """
 
     source: str
@@ -255,6 +263,9 @@ class Parameters:
         lane: Lane wish relative to the present one: -1 left, 0 stay, +1 right.
         route: Where to go where ways part: `left`, `straight`, `right`; in a parking lot `nearest`, `stadium`, `exit`
             or the name of a spot. Empty for the way as it goes.
+
+    >>> chauffeur.Parameters(target_speed_mps=22.0, look_ahead_m=8.0, look_ahead_ratio=0.6, lane=-1).kind
+    'parameters'
     """
 
     target_speed_mps: float
@@ -399,6 +410,15 @@ class PlanRequest:
 
     `observation` is the instant that C describes, as values, for planners that look for what words point at; None where
     there is none, or the planner is to see by pictures alone.
+
+    >>> class Deaf:
+    ...     id, model = "deaf", "deaf-v1"
+    ...
+    ...     async def plan(self, request: chauffeur.PlanRequest) -> chauffeur.Plan:
+    ...         words = f"I do not know what {request.instruction.text!r} means."
+    ...         return chauffeur.Plan(chauffeur.Thoughts(words), None, refusal=words, planner=self.id, model=self.model)
+    >>> chauffeur.drive_wish("Go.", planner=Deaf(), scenario="cruise").trip.plan.refusal
+    "I do not know what 'Go.' means."
     """
 
     instruction: Instruction
@@ -455,6 +475,10 @@ class Plan:
         alarm: Where the words were understood as an alarm; empty where they were not.
         unused: Parts of the wish, as said, that the policy does not use; None where the planner does not tell.
         acts: What the policy does, in order, as the planner claims; empty where it does not tell.
+
+    >>> words = "A car cannot fly."
+    >>> chauffeur.Plan(chauffeur.Thoughts(words), None, refusal=words, planner="mine").policy is None
+    True
     """
 
     thoughts: Thoughts
@@ -672,3 +696,16 @@ class Trip:
     unused: tuple[str, ...] = ()
     parts_done: tuple[int, int] | None = None
     judged_by: JudgedBy | Literal[""] = ""
+
+    @property
+    def summary(self) -> str:
+        """Wish, planner, scenario and seconds in one short line."""
+        wish, planner, scenario = (
+            text if len(text) <= most else f"{text[: most - 1]}…"
+            for text, most in ((repr(self.instruction.text), 80), (self.plan.planner, 30), (self.scenario, 30))
+        )
+        return f"{wish} by {planner} in {scenario}, {self.duration_s:.1f} s"
+
+    def __repr__(self) -> str:
+        """One line: a trip holds the whole conversation."""
+        return f"<Trip {self.outcome}: {self.summary}>"

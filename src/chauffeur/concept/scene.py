@@ -22,6 +22,11 @@ class Scenario:
         goal: Benchmark's success condition (LaMPilot's `eval` mapping), empty for free driving.
         wish: A wish this scenario shows well.
         title: One line for people.
+
+    >>> config = {"type": "dt-highway-v0", "num_lanes": 3, "vehicles_count": 8}
+    >>> quiet = chauffeur.Scenario("quiet", "highway", config, seed=3)
+    >>> chauffeur.drive_wish("Keep going.", scenario=quiet).trip.scenario
+    'quiet'
     """
 
     id: str

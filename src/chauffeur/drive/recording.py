@@ -106,7 +106,7 @@ class RecordedTrip:
     trip: Trip
     frames: tuple[Frame, ...] = field(repr=False)  # asyncio writes out what a task gave when it restores Ctrl-C
     scenario: Scenario
-    system: SystemMessage | None = None
+    system: SystemMessage | None = field(default=None, repr=False)
     final: Observation | None = field(default=None, repr=False)
     view: CameraImage | None = field(default=None, repr=False)
     cut_off: bool = False

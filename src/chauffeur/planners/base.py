@@ -19,7 +19,11 @@ OnText = Callable[[str, int], None]
 
 @runtime_checkable
 class Planner(Protocol):
-    """Turns (I, C, S, H, feedback rounds) into (R, P)."""
+    """Turns (I, C, S, H, feedback rounds) into (R, P).
+
+    >>> isinstance(chauffeur.make_planner("onboard"), chauffeur.Planner)
+    True
+    """
 
     @property
     def id(self) -> str:
@@ -121,7 +125,12 @@ class Writer(Protocol):
 
 @runtime_checkable
 class Answerer(Writer, Protocol):
-    """A model that answers questions in words; it need not be a planner."""
+    """A model that answers questions in words; it need not be a planner.
+
+    >>> model = chauffeur.make_planner("openai/m", base_url="http://localhost:8040/v1")
+    >>> isinstance(model, chauffeur.Answerer)
+    True
+    """
 
     @property
     def id(self) -> str:

@@ -31,6 +31,9 @@ def planner_names() -> tuple[str, ...]:
 def make_planner(spec: str, **options: object) -> Planner:
     """The planner a specification names.
 
+    >>> chauffeur.make_planner("openai/gpt-4o", base_url="http://localhost:8040/v1").id
+    'openai/gpt-4o'
+
     Args:
         spec: `name` or `name/argument`.
         **options: Settings of that planner, e.g. `base_url` for `openai`.

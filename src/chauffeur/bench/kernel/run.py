@@ -30,6 +30,7 @@ from chauffeur.bench.kernel.shards import WHOLE, Shard
 from chauffeur.bench.kernel.stages import Manifest, StageStore, take_over_shards
 from chauffeur.bench.kernel.store import Row, Scribe, sole_writer
 from chauffeur.concept import ChauffeurError, ConfigError
+from chauffeur.drive import event_loop
 from chauffeur.drive.files import publish
 from chauffeur.planners.base import Answerer, Planner
 from chauffeur.version import __version__
@@ -161,7 +162,7 @@ class BenchRun:
                 if self.manifest.shard == WHOLE and not self.stages.settled:
                     take_over_shards(self.stages, self.folder)
                 if not self.stages.settled:
-                    asyncio.run(self._work(watch, effort or Effort()))
+                    event_loop.run(self._work(watch, effort or Effort()))
             except BaseExceptionGroup as group:
                 raise first_error(group) from group
             finally:

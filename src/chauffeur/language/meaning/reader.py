@@ -23,8 +23,8 @@ _SENTENCE: Final = re.compile(r"[^.!?;\n]*[.!?;\n]*")
 _LONG_CHARS: Final = 240
 """A longer text is read sentence by sentence: the parser was trained on texts up to 300 characters."""
 SURE_BIAS, SURE_SLOPE = 1.58, 1.22
-"""Logistic map from the string's log-probability to the share of right readings, fitted on 600 labelled commands that no
-training saw; on each set of them left out of the fit, mean probability and share agree within 0.03
+"""Logistic map from the string's log-probability to the share of right readings, fitted on 600 labelled commands that
+no training saw; on each set of them left out of the fit, mean probability and share agree within 0.03
 (`benchmarks/meaning.py`)."""
 _WORD: Final = re.compile(r"\w[\w'’]*")
 _COURTESY_WORDS: Final = (
