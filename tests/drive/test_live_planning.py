@@ -15,7 +15,15 @@ from chauffeur.describe import describe_with_traffic
 from chauffeur.drive.events import FINAL, DriveEvent
 from chauffeur.drive.live import planner as module
 from chauffeur.drive.live.mirror import Mirror
-from chauffeur.drive.live.plan_messages import PlanMessage, Request, encode, read_brief, read_event, read_order
+from chauffeur.drive.live.plan_messages import (
+    TAKES_BACK,
+    PlanMessage,
+    Request,
+    encode,
+    read_brief,
+    read_event,
+    read_order,
+)
 from chauffeur.drive.live.planner import Planning, PlanningRings
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.live.settings import SIZES, RingName
@@ -30,7 +38,7 @@ PLAN = Plan(Thoughts("I hold it."), Program("def drive():\n    yield autopilot()
 class Written:
     """A planner that does what its wish names."""
 
-    name = "written"
+    id, model = "written", "none"
 
     async def plan(self, request: PlanRequest) -> Plan:
         match request.instruction.text.split()[0]:
@@ -218,3 +226,63 @@ def test_the_onboard_planner_plans_for_what_control_shows(tmp_path: Path) -> Non
     assert asyncio.run(rig.answered()) == [("planning", "w1"), ("planned", "w1")]
     assert isinstance(rig.ordered().plan.policy, Program)
     assert rig.ordered().scene.tick == 10
+
+
+class Repeats(Written):
+    """A planner that keeps what it is asked."""
+
+    def __init__(self) -> None:
+        self.asked: list[PlanRequest] = []
+
+    async def plan(self, request: PlanRequest) -> Plan:
+        self.asked.append(request)
+        return await super().plan(request)
+
+
+def _said(rig: Rig, *texts: str) -> list[PlanRequest]:
+    """What a planner is asked where a person says these in turn, the last while a wish is driven."""
+    planner = Repeats()
+    rig.planning._planner = planner  # pyright: ignore[reportPrivateUsage, reportAttributeAccessIssue]
+    for k, text in enumerate(texts, 1):
+        rig.requests.write(encode(Request(f"w{k}", text, runs=k > 1)))
+        asyncio.run(rig.answered())
+    return planner.asked
+
+
+@pytest.mark.parametrize(
+    ("texts", "whole"),
+    [
+        (("slow down", "a bit more"), "Slow down a bit."),
+        (("drive at 50 km/h", "make it 40"), "Drive at 40 km/h."),
+        (("change to the left lane", "back as it was"), "Change back to the original lane."),
+    ],
+)
+def test_planners_are_asked_in_whole_sentences(rig: Rig, texts: tuple[str, ...], whole: str) -> None:
+    _, last = _said(rig, *texts)
+    assert (last.instruction.text, last.instruction.said) == (whole, texts[-1])
+    assert last.utterance is not None
+    assert last.utterance.text == texts[-1]
+
+
+def test_words_that_mean_nothing_alone_are_asked_about(rig: Rig) -> None:
+    assert _said(rig, "a bit more") == []
+    assert rig.kinds()[-1] == ("declined", "w1")
+
+
+def test_what_is_driven_is_taken_back_by_an_order(rig: Rig) -> None:
+    assert len(_said(rig, "slow down", "never mind")) == 1
+    assert (rig.ordered().wish, rig.ordered().plan.policy, rig.ordered().plan.intent) == ("w2", None, TAKES_BACK)
+
+
+def test_a_wish_on_its_way_is_taken_back_without_an_order(rig: Rig) -> None:
+    async def drive() -> None:
+        rig.ask("wait")
+        await rig.planning.look()
+        await asyncio.sleep(0.02)
+        rig.requests.write(encode(Request("w2", "never mind", runs=True)))
+        await rig.planning.look()
+        await rig.planning.finish()
+
+    asyncio.run(drive())
+    assert rig.kinds()[1:] == [("superseded", "w1"), ("planning", "w2"), ("answered", "w2")]
+    assert rig.orders.latest() is None

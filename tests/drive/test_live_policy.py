@@ -12,7 +12,7 @@ from live_rig import Rig
 
 from chauffeur.concept import Plan, Thoughts
 from chauffeur.drive.live.messages import LiveSetpoints
-from chauffeur.drive.live.plan_messages import PlannedScene
+from chauffeur.drive.live.plan_messages import TAKES_BACK, PlannedScene
 from chauffeur.drive.live.policy import MOST_RESUMPTIONS
 from chauffeur.drive.live.starts import Start
 from chauffeur.drive.scenarios import find
@@ -281,3 +281,16 @@ def test_a_program_that_fails_of_being_put_down_has_failed_and_the_policy_goes_o
     rig.order(HOLD_20, "w2")
     wish = rig.period()
     assert (wish.plan, wish.state, wish.setpoints.target_speed_mps) == ("w2", "running", 20.0)
+
+
+@pytest.mark.parametrize("periods", [3, 60])
+def test_what_is_taken_back_ends_and_the_car_drives_on_as_before(rig: Rig, periods: int) -> None:
+    before = rig.period(2).setpoints
+    rig.order(HOLD_20)
+    assert rig.period(periods).setpoints.target_speed_mps == 20.0
+    rig.order(HOLD_20, "w2", plan=Plan(Thoughts("As you wish."), None, intent=TAKES_BACK))
+    wish = rig.period()
+    assert (wish.plan, wish.state, wish.setpoints.target_speed_mps) == ("", "none", before.target_speed_mps)
+    kinds = rig.kinds()
+    assert kinds[-1] == ("answered", "w2")
+    assert (("superseded", "w1") in kinds) == (periods == 3)

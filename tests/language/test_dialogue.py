@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from chauffeur.concept.utterance import Act, Utterance, acts_from_json, acts_to_json
 from chauffeur.language.meaning.dialogue import resolved
+from chauffeur.language.meaning.reader import read
 from chauffeur.language.meaning.turns import answer_in, closed_turn, takes_back
 from chauffeur.language.meaning.words import wish_words
 
@@ -54,6 +55,12 @@ def test_nothing_elliptical_is_left_for_those_that_plan(now: list[Act], before: 
     found = resolved(Utterance("", tuple(now)), None if before is None else Utterance("", tuple(before)))
     assert not {"pick", "undo"} & {act.act for act in found.acts}
     assert bool(found.acts) == bool(now)
+
+
+def test_a_number_after_nothing_is_the_parser_s() -> None:
+    assert [act.act for act in read("fifty").acts] != ["pick"]
+    last = read("keep two car lengths of distance")
+    assert [(act.act, act.value, act.unit) for act in read("three", last).acts] == [("gap", 3.0, "lengths")]
 
 
 CLOSED = """

@@ -209,6 +209,8 @@ class TalkScreen:
             self._policy(now)
         if now.verdicts and now.verdicts != before.verdicts:
             self._line(now.wish, "checks", "", _verdicts(now.verdicts))
+        if now.waits and not before.waits:
+            self._line(now.wish, "waits", "yellow", Text("Pending. “Never mind” takes it back."))
         if now.stage == "driven" and before.stage != "driven":
             self._line(now.wish, "drives", "green", plain(now.why))
         for text in now.said[len(before.said) :]:

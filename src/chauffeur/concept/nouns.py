@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, NewType
 
 from chauffeur.concept.images import CameraImage
-from chauffeur.concept.utterance import Act
+from chauffeur.concept.utterance import Act, Utterance
 
 if TYPE_CHECKING:
     from chauffeur.concept.scene import Observation
@@ -30,12 +30,14 @@ class Instruction:
         person: Whose words they are; `NOBODY` when unknown.
         source: How they came in.
         confirmed: The question of the car that the person has answered with yes; empty for none.
+        said: The words as they came, where `text` is a whole sentence for them ("the other one"); empty elsewhere.
     """
 
     text: str
     person: PersonId = NOBODY
     source: Literal["text", "speech", "benchmark"] = "text"
     confirmed: str = ""
+    said: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -409,7 +411,8 @@ class PlanRequest:
     """Everything a planner is given: I, C, S, H, V (pictures), the limits it is told of, and earlier rounds.
 
     `observation` is the instant that C describes, as values, for planners that look for what words point at; None where
-    there is none, or the planner is to see by pictures alone.
+    there is none, or the planner is to see by pictures alone. `utterance` is what the words mean, resolved against
+    the turn before; None where nobody has read them.
 
     >>> class Deaf:
     ...     id, model = "deaf", "deaf-v1"
@@ -429,6 +432,7 @@ class PlanRequest:
     limits: Limits = field(default_factory=Limits)
     images: tuple[CameraImage, ...] = ()
     observation: Observation | None = field(default=None, repr=False, compare=False)
+    utterance: Utterance | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,12 +39,12 @@ Letter = Literal["wish", "context", "history", "system", "view", "plan", "verdic
 
 WishEventKind = Literal[
     "planning", "planned", "declined", "unplanned", "superseded", "started", "refused", "stale", "finished", "failed",
-    "interrupted", "resumed", "said", "garbage", "answered", "halt",
+    "interrupted", "resumed", "said", "garbage", "answered", "halt", "waits",
 ]  # fmt: skip
 """What becomes of a wish in real time, in about this order. `declined`: the planner says no, in words; `unplanned`: it
 could not; `refused`: a check says no; `stale`: the plan came too late; `interrupted`: the process that ran it is gone,
 or the person has taken over; `answered`: it was a question, and what was driven is driven on; `halt`: the planner
-understood a call to stop, and the car is brought to a stand."""
+understood a call to stop, and the car is brought to a stand; `waits`: the wish is pending, until its time or event."""
 
 VehicleEventKind = Literal["link", "asking", "asked", "applied", "late", "answer", "feedback"]
 """Of a real vehicle. `link`: the way to it changed; `asking`: it is about to be asked, `asked`: messages are handed to

@@ -3,10 +3,11 @@
 What really differs between drives is handed in as `PlanSteps`; the order, and what no drive may leave out, stands here:
 
     I C H S   gathered, and screened: words are data, whoever wrote them
-    I         of a command in German, Spanish, French or Chinese that is read: the English sentence of its act
+    I         of a command in German, Spanish, French or Chinese that is read: the English sentence of its act; of words
+              that mean something only beside the last turn ("the other one"): the whole sentence of what they mean
     R P       the car's own answer to emergency words; nothing for a wish that is unsafe whoever plans; an answer from C
-              to a question; else the planner's, of which an alarm goes back to the car's own answer. A planner that
-              hangs or breaks ends in an error with words
+              to a question; to "never mind", what the drive does about it; else the planner's, of which an alarm goes
+              back to the car's own answer. A planner that hangs or breaks ends in an error with words
     ?         a question of the car is asked only where a yes to it could be driven
     V         the checks, and what the person forbade in words
 
@@ -49,6 +50,7 @@ from chauffeur.drive.events import DriveEvent, Listener, nobody_listens
 from chauffeur.drive.judge import account
 from chauffeur.language.emergency import read_emergency
 from chauffeur.language.languages.reader import OtherWish, read_other
+from chauffeur.language.meaning.reader import Turn, turn_of
 from chauffeur.language.questions import is_question
 from chauffeur.planners.base import NO_WISH, Planner
 from chauffeur.planners.base import declined as declined_by
@@ -77,6 +79,9 @@ async def plan_or_answer(planner: Planner, request: PlanRequest) -> Plan:
     return plan
 
 
+UNRESOLVED: Final = "I do not know what that refers to. Please say it in a whole sentence."
+"""To words that mean something only beside others, where there are none."""
+NOTHING_TO_TAKE_BACK: Final = "Nothing waits or is driven that I could take back. I go on as we are."
 RECALLED: Final = 3
 """Remembered trips that H holds at most."""
 PLAN_WITHIN_S: Final = 60.0
@@ -98,6 +103,10 @@ def no_pictures(observation: Observation) -> tuple[CameraImage, ...]:
 
 
 def _unseen() -> None:
+    return None
+
+
+def _nothing() -> Plan | None:
     return None
 
 
@@ -123,7 +132,10 @@ class PlanSteps:
         fit: What the vehicle takes of a plan, whose maker knows no vehicle.
         tell: Hears each letter as it comes.
         within_s: Time of the clock after which the planner is given up on.
-        runs: Whether an earlier wish is driven, or on its way: a question does not end it without a yes.
+        runs: Whether an earlier wish is driven, or on its way: what was said beside it (a question, feedback, words to
+            others) does not end it without a yes.
+        turn: Reads words after those before them.
+        take_back: The car's plan for "never mind"; None where there is nothing to take back.
     """
 
     planner: Planner
@@ -140,6 +152,8 @@ class PlanSteps:
     tell: Listener = nobody_listens
     within_s: float = math.inf
     runs: bool = False
+    turn: Callable[[str], Turn] = turn_of
+    take_back: Callable[[], Plan | None] = _nothing
 
 
 @dataclass(frozen=True)
@@ -183,12 +197,17 @@ async def plan_once(instruction: Instruction, steps: PlanSteps) -> Planned:
         ChauffeurError: No plan could be had.
     """
     other = read_other(instruction.text)
-    request = await request_once(instruction, steps)
-    if other is not None and other.english and read_emergency(instruction.text) is None:
+    raw = instruction.text
+    turn = None if read_emergency(raw) is not None else steps.turn((other and other.english) or raw)
+    if turn is not None and turn.whole:
+        instruction = replace(instruction, text=turn.whole, said=raw)
+    request = replace(await request_once(instruction, steps), utterance=turn and turn.utterance)
+    if other is not None and other.english and not instruction.said and read_emergency(raw) is None:
         instruction = replace(instruction, text=other.english)
         request = replace(request, instruction=instruction)
-    wish = check_wish(instruction.text)
-    own, plan = await _answered(request, wish, steps, other)
+    wish = check_wish(raw)
+    wish = wish if wish.stops else check_wish(instruction.text)
+    own, plan = await _answered(request, wish, steps, other, turn)
     if other is not None and other.english and not own:
         plan = replace(plan, thoughts=Thoughts(f"{other.words} {plan.thoughts.text}"))
     steps.tell(DriveEvent("plan", text=plan.thoughts.text, value=plan))
@@ -207,7 +226,7 @@ async def request_once(instruction: Instruction, steps: PlanSteps) -> PlanReques
     context = await steps.describe()
     history = await steps.recall(instruction, context)
     system = steps.system()
-    steps.tell(DriveEvent("wish", text=instruction.text, value=instruction))
+    steps.tell(DriveEvent("wish", text=instruction.said or instruction.text, value=instruction))
     steps.tell(DriveEvent("context", text=context.text, value=context))
     steps.tell(DriveEvent("history", text=f"{len(history.items)} remembered", value=history))
     steps.tell(DriveEvent("system", value=system))
@@ -255,7 +274,7 @@ async def _planned(request: PlanRequest, steps: PlanSteps) -> Plan:
 
 
 async def _answered(
-    request: PlanRequest, wish: Verdict, steps: PlanSteps, other: OtherWish | None
+    request: PlanRequest, wish: Verdict, steps: PlanSteps, other: OtherWish | None, turn: Turn | None
 ) -> tuple[bool, Plan]:
     """(whether it is the car's own answer, R and P): an unsafe wish reaches no planner, nor does one in another
     language that could not be read, and a planner that understands an alarm is not left to answer it."""
@@ -267,8 +286,15 @@ async def _answered(
         return False, declined_by(steps.planner, wish.reason, time.perf_counter(), intent="refuse")
     if other is not None and not other.english:
         return False, declined_by(steps.planner, other.words, time.perf_counter(), intent=ASKS)
+    if turn is not None and turn.lost:
+        return False, declined_by(steps.planner, UNRESOLVED, time.perf_counter(), intent=ASKS)
+    if turn is not None and turn.cancels:
+        back = steps.take_back()
+        if back is not None:
+            return True, steps.fit(back)
+        return False, declined_by(steps.planner, NOTHING_TO_TAKE_BACK, time.perf_counter(), intent=ANSWERED)
     plan = steps.fit(await _planned(request, steps))
-    plan = await _worth_asking(_meant(plan, request.instruction) if steps.runs else plan, request, steps)
+    plan = await _worth_asking(_meant(plan, request) if steps.runs else plan, request, steps)
     alarm = alarm_of(plan, text)
     if not alarm and is_bare_stop(plan, text):
         verdicts, _ = await (steps.check if steps.check_yes is None else steps.check_yes)(plan, False)
@@ -277,16 +303,22 @@ async def _answered(
     return (False, plan) if answer is None else (True, steps.fit(raised(alarm, answer, text)))
 
 
-def _meant(plan: Plan, instruction: Instruction) -> Plan:
-    """The plan; of words that have the form of a question, the question whether it is to be driven."""
-    if plan.policy is None or instruction.confirmed or not is_question(instruction.text):
+def _meant(plan: Plan, request: PlanRequest) -> Plan:
+    """The plan; of a question, feedback, or words to others, the question whether it is to be driven."""
+    instruction, said = request.instruction, request.utterance
+    beside = "question" if is_question(instruction.text) else said.address if said is not None and not said.acts else ""
+    if plan.policy is None or instruction.confirmed or beside not in _BESIDE:
         return plan
     does = _FIRST_SENTENCE.match(plan.thoughts.text)
     as_read = "" if does is None or instruction.text in does[0] else f" As I read it: {does[0]}"
-    words = f"I take that for a question, and go on as we are. Shall I act on it?{as_read}"
+    words = f"I take that for {_BESIDE[beside]}, and go on as we are. Shall I act on it?{as_read}"
     return replace(plan, policy=None, thoughts=Thoughts(words), refusal=words, offer=instruction.text, intent="ask")
 
 
+_BESIDE: Final = {
+    "question": "a question", "feedback": "feedback", "story": "a story", "other": "words to others",
+}  # fmt: skip
+"""Words that are said beside the driving, by their address."""
 _FIRST_SENTENCE: Final = re.compile(r"[^.:!?]{0,200}(?:[:] [^.!?]{0,200})?[.!?]?")
 
 

@@ -15,6 +15,8 @@ from chauffeur.language.questions import said_aside
 
 TOOK_OVER: Final = "You took over."
 """What is told of a wish that ended because the person took the wheel."""
+TAKES_BACK: Final = "cancel"
+"""Intent of an order without a policy: what is driven ends, and the car drives on as before it."""
 MOST_SAID: Final = 2000
 """Characters of an event's text: in JSON at most 6 bytes each, so that any event fits into its ring."""
 

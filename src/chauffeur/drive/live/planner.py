@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept import (
+    ANSWERED,
     CameraImage,
     ChauffeurError,
     Context,
@@ -22,6 +23,7 @@ from chauffeur.concept import (
     Observation,
     PersonId,
     Plan,
+    Thoughts,
 )
 from chauffeur.describe.answers import with_way
 from chauffeur.describe.services.sources import Sources, SourceSettings
@@ -31,6 +33,7 @@ from chauffeur.drive.live.messages import MessageError
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.plan_messages import (
     MOST_SAID,
+    TAKES_BACK,
     PlanMessage,
     PlannedScene,
     PlanningInputs,
@@ -41,6 +44,7 @@ from chauffeur.drive.live.plan_messages import (
 from chauffeur.drive.live.ring import Reader, Ring
 from chauffeur.drive.loop import LoopMemory
 from chauffeur.drive.planning import PLAN_WITHIN_S, RECALLED, START_WITHIN_S, Judged, PlanSteps, plan_once
+from chauffeur.drive.questions import NOT_MEANT, TAKEN_BACK, Conversing
 from chauffeur.drive.seat import SeatCamera
 from chauffeur.drive.session import parse_wish
 from chauffeur.drive.surroundings import describing, opened, weathered
@@ -89,6 +93,9 @@ class Planning:
         self._setting: Setting = setting
         self._speed, self._clock_ns = speed, clock_ns
         self._asked = Reader(rings.requests)
+        self._talk = Conversing()
+        self._ended_for = ""
+        """Wish for which the work on an older one ended."""
         self._at_work: dict[bool, tuple[asyncio.Task[None], Request]] = {}
         """The wish (False), and what was said aside (True), that were taken up last."""
 
@@ -114,7 +121,8 @@ class Planning:
             *passed_over, newest = [None, *(one for one in requests if one.aside == aside)]
             if newest is None:
                 continue
-            await self._give_up(aside, _NEWER[aside])
+            ended = await self._give_up(aside, _NEWER[aside]) or bool(passed_over[1:])
+            self._ended_for = newest.wish if ended else ""
             for request in filter(None, passed_over):
                 self._tell("superseded", request.wish, _NEWER[aside])
             self._at_work[aside] = asyncio.create_task(self._answer(newest)), newest
@@ -123,13 +131,14 @@ class Planning:
         """Wait for the work at hand."""
         await asyncio.gather(*(task for task, _ in self._at_work.values()))
 
-    async def _give_up(self, aside: bool, why: str) -> None:
+    async def _give_up(self, aside: bool, why: str) -> bool:
         task, request = self._at_work.pop(aside, (None, None))
         if task is None or request is None or task.done():
-            return
+            return False
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
         self._tell("superseded", request.wish, why)
+        return True
 
     async def _answer(self, request: Request) -> None:
         self._tell("planning", request.wish, "")
@@ -144,9 +153,9 @@ class Planning:
         if order.plan.alarm == "stop":
             self._tell("halt", request.wish, STOPPING)  # to stand in a lane is control's
             return
-        if order.plan.refusal or order.plan.policy is None:
+        if order.plan.refusal or (order.plan.policy is None and order.plan.intent != TAKES_BACK):
             words = order.plan.refusal or "The planner gave no program."
-            answered = request.aside and not order.plan.offer
+            answered = (request.aside or order.plan.intent == ANSWERED) and not order.plan.offer
             self._tell("answered" if answered else "declined", request.wish, words, offer=order.plan.offer)
             return
         try:
@@ -155,6 +164,8 @@ class Planning:
             self._tell("unplanned", request.wish, str(error), again=False)
             return
         self._tell("planned", request.wish, order.plan.thoughts.text)
+        if order.plan.policy is not None and (pending := self._talk.dialogue.pending):
+            self._tell("waits", request.wish, pending)
 
     async def _plan(self, request: Request) -> PlanMessage:
         issued_ns = self._clock_ns()  # before the look: what is seen may already be old when it has been taken in
@@ -196,6 +207,8 @@ class Planning:
             observe=lambda: observation,
             within_s=PLAN_WITHIN_S,
             runs=request.runs,
+            turn=self._talk.turn,
+            take_back=lambda: self._taken_back(request),
         )
         planned = await plan_once(instruction, steps)
         context, history, plan = planned.request.context, planned.request.history, planned.plan
@@ -220,6 +233,13 @@ class Planning:
             start_by_ns=issued_ns + round(START_WITHIN_S / self._speed * 1e9),
             expires_ns=issued_ns + round(FOLLOW_FOR_S / self._speed * 1e9),
         )
+
+    def _taken_back(self, request: Request) -> Plan | None:
+        """The order that ends what is driven; none where work on a wish has just ended for it, or nothing is driven."""
+        self._talk.cancel()
+        if self._ended_for == request.wish:
+            return Plan(Thoughts(NOT_MEANT), None, NOT_MEANT, intent=ANSWERED, planner="live")
+        return Plan(Thoughts(TAKEN_BACK), None, intent=TAKES_BACK, planner="live") if request.runs else None
 
     def _see(self, observation: Observation) -> tuple[CameraImage, ...]:
         """The view from the seat, rendered here: control never waits for a picture."""

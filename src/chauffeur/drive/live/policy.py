@@ -55,6 +55,7 @@ from chauffeur.drive.live.messages import (
 from chauffeur.drive.live.mirror import Mirror
 from chauffeur.drive.live.plan_messages import (
     MOST_SAID,
+    TAKES_BACK,
     TOOK_OVER,
     PlanMessage,
     PlannedScene,
@@ -122,6 +123,8 @@ class _Driven:
     wish: str
     expires_ns: int
     by: ProgramExecutor | _Along
+    before: Setpoints | None = None
+    """What was wished before it, to which "never mind" goes back."""
     state: ProgramState = "running"
     resumed: int = 0
     grown: bool = False
@@ -255,6 +258,9 @@ class Policy:
         if self._handovers % 2:
             self._tell("interrupted", order.wish, "You have the wheel.")
             return
+        if order.plan.intent == TAKES_BACK:
+            self._take_back(order)
+            return
         observation = self._mirror.world.observe()
         late = self._too_late(order, PlannedScene.of(self._trip, observation))
         if late:
@@ -283,8 +289,20 @@ class Policy:
         if self._driven is not None and self._driven.state == "running":
             self._tell("superseded", self._driven.wish, "A new wish took over.")
         self._drop()
-        self._driven = _Driven(order.wish, order.expires_ns, by)
+        self._driven = _Driven(order.wish, order.expires_ns, by, before=self._setpoints)
         self._tell("started", order.wish, plan.thoughts.text)
+
+    def _take_back(self, order: PlanMessage) -> None:
+        """End what is driven: the speed and distance before it are wished again, in the lane the car is in."""
+        driven = self._driven
+        if driven is not None:
+            if driven.state == "running":
+                self._tell("superseded", driven.wish, "You took it back.")
+            self._drop()
+            now = self._setpoints or Setpoints()
+            lane = self._mirror.world.perception().lane_of(EGO)
+            self._setpoints = replace(driven.before or now, target_lane=lane, served_stops=now.served_stops)
+        self._tell("answered", order.wish, order.plan.thoughts.text)
 
     def _as_seen_now(self, order: PlanMessage, observation: Observation) -> Plan:
         """The plan, with waypoints that count from where the car is now. Raises ScenarioError: they are behind it."""

@@ -65,10 +65,10 @@ from chauffeur.drive.planning import (
     PlanSteps,
     plan_once,
 )
-from chauffeur.drive.questions import NOT_MEANT, NOTHING_ASKED, OpenQuestion
+from chauffeur.drive.questions import NOT_MEANT, NOTHING_ASKED, TAKEN_BACK, Conversing
 from chauffeur.drive.session import MAX_WISH_CHARACTERS
 from chauffeur.drive.session_recorder import FLUSH_TIMEOUT_S
-from chauffeur.language.meaning.turns import takes_back
+from chauffeur.language.meaning.turns import cancels, takes_back
 from chauffeur.language.questions import said_aside
 from chauffeur.memory.base import Memory
 from chauffeur.memory.feedback import interpret_feedback
@@ -118,6 +118,8 @@ class _Made:
     words: str = ""
 
 
+_CANCEL: Final = "cancel"
+"""Intent of the plan that takes the newest wish back."""
 _SUPERSEDED: Final = _Made(status="superseded", words="A newer wish came.")
 
 
@@ -173,8 +175,10 @@ class VehicleSession:
         self._turn = asyncio.Lock()
         self._count = self._newest = 0
         self._making: asyncio.Task[_Made] | None = None
-        self._question = OpenQuestion()
+        self._talk = Conversing()
         self._asked: Parameters | None = None
+        self._before: Parameters | None = None
+        """What was in force before the newest wish, to which "never mind" goes back; None once it has."""
         self._handed: tuple[int, Published] | None = None
         self._unconfirmed: tuple[int, Published] | None = None
         self._last_trip = ""
@@ -229,7 +233,7 @@ class VehicleSession:
         begun = time.perf_counter()
         self._count += 1
         number = self._count
-        aside = said_aside(text) and not self._question.open
+        aside = said_aside(text) and not self._talk.open
         if not aside:
             self._newest = number
         if self._over:
@@ -286,10 +290,10 @@ class VehicleSession:
         self, number: int, text: str, source: Literal["text", "speech"]
     ) -> tuple[OnRoadAnswer, PlanRequest | None]:
         """The answer, and what was planned for, if anything was."""
-        if takes_back(text) and not self._question.open:
+        if takes_back(text) and not self._talk.open and (self._before is None or not cancels(text)):
             return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "answered", NOTHING_ASKED), None
         try:
-            meant = self._question.settle(text, self._person)
+            meant = self._talk.settle(text, self._person)
         except InstructionError as error:
             return OnRoadAnswer(number, text[:MAX_WISH_CHARACTERS], "declined", str(error)), None
         if meant is None:
@@ -367,6 +371,8 @@ class VehicleSession:
             tell=tell,
             within_s=PLAN_WITHIN_S,
             runs=self._asked is not None,
+            turn=self._talk.turn,
+            take_back=self._taken_back,
         )
         try:
             planned = await plan_once(instruction, steps)
@@ -382,7 +388,7 @@ class VehicleSession:
         self._say("plan", plan.thoughts.text, number, plan)
         self._say("verdicts", " ".join(one.reason for one in verdicts), number, verdicts)
         made = _Made(request, plan, verdicts)
-        self._question.ask(plan.refusal, plan.offer)
+        self._talk.ask(plan.refusal, plan.offer)
         if plan.policy is None and not verdicts[0].stops:
             words = plan.refusal or "The planner gave no parameters."
             status = "answered" if said_aside(request.instruction.text) and not plan.offer else "declined"
@@ -400,6 +406,14 @@ class VehicleSession:
             return self._stop_plan()
         words = answered_at_once(text)
         return Plan(Thoughts(words), None, words, intent="ask", planner="onroad") if words else None
+
+    def _taken_back(self) -> Plan | None:
+        """What was in force before the newest wish, as a plan."""
+        if (before := self._before) is None:
+            return None
+        self._talk.cancel()
+        settings = (("target_speed_mps", before.target_speed_mps),)
+        return Plan(Thoughts(TAKEN_BACK), before, intent=_CANCEL, settings=settings, planner="onroad")
 
     def _stop_plan(self) -> Plan:
         """A stop needs no model: the word is enough."""
@@ -442,6 +456,7 @@ class VehicleSession:
         except VehicleError as error:
             answer = replace(answer, status="refused", words=str(error))
         else:
+            self._before = None if answer.plan.intent == _CANCEL else before
             answer = await self._confirm(number, replace(answer, published=published), parameters, before)
         self._say("applied", answer.words, number, SetpointResult(answer, self._vehicle.state()))
         return answer

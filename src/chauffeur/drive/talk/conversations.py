@@ -126,6 +126,8 @@ class Conversations:
                 shown = replace(shown, stage="driven", why="")
             case "resumed":
                 shown = replace(shown, stage="driven", why=event.text)
+            case "waits":
+                shown = replace(shown, waits=event.text)
             case "said":
                 shown = replace(shown, said=_most((*shown.said, event.text)))
             case "refused":
@@ -137,7 +139,7 @@ class Conversations:
             unused = () if each.plan is None else unused_of(shown.text, each.plan)
             left_out = f"I did not use: {', '.join(f'“{part}”' for part in unused)}." if unused else ""
             why = " ".join(text for text in (event.text, left_out) if text)
-            shown = replace(shown, stage="closed", outcome=event.kind, result=str(result), why=why)
+            shown = replace(shown, stage="closed", waits="", outcome=event.kind, result=str(result), why=why)
         each.shown = replace(shown, stages=stages)
         if event.kind == "refused":
             self._hand_in(each)

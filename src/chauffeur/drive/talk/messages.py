@@ -251,6 +251,7 @@ class Conversation:
         opinion: What the person said of it afterwards.
         remembered: Where it stands in the memory, in words; empty where it is not remembered (yet).
         stages: Latency.
+        waits: The words that are pending, until their time or event; empty where nothing is.
         ends: Whether the plan may end by itself, as a turn or a way to a place; not one that holds a speed.
     """
 
@@ -271,6 +272,7 @@ class Conversation:
     remembered: str = ""
     stages: StageTimes = StageTimes()
     follows: str = ""
+    waits: str = ""
     ends: bool = False
     kind: Literal["conversation"] = "conversation"
 

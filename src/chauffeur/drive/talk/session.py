@@ -56,7 +56,7 @@ from chauffeur.drive.talk.view import View
 from chauffeur.drive.talk.voice import Voice
 from chauffeur.drive.talk.wish_queue import OVER, WishQueue, Words
 from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency
-from chauffeur.language.meaning.turns import answer_in, takes_back
+from chauffeur.language.meaning.turns import answer_in, cancels, takes_back
 from chauffeur.language.questions import ends_session
 from chauffeur.memory.feedback import interpret_feedback
 from chauffeur.safety.bounds import shoulder_at_right
@@ -316,7 +316,7 @@ class Talk:
             self._say(Note(LEAVING))
             self._stop()
             return
-        if takes_back(words.text) and not self._on_its_way:
+        if takes_back(words.text) and not self._may_be_taken_back(cancels(words.text)):
             self._asking.pass_over(words.text, "answered", NOTHING_ASKED)
             self._say(Note(NOTHING_ASKED))
             return
@@ -329,12 +329,10 @@ class Talk:
             return
         self._asking.put(words)
 
-    @property
-    def _on_its_way(self) -> bool:
-        """Whether a wish has no plan yet, which a newer one takes back."""
-        return self.busy or (
-            self._runtime is not None and any(one.stage == "asked" for one in self._runtime.open_wishes)
-        )
+    def _may_be_taken_back(self, cancelled: bool) -> bool:
+        """Whether a wish has no plan yet, which a newer one takes back; one that is `cancelled` may have one."""
+        wishes = () if self._runtime is None else self._runtime.open_wishes
+        return self.busy or any(cancelled or one.stage == "asked" for one in wishes)
 
     def _act_on(self, hotword: str, words: Words) -> None:
         """What was heard and is meant."""

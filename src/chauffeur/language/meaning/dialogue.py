@@ -15,12 +15,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
+from chauffeur.concept.dialogue import ANSWERS, DIALOGUE, wishes
 from chauffeur.concept.utterance import Act, ActPlace, Direction, LaneAim, Reference, Side, Utterance, Verb
 
-ANSWERS: Final[frozenset[Verb]] = frozenset({"yes", "no", "cancel"})
-"""Verbs that settle what is open, and ask for nothing to be driven."""
-DIALOGUE: Final[frozenset[Verb]] = frozenset({"yes", "no", "cancel", "again", "undo", "pick", "unclear"})
-
+_ELLIPTICAL: Final[frozenset[Verb]] = frozenset({"again", "undo", "pick"})
+_SURE: Final = 0.5
+"""A sentence that is less surely a turn of dialogue is left as it was said."""
 _OTHER_SIDE: Final[Mapping[Side, Side]] = {"left": "right", "right": "left"}
 _OTHER_AIM: Final[Mapping[LaneAim, LaneAim]] = {"leftmost": "rightmost", "rightmost": "leftmost"}
 _OPPOSITE: Final[Mapping[Direction, Direction]] = {
@@ -43,9 +43,9 @@ _ENDS_WITH_CANCEL: Final[frozenset[Verb]] = frozenset({"follow", "pass", "avoid"
 _UNCLEAR: Final = Act("unclear")
 
 
-def wishes(acts: Iterable[Act]) -> tuple[Act, ...]:
-    """Acts without the turns of dialogue among them: what can be driven."""
-    return tuple(act for act in acts if act.act not in DIALOGUE and act.act != "none")
+def is_elliptical(turn: Utterance) -> bool:
+    """Whether words mean something only beside the turn before: no planner can make anything of them alone."""
+    return turn.sure >= _SURE and not turn.emergency and any(act.act in _ELLIPTICAL for act in turn.acts)
 
 
 def resolved(now: Utterance, last: Utterance | None) -> Utterance:
@@ -216,7 +216,8 @@ def _referred(pick: Act, before: tuple[Act, ...]) -> tuple[Act, ...]:
     other = alone and (pick.negated or not named.deictic)  # "that one" is the one that was meant
     for k in _newest_first(before):
         act = before[k]
-        if (reference := _reference(act)) is not None:
+        turned = other and act.side is not None and act.target is None
+        if (reference := _reference(act)) is not None and not turned:
             if not alone:
                 reference = _renamed(reference, named)
             elif other:

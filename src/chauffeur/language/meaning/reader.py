@@ -6,15 +6,16 @@ import math
 import re
 import unicodedata
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 from chauffeur.concept.utterance import Act, ActPlace, Reference, Span, Utterance
 from chauffeur.language.emergency import read_emergency
-from chauffeur.language.meaning.dialogue import resolved
+from chauffeur.language.meaning.dialogue import is_elliptical, resolved
 from chauffeur.language.meaning.parser import Parsed, Parser, shipped_parser, spans_of
 from chauffeur.language.meaning.symbols import WrittenAct
 from chauffeur.language.meaning.turns import closed_turn
+from chauffeur.language.meaning.words import wish_words
 from chauffeur.language.quantities import amount_said, read_quantities
 
 MOST_CHARS: Final = 1_000
@@ -37,6 +38,37 @@ _COURTESY: Final = frozenset(_COURTESY_WORDS.split())
 """Words whose being unused tells a person nothing."""
 
 
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """What words mean in a conversation.
+
+    Attributes:
+        utterance: Resolved.
+        whole: A whole sentence for it, where the words are none by themselves; empty where they are.
+        lost: Whether the words surely mean something only beside others, and there are none.
+    """
+
+    utterance: Utterance
+    whole: str = ""
+    lost: bool = False
+
+    @property
+    def cancels(self) -> bool:
+        """Whether the words take something back, and ask for nothing instead."""
+        verbs = {act.act for act in self.utterance.acts}
+        return bool(verbs) and verbs <= {"no", "cancel"}
+
+
+def turn_of(text: str, last: Utterance | None = None) -> Turn:
+    """What words mean after the turn before, and the sentence that says so. Never raises for any text."""
+    alone, found = _read_after(text, last)
+    if not is_elliptical(alone):
+        return Turn(found)
+    whole = wish_words(found.acts)
+    lost = alone.sure == 1.0 and not whole and not any(act.act in ("again", "cancel") for act in found.acts)
+    return Turn(found, whole, lost)
+
+
 def read(text: str, last: Utterance | None = None, parser: Parser | None = None) -> Utterance:
     """What a passenger's words mean. Never raises for any text.
 
@@ -45,9 +77,23 @@ def read(text: str, last: Utterance | None = None, parser: Parser | None = None)
         last: What was said before, for words that mean something only beside it ("the other one"); None for nothing.
         parser: Reads; default the shipped one.
     """
-    emergency = read_emergency(text) is not None
+    return _read_after(text, last, parser)[1]
+
+
+def _read_after(text: str, last: Utterance | None, parser: Parser | None = None) -> tuple[Utterance, Utterance]:
+    """What words mean by themselves, and after the turn before."""
     if turns := closed_turn(text):
-        return resolved(Utterance(text, turns, emergency=emergency), last)
+        alone = Utterance(text, turns, emergency=read_emergency(text) is not None)
+        found = resolved(alone, last)
+        if not any(act.value is not None for act in turns) or all(act.act != "unclear" for act in found.acts):
+            return alone, found  # else it is a number of nothing that was said before
+    alone = _parsed(text, parser)
+    return alone, resolved(alone, last)
+
+
+def _parsed(text: str, parser: Parser | None = None) -> Utterance:
+    """What the parser makes of words by themselves."""
+    emergency = read_emergency(text) is not None
     reads = shipped_parser() if parser is None else parser
     acts: list[Act] = []
     opinion: list[Act] = []
@@ -63,7 +109,7 @@ def read(text: str, last: Utterance | None = None, parser: Parser | None = None)
         log_probability += parsed.log_probability
         address = parsed.address if parsed.address != "car" and not acts else address
     sure = 1.0 / (1.0 + math.exp(-(SURE_BIAS + SURE_SLOPE * max(log_probability, -20.0))))
-    said = Utterance(
+    return Utterance(
         text,
         tuple(acts),
         tuple(opinion),
@@ -72,7 +118,6 @@ def read(text: str, last: Utterance | None = None, parser: Parser | None = None)
         sure,
         tuple(_unused(text, (act.span for act in acts if act.span is not None))),
     )
-    return resolved(said, last)
 
 
 def _stretches(text: str) -> list[tuple[int, int, int]]:

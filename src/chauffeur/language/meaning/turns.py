@@ -14,7 +14,7 @@ from chauffeur.language.tokens import tokens_of
 
 _Phrase = tuple[tuple[str, ...], Act]
 _SIGNS: Final = frozenset(".,;:!?")
-_COURTESY_WORDS: Final = "please thanks thank you car chauffeur oh ah um er well then just"
+_COURTESY_WORDS: Final = "please thanks thank you car chauffeur oh ah um er hm hmm well then just actually and so"
 _COURTESY: Final = frozenset(_COURTESY_WORDS.split())
 """Said beside a turn, and no part of it."""
 _OTHER: Final = Reference("other")
@@ -128,6 +128,11 @@ def answer_in(text: str) -> bool | None:
 def takes_back(text: str) -> bool:
     """Whether words say no to something and nothing else; "don't!" may be meant for what the car does."""
     return bool(said := closed_turn(text)) and all(act.act in ("no", "cancel") for act in said)
+
+
+def cancels(text: str) -> bool:
+    """Whether words take back what was wished ("never mind"), and say nothing else."""
+    return bool(said := closed_turn(text)) and all(act.act == "cancel" for act in said)
 
 
 def _covered(text: str, phrases: Mapping[tuple[str, ...], Act]) -> tuple[Act, ...]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Final
 
+from chauffeur.concept.dialogue import wishes
 from chauffeur.concept.utterance import Act, Aim, Condition, Degree, Direction, Event, Manner, Reference, Style, Verb
-from chauffeur.language.meaning.dialogue import wishes
 
 _MANY: Final = ("vehicles", "pedestrians")
 

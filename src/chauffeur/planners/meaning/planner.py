@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Final
 
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
+from chauffeur.concept.dialogue import wishes
 from chauffeur.concept.utterance import Act, Reference, Utterance
 from chauffeur.language.ground import ROAD_USERS
 from chauffeur.language.meaning.reader import read
@@ -24,6 +25,7 @@ SURE: Final = 0.5
 """Below this a reading is more likely wrong than right, and is asked about."""
 _NOT_HERE: Final = "I do not park yet. Use another planner here."
 _BLIND: Final = "I am not told who is around, so I cannot look for what you mean."
+_UNCLEAR: Final = "I hear that you want something, and do not know what. Please say it in other words."
 FOR_OTHERS: Final = {
     "remark": "I hear a remark, and nothing for me to do.",
     "story": "I hear a story, and nothing for me to do.",
@@ -67,15 +69,18 @@ class MeaningPlanner:
         wish = Wish.of(self, request.instruction, time.perf_counter())
         if wish.declined is not None:
             return wish.declined
-        return self.plan_of(read(wish.instruction.text), replace(request, instruction=wish.instruction))
+        asked_for = replace(request, instruction=wish.instruction)
+        return self.plan_of(_read(asked_for), asked_for)
 
     def plan_of(self, utterance: Utterance, request: PlanRequest) -> Plan:
         """The plan for words that are read already."""
         begun = time.perf_counter()
         if utterance.emergency:
             return replace(declined(self, "I stop.", begun, intent="stop"), alarm="stop")
-        if not utterance.acts or all(act.act == "none" for act in utterance.acts):
-            words = FOR_OTHERS.get(utterance.address, "I hear nothing in that for me to do, and change nothing.")
+        if not wishes(utterance.acts):
+            unclear = any(act.act in ("unclear", "again") for act in utterance.acts)
+            nothing = _UNCLEAR if unclear else "I hear nothing in that for me to do, and change nothing."
+            words = FOR_OTHERS.get(utterance.address, nothing)
             return declined(self, words, begun, intent=NO_WISH)
         forbidden = [act for act in utterance.acts if act.act == "refuse" and act.why in ("illegal", "dangerous")]
         if (refused := next(iter(forbidden), None)) is not None:
@@ -131,11 +136,19 @@ def plan_by_sight(request: PlanRequest) -> Plan | None:
     """
     if vocabulary_of(request.context.situation.world) != "town" or request.observation is None:
         return None
-    utterance = read(request.instruction.text)
+    utterance = _read(request)
     kinds = {one.kind for act in utterance.acts for one in _references(act)}
     if not kinds & _SEEN or kinds & _BY_NAME or any(act.act == "goto" for act in utterance.acts):
         return None
     return MeaningPlanner().plan_of(utterance, request)
+
+
+def _read(request: PlanRequest) -> Utterance:
+    """What the words mean: as they were read in their conversation, else by themselves."""
+    instruction, found = request.instruction, request.utterance
+    if found is None or found.text not in (instruction.text, instruction.said):
+        return read(instruction.text)
+    return found
 
 
 def _references(act: Act) -> Iterator[Reference]:

@@ -56,6 +56,7 @@ export function makeConversation() {
     const { told: wish, shielded } = entry;
     return [
       wish.why && make('p', { class: 'why', text: wish.why }),
+      wish.waits && make('p', { class: 'why', text: 'Pending. Say “never mind” to take it back.' }),
       ...wish.said.map((line) => make('p', { class: 'car-said' }, make('b', { text: 'The car says ' }), `“${line}”`)),
       wish.thoughts && wish.thoughts !== wish.why && section('It thinks', make('p', { class: 'thoughts', text: wish.thoughts })),
       wish.source && section(wish.policy === 'parameters' ? 'It sets' : 'It drives by', code(wish, entry)),
