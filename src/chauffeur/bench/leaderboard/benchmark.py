@@ -74,9 +74,9 @@ TABLE_V: Final = TableSpec(
     over=_counted,
     published="leaderboard/table5.json",
     brackets=False,
-    lead="Engines differ: the paper's rows were driven in CARLA, ours in the engine named. In ours the world's "
-    "driver keeps the gap, obeys lights and yields, and a program chooses way, lane and speed; in the paper programs did more. "
-    "The rows are no comparison.",
+    lead="Engines differ: the paper's rows were driven in CARLA, ours in the engine named. In ours the world's driver "
+    "keeps the gap, obeys lights and yields, and a program chooses way, lane and speed; in the paper programs did "
+    "more. The rows are no comparison.",
 )
 
 

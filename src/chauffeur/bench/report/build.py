@@ -162,23 +162,25 @@ def _beside(spec: TableSpec, found: Sequence[tuple[Run, ResultTable]]) -> Result
 def _beyond(
     runs: Sequence[Run], common: Sequence[Run], specs: Sequence[TableSpec], kind: Any, choices: Choices, tell: Progress
 ) -> tuple[tuple[ResultTable, ...], tuple[FlipList, ...], tuple[Gallery, ...]]:
-    """What goes beyond tables: pairs, flips and galleries, in the columns of the first table over the rows as such."""
-    spec = next((spec for spec in specs if spec.over is None), None)
-    if spec is None:
+    """Pairs in the columns of the first table over the rows as such; flips and galleries of rows that are not as they
+    should be, as the first table with a rate of a better direction says."""
+    direct = [spec for spec in specs if spec.over is None]
+    if not direct:
         return (), (), ()
+    judged = next((spec for spec in direct if any(one.better and one.unit == "%" for one in spec.measures)), None)
     group = next((spec.group for spec in specs if spec.group), "")
     pairs = pairs_of(common) if len(common) > 1 else []
-    flips = (flip_list(a, b, spec, group) for a, b in pairs)
+    flips = [] if judged is None else [flip_list(a, b, judged, group) for a, b in pairs]
     found: list[Gallery] = []
-    judged = any(measure.better and measure.unit == "%" for measure in spec.measures)
     each = min(PICKED, max(LEAST_PICKED, PICKED_IN_ALL // len(runs))) if choices.gallery is None else choices.gallery
-    for run in runs if judged else ():
+    if judged is not None:
+        for run in runs:
 
-        def told(done: int, total: int, name: str = run.name) -> None:
-            tell(f"showing items of {name}", done, total)
+            def told(done: int, total: int, name: str = run.name) -> None:
+                tell(f"showing items of {name}", done, total)
 
-        found.append(make_gallery(run, runs, spec, group, kind, choices.data, each, told))
-    return tuple(pair_table(a, b, spec) for a, b in pairs), tuple(one for one in flips if one.flips), tuple(found)
+            found.append(make_gallery(run, runs, judged, group, kind, choices.data, each, told))
+    return tuple(pair_table(a, b, direct[0]) for a, b in pairs), tuple(one for one in flips if one.flips), tuple(found)
 
 
 def _facts(run: Run) -> tuple[tuple[str, str], ...]:
