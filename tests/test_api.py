@@ -9,7 +9,9 @@ import inspect
 import re
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -46,7 +48,11 @@ def test_what_is_offered_is_shown_without_being_imported() -> None:
     assert output.splitlines() == [" ".join(sorted(chauffeur.__all__)), "False"]
 
 
-@pytest.mark.parametrize("name", ["", *(name for name in chauffeur.__all__ if name != "__version__")])
+def _slow(names: Iterable[str], *slow: str) -> list[Any]:
+    return [pytest.param(one, marks=pytest.mark.slow) if one in slow else one for one in names]
+
+
+@pytest.mark.parametrize("name", _slow(["", *sorted({*chauffeur.__all__} - {"__version__"})], "run_benchmark"))
 def test_every_name_has_an_example_that_runs(name: str, tmp_path: Path) -> None:
     known = {"chauffeur": chauffeur, "asyncio": asyncio, "folder": tmp_path}
     found = getattr(chauffeur, name) if name else chauffeur
@@ -73,7 +79,7 @@ async def _cells(blocks: list[str]) -> list[object]:
     return shown
 
 
-@pytest.mark.parametrize("title", NOTEBOOK)
+@pytest.mark.parametrize("title", _slow(NOTEBOOK, "Evaluate an endpoint"))
 def test_a_notebook_runs(title: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("CHAUFFEUR_API_KEY", "of-no-use")

@@ -110,7 +110,7 @@ def test_package_files_hand_names_on_and_define_nothing() -> None:
     for path in SOURCE.rglob("__init__.py"):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             defined = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
-            if isinstance(node, ast.FunctionDef) and node.name == "__getattr__":
+            if isinstance(node, ast.FunctionDef) and node.name in ("__getattr__", "__dir__"):
                 continue  # hands names on when they are asked for (PEP 562)
             assert not defined, f"{path}:{node.lineno} defines {getattr(node, 'name', '')}"
 

@@ -79,7 +79,7 @@ class Drive(RecordedTrip):
     def columns(self) -> dict[str, list[Any]]:
         """One value a control period in each column, as any table library takes them; None where there was none.
 
-        `gap_m` is from centre to centre, as on the trip page. Set-points are `target_...`; None keeps what is.
+        `gap_m` is from centre to centre, as on the trip page. Set-points are `target_...`; None of one keeps what is.
         """
         return {name: [value(frame) for frame in self.frames] for name, value in _COLUMNS.items()}
 
