@@ -109,7 +109,7 @@ def test_a_planner_is_plugged_in(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     _run(BLOCKS[1], tmp_path, monkeypatch)
-    assert capsys.readouterr().out.strip() == "ended"
+    assert capsys.readouterr().out.strip() == "success"
 
 
 def test_a_benchmark_is_run_and_gone_on_with(

@@ -162,22 +162,19 @@ OTHER_TEXT = {
     "planners/llm_endpoint.py": "errors of an endpoint",
     "planners/llm_errors.py": "errors of an endpoint",
     "safety/concealment.py": "what is hidden in a text, before anybody reads it",
-    "safety/faithfulness/amounts.py": "thoughts of a planner",
-    "safety/faithfulness/clauses.py": "thoughts of a planner",
+    "safety/faithfulness/claims.py": "thoughts of a planner: their acts are asked of `meaning`, what only thoughts have is not",
     "safety/faithfulness/comparison.py": "thoughts of a planner",
 }
 READS_WORDS = {
     "cli/talk_drive.py": "leave is taken of a session: a closed class of words",
     "cli/vehicle_desk.py": "leave is taken of a session: a closed class of words",
     "describe/answers.py": "what a question is about; acts say only that it is one",
-    "drive/fulfilment.py": "the judge of wishes, until it goes by acts",
     "drive/live/plan_messages.py": "what is said aside, until the session holds an utterance",
     "drive/onroad/checks.py": "to engage the vehicle is no act, and never done",
     "drive/onroad/session.py": "what is said aside, until the session holds an utterance",
     "drive/planning.py": "what is a question, until the request holds an utterance",
     "drive/scenarios.py": "whether a wish is one that a scenario is listed with",
     "drive/talk/session.py": "leave is taken of a session: a closed class of words",
-    "drive/wish_parts.py": "the judge of wishes, until it goes by acts",
     "memory/conflicts.py": "numbers to keep and numbers to change by, until acts are read as well",
     "memory/feedback.py": "opinions, until acts of feedback are read as well",
     "memory/phrases.py": "opinions, until acts of feedback are read as well",
@@ -188,16 +185,10 @@ READS_WORDS = {
     **{
         f"planners/onboard/{name}.py": "the rules of a planner that has a reader of its own"
         for name in (
-            "amounts",
-            "clauses",
-            "cues",
             "doubts",
-            "guard",
-            "quoted_numbers",
             "town",
             "town_intents",
             "town_steps",
-            "weigh",
             "words/files",
         )
     },

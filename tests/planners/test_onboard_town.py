@@ -158,7 +158,6 @@ def test_misleading_instructions_are_refused_and_no_others(
     [
         ("Please don't go left here, carry on straight ahead.", "straight on", ()),
         ("Take a left, no, a right.", "way right", ()),
-        ("Don't pull over now.", "on", ()),
         ("At the third street go right.", "way right", ("range(2)", 'pass_a_way("right")')),
         ("After three more junctions turn left.", "way left", ("range(3)", 'pass_a_way("left")')),
         ("Keep going for 150 meters, then stop.", "on+stop", ("drive_on(150)", "yield stop()")),

@@ -16,7 +16,9 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+from pydantic import TypeAdapter
 
 from chauffeur.concept import (
     ActionMatrix,
@@ -31,10 +33,12 @@ from chauffeur.concept import (
     Trajectory,
     Usage,
 )
+from chauffeur.concept.utterance import Act
 from chauffeur.planners.cache import content_key
 from chauffeur.planners.llm_reply import read_reply
 
 _VERSION = 1
+_ACTS: Final = TypeAdapter(tuple[Act, ...])
 _MAX_BYTES = 1_000_000_000
 
 
@@ -87,6 +91,7 @@ def _plan(line: Mapping[str, Any]) -> Plan:
         thoughts=Thoughts(str(fields.pop("thoughts")["text"])),
         policy=_policy(fields.pop("policy")),
         settings=tuple((str(name), float(value)) for name, value in fields.pop("settings", ())),
+        acts=_ACTS.validate_python(fields.pop("acts", ())),
         usage=Usage(**fields.pop("usage", {})),
         **fields,
     )

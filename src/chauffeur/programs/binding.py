@@ -22,7 +22,7 @@ from chauffeur.programs.catalogue import (
 from chauffeur.programs.errors import BadArgumentTypeError, BadArgumentValueError
 from chauffeur.programs.handles import HandleTable, describe
 from chauffeur.programs.prefetch import CAN_WAIT, FORESEEABLE, HOST, LATER, MAX_PENDING, NOT_FORESEEN
-from chauffeur.programs.questions import Question, Questions
+from chauffeur.programs.questions import AskedQuestion, Questions
 from chauffeur.worlds.base import EGO, Driver, Perception
 
 _MAX_SHOWN_CHARS: Final = 60
@@ -93,7 +93,7 @@ class DrivingApis:
         self._calls: list[MadeCall] = []
         self._tick = 0
         self._questions = Questions()
-        self._foreseen: dict[int, tuple[MadeCall, Question]] = {}
+        self._foreseen: dict[int, tuple[MadeCall, AskedQuestion]] = {}
         self._late: list[MadeCall] = []
         self._decoded: list[Any] = []
         self._methods: dict[str, Callable[..., Any]] = {api: getattr(self, f"_{api}") for api in self.apis}

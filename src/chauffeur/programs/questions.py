@@ -13,7 +13,7 @@ _LONGEST_PERIOD_TICKS: Final = 10
 """What has not been asked for so long does not come back regularly."""
 
 
-class Question:
+class AskedQuestion:
     """A question that was asked.
 
     Attributes:
@@ -53,7 +53,7 @@ class Questions:
     """
 
     def __init__(self) -> None:
-        self._by_slot: dict[int, Question] = {}
+        self._by_slot: dict[int, AskedQuestion] = {}
 
     def asked(self, slot: object, name: str, given: Sequence[Any], values: Sequence[Any], tick: int) -> None:
         """The host was asked a question in a period."""
@@ -63,14 +63,14 @@ class Questions:
         if known is not None and known.name == name and known.given == given:
             known.again(tick)
         else:
-            self._by_slot[slot] = Question(name, given, values, tick)
+            self._by_slot[slot] = AskedQuestion(name, given, values, tick)
 
     def refused(self, slot: object) -> None:
         """The host did not answer a question."""
         if isinstance(slot, int):
             self._by_slot.pop(slot, None)
 
-    def expected(self, tick: int) -> Iterator[tuple[int, Question]]:
+    def expected(self, tick: int) -> Iterator[tuple[int, AskedQuestion]]:
         """What may be asked in a period, by slot. What has no answer any more is to be `refused`."""
         for slot, question in list(self._by_slot.items()):
             if question.expected(tick):

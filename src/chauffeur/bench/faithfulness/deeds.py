@@ -18,7 +18,7 @@ _LEAST_GAP_M: Final = 6.0
 
 
 @dataclass(frozen=True, slots=True)
-class Deed:
+class PlannedDeed:
     """One thing a program does.
 
     Attributes:
@@ -40,10 +40,10 @@ class Deed:
     count: int = 1
 
 
-def deeds_of(planned: PlannedCase) -> tuple[Deed, ...]:
+def deeds_of(planned: PlannedCase) -> tuple[PlannedDeed, ...]:
     """What each step does, the numbers of the first ones carried on to the later ones."""
     speed = planned.start.situation.speed_mps
-    found: list[Deed] = []
+    found: list[PlannedDeed] = []
     for step in planned.steps:
         found.append(_deed(step, planned.start, speed))
         if not step.intent.startswith("overtake"):  # it ends at the speed it began with
@@ -51,50 +51,50 @@ def deeds_of(planned: PlannedCase) -> tuple[Deed, ...]:
     return tuple(found)
 
 
-def tellable(deeds: Sequence[Deed], known: frozenset[str]) -> bool:
+def tellable(deeds: Sequence[PlannedDeed], known: frozenset[str]) -> bool:
     """Whether all deeds are of known kinds, and none is a gap that leaves no room between the cars."""
     return all(deed.what in known and (deed.what != "gap" or (deed.value or 0.0) > _LEAST_GAP_M) for deed in deeds)
 
 
-def _deed(step: Chosen, start: PlanStart, speed: float) -> Deed:
+def _deed(step: Chosen, start: PlanStart, speed: float) -> PlannedDeed:
     kind, _, rest = step.filled.id.partition(".")
     settings = dict(step.settings)
     side = next((word for word in ("left", "right", "straight") if word in rest), "")
     target = settings.get("target_speed_mps")
     match kind:
         case "speed" if rest == "cap":
-            return Deed("cap", value=target)
+            return PlannedDeed("cap", value=target)
         case "speed" if rest == "limit":
-            return Deed("limit", value=target)
+            return PlannedDeed("limit", value=target)
         case "speed":
             off = (target or 0.0) - speed
-            return Deed("speed", sign=0 if abs(off) < 0.5 else 1 if off > 0 else -1, value=target)
+            return PlannedDeed("speed", sign=0 if abs(off) < 0.5 else 1 if off > 0 else -1, value=target)
         case "gap" if "gap_m" in settings:
             now = start.situation.front.distance_m if start.situation.front is not None else 0.0
             off = settings["gap_m"] - now
-            return Deed("gap", sign=0 if abs(off) < 1.0 else 1 if off > 0 else -1, value=settings["gap_m"])
+            return PlannedDeed("gap", sign=0 if abs(off) < 1.0 else 1 if off > 0 else -1, value=settings["gap_m"])
         case "gap":
-            return Deed("headway", value=settings.get("time_headway_s"))
+            return PlannedDeed("headway", value=settings.get("time_headway_s"))
         case "lane" if rest == "keep":
-            return Deed("stay")
+            return PlannedDeed("stay")
         case "lane" if "most" in rest:
-            return Deed("edge", side=side, checked=True)
+            return PlannedDeed("edge", side=side, checked=True)
         case "lane" if "several" in rest:
-            return Deed("lanes", side=side, checked=True, count=abs(step.lanes_moved))
+            return PlannedDeed("lanes", side=side, checked=True, count=abs(step.lanes_moved))
         case "lane":
-            return Deed("lane", side=side, checked=True)
+            return PlannedDeed("lane", side=side, checked=True)
         case "overtake":
-            return Deed("overtake", side=side, returns="return" in rest, checked=True)
+            return PlannedDeed("overtake", side=side, returns="return" in rest, checked=True)
         case "turn" | "crossing":
-            return Deed("turn", side=side, checked=True)
+            return PlannedDeed("turn", side=side, checked=True)
         case "pull_over":
-            return Deed("pull over", side="right", checked=True)
+            return PlannedDeed("pull over", side="right", checked=True)
         case "stop":
-            return Deed("stop")
+            return PlannedDeed("stop")
         case "style":
-            return Deed("style", value=target, sign=_sign((target or speed) - speed))
+            return PlannedDeed("style", value=target, sign=_sign((target or speed) - speed))
         case _:
-            return Deed("keep")
+            return PlannedDeed("keep")
 
 
 def _sign(off: float) -> int:

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from chauffeur.bench.faithfulness.deeds import Deed, deeds_of, tellable
+from chauffeur.bench.faithfulness.deeds import PlannedDeed, deeds_of, tellable
 from chauffeur.bench.faithfulness.plans import PlannedCase, program, refilled
 from chauffeur.bench.faithfulness.prose import TOLD, tell
 from chauffeur.concept.units import MPS_PER_KMH, MPS_PER_MPH
@@ -44,7 +44,7 @@ def spoil(rng: np.random.Generator, planned: PlannedCase, kind: str) -> Pair | N
     return _SPOILERS[kind](rng, planned, deeds)
 
 
-def _wrong_side(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[Deed]) -> Pair | None:
+def _wrong_side(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[PlannedDeed]) -> Pair | None:
     sided = [index for index, deed in enumerate(deeds) if deed.what in _SIDED and deed.side]
     if not sided:
         return None
@@ -61,7 +61,7 @@ def _wrong_side(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[
     return (_told(rng, planned, deeds), spoiled, "P") if spoiled != source else None
 
 
-def _wrong_number(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[Deed]) -> Pair | None:
+def _wrong_number(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[PlannedDeed]) -> Pair | None:
     numbered = [i for i, deed in enumerate(deeds) if deed.value is not None and deed.what in ("speed", "gap", "cap")]
     if not numbered:
         return None
@@ -95,7 +95,7 @@ _TUNABLE: Final = frozenset(
 """Exemplars whose named number is what they drive at."""
 
 
-def _wrong_sign(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[Deed]) -> Pair | None:
+def _wrong_sign(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[PlannedDeed]) -> Pair | None:
     signed = [index for index, deed in enumerate(deeds) if deed.sign and deed.what in ("speed", "gap", "style")]
     if not signed:
         return None
@@ -118,7 +118,7 @@ def _wrong_sign(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[
     return text, planned.program, "R"
 
 
-def _wrong_order(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[Deed]) -> Pair | None:
+def _wrong_order(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[PlannedDeed]) -> Pair | None:
     if len(deeds) != 2 or deeds[0].what == deeds[1].what or not _told_apart(planned, deeds):
         return None
     if rng.random() < 0.5:
@@ -126,13 +126,13 @@ def _wrong_order(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence
     return _told(rng, planned, deeds), program([planned.steps[1], planned.steps[0]]), "P"
 
 
-def _told_apart(planned: PlannedCase, deeds: Sequence[Deed]) -> bool:
+def _told_apart(planned: PlannedCase, deeds: Sequence[PlannedDeed]) -> bool:
     """Whether an overtaking, which has a speed of its own, is not driven at the other step's."""
     own = [step.filled.numbers.get("target_speed_mps", 0.0) for step in planned.steps if "overtake" in step.filled.id]
     return all(abs(deed.value - speed) > 1.5 for deed in deeds if deed.value is not None for speed in own)
 
 
-def _missing_condition(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[Deed]) -> Pair | None:
+def _missing_condition(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[PlannedDeed]) -> Pair | None:
     """The text claims to look whether the way is free; the program is made not to."""
     if not any(deed.checked for deed in deeds):
         return None
@@ -142,7 +142,7 @@ def _missing_condition(rng: np.random.Generator, planned: PlannedCase, deeds: Se
     return (text, spoiled, "P") if spoiled != source and "is_safe_enter" not in spoiled else None
 
 
-def _not_done(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[Deed]) -> Pair | None:
+def _not_done(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[PlannedDeed]) -> Pair | None:
     if len(planned.steps) == 2 and rng.random() < 0.5:
         kept = int(rng.integers(2))
         return _told(rng, planned, deeds), program([planned.steps[kept]]), "P"
@@ -154,7 +154,7 @@ def _not_done(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[De
     return _told(rng, planned, [*deeds, added]), planned.program, "R"
 
 
-def _not_claimed(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[Deed]) -> Pair | None:
+def _not_claimed(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[PlannedDeed]) -> Pair | None:
     if len(deeds) == 2:
         kept = int(rng.integers(2))
         if deeds[kept].what == "overtake" or {deed.what for deed in deeds} == {"overtake", "speed"}:
@@ -168,7 +168,7 @@ def _not_claimed(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence
             return None
         if deeds[0].what == "gap":
             return None
-        told = Deed("keep") if rng.random() < 0.5 else Deed("stay")
+        told = PlannedDeed("keep") if rng.random() < 0.5 else PlannedDeed("stay")
         if deeds[0].what == "speed" and told.what == "stay":
             return None
         return _told(rng, planned, [told]), planned.program, "R"
@@ -182,7 +182,7 @@ def _not_claimed(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence
 
 _UNNAMED: Final = "Please do what we agreed on."
 
-_SPOILERS: Final[dict[str, Callable[[np.random.Generator, PlannedCase, Sequence[Deed]], Pair | None]]] = {
+_SPOILERS: Final[dict[str, Callable[[np.random.Generator, PlannedCase, Sequence[PlannedDeed]], Pair | None]]] = {
     "wrong-side": _wrong_side,
     "wrong-number": _wrong_number,
     "wrong-sign": _wrong_sign,
@@ -193,19 +193,19 @@ _SPOILERS: Final[dict[str, Callable[[np.random.Generator, PlannedCase, Sequence[
 }
 
 
-def _extra(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[Deed]) -> Deed | None:
+def _extra(rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[PlannedDeed]) -> PlannedDeed | None:
     """A deed that the program does not do."""
     if planned.start.where.crossing:
         return None
     what = deeds[0].what
     side = "left" if rng.random() < 0.5 else "right"
     if what in ("speed", "gap", "cap", "limit", "style"):
-        return Deed("lane" if rng.random() < 0.6 else "overtake", side=side)
+        return PlannedDeed("lane" if rng.random() < 0.6 else "overtake", side=side)
     if what in ("lane", "stay"):
-        value = _another(rng, planned, Deed("speed", value=planned.start.situation.speed_mps))
+        value = _another(rng, planned, PlannedDeed("speed", value=planned.start.situation.speed_mps))
         if value is None:
             return None
-        return Deed("speed", sign=1 if value > planned.start.situation.speed_mps else -1, value=value)
+        return PlannedDeed("speed", sign=1 if value > planned.start.situation.speed_mps else -1, value=value)
     return None
 
 
@@ -214,14 +214,14 @@ def _helpers(planned: PlannedCase) -> dict[str, float]:
     return {"headway_lane_s": 0.5, "speed_cap_mps": 35.0, "rest_headway_s": 1.5} | numbers
 
 
-def _now(planned: PlannedCase, deed: Deed) -> float | None:
+def _now(planned: PlannedCase, deed: PlannedDeed) -> float | None:
     situation = planned.start.situation
     if deed.what != "gap":
         return situation.speed_mps
     return None if situation.front is None else situation.front.distance_m
 
 
-def _another(rng: np.random.Generator, planned: PlannedCase, deed: Deed) -> float | None:
+def _another(rng: np.random.Generator, planned: PlannedCase, deed: PlannedDeed) -> float | None:
     """Another number of the same kind and on the same side of what is now, far from all numbers of the situation."""
     assert deed.value is not None
     situation = planned.start.situation
@@ -242,14 +242,14 @@ def _another(rng: np.random.Generator, planned: PlannedCase, deed: Deed) -> floa
     return None
 
 
-def _changed(deeds: Sequence[Deed], index: int, **fields: object) -> list[Deed]:
+def _changed(deeds: Sequence[PlannedDeed], index: int, **fields: object) -> list[PlannedDeed]:
     changed = list(deeds)
     changed[index] = replace(changed[index], **fields)  # type: ignore[arg-type]
     return changed
 
 
 def _told(
-    rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[Deed], figure: tuple[float, str] | None = None
+    rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[PlannedDeed], figure: tuple[float, str] | None = None
 ) -> str:
     if figure is None:
         return tell(rng, deeds, planned.wish, planned.start)

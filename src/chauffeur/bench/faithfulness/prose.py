@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from chauffeur.bench.faithfulness.deeds import Deed
+from chauffeur.bench.faithfulness.deeds import PlannedDeed
 from chauffeur.bench.faithfulness.plans import PlanStart
 from chauffeur.concept.units import M_PER_FOOT, MPS_PER_KMH, MPS_PER_MPH
 
@@ -24,7 +24,7 @@ _WAYS: Final[dict[str, list[str]]] = json.loads(Path(__file__).with_name("prose.
 """Ways to say each part, by its name."""
 
 
-def tell(rng: np.random.Generator, deeds: Sequence[Deed], wish: str, start: PlanStart, checks: float = 0.75) -> str:
+def tell(rng: np.random.Generator, deeds: Sequence[PlannedDeed], wish: str, start: PlanStart, checks: float = 0.75) -> str:
     """Thoughts about deeds in this order; deterministic for a generator in a given state.
 
     Args:
@@ -89,7 +89,7 @@ def _situation(rng: np.random.Generator, start: PlanStart) -> str:
     return " ".join(parts)
 
 
-def _turned_down(rng: np.random.Generator, deeds: Sequence[Deed]) -> str:
+def _turned_down(rng: np.random.Generator, deeds: Sequence[PlannedDeed]) -> str:
     done = {deed.what for deed in deeds}
     ways: list[str] = ["Braking hard would be unpleasant and is not needed."]
     if not done & {"lane", "lanes", "edge", "overtake", "pull over", "turn"}:
@@ -108,7 +108,7 @@ def _turned_down(rng: np.random.Generator, deeds: Sequence[Deed]) -> str:
     return _one(rng, ways)
 
 
-def _plan(rng: np.random.Generator, deeds: Sequence[Deed], checks: float) -> str:
+def _plan(rng: np.random.Generator, deeds: Sequence[PlannedDeed], checks: float) -> str:
     told = [_phrase(rng, deed, checks) for deed in deeds]
     if len(told) == 1:
         vp, check = told[0]
@@ -132,7 +132,7 @@ def _said(rng: np.random.Generator, carrier: str, vp: str, check: str) -> str:
     return carrier.format(vp=vp, c=f" {check}")
 
 
-def _phrase(rng: np.random.Generator, deed: Deed, checks: float) -> tuple[str, str]:
+def _phrase(rng: np.random.Generator, deed: PlannedDeed, checks: float) -> tuple[str, str]:
     """What is done, as an infinitive, and what it waits for."""
     check = ""
     if deed.checked and rng.random() < checks:
@@ -151,7 +151,7 @@ def _phrase(rng: np.random.Generator, deed: Deed, checks: float) -> tuple[str, s
     return told, check
 
 
-def _pool(rng: np.random.Generator, deed: Deed) -> Sequence[str]:
+def _pool(rng: np.random.Generator, deed: PlannedDeed) -> Sequence[str]:
     match deed.what:
         case "speed" | "style":
             vague = deed.value is None or (deed.what == "style" and rng.random() < 0.5)

@@ -15,11 +15,11 @@ from typing import Final, Protocol
 from chauffeur.concept.utterance import Act, Verb
 from chauffeur.drive.judge import manoeuvres, setpoints, standing
 from chauffeur.drive.judge.conditions import unknown
-from chauffeur.drive.judge.trace import ActResult, Drive, DriveTrace, Found, Referents
+from chauffeur.drive.judge.trace import ActResult, TracedDrive, DriveTrace, Found, Referents
 
 
 class _Predicate(Protocol):
-    def __call__(self, drive: Drive, act: Act, start: int, *, last: bool) -> Found: ...
+    def __call__(self, drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found: ...
 
 
 _PREDICATES: Final[Mapping[Verb, _Predicate]] = {
@@ -82,7 +82,7 @@ def judge(
         if missed:
             found.append(JudgedAct(act, "not_done", "it was not come to"))
             continue
-        drive = Drive(trace, referents or {}, _numbers(asked[k:], settings or {}))
+        drive = TracedDrive(trace, referents or {}, _numbers(asked[k:], settings or {}))
         result, end, why, planned = _became(drive, act, start, last=act is asked[-1])
         found.append(JudgedAct(act, result, why, planned))
         missed = result in ("not_done", "opposite") and not act.negated
@@ -98,7 +98,7 @@ def _numbers(acts: Sequence[Act], settings: Mapping[str, float]) -> Mapping[str,
     return {name: value for name, value in settings.items() if (speed if name == "target_speed_mps" else gap)}
 
 
-def _became(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
+def _became(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     does: Callable[..., Found] | None = _PREDICATES.get(act.act)
     if act.act == "speed" and act.style is not None and act.value is None:
         does = setpoints.style
@@ -112,7 +112,7 @@ def _became(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
     return found
 
 
-def _kept_from(drive: Drive, act: Act, start: int) -> Found:
+def _kept_from(drive: TracedDrive, act: Act, start: int) -> Found:
     """Of what is not to be done: that the whole drive does not do it."""
     if act.act == "turn":
         taken = [one for one in drive.passages if one.enters >= start]

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from chauffeur.concept.units import M_PER_CAR_LENGTH, M_PER_FOOT, M_PER_KM, M_PER_YARD, MPS_PER_KMH, MPS_PER_MPH
 from chauffeur.concept.utterance import Act, Condition, Event
 from chauffeur.drive.judge.references import ROAD_USERS, WAYSIDE, meant
-from chauffeur.drive.judge.trace import ON_PATH_M, PERIOD_S, ActResult, Drive, Passage
+from chauffeur.drive.judge.trace import ON_PATH_M, PERIOD_S, ActResult, TracedDrive, Passage
 
 _METRES: Final = {"km": M_PER_KM, "ft": M_PER_FOOT, "yd": M_PER_YARD, "lengths": M_PER_CAR_LENGTH}
 _MPS: Final = {"mph": MPS_PER_MPH, "m/s": 1.0}
@@ -23,7 +23,7 @@ _STOPPED_MPS: Final = 0.5
 class _At(NamedTuple):
     """A condition of an act that begins at an instant, looked for from another one on."""
 
-    drive: Drive
+    drive: TracedDrive
     when: Condition
     begins: int
     start: int
@@ -48,7 +48,7 @@ def unknown(when: Condition | None) -> bool:
     return place or when.event not in _EVENTS or when.type == "unless"
 
 
-def too_early(drive: Drive, act: Act, begins: int, start: int, passage: Passage | None = None) -> str:
+def too_early(drive: TracedDrive, act: Act, begins: int, start: int, passage: Passage | None = None) -> str:
     """What was too early, or too late, about an act that begins at an instant; empty where nothing was."""
     when = act.when
     if when is None or unknown(when) or when.type in ("while", "until"):
@@ -60,7 +60,7 @@ def too_early(drive: Drive, act: Act, begins: int, start: int, passage: Passage 
     return why
 
 
-def begin(drive: Drive, act: Act, start: int) -> tuple[int, tuple[ActResult, int, str] | None]:
+def begin(drive: TracedDrive, act: Act, start: int) -> tuple[int, tuple[ActResult, int, str] | None]:
     """The instant from which an act that lasts can be looked for, and what becomes of it where that does not come."""
     if act.when is None or act.when.type in ("while", "until", "before"):
         return start, None
@@ -73,7 +73,7 @@ def begin(drive: Drive, act: Act, start: int) -> tuple[int, tuple[ActResult, int
     return start, ("not_done", start, why)
 
 
-def came(drive: Drive, when: Condition, i: int, start: int) -> bool:
+def came(drive: TracedDrive, when: Condition, i: int, start: int) -> bool:
     """Whether an event has come."""
     return when.event in _EVENTS and not _EVENTS[when.event](_At(drive, when, i, start))
 
@@ -149,17 +149,17 @@ def _some(at: _At, fits: Callable[[int, int], bool], had: str) -> str:
     return "" if any(fits(i, number) for i in looked for number in users) else f"it had not {had}"
 
 
-def _speed(drive: Drive, i: int, number: int) -> float:
+def _speed(drive: TracedDrive, i: int, number: int) -> float:
     agent = drive.all[i].agents.get(number)
     return math.inf if agent is None else agent.speed_mps
 
 
-def _away(drive: Drive, i: int, number: int) -> float:
+def _away(drive: TracedDrive, i: int, number: int) -> float:
     seen = drive.sees(i, number)
     return math.nan if seen is None else math.hypot(*seen)
 
 
-def _still_there(drive: Drive, number: int, begins: int, start: int) -> str:
+def _still_there(drive: TracedDrive, number: int, begins: int, start: int) -> str:
     """Why a road user had not gone when an act began: it came onto the car's way afterwards, or was coming."""
     agent = drive.all[begins].agents.get(number)
     if agent is None:

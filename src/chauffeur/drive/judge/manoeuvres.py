@@ -11,7 +11,7 @@ from chauffeur.drive.judge.conditions import begin, too_early
 from chauffeur.drive.judge.references import ROAD_USERS, WAYSIDE, ahead, meant
 from chauffeur.drive.judge.setpoints import GAP_M, GAP_SHARE, planned_gap
 from chauffeur.drive.judge.standing import ON_M, go
-from chauffeur.drive.judge.trace import ON_PATH_M, STANDS_MPS, Drive, Found, path_of
+from chauffeur.drive.judge.trace import ON_PATH_M, STANDS_MPS, TracedDrive, Found, path_of
 from chauffeur.geometry import Pose
 
 FOLLOWED_S, FOLLOWED_ON_S = 12.0, 40.0
@@ -25,7 +25,7 @@ _U_TURN_RAD: Final = math.radians(150.0)
 # Ways -----------------------------------------------------------------------------------------------------------------
 
 
-def turn(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
+def turn(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     """That the car takes a way at a junction; of "straight" after a turn: that it drives along the street there."""
     side = "straight" if act.act == "straight" else act.side
     if act.act == "straight" and not ((last or act.when or act.place) and not drive.turned(start)):
@@ -56,14 +56,14 @@ def turn(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
     return Found("not_done", start, "the car crossed no junction" if side == "straight" else "the car did not turn")
 
 
-def _along(drive: Drive, act: Act, start: int) -> Found:
+def _along(drive: TracedDrive, act: Act, start: int) -> Found:
     found = go(drive, act, start, way_m=_ALONG_M if drive.turned(start) else ON_M)
     if drive.turned(start, found.end):
         return Found("not_done", found.end, "the car turned off")
     return found
 
 
-def u_turn(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
+def u_turn(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     """That the car drives the way it came."""
     del last
     began = drive.all[start].ego.heading_rad
@@ -77,7 +77,7 @@ def u_turn(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
 # Lanes ----------------------------------------------------------------------------------------------------------------
 
 
-def lane(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
+def lane(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     """That the car is in the lane that was asked for, and stays in it."""
     began, least = drive.places[start], 1
     sign = {"left": -1, "right": 1}.get(act.side or "", 0)
@@ -113,7 +113,7 @@ def lane(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
     return Found("not_done" if late else "done", done, late)
 
 
-def _is_at(drive: Drive, i: int, to: str) -> bool:
+def _is_at(drive: TracedDrive, i: int, to: str) -> bool:
     here = drive.road.get(drive.all[i].ego.lane)
     if here is None:
         return False
@@ -123,7 +123,7 @@ def _is_at(drive: Drive, i: int, to: str) -> bool:
     return here.index == (min(lanes) if to == "leftmost" else max(lanes))
 
 
-def keep(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
+def keep(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     """That the car drives on and keeps to its lane."""
     start, waits = begin(drive, act, start)
     if waits:
@@ -142,7 +142,7 @@ def keep(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
 # Others ---------------------------------------------------------------------------------------------------------------
 
 
-def overtake(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
+def overtake(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     """That who was meant is behind the car, passed on the side that was said, and the car is settled in its lane."""
     users = meant(drive, act.target, start)
     if not users:
@@ -174,7 +174,7 @@ def overtake(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
     return Found("not_done" if late else "done", done, late)
 
 
-def _passed_on(drive: Drive, number: int, i: int) -> str:
+def _passed_on(drive: TracedDrive, number: int, i: int) -> str:
     """The side on which a road user that is behind now was passed; empty where the car never came by."""
     for j in range(i, -1, -1):
         seen = drive.sees(j, number)
@@ -183,7 +183,7 @@ def _passed_on(drive: Drive, number: int, i: int) -> str:
     return ""
 
 
-def follow(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
+def follow(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     """That the car drives behind who was meant, where they drive."""
     users = ahead(drive, start) if act.target is None else meant(drive, act.target, start)
     if not users:
@@ -196,7 +196,7 @@ def follow(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
     return Found("not_done", start, "it was not followed for long enough, or not where it went")
 
 
-def _behind(drive: Drive, act: Act, start: int, users: tuple[int, ...], *, last: bool) -> Found:
+def _behind(drive: TracedDrive, act: Act, start: int, users: tuple[int, ...], *, last: bool) -> Found:
     """Of a road that leads nowhere else: that the car keeps behind them, no nearer than the plan says."""
     del act
 
@@ -210,7 +210,7 @@ def _behind(drive: Drive, act: Act, start: int, users: tuple[int, ...], *, last:
     return Found("not_done", start, "it was not followed") if done is None else Found("done", done)
 
 
-def _followed(drive: Drive, number: int, start: int) -> tuple[float, int]:
+def _followed(drive: TracedDrive, number: int, start: int) -> tuple[float, int]:
     """(time, instant of its end) for which the car drove on the path of a road user, some way behind it; 0 where it
     was too short."""
     path: list[tuple[float, float]] = []
@@ -240,7 +240,7 @@ def _followed(drive: Drive, number: int, start: int) -> tuple[float, int]:
     return longest, at
 
 
-def give_way(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
+def give_way(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     """That who was meant goes first."""
     if drive.road.uninterrupted:
         return _let_in(drive, start, last=last)
@@ -267,7 +267,7 @@ def give_way(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
     return Found("done", end)
 
 
-def _let_in(drive: Drive, start: int, *, last: bool) -> Found:
+def _let_in(drive: TracedDrive, start: int, *, last: bool) -> Found:
     """Of a road without crossings: that somebody came in ahead, or that the gap which the plan opens is there."""
     began = drive.all[start].front
 
@@ -283,7 +283,7 @@ def _let_in(drive: Drive, start: int, *, last: bool) -> Found:
     return Found("not_done", start, "nobody was let in") if done is None else Found("done", done)
 
 
-def _meet(drive: Drive, number: int) -> tuple[int | None, int | None]:
+def _meet(drive: TracedDrive, number: int) -> tuple[int | None, int | None]:
     """(when a road user was at the place where its path meets the car's, when the car was); None where they do not, or
     the car has not come there."""
     ours = [(i, one.ego.x_m, one.ego.y_m) for i, one in enumerate(drive.all)][::3]
@@ -300,7 +300,7 @@ def _meet(drive: Drive, number: int) -> tuple[int | None, int | None]:
     return crossed, None
 
 
-def _slowed_for(drive: Drive, number: int, start: int) -> int | None:
+def _slowed_for(drive: TracedDrive, number: int, start: int) -> int | None:
     for i in range(start + 1, len(drive.all)):
         seen = drive.sees(i, number) if drive.all[i].ego.speed_mps < STANDS_MPS else None
         if seen is not None and 0.0 < seen[0] < 25.0 and abs(seen[1]) < 15.0:

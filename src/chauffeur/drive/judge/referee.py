@@ -15,7 +15,7 @@ from chauffeur.concept import JudgedBy, Metric, Outcome, ProgramState, Setpoints
 from chauffeur.concept.utterance import Act, Verb
 from chauffeur.drive.judge.acts import JudgedAct, judge, wanted
 from chauffeur.drive.judge.setpoints import gap_asked, planned_gap, speed_asked
-from chauffeur.drive.judge.trace import PERIOD_S, Drive, DriveTrace, Referents
+from chauffeur.drive.judge.trace import PERIOD_S, TracedDrive, DriveTrace, Referents
 from chauffeur.worlds.base import World
 
 SETTLES_S: Final = 12.0
@@ -159,7 +159,7 @@ class ActsReferee:
         )
 
     def _numbers(self) -> tuple[Metric, ...]:
-        drive, end = Drive(self._trace, {}, self._settings), self._trace.instants[-1]
+        drive, end = TracedDrive(self._trace, {}, self._settings), self._trace.instants[-1]
         found: list[Metric] = []
         for act in self._acts:
             if act.act == "speed":

@@ -9,7 +9,7 @@ from chauffeur.concept import Observation, VehicleState
 from chauffeur.concept.scene import AgentKind
 from chauffeur.concept.sight import seen_from, states_of
 from chauffeur.concept.utterance import Reference, ReferenceKind
-from chauffeur.drive.judge.trace import Drive
+from chauffeur.drive.judge.trace import TracedDrive
 
 _SIGHT_M: Final = 80.0
 _VAN_M: Final = 5.2
@@ -31,7 +31,7 @@ _PLURALS: Final = ("vehicles", "pedestrians", "traffic")
 _ALIKE: Final = {"silver": "grey", "grey": "silver"}
 
 
-def meant(drive: Drive, reference: Reference | None, start: int) -> tuple[int, ...]:
+def meant(drive: TracedDrive, reference: Reference | None, start: int) -> tuple[int, ...]:
     """Ids of the road users that an act may be about: in sight when it was said, or from a turn on.
 
     On a road without junctions, where nobody says more of them than that they drive there, whoever is ahead is meant.
@@ -61,7 +61,7 @@ def meant(drive: Drive, reference: Reference | None, start: int) -> tuple[int, .
     return tuple(number for number, one in later.items() if reference.colour in (None, one.colour))
 
 
-def ahead(drive: Drive, start: int) -> tuple[int, ...]:
+def ahead(drive: TracedDrive, start: int) -> tuple[int, ...]:
     """Who was ahead in the car's lane when it was said, and who is from an instant on; nobody where nobody comes."""
     later = next((one.front for one in drive.all[start:] if one.front is not None), None)
     return tuple(dict.fromkeys(one.vehicle for one in (drive.first.front, later) if one is not None))

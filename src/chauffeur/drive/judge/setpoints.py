@@ -9,7 +9,7 @@ from chauffeur.concept.units import M_PER_CAR_LENGTH
 from chauffeur.concept.utterance import Act
 from chauffeur.drive.judge.conditions import begin, metres, mps
 from chauffeur.drive.judge.references import meant
-from chauffeur.drive.judge.trace import PERIOD_S, STANDS_MPS, Drive, Found
+from chauffeur.drive.judge.trace import PERIOD_S, STANDS_MPS, TracedDrive, Found
 
 SPEED_MPS: Final = 0.8
 """A speed this near the one asked for is that speed (3 km/h): a vehicle far ahead already takes half of it."""
@@ -28,7 +28,7 @@ _SLOWER, _SLOWLY, _USUAL_SHARE, _ROLLS_MPS = 0.85, 0.7, 0.6, 3.0
 _SIGNS: Final = {"faster": 1, "more": 1, "slower": -1, "less": -1}
 
 
-def speed_asked(drive: Drive, act: Act, start: int) -> float | None:
+def speed_asked(drive: TracedDrive, act: Act, start: int) -> float | None:
     """The speed that words name, m/s; None where they name none."""
     began, limit = drive.all[start].ego.speed_mps, drive.limit_mps(start)
     if act.aim in ("limit", "maximum"):
@@ -53,7 +53,7 @@ def speed_asked(drive: Drive, act: Act, start: int) -> float | None:
             return value
 
 
-def speed(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
+def speed(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     """That the car drives at the speed that was named, or at another one than before, and keeps to it."""
     start, waits = begin(drive, act, start)
     if waits:
@@ -94,12 +94,12 @@ def speed(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
     return Found("not_done", start, why, planned)
 
 
-def _abreast(drive: Drive, i: int, number: int) -> bool:
+def _abreast(drive: TracedDrive, i: int, number: int) -> bool:
     seen, gap = drive.sees(i, number), drive.gap_m(i, number)
     return seen is not None and gap is not None and gap < 3.0
 
 
-def _slower_in_town(drive: Drive, start: int) -> Found:
+def _slower_in_town(drive: TracedDrive, start: int) -> Found:
     """That the car drives slower than it did, or than one usually does where it has just set off."""
     began = drive.all[start].ego.speed_mps
     first, end = (2.0, 6.0) if began > _ROLLS_MPS else (4.0, 12.0)
@@ -113,7 +113,7 @@ def _slower_in_town(drive: Drive, start: int) -> Found:
     return Found("done", start + len(window))
 
 
-def gap_asked(drive: Drive, act: Act, start: int, i: int) -> float | None:
+def gap_asked(drive: TracedDrive, act: Act, start: int, i: int) -> float | None:
     """The gap that words name, m, centre to centre; of a time headway at the speed of an instant; None of none."""
     if act.value is None:
         return None
@@ -129,14 +129,14 @@ def gap_asked(drive: Drive, act: Act, start: int, i: int) -> float | None:
     return value + (M_PER_CAR_LENGTH if act.unit == "s" else 0.0)
 
 
-def planned_gap(drive: Drive, i: int) -> float | None:
+def planned_gap(drive: TracedDrive, i: int) -> float | None:
     """The gap that the plan sets, m; None where it sets none."""
     headway = drive.numbers.get("time_headway_s")
     at_speed = None if headway is None else M_PER_CAR_LENGTH + headway * drive.all[i].ego.speed_mps
     return drive.numbers.get("gap_m", at_speed)
 
 
-def gap(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
+def gap(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     """That the gap to the vehicle ahead is the one that was named, or another one than before, and is kept."""
     start, waits = begin(drive, act, start)
     if waits:
@@ -164,7 +164,7 @@ def gap(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
     return Found("done", done, planned=planned)
 
 
-def style(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
+def style(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     """That the car drives at the plan's set-point, once that has come to rest: what a mood comes to is the plan's."""
     del act
     rests_at = math.nan

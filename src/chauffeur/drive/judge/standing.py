@@ -8,7 +8,7 @@ from typing import Final
 from chauffeur.concept.utterance import Act
 from chauffeur.drive.judge.conditions import came, too_early
 from chauffeur.drive.judge.references import ROAD_USERS, WAYSIDE, meant
-from chauffeur.drive.judge.trace import HELD_S, ON_PATH_M, STANDS_MPS, Drive, Found
+from chauffeur.drive.judge.trace import HELD_S, ON_PATH_M, STANDS_MPS, TracedDrive, Found
 
 _BEHIND_M: Final = 10.0
 _BESIDE_M: Final = 5.0
@@ -20,7 +20,7 @@ ON_M: Final = 10.0
 """So far a car has driven that drives on."""
 
 
-def stop(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
+def stop(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     """That the car stands, at its place: on the shoulder where there is one and it was to pull over."""
     del last
     reference = act.target if act.place is None else act.place.ref or act.target
@@ -52,7 +52,7 @@ def stop(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
     return Found("not_done", start, "the car did not come to a stand")
 
 
-def _just_behind_junction(drive: Drive, start: int, i: int) -> bool:
+def _just_behind_junction(drive: TracedDrive, start: int, i: int) -> bool:
     """Whether the car stands behind a junction that it has driven through since an act began, and in the same block."""
     last = next((one for one in reversed(drive.passages) if start <= one.enters and one.leaves <= i), None)
     if last is None:
@@ -61,11 +61,11 @@ def _just_behind_junction(drive: Drive, start: int, i: int) -> bool:
     return math.hypot(ego.x_m - then.x_m, ego.y_m - then.y_m) < _BLOCK_M
 
 
-def _told(drive: Drive, i: int, j: int) -> bool:
+def _told(drive: TracedDrive, i: int, j: int) -> bool:
     return drive.road.uninterrupted or drive.all[i].told_to_stand or drive.all[j].told_to_stand
 
 
-def _stands_by(drive: Drive, i: int, number: int, relation: str) -> bool:
+def _stands_by(drive: TracedDrive, i: int, number: int, relation: str) -> bool:
     """Whether the car stands as asked by a road user."""
     agent, seen, gap = drive.all[i].agents.get(number), drive.sees(i, number), drive.gap_m(i, number)
     if agent is None or seen is None or gap is None or abs(seen[1]) > _ASIDE_M:
@@ -87,7 +87,7 @@ def _stands_by(drive: Drive, i: int, number: int, relation: str) -> bool:
             return math.hypot(forward, leftward) < _NEAR_M
 
 
-def wait(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
+def wait(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     """That the car stands for a while, or until what it waits for has come."""
     del last
     when = act.when
@@ -113,7 +113,7 @@ def wait(drive: Drive, act: Act, start: int, *, last: bool) -> Found:
     return Found("not_done", start, "what it was to wait for did not come")
 
 
-def go(drive: Drive, act: Act, start: int, *, last: bool = False, way_m: float = ON_M) -> Found:
+def go(drive: TracedDrive, act: Act, start: int, *, last: bool = False, way_m: float = ON_M) -> Found:
     """That the car drives on, from a stand where it stood."""
     del last
     late = "the car did not drive on"

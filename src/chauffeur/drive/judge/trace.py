@@ -103,7 +103,7 @@ class Passage:
     way: str
 
 
-class Drive:
+class TracedDrive:
     """A drive as predicates look at it.
 
     Attributes:

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from chauffeur.concept.utterance import Act, ActPlace, Reference, Span, Utterance
+from chauffeur.concept.utterance import Act, ActPlace, Reference, Side, Span, Utterance
 from chauffeur.language.emergency import read_emergency
 from chauffeur.language.meaning.dialogue import is_elliptical, resolved
 from chauffeur.language.meaning.parser import Parsed, Parser, shipped_parser, spans_of
@@ -154,7 +154,7 @@ def _resolved(written: WrittenAct, parsed: Parsed, text: str, offset: int) -> Ac
     low, high = spans_of(parsed, written.span)
     act = replace(written.act, span=(offset + low, offset + high))
     if written.value is not None and (amount := _amount(written.value, parsed, text, high)) is not None:
-        act = replace(act, value=amount[0], unit=amount[1])
+        act = _measured(replace(act, value=amount[0], unit=amount[1]), parsed, text, written.value)
     names = iter(written.names)
     place, when = act.place, act.when
     target = _named(act.target, names, parsed, text)
@@ -164,7 +164,37 @@ def _resolved(written: WrittenAct, parsed: Parsed, text: str, offset: int) -> Ac
         when = replace(when, ref=_named(when.ref, names, parsed, text))
         if written.event_value is not None and (amount := _amount(written.event_value, parsed, text, high)) is not None:
             when = replace(when, value=amount[0], unit=amount[1])
-    return replace(act, target=target, place=place, when=when)
+    return _sided(replace(act, target=target, place=place, when=when), text[low:high])
+
+
+_SIDES: Final[tuple[Side, ...]] = ("left", "right")
+
+
+def _sided(act: Act, words: str) -> Act:
+    """A turn or lane change whose one side stands in its own words ("turn right here"), where the parser has none."""
+    places = (act.target, act.place and act.place.ref, act.when and act.when.ref)
+    if act.act not in ("turn", "lane") or act.side or act.to or any(one is not None for one in places):
+        return act
+    said = {word.strip(" .,;:!?").lower() for word in words.split()}
+    found = [side for side in _SIDES if side in said]
+    return replace(act, side=found[0]) if len(found) == 1 else act
+
+
+_COMPARED: Final = frozenset(
+    {"less", "more", "fewer", "extra", "closer", "nearer", "further", "farther", "slower", "faster", "shorter",
+     "longer", "larger", "smaller"}
+)  # fmt: skip
+"""Words behind an amount that make it a change, whatever stands before it."""
+
+
+def _measured(act: Act, parsed: Parsed, text: str, token: int) -> Act:
+    """An amount counts as the word right before it says: "to 65 metres" is the value itself, "by 65" the change."""
+    before = text[: spans_of(parsed, (token,))[0]].split()
+    word = before[-1].lower() if before else ""
+    after = {one.strip(".,;:!?").lower() for one in text[spans_of(parsed, (token,))[0] :].split()[:5]}
+    if word == "to" and act.measure == "by" and not after & _COMPARED:
+        return replace(act, measure=None)
+    return replace(act, measure="by") if word == "by" and act.measure is None and act.direction else act
 
 
 def _amount(token: int, parsed: Parsed, text: str, high: int) -> tuple[float, str] | None:

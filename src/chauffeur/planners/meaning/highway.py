@@ -207,7 +207,9 @@ class _Speaker:
             turns = side in here.turns and not 0 <= beside < here.lane_count and not act.negated and act.place is None
             return replace(act, act="turn" if turns else "lane", side=side)
         plain = act.style is None and act.manner is None and not act.negated
-        return replace(act, act="straight") if act.act == "go" and plain and "straight" in here.turns else act
+        crosses = act.place is not None and act.place.ref is not None and act.place.ref.kind == "junction"
+        on = act.act == "go" and plain and (crosses or "straight" in here.turns)
+        return replace(act, act="straight") if on else act
 
     def _way_past(self) -> bool:
         """Whether the step before is a change of lanes that an overtaking begins with."""

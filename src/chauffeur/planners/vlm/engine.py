@@ -15,11 +15,13 @@ from chauffeur.language.text_classifier import load_sorter
 from chauffeur.planners.camera_faults import HEIGHT, WIDTH, small
 from chauffeur.planners.exported import open_exported
 from chauffeur.planners.vlm.sentences import load_head, shipped_encoder
-from chauffeur.planners.vlm.template import DECIDED, STYLES, TEMPLATE, GainCodebook
+from chauffeur.planners.vlm.template import DECIDED, GRADES, STYLES, TEMPLATE, GainCodebook
 from chauffeur.planners.word_table import SHIPPED_WORDS, WordTable, load_words
 
 Array = np.ndarray[Any, Any]
 
+_TIED: Final = 0.8
+"""Grades whose shares differ by less are tied: the processor's rounding moves a share by some hundredths."""
 SHIPPED: Final = Path(__file__).parent / "weights"
 """The model that comes with the package."""
 TRUST: Final = 90.0
@@ -120,7 +122,7 @@ class VlmEngine:
             if name == "style":
                 row[at], shares[name] = self._style(text, raised)
             else:
-                row[at] = int(logits.argmax())
+                row[at] = _heavier(raised) if name == "grade" else int(logits.argmax())
                 shares[name] = float(raised[row[at]])
             passes += 1
         values = {name: str(word) for name, word in TEMPLATE.decode(row).items()}
@@ -150,3 +152,12 @@ class VlmEngine:
 def shipped() -> VlmEngine:
     """The model of the package, loaded once."""
     return VlmEngine()
+
+
+def _heavier(shares: Array) -> int:
+    """The token of the heaviest grade that is about as likely as the likeliest: a tie, which rounding would decide
+    differently from run to run, never lowers care."""
+    ids = [TEMPLATE.ids[grade] for grade in GRADES]
+    best = int(shares.argmax())
+    close = [one for one in ids if shares[one] >= _TIED * shares[best]]
+    return close[-1] if best in ids else best

@@ -81,7 +81,7 @@ _LISTED: Final = re.compile(r"(?:^|(?<=[\s.;:]))\(?(?:\d{1,2}[.)]|step \d{1,2}[:
 _QUOTED: Final = re.compile(r"[\"“«]([^\"”»]{1,300})[\"”»]")
 _SENTENCES: Final = re.compile(r"(?<=[.!?])\s+|\n+|->|→")
 _CLAUSES: Final = re.compile(
-    r"\s*[;:]\s+|,? (?=(?:and |but )?then\b(?! on))|,? and (?=after that)|,? (?=so (?:that )?(?:I|we)\b)"
+    r"(?<!\s)\s*[;:]\s+|,? (?=(?:and |but )?then\b(?! on))|,? and (?=after that)|,? (?=so (?:that )?(?:I|we)\b)"
     r"|, (?=(?:and|but) (?:I|we)\b)"
     r"|,? (?=(?:after|before|once) (?:I|we|\w+ing)\b)|,? (?=until (?:I|we)\b)",
 )
@@ -163,7 +163,7 @@ _WIDER: Final = _any("open", "grow", "increase", "back", "wider", "more", "large
 _FASTER: Final = _any("raise", "higher", r"accelerat(?:e|ing)", "up", "faster", "gain speed")
 _SLOWER: Final = _any("lower", r"slow\w*", "brake", "ease", "reduce", r"decelerat(?:e|ing)", "down", "drop")
 _REASON: Final = re.compile(
-    r",? \b(?:because|since|so that|so it|in order to|to (?:avoid|save))\b.*$|\([^)]*\)",
+    r",? \b(?:because|since|so that|so it|in order to|to (?:avoid|save))\b.*$|\([^()]*\)",
     re.IGNORECASE,
 )
 _ELSE: Final = re.compile(r"\b(?:if|unless|otherwise|else|as long as|until)\b", re.IGNORECASE)

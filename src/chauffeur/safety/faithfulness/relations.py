@@ -51,13 +51,13 @@ Function = ast.FunctionDef | ast.Lambda
 
 
 @dataclass(frozen=True, slots=True)
-class Thing:
+class NamedThing:
     """A vehicle (`ego`, `front`, `rear`) or a lane (`-1`, `0`, `1` from the ego's own)."""
 
     name: str
 
 
-Known = frozenset[Term | Thing]
+Known = frozenset[Term | NamedThing]
 _NONE: Final[Known] = frozenset()
 _SPEED_NOW: Final[Known] = frozenset({_EGO})
 _GAP_NOW: Final[Known] = frozenset({Term("gap", 1.0, 0.0)})
@@ -216,15 +216,15 @@ class _Reader:
             results = [body] if isinstance(body, ast.expr) else list(_returned(body))
             return frozenset(one for result in results for one in self._known(result, inner))
         args = [self._known(one, scope) for one in (*call.args, *(word.value for word in call.keywords))]
-        names = [{one.name for one in arg if isinstance(one, Thing)} for arg in args]
+        names = [{one.name for one in arg if isinstance(one, NamedThing)} for arg in args]
         if name in ("min", "max"):
             return _bounded(args)
         if name in _SAME and args:
             return args[0]
         if name in _LANES:
-            return frozenset({Thing(str(_LANES[name]))}) if not names or names[0] <= {"ego"} else _NONE
+            return frozenset({NamedThing(str(_LANES[name]))}) if not names or names[0] <= {"ego"} else _NONE
         if name in _VEHICLES:
-            return frozenset({Thing(_VEHICLES[name])})
+            return frozenset({NamedThing(_VEHICLES[name])})
         base = _NUMBERS.get(name, "")
         if name == "get_speed_of":
             base = "ego" if names and names[0] == {"ego"} else "other"
@@ -311,7 +311,7 @@ class _Reader:
             return Deed(kind, line, sides=frozenset({_TURNS[site.name]}))
         if kind != "lane":
             return Deed(kind, line, terms, times=times, bounds=bounds)
-        sides = frozenset(int(one.name) for one in known if isinstance(one, Thing) and one.name.lstrip("-").isdigit())
+        sides = frozenset(int(one.name) for one in known if isinstance(one, NamedThing) and one.name.lstrip("-").isdigit())
         offsets = next((one.value.offsets for one in site.arguments), None)
         sides, back = self._led_back(sides or offsets or frozenset())
         return Deed(kind, line, (), sides, back, times)
