@@ -168,18 +168,33 @@ def test_every_page_is_in_the_menu_and_at_the_start() -> None:
 
 
 FIGURES = {
+    "held out, right outcomes": (
+        r"twelve voices: ([\d.]+) % right outcomes at once",
+        r"\| `onboard`, held out \| 200 \| ([\d.]+) %",
+    ),
+    "held out, right after a yes": (
+        r"right outcomes at once, ([\d.]+) % with one yes",
+        r"\| `onboard`, held out \| 200 \| [^|]+\| ([\d.]+) %",
+    ),
+    "held out, driven wrongly": (
+        r"([\d.]+) % driven wrongly",
+        r"\| `onboard`, held out \| 200 \| [^|]+\| [^|]+\| ([\d.]+) %",
+    ),
     "right outcomes": (
-        r"(\d+) % right outcomes on 417",
-        r"417 wishes of passengers: right outcome \| \d+ \(\*\*([\d.]+) %",
+        r"417 wishes of one developer, [^:|]+: ([\d.]+) and",
+        r"\| `onboard`: [^|]+\| 417 \| ([\d.]+) %",
     ),
-    "right after a yes": (r"(\d+) % with one yes", r"with one yes to the question \| \d+ \(\*\*([\d.]+) %"),
-    "of the rules": (
-        r"`retrieval`: (\d+) %\)",
-        r"417 wishes of passengers: right outcome .*?\| \d+ \(([\d.]+) %\) \| 85 %",
+    "right after a yes": (
+        r"417 wishes of one developer, [^:|]+: [\d.]+ and ([\d.]+) %",
+        r"\| `onboard`: [^|]+\| 417 \| [^|]+\| ([\d.]+) %",
     ),
-    "planning": (r"(\d+) ms a wish on one CPU", r"wish to reply, median / 95 %, one thread \| (\d+) /"),
+    "parsing": (r"28 M parameters, (\d+) ms\)", r"doScenes: the parser that ships .*\| (\d+) \|"),
+    "planning": (
+        r"writes programs \([\d.]+ M, (\d+) ms",
+        r"wish to reply, median / 95 %, one thread \| (\d+) /",
+    ),
     "size of the model": (r"language model, (\d+) MB\)", r"int8, ([\d.]+) MB with its tokenizer"),
-    "parameters": (r"language model of ([\d.]+) M", r"([\d.]+) M parameters \(Llama"),
+    "parameters": (r"writes programs \(([\d.]+) M, ", r"([\d.]+) M parameters \(Llama"),
     "stepping": (r"at (\d+) times its stepping", r"Goal 150 times: \*\*(\d+) times"),
     "first drive": (r"The first `make drive` takes (\d+) s", r"`make drive` for the first time .*?\| (\d+) s"),
     "installing": (r"\((\d+) s installing", r"of which installing .*?\| (\d+) s"),

@@ -162,7 +162,7 @@ OTHER_TEXT = {
     "planners/llm_endpoint.py": "errors of an endpoint",
     "planners/llm_errors.py": "errors of an endpoint",
     "safety/concealment.py": "what is hidden in a text, before anybody reads it",
-    "safety/faithfulness/claims.py": "thoughts of a planner: their acts are asked of `meaning`, what only thoughts have is not",
+    "safety/faithfulness/claims.py": "thoughts of a planner: what wishes have not; acts are asked of `meaning`",
     "safety/faithfulness/comparison.py": "thoughts of a planner",
 }
 READS_WORDS = {

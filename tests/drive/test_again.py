@@ -74,7 +74,7 @@ def test_an_honest_trip_is_the_same_bit_for_bit(tmp_path: Path, limits: Limits) 
 
 
 def test_one_under_other_limits_of_the_house_is_the_same_under_those(tmp_path: Path) -> None:
-    recorded = through_a_file(driven("Drive at 120 km/h.", "cruise", LAMPILOT_LIMITS), tmp_path)
+    recorded = through_a_file(driven("Speed up to 120 km/h.", "cruise", LAMPILOT_LIMITS), tmp_path)
     found = again(recorded, LAMPILOT_LIMITS)
     assert found.trip is not None and compare_trips(recorded, found.trip) is None
     assert again(recorded).notes, "and under today's own it is said what differs"

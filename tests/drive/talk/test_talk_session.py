@@ -12,7 +12,6 @@ import pytest
 from chauffeur.concept import PersonId
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
-from chauffeur.drive.questions import NOTHING_ASKED
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.messages import (

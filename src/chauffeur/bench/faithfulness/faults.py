@@ -249,7 +249,10 @@ def _changed(deeds: Sequence[PlannedDeed], index: int, **fields: object) -> list
 
 
 def _told(
-    rng: np.random.Generator, planned: PlannedCase, deeds: Sequence[PlannedDeed], figure: tuple[float, str] | None = None
+    rng: np.random.Generator,
+    planned: PlannedCase,
+    deeds: Sequence[PlannedDeed],
+    figure: tuple[float, str] | None = None,
 ) -> str:
     if figure is None:
         return tell(rng, deeds, planned.wish, planned.start)

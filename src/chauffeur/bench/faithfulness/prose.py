@@ -24,7 +24,9 @@ _WAYS: Final[dict[str, list[str]]] = json.loads(Path(__file__).with_name("prose.
 """Ways to say each part, by its name."""
 
 
-def tell(rng: np.random.Generator, deeds: Sequence[PlannedDeed], wish: str, start: PlanStart, checks: float = 0.75) -> str:
+def tell(
+    rng: np.random.Generator, deeds: Sequence[PlannedDeed], wish: str, start: PlanStart, checks: float = 0.75
+) -> str:
     """Thoughts about deeds in this order; deterministic for a generator in a given state.
 
     Args:

@@ -15,7 +15,7 @@ from typing import Final, Protocol
 from chauffeur.concept.utterance import Act, Verb
 from chauffeur.drive.judge import manoeuvres, setpoints, standing
 from chauffeur.drive.judge.conditions import unknown
-from chauffeur.drive.judge.trace import ActResult, TracedDrive, DriveTrace, Found, Referents
+from chauffeur.drive.judge.trace import ActResult, DriveTrace, Found, Referents, TracedDrive
 
 
 class _Predicate(Protocol):

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from chauffeur.concept.units import M_PER_CAR_LENGTH, M_PER_FOOT, M_PER_KM, M_PER_YARD, MPS_PER_KMH, MPS_PER_MPH
 from chauffeur.concept.utterance import Act, Condition, Event
 from chauffeur.drive.judge.references import ROAD_USERS, WAYSIDE, meant
-from chauffeur.drive.judge.trace import ON_PATH_M, PERIOD_S, ActResult, TracedDrive, Passage
+from chauffeur.drive.judge.trace import ON_PATH_M, PERIOD_S, ActResult, Passage, TracedDrive
 
 _METRES: Final = {"km": M_PER_KM, "ft": M_PER_FOOT, "yd": M_PER_YARD, "lengths": M_PER_CAR_LENGTH}
 _MPS: Final = {"mph": MPS_PER_MPH, "m/s": 1.0}

@@ -11,7 +11,7 @@ from chauffeur.drive.judge.conditions import begin, too_early
 from chauffeur.drive.judge.references import ROAD_USERS, WAYSIDE, ahead, meant
 from chauffeur.drive.judge.setpoints import GAP_M, GAP_SHARE, planned_gap
 from chauffeur.drive.judge.standing import ON_M, go
-from chauffeur.drive.judge.trace import ON_PATH_M, STANDS_MPS, TracedDrive, Found, path_of
+from chauffeur.drive.judge.trace import ON_PATH_M, STANDS_MPS, Found, TracedDrive, path_of
 from chauffeur.geometry import Pose
 
 FOLLOWED_S, FOLLOWED_ON_S = 12.0, 40.0

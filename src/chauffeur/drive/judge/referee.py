@@ -15,7 +15,7 @@ from chauffeur.concept import JudgedBy, Metric, Outcome, ProgramState, Setpoints
 from chauffeur.concept.utterance import Act, Verb
 from chauffeur.drive.judge.acts import JudgedAct, judge, wanted
 from chauffeur.drive.judge.setpoints import gap_asked, planned_gap, speed_asked
-from chauffeur.drive.judge.trace import PERIOD_S, TracedDrive, DriveTrace, Referents
+from chauffeur.drive.judge.trace import PERIOD_S, DriveTrace, Referents, TracedDrive
 from chauffeur.worlds.base import World
 
 SETTLES_S: Final = 12.0

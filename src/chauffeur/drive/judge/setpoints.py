@@ -9,7 +9,7 @@ from chauffeur.concept.units import M_PER_CAR_LENGTH
 from chauffeur.concept.utterance import Act
 from chauffeur.drive.judge.conditions import begin, metres, mps
 from chauffeur.drive.judge.references import meant
-from chauffeur.drive.judge.trace import PERIOD_S, STANDS_MPS, TracedDrive, Found
+from chauffeur.drive.judge.trace import PERIOD_S, STANDS_MPS, Found, TracedDrive
 
 SPEED_MPS: Final = 0.8
 """A speed this near the one asked for is that speed (3 km/h): a vehicle far ahead already takes half of it."""

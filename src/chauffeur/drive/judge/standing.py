@@ -8,7 +8,7 @@ from typing import Final
 from chauffeur.concept.utterance import Act
 from chauffeur.drive.judge.conditions import came, too_early
 from chauffeur.drive.judge.references import ROAD_USERS, WAYSIDE, meant
-from chauffeur.drive.judge.trace import HELD_S, ON_PATH_M, STANDS_MPS, TracedDrive, Found
+from chauffeur.drive.judge.trace import HELD_S, ON_PATH_M, STANDS_MPS, Found, TracedDrive
 
 _BEHIND_M: Final = 10.0
 _BESIDE_M: Final = 5.0

@@ -311,7 +311,9 @@ class _Reader:
             return Deed(kind, line, sides=frozenset({_TURNS[site.name]}))
         if kind != "lane":
             return Deed(kind, line, terms, times=times, bounds=bounds)
-        sides = frozenset(int(one.name) for one in known if isinstance(one, NamedThing) and one.name.lstrip("-").isdigit())
+        sides = frozenset(
+            int(one.name) for one in known if isinstance(one, NamedThing) and one.name.lstrip("-").isdigit()
+        )
         offsets = next((one.value.offsets for one in site.arguments), None)
         sides, back = self._led_back(sides or offsets or frozenset())
         return Deed(kind, line, (), sides, back, times)
