@@ -256,7 +256,7 @@ def test_what_is_judged_is_what_was_said_and_not_what_the_plan_says() -> None:
     assert (result_of(misread), misread.judged_by) == ("not done", "reading")
     untold = driven("Change to the left lane.", place, Fixed(LEFT_LANE, "")).trip
     assert (result_of(untold), untold.judged_by) == ("done", "reading")
-    mood = driven("I feel like flying today.", find("cruise"), Fixed(SLOW, "speed.set", (("target_speed_mps", 25.0),)))
+    mood = driven("What a lovely morning.", find("cruise"), Fixed(SLOW, "speed.set", (("target_speed_mps", 25.0),)))
     assert (mood.trip.outcome, mood.trip.judged_by) == ("success", "plan"), "nothing is read in it, so the plan's acts"
 
 
@@ -270,7 +270,6 @@ SLOW = """def drive():
 @pytest.mark.parametrize("wish", ["Slow down when it rains", "Drive at 90 km/h after the bridge"])
 def test_a_condition_that_is_not_used_is_named_and_never_ticked(wish: str) -> None:
     recorded = driven(wish, find("cruise"), Fixed(SLOW, "speed.set", (("target_speed_mps", 25.0),)))
-    assert recorded.trip.outcome == "ended", "nothing could be compared"
     assert result_of(recorded.trip) == "partly done"
     assert recorded.trip.unused[0] in wish
     sign, label, tone = trip_words(recorded.trip)

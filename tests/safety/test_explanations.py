@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
-from chauffeur.planners.onboard.retrieval import RetrievalPlanner
+from chauffeur.planners.onboard import LanguageModelPlanner
 
 from chauffeur.concept import (
     LAMPILOT_LIMITS,
@@ -258,7 +258,7 @@ def test_plans_of_our_own_are_not_called_unfaithful(scenario: object) -> None:
     observation = HighwayWorld().reset(scenario, scenario.seed)  # type: ignore[arg-type, attr-defined]
     context = describe(observation)
     judged = 0
-    for planner in (RetrievalPlanner(), KeywordPlanner()):
+    for planner in (LanguageModelPlanner.from_spec(""), KeywordPlanner()):
         for wish in WISHES:
             request = PlanRequest(Instruction(wish), context, SystemMessage(""), limits=LAMPILOT_LIMITS)
             planned = asyncio.run(planner.plan(request))

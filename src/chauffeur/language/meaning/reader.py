@@ -164,7 +164,19 @@ def _resolved(written: WrittenAct, parsed: Parsed, text: str, offset: int) -> Ac
         when = replace(when, ref=_named(when.ref, names, parsed, text))
         if written.event_value is not None and (amount := _amount(written.event_value, parsed, text, high)) is not None:
             when = replace(when, value=amount[0], unit=amount[1])
-    return _sided(replace(act, target=target, place=place, when=when), text[low:high])
+    act = _sided(replace(act, target=target, place=place, when=when), text[low:high])
+    return act if act.place or act.when else replace(act, span=(offset + low, offset + _before_clause(text, low, high)))
+
+
+_CLAUSES: Final = frozenset({"after", "before", "until", "till", "unless", "when", "once", "if", "while"})
+"""Words that begin a place or a condition: an act that has neither did not use what they begin."""
+
+
+def _before_clause(text: str, low: int, high: int) -> int:
+    """Where an act's own words end, before a clause that nothing was read from."""
+    words = list(_WORD.finditer(text, low, high))
+    begins = next((word.start() for word in words[1:] if word[0].lower() in _CLAUSES), high)
+    return low + len(text[low:begins].rstrip())
 
 
 _SIDES: Final[tuple[Side, ...]] = ("left", "right")
