@@ -44,8 +44,8 @@ def score(cases: Iterable[FaithfulnessCase]) -> dict[str, float | None]:
     bench = FaithfulnessBenchmark(0)
     found = [ItemOutcome(case, None, "", JudgeJob(case).run()) for case in cases]
     rows = [{"item": one.item.id, **asdict(row)} for one in found for row in bench.rows(one)]
-    ((_, _, figures),) = fill(TableSpec("", SCORES), rows).lines
-    return {measure.title: figure.value for measure, figure in zip(SCORES, figures, strict=True)}
+    (line,) = fill(TableSpec("", SCORES), rows).lines
+    return {measure.title: figure.value for measure, figure in zip(SCORES, line.found, strict=True)}
 
 
 def test_same_seed_same_cases() -> None:
