@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
-from chauffeur.planners.onboard import LanguageModelPlanner
 
 from chauffeur.concept import (
     LAMPILOT_LIMITS,
@@ -23,6 +22,7 @@ from chauffeur.concept import (
 )
 from chauffeur.describe import describe
 from chauffeur.planners.keyword import KeywordPlanner
+from chauffeur.planners.onboard import LanguageModelPlanner
 from chauffeur.safety.faithfulness import (
     Effect,
     FactSurroundings,
