@@ -640,3 +640,22 @@ def test_a_question_to_which_a_yes_would_be_refused_is_not_asked() -> None:
     assert answer.plan.offer == ""
     assert "50 m/s" not in answer.words
     assert "180 km/h" in answer.words
+
+
+def test_never_mind_goes_back_to_what_was_in_force_before_the_newest_wish() -> None:
+    planner = gives(5.0, 8.0)
+    answers = ask(planner, "Drive at 5 m/s.", "never mind", "Drive at 8 m/s.", "never mind", "forget it")
+    assert [one.status for one in answers] == ["dry-run", "answered", "dry-run", "dry-run", "answered"]
+    assert len(planner.requests) == 2
+    back = answers[3].plan
+    assert back is not None
+    assert isinstance(back.policy, Parameters)
+    assert back.policy.target_speed_mps == 5.0
+    assert answers[4].words == questions.NOTHING_ASKED
+
+
+def test_planners_of_a_vehicle_are_asked_in_whole_sentences() -> None:
+    planner = gives(5.0, 4.0)
+    ask(planner, "Drive at 20 km/h.", "make it 15")
+    assert [one.instruction.text for one in planner.requests] == ["Drive at 20 km/h.", "Drive at 15 km/h."]
+    assert planner.requests[1].instruction.said == "make it 15"
