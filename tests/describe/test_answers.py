@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from chauffeur.bench.passengers import load_wishes
 from chauffeur.concept import Context, Lead, Situation
-from chauffeur.describe.answers import answer_to, asks_to_know, with_way
+from chauffeur.describe.answers import answer_to, asks_to_know, with_doing, with_way
 from chauffeur.worlds.places import Destination
 
 ROAD = Situation("highway", 28.0, 31.2928, 4, 1, True, Lead(2, 40.0, 24.0), None)
@@ -104,3 +104,17 @@ def test_no_wish_of_a_passenger_to_be_driven_is_taken_for_a_question() -> None:
 @given(st.text(max_size=80))
 def test_any_text_is_read(text: str) -> None:
     answer_to(text, ROAD)
+
+
+@pytest.mark.parametrize(
+    ("question", "asks"),
+    [
+        ("What are you doing?", True), ("what did you just do", True), ("Did you do that already?", True),
+        ("Why did you change lanes?", True), ("why are we turning left?", True), ("What are you waiting for?", False),
+        ("Why so slow?", False), ("Do that again", False),
+    ],
+)  # fmt: skip
+def test_what_is_done_is_told_by_the_execution(question: str, asks: bool) -> None:
+    doing = "You asked: “overtake him” I am at it."
+    assert (answer_to(question, with_doing(Context("", ROAD), doing).situation) == doing) == asks
+    assert answer_to(question, ROAD) != doing

@@ -56,6 +56,17 @@ _AHEAD: Final = r"(?:ahead|in front|before us|front|lead)"
 
 _WAY: Final = "way"
 """Name of the fact how far it is to where the car is going."""
+_DOING: Final = "doing"
+"""Name of the fact what is driven, and what became of what was driven last."""
+_ABOUT_DOING: Final = re.compile(
+    rf"{ADDRESS}(?:what (?:are|were) {_US} doing(?: now| here| there| right now)?$|"
+    rf"what (?:did|have) {_US} (?:just )?(?:do|done)(?: now| there| just now)?$|"
+    rf"did {_US} (?:do|finish) (?:it|that)(?: already| yet)?$|"
+    rf"are {_US} (?:doing|still doing) (?:it|that)(?: now| yet)?$|"
+    rf"why (?:are|were|did|do|have|has|is) {_US} (?:just |now |still |all )?"
+    r"(?:chang|overtak|pass|turn|follow|accelerat|speed(?:ing)? up|mov|cross|merg|leav|pull)\w*\b)"
+)
+"""Asks about what the car does or did; answered by its execution."""
 
 
 def _speed(speed_mps: float) -> str:
@@ -106,7 +117,16 @@ def with_way(context: Context, there: Destination | None) -> Context:
         f"{there.left_m / 1000.0:.1f} km" if there.left_m >= 1000.0 else f"{max(10.0, round(there.left_m, -1)):.0f} m"
     )
     words = f"It is about {left} by road to {there.name or 'where we are going'}."
-    situation = replace(context.situation, scene=(*context.situation.scene, (_WAY, words)))
+    return _with_fact(context, _WAY, words)
+
+
+def with_doing(context: Context, doing: str) -> Context:
+    """C that knows what is driven, and what became of what was driven last; as it was where that is nothing."""
+    return _with_fact(context, _DOING, doing) if doing else context
+
+
+def _with_fact(context: Context, name: str, words: str) -> Context:
+    situation = replace(context.situation, scene=(*context.situation.scene, (name, words)))
     return replace(context, situation=situation)
 
 
@@ -195,6 +215,8 @@ def answer_to(text: str, situation: Situation, seen: str = "") -> str:
         seen: C in words.
     """
     words = words_of(text).rstrip(" ?.!")
+    if _ABOUT_DOING.match(words) and (doing := dict(situation.scene).get(_DOING, "")):
+        return doing
     if _WHY_STANDING.match(words):
         return _held_up(situation, seen)
     if not asks_to_know(text):

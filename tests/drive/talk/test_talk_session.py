@@ -12,6 +12,7 @@ import pytest
 from chauffeur.concept import PersonId
 from chauffeur.drive.live.settings import Settings
 from chauffeur.drive.live.starts import Start
+from chauffeur.drive.questions import NOTHING_ASKED, TAKEN_BACK
 from chauffeur.drive.scenarios import find
 from chauffeur.drive.talk.asr_process import AsrEngine
 from chauffeur.drive.talk.messages import (
@@ -165,6 +166,25 @@ def test_what_is_said_beside_a_wish_does_not_end_it_and_quit_is_no_wish() -> Non
             talk.poll()
             time.sleep(0.005)
     assert talk.outcome == "stopped"
+
+
+def test_what_is_driven_is_told_of_and_taken_back() -> None:
+    person = Person()
+    with person.talk as talk:
+        talk.take(Say("Slow down to 70 km/h."))
+        person.until(lambda: person.driven("w1"))
+        for wish, text in (("w2", "What are you doing?"), ("w3", "Never mind.")):
+            talk.take(Say(text))
+            person.until(lambda w=wish: (found := person.conversation(w)) and found.stage == "closed")
+        told, taken_back, first = (person.conversation(wish) for wish in ("w2", "w3", "w1"))
+        assert told is not None and (told.outcome, "Slow down to 70 km/h." in told.why) == ("answered", True)
+        assert taken_back is not None and (taken_back.outcome, taken_back.why) == ("answered", TAKEN_BACK)
+        assert first is not None and first.outcome == "superseded"
+        seen = len(person.all(Scene))
+        person.until(lambda: len(person.all(Scene)) > seen + 2)
+        assert person.all(Scene)[-1].wish == ""  # pyright: ignore
+        talk.take(Say("Never mind."))
+        assert person.all(Note)[-1].text == NOTHING_ASKED  # pyright: ignore
 
 
 def test_what_goes_wrong_is_told_and_the_drive_goes_on() -> None:

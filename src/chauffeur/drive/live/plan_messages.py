@@ -32,6 +32,7 @@ class Request:
         turn: Counts how often it was asked for; more than once where a plan was stale or the planner died.
         confirmed: The car's question to which these words are the person's yes; empty for none.
         runs: Whether another wish is driven, or on its way, which a question must not end.
+        doing: What is driven, or what became of what was driven last, in words: the answer to questions about it.
     """
 
     wish: str
@@ -40,6 +41,7 @@ class Request:
     turn: int = 1
     confirmed: str = ""
     runs: bool = False
+    doing: str = ""
 
     @property
     def aside(self) -> bool:

@@ -25,7 +25,7 @@ from chauffeur.concept import (
     Plan,
     Thoughts,
 )
-from chauffeur.describe.answers import with_way
+from chauffeur.describe.answers import with_doing, with_way
 from chauffeur.describe.services.sources import Sources, SourceSettings
 from chauffeur.drive.emergency import NO_SHOULDER, STOPPING, planned_for
 from chauffeur.drive.events import DriveEvent, WishEventKind
@@ -178,7 +178,7 @@ class Planning:
 
         async def describe() -> Context:
             described = weathered(self._mirror.world, await describing(self._sources))(observation)
-            return with_way(described, there)
+            return with_doing(with_way(described, there), request.doing)
 
         async def recall(instruction: Instruction, context: Context) -> History:
             return self._memory.recall(instruction.person, instruction, context, RECALLED)

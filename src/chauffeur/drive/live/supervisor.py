@@ -37,6 +37,7 @@ from chauffeur.drive.live.plan_messages import (
 from chauffeur.drive.live.ring import Reader, RingMessage
 from chauffeur.drive.live.settings import SIZES, RingName, Settings, ring
 from chauffeur.language.emergency import read_emergency
+from chauffeur.language.meaning.words import wish_words
 
 Role = Literal["control", "policy", "spare", "planner"]
 """`spare`: a policy process that waits to take over."""
@@ -163,7 +164,7 @@ class Runtime:
             confirmed: The car's question to which they are the yes.
         """
         wish = self.next_wish
-        request = Request(wish, text, person, confirmed=confirmed, runs=bool(self.open_wishes))
+        request = Request(wish, text, person, confirmed=confirmed, runs=bool(self.open_wishes), doing=self._doing())
         interaction = self.interactions[wish] = Interaction(request, since_s=time.monotonic())
         if stop_wanted(read_emergency(text)):
             self.halt()
@@ -171,6 +172,16 @@ class Runtime:
         else:
             self._send(interaction)
         return wish
+
+    def _doing(self) -> str:
+        """What is driven, or what became of what was driven last, by the plan's acts and the state of its execution."""
+        driven = [one for one in self.interactions.values() if one.started_tick is not None and one.brief is not None]
+        if not driven or (brief := driven[-1].brief) is None:
+            return ""
+        answer = driven[-1].answer
+        became = "I am at it." if answer is None else "That is done." if answer.kind == "finished" else answer.text
+        acts = wish_words(brief.plan.acts)
+        return f"You asked: “{driven[-1].request.text}” {f'I took that for: “{acts}” ' if acts else ''}{became}"
 
     @property
     def next_wish(self) -> str:
