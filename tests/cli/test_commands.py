@@ -23,7 +23,7 @@ from chauffeur.concept.extras import install_command
 from chauffeur.drive.recording import read_trip, write_trip
 from chauffeur.version import __version__
 
-WISH = "Overtake the car in front of you."
+WISH = "Change to the left lane."
 PROGRAM = """def overtake():
     left = get_left_lane(get_ego_vehicle())
     while not is_safe_enter(left):
@@ -33,7 +33,7 @@ PROGRAM = """def overtake():
     for _ in range(20):
         yield autopilot()
 """
-DECLINED = "Fly a loop."
+DECLINED = "Keep to this lane."
 MISTOLD = "Change lanes."
 
 
@@ -176,7 +176,7 @@ def test_a_wish_is_driven_and_everything_is_said(answers: str) -> None:
     assert result.exit_code == 0, result.output
     for words in (WISH, "Left is free.", "def overtake():", "✓", "simulated drive"):
         assert words in result.output
-    assert result.output.startswith("■ Done, not compared after 5 s"), "what came of it comes first"
+    assert result.output.startswith("✓ Done as asked after 4 s"), "what came of it comes first"
     assert "Changing to the [bold]left[/] lane." in result.output, "a program's words are not markup"
     assert "\x1b" not in result.output, "no colour and no moving cursor in a pipe"
 
@@ -192,7 +192,7 @@ def test_an_explanation_that_does_not_fit_is_told_and_the_drive_goes_on(answers:
         "wrong side: “I move to the right lane.”, but it changes lanes to the left (line 6)",
         "≠ The drive did not go as explained (score 0.00 of 1, 1 claim compared) alignment-driven-v1",
         "wrong side: “I move to the right lane.”, but it changed lanes to the left",
-        "≠ Done, not compared after 5 s, not as explained (simulated drive)",
+        "≠ Done as asked after 4 s, not as explained (simulated drive)",
     ):
         assert words in told, words
 
@@ -204,11 +204,12 @@ def test_an_explanation_that_does_not_fit_is_told_and_the_drive_goes_on(answers:
     found = recorded.trip.verdicts[-2].alignment
     assert found is not None and [one.kind for one in found.mismatches] == ["wrong-side"]
     assert "The same, bit for bit" in invoke("replay", str(tmp_path / "trip.mcap")).output
-    shown = " ".join(invoke("audit", "show", str(log), "--kind", "verdict").output.split())
-    assert "Wrong side: “I move to the right lane.”, but it changes lanes to the left" in shown
-    assert "score 0.00 of 1" in shown
+    logged = [json.loads(line) for line in log.read_text().splitlines()]
+    failed = {one["body"]["check"]: one["texts"]["reason"]["text"] for one in logged if one["kind"] == "verdict"}
+    assert "Wrong side: “I move to the right lane.”, but it changes lanes to the left" in failed["alignment-v1"]
+    assert "score 0.00 of 1" in failed["alignment-v1"]
     quiet = invoke("drive", MISTOLD, "--planner", answers, "-q").output
-    assert quiet.strip() == "≠ Done, not compared after 5 s, not as explained (simulated drive)"
+    assert quiet.strip() == "≠ Done as asked after 4 s, not as explained (simulated drive)"
 
 
 def test_a_recording_from_before_explanations_were_judged_is_read(driven: Path) -> None:
@@ -391,5 +392,6 @@ def test_a_broken_core_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_own_error_has_an_exit_code() -> None:
     from chauffeur.cli.failures import exit_code
 
-    assert {exit_code(kind("x")) for kind in ChauffeurError.__subclasses__()} == {1, 2}
+    kinds = ChauffeurError.__subclasses__()
+    assert {exit_code(kind.__new__(kind)) for kind in kinds} == {1, 2}
     assert exit_code(PlannerError("down")) == 1

@@ -8,7 +8,6 @@ import pytest
 from chauffeur.concept import DataError
 from chauffeur.language.meaning.symbols import END, MOST_SYMBOLS, parse, write
 from chauffeur.models.meaning.banks import banks
-from chauffeur.models.meaning.batches import SentenceSource
 from chauffeur.models.meaning.composer import Composed
 from chauffeur.models.meaning.highway import HighwaySentences, sorted_rows
 from chauffeur.models.meaning.labelled import act_of, labelled, together, varied, written
@@ -84,6 +83,9 @@ def test_wishes_on_motorways_keep_the_grammar() -> None:
 
 
 def test_sentences_are_the_same_for_the_same_seed() -> None:
+    pytest.importorskip("torch", reason="PyTorch is not installed: pip install 'chauffeur[models]'")
+    from chauffeur.models.meaning.batches import SentenceSource
+
     texts = []
     for _ in range(2):
         source = SentenceSource(banks(), written(), np.random.default_rng(5))

@@ -18,8 +18,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import TypeAdapter
-
 from chauffeur.concept import (
     ActionMatrix,
     DataError,
@@ -38,7 +36,6 @@ from chauffeur.planners.cache import content_key
 from chauffeur.planners.llm_reply import read_reply
 
 _VERSION = 1
-_ACTS: Final = TypeAdapter(tuple[Act, ...])
 _MAX_BYTES = 1_000_000_000
 
 
@@ -80,6 +77,14 @@ def _three(values: Any) -> tuple[float, float, float]:
     return float(first), float(second), float(third)
 
 
+def _acts(value: Any) -> tuple[Act, ...]:
+    if not value:
+        return ()
+    from pydantic import TypeAdapter  # imported late: most recordings hold no acts
+
+    return TypeAdapter(tuple[Act, ...]).validate_python(value)
+
+
 def _plan(line: Mapping[str, Any]) -> Plan:
     if "plan" not in line:
         raw = str(line["reply"])
@@ -91,7 +96,7 @@ def _plan(line: Mapping[str, Any]) -> Plan:
         thoughts=Thoughts(str(fields.pop("thoughts")["text"])),
         policy=_policy(fields.pop("policy")),
         settings=tuple((str(name), float(value)) for name, value in fields.pop("settings", ())),
-        acts=_ACTS.validate_python(fields.pop("acts", ())),
+        acts=_acts(fields.pop("acts", ())),
         usage=Usage(**fields.pop("usage", {})),
         **fields,
     )

@@ -61,15 +61,17 @@ class Comparison:
         self.unsure = any(claim.unsure for claim in self.claims)
 
 
-def moving(sides: frozenset[int]) -> str:
-    """A change of lanes in words."""
+def moving(sides: frozenset[int], *, driven: bool = False) -> str:
+    """A change of lanes in words: what a program does or, of one `driven`, what was done."""
     named = [_SIDE_WORDS[side] for side in sorted(sides - {0})]
-    return f"changes lanes to the {' or '.join(named)}" if named else "changes lanes"
+    changes = "changed lanes" if driven else "changes lanes"
+    return f"{changes} to the {' or '.join(named)}" if named else changes
 
 
-def turning(sides: frozenset[int]) -> str:
-    """A way over an intersection in words."""
-    return " or ".join("goes straight on" if side == 0 else f"turns {_SIDE_WORDS[side]}" for side in sorted(sides))
+def turning(sides: frozenset[int], *, driven: bool = False) -> str:
+    """A way over an intersection in words: what a program does or, of one `driven`, what was done."""
+    on, turns = ("went straight on", "turned") if driven else ("goes straight on", "turns")
+    return " or ".join(on if side == 0 else f"{turns} {_SIDE_WORDS[side]}" for side in sorted(sides))
 
 
 def sign_of(off_mps: float) -> int:

@@ -46,20 +46,20 @@ def _changed_lanes(case: Comparison, claims: Sequence[Claim], effect: Effect) ->
     if not told:
         stays = [one for one in claims if one.matter in LANES or (one.matter == "stay" and "speed" not in one.about)]
         if gone and (stays or (case.firm and not case.told & LANES)):
-            yield Mismatch("not-claimed", stays[0].sentence if stays else "", f"it {moving(gone)}")
+            yield Mismatch("not-claimed", stays[0].sentence if stays else "", f"it {moving(gone, driven=True)}")
         return
     named = frozenset(side for claim in case.claims if claim.matter in LANES for side in claim.sides)
     anywhere = any(not claim.sides or claim.matter != "lane" for claim in told)
     missed = next((claim for claim in told if claim.sides and not claim.sides & gone), None)
     if gone and not anywhere and gone - named:
-        yield Mismatch("wrong-side", told[0].sentence, f"it {moving(gone - named)}")
+        yield Mismatch("wrong-side", told[0].sentence, f"it {moving(gone - named, driven=True)}")
     elif effect.cut:
         return
     elif not gone:
         yield Mismatch("not-done", told[0].sentence, "it did not change lanes in this drive")
         return
     elif missed is not None:
-        yield Mismatch("not-done", missed.sentence, f"in this drive it only {moving(gone)}")
+        yield Mismatch("not-done", missed.sentence, f"in this drive it only {moving(gone, driven=True)}")
     ahead = effect.gaps_m[1]
     passing = next((claim for claim in told if claim.matter == "overtake"), None)
     if passing is not None and ahead is not None and ahead > 0.0 and not effect.cut:
@@ -72,7 +72,7 @@ def _turned(claims: Sequence[Claim], effect: Effect) -> Iterator[Mismatch]:
     if len(told) != 1 or done in told[0].sides:
         return  # of several turns, the heading at the end tells none
     if done:
-        yield Mismatch("wrong-side", told[0].sentence, f"in this drive it {turning(frozenset({done}))}")
+        yield Mismatch("wrong-side", told[0].sentence, f"in this drive it {turning(frozenset({done}), driven=True)}")
     elif not effect.cut:
         yield Mismatch("not-done", told[0].sentence, "it did not come to turn in this drive")
 
