@@ -172,9 +172,6 @@ def test_a_killed_session_loses_no_wish(silent_endpoint: str, answers: str, tmp_
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
     assert [each.text for each in unanswered(log)] == ["Slow down a bit."]
-    shown = CliRunner().invoke(app, ["audit", "show", str(log)])
-    assert shown.exit_code == 0
-    assert "wish: Slow down a bit." in shown.output
     _type_and_interrupt(log, answers)
     assert verify(log).ok
     assert unanswered(log) == ()

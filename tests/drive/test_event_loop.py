@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import signal
 import threading
+from collections.abc import Iterator
 from contextvars import ContextVar
 
 import pytest
@@ -71,6 +72,15 @@ async def _set(event: asyncio.Event) -> None:
     event.set()
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Python's own interrupt, also where the tests were started in the background of a shell, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_cancels_it_and_waits_for_it_to_clean_up() -> None:
     ended: list[str] = []
     caller = threading.get_ident()

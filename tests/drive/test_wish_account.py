@@ -25,7 +25,7 @@ def going_to(route: str) -> Plan:
         ("Overtake and come back.", plan("overtake.left"), ()),
         ("Step on it, I'm late", plan("style.hurry"), ()),
         ("Pull over after the fountain", plan("pull_over"), ("after the fountain",)),
-        ("Turn left, then left again", plan("way left"), ("left again",)),
+        ("Turn left, then left again", plan("way left"), ("then left again",)),
         ("Turn left, then left again", plan("way left+way left"), ()),
         ("Slow down if it starts raining", plan("speed.decrease"), ("if it starts raining",)),
         ("Stop after the church", plan("stop", 'def f():\n    x = get_distance_to_place("church")\n'), ()),

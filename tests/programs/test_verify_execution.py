@@ -123,9 +123,7 @@ def assert_calls_are_foreseen(report: Verification, calls: list[Call], source: s
     for call in calls:
         name, line, given = call.name, call.line, call.given
         sites = [
-            site
-            for site in report.calls
-            if (site.name, site.line, site.in_library) == (name, line, call.in_library)
+            site for site in report.calls if (site.name, site.line, site.in_library) == (name, line, call.in_library)
         ]
         assert sites, f"{name} in line {line} was not foreseen\n{source}"
         for param, value in given.items():

@@ -74,7 +74,7 @@ def test_the_reason_says_what_where_and_what_would_do(snap: Snap, plan: Make) ->
         "A target speed of 38.89 m/s (140 km/h) is more than 1 m/s (4 km/h) above the speed limit of 30 m/s (108 km/h) "
         "here.",
         4,
-        "Use a speed from 0 to 31 m/s (112 km/h).",
+        "Use a target speed from 0 to 31 m/s (112 km/h).",
     )
     assert judge(plan(program("set_target_speed(25)")), snap(), CAPPED).reason == (
         "A target speed of 25 m/s (90 km/h) is above the cap of 20 m/s (72 km/h)."
@@ -283,7 +283,7 @@ def test_all_faults_are_told_the_first_line_leads(snap: Snap, plan: Make) -> Non
     assert verdict.reason.count("99 m/s") == 1
     assert verdict.reason.count("time headway of 0.1 s") == 1
     assert "98 m/s" in verdict.reason
-    assert verdict.remedy == "Use a speed from 0 to 31 m/s (112 km/h)."
+    assert verdict.remedy == "Use a target speed from 0 to 31 m/s (112 km/h)."
 
 
 def test_a_check_never_edits_the_plan(snap: Snap, plan: Make) -> None:

@@ -79,7 +79,7 @@ def test_what_is_said_of_a_good_form(plan: Make, snap: Snap, policy: Any, reason
 TOO_FAST = (
     "A target speed of 40 m/s (144 km/h) is more than 1 m/s (4 km/h) above the speed limit of 30 m/s (108 km/h) here."
 )
-SPEED_REMEDY = "Use a speed from 0 to 31 m/s (112 km/h)."
+SPEED_REMEDY = "Use a target speed from 0 to 31 m/s (112 km/h)."
 TURN = "The program wants to {} at the next intersection, but there is no intersection ahead."
 GAP = (
     "A gap of {} centre to centre leaves {} between the bumpers; at 25 m/s (90 km/h) at least {} and more than 0 m are "
@@ -159,7 +159,7 @@ def test_what_is_said_of_a_cap(plan: Make, snap: Snap) -> None:
     found = check_parameters(plan(program("set_target_speed(25)")), snap(), Limits(max_speed_mps=20.0))
     assert (found.reason, found.line) == (
         "A target speed of 25 m/s (90 km/h) is above the cap of 20 m/s (72 km/h).", 3)  # fmt: skip
-    assert found.remedy == "Use a speed from 0 to 20 m/s (72 km/h)."
+    assert found.remedy == "Use a target speed from 0 to 20 m/s (72 km/h)."
 
 
 def test_several_faults_are_told_in_order_and_the_first_is_remedied(plan: Make, snap: Snap) -> None:

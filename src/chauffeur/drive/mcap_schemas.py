@@ -79,7 +79,13 @@ class Channel:
 INSTRUCTION = Channel(
     "/instruction",
     "chauffeur.Instruction",
-    _object(text=_text("I: the wish"), person=_text(), source=_text(), confirmed=_text("question it is the yes to")),
+    _object(
+        text=_text("I: the wish"),
+        person=_text(),
+        source=_text(),
+        confirmed=_text("question it is the yes to"),
+        said=_text("the words as they came, where `text` is a whole sentence for them"),
+    ),
 )
 CONTEXT = Channel(
     "/context",

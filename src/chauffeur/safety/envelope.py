@@ -191,7 +191,7 @@ def _turn_faults(reading: ProgramReading, road: _Road) -> Iterator[_Fault]:
 def _speed_faults(what: str, value: float, road: _Road, limits: Limits, line: int | None = None) -> Iterator[_Fault]:
     allowed = road.limit_mps + limits.max_over_limit_mps
     cap = math.inf if limits.max_speed_mps is None else limits.max_speed_mps
-    remedy = f"Use a speed from 0 to {speed_words(min(allowed, cap))}."
+    remedy = f"Use a target speed from 0 to {speed_words(min(allowed, cap))}."
     if not math.isfinite(value):
         yield _Fault(f"The {what} is {value}, not a speed.", remedy, line)
     elif value < 0:

@@ -10,6 +10,7 @@ from typing import Final
 from chauffeur.concept import ConfigError, Plan, PlanRequest, Program, Thoughts
 from chauffeur.concept.dialogue import wishes
 from chauffeur.concept.utterance import Act, Reference, Utterance
+from chauffeur.describe.answers import DONT_KNOW
 from chauffeur.language.ground import ROAD_USERS
 from chauffeur.language.meaning.reader import read
 from chauffeur.language.meaning.words import act_words
@@ -29,7 +30,7 @@ _UNCLEAR: Final = "I hear that you want something, and do not know what. Please 
 FOR_OTHERS: Final = {
     "remark": "I hear a remark, and nothing for me to do.",
     "story": "I hear a story, and nothing for me to do.",
-    "question": "I hear a question, and change nothing.",
+    "question": DONT_KNOW,
     "feedback": "Thank you for telling me. I change nothing now.",
     "other": "I think that was not said to me, and change nothing.",
 }
