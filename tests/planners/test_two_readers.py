@@ -92,3 +92,17 @@ def test_alike_is_the_same_thing_to_do_with_the_same_numbers(one: DialectStep, o
 )
 def test_a_number_is_one_that_was_said(wish: str, step: DialectStep, said: bool) -> None:
     assert quoted(wish, (step,)) is said
+
+
+@pytest.mark.parametrize(
+    ("spoken", "acts_sure", "driven"),
+    [
+        (SpokenSteps((FASTER,)), 0.8, True),
+        (SpokenSteps((FASTER,)), 0.7, False),
+        (SpokenSteps((FASTER, DialectStep("lane_left"))), 0.9, False),
+    ],
+)
+def test_one_sure_act_needs_no_network_that_only_asks(spoken: SpokenSteps, acts_sure: float, driven: bool) -> None:
+    said = Utterance("quicker", sure=acts_sure)
+    assert compared(said, spoken, (), 0.5, asks=True).sure == driven
+    assert not compared(said, spoken, (), 0.5).sure, "what it refuses is asked about"

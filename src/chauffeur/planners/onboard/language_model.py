@@ -224,7 +224,7 @@ class LanguageModelPlanner:
             )
         except ProgramError as error:
             return declined(self, "I did not understand that.", begun, intent="ask", raw=str(error))
-        found = compared(utterance, spoken, reply.steps, written.sure)
+        found = compared(utterance, spoken, reply.steps, written.sure, asks=bool(reply.question) and not reply.steps)
         if not found.steps:
             forbidden = (WHY_NOT[act.why] for act in utterance.acts if act.act == "refuse" and act.why in WHY_NOT)
             words = next(forbidden, "") or spoken.question or left_out(spoken.undoable)

@@ -20,6 +20,8 @@ SURE: Final = 0.9
 `bench passengers` in sight."""
 ACTS_SURE: Final = 0.5
 """Below this the acts are more likely wrong than right: what the network read is asked about rather than they."""
+ACTS_ALONE: Final = 0.75
+"""From this one act is believed where the network only asks what is wanted."""
 _CLOSE: Final = 0.011
 
 
@@ -38,7 +40,9 @@ class ReadWish:
     by_acts: bool = False
 
 
-def compared(utterance: Utterance, spoken: SpokenSteps, written: Sequence[DialectStep], sure: float) -> ReadWish:
+def compared(
+    utterance: Utterance, spoken: SpokenSteps, written: Sequence[DialectStep], sure: float, *, asks: bool = False
+) -> ReadWish:
     """What is to be driven.
 
     Args:
@@ -46,6 +50,7 @@ def compared(utterance: Utterance, spoken: SpokenSteps, written: Sequence[Dialec
         spoken: The acts as steps.
         written: The network's steps.
         sure: Probability of its least sure choice.
+        asks: Whether it wrote a question instead: it has no word against the acts.
     """
     if alike(spoken.steps, written):
         return ReadWish(spoken.steps, sure=not spoken.undoable, by_acts=True)
@@ -56,6 +61,8 @@ def compared(utterance: Utterance, spoken: SpokenSteps, written: Sequence[Dialec
     denied = any(act.negated for act in utterance.acts)  # what is not wanted no network outweighs
     if network and sure >= SURE and not denied and refused is None:
         return ReadWish(tuple(written), sure=True)
+    if asks and len(spoken.steps) == 1 and utterance.sure >= ACTS_ALONE:
+        return ReadWish(spoken.steps, sure=not spoken.undoable, by_acts=True)
     if spoken.steps and (utterance.sure >= ACTS_SURE or not network):
         return ReadWish(spoken.steps, by_acts=True)
     return ReadWish(tuple(written))
