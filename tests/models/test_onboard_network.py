@@ -220,7 +220,7 @@ def test_a_checkpoint_loads_in_transformers_and_answers_chats(model: Any, tokeni
     words = AutoTokenizer.from_pretrained(tmp_path)
     chat = [{"role": "user", "content": "Take the LEFT lane"}]
     text = words.apply_chat_template(chat, tokenize=False)
-    assert text == prompt(None, (), "take the left lane", drafted=False)
+    assert text == prompt(None, (), "take the left lane")
     ids = words(text, return_tensors="pt", add_special_tokens=False).input_ids
     out = loaded.generate(ids, max_new_tokens=40, do_sample=False)
     reply = words.decode(out[0, ids.shape[1] :], skip_special_tokens=True)
