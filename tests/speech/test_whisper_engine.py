@@ -26,7 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     import tiny_whisper
 
     at = tmp_path_factory.mktemp("models") / "parrot"
-    return tiny_whisper.make(at, "Command.Stop!", AFTER, np.random.default_rng(0))
+    return tiny_whisper.make(at, "Please.Stop!", AFTER, np.random.default_rng(0))
 
 
 def test_a_model_in_a_folder_is_loaded_and_asked(folder: Path) -> None:
@@ -34,7 +34,7 @@ def test_a_model_in_a_folder_is_loaded_and_asked(folder: Path) -> None:
     assert engine.name == "whisper/parrot" and not engine.remote
     before = SOUND.copy()
     found = engine.recognise(SOUND)
-    assert found.text == "Command.Stop!"
+    assert found.text == "Please.Stop!"
     assert found.confidence is not None and found.confidence > 0.9 and not found.to_confirm
     assert engine.recognise(SOUND) == found
     assert np.array_equal(SOUND, before)
@@ -44,9 +44,9 @@ def test_a_model_that_hesitates_has_to_be_confirmed(tmp_path: Path) -> None:
     pytest.importorskip("faster_whisper", reason="needs the extra `speech`")
     import tiny_whisper
 
-    folder = tiny_whisper.make(tmp_path / "shy", "Command.Stop!", AFTER, np.random.default_rng(0), sure=0.95)
+    folder = tiny_whisper.make(tmp_path / "shy", "Please.Stop!", AFTER, np.random.default_rng(0), sure=0.95)
     found = WhisperRecogniser(folder, threads=1).recognise(SOUND)
-    assert found.text == "Command.Stop!" and found.to_confirm
+    assert found.text == "Please.Stop!" and found.to_confirm
     assert found.confidence is not None and found.confidence < 0.6
 
 
@@ -65,7 +65,7 @@ def test_it_opens_no_connection_and_writes_no_file(folder: Path, tmp_path: Path)
     )
     environ = {**os.environ, "TMPDIR": str(tmp_path), "HOME": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environ, check=True)
-    assert done.stdout.strip() == "Command.Stop! []"
+    assert done.stdout.strip() == "Please.Stop! []"
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 

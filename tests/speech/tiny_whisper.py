@@ -23,6 +23,7 @@ def make(folder: Path, says: str, after: int, rng: np.random.Generator, sure: fl
     Args:
         folder: New folder.
         says: What it says, fewer letters than `WIDTH`, without blanks: the library takes those for noise here.
+            No letter twice in a row: on processors whose 8-bit products saturate, those get uncertain.
         after: Number of tokens before its answer.
         rng: Weights that do not matter.
         sure: Scale of its certainty; below 1 it hesitates.
