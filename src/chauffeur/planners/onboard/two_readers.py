@@ -20,7 +20,7 @@ SURE: Final = 0.9
 `bench passengers` in sight."""
 ACTS_SURE: Final = 0.5
 """Below this the acts are more likely wrong than right: what the network read is asked about rather than they."""
-ACTS_ALONE: Final = 0.75
+ACTS_ALONE: Final = 0.8
 """From this one act is believed where the network only asks what is wanted."""
 _CLOSE: Final = 0.011
 
