@@ -263,7 +263,7 @@ GREEN = {"act": "straight", "when": {"type": "once", "event": "green", "ref": {"
 )
 def test_the_judge_tells_done_from_not_done(program: str, act: Any, stage: list[Any], result: str) -> None:
     """By what was driven alone: the program knows nothing of the words that it is judged by."""
-    _, judge = driven("Whatever.", stage, Fixed(program), acts=[act], duration_s=50.0)
+    _, judge = driven("Drive on.", stage, Fixed(program), acts=[act], duration_s=50.0)
     assert judge is not None
     assert [one.result for one in judge.judged] == [result], judge.judged
 

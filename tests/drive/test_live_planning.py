@@ -48,9 +48,9 @@ class Written:
                 raise ConfigError("No such model.")
             case "fault":
                 raise ZeroDivisionError("oops")
-            case "decline":
+            case "turn":
                 return Plan(Thoughts(""), None, refusal="Cars cannot fly.")
-            case "nothing":
+            case "follow":
                 return Plan(Thoughts(""), None)
             case "long":
                 return Plan(Thoughts(""), Program("#" * 400_000))
@@ -114,8 +114,8 @@ def test_a_wish_becomes_an_order_that_says_what_it_was_made_for(rig: Rig) -> Non
 @pytest.mark.parametrize(
     ("wish", "kind", "words"),
     [
-        ("decline", "declined", "cannot fly"),
-        ("nothing", "declined", "no program"),
+        ("turn left here", "declined", "cannot fly"),
+        ("follow the truck", "declined", "no program"),
         ("raise", "unplanned", "No such model"),
         ("fault", "unplanned", "ZeroDivisionError"),
         ("long", "unplanned", "does not fit"),
@@ -131,12 +131,12 @@ def test_what_goes_wrong_is_an_answer(rig: Rig, wish: str, kind: str, words: str
 
 def test_what_a_plan_was_made_of_is_left_for_the_books(rig: Rig) -> None:
     rig.bench.tick()
-    rig.ask("decline")
+    rig.ask("turn left here")
     asyncio.run(rig.answered())
     message = rig.briefs.latest()
     assert message is not None
     brief = read_brief(message.payload)
-    assert (brief.wish, brief.instruction.text, brief.trip, brief.tick) == ("w1", "decline", 1, 1)
+    assert (brief.wish, brief.instruction.text, brief.trip, brief.tick) == ("w1", "turn left here", 1, 1)
     assert brief.context == describe_with_traffic(rig.bench.world.observe())
     assert (brief.history.items, brief.plan.refusal) == ((), "Cars cannot fly.")
 
