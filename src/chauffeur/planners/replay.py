@@ -15,8 +15,9 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from chauffeur.concept import (
     ActionMatrix,
@@ -34,6 +35,9 @@ from chauffeur.concept import (
 from chauffeur.concept.utterance import Act
 from chauffeur.planners.cache import content_key
 from chauffeur.planners.llm_reply import read_reply
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 _VERSION = 1
 _MAX_BYTES = 1_000_000_000
@@ -77,12 +81,15 @@ def _three(values: Any) -> tuple[float, float, float]:
     return float(first), float(second), float(third)
 
 
-def _acts(value: Any) -> tuple[Act, ...]:
-    if not value:
-        return ()
+@cache  # it takes milliseconds to make, and a recording has a line a plan
+def _acts_reader() -> TypeAdapter[tuple[Act, ...]]:
     from pydantic import TypeAdapter  # imported late: most recordings hold no acts
 
-    return TypeAdapter(tuple[Act, ...]).validate_python(value)
+    return TypeAdapter(tuple[Act, ...])
+
+
+def _acts(value: Any) -> tuple[Act, ...]:
+    return _acts_reader().validate_python(value) if value else ()
 
 
 def _plan(line: Mapping[str, Any]) -> Plan:
