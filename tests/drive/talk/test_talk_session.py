@@ -109,6 +109,9 @@ def test_wish_opinion_memory_wheel_and_stop() -> None:
         person.until(lambda: "with your opinion" in person.conversation("w1").remembered)  # pyright: ignore
         assert person.conversation("w1").opinion == "much too slow"  # pyright: ignore
 
+        talk.take(Say("I didn't like that."))  # no wish: an opinion needs no button
+        assert person.conversation("w2").opinion == "I didn't like that."  # pyright: ignore
+
         talk.take(TakeOver(True))
         person.until(lambda: person.all(Scene)[-1].taken_over)  # pyright: ignore
         talk.take(Say("Faster."))

@@ -68,6 +68,7 @@ from chauffeur.drive.planning import (
 from chauffeur.drive.questions import NOT_MEANT, NOTHING_ASKED, TAKEN_BACK, Conversing
 from chauffeur.drive.session import MAX_WISH_CHARACTERS
 from chauffeur.drive.session_recorder import FLUSH_TIMEOUT_S
+from chauffeur.language.meaning.reader import read
 from chauffeur.language.meaning.turns import cancels, takes_back
 from chauffeur.language.questions import said_aside
 from chauffeur.memory.base import Memory
@@ -272,6 +273,13 @@ class VehicleSession:
         number, words = self._count, " ".join(text.split())
         if not words:
             return OnRoadAnswer(number, text, "declined", "The feedback is empty; say how it was.")
+        if await self._keep_feedback(number, words):
+            return OnRoadAnswer(number, words, "taken", "Kept with your last wish.", trip=self._last_trip)
+        why = "Nobody's profile is open" if self._person == NOBODY else "No drive of yours is kept that it is about"
+        return OnRoadAnswer(number, words, "declined", f"{why}; the feedback is not kept.")
+
+    async def _keep_feedback(self, number: int, words: str) -> bool:
+        """Keep an opinion with the last trip; whether there was one, and a memory to keep it."""
         memory, meant = self._memory, interpret_feedback(words)
         kept: bool | None = False
         if memory is not None and self._person != NOBODY:
@@ -279,10 +287,7 @@ class VehicleSession:
                 number, lambda: memory.attach_feedback(self._person, meant, self._last_trip or None)
             )
         self._say("feedback", words, number, Opinion(meant, str(self._person), bool(kept)))
-        if kept:
-            return OnRoadAnswer(number, words, "taken", "Kept with your last wish.", trip=self._last_trip)
-        why = "Nobody's profile is open" if self._person == NOBODY else "No drive of yours is kept that it is about"
-        return OnRoadAnswer(number, words, "declined", f"{why}; the feedback is not kept.")
+        return bool(kept)
 
     # One wish ---------------------------------------------------------------------------------------------------------
 
@@ -308,6 +313,8 @@ class VehicleSession:
         state = self._observed()
         if state.link not in _USABLE:
             return replace(answer, status="unreachable", words=_unreachable(state)), None
+        if self._last_trip and not is_stop(instruction.text) and read(instruction.text).address == "feedback":
+            await self._keep_feedback(number, instruction.text)  # and planned: it may ask for something else now
         begun = time.perf_counter()
         made = await self._made(number, instruction)
         answer = replace(

@@ -56,6 +56,7 @@ from chauffeur.drive.talk.view import View
 from chauffeur.drive.talk.voice import Voice
 from chauffeur.drive.talk.wish_queue import OVER, WishQueue, Words
 from chauffeur.language.emergency import SAFE_STOP_WISH, Emergency, read_emergency
+from chauffeur.language.meaning.reader import read
 from chauffeur.language.meaning.turns import answer_in, cancels, takes_back
 from chauffeur.language.questions import ends_session
 from chauffeur.memory.feedback import interpret_feedback
@@ -326,6 +327,9 @@ class Talk:
             return
         if self._runtime is not None and self._runtime.taken_over:
             self._say(Note(f"You have the wheel; give it back before you wish for something: “{words.text}”."))
+            return
+        if not words.follows and self._conversations.last_felt and read(words.text).address == "feedback":
+            self._evaluate(words.text, "", words)
             return
         self._asking.put(words)
 
