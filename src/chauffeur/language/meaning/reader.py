@@ -7,6 +7,7 @@ import re
 import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Final
 
 from chauffeur.concept.utterance import Act, ActPlace, Reference, Side, Span, Utterance
@@ -91,6 +92,7 @@ def _read_after(text: str, last: Utterance | None, parser: Parser | None = None)
     return alone, resolved(alone, last)
 
 
+@lru_cache(maxsize=16)  # planner, checks and session ask for the words of one wish each
 def _parsed(text: str, parser: Parser | None = None) -> Utterance:
     """What the parser makes of words by themselves."""
     emergency = read_emergency(text) is not None
