@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Final
 
 from chauffeur.concept import Alarm, Plan, PlanRequest, Program, Thoughts, Usage
 from chauffeur.concept.utterance import Act
@@ -41,6 +42,36 @@ class ReadSteps:
     usage: Usage = field(default_factory=Usage)
 
 
+_QUICKENS: Final = ("faster", "a_bit_faster", "much_faster", "hurry")
+_FOLLOWING_S: Final = 3.0
+"""Time headway up to which the vehicle ahead sets the ego's speed, when it is no faster."""
+_SAME_SPEED_MPS: Final = 1.0
+
+
+def past_the_lead(
+    steps: Sequence[DialectStep], acts: Sequence[Act], wish: str, request: PlanRequest
+) -> tuple[DialectStep, ...]:
+    """The steps, with an overtaking first where the lead vehicle holds up an ego that is to be faster by no number.
+
+    Args:
+        steps: What is to be driven.
+        acts: What the words ask for; who says what is not to be done gets nothing added.
+        wish: The words.
+        request: Where we are, and the limits.
+    """
+    here = request.context.situation
+    alone = len(steps) == 1 and steps[0].skill in _QUICKENS and steps[0].condition is None
+    lead = here.front
+    if not alone or lead is None or any(act.negated for act in acts):
+        return tuple(steps)
+    held_up = lead.speed_mps < here.speed_mps + _SAME_SPEED_MPS and lead.distance_m < _FOLLOWING_S * here.speed_mps
+    passing = DialectStep("overtake", manner=steps[0].manner)
+    if not held_up or wary_of(wish, steps[0].meaning.family):
+        return tuple(steps)
+    linked, _ = linked_here((passing, *steps), wish, request)
+    return tuple(steps) if isinstance(linked, Declined) else (passing, *steps)
+
+
 def linked_here(
     steps: Sequence[DialectStep], wish: str, request: PlanRequest
 ) -> tuple[Linked | Declined, tuple[Leaning, ...]]:
@@ -62,6 +93,7 @@ def plan_of_steps(planner: Planner, read: ReadSteps, request: PlanRequest, begun
         begun: When planning began, by `time.perf_counter`.
         unsure: Why the reading is to be asked about before it is driven; empty where it is sure.
     """
+    read = replace(read, steps=past_the_lead(read.steps, read.acts, read.wish, request))
     linked, used = linked_here(read.steps, read.wish, request)
     if isinstance(linked, Declined):
         intent = "+".join(step.meaning.family for step in read.steps)

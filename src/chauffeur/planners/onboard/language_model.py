@@ -20,7 +20,7 @@ from chauffeur.planners.meaning.highway import steps_before, steps_of
 from chauffeur.planners.meaning.planner import FOR_OTHERS, WHY_NOT, left_out, plan_by_sight, unused_words
 from chauffeur.planners.onboard.dialect import DialectStep, shall_i
 from chauffeur.planners.onboard.doubts import CAN_DO, ENGLISH_ONLY, foreign
-from chauffeur.planners.onboard.driven import ReadSteps, alarm_of, linked_here, plan_of_linked
+from chauffeur.planners.onboard.driven import ReadSteps, alarm_of, linked_here, past_the_lead, plan_of_linked
 from chauffeur.planners.onboard.engine import Engine, Written
 from chauffeur.planners.onboard.link import Linked
 from chauffeur.planners.onboard.options import Declined
@@ -236,10 +236,11 @@ class LanguageModelPlanner:
             return declined(self, words, begun, intent=intent, usage=usage_of(written), raw=written.text)
         acts, assumed = (spoken.done, spoken.assumed) if found.by_acts else ((), ())
         unused = unused_words(utterance, spoken.undoable) if found.by_acts else None
-        reads = ReadSteps(wish, found.steps, acts, assumed, unused, written.text, usage_of(written))
-        linked, used = linked_here(found.steps, wish, request)
+        steps = past_the_lead(found.steps, utterance.acts, wish, request)
+        reads = ReadSteps(wish, steps, acts, assumed, unused, written.text, usage_of(written))
+        linked, used = linked_here(steps, wish, request)
         if isinstance(linked, Declined):
-            intent = "+".join(step.meaning.family for step in found.steps)
+            intent = "+".join(step.meaning.family for step in steps)
             plan = declined(self, linked.words, begun, intent=intent, usage=reads.usage, raw=written.text)
             return replace(plan, alarm=alarm_of(reads, sure=found.sure))
         words = left_out(spoken.undoable) if found.by_acts else ""

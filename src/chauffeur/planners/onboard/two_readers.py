@@ -23,6 +23,8 @@ ACTS_SURE: Final = 0.5
 ACTS_ALONE: Final = 0.8
 """From this one act is believed where the network only asks what is wanted."""
 _CLOSE: Final = 0.011
+_PACES: Final = {"style.hurry": "speed.increase", "style.relax": "speed.decrease"}
+"""Styles that are first of all a pace."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +71,9 @@ def compared(
 
 
 def alike(some: Sequence[DialectStep], others: Sequence[DialectStep]) -> bool:
-    """Whether two programs do the same; how much a "bit" is, and how briskly, are no difference."""
+    """Whether two programs do the same; how much a "bit" is, how briskly, and whether haste is a pace or a style, are
+    no difference.
+    """
     return (
         bool(some)
         and len(some) == len(others)
@@ -80,9 +84,14 @@ def alike(some: Sequence[DialectStep], others: Sequence[DialectStep]) -> bool:
 def _same_step(one: DialectStep, other: DialectStep) -> bool:
     named = None if one.condition is None else (one.condition.how, one.condition.name)
     tested = None if other.condition is None else (other.condition.how, other.condition.name)
-    kinds = one.meaning.family == other.meaning.family and one.meaning.variant == other.meaning.variant
+    kinds = _kind(one) == _kind(other)
     same_numbers = len(one.numbers) == len(other.numbers) and all(map(_close, one.numbers, other.numbers))
     return kinds and SKILLS[one.skill].takes == SKILLS[other.skill].takes and named == tested and same_numbers
+
+
+def _kind(step: DialectStep) -> tuple[str, str]:
+    meaning = step.meaning
+    return (meaning.family, meaning.variant) if meaning.family not in _PACES else (_PACES[meaning.family], "")
 
 
 def _close(one: Number, other: Number) -> bool:
