@@ -72,13 +72,13 @@ def test_it_is_the_default_planner() -> None:
     [
         ("Drive at 55 mph.", ["drive_at(mph(55))"]),
         ("Please go 3 m/s slower", ["slower_by(3)"]),
-        ("could you go faster", ["faster()"]),
+        ("could you go faster", ["overtake()", "faster()"]),
         ("keep 30 meters distance to the car in front", ["gap_of(30)"]),
         ("Change to the left lane", ["lane_left()"]),
         ("Change to the right lane", ["lane_right()"]),
         ("overtake the car ahead on the left", ["overtake_left()"]),
         ("overtake the car ahead on the right", ["overtake_right()"]),
-        ("I'm late for work", ["hurry()"]),
+        ("I'm late for work", ["overtake()", "hurry()"]),
         ("take the left lane and then slow down by 5 mph", ["lane_left()", "slower_by(mph(5))"]),
     ],
 )
@@ -111,7 +111,7 @@ def test_numbers_are_copied_digit_by_digit(planner: LanguageModelPlanner, speed:
 def test_opposite_words_make_opposite_programs(
     planner: LanguageModelPlanner, wish: str, other: tuple[str, str]
 ) -> None:
-    first, second = (steps(planned(planner, wish.format(word)))[0].meaning for word in other)
+    first, second = (steps(planned(planner, wish.format(word)))[-1].meaning for word in other)
     assert first.manoeuvre == second.manoeuvre
     if first.direction is not None:
         assert {first.direction, second.direction} == set(other)

@@ -19,8 +19,8 @@ from chauffeur.models.meaning.highway import HighwaySentences
 from chauffeur.models.meaning.labelled import together, varied
 from chauffeur.models.meaning.noise import with_noise
 
-WRITTEN_SHARE: Final = 0.5
-HIGHWAY_SHARE: Final = 0.2
+WRITTEN_SHARE: Final = 0.6
+HIGHWAY_SHARE: Final = 0.15
 """The rest is composed from phrases."""
 JOINED_SHARE: Final = 0.12
 """Share of labelled sentences that are said together with another."""

@@ -48,28 +48,21 @@ _FOLLOWING_S: Final = 3.0
 _SAME_SPEED_MPS: Final = 1.0
 
 
-def past_the_lead(
-    steps: Sequence[DialectStep], acts: Sequence[Act], wish: str, request: PlanRequest
-) -> tuple[DialectStep, ...]:
-    """The steps, with an overtaking first where the lead vehicle holds up an ego that is to be faster by no number.
+def past_the_lead(read: ReadSteps, request: PlanRequest) -> tuple[ReadSteps, Linked, tuple[Leaning, ...]] | None:
+    """The same with an overtaking first, where the lead vehicle holds up an ego that is to be faster by no number.
 
-    Args:
-        steps: What is to be driven.
-        acts: What the words ask for; who says what is not to be done gets nothing added.
-        wish: The words.
-        request: Where we are, and the limits.
+    None where nothing holds it up, it cannot be overtaken, or the person said what is not to be done.
     """
     here = request.context.situation
-    alone = len(steps) == 1 and steps[0].skill in _QUICKENS and steps[0].condition is None
-    lead = here.front
-    if not alone or lead is None or any(act.negated for act in acts):
-        return tuple(steps)
-    held_up = lead.speed_mps < here.speed_mps + _SAME_SPEED_MPS and lead.distance_m < _FOLLOWING_S * here.speed_mps
-    passing = DialectStep("overtake", manner=steps[0].manner)
-    if not held_up or wary_of(wish, steps[0].meaning.family):
-        return tuple(steps)
-    linked, _ = linked_here((passing, *steps), wish, request)
-    return tuple(steps) if isinstance(linked, Declined) else (passing, *steps)
+    step, lead = read.steps[0], here.front
+    alone = len(read.steps) == 1 and step.skill in _QUICKENS and step.condition is None
+    if not alone or lead is None or any(act.negated for act in read.acts) or wary_of(read.wish, step.meaning.family):
+        return None
+    if lead.speed_mps > here.speed_mps + _SAME_SPEED_MPS or lead.distance_m > _FOLLOWING_S * here.speed_mps:
+        return None
+    passing = replace(read, steps=(DialectStep("overtake", manner=step.manner), step))
+    linked, used = linked_here(passing.steps, passing.wish, request)
+    return None if isinstance(linked, Declined) else (passing, linked, used)
 
 
 def linked_here(
@@ -93,11 +86,12 @@ def plan_of_steps(planner: Planner, read: ReadSteps, request: PlanRequest, begun
         begun: When planning began, by `time.perf_counter`.
         unsure: Why the reading is to be asked about before it is driven; empty where it is sure.
     """
-    read = replace(read, steps=past_the_lead(read.steps, read.acts, read.wish, request))
     linked, used = linked_here(read.steps, read.wish, request)
     if isinstance(linked, Declined):
         intent = "+".join(step.meaning.family for step in read.steps)
         return replace(declined(planner, linked.words, begun, intent=intent), alarm=alarm_of(read, sure=not unsure))
+    if (passing := past_the_lead(read, request)) is not None:
+        read, linked, used = passing
     why = unsure or slow_words(linked.choice.steps, request.context.situation, request.limits)
     if why and (question := unanswered(request.instruction, f"{why} {shall_i(read.steps)}")):
         return replace(asked(planner, question, begun, offer=read.wish), alarm=alarm_of(read, sure=not unsure))

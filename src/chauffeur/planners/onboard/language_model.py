@@ -193,6 +193,9 @@ class LanguageModelPlanner:
         settled = self.settle(request, begun)
         if isinstance(settled, Plan):
             return settled
+        if (passing := past_the_lead(settled.read, request)) is not None:
+            read, linked, used = passing
+            settled = replace(settled, read=read, linked=linked, used=used)
         if asks := settled.question(request):
             plan = asked(self, asks, begun, offer=settled.wish, raw=settled.written.text)
             return replace(plan, usage=usage_of(settled.written), alarm=alarm_of(settled.read, sure=settled.witnessed))
@@ -236,11 +239,10 @@ class LanguageModelPlanner:
             return declined(self, words, begun, intent=intent, usage=usage_of(written), raw=written.text)
         acts, assumed = (spoken.done, spoken.assumed) if found.by_acts else ((), ())
         unused = unused_words(utterance, spoken.undoable) if found.by_acts else None
-        steps = past_the_lead(found.steps, utterance.acts, wish, request)
-        reads = ReadSteps(wish, steps, acts, assumed, unused, written.text, usage_of(written))
-        linked, used = linked_here(steps, wish, request)
+        reads = ReadSteps(wish, found.steps, acts, assumed, unused, written.text, usage_of(written))
+        linked, used = linked_here(found.steps, wish, request)
         if isinstance(linked, Declined):
-            intent = "+".join(step.meaning.family for step in steps)
+            intent = "+".join(step.meaning.family for step in found.steps)
             plan = declined(self, linked.words, begun, intent=intent, usage=reads.usage, raw=written.text)
             return replace(plan, alarm=alarm_of(reads, sure=found.sure))
         words = left_out(spoken.undoable) if found.by_acts else ""

@@ -55,7 +55,8 @@ def compared(
         asks: Whether it wrote a question instead: it has no word against the acts.
     """
     if alike(spoken.steps, written):
-        return ReadWish(spoken.steps, sure=not spoken.undoable, by_acts=True)
+        steps = tuple(other if _is_style(other) else one for one, other in zip(spoken.steps, written, strict=True))
+        return ReadWish(steps, sure=not spoken.undoable, by_acts=True)
     network = bool(written) and quoted(utterance.text, written)
     refused = next((act.why for act in utterance.acts if act.act == "refuse"), None)
     if utterance.sure >= ACTS_SURE and (spoken.question or refused == "not driving"):
@@ -92,6 +93,11 @@ def _same_step(one: DialectStep, other: DialectStep) -> bool:
 def _kind(step: DialectStep) -> tuple[str, str]:
     meaning = step.meaning
     return (meaning.family, meaning.variant) if meaning.family not in _PACES else (_PACES[meaning.family], "")
+
+
+def _is_style(step: DialectStep) -> bool:
+    """Whether it is a pace as a way of driving: it says more than the pace, and what a person likes is kept by it."""
+    return step.meaning.family in _PACES
 
 
 def _close(one: Number, other: Number) -> bool:
