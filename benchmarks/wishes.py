@@ -6,7 +6,8 @@
 a reading says it back as a question ("Shall I drive slower?"); each is answered with yes, as a person would whose wish
 it names, and a drive that then misses the wish counts as asked in vain. `opposite` is a wrong drive to the other side,
 or with the other sign, by the plan's own tags. Wishes noted `pair N do` and `pair N dont`, or `chat N plain` and `chat
-N chat`, are counted as pairs as well: both are to be right. Judged like `chauffeur bench passengers`.
+N chat`, are counted as pairs as well: both are to be right. Judged like `chauffeur bench passengers`; but a `dont` that
+asks for nothing else is right, too, where a drive does not do what its `do` asks for ("don't overtake": it follows).
 """
 
 from __future__ import annotations
@@ -58,6 +59,7 @@ class Judged:
         self._planner = planner
         self._requests = PassengerRequests(PlainRequests.of("few-shot", LAMPILOT_LIMITS), wishes)
         self._contexts: dict[str, Context] = {}
+        self._denied = {wish.note.removesuffix("do") + "dont": wish for wish in wishes if wish.note.endswith(" do")}
 
     def outcome(self, wish: PassengerWish) -> str:
         """What became of a wish."""
@@ -78,6 +80,9 @@ class Judged:
 
     def _right(self, wish: PassengerWish, plan: Plan) -> bool:
         stored: dict[str, Any] = plan_adapter.dump_python(plan_adapter.validate_python(asdict(plan)), mode="json")
+        if wish.right == "refuse" and plan.policy is not None and (denied := self._denied.get(wish.note)) is not None:
+            scene = replace(wish.scene, goal=denied.scene.goal)
+            return not bool(roll_out(RolloutJob(wish.id, scene, "", stored, LAMPILOT_LIMITS))["success"])
         row = roll_out(RolloutJob(wish.id, wish.scene, "", stored, LAMPILOT_LIMITS))
         return answered_rightly(wish.scene.goal, refused=bool(row["refused"]), success=bool(row["success"]))
 

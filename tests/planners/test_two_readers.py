@@ -1,13 +1,15 @@
-"""What is driven of two readings: what both say; the surer network; else a question."""
+"""What is driven of two readings: what both say; what the one that is sure says; else a question."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import pytest
 
 from chauffeur.concept.utterance import Utterance
 from chauffeur.planners.meaning.highway import SpokenSteps
 from chauffeur.planners.onboard.dialect import DialectStep, Number, StepCondition
-from chauffeur.planners.onboard.two_readers import ACTS_SURE, SURE, alike, compared, quoted
+from chauffeur.planners.onboard.two_readers import ACTS_ALONE, ACTS_SURE, SURE, alike, compared, quoted
 
 FASTER, SLOWER = DialectStep("faster"), DialectStep("slower")
 FAST = DialectStep("drive_at", Number(60.0, "mph"))
@@ -29,17 +31,19 @@ def read(
     ("acts", "network", "sure", "acts_sure", "steps", "driven"),
     [
         (FASTER, FASTER, 0.1, 0.1, (FASTER,), True),
-        (FASTER, SLOWER, SURE, 1.0, (SLOWER,), True),
-        (FASTER, SLOWER, 0.8, 1.0, (FASTER,), False),
+        (FASTER, SLOWER, SURE, 1.0, (FASTER,), False),
+        (FASTER, SLOWER, SURE, ACTS_ALONE - 0.1, (SLOWER,), True),
+        (FASTER, SLOWER, 0.8, ACTS_ALONE, (FASTER,), True),
+        (FASTER, SLOWER, 0.8, ACTS_ALONE - 0.1, (FASTER,), False),
         (FASTER, SLOWER, 0.8, ACTS_SURE - 0.1, (SLOWER,), False),
         (None, SLOWER, SURE, 1.0, (SLOWER,), True),
         (None, SLOWER, 0.8, 1.0, (SLOWER,), False),
-        (FASTER, None, 1.0, 1.0, (FASTER,), False),
+        (FASTER, None, 1.0, 1.0, (FASTER,), True),
         (FASTER, DialectStep("drive_at", Number(80.0, "mph")), 1.0, 0.1, (FASTER,), False),
         (None, None, 1.0, 1.0, (), False),
     ],
 )
-def test_what_both_read_or_the_network_is_sure_of_is_driven(
+def test_what_both_read_or_the_surer_one_does_is_driven(
     acts: DialectStep | None,
     network: DialectStep | None,
     sure: float,
@@ -95,15 +99,14 @@ def test_a_number_is_one_that_was_said(wish: str, step: DialectStep, said: bool)
     assert quoted(wish, (step,)) is said
 
 
-@pytest.mark.parametrize(
-    ("spoken", "acts_sure", "driven"),
-    [
-        (SpokenSteps((FASTER,)), 0.8, True),
-        (SpokenSteps((FASTER,)), 0.7, False),
-        (SpokenSteps((FASTER, DialectStep("lane_left"))), 0.9, False),
-    ],
-)
-def test_one_sure_act_needs_no_network_that_only_asks(spoken: SpokenSteps, acts_sure: float, driven: bool) -> None:
-    said = Utterance("quicker", sure=acts_sure)
-    assert compared(said, spoken, (), 0.5, asks=True).sure == driven
-    assert not compared(said, spoken, (), 0.5).sure, "what it refuses is asked about"
+def test_what_the_network_refuses_or_leaves_out_is_asked_about() -> None:
+    wish = Utterance("faster, then the left lane", sure=0.7)
+    both = SpokenSteps((FASTER, DialectStep("lane_left")))
+    assert not compared(wish, both, (FASTER,), 1.0).sure
+    assert not compared(replace(wish, sure=1.0), both, (), 0.5, refuses=True).sure
+    assert compared(replace(wish, sure=1.0), both, (), 0.5).sure
+
+
+def test_words_for_somebody_else_are_not_driven_by_the_network_alone() -> None:
+    for address, driven in (("car", True), ("story", False)):
+        assert compared(Utterance("we left", sure=0.7, address=address), SpokenSteps(), (FASTER,), 1.0).sure is driven

@@ -51,6 +51,8 @@ _BOUNDS: Final = {
     ("gap", "less"): "gap_at_least", ("gap", "more"): "gap_at_most",
 }  # fmt: skip
 """What "not faster than 100" is."""
+_ONCE: Final = ("yield", "follow", "keep", "resume", "style", "pull_over", "stop")
+"""Said twice it is done once; two lanes to the left are said as one and another."""
 _ASKED: Final[Mapping[Verb, str]] = {
     "speed": "Shall I drive faster or slower, or at a speed you name?",
     "gap": "Shall I close up or drop back, or keep a distance you name?",
@@ -146,6 +148,8 @@ class _Speaker:
                 undoable.append(Undoable(act, f"I remember {MAX_STEPS} things at a time; tell me that later"))
                 continue
             done.append(act)
+            if found and found == self._steps[-1:] and SKILLS[found[0].skill].meaning.manoeuvre in _ONCE:
+                continue
             if found:
                 found[0] = replace(found[0], wait_s=self._wait or found[0].wait_s)
                 self._wait = None

@@ -227,7 +227,7 @@ class LanguageModelPlanner:
             )
         except ProgramError as error:
             return declined(self, "I did not understand that.", begun, intent="ask", raw=str(error))
-        found = compared(utterance, spoken, reply.steps, written.sure, asks=bool(reply.question) and not reply.steps)
+        found = compared(utterance, spoken, reply.steps, written.sure, refuses=bool(reply.refusal))
         if not found.steps:
             forbidden = (WHY_NOT[act.why] for act in utterance.acts if act.act == "refuse" and act.why in WHY_NOT)
             words = next(forbidden, "") or spoken.question or left_out(spoken.undoable)

@@ -1,7 +1,8 @@
 """Two readers of the same words: the acts of the one reader, and the on-board network's program.
 
-Neither knows the other. What both read is driven. Where they differ the network is believed if it is sure enough and
-every number of its program was said; anything else is asked about in one question that a yes answers.
+Neither knows the other. What both read is driven. Where they differ the one that is sure is believed; where both are,
+or neither, what the acts say is asked about in one question that a yes answers. The network counts as sure only if
+every number of its program was said, and it does not make less of the words, or of words that are for somebody else.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ SURE: Final = 0.9
 `bench passengers` in sight."""
 ACTS_SURE: Final = 0.5
 """Below this the acts are more likely wrong than right: what the network read is asked about rather than they."""
-ACTS_ALONE: Final = 0.8
-"""From this one act is believed where the network only asks what is wanted."""
+ACTS_ALONE: Final = 0.75
+"""From this the acts are believed against a network that is not sure: of 450 turns on the motorway by a writer whom
+neither reader had seen, 27 of the 31 that it drives were right, and of the network's programs none."""
 _CLOSE: Final = 0.011
 _PACES: Final = {"style.hurry": "speed.increase", "style.relax": "speed.decrease"}
 """Styles that are first of all a pace."""
@@ -43,16 +45,16 @@ class ReadWish:
 
 
 def compared(
-    utterance: Utterance, spoken: SpokenSteps, written: Sequence[DialectStep], sure: float, *, asks: bool = False
+    utterance: Utterance, spoken: SpokenSteps, written: Sequence[DialectStep], sure: float, *, refuses: bool = False
 ) -> ReadWish:
     """What is to be driven.
 
     Args:
         utterance: What the acts were read from.
         spoken: The acts as steps.
-        written: The network's steps.
+        written: The network's steps; none where it asks or refuses.
         sure: Probability of its least sure choice.
-        asks: Whether it wrote a question instead: it has no word against the acts.
+        refuses: Whether it refuses: then nothing is driven without a question.
     """
     if alike(spoken.steps, written):
         steps = tuple(other if _is_style(other) else one for one, other in zip(spoken.steps, written, strict=True))
@@ -62,12 +64,13 @@ def compared(
     if utterance.sure >= ACTS_SURE and (spoken.question or refused == "not driving"):
         return ReadWish()
     denied = any(act.negated for act in utterance.acts)  # what is not wanted no network outweighs
-    if network and sure >= SURE and not denied and refused is None:
+    allowed = utterance.address == "car" and not denied and refused is None and len(written) >= len(spoken.steps)
+    by_network = network and allowed and sure >= SURE
+    by_acts = bool(spoken.steps) and not spoken.undoable and not refuses and utterance.sure >= ACTS_ALONE
+    if by_network and not by_acts:
         return ReadWish(tuple(written), sure=True)
-    if asks and len(spoken.steps) == 1 and utterance.sure >= ACTS_ALONE:
-        return ReadWish(spoken.steps, sure=not spoken.undoable, by_acts=True)
     if spoken.steps and (utterance.sure >= ACTS_SURE or not network):
-        return ReadWish(spoken.steps, by_acts=True)
+        return ReadWish(spoken.steps, sure=by_acts and not by_network, by_acts=True)
     return ReadWish(tuple(written))
 
 
