@@ -46,7 +46,7 @@ from chauffeur.planners.registry import make_planner
 from chauffeur.safety.checks import DEFAULT_CHECKS
 from chauffeur.worlds.town import TownWorld
 
-VERSION: Final = "realization-v3"
+VERSION: Final = "realization-v4"
 """Stage, judge and rollout together; changes whenever the same command could give another row."""
 LABELS, BLIND = "labels", "blind"
 _ON: Final[Mapping[str, str]] = {

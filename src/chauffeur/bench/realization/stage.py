@@ -37,7 +37,10 @@ _OVER_THE_STREET_M: Final = 6.4
 _KERB_PLACES_M: Final = (44.0, 30.0, 20.0)
 _ROW_M: Final = (22.0, 34.0, 46.0)
 """Where several alike stand, one of which an ordinal names."""
-_AFTER_TURN_M: Final = (112.0, 96.0)
+_AFTER_TURN_M: Final = (124.0, 108.0)
+"""Far enough behind the junction that a distractor leaves room to come out of it."""
+_LEFT_TURN_M: Final = 10.0
+"""How much longer the way over a junction is to the left."""
 _SECOND_TURN_M: Final = 98.0
 """How much farther it is behind a second turn."""
 _VERBS: Final = frozenset(
@@ -55,6 +58,7 @@ _NEEDS_NOTHING: Final[frozenset[ReferenceKind]] = frozenset(
     {"junction", "light", "me_here", "road", "lane", "crosswalk", "end_of_road"}
 )
 _COUNTED: Final[frozenset[ReferenceKind]] = frozenset({"junction", "light", "road"})
+_MOST_COUNTED: Final = 3
 _ANYWHERE: Final[frozenset[ReferenceKind]] = frozenset({"road", "lane", "sidewalk", "other"})
 """What something may stand on or by without being staged."""
 _OTHER: Final[dict[StagedKind, StagedKind]] = {"car": "truck", "truck": "car", "bus": "car", "van": "truck"}
@@ -127,7 +131,8 @@ def _starts(acts: Sequence[Act]) -> tuple[Start, ...]:
         return (ENDS[side],)
     if len(turns) > 1 and turns[0].act == "straight" and not changes:
         return (FAR[side or "right"],)
-    if any(_counts(act) for act in acts) and not changes:
+    passed_up = any(act.act == "turn" and act.negated for act in acts) and bool(turns)
+    if (passed_up or any(_counts(act) for act in acts)) and not changes:
         return (FAR[side or "right"],)
     if changes and changes[0] < turned:
         to_left = _lane_side(acts[changes[0]]) == "left"
@@ -146,6 +151,12 @@ def _counts(act: Act) -> bool:
     return any(one is not None and one.kind in _COUNTED and (one.ordinal or 1) > 1 for one in held)
 
 
+def _too_far(act: Act) -> bool:
+    """Whether an act names a junction beyond those that a town has in a row."""
+    reference = None if act.place is None else act.place.ref
+    return reference is not None and reference.kind in _COUNTED and (reference.ordinal or 1) > _MOST_COUNTED
+
+
 def _at_end(act: Act) -> bool:
     return act.place is not None and act.place.ref is not None and act.place.ref.kind == "end_of_road"
 
@@ -159,9 +170,11 @@ def _staged(acts: Sequence[Act], start: Start) -> CommandScene:
     """The scene at a start. Raises _UnstagedError."""
     named = tuple(reference for act in acts for reference, _ in _roles(act))
     scene = CommandScene(start, _ROLLING_MPS if acts[0].act in ("speed", "gap") else 0.0, named=named)
-    way: tuple[Side, ...] = ()
+    way: tuple[Turn, ...] = ()
     changed = 0
     for act in acts:
+        if _too_far(act):
+            raise _UnstagedError
         if act.act == "turn" and (act.side is None or len(way) > 1 or (_at_end(act) and start not in ENDS.values())):
             raise _UnstagedError
         if act.act == "lane" or (act.act == "keep" and (act.side or act.to)):
@@ -172,10 +185,12 @@ def _staged(acts: Sequence[Act], start: Start) -> CommandScene:
             _put(scene, reference, role, act, way)
         if act.act == "turn" and act.side is not None and not act.negated:
             way = (*way, act.side)
+        if act.act == "straight" and not act.negated:
+            way = (*way, "straight")
     return scene
 
 
-def _can_change(scene: CommandScene, act: Act, way: tuple[Side, ...], changed: int) -> bool:
+def _can_change(scene: CommandScene, act: Act, way: tuple[Turn, ...], changed: int) -> bool:
     """Whether there is the lane that an act names. A turn from a side street leads into the lane on its own side."""
     side = _lane_side(act)
     if act.to == "original":
@@ -210,7 +225,7 @@ def _roles(act: Act) -> list[tuple[Reference, str]]:
     return found
 
 
-def _put(scene: CommandScene, reference: Reference, role: str, act: Act, way: tuple[Side, ...]) -> None:
+def _put(scene: CommandScene, reference: Reference, role: str, act: Act, way: tuple[Turn, ...]) -> None:
     if reference in scene.referents or reference.kind in _NEEDS_NOTHING:
         return
     kind = _KINDS.get(reference.kind)
@@ -228,7 +243,7 @@ def _put(scene: CommandScene, reference: Reference, role: str, act: Act, way: tu
     _distract(scene, reference, actor, role)
 
 
-def _row(scene: CommandScene, reference: Reference, kind: StagedKind, role: str, way: tuple[Side, ...]) -> None:
+def _row(scene: CommandScene, reference: Reference, kind: StagedKind, role: str, way: tuple[Turn, ...]) -> None:
     """Several alike along the kerb, the one of the ordinal among them."""
     free = (
         not way and scene.has_kerb and not scene.actors and reference.state in (None, "parked", "stopped", "standing")
@@ -247,7 +262,7 @@ def _aside_m(kind: StagedKind) -> float:
 
 
 def _actor(
-    scene: CommandScene, reference: Reference, kind: StagedKind, role: str, act: Act, way: tuple[Side, ...]
+    scene: CommandScene, reference: Reference, kind: StagedKind, role: str, act: Act, way: tuple[Turn, ...]
 ) -> StagedActor:
     thing = kind in _UNMOVING
     if thing and (reference.colour is not None or role == "gone"):
@@ -272,8 +287,8 @@ def _actor(
         and not (reference.side or reference.where == "behind")
     ):
         turns: tuple[Turn, ...] = way or (("left",) if scene.start == LEFT_LANE else ("right",))
-        # Where it goes decides, not the road; one that is not to be passed stays on our own way.
-        if role == "pass":
+        # Where it goes decides, not the road; one that is not to be passed or followed goes straight on.
+        if act.negated:
             turns = ("straight",)
         return StagedActor(kind=kind, colour=colour, ahead_m=18.0, drives=True, turns=turns)
     if role == "moves" and not way and kind != "pedestrian":
@@ -299,7 +314,8 @@ def _actor(
         return _on_the_left(scene, reference, kind, colour, walks=walks)
     if not way and not scene.has_kerb:
         raise _UnstagedError
-    places = _KERB_PLACES_M if not way else tuple(at + _SECOND_TURN_M * (len(way) - 1) for at in _AFTER_TURN_M)
+    wide = _LEFT_TURN_M if way and way[-1] == "left" else 0.0
+    places = _KERB_PLACES_M if not way else tuple(at + wide + _SECOND_TURN_M * (len(way) - 1) for at in _AFTER_TURN_M)
     used = sum(one.left_m in (_KERB_M, -3.6, -2.4, -3.0) and bool(one.way) == bool(way) for one in scene.actors)
     if used >= len(places):
         raise _UnstagedError

@@ -84,9 +84,13 @@ def judge(
             continue
         drive = TracedDrive(trace, referents or {}, _numbers(asked[k:], settings or {}))
         result, end, why, planned = _became(drive, act, start, last=act is asked[-1])
+        if result == "opposite" and act.negated and _does_the_other(drive, act, asked[k + 1 :], start):
+            result, end, why = "done", start, ""
         found.append(JudgedAct(act, result, why, planned))
         missed = result in ("not_done", "opposite") and not act.negated
         start = max(start, end)
+        if act.act == "turn" and act.negated and _is_next(asked[k + 1 : k + 2]):
+            start = next((one.leaves for one in drive.passages if one.enters >= start), start)
     return tuple(found)
 
 
@@ -112,6 +116,17 @@ def _became(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
     return found
 
 
+def _is_next(acts: Sequence[Act]) -> bool:
+    """Whether what follows is to be done at the junction after the one that was spoken of: "not here, the next one"."""
+    return any(one.act == "turn" and one.place is not None and one.place.rel == "next" for one in acts)
+
+
+def _does_the_other(drive: TracedDrive, act: Act, later: Sequence[Act], start: int) -> bool:
+    """Whether what looks like a denied act is the one that is asked for instead: "not by that truck, ahead of it"."""
+    others = (one for one in later if one.act == act.act and not one.negated and act.act != "turn")
+    return any(_became(drive, one, start, last=False).result == "done" for one in others)
+
+
 def _kept_from(drive: TracedDrive, act: Act, start: int) -> Found:
     """Of what is not to be done: that the whole drive does not do it."""
     if act.act == "turn":
@@ -121,7 +136,10 @@ def _kept_from(drive: TracedDrive, act: Act, start: int) -> Found:
         return Found("done", start) if taken else Found("not_done", start, "the car came to no junction")
     if act.act in ("straight", "go", "wait", "keep"):
         return Found("not_judged", start, "no predicate knows this")
-    did = _became(drive, replace(act, negated=False), start, last=False)
+    since = start
+    if act.act == "follow" and not drive.road.uninterrupted:  # up to a junction nobody can go another way
+        since = next((one.leaves for one in drive.passages if one.enters >= start), len(drive.all) - 1)
+    did = _became(drive, replace(act, negated=False), since, last=False)
     if did.result == "done":
         return Found("opposite", did.end, "the car did it all the same")
     if did.result == "not_judged":

@@ -20,6 +20,8 @@ BEYOND_S: Final = 1.0
 """A turn is taken when the car is so long behind the junction: the way back is none, and the road may end."""
 _ALONG_M: Final = 40.0
 _GAP_M: Final = 45.0
+_BESIDE_M: Final = 12.0
+"""How far aside a road user may be that the car comes by: three lanes."""
 _U_TURN_RAD: Final = math.radians(150.0)
 
 # Ways -----------------------------------------------------------------------------------------------------------------
@@ -156,9 +158,9 @@ def overtake(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
         for number in users:
             if drive.is_behind(i, number):
                 on = _passed_on(drive, number, i)
-                if side in (None, on):
+                if on and side in (None, on):
                     return drive.settled(i)
-                wrong = f"it was passed on the {on}"
+                wrong = f"it was passed on the {on}" if on else "it went another way"
         return False
 
     if drive.road.uninterrupted:
@@ -175,11 +177,12 @@ def overtake(drive: TracedDrive, act: Act, start: int, *, last: bool) -> Found:
 
 
 def _passed_on(drive: TracedDrive, number: int, i: int) -> str:
-    """The side on which a road user that is behind now was passed; empty where the car never came by."""
+    """The side on which a road user that is behind now was passed; empty where the car never came by, or it was in
+    another street then."""
     for j in range(i, -1, -1):
         seen = drive.sees(j, number)
         if seen is not None and seen[0] >= 0.0:
-            return "left" if seen[1] < 0.0 else "right"
+            return "" if abs(seen[1]) > _BESIDE_M else "left" if seen[1] < 0.0 else "right"
     return ""
 
 

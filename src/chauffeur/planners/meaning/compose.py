@@ -203,6 +203,8 @@ class _Composer:
             yield f"yield from cross_the_junction({self._pace:g})"
         elif act.act == "go":
             yield "yield from halt(200)"
+        elif act.act == "pass" and act.target is not None and act.target.state not in ("parked", "stopped"):
+            yield from self._follow(replace(act, act="follow", negated=False))
         elif act.act in ("stop", "park", "pull_over", "lane", "pass", "speed", "follow", "u_turn"):
             yield f"yield from drive_on(200, {self._pace:g})"
         else:
@@ -328,6 +330,9 @@ class _Composer:
         nth = 1
         if reference is not None and reference.kind in ("junction", "road", "light", "driveway"):
             nth = max(1, reference.ordinal or 1)
+            passed_up = any(one.act == "turn" and one.negated for one in self._acts)
+            if nth == 1 and passed_up and act.place is not None and act.place.rel == "next":
+                nth = 2  # "not this right, the next one"
         elif reference is not None and reference.kind in _ROAD_USERS and act.place is not None:
             yield from self._past(act.place, reference, act)
         turns = self._situation.turns
