@@ -76,6 +76,14 @@ def linked_here(
     return found, tuple(leaning(family) for family in families)
 
 
+def drive_alike(some: Sequence[DialectStep], others: Sequence[DialectStep], wish: str, request: PlanRequest) -> bool:
+    """Whether two readings of a wish come to the same drive here: a lane change without a side, where there is one."""
+    if not some or not others:
+        return False
+    one, other = (linked_here(steps, wish, request)[0] for steps in (some, others))
+    return isinstance(one, Linked) and isinstance(other, Linked) and one.choice == other.choice
+
+
 def plan_of_steps(planner: Planner, read: ReadSteps, request: PlanRequest, begun: float, *, unsure: str = "") -> Plan:
     """The plan that drives the steps; or that declines, or asks.
 

@@ -20,7 +20,14 @@ from chauffeur.planners.meaning.highway import steps_before, steps_of
 from chauffeur.planners.meaning.planner import FOR_OTHERS, WHY_NOT, left_out, plan_by_sight, unused_words
 from chauffeur.planners.onboard.dialect import DialectStep, shall_i
 from chauffeur.planners.onboard.doubts import CAN_DO, ENGLISH_ONLY, foreign
-from chauffeur.planners.onboard.driven import ReadSteps, alarm_of, linked_here, past_the_lead, plan_of_linked
+from chauffeur.planners.onboard.driven import (
+    ReadSteps,
+    alarm_of,
+    drive_alike,
+    linked_here,
+    past_the_lead,
+    plan_of_linked,
+)
 from chauffeur.planners.onboard.engine import Engine, Written
 from chauffeur.planners.onboard.link import Linked
 from chauffeur.planners.onboard.options import Declined
@@ -227,7 +234,8 @@ class LanguageModelPlanner:
             )
         except ProgramError as error:
             return declined(self, "I did not understand that.", begun, intent="ask", raw=str(error))
-        found = compared(utterance, spoken, reply.steps, written.sure, refuses=bool(reply.refusal))
+        same = drive_alike(spoken.steps, reply.steps, wish, request)
+        found = compared(utterance, spoken, reply.steps, written.sure, same_here=same, refuses=bool(reply.refusal))
         if not found.steps:
             forbidden = (WHY_NOT[act.why] for act in utterance.acts if act.act == "refuse" and act.why in WHY_NOT)
             words = next(forbidden, "") or spoken.question or left_out(spoken.undoable)

@@ -45,7 +45,13 @@ class ReadWish:
 
 
 def compared(
-    utterance: Utterance, spoken: SpokenSteps, written: Sequence[DialectStep], sure: float, *, refuses: bool = False
+    utterance: Utterance,
+    spoken: SpokenSteps,
+    written: Sequence[DialectStep],
+    sure: float,
+    *,
+    same_here: bool = False,
+    refuses: bool = False,
 ) -> ReadWish:
     """What is to be driven.
 
@@ -54,8 +60,11 @@ def compared(
         spoken: The acts as steps.
         written: The network's steps; none where it asks or refuses.
         sure: Probability of its least sure choice.
+        same_here: Whether both come to the same drive on this road.
         refuses: Whether it refuses: then nothing is driven without a question.
     """
+    if same_here:
+        return ReadWish(spoken.steps, sure=not spoken.undoable, by_acts=True)
     if alike(spoken.steps, written):
         steps = tuple(other if _is_style(other) else one for one, other in zip(spoken.steps, written, strict=True))
         return ReadWish(steps, sure=not spoken.undoable, by_acts=True)
@@ -75,8 +84,8 @@ def compared(
 
 
 def alike(some: Sequence[DialectStep], others: Sequence[DialectStep]) -> bool:
-    """Whether two programs do the same; how much a "bit" is, how briskly, and whether haste is a pace or a style, are
-    no difference.
+    """Whether two programs do the same; how much a "bit" is, how briskly, whether haste is a pace or a style, and
+    whether a lane is to be clear first, which it is in any case, are no difference.
     """
     return (
         bool(some)
@@ -86,8 +95,7 @@ def alike(some: Sequence[DialectStep], others: Sequence[DialectStep]) -> bool:
 
 
 def _same_step(one: DialectStep, other: DialectStep) -> bool:
-    named = None if one.condition is None else (one.condition.how, one.condition.name)
-    tested = None if other.condition is None else (other.condition.how, other.condition.name)
+    named, tested = _waits_for(one), _waits_for(other)
     kinds = _kind(one) == _kind(other)
     same_numbers = len(one.numbers) == len(other.numbers) and all(map(_close, one.numbers, other.numbers))
     return kinds and SKILLS[one.skill].takes == SKILLS[other.skill].takes and named == tested and same_numbers
@@ -96,6 +104,14 @@ def _same_step(one: DialectStep, other: DialectStep) -> bool:
 def _kind(step: DialectStep) -> tuple[str, str]:
     meaning = step.meaning
     return (meaning.family, meaning.variant) if meaning.family not in _PACES else (_PACES[meaning.family], "")
+
+
+def _waits_for(step: DialectStep) -> tuple[str, str] | None:
+    """Its condition, but for that lane to be clear into which it changes."""
+    side = step.meaning.direction if step.meaning.manoeuvre in ("lane", "overtake") else None
+    if step.condition is None or (step.condition.how == "once" and step.condition.name == f"clear_{side}"):
+        return None
+    return step.condition.how, step.condition.name
 
 
 def _is_style(step: DialectStep) -> bool:
