@@ -111,7 +111,9 @@ def steps_of(acts: Sequence[Act], situation: Situation, before: Sequence[Dialect
         situation: Where we are: a number without a unit is in the unit of the signs.
         before: What was driven on an earlier trip, for "as last time".
     """
-    does = (act for act in acts if not act.purpose or act.act == "pass")  # "the left lane, to overtake": it is overtaken
+    does = (
+        act for act in acts if not act.purpose or act.act == "pass"
+    )  # "the left lane, to overtake": it is overtaken
     wanted = [act for act in does if act.act not in ("none", "yes", "no", "cancel")]
     return _Speaker(wanted, situation, before).spoken()
 
