@@ -171,6 +171,7 @@ def test_a_story_asks_for_nothing() -> None:
 
 def test_emergency_words_are_marked_by_their_own_reader() -> None:
     assert read("stop! there's a child").emergency
+    assert not read("Don't stop behind the bus, change to the left lane.").emergency
 
 
 @given(st.text(max_size=MOST_CHARS + 50))

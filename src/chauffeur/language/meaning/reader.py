@@ -84,7 +84,7 @@ def read(text: str, last: Utterance | None = None, parser: Parser | None = None)
 def _read_after(text: str, last: Utterance | None, parser: Parser | None = None) -> tuple[Utterance, Utterance]:
     """What words mean by themselves, and after the turn before."""
     if turns := closed_turn(text):
-        alone = Utterance(text, turns, emergency=read_emergency(text) is not None)
+        alone = Utterance(text, turns, emergency=_stops(text))
         found = resolved(alone, last)
         if not any(act.value is not None for act in turns) or all(act.act != "unclear" for act in found.acts):
             return alone, found  # else it is a number of nothing that was said before
@@ -95,7 +95,7 @@ def _read_after(text: str, last: Utterance | None, parser: Parser | None = None)
 @lru_cache(maxsize=16)  # planner, checks and session ask for the words of one wish each
 def _parsed(text: str, parser: Parser | None = None) -> Utterance:
     """What the parser makes of words by themselves."""
-    emergency = read_emergency(text) is not None
+    emergency = _stops(text)
     reads = shipped_parser() if parser is None else parser
     acts: list[Act] = []
     opinion: list[Act] = []
@@ -120,6 +120,12 @@ def _parsed(text: str, parser: Parser | None = None) -> Utterance:
         sure,
         tuple(_unused(text, (act.span for act in acts if act.span is not None))),
     )
+
+
+def _stops(text: str) -> bool:
+    """Whether words call for help or for a stop; "don't stop" calls for none."""
+    found = read_emergency(text)
+    return found is not None and found.kind != "no_stop"
 
 
 def _stretches(text: str) -> list[tuple[int, int, int]]:

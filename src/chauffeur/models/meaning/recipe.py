@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -143,6 +143,36 @@ def fit(
     held["symbols"] = list(SYMBOLS)
     (folder / CONFIG).write_text(json.dumps(held, indent=1))
     return network
+
+
+def mean_of(stages: Mapping[Path, float], out: Path) -> None:
+    """Write the mean of the weights of several stages of one training, which reads better than its last one alone.
+
+    Args:
+        stages: Folders that `fit` wrote, one trained on from the other, and the share of each.
+        out: Where the mean is written, in the form of `fit`.
+
+    Raises:
+        DataError: The shares do not add up to 1, or the networks have other parameters.
+    """
+    held = [torch.load(folder / WEIGHTS, weights_only=True) for folder in stages]
+    shares = list(stages.values())
+    shapes = [{name: value.shape for name, value in one.items()} for one in held]
+    if not math.isclose(sum(shares), 1.0) or any(one != shapes[0] for one in shapes):
+        raise DataError("A mean of weights is of networks with the same parameters, by shares that add up to 1.")
+    mean = {
+        name: torch.stack([share * one[name].float() for share, one in zip(shares, held, strict=True)])
+        .sum(0)
+        .to(value.dtype)
+        if value.is_floating_point()
+        else value
+        for name, value in held[-1].items()
+    }
+    last = list(stages)[-1]
+    about = json.loads((last / CONFIG).read_text()) | {"mean_of": [[folder.name, one] for folder, one in stages.items()]}
+    out.mkdir(parents=True, exist_ok=True)
+    torch.save(mean, out / WEIGHTS)
+    (out / CONFIG).write_text(json.dumps(about, indent=1))
 
 
 def go_on_from(network: MeaningParser, folder: Path) -> None:
